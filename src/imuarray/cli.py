@@ -1,0 +1,226 @@
+"""The console script `imuarray`; nothing heavy loads before a command is known to be sound."""
+
+import argparse
+import os
+import sys
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NoReturn
+
+import imuarray
+from imuarray.errors import InputError
+
+OK, BAD_INPUT, INTERRUPTED = 0, 2, 130
+
+CALIBRATION_METHODS = ("bcd",)
+SAMPLING_METHODS = ("pmmh",)
+
+
+class _Parser(argparse.ArgumentParser):
+    """Reports a wrong command line as one line, like every other wrong input."""
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{message} (see '{self.prog} --help')")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; returns the exit status: 0, 2 for bad input, 130 when interrupted.
+
+    `argv` are the arguments without the program's name, by default the process's own.
+    """
+    try:
+        with _warnings_in_one_line():
+            arguments = _parser().parse_args(argv)
+            _check_output(arguments)
+            arguments.run(arguments)
+    except InputError as error:
+        return _fail(str(error))
+    except OSError as error:
+        return _fail(_describe(error))
+    except KeyboardInterrupt:
+        print("imuarray: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    return OK
+
+
+def _fail(message: str) -> int:
+    print(f"imuarray: {' '.join(message.split())}", file=sys.stderr)
+    return BAD_INPUT
+
+
+def _describe(error: OSError) -> str:
+    """The system's error without its number."""
+    if error.strerror and error.filename is not None:
+        return f"{error.filename}: {error.strerror}"
+    return error.strerror or str(error)
+
+
+@contextmanager
+def _warnings_in_one_line() -> Iterator[None]:
+    """A warning is for the user of the command, who did not write the line it comes from."""
+
+    def one_line(message: Warning | str, *_where: object, **__: object) -> str:
+        return f"imuarray: warning: {' '.join(str(message).split())}\n"
+
+    before = warnings.formatwarning
+    warnings.formatwarning = one_line
+    try:
+        yield
+    finally:
+        warnings.formatwarning = before
+
+
+def _check_output(arguments: argparse.Namespace) -> None:
+    """Refuse an output that cannot be written now, not after an hour of sampling."""
+    out: Path = arguments.out
+    if out.is_dir():
+        raise InputError(f"--out {out}: expected a file to write, found a folder")
+    if not out.parent.is_dir():
+        raise InputError(f"--out {out}: expected an existing folder, found no {out.parent}")
+    if not os.access(out.parent, os.W_OK | os.X_OK):
+        raise InputError(f"--out {out}: expected a folder one may write to, found {out.parent}")
+    source: Path = arguments.config if arguments.command == "simulate" else arguments.recording
+    if not source.is_file():
+        raise InputError(f"{source}: expected a file to read, found none")
+    if out.exists() and out.samefile(source):
+        raise InputError(f"--out {out}: expected another file than the input, found the same")
+
+
+def _simulate(arguments: argparse.Namespace) -> None:
+    from imuarray.commands import simulate
+
+    simulate(arguments)
+
+
+def _calibrate(arguments: argparse.Namespace) -> None:
+    from imuarray.commands import calibrate
+
+    calibrate(arguments)
+
+
+def _sample(arguments: argparse.Namespace) -> None:
+    from imuarray.commands import sample
+
+    sample(arguments)
+
+
+def _effects(text: str) -> tuple[str, ...]:
+    """Comma-separated names; whether they exist is for the measurement model to say."""
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    if len(set(names)) != len(names):
+        raise argparse.ArgumentTypeError(f"expected each effect once, found {text!r}")
+    return names
+
+
+def _at_least(least: int, text: str) -> int:
+    try:
+        value = int(text)
+    except ValueError:
+        value = None
+    if value is None or value < least:
+        raise argparse.ArgumentTypeError(f"expected an integer of at least {least}, found {text!r}")
+    return value
+
+
+def _count(text: str) -> int:
+    return _at_least(1, text)
+
+
+def _seed(text: str) -> int:
+    return _at_least(0, text)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="imuarray", description="Calibrate the geometry of inertial sensor arrays."
+    )
+    parser.add_argument("--version", action="version", version=f"imuarray {imuarray.__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="command", required=True)
+    _add_simulate(commands)
+    _add_calibrate(commands)
+    _add_sample(commands)
+    return parser
+
+
+def _add_command(commands, name, run, summary, example, out) -> argparse.ArgumentParser:
+    """One subcommand, with what all of them have."""
+    parser = commands.add_parser(
+        name, help=summary, description=summary, epilog=f"example: imuarray {name} {example}"
+    )
+    parser.add_argument("--out", required=True, type=Path, metavar="FILE", help=out)
+    parser.add_argument("--quiet", action="store_true", help="no progress, no summary")
+    parser.set_defaults(run=run)
+    return parser
+
+
+def _add_recording(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("recording", type=Path, help="NetCDF-4 recording to read")
+    parser.add_argument(
+        "--effects",
+        type=_effects,
+        default=(),
+        metavar="A,B",
+        help="effects that extend the measurement model, separated by commas (default: none)",
+    )
+
+
+def _add_simulate(commands) -> None:
+    parser = _add_command(
+        commands,
+        "simulate",
+        _simulate,
+        "Simulate a recording; its truth is stored in the group 'truth'.",
+        "--config config.yaml --out rec.nc",
+        "recording to write (NetCDF-4)",
+    )
+    parser.add_argument(
+        "--config", required=True, type=Path, metavar="FILE", help="configuration (YAML)"
+    )
+
+
+def _add_calibrate(commands) -> None:
+    parser = _add_command(
+        commands,
+        "calibrate",
+        _calibrate,
+        "Estimate the accelerometer positions and the motion by maximum likelihood.",
+        "rec.nc --method bcd --out cal.nc",
+        "estimates to write (NetCDF-4)",
+    )
+    _add_recording(parser)
+    parser.add_argument(
+        "--method",
+        choices=CALIBRATION_METHODS,
+        default="bcd",
+        help="bcd: block coordinate descent (default)",
+    )
+
+
+def _add_sample(commands) -> None:
+    parser = _add_command(
+        commands,
+        "sample",
+        _sample,
+        "Sample the posterior distribution of the accelerometer positions.",
+        "rec.nc --method pmmh --steps 5000 --seed 1 --out posterior.nc",
+        "posterior to write (NetCDF-4)",
+    )
+    _add_recording(parser)
+    parser.add_argument(
+        "--method",
+        choices=SAMPLING_METHODS,
+        default="pmmh",
+        help="pmmh: pseudo-marginal Metropolis-Hastings (default)",
+    )
+    parser.add_argument(
+        "--steps", type=_count, default=None, metavar="N", help="steps of each chain"
+    )
+    parser.add_argument(
+        "--seed", type=_seed, default=0, metavar="S", help="of the random numbers (default: 0)"
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,223 @@
+"""ML-BCD: positions and motion by block coordinate descent (2017, Algorithm 1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba as nb
+import numpy as np
+
+from imuarray.errors import IdentifiabilityError, InputError
+from imuarray.estimation import kernels
+from imuarray.estimation.collapsed import Collapsed, tables
+from imuarray.estimation.motion_ml import MotionEstimate, motion_from
+from imuarray.geometry.array import require_planar_extent
+from imuarray.model import ArrayModel
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Estimated positions with how the iteration went.
+
+    ``positions`` (A, 3) m relative to the reference triad; ``cost`` and ``step`` per
+    iteration: twice the negative log likelihood before, and the largest position change
+    (m) in, that iteration; ``snapshots`` (S, A, 3) after the iterations asked for.
+    """
+
+    positions: np.ndarray
+    motion: MotionEstimate
+    cost: np.ndarray
+    step: np.ndarray
+    converged: bool
+    snapshots: np.ndarray
+    position_covariance: np.ndarray | None = None
+    effect_parameters: np.ndarray | None = None
+
+
+@nb.njit(cache=True, nogil=True, fastmath=kernels.FAST)
+def _position_block(force, state, rows, values, A, positions):
+    """Line 10-13 of Algorithm 1: least squares for r_2 ... r_K; returns the largest step.
+
+    Returns -1 where sum_n A_n' A_n is singular (a common axis of rotation).
+    """
+    accelerometers, _, samples = force.shape
+    A[:] = 0.0
+    for e in range(len(values)):
+        i, c, a = rows[e]
+        for t in range(samples):
+            A[i, c, t] += values[e] * state[a, t]
+    N = np.zeros((3, 3))
+    for i in range(3):
+        for j in range(3):
+            total = 0.0
+            for c in range(3):
+                for t in range(samples):
+                    total += A[i + 1, c, t] * A[j + 1, c, t]
+            N[i, j] = total
+    inverse = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            p, q = (i + 1) % 3, (i + 2) % 3
+            u, v = (j + 1) % 3, (j + 2) % 3
+            inverse[i, j] = N[p, u] * N[q, v] - N[p, v] * N[q, u]
+    determinant = N[0, 0] * inverse[0, 0] + N[0, 1] * inverse[0, 1] + N[0, 2] * inverse[0, 2]
+    if not determinant > 1e-12 * (N[0, 0] + N[1, 1] + N[2, 2]) ** 3:
+        return -1.0
+    inverse /= determinant
+    largest = 0.0
+    rhs = np.empty(3)
+    for k in range(1, accelerometers):
+        for i in range(3):
+            total = 0.0
+            for c in range(3):
+                for t in range(samples):
+                    total += A[i + 1, c, t] * (force[k, c, t] - A[0, c, t])
+            rhs[i] = total
+        for i in range(3):
+            new = inverse[i, 0] * rhs[0] + inverse[i, 1] * rhs[1] + inverse[i, 2] * rhs[2]
+            largest = max(largest, abs(new - positions[k, i]))
+            positions[k, i] = new
+    return largest
+
+
+@nb.njit(cache=True, nogil=True)
+def descend(
+    force, energy, moments, mean, P, weights, rows, values, pairs, products, positions,
+    tolerance, cost_tolerance, limit, marks, snapshots, cost_trace, step_trace,
+):  # fmt: skip
+    """Algorithm 1 on one realisation; ``positions`` is start and result.
+
+    Returns (iterations, status): status 1 converged, 0 stopped at the limit, -1 sum A'A
+    singular, -2 H' Lambda H singular.
+    """
+    samples = energy.size
+    weighted = np.empty_like(force)
+    for k in range(len(force)):
+        weighted[k] = weights[k] * force[k]
+    K, C, X = np.empty((12, 12)), np.empty((6, 6)), np.empty((6, 6))
+    inverse = np.empty((6, 6))
+    full, b, phi = np.empty((12, samples)), np.empty((6, samples)), np.empty((6, samples))
+    const, cost = np.empty(samples), np.empty(samples)
+    A, state = np.empty((4, 3, samples)), np.empty((12, samples))
+    counts = np.empty(samples, np.int64)
+    rate = mean.copy()
+    mark = 0
+    for iteration in range(limit):
+        kernels.information(positions, weights, pairs, products, K)
+        if np.isnan(kernels.eliminate(K, C, X, inverse)):
+            return iteration, -2
+        kernels.weighted_moments(positions, weighted, moments)
+        kernels.project(moments, rows, values, full)
+        kernels.reduce_linear(full, X, inverse, b, phi, const, energy)
+        kernels.angular_rates(rate, C, b, mean, P, 1e-10, 50, cost, counts)
+        kernels.linear_motion(rate, X, phi, state)
+        step = _position_block(force, state, rows, values, A, positions)
+        if step < 0.0:
+            return iteration, -1
+        cost_trace[iteration] = cost.sum() + const.sum()
+        step_trace[iteration] = step
+        while mark < len(marks) and marks[mark] == iteration + 1:
+            snapshots[mark] = positions
+            mark += 1
+        fallen = cost_trace[max(iteration - 1, 0)] - cost_trace[iteration]
+        settled = iteration > 0 and fallen <= cost_tolerance * abs(cost_trace[iteration])
+        if step <= tolerance or settled:
+            for later in range(mark, len(marks)):
+                snapshots[later] = positions
+            return iteration + 1, 1
+    for later in range(mark, len(marks)):
+        snapshots[later] = positions
+    return limit, 0
+
+
+def require_samples(samples: int) -> None:
+    """Raise IdentifiabilityError for fewer than two samples (2017, section II)."""
+    if samples < 2:
+        raise IdentifiabilityError(f"samples: expected at least 2, found {samples}")
+
+
+def explain(status: int) -> None:
+    """Raise the IdentifiabilityError a kernel's negative status stands for."""
+    if status == -1:
+        raise IdentifiabilityError(
+            "motion: expected rotation about more than one axis (or angular acceleration off the"
+            " axis), found angular rate and angular acceleration parallel to one axis throughout"
+            " (Lemma 1 of paper 2017)"
+        )
+    if status == -2:
+        raise IdentifiabilityError("positions: expected at least 3 triads that span a plane")
+
+
+def calibrate_bcd(
+    model: ArrayModel,
+    specific_force,
+    angular_rate,
+    start=None,
+    saturated=None,
+    tolerance: float = 1e-10,
+    cost_tolerance: float = 0.0,
+    limit: int = 5000,
+    marks=(),
+) -> Calibration:
+    """Positions by ML-BCD for the papers' model with isotropic triads.
+
+    Parameters
+    ----------
+    start : (A, 3) m or None for the nominal positions
+    tolerance : float, m
+        Stop when no position moved by more in one iteration.
+    cost_tolerance : float
+        ... or when the cost fell by less than this, relatively.
+    limit : int
+        Largest number of iterations; ``converged`` tells whether it was hit.
+    marks : sequence of int
+        Iterations after which positions are kept in ``snapshots``.
+
+    Raises
+    ------
+    IdentifiabilityError
+        Fewer than 2 samples, fewer than 3 or collinear triads, or omega and omega_dot
+        along one axis throughout (Lemma 1).
+    """
+    require_samples(len(specific_force))
+    positions = model.array.relative if start is None else np.array(start, float)
+    positions = np.ascontiguousarray(positions - positions[0])
+    require_planar_extent(positions, "positions")
+    data = Collapsed.of(model, specific_force, angular_rate, saturated)
+    if data.weights is None:
+        raise InputError("bcd: expected isotropic noise per triad; use --method gauss-newton")
+    require_rotation(data, positions)
+    cost, step = np.empty(limit), np.empty(limit)
+    marks = np.asarray(sorted(marks), np.int64)
+    snapshots = np.empty((len(marks), *positions.shape))
+    done, status = descend(
+        data.specific_force, data.energy, data.moments.copy(), data.mean,
+        data.gyroscope_information, data.weights, *tables(),
+        positions, tolerance, cost_tolerance, limit, marks, snapshots, cost, step,
+    )  # fmt: skip
+    explain(status)
+    motion = motion_from(data, positions)
+    return Calibration(positions, motion, cost[:done], step[:done], status == 1, snapshots)
+
+
+def require_rotation(data: Collapsed, positions) -> None:
+    """Raise IdentifiabilityError where omega and omega_dot stay on one axis throughout.
+
+    Every A_n = Omega(omega)^2 + Omega(omega_dot) is then blind along that axis (Lemma 1).
+    Noise and the start's wrong positions would hide this from a plain rank test, so the
+    motion off the common axis is compared with what they can feign: 5 sigma of noise, and
+    a tenth of the centrifugal and Euler terms (positions wrong by a tenth of the array).
+    """
+    axis = np.linalg.svd(data.mean.T, full_matrices=False)
+    spread = axis[1] / np.sqrt(data.samples)
+    informed = data.gyroscope_information[[0, 1, 2], [0, 1, 2]]
+    noise = np.sqrt(1.0 / max(np.median(informed), 1e-300))
+    if spread[1] > max(1e-3 * spread[0], 5 * noise):
+        return
+    acceleration = motion_from(data, positions).motion.angular_acceleration
+    along = acceleration @ axis[2][0]
+    across = np.sqrt(np.mean(np.sum(acceleration**2, axis=1) - along**2))
+    inverse = data.reduce(positions)[-1]
+    feigned = 0.1 * np.hypot(np.sqrt(np.mean(along**2)), np.mean(data.mean**2) * 3)
+    if across <= max(feigned, 5 * np.sqrt(2 * np.max(np.diag(inverse)[:3]))):
+        explain(-1)

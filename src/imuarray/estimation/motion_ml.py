@@ -1,0 +1,77 @@
+"""Motion by maximum likelihood given the positions, sample by sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from imuarray.errors import IdentifiabilityError
+from imuarray.estimation import kernels
+from imuarray.estimation.collapsed import Collapsed
+from imuarray.geometry.array import require_planar_extent
+from imuarray.model import ArrayModel
+from imuarray.motion import Motion
+
+
+@dataclass(frozen=True)
+class MotionEstimate:
+    """Motion per sample with its convergence.
+
+    ``motion`` fields (T, 3); ``cost`` (T,) twice the negative log likelihood up to a
+    constant; ``iterations`` (T,) Gauss-Newton steps; ``converged`` (T,) bool.
+    """
+
+    motion: Motion
+    cost: np.ndarray
+    iterations: np.ndarray
+    converged: np.ndarray
+
+
+def estimate_motion(
+    model: ArrayModel,
+    specific_force,
+    angular_rate,
+    positions=None,
+    saturated=None,
+    tolerance: float = 1e-10,
+    limit: int = 50,
+) -> MotionEstimate:
+    """Concentrated Gauss-Newton of Skog et al. (2017, eq. 5): phi is eliminated exactly.
+
+    Parameters
+    ----------
+    specific_force : (T, A, 3) m/s^2
+    angular_rate : (T, G, 3) rad/s
+    positions : (A, 3) m or None for the nominal ones (relative to the reference triad)
+    saturated : (T, G, 3) bool or None
+        Gyroscope axes at the rail; they are left out, and their reading only starts the
+        iteration (which fixes the sign when every gyroscope is lost).
+
+    Raises
+    ------
+    IdentifiabilityError
+        For fewer than three or collinear triads.
+    """
+    positions = model.array.relative if positions is None else np.asarray(positions, float)
+    require_planar_extent(positions, "positions")
+    data = Collapsed.of(model, specific_force, angular_rate, saturated)
+    return motion_from(data, positions, tolerance, limit)
+
+
+def motion_from(data: Collapsed, positions, tolerance=1e-10, limit=50) -> MotionEstimate:
+    """`estimate_motion` for data already arranged."""
+    C, b, X, phi, const, logdet, _ = data.reduce(positions)
+    if np.isnan(logdet):
+        raise IdentifiabilityError(
+            "positions: expected triads from which omega_dot and s follow, found H'QH singular"
+        )
+    rate = data.mean.copy()
+    cost, iterations = np.empty(data.samples), np.empty(data.samples, np.int64)
+    kernels.angular_rates(
+        rate, C, b, data.mean, data.gyroscope_information, tolerance, limit, cost, iterations
+    )
+    state = np.empty((12, data.samples))
+    kernels.linear_motion(rate, X, phi, state)
+    motion = Motion.of(rate.T, state[6:9].T, (state[9:12] + data.offset).T)
+    return MotionEstimate(motion, cost + const, np.abs(iterations), iterations > 0)

@@ -1,0 +1,13 @@
+"""Where the triads sit on the board."""
+
+from imuarray.geometry.array import Array, array_from_config, array_from_csv
+from imuarray.geometry.mimu4444 import UNDERSIDE_ROTATION, mimu4444, mimu4444_corners
+
+__all__ = [
+    "UNDERSIDE_ROTATION",
+    "Array",
+    "array_from_config",
+    "array_from_csv",
+    "mimu4444",
+    "mimu4444_corners",
+]

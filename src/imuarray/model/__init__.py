@@ -1,0 +1,16 @@
+"""The measurement model, written once: forward functions, effects, noise."""
+
+from imuarray.model.array_model import ArrayModel, Prediction
+from imuarray.model.effects import EFFECTS, Effect, effect
+from imuarray.model.noise import Noise
+from imuarray.model.structure import structure_tensor
+
+__all__ = [
+    "EFFECTS",
+    "ArrayModel",
+    "Effect",
+    "Noise",
+    "Prediction",
+    "effect",
+    "structure_tensor",
+]

@@ -1,0 +1,128 @@
+"""The array's measurement model: geometry, noise and a list of effects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+
+from imuarray.errors import InputError
+from imuarray.geometry import Array
+from imuarray.model import kinematics
+from imuarray.model.effects import Effect, Instant, Prediction, find_effects
+from imuarray.model.jax64 import jax, jnp
+from imuarray.model.noise import Noise
+from imuarray.motion.state import Motion
+
+
+@dataclass(frozen=True)
+class ArrayModel:
+    """y = predict(motion, positions, effect parameters) + noise (paper 2021, eq. 4 and 5).
+
+    Attributes
+    ----------
+    array : Array
+    noise : Noise
+    effects : tuple of str
+        Ids from `imuarray.model.EFFECTS`, applied in this order; empty is the papers' model.
+    """
+
+    array: Array
+    noise: Noise
+    effects: tuple[str, ...] = ()
+
+    @classmethod
+    def isotropic(cls, array, accelerometer_sd, gyroscope_sd, effects=()) -> ArrayModel:
+        """The papers' noise: one sd (m/s^2, rad/s) for all triads of a kind."""
+        noise = Noise.of(
+            array.accelerometers, array.gyroscopes, accelerometer_sd, gyroscope_sd
+        )
+        return cls(array, noise, tuple(effects))
+
+    @cached_property
+    def chain(self) -> tuple[Effect, ...]:
+        """The effects themselves; InputError for an unknown id."""
+        return find_effects(self.effects)
+
+    @cached_property
+    def shapes(self) -> tuple[tuple[int, ...], ...]:
+        """Shape of each effect's parameters on this array."""
+        counts = self.array.accelerometers, self.array.gyroscopes
+        return tuple(item.shape(*counts) for item in self.chain)
+
+    @property
+    def effect_size(self) -> int:
+        """Number of effect parameters in all."""
+        return int(sum(np.prod(shape) for shape in self.shapes))
+
+    @cached_property
+    def effect_prior_sd(self) -> np.ndarray:
+        """Prior sd of every effect parameter, (P,), in the effects' units."""
+        parts = [np.full(int(np.prod(s)), e.prior_sd) for e, s in zip(self.chain, self.shapes)]
+        return np.concatenate([np.empty(0), *parts])
+
+    @property
+    def needs_derivatives(self) -> bool:
+        """Whether an effect looks at omega double dot and s dot."""
+        return any(item.derivatives for item in self.chain)
+
+    def split(self, parameters) -> dict[str, object]:
+        """The flat effect parameters (P,) as a dict id -> array of the effect's shape."""
+        out, start = {}, 0
+        for item, shape in zip(self.chain, self.shapes):
+            size = int(np.prod(shape))
+            out[item.id] = parameters[start : start + size].reshape(shape)
+            start += size
+        return out
+
+    def join(self, values: dict) -> np.ndarray:
+        """Flat effect parameters from a dict; absent ones are zero, scalars are spread."""
+        unknown = set(values) - set(self.effects)
+        if unknown:
+            raise InputError(f"effects: expected values for {self.effects}, found {sorted(unknown)}")
+        parts = [
+            np.broadcast_to(np.asarray(values.get(item.id, 0.0), float), shape).ravel()
+            for item, shape in zip(self.chain, self.shapes)
+        ]
+        return np.concatenate([np.empty(0), *parts])
+
+    def predict(self, motion: Motion, positions, parameters=()) -> Prediction:
+        """Noise-free measurement at one instant (traceable by JAX).
+
+        ``motion`` fields (3,), ``positions`` (A, 3) metres relative to the reference
+        triad, ``parameters`` (P,) flat effect parameters.
+        """
+        rate = jnp.broadcast_to(motion.angular_rate, (self.array.gyroscopes, 3))
+        predicted = Prediction(kinematics.specific_force(motion, positions), rate)
+        instant = Instant(motion, positions)
+        values = self.split(jnp.asarray(parameters)) if self.effects else {}
+        for item in self.chain:
+            predicted = item.apply(values[item.id], instant, predicted)
+        return predicted
+
+    def predict_many(self, motion: Motion, positions, parameters=()) -> Prediction:
+        """`predict` over leading sample axes, compiled; returns numpy arrays (..., n, 3).
+
+        ``positions`` is (A, 3), or (realisations, A, 3) with motion (realisations, T, 3).
+        """
+        fields = Motion(*(jnp.asarray(field) for field in motion))
+        positions = jnp.asarray(positions)
+        parameters = jnp.asarray(np.asarray(parameters, float))
+        out = _predict_many(self, fields, positions, parameters)
+        return Prediction(*(np.asarray(part) for part in out))
+
+    def __hash__(self):
+        return hash((self.array.name, self.array.accelerometers, self.array.gyroscopes, self.effects))
+
+    def __eq__(self, other):
+        """Equal where `predict` is the same function, which is what compilation keys on."""
+        return isinstance(other, ArrayModel) and hash(self) == hash(other)
+
+
+@partial(jax.jit, static_argnums=0)
+def _predict_many(model, motion, positions, parameters):
+    single = jax.vmap(model.predict, in_axes=(0, None, None))
+    if positions.ndim == 3:
+        return jax.vmap(single, in_axes=(0, 0, None))(motion, positions, parameters)
+    return single(motion, positions, parameters)

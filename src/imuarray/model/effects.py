@@ -1,0 +1,95 @@
+"""Effects: what real triads add to the papers' model, each a small forward function.
+
+An effect names its parameters' shape, unit and prior scale, and turns a predicted
+measurement into another one. Nothing else is needed: simulation, both estimators and
+the likelihood call `ArrayModel.predict`, and derivatives come from autodiff. To add
+one, write a function here with the `effect` decorator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from imuarray.errors import InputError
+from imuarray.model import kinematics
+from imuarray.model.jax64 import jnp
+from imuarray.motion.state import Motion
+
+
+class Prediction(NamedTuple):
+    """Noise-free measurement of the whole array at one instant."""
+
+    specific_force: object  # (A, 3) m/s^2
+    angular_rate: object  # (G, 3) rad/s
+
+
+class Instant(NamedTuple):
+    """The truth an effect may look at: the motion and where the triads are."""
+
+    motion: Motion
+    positions: object  # (A, 3) m
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A named extension of the measurement model.
+
+    Attributes
+    ----------
+    shape : callable (A, G) -> tuple
+        Shape of its parameters for A accelerometer and G gyroscope triads.
+    prior_sd : float
+        Prior standard deviation of each parameter around zero, in ``unit``.
+    derivatives : bool
+        Whether it needs omega double dot and s dot (12-column H instead of 6).
+    """
+
+    id: str
+    unit: str
+    prior_sd: float
+    shape: Callable[[int, int], tuple[int, ...]]
+    derivatives: bool
+    apply: Callable[[object, Instant, Prediction], Prediction]
+
+
+EFFECTS: dict[str, Effect] = {}
+
+
+def effect(id, *, unit, prior_sd, shape, derivatives=False):
+    """Register the decorated function as the effect ``id`` of the catalogue."""
+
+    def register(function):
+        EFFECTS[id] = Effect(id, unit, prior_sd, shape, derivatives, function)
+        return function
+
+    return register
+
+
+def find_effects(ids) -> tuple[Effect, ...]:
+    """Effects by id; InputError names the unknown one and what is known."""
+    for name in ids:
+        if name not in EFFECTS:
+            raise InputError(f"effects: expected any of {', '.join(sorted(EFFECTS))}, found {name}")
+    return tuple(EFFECTS[name] for name in ids)
+
+
+@effect("gyroscope_scale", unit="1", prior_sd=0.02, shape=lambda a, g: (g, 3))
+def gyroscope_scale(scale, instant, predicted):
+    """(1 + c_i) omega_i at each gyroscope axis."""
+    return predicted._replace(angular_rate=(1.0 + scale) * predicted.angular_rate)
+
+
+@effect(
+    "sensor_delay", unit="s", prior_sd=1e-3, shape=lambda a, g: (max(a, g) - 1,), derivatives=True
+)
+def sensor_delay(delay, instant, predicted):
+    """Both triads of IMU k sampled tau_k late (to first order); IMU 1 keeps the time."""
+    delay = jnp.concatenate([jnp.zeros(1), delay])[:, None]
+    force_rate = kinematics.force_rate(instant.motion, instant.positions)
+    accelerometers, gyroscopes = len(predicted.specific_force), len(predicted.angular_rate)
+    return Prediction(
+        predicted.specific_force + delay[:accelerometers] * force_rate,
+        predicted.angular_rate + delay[:gyroscopes] * instant.motion.angular_acceleration,
+    )

@@ -1,0 +1,115 @@
+"""Measurement noise: Gaussian, white in time, any covariance across the array."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from imuarray.errors import InputError
+
+
+def _covariance(blocks, count, what) -> np.ndarray:
+    """(3n, 3n) covariance from a scalar sd, (n,) sds, (n, 3, 3) blocks or the full form."""
+    given = np.asarray(blocks, float)
+    size = 3 * count
+    if given.ndim == 0 or given.shape == (count,):
+        full = np.diag(np.repeat(np.broadcast_to(given, count) ** 2, 3))
+    elif given.shape == (count, 3, 3):
+        full = np.zeros((size, size))
+        for k, block in enumerate(given):
+            full[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = block
+    elif given.shape == (size, size):
+        full = given
+    else:
+        raise InputError(
+            f"{what} noise: expected a standard deviation, {count} of them, {count} 3 x 3"
+            f" covariances or one {size} x {size} covariance, found shape {given.shape}"
+        )
+    if not np.allclose(full, full.T, rtol=1e-10, atol=0) or np.linalg.eigvalsh(full)[0] <= 0:
+        raise InputError(f"{what} noise: expected a symmetric positive definite covariance")
+    return full
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Covariances of the stacked accelerometers (3A, 3A) and gyroscopes (3G, 3G).
+
+    Off-diagonal blocks are cross-talk between triads; the two kinds of sensor are
+    uncorrelated (paper 2021, section II-B).
+    """
+
+    accelerometer: np.ndarray
+    gyroscope: np.ndarray
+
+    @classmethod
+    def of(cls, accelerometers, gyroscopes, accelerometer, gyroscope) -> Noise:
+        """Noise for A and G triads from sds (m/s^2, rad/s), per-triad or full covariances."""
+        return cls(
+            _covariance(accelerometer, accelerometers, "accelerometer"),
+            _covariance(gyroscope, gyroscopes, "gyroscope"),
+        )
+
+    @cached_property
+    def accelerometer_precision(self) -> np.ndarray:
+        """Lambda, (3A, 3A)."""
+        return np.linalg.inv(self.accelerometer)
+
+    @cached_property
+    def triad_weights(self) -> np.ndarray | None:
+        """(A,) values 1 / sigma_k^2 when each triad's noise is isotropic, else None."""
+        variances = np.diag(self.accelerometer).reshape(-1, 3)
+        scalar = np.diag(np.repeat(variances[:, 0], 3))
+        return 1.0 / variances[:, 0] if np.array_equal(scalar, self.accelerometer) else None
+
+    def draw(self, rng, shape) -> tuple[np.ndarray, np.ndarray]:
+        """Noise for ``shape`` samples: (*shape, A, 3) m/s^2 and (*shape, G, 3) rad/s."""
+
+        def one(covariance):
+            white = rng.standard_normal((*shape, len(covariance)))
+            diagonal = np.diag(covariance)
+            if np.array_equal(np.diag(diagonal), covariance):
+                white *= np.sqrt(diagonal)
+            else:
+                white = white @ np.linalg.cholesky(covariance).T
+            return white.reshape(*shape, -1, 3)
+
+        return one(self.accelerometer), one(self.gyroscope)
+
+    def angular_rate_given_gyroscopes(self, angular_rate, saturated=None):
+        """The Gaussian p(omega_t | y_g) under a flat prior (paper 2021, eq. 15).
+
+        Parameters
+        ----------
+        angular_rate : (T, G, 3) rad/s
+        saturated : (T, G, 3) bool or None
+            Axes to leave out.
+
+        Returns
+        -------
+        mean (T, 3) rad/s, information (T, 3, 3) s^2/rad^2. Where no gyroscope sees an
+        axis the information is singular and the mean holds the plain average there.
+        """
+        samples, count, _ = angular_rate.shape
+        stack = np.tile(np.eye(3), (count, 1))
+        flat = angular_rate.reshape(samples, -1)
+        out = np.zeros((samples, 3 * count), bool)
+        if saturated is not None:
+            out = np.asarray(saturated, bool).reshape(samples, -1)
+        information = np.empty((samples, 3, 3))
+        mean = np.empty((samples, 3))
+        patterns, which = np.unique(out, axis=0, return_inverse=True)
+        for number, pattern in enumerate(patterns):
+            rows = np.flatnonzero(which.ravel() == number)
+            keep = ~pattern
+            precision = np.linalg.inv(self.gyroscope[np.ix_(keep, keep)])
+            weighted = precision @ stack[keep]
+            total = stack[keep].T @ weighted
+            information[rows] = total
+            lost = np.diag(total) <= 0
+            average = flat[rows].reshape(len(rows), count, 3).mean(axis=1)
+            pivot = total + np.diag(lost.astype(float))
+            mean[rows] = np.linalg.solve(pivot, (flat[np.ix_(rows, keep)] @ weighted).T).T
+            mean[np.ix_(rows, lost)] = average[:, lost]
+        return mean, information

@@ -1,0 +1,172 @@
+"""Compiled likelihood estimate (26a) and pseudo-marginal Metropolis-Hastings transitions."""
+
+import math
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+
+from imuarray.estimation import kernels
+
+
+class Data(NamedTuple):
+    """A recording as the compiled likelihood wants it; time is the last axis."""
+
+    weighted: np.ndarray  # (A, 3, T) Lambda y
+    energy: np.ndarray  # (T,) y' Lambda y
+    base: np.ndarray  # (3, T) sum_k (Lambda y)_k
+    mean: np.ndarray  # (3, T) mean of p(omega_t | y_g)
+    factor: np.ndarray  # (6, T) its covariance's Cholesky factor: xx, yx, yy, zx, zy, zz
+    weights: np.ndarray  # (A,) 1 / sigma_k^2, empty for a general covariance
+    precision: np.ndarray  # (3A, 3A) Lambda, empty for isotropic triads
+    tensor: np.ndarray  # (4, 3, 12)
+    rows: np.ndarray
+    values: np.ndarray
+    pairs: np.ndarray
+    products: np.ndarray
+
+
+class Workspace(NamedTuple):
+    """Scratch memory of one chain."""
+
+    moments: np.ndarray
+    full: np.ndarray
+    b: np.ndarray
+    phi: np.ndarray
+    const: np.ndarray
+    K: np.ndarray
+    C: np.ndarray
+    X: np.ndarray
+    inverse: np.ndarray
+    exponent: np.ndarray
+
+
+@nb.njit(cache=True, nogil=True)
+def workspace(samples, draws):
+    """Allocate a `Workspace` for T samples and N draws."""
+    return Workspace(
+        np.zeros((4, 3, samples)),
+        np.empty((12, samples)),
+        np.empty((6, samples)),
+        np.empty((6, samples)),
+        np.empty(samples),
+        np.empty((12, 12)),
+        np.empty((6, 6)),
+        np.empty((6, 6)),
+        np.empty((6, 6)),
+        np.empty(draws),
+    )
+
+
+@nb.njit(cache=True, nogil=True)
+def _collapse(positions, data, work):
+    """Everything that depends on theta but not on omega; returns log |H' Lambda H|."""
+    if data.weights.size:
+        kernels.information(positions, data.weights, data.pairs, data.products, work.K)
+    else:
+        kernels.information_general(positions, data.precision, data.tensor, work.K)
+    logdet = kernels.eliminate(work.K, work.C, work.X, work.inverse)
+    work.moments[0] = data.base
+    kernels.weighted_moments(positions, data.weighted, work.moments)
+    kernels.project(work.moments, data.rows, data.values, work.full)
+    kernels.reduce_linear(
+        work.full, work.X, work.inverse, work.b, work.phi, work.const, data.energy
+    )
+    return logdet
+
+
+@nb.njit(cache=True, nogil=True, inline="always")
+def _log_mean_exp(exponent):
+    """log of the mean of exp(exponent), safe from over- and underflow (Appendix A)."""
+    top = exponent[0]
+    for n in range(1, exponent.size):
+        top = max(top, exponent[n])
+    if exponent.size == 1 or not top > -math.inf:
+        return top
+    total = 0.0
+    for n in range(exponent.size):
+        total += math.exp(exponent[n] - top)
+    return top + math.log(total / exponent.size)
+
+
+@nb.njit(cache=True, nogil=True)
+def _assemble(total, const, logdet, determinant_power):
+    return total - 0.5 * const.sum() - determinant_power * const.size * logdet
+
+
+@nb.njit(cache=True, nogil=True)
+def fixed_draws(positions, data, rates, work, power):
+    """log p-hat (26a) on given draws ``rates`` (T, N, 3) rad/s."""
+    logdet = _collapse(positions, data, work)
+    total = 0.0
+    for t in range(rates.shape[0]):
+        b = work.b[:, t]
+        for n in range(rates.shape[1]):
+            x, y, z = rates[t, n]
+            work.exponent[n] = -0.5 * kernels.quadratic(
+                x, y, z, work.C, b[0], b[1], b[2], b[3], b[4], b[5]
+            )
+        total += _log_mean_exp(work.exponent)
+    return _assemble(total, work.const, logdet, power)
+
+
+@nb.njit(cache=True, nogil=True)
+def fresh_draws(positions, data, rng, work, power, first, last):
+    """log p-hat (26a) of samples first..last-1 with omega drawn anew from p(omega | y_g)."""
+    logdet = _collapse(positions, data, work)
+    total, C = 0.0, work.C
+    m, f = data.mean, data.factor
+    for t in range(first, last):
+        b0, b1, b2 = work.b[0, t], work.b[1, t], work.b[2, t]
+        b3, b4, b5 = work.b[3, t], work.b[4, t], work.b[5, t]
+        mx, my, mz = m[0, t], m[1, t], m[2, t]
+        xx, yx, yy = f[0, t], f[1, t], f[2, t]
+        zx, zy, zz = f[3, t], f[4, t], f[5, t]
+        for n in range(work.exponent.size):
+            u = rng.standard_normal()
+            v = rng.standard_normal()
+            w = rng.standard_normal()
+            x = mx + xx * u
+            y = my + yx * u + yy * v
+            z = mz + zx * u + zy * v + zz * w
+            work.exponent[n] = -0.5 * kernels.quadratic(x, y, z, C, b0, b1, b2, b3, b4, b5)
+        total += _log_mean_exp(work.exponent)
+    return _assemble(total, work.const[first:last], logdet, power)
+
+
+@nb.njit(cache=True, nogil=True)
+def repeated(positions, data, rng, draws, power, out):
+    """Independent realisations of log p-hat at one theta, filling ``out``."""
+    work = workspace(data.energy.size, draws)
+    for i in range(out.size):
+        out[i] = fresh_draws(positions, data, rng, work, power, 0, data.energy.size)
+
+
+@nb.njit(cache=True, nogil=True)
+def transitions(theta, state, prior, step_length, draws, power, data, rng, thin, kept, logs):
+    """Run len(kept) * thin transitions of Algorithm 1 (2021); returns how many accepted.
+
+    ``theta`` (3 (A - 1),) and ``state`` (2,) = (log prior, log p-hat) are start and
+    result; ``prior`` (2, 3 (A - 1)) holds means and precisions; every ``thin``-th state
+    goes to ``kept`` and ``logs``. The accepted noisy estimate is kept, never redrawn.
+    """
+    work = workspace(data.energy.size, draws)
+    size = theta.size
+    positions = np.zeros((size // 3 + 1, 3))
+    flat = positions.ravel()[3:]
+    accepted = 0
+    for number in range(kept.shape[0]):
+        for _ in range(thin):
+            log_prior = 0.0
+            for i in range(size):
+                flat[i] = theta[i] + step_length * rng.standard_normal()
+                log_prior -= 0.5 * prior[1, i] * (flat[i] - prior[0, i]) ** 2
+            estimate = fresh_draws(positions, data, rng, work, power, 0, data.energy.size)
+            ratio = log_prior + estimate - state[0] - state[1]
+            if math.log(rng.random()) < ratio:
+                theta[:] = flat
+                state[0], state[1] = log_prior, estimate
+                accepted += 1
+        kept[number] = theta
+        logs[number] = state
+    return accepted

@@ -1,0 +1,140 @@
+"""Where a result comes from, and writing it whole or not at all.
+
+Nothing here knows the time of day: the same code, configuration and seed write the same bytes.
+"""
+
+import errno
+import hashlib
+import json
+import os
+import platform
+import secrets
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+import imuarray
+
+_LIBRARIES = ("numpy", "scipy", "jax", "numba", "emcee", "arviz")
+
+
+def versions() -> dict[str, str]:
+    """Versions of imuarray, of Python and of the libraries that the numbers depend on."""
+    found = {"imuarray": imuarray.__version__, "python": platform.python_version()}
+    return found | {name: metadata.version(name) for name in _LIBRARIES}
+
+
+def digest(*objects: Any) -> str:
+    """SHA-256, in hexadecimal, of nested dicts, sequences, text, numbers and numpy arrays.
+
+    A dict's order, an array's memory layout and byte order, and tuple against list make no
+    difference; 1 and 1.0 do, as do the types of two arrays. Raises TypeError for anything else,
+    since the text of an arbitrary object may hold its address.
+    """
+    state = hashlib.sha256()
+    _feed(state, list(objects))
+    return state.hexdigest()
+
+
+def _feed(state: Any, value: Any) -> None:
+    """Add one value to the hash, each with its type and length so that no two nestings agree."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, Mapping):
+        items = sorted(value.items(), key=lambda item: (type(item[0]).__name__, item[0]))
+        state.update(f"dict {len(items)};".encode())
+        for pair in items:
+            _feed(state, pair)
+    elif isinstance(value, list | tuple):
+        state.update(f"list {len(value)};".encode())
+        for item in value:
+            _feed(state, item)
+    elif isinstance(value, np.ndarray) and value.dtype.kind in "biufcUS":
+        array = np.ascontiguousarray(value.astype(value.dtype.newbyteorder("<"), copy=False))
+        state.update(f"array {array.dtype.str} {value.shape};".encode())
+        state.update(array.tobytes())
+    elif value is None or isinstance(value, bool | int | float | complex | str | Path):
+        text = str(value) if isinstance(value, Path) else value
+        body = repr(text).encode()
+        state.update(f"{type(text).__name__} {len(body)};".encode() + body)
+    else:
+        raise TypeError(f"digest: no stable bytes for an object of type {type(value).__name__}")
+
+
+def code_digest() -> str:
+    """SHA-256, in hexadecimal, of the names and the text of the package's Python files."""
+    root = Path(__file__).parent
+    sources = sorted((path.relative_to(root).as_posix(), path) for path in root.rglob("*.py"))
+    # a checkout may have changed the line ends
+    return digest([[name, path.read_text(encoding="utf-8")] for name, path in sources])
+
+
+def stamp(config: Mapping[str, Any], seed: int) -> dict[str, str | int]:
+    """Attributes that every result carries: effective configuration, seed and versions.
+
+    Text and an integer only, as NetCDF attributes are flat: `config` and `versions` are JSON.
+    """
+    return {
+        "config": _json(config, sort_keys=True),
+        "seed": int(seed),
+        "versions": _json(versions(), sort_keys=True),
+        "created_by": f"imuarray {imuarray.__version__}",
+    }
+
+
+def _plain(value: Any) -> Any:
+    """Numpy's numbers and arrays, and paths, as JSON knows them."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, Path):
+        return str(value)
+    raise TypeError(f"JSON: expected plain data, found an object of type {type(value).__name__}")
+
+
+def _json(value: Any, **options: Any) -> str:
+    """JSON text; NaN and infinity, which JSON does not have, are a ValueError."""
+    return json.dumps(value, default=_plain, allow_nan=False, ensure_ascii=False, **options)
+
+
+@contextmanager
+def atomic_write(path: str | Path) -> Iterator[Path]:
+    """Give a temporary path beside `path`; it becomes `path` if the block ends without an error.
+
+    A reader sees the old file or the new one, never a part; a failure leaves nothing behind.
+    Raises FileNotFoundError if the folder does not exist.
+    """
+    path = Path(path)
+    if not path.parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, "the output's folder does not exist", str(path))
+    # the ending stays last: some writers choose the format by it
+    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}{path.suffix}")
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    finally:
+        # after a success there is nothing left to delete
+        temporary.unlink(missing_ok=True)
+
+
+def write_json(value: Any, path: str | Path) -> None:
+    """Write plain data (numpy's too) as indented JSON in the given order; see `_json` on NaN."""
+    with atomic_write(path) as temporary:
+        temporary.write_text(_json(value, indent=2) + "\n", encoding="utf-8", newline="\n")
+
+
+def write_csv(frame: pd.DataFrame, path: str | Path) -> None:
+    """Write a table without its index; numbers have the digits that give them back exactly."""
+    with atomic_write(path) as temporary:
+        frame.to_csv(temporary, index=False, lineterminator="\n")
+
+
+def write_netcdf(data: xr.Dataset | xr.DataTree, path: str | Path) -> None:
+    """Write a dataset or a tree of them as NetCDF-4."""
+    with atomic_write(path) as temporary:
+        data.to_netcdf(temporary, engine="h5netcdf")

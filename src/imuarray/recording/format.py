@@ -1,0 +1,205 @@
+"""The NetCDF-4 file of a recording, and the same in memory in SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import xarray as xr
+
+from imuarray.errors import InputError
+from imuarray.provenance import atomic_write
+from imuarray.recording import validate
+from imuarray.recording.validate import AXES, DIMENSIONS, NUMBERS, TEXTS, TRUTH, UNITS
+
+# A rail is a count; turning counts into SI units and back may cost the last digits.
+_RAIL_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What the triads of one rigid array measured, in one array frame.
+
+    Attributes
+    ----------
+    time : ndarray (T,), seconds, strictly increasing
+    specific_force : ndarray (T, A, 3), m/s^2
+    angular_rate : ndarray (T, G, 3), rad/s
+    accelerometer_position : ndarray (A, 3), metres
+        Nominal; the first triad is the reference.
+    accelerometer_labels, gyroscope_labels : tuples of A and of G str
+    accelerometer_noise_sd : float, m/s^2
+    gyroscope_noise_sd : float, rad/s
+    accelerometer_range : float, m/s^2, may be infinite
+    gyroscope_range : float, rad/s, may be infinite
+    position_prior_sd : float, metres
+    stationary : ndarray (T,) bool, or None
+        Still poses.
+    title, source, license : str, empty if not known
+    """
+
+    time: np.ndarray
+    specific_force: np.ndarray
+    angular_rate: np.ndarray
+    accelerometer_position: np.ndarray
+    accelerometer_labels: tuple[str, ...]
+    gyroscope_labels: tuple[str, ...]
+    accelerometer_noise_sd: float
+    gyroscope_noise_sd: float
+    accelerometer_range: float
+    gyroscope_range: float
+    position_prior_sd: float
+    stationary: np.ndarray | None = None
+    title: str = ""
+    source: str = ""
+    license: str = ""
+
+    def to_dataset(self) -> xr.Dataset:
+        """The recording as the file holds it, rates in rad/s; InputError for shapes at odds."""
+        variables = {
+            name: (DIMENSIONS[name], np.asarray(getattr(self, name), float), {"units": units[0]})
+            for name, units in UNITS.items()
+        }
+        if self.stationary is not None:
+            variables["stationary"] = (DIMENSIONS["stationary"], np.asarray(self.stationary, bool))
+        coordinates = {
+            "time": variables.pop("time"),
+            "accelerometer": ("accelerometer", np.array(self.accelerometer_labels, object)),
+            "gyroscope": ("gyroscope", np.array(self.gyroscope_labels, object)),
+            "axis": ("axis", np.array(AXES, object)),
+        }
+        attributes = {name: float(getattr(self, name)) for name in NUMBERS}
+        attributes |= {name: getattr(self, name) for name in TEXTS if getattr(self, name)}
+        try:
+            return xr.Dataset(variables, coordinates, attributes)
+        except ValueError as error:
+            raise InputError(f"recording: expected arrays of matching shapes, {error}") from error
+
+    def relative_positions(self) -> np.ndarray:
+        """Nominal positions relative to the reference triad, (A, 3) metres; row 0 is zero."""
+        return self.accelerometer_position - self.accelerometer_position[0]
+
+    def saturated_gyroscopes(self) -> np.ndarray:
+        """Which rates are at the gyroscopes' rail, (T, G, 3) bool."""
+        return np.abs(self.angular_rate) >= self.gyroscope_range * (1 - _RAIL_TOLERANCE)
+
+    def select(self, index: Any) -> Recording:
+        """The samples that `index` picks: a slice, a (T,) mask or an array of time indices."""
+        still = None if self.stationary is None else self.stationary[index]
+        return replace(
+            self,
+            time=self.time[index],
+            specific_force=self.specific_force[index],
+            angular_rate=self.angular_rate[index],
+            stationary=still,
+        )
+
+
+def from_dataset(dataset: xr.Dataset, where: str = "recording") -> Recording:
+    """Turn the file's dataset into a recording; InputError, naming `where`, if it is not one."""
+    validate.check_structure(dataset, where)
+    arrays = {name: _in_si_units(dataset[name]) for name in UNITS}
+    still = dataset["stationary"].values.astype(bool) if "stationary" in dataset else None
+    recording = Recording(
+        **arrays,
+        accelerometer_labels=_labels(dataset["accelerometer"]),
+        gyroscope_labels=_labels(dataset["gyroscope"]),
+        stationary=still,
+        **{name: float(np.asarray(dataset.attrs[name]).item()) for name in NUMBERS},
+        **{name: str(dataset.attrs.get(name, "")) for name in TEXTS},
+    )
+    validate.check_values(recording, where)
+    return recording
+
+
+def _in_si_units(variable: xr.DataArray) -> np.ndarray:
+    """Values as float64; rates in rad/s whatever the file has."""
+    values = np.asarray(variable.values, dtype=float)
+    return np.deg2rad(values) if variable.attrs["units"] == "deg s-1" else values
+
+
+def _labels(coordinate: xr.DataArray) -> tuple[str, ...]:
+    """Labels as text; NetCDF's character arrays arrive as bytes."""
+    values = coordinate.values.tolist()
+    return tuple(v.decode(errors="replace") if isinstance(v, bytes) else v for v in values)
+
+
+def read_recording(path: str | Path) -> Recording:
+    """Read and validate a recording; angular rates come out in rad/s.
+
+    Raises InputError, with one line that says what was expected, what was found and where, if the
+    file is missing, is not NetCDF-4 or is not a recording; raises IdentifiabilityError for fewer
+    than three accelerometers or collinear ones. Large gaps in time are a warning.
+    """
+    path = _existing(path)
+    return from_dataset(_load(path, group=None), str(path))
+
+
+def read_truth(path: str | Path) -> xr.Dataset:
+    """Read what a simulated recording was made from; InputError if the file has no truth."""
+    path = _existing(path)
+    with _hdf5(path) as file:
+        if TRUTH not in file or not isinstance(file[TRUTH], h5py.Group):
+            raise InputError(
+                f"{path}: expected a group '{TRUTH}' (simulated recordings have one), found none"
+            )
+    return _load(path, group=TRUTH)
+
+
+def write_recording(
+    recording: Recording,
+    path: str | Path,
+    truth: xr.Dataset | None = None,
+    attrs: Mapping[str, Any] | None = None,
+) -> None:
+    """Write a recording, and in group `truth` what it was simulated from.
+
+    `attrs` (such as `provenance.stamp` gives) join the recording's own attributes, which win. The
+    file reads back, or it is not written: InputError as in `read_recording`.
+    """
+    dataset = recording.to_dataset()
+    dataset.attrs = {**(attrs or {}), **dataset.attrs}
+    from_dataset(dataset, str(path))
+    with atomic_write(path) as temporary:
+        dataset.to_netcdf(temporary, engine="h5netcdf")
+        if truth is not None:
+            truth.to_netcdf(temporary, mode="a", group=TRUTH, engine="h5netcdf")
+
+
+def _existing(path: str | Path) -> Path:
+    path = Path(path)
+    if not path.is_file():
+        found = "a folder" if path.is_dir() else "nothing"
+        raise InputError(f"{path}: expected a recording (a NetCDF-4 file), found {found} there")
+    return path
+
+
+def _hdf5(path: Path) -> h5py.File:
+    """Open the file as HDF5, on which NetCDF-4 rests."""
+    try:
+        return h5py.File(path, "r")
+    except OSError as error:
+        raise InputError(f"{path}: expected a NetCDF-4 file, found another: {error}") from None
+
+
+def _load(path: Path, group: str | None) -> xr.Dataset:
+    """Read one group into memory, after looking at what sizes it declares."""
+    try:
+        with _hdf5(path) as file:
+            validate.check_sizes(file, str(path))
+        # "s" is a number of seconds here, not a date or a time span
+        options = {"engine": "h5netcdf", "decode_times": False, "decode_timedelta": False}
+        # HDF5 without named dimensions is for `validate` to refuse, not for the library to warn of
+        options["phony_dims"] = "access"
+        with xr.open_dataset(path, group=group, **options) as dataset:
+            return dataset.load()
+    except InputError:
+        raise
+    except Exception as error:
+        # a damaged file makes the libraries below raise nearly anything
+        what = f"{type(error).__name__}: {error}"
+        raise InputError(f"{path}: expected a readable NetCDF-4 file, found {what}") from error

@@ -1,0 +1,269 @@
+"""What makes a file a recording: names, dimensions, units, values; the one place that knows them.
+
+Every error says what was expected, what was found and where.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+import xarray as xr
+
+from imuarray.errors import IdentifiabilityError, InputError
+from imuarray.geometry.array import require_planar_extent
+
+if TYPE_CHECKING:
+    from imuarray.recording.format import Recording
+
+AXES = ("x", "y", "z")
+
+# Group with what a simulated recording was made from.
+TRUTH = "truth"
+
+DIMENSIONS = {
+    "time": ("time",),
+    "specific_force": ("time", "accelerometer", "axis"),
+    "angular_rate": ("time", "gyroscope", "axis"),
+    "accelerometer_position": ("accelerometer", "axis"),
+    "stationary": ("time",),
+}
+
+# Accepted values of the attribute `units`; the first is written, and is SI.
+UNITS = {
+    "time": ("s",),
+    "specific_force": ("m s-2",),
+    "angular_rate": ("rad s-1", "deg s-1"),
+    "accelerometer_position": ("m",),
+}
+
+LABELS = ("accelerometer", "gyroscope")
+
+# Attributes that are positive numbers, and their units.
+NUMBERS = {
+    "accelerometer_noise_sd": "m s-2",
+    "gyroscope_noise_sd": "rad s-1",
+    "accelerometer_range": "m s-2",
+    "gyroscope_range": "rad s-1",
+    "position_prior_sd": "m",
+}
+
+# A simulated sensor need not have a rail.
+MAY_BE_INFINITE = ("accelerometer_range", "gyroscope_range")
+
+# Optional attributes that are text.
+TEXTS = ("title", "source", "license")
+
+# 1.6 GB as float64. A file of a few bytes can declare far more than any memory holds.
+MAX_VALUES = 200_000_000
+
+# A pause this many times the usual step is worth a word: estimators that smooth would bridge it.
+GAP_FACTOR = 5.0
+
+# Calibrated values may pass the rail by some per cent; this is to find wrong units (57, 9.8, ...).
+BEYOND_RANGE = 1.5
+
+
+def check_sizes(file: h5py.File, where: str) -> None:
+    """Refuse a file that declares an absurd size, before any of it is read."""
+    found: list[tuple[str, tuple[int, ...]]] = []
+
+    def visit(name: str, item: Any) -> None:
+        # Python's integers: the declared sizes may overflow 64 bits
+        shape = tuple(int(n) for n in getattr(item, "shape", None) or ())
+        if math.prod(shape) > MAX_VALUES:
+            found.append((name, shape))
+
+    file.visititems(visit)
+    if found:
+        name, shape = found[0]
+        raise InputError(
+            f"{where}: {name}: expected at most {MAX_VALUES} values, found shape {shape}"
+        )
+
+
+def check_structure(dataset: xr.Dataset, where: str) -> None:
+    """Variables, dimensions, units, labels' type and attributes; the values are for later."""
+    for name in (*UNITS, *LABELS, "axis"):
+        _check_present(dataset, name, where)
+    for name in UNITS:
+        _check_numeric(dataset[name], where)
+        _check_units(dataset[name], where)
+    for name in LABELS:
+        _check_text(dataset[name], where)
+    _check_axis(dataset["axis"], where)
+    if "stationary" in dataset:
+        _check_boolean(dataset["stationary"], where)
+    for name in NUMBERS:
+        _check_number(dataset.attrs, name, where)
+
+
+def check_values(recording: Recording, where: str) -> None:
+    """Numbers, order in time, labels and geometry of a well-formed recording."""
+    _check_counts(recording, where)
+    _check_labels("accelerometer", recording.accelerometer_labels, where)
+    _check_labels("gyroscope", recording.gyroscope_labels, where)
+    for name in UNITS:
+        _check_finite(recording, name, where)
+    _check_time(recording.time, where)
+    require_planar_extent(recording.accelerometer_position, f"{where}: accelerometer_position")
+    _check_range(recording, "specific_force", recording.accelerometer_range, where)
+    _check_range(recording, "angular_rate", recording.gyroscope_range, where)
+
+
+def _check_present(dataset: xr.Dataset, name: str, where: str) -> None:
+    # a dimension without a coordinate would be given numbers as labels by xarray
+    if name not in dataset.variables:
+        have = ", ".join(sorted(map(str, dataset.variables))) or "none"
+        raise InputError(f"{where}: expected a variable '{name}', found {have}")
+    expected = DIMENSIONS.get(name, (name,))
+    if dataset[name].dims != expected:
+        raise InputError(
+            f"{where}: {name}: expected dimensions {_listed(expected)}, "
+            f"found {_listed(dataset[name].dims)}"
+        )
+
+
+def _listed(names: tuple) -> str:
+    return f"({', '.join(map(str, names))})"
+
+
+def _check_numeric(variable: xr.DataArray, where: str) -> None:
+    if variable.dtype.kind not in "fiu":
+        raise InputError(
+            f"{where}: {variable.name}: expected real numbers, found type {variable.dtype}"
+        )
+
+
+def _check_units(variable: xr.DataArray, where: str) -> None:
+    known = UNITS[variable.name]
+    found = variable.attrs.get("units")
+    if not (isinstance(found, str) and found in known):
+        what = "none" if found is None else repr(found)
+        expected = " or ".join(repr(unit) for unit in known)
+        raise InputError(
+            f"{where}: {variable.name}: expected the attribute units to be {expected}, found {what}"
+        )
+
+
+def _check_text(coordinate: xr.DataArray, where: str) -> None:
+    if not all(isinstance(label, str | bytes) for label in coordinate.values.tolist()):
+        raise InputError(
+            f"{where}: {coordinate.name}: expected text as labels, found type {coordinate.dtype}"
+        )
+
+
+def _check_axis(coordinate: xr.DataArray, where: str) -> None:
+    values = coordinate.values.tolist()
+    found = [v.decode(errors="replace") if isinstance(v, bytes) else v for v in values]
+    if found != list(AXES):
+        shown = found if len(found) <= 6 else f"{len(found)} of them"
+        raise InputError(f"{where}: axis: expected the labels {list(AXES)}, found {shown}")
+
+
+def _check_boolean(variable: xr.DataArray, where: str) -> None:
+    if variable.dims != DIMENSIONS["stationary"]:
+        raise InputError(
+            f"{where}: stationary: expected dimensions (time), found {_listed(variable.dims)}"
+        )
+    values = variable.values
+    if values.dtype.kind not in "biu" or not np.isin(values, (0, 1)).all():
+        raise InputError(
+            f"{where}: stationary: expected true or false (1 or 0) for each time, "
+            f"found type {values.dtype} with other values"
+        )
+
+
+def _check_number(attributes: dict, name: str, where: str) -> None:
+    bounds = "positive" if name in MAY_BE_INFINITE else "positive finite"
+    expected = f"expected the attribute '{name}' to be a {bounds} number in {NUMBERS[name]}"
+    if name not in attributes:
+        raise InputError(f"{where}: {expected}, found none")
+    value = np.asarray(attributes[name])
+    if value.dtype.kind not in "fiu" or value.size != 1:
+        raise InputError(f"{where}: {expected}, found {attributes[name]!r}")
+    number = float(value.item())
+    # written so that NaN fails
+    if not number > 0 or (np.isinf(number) and name not in MAY_BE_INFINITE):
+        raise InputError(f"{where}: {expected}, found {number}")
+
+
+def _check_counts(recording: Recording, where: str) -> None:
+    if len(recording.time) == 0:
+        raise InputError(f"{where}: time: expected at least 1 sample, found 0")
+    if len(recording.gyroscope_labels) == 0:
+        raise IdentifiabilityError(f"{where}: expected at least 1 gyroscope triad, found 0")
+
+
+def _check_labels(kind: str, labels: tuple[str, ...], where: str) -> None:
+    repeated = [label for label, count in Counter(labels).items() if count > 1]
+    if repeated:
+        raise InputError(
+            f"{where}: {kind}: expected labels that are all different, "
+            f"found {repeated[0]!r} {labels.count(repeated[0])} times"
+        )
+
+
+def _check_finite(recording: Recording, name: str, where: str) -> None:
+    values = getattr(recording, name)
+    bad = ~np.isfinite(values)
+    if bad.any():
+        index = _first(bad)
+        raise InputError(
+            f"{where}: {name}: expected finite numbers, found {values[index]} at "
+            f"{_place(recording, name, index)} ({bad.sum()} of {bad.size} values)"
+        )
+
+
+def _check_range(recording: Recording, name: str, limit: float, where: str) -> None:
+    values = getattr(recording, name)
+    beyond = np.abs(values) > BEYOND_RANGE * limit
+    if beyond.any():
+        index = _first(beyond)
+        raise InputError(
+            f"{where}: {name}: expected values within the declared range of {limit:g} "
+            f"{UNITS[name][0]}, found {values[index]:g} at {_place(recording, name, index)}; "
+            "is the units attribute right?"
+        )
+
+
+def _first(mask: np.ndarray) -> tuple[int, ...]:
+    return tuple(int(i) for i in np.unravel_index(int(np.argmax(mask)), mask.shape))
+
+
+def _place(recording: Recording, name: str, index: tuple[int, ...]) -> str:
+    """Where an index of a variable is, in the words of the file."""
+    words = []
+    for dimension, i in zip(DIMENSIONS[name], index, strict=True):
+        if dimension == "time":
+            words.append(f"time index {i}")
+        elif dimension == "axis":
+            words.append(f"axis {AXES[i]}")
+        else:
+            words.append(f"{dimension} {getattr(recording, dimension + '_labels')[i]!r}")
+    return ", ".join(words)
+
+
+def _check_time(time: np.ndarray, where: str) -> None:
+    """Strictly increasing, or InputError; even, or a warning."""
+    steps = np.diff(time)
+    if (steps <= 0).any():
+        i = int(np.argmax(steps <= 0))
+        raise InputError(
+            f"{where}: time: expected strictly increasing values, found {time[i]} s and then "
+            f"{time[i + 1]} s at index {i + 1}"
+        )
+    if len(steps) == 0:
+        return
+    usual = float(np.median(steps))
+    gaps = np.flatnonzero(steps > GAP_FACTOR * usual)
+    if len(gaps):
+        warnings.warn(
+            f"{where}: time: {len(gaps)} gap(s) longer than {GAP_FACTOR:g} times the usual step "
+            f"of {usual:g} s; the first, {steps[gaps[0]]:g} s, comes after index {gaps[0]}",
+            stacklevel=2,
+        )

@@ -1,0 +1,195 @@
+"""The command line: exit status, one line on standard error, nothing written, no traceback."""
+
+import os
+import subprocess
+import sys
+import types
+import warnings
+
+import pytest
+
+import imuarray
+from imuarray.cli import main
+from imuarray.errors import IdentifiabilityError, InputError
+
+
+@pytest.fixture
+def calls(monkeypatch, tmp_path):
+    """Stand-ins for the commands, which note what they were called with."""
+    seen = []
+    commands = types.ModuleType("imuarray.commands")
+    for name in ("simulate", "calibrate", "sample"):
+        setattr(commands, name, lambda arguments, name=name: seen.append((name, arguments)))
+    monkeypatch.setitem(sys.modules, "imuarray.commands", commands)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "rec.nc").write_text("stands for a recording")
+    (tmp_path / "c.yaml").write_text("scale: quick")
+    (tmp_path / "folder").mkdir()
+    return seen
+
+
+def fail_with(monkeypatch, error):
+    def command(arguments):
+        raise error
+
+    commands = types.ModuleType("imuarray.commands")
+    commands.calibrate = command
+    monkeypatch.setitem(sys.modules, "imuarray.commands", commands)
+
+
+def error_line(capsys):
+    """What the command said: one line on standard error, nothing on standard output."""
+    out, err = capsys.readouterr()
+    assert out == "" and err.endswith("\n") and err.count("\n") == 1
+    assert err.startswith("imuarray: ") and "Traceback" not in err
+    return err
+
+
+def test_simulate(calls):
+    assert main(["simulate", "--config", "c.yaml", "--out", "new.nc"]) == 0
+    [(name, arguments)] = calls
+    assert name == "simulate" and not arguments.quiet
+    assert (str(arguments.config), str(arguments.out)) == ("c.yaml", "new.nc")
+
+
+def test_calibrate(calls):
+    command = "calibrate rec.nc --method bcd --out cal.nc --quiet"
+    assert main([*command.split(), "--effects", "size_effect, gyroscope_bias"]) == 0
+    [(name, arguments)] = calls
+    assert (name, arguments.method, arguments.quiet) == ("calibrate", "bcd", True)
+    assert arguments.effects == ("size_effect", "gyroscope_bias")
+
+
+def test_sample(calls):
+    assert main("sample rec.nc --out p.nc --steps 50 --seed 3".split()) == 0
+    assert main("sample rec.nc --out p.nc".split()) == 0
+    first, second = (arguments for _, arguments in calls)
+    assert (first.method, first.steps, first.seed) == ("pmmh", 50, 3)
+    assert (second.steps, second.seed, second.effects) == (None, 0, ())
+
+
+BAD = {
+    "": "required: command",
+    "frobnicate": "invalid choice",
+    "simulate --out new.nc": "required: --config",
+    "simulate --config c.yaml": "required: --out",
+    "simulate --config no.yaml --out new.nc": "no.yaml: expected a file to read, found none",
+    "calibrate --out new.nc": "required: recording",
+    "calibrate no.nc --out new.nc": "no.nc: expected a file to read, found none",
+    "calibrate folder --out new.nc": "folder: expected a file to read, found none",
+    "calibrate rec.nc --out no/new.nc": "expected an existing folder, found no no",
+    "calibrate rec.nc --out rec.nc/new.nc": "expected an existing folder, found no rec.nc",
+    "calibrate rec.nc --out folder": "expected a file to write, found a folder",
+    "calibrate rec.nc --out rec.nc": "expected another file than the input",
+    "calibrate rec.nc --out new.nc --method magic": "invalid choice: 'magic'",
+    "calibrate rec.nc --out new.nc --effects a,b,a": "expected each effect once, found 'a,b,a'",
+    "calibrate rec.nc --out new.nc --steps 3": "unrecognized arguments: --steps",
+    "sample rec.nc --out new.nc --steps 0": "an integer of at least 1, found '0'",
+    "sample rec.nc --out new.nc --steps many": "an integer of at least 1, found 'many'",
+    "sample rec.nc --out new.nc --seed -1": "an integer of at least 0, found '-1'",
+    "sample rec.nc --out new.nc --seed 1.5": "an integer of at least 0, found '1.5'",
+}
+
+
+@pytest.mark.parametrize("command", BAD)
+def test_bad_command_lines(calls, capsys, tmp_path, command):
+    before = sorted(path.name for path in tmp_path.iterdir())
+    assert main(command.split()) == 2
+    assert BAD[command] in error_line(capsys)
+    assert calls == [] and sorted(path.name for path in tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        (InputError("rec.nc: expected x,\n found y"), "imuarray: rec.nc: expected x, found y\n"),
+        (IdentifiabilityError("too few"), "imuarray: too few\n"),
+        (
+            PermissionError(13, "Permission denied", "cal.nc"),
+            "imuarray: cal.nc: Permission denied\n",
+        ),
+        (OSError("HDF5 says\nno"), "imuarray: HDF5 says no\n"),
+        (OSError(28, "No space left on device"), "imuarray: No space left on device\n"),
+    ],
+)
+def test_errors_of_a_command(calls, capsys, monkeypatch, error, message):
+    fail_with(monkeypatch, error)
+    assert main("calibrate rec.nc --out cal.nc".split()) == 2
+    assert error_line(capsys) == message
+
+
+def test_interruption(calls, capsys, monkeypatch):
+    fail_with(monkeypatch, KeyboardInterrupt())
+    assert main("calibrate rec.nc --out cal.nc".split()) == 130
+    assert error_line(capsys) == "imuarray: interrupted\n"
+
+
+def test_defects_are_not_hidden(calls, monkeypatch):
+    fail_with(monkeypatch, ZeroDivisionError("a defect"))
+    with pytest.raises(ZeroDivisionError):
+        main("calibrate rec.nc --out cal.nc".split())
+
+
+def test_a_warning_is_one_line():
+    """In a process of its own: pytest collects warnings before they are printed."""
+    code = (
+        "import sys, types, warnings; from imuarray.cli import main\n"
+        "m = sys.modules['imuarray.commands'] = types.ModuleType('m')\n"
+        "m.calibrate = lambda a: warnings.warn('a gap\\nin time', stacklevel=1)\n"
+        "sys.exit(main(['calibrate', sys.executable, '--out', 'cal.nc']))"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (run.returncode, run.stderr) == (0, "imuarray: warning: a gap in time\n")
+
+
+def test_warnings_are_left_as_they_were(calls):
+    main("calibrate rec.nc --out cal.nc".split())
+    assert warnings.formatwarning.__module__ == "warnings"
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_without_permission(calls, capsys, tmp_path):
+    (tmp_path / "folder").chmod(0o500)
+    assert main("calibrate rec.nc --out folder/cal.nc".split()) == 2
+    assert "expected a folder one may write to" in error_line(capsys)
+
+
+@pytest.mark.parametrize("command", ["simulate", "calibrate", "sample"])
+def test_help_has_an_example(capsys, command):
+    with pytest.raises(SystemExit) as info:
+        main([command, "--help"])
+    assert info.value.code == 0
+    assert f"example: imuarray {command}" in capsys.readouterr().out
+
+
+def test_version(capsys):
+    with pytest.raises(SystemExit) as info:
+        main(["--version"])
+    assert info.value.code == 0
+    assert capsys.readouterr().out == f"imuarray {imuarray.__version__}\n"
+
+
+def test_a_wrong_recording_end_to_end(tmp_path):
+    """The real script on a text file, up to where the estimators begin."""
+    (tmp_path / "rec.nc").write_text("not a recording")
+    code = (
+        "import sys, types; from imuarray.cli import main\n"
+        "from imuarray.recording import read_recording\n"
+        "m = sys.modules['imuarray.commands'] = types.ModuleType('m')\n"
+        "m.calibrate = lambda arguments: read_recording(arguments.recording)\n"
+        "sys.exit(main(sys.argv[1:]))"
+    )
+    recording, out = tmp_path / "rec.nc", tmp_path / "cal.nc"
+    command = [sys.executable, "-c", code, "calibrate", recording, "--out", out]
+    run = subprocess.run(command, capture_output=True, text=True)
+    assert run.returncode == 2 and run.stdout == ""
+    assert run.stderr.startswith(f"imuarray: {recording}: expected a NetCDF-4 file")
+    assert run.stderr.count("\n") == 1 and "Traceback" not in run.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["rec.nc"]
+
+
+def test_start_is_fast():
+    """Help and refusals need neither numpy nor JAX."""
+    code = "import sys, imuarray.cli; print([m for m in ('numpy', 'jax') if m in sys.modules])"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout == "[]\n"
