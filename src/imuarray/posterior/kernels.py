@@ -143,30 +143,25 @@ def repeated(positions, data, rng, draws, power, out):
 
 
 @nb.njit(cache=True, nogil=True)
-def transitions(theta, state, prior, step_length, draws, power, data, rng, thin, kept, logs):
-    """Run len(kept) * thin transitions of Algorithm 1 (2021); returns how many accepted.
+def transitions(theta, log_target, prior, step, draws, power, data, rng, count):
+    """``count`` transitions of Algorithm 1 (2021) from ``theta`` (3 (A - 1),), in place.
 
-    ``theta`` (3 (A - 1),) and ``state`` (2,) = (log prior, log p-hat) are start and
-    result; ``prior`` (2, 3 (A - 1)) holds means and precisions; every ``thin``-th state
-    goes to ``kept`` and ``logs``. The accepted noisy estimate is kept, never redrawn.
+    ``prior`` (2, 3 (A - 1)) holds means and precisions, ``step`` the walk's sd. The
+    accepted noisy estimate is kept, never redrawn. Returns (accepted, log_target).
     """
     work = workspace(data.energy.size, draws)
     size = theta.size
     positions = np.zeros((size // 3 + 1, 3))
     flat = positions.ravel()[3:]
     accepted = 0
-    for number in range(kept.shape[0]):
-        for _ in range(thin):
-            log_prior = 0.0
-            for i in range(size):
-                flat[i] = theta[i] + step_length * rng.standard_normal()
-                log_prior -= 0.5 * prior[1, i] * (flat[i] - prior[0, i]) ** 2
-            estimate = fresh_draws(positions, data, rng, work, power, 0, data.energy.size)
-            ratio = log_prior + estimate - state[0] - state[1]
-            if math.log(rng.random()) < ratio:
-                theta[:] = flat
-                state[0], state[1] = log_prior, estimate
-                accepted += 1
-        kept[number] = theta
-        logs[number] = state
-    return accepted
+    for _ in range(count):
+        proposed = 0.0
+        for i in range(size):
+            flat[i] = theta[i] + step * rng.standard_normal()
+            proposed -= 0.5 * prior[1, i] * (flat[i] - prior[0, i]) ** 2
+        proposed += fresh_draws(positions, data, rng, work, power, 0, data.energy.size)
+        if math.log(rng.random()) < proposed - log_target:
+            theta[:] = flat
+            log_target = proposed
+            accepted += 1
+    return accepted, log_target

@@ -1,0 +1,65 @@
+# `make run` and `make test` are all a fresh machine needs (Python >= 3.11 and make).
+PYTHON ?= python3
+CORES ?= 2
+# more options for snakemake, such as SNAKEMAKE_ARGS=--dry-run
+SNAKEMAKE_ARGS ?=
+
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.installed
+SNAKEMAKE := $(BIN)/snakemake --cores $(CORES) $(SNAKEMAKE_ARGS)
+
+# Snakemake's jobs start `python` and `imuarray` by name.
+export PATH := $(CURDIR)/$(BIN):$(PATH)
+
+.PHONY: help run quick paper test bench lint lock clean
+.DEFAULT_GOAL := help
+
+help:
+	@echo "make run     all results and figures at the default scale"
+	@echo "make quick   the same pipeline, smallest useful sizes"
+	@echo "make paper   the papers' own sizes (long)"
+	@echo "make test    the tests"
+	@echo "make bench   the benchmarks"
+	@echo "make lint    ruff, snakefmt and snakemake --lint"
+	@echo "make lock    resolve pyproject.toml into requirements.lock anew (needs uv)"
+	@echo "make clean   remove the environment and the caches, not the results"
+
+# The stamp is newer than the lock: nothing is installed again until the lock or the project changes.
+# The old environment goes first, so that `python3` below cannot be the one inside it.
+$(READY): requirements.lock pyproject.toml
+	rm -rf $(VENV)
+	@$(PYTHON) -c 'import sys; v = sys.version_info; v >= (3, 11) or sys.exit("imuarray: expected Python 3.11 or newer, found %d.%d; set PYTHON=..." % v[:2])'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	touch $@
+
+run: $(READY)
+	$(SNAKEMAKE)
+
+quick: $(READY)
+	$(SNAKEMAKE) quick
+
+paper: $(READY)
+	$(SNAKEMAKE) --config scale=paper
+
+test: $(READY)
+	$(BIN)/python -m pytest -q
+
+bench: $(READY)
+	$(BIN)/python benchmarks/run.py
+
+lint: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/snakefmt --check Snakefile workflow
+	$(BIN)/snakemake --lint
+
+lock:
+	uv pip compile pyproject.toml --universal --python-version 3.11 --extra test --extra build \
+	    --generate-hashes --no-header --quiet -o requirements.lock
+
+clean:
+	rm -rf $(VENV) build dist src/*.egg-info .pytest_cache .ruff_cache .hypothesis
+	find src tests workflow benchmarks -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true

@@ -1,0 +1,154 @@
+"""Pseudo-marginal Metropolis-Hastings (2021, Algorithm 1), run by emcee."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import emcee
+import numpy as np
+from tqdm import tqdm
+
+from imuarray.errors import InputError
+from imuarray.posterior.target import Target
+from imuarray.provenance import atomic_write
+from imuarray.streams import stream
+
+
+class PseudoMarginalMove(emcee.moves.Move):
+    """An emcee move: each walker is a Metropolis-Hastings chain of its own.
+
+    One proposal runs ``thin`` transitions with the walk (27) in every chain and hands
+    back the last state with its noisy log target. Chain c at iteration i draws from the
+    stream (seed, names, c, i) alone: chains are independent, whatever the number of
+    threads, and a chain resumed at i continues bit for bit.
+    """
+
+    def __init__(self, target: Target, step: float, thin: int, seed: int, names, iteration=0):
+        self.target, self.step, self.thin = target, step, thin
+        self.seed, self.names, self.iteration = seed, tuple(names), iteration
+        self.accepted: np.ndarray | None = None
+        self.pool = ThreadPoolExecutor(max_workers=8)
+
+    def propose(self, model, state):
+        """Advance every chain; returns the new state and which chains moved at all."""
+        chains = len(state.coords)
+
+        def advance(chain):
+            rng = stream(self.seed, *self.names, "chain", chain, self.iteration)
+            theta = np.array(state.coords[chain])
+            accepted, value = self.target.transitions(
+                theta, float(state.log_prob[chain]), self.step, self.thin, rng
+            )
+            return theta, accepted, value
+
+        results = list(self.pool.map(advance, range(chains)))
+        self.iteration += 1
+        counts = np.array([accepted for _, accepted, _ in results])
+        self.accepted = counts if self.accepted is None else self.accepted + counts
+        coords = np.array([theta for theta, _, _ in results])
+        log_prob = np.array([value for _, _, value in results])
+        return emcee.State(coords, log_prob=log_prob), counts > 0
+
+
+@dataclass(frozen=True)
+class Chains:
+    """Paired chains: ``draws`` (chains, draws, size), ``log_target`` (chains, draws).
+
+    ``thin`` transitions lie between stored draws; ``acceptance`` (chains,) is the share
+    of accepted proposals over the whole run.
+    """
+
+    draws: np.ndarray
+    log_target: np.ndarray
+    acceptance: np.ndarray
+    thin: int
+    step: float
+
+    @property
+    def steps(self) -> int:
+        """Transitions made by each chain."""
+        return self.draws.shape[1] * self.thin
+
+
+def run_chains(
+    target: Target,
+    starts,
+    step: float,
+    draws: int,
+    thin: int,
+    seed: int,
+    names=("pmmh",),
+    checkpoint: str | Path | None = None,
+    key: str = "",
+    block: int = 500,
+    quiet: bool = False,
+) -> Chains:
+    """Run one chain from each of ``starts`` (chains, size) for draws * thin transitions.
+
+    Parameters
+    ----------
+    checkpoint : path or None
+        Where the state is kept after every ``block`` draws; an existing one with the same
+        ``key`` (a hash of config, data and code) is continued exactly.
+
+    Raises
+    ------
+    InputError
+        A start with no finite log target, or a checkpoint that belongs to another key.
+    """
+    starts = np.atleast_2d(np.asarray(starts, float))
+    done = _load(checkpoint, key, starts.shape, thin) if checkpoint else None
+    if done is None:
+        values = [
+            target.log_target(start, stream(seed, *names, "start", chain))
+            for chain, start in enumerate(starts)
+        ]
+        if not np.all(np.isfinite(values)):
+            raise InputError(f"pmmh: expected a finite log target at every start, found {values}")
+        state = emcee.State(starts.copy(), log_prob=np.array(values))
+        past = [np.empty((len(starts), 0, starts.shape[1])), np.empty((len(starts), 0))]
+        accepted = np.zeros(len(starts), np.int64)
+    else:
+        past, accepted = [done["draws"], done["log_target"]], done["accepted"]
+        state = emcee.State(past[0][:, -1].copy(), log_prob=past[1][:, -1].copy())
+    move = PseudoMarginalMove(target, step, thin, seed, names, iteration=past[0].shape[1])
+    move.accepted = accepted
+    sampler = emcee.EnsembleSampler(
+        len(starts), starts.shape[1], _never, moves=move, vectorize=True
+    )
+    with tqdm(total=draws, initial=past[0].shape[1], disable=quiet, unit="draw") as bar:
+        while past[0].shape[1] < draws:
+            count = min(block, draws - past[0].shape[1])
+            sampler.reset()
+            for state in sampler.sample(state, iterations=count, skip_initial_state_check=True):
+                bar.update()
+            past[0] = np.concatenate([past[0], sampler.get_chain().swapaxes(0, 1)], axis=1)
+            past[1] = np.concatenate([past[1], sampler.get_log_prob().T], axis=1)
+            if checkpoint:
+                _save(checkpoint, key, thin, past, move.accepted)
+    return Chains(past[0], past[1], move.accepted / (thin * draws), thin, step)
+
+
+def _never(theta):
+    """emcee must not evaluate the target by itself: that would redraw the estimate."""
+    raise AssertionError("the log target is handed over with the state")
+
+
+def _save(path, key, thin, past, accepted) -> None:
+    with atomic_write(Path(path)) as temporary, open(temporary, "wb") as handle:
+        np.savez(
+            handle, key=key, thin=thin, draws=past[0], log_target=past[1], accepted=accepted
+        )
+
+
+def _load(path, key, shape, thin):
+    if not Path(path).exists():
+        return None
+    with np.load(path, allow_pickle=False) as stored:
+        found = {name: stored[name] for name in stored.files}
+    matches = str(found["key"]) == key and int(found["thin"]) == thin
+    if not matches or found["draws"].shape[::2] != shape:
+        raise InputError(f"{path}: expected a checkpoint of this very run, found another's")
+    return found

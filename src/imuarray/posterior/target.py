@@ -1,0 +1,103 @@
+"""What a chain samples: prior times estimated likelihood, as a function of theta."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from imuarray.posterior import kernels
+from imuarray.posterior.likelihood import Likelihood
+
+
+class Target(Protocol):
+    """A posterior density estimated with fresh randomness at each evaluation."""
+
+    size: int
+
+    def log_target(self, theta, rng) -> float:
+        """log prior + log p-hat at theta (size,)."""
+        ...
+
+    def transitions(self, theta, log_target, step, count, rng) -> tuple[int, float]:
+        """Advance ``theta`` in place by ``count`` steps; (accepted, the last log target)."""
+        ...
+
+
+@dataclass(frozen=True)
+class GaussianPrior:
+    """Independent normal prior of theta: ``mean`` and ``sd`` (size,), metres for positions."""
+
+    mean: np.ndarray
+    sd: np.ndarray
+
+    @classmethod
+    def of(cls, mean, sd) -> GaussianPrior:
+        """Spread a scalar sd over all parameters."""
+        mean = np.asarray(mean, float)
+        return cls(mean, np.broadcast_to(np.asarray(sd, float), mean.shape).copy())
+
+    def log_density(self, theta) -> float:
+        """Up to its constant."""
+        return -0.5 * float(np.sum(((theta - self.mean) / self.sd) ** 2))
+
+
+@dataclass(frozen=True)
+class CompiledTarget:
+    """The papers' model: theta are the positions r_2 ... r_A, everything compiled."""
+
+    likelihood: Likelihood
+    prior: GaussianPrior
+    draws: int
+
+    @property
+    def size(self) -> int:
+        """3 (A - 1)."""
+        return self.prior.mean.size
+
+    def log_target(self, theta, rng) -> float:
+        """log prior + log p-hat with fresh draws."""
+        positions = np.vstack([np.zeros(3), np.reshape(theta, (-1, 3))])
+        return self.prior.log_density(theta) + self.likelihood.estimate(positions, self.draws, rng)
+
+    def transitions(self, theta, log_target, step, count, rng) -> tuple[int, float]:
+        """`Target.transitions`, compiled; releases the interpreter for other chains."""
+        prior = np.stack([self.prior.mean, self.prior.sd**-2.0])
+        return kernels.transitions(
+            theta, log_target, prior, step, self.draws, self.likelihood.power,
+            self.likelihood.data, rng, count,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class GenericTarget:
+    """Any model: ``estimate(theta, rng)`` returns log p-hat; one Python step at a time.
+
+    ``scale`` (size,) turns the walk's one step length into a step per parameter, since
+    effects have units of their own.
+    """
+
+    estimate: object
+    prior: GaussianPrior
+    scale: np.ndarray
+
+    @property
+    def size(self) -> int:
+        """Number of parameters, positions first."""
+        return self.prior.mean.size
+
+    def log_target(self, theta, rng) -> float:
+        """log prior + log p-hat with fresh draws."""
+        return self.prior.log_density(theta) + self.estimate(theta, rng)
+
+    def transitions(self, theta, log_target, step, count, rng) -> tuple[int, float]:
+        """`Target.transitions` in plain Python."""
+        accepted = 0
+        for _ in range(count):
+            proposal = theta + step * self.scale * rng.standard_normal(self.size)
+            value = self.log_target(proposal, rng)
+            if np.log(rng.random()) < value - log_target:
+                theta[:], log_target = proposal, value
+                accepted += 1
+        return accepted, log_target
