@@ -26,11 +26,15 @@ class ArrayModel:
     noise : Noise
     effects : tuple of str
         Ids from `imuarray.model.EFFECTS`, applied in this order; empty is the papers' model.
+    derivative_sd : (float, float)
+        Prior sd of omega double dot (rad/s^3) and s dot (m/s^3), used only where an effect
+        needs them; the defaults are the papers' motion at 5 Hz.
     """
 
     array: Array
     noise: Noise
     effects: tuple[str, ...] = ()
+    derivative_sd: tuple[float, float] = (2e4, 600.0)
 
     @classmethod
     def isotropic(cls, array, accelerometer_sd, gyroscope_sd, effects=()) -> ArrayModel:
@@ -59,8 +63,13 @@ class ArrayModel:
     @cached_property
     def effect_prior_sd(self) -> np.ndarray:
         """Prior sd of every effect parameter, (P,), in the effects' units."""
-        parts = [np.full(int(np.prod(s)), e.prior_sd) for e, s in zip(self.chain, self.shapes)]
+        parts = [np.full(int(np.prod(s)), e.prior_sd) for e, s in zip(self.chain, self.shapes, strict=True)]
         return np.concatenate([np.empty(0), *parts])
+
+    @property
+    def motion_size(self) -> int:
+        """Unknowns of a sample's motion: 9, or 15 with omega double dot and s dot."""
+        return 15 if self.needs_derivatives else 9
 
     @property
     def needs_derivatives(self) -> bool:
@@ -70,7 +79,7 @@ class ArrayModel:
     def split(self, parameters) -> dict[str, object]:
         """The flat effect parameters (P,) as a dict id -> array of the effect's shape."""
         out, start = {}, 0
-        for item, shape in zip(self.chain, self.shapes):
+        for item, shape in zip(self.chain, self.shapes, strict=True):
             size = int(np.prod(shape))
             out[item.id] = parameters[start : start + size].reshape(shape)
             start += size
@@ -83,7 +92,7 @@ class ArrayModel:
             raise InputError(f"effects: expected values for {self.effects}, found {sorted(unknown)}")
         parts = [
             np.broadcast_to(np.asarray(values.get(item.id, 0.0), float), shape).ravel()
-            for item, shape in zip(self.chain, self.shapes)
+            for item, shape in zip(self.chain, self.shapes, strict=True)
         ]
         return np.concatenate([np.empty(0), *parts])
 

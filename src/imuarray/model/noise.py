@@ -92,24 +92,30 @@ class Noise:
         axis the information is singular and the mean holds the plain average there.
         """
         samples, count, _ = angular_rate.shape
-        stack = np.tile(np.eye(3), (count, 1))
-        flat = angular_rate.reshape(samples, -1)
-        out = np.zeros((samples, 3 * count), bool)
-        if saturated is not None:
-            out = np.asarray(saturated, bool).reshape(samples, -1)
-        information = np.empty((samples, 3, 3))
-        mean = np.empty((samples, 3))
-        patterns, which = np.unique(out, axis=0, return_inverse=True)
+        used, total = self._fuse(np.ones(3 * count, bool))
+        mean = angular_rate.reshape(samples, -1) @ used.T
+        information = np.broadcast_to(total, (samples, 3, 3)).copy()
+        if saturated is None or not np.any(saturated):
+            return mean, information
+        lost = np.asarray(saturated, bool).reshape(samples, -1)
+        affected = np.flatnonzero(lost.any(axis=1))
+        patterns, which = np.unique(lost[affected], axis=0, return_inverse=True)
         for number, pattern in enumerate(patterns):
-            rows = np.flatnonzero(which.ravel() == number)
-            keep = ~pattern
-            precision = np.linalg.inv(self.gyroscope[np.ix_(keep, keep)])
-            weighted = precision @ stack[keep]
-            total = stack[keep].T @ weighted
-            information[rows] = total
-            lost = np.diag(total) <= 0
-            average = flat[rows].reshape(len(rows), count, 3).mean(axis=1)
-            pivot = total + np.diag(lost.astype(float))
-            mean[rows] = np.linalg.solve(pivot, (flat[np.ix_(rows, keep)] @ weighted).T).T
-            mean[np.ix_(rows, lost)] = average[:, lost]
+            rows = affected[which.ravel() == number]
+            gain, information[rows] = self._fuse(~pattern)
+            mean[rows] = angular_rate[rows].reshape(len(rows), -1) @ gain.T
         return mean, information
+
+    def _fuse(self, keep):
+        """Gain (3, 3G) and information (3, 3) of the gyroscope axes in ``keep`` (3G,).
+
+        An axis nobody keeps gets the plain average and no information.
+        """
+        stack = np.tile(np.eye(3), (len(keep) // 3, 1))
+        weighted = np.linalg.inv(self.gyroscope[np.ix_(keep, keep)]) @ stack[keep]
+        total = stack[keep].T @ weighted
+        blind = ~keep.reshape(-1, 3).any(axis=0)
+        gain = np.zeros((3, len(keep)))
+        gain[:, keep] = np.linalg.solve(total + np.diag(blind.astype(float)), weighted.T)
+        gain[blind] = stack.T[blind] / (len(keep) // 3)
+        return gain, total

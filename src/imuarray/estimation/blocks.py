@@ -1,0 +1,142 @@
+"""Least squares for any model: per-sample blocks of the normal equations, by autodiff.
+
+Unknowns are a sample's motion x (9, or 15 where effects need derivatives) and the shared
+p = (r_2 ... r_A, effect parameters). Residuals are in units of their sd.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from imuarray.errors import InputError
+from imuarray.model import ArrayModel
+from imuarray.model.jax64 import jax, jnp
+from imuarray.motion.state import Motion
+
+CHUNK = 64  # samples per compiled call: bounds memory and keeps one compiled shape
+
+
+class Problem(NamedTuple):
+    """A recording with its whitening, for one model."""
+
+    model: ArrayModel
+    specific_force: np.ndarray  # (T, A, 3)
+    angular_rate: np.ndarray  # (T, G, 3)
+    keep: np.ndarray  # (T, 3G) 1.0 where the gyroscope axis is used, else 0.0
+    whiten_force: np.ndarray  # (3A, 3A), upper Cholesky factor of the precision
+    whiten_rate: np.ndarray  # (3G, 3G)
+    prior_mean: np.ndarray  # (P,)
+    prior_sd: np.ndarray  # (P,), infinite where flat
+
+
+class Blocks(NamedTuple):
+    """Normal equations: x (T, n, n), cross (T, n, P), gradients, shared (P, P), cost."""
+
+    motion: np.ndarray
+    cross: np.ndarray
+    motion_gradient: np.ndarray
+    shared: np.ndarray
+    shared_gradient: np.ndarray
+    cost: float
+
+
+def problem(
+    model: ArrayModel, specific_force, angular_rate, saturated=None, position_prior=None
+) -> Problem:
+    """Arrange measurements (T, A, 3) m/s^2, (T, G, 3) rad/s for the general estimators.
+
+    ``position_prior``: None for a flat one, or (mean (3 (A - 1),), sd) in metres. Effect
+    parameters always have theirs. InputError where saturated axes meet correlated
+    gyroscopes, which only the papers' model supports.
+    """
+    keep = np.ones((len(angular_rate), 3 * model.array.gyroscopes))
+    if saturated is not None and np.any(saturated):
+        covariance = model.noise.gyroscope
+        if not np.array_equal(np.diag(np.diag(covariance)), covariance):
+            raise InputError("saturated gyroscopes: expected uncorrelated gyroscope noise")
+        keep -= np.asarray(saturated, float).reshape(keep.shape)
+    size = 3 * (model.array.accelerometers - 1)
+    mean, sd = (np.zeros(size), np.inf) if position_prior is None else position_prior
+    spread = np.broadcast_to(sd, size)
+    return Problem(
+        model, np.asarray(specific_force), np.asarray(angular_rate), keep,
+        np.linalg.cholesky(model.noise.accelerometer_precision).T,
+        np.linalg.cholesky(np.linalg.inv(model.noise.gyroscope)).T,
+        np.concatenate([mean, np.zeros(model.effect_size)]),
+        np.concatenate([spread, model.effect_prior_sd]),
+    )  # fmt: skip
+
+
+def unpack_motion(x) -> Motion:
+    """A `Motion` from x (..., 9 or 15)."""
+    parts = [x[..., 3 * i : 3 * i + 3] for i in range(x.shape[-1] // 3)]
+    nothing = jnp.zeros_like(parts[0])
+    return Motion(*(parts + [nothing] * (5 - len(parts))))
+
+
+def pack_motion(model: ArrayModel, motion: Motion) -> np.ndarray:
+    """x (T, 9 or 15) from a `Motion` with fields (T, 3)."""
+    return np.concatenate([np.asarray(f) for f in motion[: model.motion_size // 3]], axis=-1)
+
+
+def residual(model, x, p, force, rate, keep, whiten_force, whiten_rate):
+    """Whitened residuals of one sample, (3A + 3G [+ 6],), its derivatives' prior included."""
+    shared = 3 * (model.array.accelerometers - 1)
+    positions = jnp.concatenate([jnp.zeros((1, 3)), p[:shared].reshape(-1, 3)])
+    predicted = model.predict(unpack_motion(x), positions, p[shared:])
+    parts = [
+        whiten_force @ (force - predicted.specific_force).ravel(),
+        keep * (whiten_rate @ (rate - predicted.angular_rate).ravel()),
+    ]
+    if model.needs_derivatives:
+        parts.append(x[9:12] / model.derivative_sd[0])
+        parts.append(x[12:15] / model.derivative_sd[1])
+    return jnp.concatenate(parts)
+
+
+@partial(jax.jit, static_argnums=0)
+def _chunk(model, x, p, force, rate, keep, use, whiten_force, whiten_rate):
+    def one(x, force, rate, keep, use):
+        def flat(both):
+            return residual(
+                model, both[: x.size], both[x.size :], force, rate, keep, whiten_force, whiten_rate
+            )
+
+        both = jnp.concatenate([x, p])
+        value, jac = flat(both), jax.jacfwd(flat)(both)
+        left, right = jac[:, : x.size], jac[:, x.size :]
+        blocks = left.T @ left, left.T @ right, left.T @ value
+        return (*blocks, use * (right.T @ right), use * (right.T @ value), use * (value @ value))
+
+    A, B, g, shared, gradient, cost = jax.vmap(one)(x, force, rate, keep, use)
+    return A, B, g, shared.sum(0), gradient.sum(0), cost.sum()
+
+
+def normal_equations(given: Problem, x, p) -> Blocks:
+    """Blocks at motion x (T, n) and shared parameters p (P,), priors included."""
+    samples = len(x)
+    motion, cross, gradient = [], [], []
+    weight = 1.0 / given.prior_sd**2
+    offset = p - given.prior_mean
+    shared, shared_gradient = np.diag(weight), weight * offset
+    cost = float(np.sum(weight * offset**2))
+    for start in range(0, samples, CHUNK):
+        index = np.arange(start, start + CHUNK)
+        use = (index < samples).astype(float)
+        index = np.minimum(index, samples - 1)
+        out = _chunk(
+            given.model, x[index], p, given.specific_force[index], given.angular_rate[index],
+            given.keep[index], use, given.whiten_force, given.whiten_rate,
+        )  # fmt: skip
+        used = int(use.sum())
+        motion.append(np.asarray(out[0])[:used])
+        cross.append(np.asarray(out[1])[:used])
+        gradient.append(np.asarray(out[2])[:used])
+        shared = shared + np.asarray(out[3])
+        shared_gradient = shared_gradient + np.asarray(out[4])
+        cost += float(out[5])
+    joined = [np.concatenate(part) for part in (motion, cross, gradient)]
+    return Blocks(*joined, shared, shared_gradient, cost)

@@ -1,0 +1,117 @@
+"""Positions and effects by joint Gauss-Newton, the motion eliminated sample by sample."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from imuarray.errors import IdentifiabilityError
+from imuarray.estimation.bcd import Calibration, require_rotation, require_samples
+from imuarray.estimation.blocks import Blocks, normal_equations, pack_motion, problem
+from imuarray.estimation.collapsed import Collapsed
+from imuarray.estimation.motion_ml import MotionEstimate, motion_from
+from imuarray.geometry.array import require_planar_extent
+from imuarray.model import ArrayModel
+from imuarray.motion import Motion
+
+
+def eliminate_motion(blocks: Blocks):
+    """Schur complement: (information (P, P), gradient (P,), x-steps given p's step).
+
+    Returns also a function from a shared step (P,) to the motion's (T, n).
+    """
+    right = np.concatenate([blocks.cross, blocks.motion_gradient[..., None]], axis=2)
+    solved = np.linalg.solve(blocks.motion, right)
+    cross = np.einsum("tna,tnb->ab", blocks.cross, solved[..., :-1])
+    gradient = np.einsum("tna,tn->a", blocks.cross, solved[..., -1])
+
+    def motion_step(step):
+        return -solved[..., -1] - solved[..., :-1] @ step
+
+    return blocks.shared - cross, blocks.shared_gradient - gradient, motion_step
+
+
+def _checked_solve(information, gradient):
+    """The shared step, in parameters scaled to a unit diagonal (metres beside seconds)."""
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    scaled = information / np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(scaled)
+    if not values[0] > 1e-12:
+        weak = np.flatnonzero(np.abs(vectors[:, 0]) > 0.3)
+        raise IdentifiabilityError(
+            "calibration: expected informative motion, found a direction of the parameters"
+            f" (components {weak.tolist()}) that the data do not determine; an effect with a"
+            " gauge needs --position-prior, or the motion is too poor"
+        )
+    inverse = (vectors / values) @ vectors.T / np.outer(scale, scale)
+    return -inverse @ gradient, inverse
+
+
+def calibrate_gauss_newton(
+    model: ArrayModel,
+    specific_force,
+    angular_rate,
+    start=None,
+    saturated=None,
+    position_prior=None,
+    tolerance: float = 1e-6,
+    limit: int = 50,
+) -> Calibration:
+    """ML (or MAP) positions and effect parameters of any model, with their covariance.
+
+    Parameters
+    ----------
+    start : (A, 3) m or None for the nominal positions
+    position_prior : None, or (mean (3 (A - 1),), sd) in metres
+    tolerance : float
+        Stop when no shared parameter moves by more than this many of its own sds.
+
+    Raises
+    ------
+    IdentifiabilityError
+        As `calibrate_bcd`, and where the information of the parameters is singular.
+    """
+    require_samples(len(specific_force))
+    positions = model.array.relative if start is None else np.asarray(start, float)
+    positions = positions - positions[0]
+    require_planar_extent(positions, "positions")
+    data = Collapsed.of(model, specific_force, angular_rate, saturated)
+    require_rotation(data, positions)
+    first = motion_from(data, positions)
+    given = problem(model, specific_force, angular_rate, saturated, position_prior)
+    x = pack_motion(model, first.motion)
+    p = np.concatenate([positions[1:].ravel(), np.zeros(model.effect_size)])
+    x, p, costs, steps, converged, covariance = _iterate(given, x, p, tolerance, limit)
+    size = 3 * (model.array.accelerometers - 1)
+    found = np.vstack([np.zeros(3), p[:size].reshape(-1, 3)])
+    motion = Motion.of(x[:, :3], x[:, 3:6], x[:, 6:9])
+    flags = np.full(len(x), converged)
+    estimate = MotionEstimate(motion, np.full(len(x), np.nan), np.full(len(x), len(costs)), flags)
+    return Calibration(
+        found, estimate, np.array(costs), np.array(steps), converged, found[None],
+        covariance[:size, :size], p[size:],
+    )  # fmt: skip
+
+
+def _iterate(given, x, p, tolerance, limit):
+    """Damped by halving: a step that raises the cost is halved, at most ten times."""
+    size = 3 * (given.model.array.accelerometers - 1)
+    blocks = normal_equations(given, x, p)
+    costs, steps, converged = [blocks.cost], [0.0], False
+    for _ in range(limit):
+        information, gradient, motion_step = eliminate_motion(blocks)
+        step, covariance = _checked_solve(information, gradient)
+        if np.max(np.abs(step) / np.sqrt(np.diag(covariance))) < tolerance:
+            converged = True
+            break
+        length = 1.0
+        for _ in range(10):
+            trial_p = p + length * step
+            trial_x = x + length * motion_step(step)
+            trial = normal_equations(given, trial_x, trial_p)
+            if trial.cost <= blocks.cost * (1 + 1e-12):
+                break
+            length /= 2
+        x, p, blocks = trial_x, trial_p, trial
+        costs.append(blocks.cost)
+        steps.append(float(np.max(np.abs(length * step[:size]))))
+    return x, p, costs, steps, converged, covariance

@@ -1,0 +1,74 @@
+"""Whole simulated recordings with their truth."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from imuarray.model import ArrayModel
+from imuarray.motion import Motion
+from imuarray.recording import Recording
+from imuarray.simulation.measure import clip, measure
+
+
+def _recording(model, time, force, rate, nominal, ranges, prior_sd, title) -> Recording:
+    array = model.array
+    return Recording(
+        time=time,
+        specific_force=force,
+        angular_rate=rate,
+        accelerometer_position=nominal,
+        accelerometer_labels=array.labels,
+        gyroscope_labels=tuple(str(k + 1) for k in range(array.gyroscopes)),
+        accelerometer_noise_sd=float(np.sqrt(model.noise.accelerometer[0, 0])),
+        gyroscope_noise_sd=float(np.sqrt(model.noise.gyroscope[0, 0])),
+        accelerometer_range=ranges[0],
+        gyroscope_range=ranges[1],
+        position_prior_sd=prior_sd,
+        title=title,
+        source="simulated by imuarray",
+    )
+
+
+def _truth(motion: Motion, positions, parameters) -> xr.Dataset:
+    axes = ("time", "axis")
+    data = {name: (axes, getattr(motion, name)) for name in Motion._fields}
+    data["position"] = (("accelerometer", "axis"), positions)
+    data["effect_parameter"] = (("parameter",), np.asarray(parameters, float))
+    units = {
+        "angular_rate": "rad s-1", "angular_acceleration": "rad s-2", "specific_force": "m s-2",
+        "angular_jerk": "rad s-3", "force_rate": "m s-3", "position": "m",
+    }  # fmt: skip
+    truth = xr.Dataset(data)
+    for name, unit in units.items():
+        truth[name].attrs["units"] = unit
+    return truth
+
+
+def simulate_samples(
+    model: ArrayModel, motion: Motion, positions, nominal, rng, time=None, parameters=(),
+    accelerometer_range=np.inf, gyroscope_range=np.inf, position_prior_sd=3e-3, title="",
+):  # fmt: skip
+    """A `Recording` and its truth (`xarray.Dataset`) for given motion, fields (T, 3).
+
+    ``positions`` are the true ones, ``nominal`` (A, 3) those the recording declares (the
+    prior mean), both in metres; ``time`` (T,) s defaults to one sample a second.
+    """
+    relative = positions - positions[0]
+    force, rate, _ = measure(model, motion, relative, rng, parameters, gyroscope_range)
+    force, _ = clip(force, accelerometer_range)
+    time = np.arange(len(force), dtype=float) if time is None else np.asarray(time, float)
+    ranges = (accelerometer_range, gyroscope_range)
+    recording = _recording(model, time, force, rate, nominal, ranges, position_prior_sd, title)
+    return recording, _truth(motion, relative, parameters)
+
+
+def simulate_recording(
+    model: ArrayModel, motion, positions, nominal, rng, sampling_rate: float, duration: float,
+    **options,
+):  # fmt: skip
+    """A recording of a `SmoothMotion` at ``sampling_rate`` Hz for ``duration`` seconds."""
+    time = np.arange(int(round(sampling_rate * duration))) / sampling_rate
+    return simulate_samples(
+        model, motion.at(time), positions, nominal, rng, time=time, **options
+    )

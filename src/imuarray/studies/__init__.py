@@ -1,0 +1,1 @@
+"""The papers' Monte Carlo studies; every function returns a table."""

@@ -1,0 +1,38 @@
+"""Monte Carlo realisations in batches, each with a random stream of its own."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from tqdm import tqdm
+
+from imuarray.streams import stream
+
+BATCH = 50  # realisations; part of the streams' definition, so results hang on it
+
+
+def run_batches(function, jobs, threads: int, quiet: bool, label: str) -> list:
+    """``function(job)`` for each job on ``threads`` threads, results in the jobs' order."""
+    with ThreadPoolExecutor(threads) as pool:
+        results = pool.map(function, jobs)
+        return list(tqdm(results, total=len(jobs), disable=quiet, desc=label))
+
+
+def batches(realisations: int):
+    """(number, size) of each batch."""
+    full, rest = divmod(realisations, BATCH)
+    return [(i, BATCH) for i in range(full)] + ([(full, rest)] if rest else [])
+
+
+def batch_stream(seed: int, *names):
+    """The random stream of one batch."""
+    return stream(seed, *names)
+
+
+def root_mean_square(squares) -> tuple[float, float]:
+    """RMSE and its Monte Carlo standard error from mean squared errors (realisations,)."""
+    squares = np.asarray(squares, float)
+    mean = squares.mean()
+    error = squares.std(ddof=1) / np.sqrt(squares.size) if squares.size > 1 else np.nan
+    return float(np.sqrt(mean)), float(error / (2 * np.sqrt(mean))) if mean > 0 else 0.0

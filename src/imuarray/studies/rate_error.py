@@ -1,0 +1,66 @@
+"""RMSE of the estimated motion when positions are wrong: paper 2017, figure 3."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from imuarray.estimation import estimate_motion
+from imuarray.model import ArrayModel
+from imuarray.motion import sphere_motion
+from imuarray.simulation import measure
+from imuarray.studies.batches import batch_stream, batches, root_mean_square, run_batches
+
+
+def _batch(model, rng, count, motion, position_sd, rail):
+    """Squared errors of ``count`` realisations, each with its own true positions.
+
+    The estimator believes the nominal positions. Returns (count,) means over axes for the
+    array's omega, the gyroscopes' average, the array's omega_dot and s, and convergence.
+    """
+    array = model.array
+    errors = position_sd * rng.standard_normal((count, array.accelerometers, 3))
+    truth = array.relative + errors - errors[:, :1]
+    moves = sphere_motion(rng, (count, 1), *motion)
+    force, rate, saturated = measure(model, moves, truth, rng, gyroscope_range=rail)
+    found = estimate_motion(model, force[:, 0], rate[:, 0], saturated=saturated[:, 0])
+    true = [field[:, 0] for field in moves]
+    pairs = (
+        (found.motion.angular_rate, true[0]),
+        (rate[:, 0].mean(axis=1), true[0]),
+        (found.motion.angular_acceleration, true[1]),
+        (found.motion.specific_force, true[2]),
+    )
+    squares = [np.mean((estimate - value) ** 2, axis=1) for estimate, value in pairs]
+    return (*squares, found.converged)
+
+
+def rmse_against_rate(
+    model: ArrayModel, seed, rates, angular_acceleration, specific_force, position_sds,
+    realisations, rail, threads=1, quiet=True,
+) -> pd.DataFrame:  # fmt: skip
+    """Figure 3: RMSE of the motion for each |omega| (rad/s) and position error sd (m)."""
+    rows = []
+    for position_sd in position_sds:
+        for number, rate in enumerate(rates):
+            names = ("rate", f"{position_sd:g}", number)
+            motion = (rate, angular_acceleration, specific_force)
+
+            def job(batch, names=names, motion=motion, sd=position_sd):
+                rng = batch_stream(seed, *names, batch[0])
+                return _batch(model, rng, batch[1], motion, sd, rail)
+
+            parts = run_batches(job, batches(realisations), threads, True, "rate")
+            array, gyroscopes, acceleration, force, converged = (
+                np.concatenate(part) for part in zip(*parts, strict=True)
+            )
+            row = {"angular_rate_dps": np.degrees(rate), "position_sd_m": position_sd}
+            for name, squares in (("array", array), ("gyroscopes", gyroscopes)):
+                rmse, error = root_mean_square(squares)
+                row[f"{name}_rmse_dps"], row[f"{name}_rmse_se_dps"] = np.degrees([rmse, error])
+            row["acceleration_rmse_dps2"] = np.degrees(root_mean_square(acceleration)[0])
+            row["specific_force_rmse_mps2"] = root_mean_square(force)[0]
+            row["converged_share"] = float(converged.mean())
+            row["realisations"] = realisations
+            rows.append(row)
+    return pd.DataFrame(rows)
