@@ -46,8 +46,8 @@ def proper_log_likelihood(specific_force, positions, covariance, rates, phi_sd):
     H = linear_matrix(positions)
     total = covariance + phi_sd**2 * H @ H.T
     residual = specific_force.reshape(len(rates), 1, -1) - nonlinear_part(rates, positions)
-    square = np.einsum("tni,tni->tn", residual @ np.linalg.inv(total), residual)
-    terms = logsumexp(-0.5 * square, axis=1) - np.log(rates.shape[1])
+    white = np.linalg.solve(np.linalg.cholesky(total), np.swapaxes(residual, -1, -2))
+    terms = logsumexp(-0.5 * (white**2).sum(axis=1), axis=1) - np.log(rates.shape[1])
     return terms.sum() - 0.5 * len(rates) * np.linalg.slogdet(total)[1]
 
 

@@ -1,0 +1,65 @@
+"""The configuration: read, validated, and turned into models."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import yaml
+
+from imuarray.errors import InputError
+
+SCHEMA = Path(__file__).parent / "schemas" / "config.schema.yaml"
+
+
+def read_config(path) -> dict:
+    """A validated configuration from a YAML file; InputError says what and where."""
+    try:
+        with open(path, encoding="utf-8") as handle:
+            config = yaml.safe_load(handle)
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise InputError(f"{path}: expected a readable YAML file: {error}") from None
+    return check_config(config, str(path))
+
+
+def check_config(config, where: str = "config") -> dict:
+    """The same configuration, after the schema and what the schema cannot say."""
+    import jsonschema
+
+    with open(SCHEMA, encoding="utf-8") as handle:
+        validator = jsonschema.Draft202012Validator(yaml.safe_load(handle))
+    fault = jsonschema.exceptions.best_match(validator.iter_errors(config))
+    if fault is not None:
+        place = ".".join(str(part) for part in fault.absolute_path) or "top level"
+        raise InputError(f"{where}: {place}: {fault.message}")
+    if config["scale"] not in config["scales"]:
+        known = ", ".join(config["scales"])
+        raise InputError(f"{where}: scale: expected one of {known}, found {config['scale']}")
+    for name, scale in config["scales"].items():
+        for key in ("transitions", "experiment_transitions"):
+            _check_lengths(scale[key], config["paper2021"]["samples"], scale["draws"],
+                           f"{where}: scales.{name}.{key}")  # fmt: skip
+    return config
+
+
+def _check_lengths(lengths, samples, draws, where) -> None:
+    for count in samples:
+        if f"T{count}" not in lengths:
+            raise InputError(f"{where}: expected an entry T{count}, found {sorted(lengths)}")
+        if lengths[f"T{count}"] < draws:
+            raise InputError(
+                f"{where}.T{count}: expected at least {draws} transitions (one a stored draw),"
+                f" found {lengths[f'T{count}']}"
+            )
+
+
+def model_from(settings: dict, accelerometer_sd: float | None = None, effects=()):
+    """The `ArrayModel` of a configuration; ``accelerometer_sd`` (m/s^2) replaces its own."""
+    import numpy as np
+
+    from imuarray.geometry import array_from_config
+    from imuarray.model import ArrayModel
+
+    noise = settings["noise"]
+    force = noise["accelerometer_sd"] if accelerometer_sd is None else accelerometer_sd
+    rate = np.radians(noise["gyroscope_sd_dps"])
+    return ArrayModel.isotropic(array_from_config(settings["array"]), force, rate, effects)

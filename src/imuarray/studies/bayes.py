@@ -1,0 +1,137 @@
+"""The Bayesian studies of paper 2021: data, targets and chains from a configuration."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from imuarray.config import model_from
+from imuarray.estimation import calibrate_bcd
+from imuarray.geometry import Array
+from imuarray.motion import hand_twisting, normal_motion
+from imuarray.posterior import CompiledTarget, GaussianPrior, Likelihood
+from imuarray.recording import Recording
+from imuarray.simulation import simulate_recording, simulate_samples
+from imuarray.streams import stream
+
+
+def simulate_dataset(settings: dict, samples: int):
+    """T = ``samples`` of the 2021 setting: (recording, truth); section IV-A.
+
+    The recording's nominal positions are the prior mean, off the truth as configured.
+    """
+    paper, model = settings["paper2021"], model_from(settings)
+    seed = settings["seed"]
+    motion = normal_motion(
+        stream(seed, "motion", samples),
+        (samples,),
+        np.radians(paper["angular_rate_sd_dps"]),
+        np.radians(paper["angular_acceleration_sd_dps2"]),
+        paper["specific_force_sd"],
+    )
+    nominal = prior_mean(model.array, paper["prior_mean_error"], stream(seed, "prior mean"))
+    return simulate_samples(
+        model, motion, model.array.positions, nominal, stream(seed, "noise", samples),
+        position_prior_sd=paper["prior_sd"], title=f"paper 2021, section IV-A, T = {samples}",
+    )  # fmt: skip
+
+
+def prior_mean(array: Array, error_sd: float, rng) -> np.ndarray:
+    """Nominal positions (A, 3) m, each but the reference off by a normal error."""
+    errors = error_sd * rng.standard_normal(array.positions.shape)
+    errors[0] = 0.0
+    return array.positions + errors
+
+
+def simulate_twisting(settings: dict, accelerometer_sd: float):
+    """A recording of the board twisted by hand, as section IV-C describes the experiment.
+
+    Stands in for measured data until there are some. ``accelerometer_sd`` (m/s^2) is the
+    noise that is really there.
+    """
+    paper, experiment, seed = settings["paper2021"], settings["experiment"], settings["seed"]
+    model = model_from(settings, accelerometer_sd)
+    motion = hand_twisting(
+        stream(seed, "twisting"),
+        np.radians(paper["angular_rate_sd_dps"]) / 2,
+        paper["specific_force_sd"],
+        experiment["bandwidth"],
+    )
+    truth = prior_mean(model.array, paper["prior_mean_error"], stream(seed, "mounting"))
+    return simulate_recording(
+        model, motion, truth, model.array.positions,
+        stream(seed, "twisting noise", f"{accelerometer_sd:g}"),
+        experiment["sampling_rate"], experiment["duration"],
+        gyroscope_range=np.radians(settings["paper2017"]["gyroscope_range_dps"]),
+        position_prior_sd=paper["prior_sd"], title="simulated hand twisting",
+    )  # fmt: skip
+
+
+def select_disjoint(recording: Recording, counts) -> dict[int, np.ndarray]:
+    """Disjoint sets of informative samples, one for each T in ``counts``.
+
+    A sample is used when nothing saturates in it or next to it and it rotates faster than
+    the median; the sets are spread evenly over the recording.
+    """
+    rail = recording.saturated_gyroscopes().any(axis=(1, 2))
+    near = rail.copy()
+    near[1:] |= rail[:-1]
+    near[:-1] |= rail[1:]
+    speed = np.linalg.norm(recording.angular_rate.mean(axis=1), axis=1)
+    usable = np.flatnonzero(~near & (speed >= np.median(speed)))
+    chosen = {}
+    for count in sorted(counts, reverse=True):
+        picks = np.unique(np.linspace(0, len(usable) - 1, count).round().astype(int))
+        chosen[count] = usable[picks]
+        usable = np.delete(usable, picks)
+    return chosen
+
+
+def sample_covariance(angular_rate):
+    """p(omega_t | y_g) from the spread among gyroscopes, (30a) and (30b): mean, covariance.
+
+    ``angular_rate`` (T, G, 3) with G > 3. The covariance is that of one gyroscope, as
+    the paper writes it.
+    """
+    mean = angular_rate.mean(axis=1)
+    off = angular_rate - mean[:, None]
+    return mean, np.einsum("tgi,tgj->tij", off, off) / (angular_rate.shape[1] - 1)
+
+
+def target_for(
+    settings: dict, recording: Recording, draws: int, accelerometer_sd=None, spread=False
+):
+    """The compiled target of a recording; its nominal positions are the prior mean.
+
+    ``accelerometer_sd`` is what the likelihood assumes; ``spread`` takes p(omega | y_g)
+    from (30a)/(30b) instead of the declared noise.
+    """
+    model = model_from(settings, accelerometer_sd)
+    distribution = sample_covariance(recording.angular_rate) if spread else None
+    likelihood = Likelihood.of(
+        model, recording.specific_force, recording.angular_rate, rate_distribution=distribution
+    )
+    nominal = recording.relative_positions()
+    prior = GaussianPrior.of(nominal[1:].ravel(), recording.position_prior_sd)
+    return CompiledTarget(likelihood, prior, draws)
+
+
+def mode_of(settings: dict, recording: Recording, accelerometer_sd=None) -> np.ndarray:
+    """A high-probability theta to start the step-length sweep from: ML-BCD, kept near the prior.
+
+    (3 (A - 1),) metres. Where few samples leave ML without bounds the prior mean serves.
+    """
+    model = model_from(settings, accelerometer_sd)
+    start = recording.relative_positions()
+    found = calibrate_bcd(
+        model, recording.specific_force, recording.angular_rate, start=start, limit=1000,
+        tolerance=1e-9,
+    ).positions  # fmt: skip
+    wild = np.max(np.abs(found - start)) > 3 * recording.position_prior_sd
+    return (start if wild else found)[1:].ravel()
+
+
+def starts_for(settings: dict, recording: Recording, names) -> np.ndarray:
+    """Two different starts (2, 3 (A - 1)) m around the prior mean."""
+    rng = stream(settings["seed"], *names, "starts")
+    mean = recording.relative_positions()[1:].ravel()
+    return mean + settings["paper2021"]["start_sd"] * rng.standard_normal((2, mean.size))

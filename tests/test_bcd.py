@@ -1,0 +1,182 @@
+"""ML-BCD against a general optimiser on positions and motion together."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from imuarray.errors import InputError
+from imuarray.estimation import calibrate_bcd
+from imuarray.geometry import Array
+from imuarray.model import ArrayModel
+from tests import oracles
+from tests.cases import noises, simulate, small_array
+
+
+def problem(seed=1, samples=6, noise=True):
+    """(model with nominal positions 1 mm off, true positions, forces, rates)."""
+    rng = np.random.default_rng(seed)
+    array = small_array(5, 2)
+    model = ArrayModel.isotropic(array, 0.04, 0.02)
+    _, force, rate = simulate(rng, model, samples, noise=noise)
+    off = array.relative + 1e-3 * rng.standard_normal((5, 3))
+    off[0] = 0.0
+    nominal = Array(off, array.labels, array.gyroscopes, "off")
+    return ArrayModel(nominal, model.noise), array.relative, force, rate
+
+
+@cache
+def solution():
+    """The problem of seed 1 with its calibration to the last digits."""
+    model, truth, force, rate = problem()
+    return calibrate_bcd(model, force, rate, tolerance=1e-13, limit=200_000)
+
+
+def joint_residual(x, model, force, rate):
+    positions = np.vstack([np.zeros(3), x[:12].reshape(4, 3) * 1e-2])
+    motions = x[12:].reshape(-1, 9) * np.repeat([1.0, 100.0, 10.0], 3)
+    parts = [
+        oracles.whitened_residual(m, positions, f, w, model.noise)
+        for m, f, w in zip(motions, force, rate)
+    ]
+    return np.concatenate(parts)
+
+
+def test_is_the_joint_optimum():
+    """66 unknowns; the same positions to 1e-7 m, the same motion and the same cost."""
+    model, _, force, rate = problem()
+    start = [np.concatenate([w.mean(axis=0), np.zeros(3), f.mean(axis=0)])
+             for f, w in zip(force, rate)]
+    start = np.array(start) / np.repeat([1.0, 100.0, 10.0], 3)
+    x = np.concatenate([model.array.parameters * 100, start.ravel()])
+    best = least_squares(
+        joint_residual, x, args=(model, force, rate), xtol=1e-14, ftol=1e-14, gtol=1e-10
+    )
+    found = solution()
+    assert found.converged
+    np.testing.assert_allclose(
+        found.positions[1:], best.x[:12].reshape(4, 3) * 1e-2, rtol=0, atol=1e-7
+    )
+    motions = best.x[12:].reshape(-1, 9) * np.repeat([1.0, 100.0, 10.0], 3)
+    np.testing.assert_allclose(found.motion.motion.angular_rate, motions[:, :3], atol=1e-5)
+    np.testing.assert_allclose(
+        found.motion.motion.angular_acceleration, motions[:, 3:6], atol=1e-2
+    )
+    apart = np.sum((rate - rate.mean(axis=1, keepdims=True)) ** 2) / 0.02**2
+    assert found.cost[-1] + apart == pytest.approx(2 * best.cost, rel=1e-6)
+
+
+def test_cost_falls_in_every_iteration():
+    found = solution()
+    assert len(found.cost) > 5
+    assert np.all(np.diff(found.cost) <= 1e-9 * found.cost[0])
+    assert found.cost[-1] < 0.1 * found.cost[0]
+
+
+def test_noise_free_positions_are_recovered():
+    model, truth, force, rate = problem(seed=2, samples=20, noise=False)
+    found = calibrate_bcd(model, force, rate, tolerance=1e-13, limit=200_000)
+    np.testing.assert_allclose(found.positions, truth, atol=1e-8)
+    np.testing.assert_array_equal(found.positions[0], 0)
+
+
+def test_errors_have_the_size_fisher_information_says():
+    """Seed 3, 30 recordings of 20 samples: squared errors in units of the Cramer-Rao bound
+    are chi-square with 360 degrees of freedom; (0.63, 1.5) x 360 has false alarm below 1e-6."""
+    rng = np.random.default_rng(3)
+    array = small_array(5, 2)
+    model = ArrayModel.isotropic(array, 0.04, 0.02)
+    total = 0.0
+    for _ in range(30):
+        motion, force, rate = simulate(rng, model, 20)
+        found = calibrate_bcd(model, force, rate)
+        jacobian = oracles.joint_jacobian(
+            np.hstack(motion[:3]), array.relative, 2, 0.04, 0.02
+        )
+        error = (found.positions - array.relative)[1:].ravel()
+        total += error @ oracles.position_information(jacobian, 12) @ error
+    assert 0.63 < total / 360 < 1.5
+
+
+def test_stops_by_the_largest_step():
+    model, _, force, rate = problem()
+    found = calibrate_bcd(model, force, rate, tolerance=1e-6)
+    assert found.converged
+    assert found.step[-1] <= 1e-6
+    assert np.all(found.step[:-1] > 1e-6)
+    assert len(found.step) == len(found.cost) < len(solution().cost)
+
+
+def test_stops_when_the_cost_settles():
+    model, _, force, rate = problem()
+    found = calibrate_bcd(model, force, rate, tolerance=0.0, cost_tolerance=1e-4)
+    fallen = -np.diff(found.cost) / found.cost[1:]
+    assert found.converged
+    assert fallen[-1] <= 1e-4
+    assert np.all(fallen[:-1] > 1e-4)
+
+
+def test_stops_at_the_limit():
+    model, _, force, rate = problem()
+    found = calibrate_bcd(model, force, rate, tolerance=0.0, limit=7)
+    assert not found.converged
+    assert len(found.cost) == len(found.step) == 7
+
+
+def test_snapshots():
+    """Positions after the iterations asked for, and the result for those never reached."""
+    model, _, force, rate = problem()
+    found = calibrate_bcd(model, force, rate, limit=20, tolerance=0.0, marks=(12, 3, 50))
+    for mark, snapshot in zip((3, 12, 20), found.snapshots):
+        short = calibrate_bcd(model, force, rate, limit=mark, tolerance=0.0)
+        np.testing.assert_allclose(snapshot, short.positions, rtol=1e-13, atol=1e-16)
+    assert np.abs(found.snapshots[0] - found.snapshots[1]).max() > 1e-9
+
+
+def test_start_is_not_written_to():
+    model, truth, force, rate = problem()
+    start = truth + 0.5
+    before = start.copy()
+    found = calibrate_bcd(model, force, rate, start=start, tolerance=1e-13, limit=200_000)
+    np.testing.assert_array_equal(start, before)
+    np.testing.assert_allclose(found.positions, solution().positions, rtol=0, atol=2e-8)
+
+
+def test_common_specific_force_does_not_matter():
+    model, _, force, rate = problem()
+    shift = 50.0 * np.random.default_rng(4).standard_normal((len(force), 1, 3))
+    moved = calibrate_bcd(model, force + shift, rate, tolerance=1e-13, limit=200_000)
+    np.testing.assert_allclose(moved.positions, solution().positions, rtol=0, atol=2e-8)
+    np.testing.assert_allclose(
+        moved.motion.motion.specific_force - shift[:, 0],
+        solution().motion.motion.specific_force,
+        atol=1e-6,
+    )
+
+
+def test_better_triads_count_for_more():
+    """Weights per triad: still the joint optimum (its gradient vanishes), and another one."""
+    model, _, force, rate = problem()
+    rng = np.random.default_rng(5)
+    uneven = ArrayModel(model.array, noises(rng, 5, 2)["per_triad"])
+    found = calibrate_bcd(uneven, force, rate, tolerance=1e-13, limit=200_000)
+    assert np.abs(found.positions - solution().positions).max() > 1e-6
+    motion = np.hstack(found.motion.motion[:3]) / np.repeat([1.0, 100.0, 10.0], 3)
+    x = np.concatenate([found.positions[1:].ravel() * 100, motion.ravel()])
+
+    def cost(point):
+        return 0.5 * np.sum(joint_residual(point, uneven, force, rate) ** 2)
+
+    for i in range(x.size):
+        step = 1e-4 * np.eye(x.size)[i]
+        up, down, here = cost(x + step), cost(x - step), cost(x)
+        newton = 0.5 * (up - down) / max(up + down - 2 * here, 1e-12) * 1e-4
+        assert abs(newton) < 1e-5, f"unknown {i} can still be improved"
+
+
+def test_triads_with_uneven_axes_are_for_another_method():
+    model, _, force, rate = problem()
+    general = ArrayModel(model.array, noises(np.random.default_rng(6), 5, 2)["crosstalk"])
+    with pytest.raises(InputError, match="isotropic"):
+        calibrate_bcd(general, force, rate)

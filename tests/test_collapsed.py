@@ -1,0 +1,212 @@
+"""The likelihood, collapsed to six dimensions, against its direct form in 3A dimensions."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.special import logsumexp
+
+from imuarray.errors import InputError
+from imuarray.estimation import Collapsed
+from imuarray.geometry import mimu4444
+from imuarray.model import ArrayModel
+from imuarray.posterior import Likelihood, kernels
+from tests import oracles
+from tests.cases import noises, simulate, small_array
+
+FORMS = ("isotropic", "per_triad", "triad_covariances", "crosstalk")
+
+
+def problem(form="isotropic", seed=1, samples=7, array=None):
+    """(rng, model, measurements, positions off by 1 mm, rates (T, N = 9, 3))."""
+    rng = np.random.default_rng(seed)
+    array = array or small_array()
+    model = ArrayModel(array, noises(rng, array.accelerometers, array.gyroscopes)[form])
+    motion, force, rate = simulate(rng, model, samples)
+    positions = array.relative + 1e-3 * rng.standard_normal(array.relative.shape)
+    positions[0] = 0.0
+    rates = motion.angular_rate[:, None] + 0.1 * rng.standard_normal((samples, 9, 3))
+    return rng, model, (force, rate), positions, rates
+
+
+@pytest.mark.parametrize("determinant", ["derived", "printed"])
+@pytest.mark.parametrize("form", FORMS)
+def test_equals_the_direct_form(form, determinant):
+    _, model, data, positions, rates = problem(form)
+    found = Likelihood.of(model, *data, determinant=determinant).on(positions, rates)
+    direct = oracles.direct_log_likelihood(
+        data[0], positions, model.noise.accelerometer, rates, 0.5 if determinant == "derived" else 1
+    )
+    assert found == pytest.approx(direct, rel=1e-9)
+
+
+def test_equals_the_direct_form_in_96_dimensions():
+    _, model, data, positions, rates = problem(array=mimu4444(), samples=4)
+    found = Likelihood.of(model, *data).on(positions, rates)
+    direct = oracles.direct_log_likelihood(data[0], positions, model.noise.accelerometer, rates)
+    assert found == pytest.approx(direct, rel=1e-9)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_one_draw(form):
+    _, model, data, positions, rates = problem(form)
+    found = Likelihood.of(model, *data).on(positions, rates[:, :1])
+    direct = oracles.direct_log_likelihood(
+        data[0], positions, model.noise.accelerometer, rates[:, :1]
+    )
+    assert found == pytest.approx(direct, rel=1e-9)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_flat_phi_is_the_limit_of_a_wide_prior(form):
+    """Differences in theta, against a normal density with no algebra in it: only the
+    derived determinant has them."""
+    _, model, data, positions, rates = problem(form)
+    other = 1.3 * positions
+    covariance = model.noise.accelerometer
+
+    def difference(function):
+        return function(other) - function(positions)
+
+    wide = difference(
+        lambda r: oracles.proper_log_likelihood(data[0], r, covariance, rates, phi_sd=3e3)
+    )
+    derived = difference(lambda r: Likelihood.of(model, *data).on(r, rates))
+    printed = difference(
+        lambda r: Likelihood.of(model, *data, determinant="printed").on(r, rates)
+    )
+    assert derived == pytest.approx(wide, abs=0.2)  # the prior is wide, not flat
+    assert abs(printed - wide) > 3.0
+
+
+@pytest.mark.parametrize("form", ["isotropic", "crosstalk"])
+def test_common_specific_force_does_not_matter(form):
+    """s_t is marginalised under a flat prior: any force common to all triads is absorbed."""
+    rng, model, (force, rate), positions, rates = problem(form)
+    shift = 100.0 * rng.standard_normal((len(force), 1, 3))
+    one = Likelihood.of(model, force, rate).on(positions, rates)
+    two = Likelihood.of(model, force + shift, rate).on(positions, rates)
+    assert two == pytest.approx(one, rel=1e-9)
+
+
+@pytest.mark.parametrize("form", ["isotropic", "crosstalk"])
+def test_only_relative_positions_matter(form):
+    _, model, data, positions, rates = problem(form)
+    likelihood = Likelihood.of(model, *data)
+    moved = likelihood.on(positions + [0.3, -0.2, 0.1], rates)
+    assert moved == pytest.approx(likelihood.on(positions, rates), rel=1e-9)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_elimination_of_phi(form):
+    """C, b, phi, const, log determinant and inverse against plain linear algebra."""
+    _, model, data, positions, rates = problem(form)
+    precision = np.linalg.inv(model.noise.accelerometer)
+    collapsed = Collapsed.of(model, *data)
+    C, b, X, phi, const, logdet, inverse = collapsed.reduce(positions)
+    H = oracles.linear_matrix(positions)
+    w = np.stack([rates[0, :, i] * rates[0, :, j] for i, j in
+                  ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))])
+    h = oracles.nonlinear_part(rates[0], positions).T
+    B = np.linalg.lstsq(w.T, h.T, rcond=None)[0].T
+    y = (data[0] - data[0].mean(axis=1, keepdims=True)).reshape(len(data[0]), -1).T
+    gram = H.T @ precision @ H
+    S = precision - precision @ H @ np.linalg.solve(gram, H.T @ precision)
+
+    def close(found, direct):
+        np.testing.assert_allclose(found, direct, atol=1e-8 * np.abs(direct).max())
+
+    close(C, B.T @ S @ B)
+    close(b, B.T @ S @ y)
+    close(X, np.linalg.solve(gram, H.T @ precision @ B))
+    close(phi, np.linalg.solve(gram, H.T @ precision @ y))
+    np.testing.assert_allclose(const, np.einsum("it,ij,jt->t", y, S, y), rtol=1e-7)
+    assert logdet == pytest.approx(np.linalg.slogdet(gram)[1], rel=1e-10)
+    close(inverse, np.linalg.inv(gram))
+
+
+extreme = st.one_of(
+    st.floats(-1e300, 1e300), st.floats(-50, 50), st.floats(600, 800), st.floats(-800, -600),
+    st.just(-np.inf),
+)  # fmt: skip
+
+
+@settings(max_examples=300, deadline=None)
+@given(arrays(float, st.integers(1, 30), elements=extreme))
+def test_log_mean_exp(exponent):
+    with np.errstate(all="ignore"):
+        direct = logsumexp(exponent) - np.log(exponent.size)
+    found = kernels._log_mean_exp(exponent)
+    assert found == pytest.approx(direct, rel=1e-12, abs=1e-12)
+
+
+def quadrature_case(seed=2, form="isotropic"):
+    """Four triads, 3 samples, gyroscopes so bad that omega has to be integrated out."""
+    rng = np.random.default_rng(seed)
+    array = small_array(4, 2)
+    noise = noises(rng, 4, 2)[form]
+    model = ArrayModel(array, type(noise).of(4, 2, noise.accelerometer, 0.2))
+    _, force, rate = simulate(rng, model, 3)
+    nodes, logs = oracles.gauss_hermite(rate.mean(axis=1), 0.02 * np.eye(3), 21)
+    exact = oracles.exact_log_likelihood(
+        force, array.parameters[None], noise.accelerometer, nodes, logs
+    )[0]
+    return rng, Likelihood.of(model, force, rate), array.relative, exact
+
+
+@pytest.mark.parametrize("form", ["isotropic", "crosstalk"])
+@pytest.mark.parametrize("threads", [1, 2])
+def test_estimate_is_unbiased_whatever_the_threads(form, threads):
+    """Seed 2; E exp(log p-hat) is p(y_a) by quadrature, within five of its standard errors
+    (false alarm 6e-7 each; 4000 values of N = 25 draws)."""
+    rng, likelihood, positions, exact = quadrature_case(form=form)
+    values = np.array([likelihood.estimate(positions, 25, rng, threads) for _ in range(4000)])
+    ratio = np.exp(values - exact)
+    assert ratio.std() > 0.05  # the estimate is noisy, or this test says nothing
+    assert abs(ratio.mean() - 1.0) < 5 * ratio.std() / np.sqrt(ratio.size)
+
+
+def test_threads_do_not_change_the_law():
+    """Seed 3; mean and log variance of 2000 values each within five standard errors."""
+    rng, model, data, positions, _ = problem(seed=3, samples=20)
+    likelihood = Likelihood.of(model, *data)
+    count = 2000
+    one, two = (
+        np.array([likelihood.estimate(positions, 200, rng, n) for _ in range(count)])
+        for n in (1, 2)
+    )
+    assert abs(one.mean() - two.mean()) < 5 * np.sqrt((one.var() + two.var()) / count)
+    kurtosis = np.mean((one - one.mean()) ** 4) / one.var() ** 2
+    assert abs(np.log(one.var() / two.var())) < 5 * np.sqrt(2 * (kurtosis - 1) / count)
+
+
+def test_realisations_are_fresh_estimates():
+    """The same stream gives the same numbers one by one."""
+    _, model, data, positions, _ = problem()
+    likelihood = Likelihood.of(model, *data)
+    many = likelihood.realisations(positions, 30, 5, np.random.default_rng(7))
+    rng = np.random.default_rng(7)
+    single = [likelihood.estimate(positions, 30, rng) for _ in range(5)]
+    np.testing.assert_array_equal(many, single)
+    assert len(set(single)) == 5
+
+
+def test_given_rate_distribution_is_used():
+    """Draws come from the pair (mean, covariance): with no spread, the value at the mean."""
+    _, model, data, positions, rates = problem("isotropic")
+    mean = rates[:, 0]
+    tight = np.tile(1e-24 * np.eye(3), (len(mean), 1, 1))
+    likelihood = Likelihood.of(model, *data, rate_distribution=(mean, tight))
+    found = likelihood.estimate(positions, 5, np.random.default_rng(8))
+    assert found == pytest.approx(likelihood.on(positions, mean[:, None]), rel=1e-9)
+
+
+def test_input_errors():
+    _, model, (force, rate), _, _ = problem()
+    with pytest.raises(InputError, match="determinant"):
+        Likelihood.of(model, force, rate, determinant="guessed")
+    saturated = np.zeros(rate.shape, bool)
+    saturated[3, :, 1] = True
+    with pytest.raises(InputError, match="sample 3"):
+        Likelihood.of(model, force, rate, saturated)

@@ -1,0 +1,43 @@
+# paper_figures/ holds the configured scale's figures; every scale keeps its own in results/.
+PUBLISHED = "results/{}/{{}}/{{{{name}}}}.{{{{kind}}}}".format(config["scale"])
+
+
+rule publish_figure:
+    input:
+        PUBLISHED.format("figures"),
+    output:
+        "paper_figures/{name}.{kind}",
+    wildcard_constraints:
+        name=r"\d{4}_fig\d",
+        kind="pdf|png|csv",
+    log:
+        "results/logs/publish/{name}.{kind}.log",
+    shell:
+        "cp {input:q} {output:q} 2> {log:q}"
+
+
+rule publish_table:
+    input:
+        PUBLISHED.format("tables"),
+    output:
+        "paper_figures/{name}.{kind}",
+    wildcard_constraints:
+        name=r"\d{4}_table\d",
+        kind="csv|tex|md",
+    log:
+        "results/logs/publish/{name}.{kind}.log",
+    shell:
+        "cp {input:q} {output:q} 2> {log:q}"
+
+
+rule publish_claims:
+    input:
+        "results/{}/claims/claims.{{kind}}".format(config["scale"]),
+    output:
+        "paper_figures/claims.{kind}",
+    wildcard_constraints:
+        kind="csv|md",
+    log:
+        "results/logs/publish/claims.{kind}.log",
+    shell:
+        "cp {input:q} {output:q} 2> {log:q}"

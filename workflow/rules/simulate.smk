@@ -1,0 +1,36 @@
+rule simulate_samples:
+    input:
+        code=library("simulation"),
+    output:
+        "results/{scale}/recordings/T{samples}.nc",
+    log:
+        "results/{scale}/logs/recordings/T{samples}.log",
+    benchmark:
+        "results/{scale}/benchmarks/recordings/T{samples}.tsv"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=30,
+    params:
+        settings=lambda wc: effective(config, wc.scale, "paper2021"),
+    script:
+        "../scripts/simulate_samples.py"
+
+
+rule simulate_experiment:
+    input:
+        code=library("simulation"),
+    output:
+        "results/{scale}/recordings/{kind}.nc",
+    log:
+        "results/{scale}/logs/recordings/{kind}.log",
+    benchmark:
+        "results/{scale}/benchmarks/recordings/{kind}.tsv"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=30,
+    params:
+        settings=lambda wc: effective(config, wc.scale, "paper2017", "paper2021", "experiment"),
+    script:
+        "../scripts/simulate_experiment.py"

@@ -1,0 +1,21 @@
+"""Simulate hand twisting -> recording with its truth (NetCDF).
+
+kind ``standin`` has the sensors' declared noise and is analysed as the paper analyses its
+experiment; ``simulation`` really has the large noise that the analysis assumes.
+"""
+
+from job import job
+
+with job(snakemake) as settings:  # noqa: F821
+    from imuarray.provenance import stamp
+    from imuarray.recording import write_recording
+    from imuarray.studies.bayes import simulate_twisting
+
+    noise = {
+        "standin": settings["noise"]["accelerometer_sd"],
+        "simulation": settings["experiment"]["accelerometer_sd"],
+    }[snakemake.wildcards.kind]  # noqa: F821
+    recording, truth = simulate_twisting(settings, noise)
+    write_recording(
+        recording, snakemake.output[0], truth, stamp(settings, settings["seed"])  # noqa: F821
+    )

@@ -1,0 +1,13 @@
+"""Simulate the 2021 dataset of T samples -> recording with its truth (NetCDF)."""
+
+from job import job
+
+with job(snakemake) as settings:  # noqa: F821
+    from imuarray.provenance import stamp
+    from imuarray.recording import write_recording
+    from imuarray.studies.bayes import simulate_dataset
+
+    recording, truth = simulate_dataset(settings, int(snakemake.wildcards.samples))  # noqa: F821
+    write_recording(
+        recording, snakemake.output[0], truth, stamp(settings, settings["seed"])  # noqa: F821
+    )
