@@ -14,7 +14,7 @@ from imuarray.errors import InputError
 
 OK, BAD_INPUT, INTERRUPTED = 0, 2, 130
 
-CALIBRATION_METHODS = ("bcd",)
+CALIBRATION_METHODS = ("bcd", "gauss-newton")
 SAMPLING_METHODS = ("pmmh",)
 
 
@@ -157,6 +157,10 @@ def _add_command(commands, name, run, summary, example, out) -> argparse.Argumen
 
 def _add_recording(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recording", type=Path, help="NetCDF-4 recording to read")
+    _add_effects(parser)
+
+
+def _add_effects(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--effects",
         type=_effects,
@@ -178,6 +182,7 @@ def _add_simulate(commands) -> None:
     parser.add_argument(
         "--config", required=True, type=Path, metavar="FILE", help="configuration (YAML)"
     )
+    _add_effects(parser)
 
 
 def _add_calibrate(commands) -> None:
@@ -194,7 +199,7 @@ def _add_calibrate(commands) -> None:
         "--method",
         choices=CALIBRATION_METHODS,
         default="bcd",
-        help="bcd: block coordinate descent (default)",
+        help="bcd: block coordinate descent (default); gauss-newton: any effects, fewer iterations",
     )
 
 

@@ -22,6 +22,8 @@ class Calibration:
     ``positions`` (A, 3) m relative to the reference triad; ``cost`` and ``step`` per
     iteration: twice the negative log likelihood before, and the largest position change
     (m) in, that iteration; ``snapshots`` (S, A, 3) after the iterations asked for.
+    ``covariance`` (P, P) of (r_2 ... r_A, effect parameters), ``effect_parameters`` (P',),
+    where the method gives them.
     """
 
     positions: np.ndarray
@@ -30,7 +32,7 @@ class Calibration:
     step: np.ndarray
     converged: bool
     snapshots: np.ndarray
-    position_covariance: np.ndarray | None = None
+    covariance: np.ndarray | None = None
     effect_parameters: np.ndarray | None = None
 
 

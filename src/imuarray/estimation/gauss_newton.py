@@ -88,7 +88,7 @@ def calibrate_gauss_newton(
     estimate = MotionEstimate(motion, np.full(len(x), np.nan), np.full(len(x), len(costs)), flags)
     return Calibration(
         found, estimate, np.array(costs), np.array(steps), converged, found[None],
-        covariance[:size, :size], p[size:],
+        covariance, p[size:],
     )  # fmt: skip
 
 
@@ -115,3 +115,17 @@ def _iterate(given, x, p, tolerance, limit):
         costs.append(blocks.cost)
         steps.append(float(np.max(np.abs(length * step[:size]))))
     return x, p, costs, steps, converged, covariance
+
+
+def parameter_covariance(
+    model: ArrayModel, specific_force, angular_rate, found: Calibration, saturated=None
+) -> np.ndarray:
+    """Covariance (P, P) of r_2 ... r_A at an ML estimate: the Fisher information's inverse.
+
+    IdentifiabilityError where that information is singular.
+    """
+    given = problem(model, specific_force, angular_rate, saturated)
+    x = pack_motion(model, found.motion.motion)
+    blocks = normal_equations(given, x, found.positions[1:].ravel())
+    information, gradient, _ = eliminate_motion(blocks)
+    return _checked_solve(information, gradient)[1]

@@ -121,12 +121,17 @@ class ArrayModel:
         out = _predict_many(self, fields, positions, parameters)
         return Prediction(*(np.asarray(part) for part in out))
 
+    @property
+    def _function(self) -> tuple:
+        """All that `predict` and the compiled residuals depend on, noise excepted."""
+        return self.array.accelerometers, self.array.gyroscopes, self.chain, self.derivative_sd
+
     def __hash__(self):
-        return hash((self.array.name, self.array.accelerometers, self.array.gyroscopes, self.effects))
+        return hash(self._function)
 
     def __eq__(self, other):
         """Equal where `predict` is the same function, which is what compilation keys on."""
-        return isinstance(other, ArrayModel) and hash(self) == hash(other)
+        return isinstance(other, ArrayModel) and self._function == other._function
 
 
 @partial(jax.jit, static_argnums=0)

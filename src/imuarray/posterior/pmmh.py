@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -118,7 +119,9 @@ def run_chains(
     sampler = emcee.EnsembleSampler(
         len(starts), starts.shape[1], _never, moves=move, vectorize=True
     )
-    with tqdm(total=draws, initial=past[0].shape[1], disable=quiet, unit="draw") as bar:
+    seldom = 0.2 if sys.stderr.isatty() else 15.0  # seconds; a log file needs few lines
+    done = past[0].shape[1]
+    with tqdm(total=draws, initial=done, disable=quiet, unit="draw", mininterval=seldom) as bar:
         while past[0].shape[1] < draws:
             count = min(block, draws - past[0].shape[1])
             sampler.reset()

@@ -16,7 +16,7 @@ def run_batches(function, jobs, threads: int, quiet: bool, label: str) -> list:
     """``function(job)`` for each job on ``threads`` threads, results in the jobs' order."""
     with ThreadPoolExecutor(threads) as pool:
         results = pool.map(function, jobs)
-        return list(tqdm(results, total=len(jobs), disable=quiet, desc=label))
+        return list(tqdm(results, total=len(jobs), disable=quiet, desc=label, mininterval=15.0))
 
 
 def batches(realisations: int):

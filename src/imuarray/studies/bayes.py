@@ -42,14 +42,16 @@ def prior_mean(array: Array, error_sd: float, rng) -> np.ndarray:
     return array.positions + errors
 
 
-def simulate_twisting(settings: dict, accelerometer_sd: float):
+def simulate_twisting(settings: dict, accelerometer_sd: float, effects=()):
     """A recording of the board twisted by hand, as section IV-C describes the experiment.
 
     Stands in for measured data until there are some. ``accelerometer_sd`` (m/s^2) is the
-    noise that is really there.
+    noise that is really there; effects get parameters drawn from their priors.
     """
     paper, experiment, seed = settings["paper2021"], settings["experiment"], settings["seed"]
-    model = model_from(settings, accelerometer_sd)
+    model = model_from(settings, accelerometer_sd, effects)
+    sizes = model.effect_prior_sd
+    parameters = sizes * stream(seed, "effects").standard_normal(sizes.shape)
     motion = hand_twisting(
         stream(seed, "twisting"),
         np.radians(paper["angular_rate_sd_dps"]) / 2,
@@ -63,6 +65,7 @@ def simulate_twisting(settings: dict, accelerometer_sd: float):
         experiment["sampling_rate"], experiment["duration"],
         gyroscope_range=np.radians(settings["paper2017"]["gyroscope_range_dps"]),
         position_prior_sd=paper["prior_sd"], title="simulated hand twisting",
+        parameters=parameters,
     )  # fmt: skip
 
 
