@@ -1,5 +1,6 @@
 # Entry point: `snakemake --cores 2` here runs the whole pipeline in workflow/.
 
+
 include: "workflow/Snakefile"
 
 

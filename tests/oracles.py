@@ -107,7 +107,7 @@ def joint_jacobian(motions, positions, gyroscopes, accelerometer_sd, gyroscope_s
     samples, count = len(motions), len(positions)
     rows, base = 3 * (count + gyroscopes), 3 * (count - 1)
     out = np.zeros((samples * rows, base + 9 * samples))
-    for t, (rate, acceleration) in enumerate(zip(motions[:, :3], motions[:, 3:6])):
+    for t, (rate, acceleration) in enumerate(zip(motions[:, :3], motions[:, 3:6], strict=True)):
         at, col = t * rows, base + 9 * t
         A = skew(rate) @ skew(rate) + skew(acceleration)
         for k, r in enumerate(positions):

@@ -38,7 +38,7 @@ def joint_residual(x, model, force, rate):
     motions = x[12:].reshape(-1, 9) * np.repeat([1.0, 100.0, 10.0], 3)
     parts = [
         oracles.whitened_residual(m, positions, f, w, model.noise)
-        for m, f, w in zip(motions, force, rate)
+        for m, f, w in zip(motions, force, rate, strict=True)
     ]
     return np.concatenate(parts)
 
@@ -46,8 +46,10 @@ def joint_residual(x, model, force, rate):
 def test_is_the_joint_optimum():
     """66 unknowns; the same positions to 1e-7 m, the same motion and the same cost."""
     model, _, force, rate = problem()
-    start = [np.concatenate([w.mean(axis=0), np.zeros(3), f.mean(axis=0)])
-             for f, w in zip(force, rate)]
+    start = [
+        np.concatenate([w.mean(axis=0), np.zeros(3), f.mean(axis=0)])
+        for f, w in zip(force, rate, strict=True)
+    ]
     start = np.array(start) / np.repeat([1.0, 100.0, 10.0], 3)
     x = np.concatenate([model.array.parameters * 100, start.ravel()])
     best = least_squares(
@@ -60,9 +62,7 @@ def test_is_the_joint_optimum():
     )
     motions = best.x[12:].reshape(-1, 9) * np.repeat([1.0, 100.0, 10.0], 3)
     np.testing.assert_allclose(found.motion.motion.angular_rate, motions[:, :3], atol=1e-5)
-    np.testing.assert_allclose(
-        found.motion.motion.angular_acceleration, motions[:, 3:6], atol=1e-2
-    )
+    np.testing.assert_allclose(found.motion.motion.angular_acceleration, motions[:, 3:6], atol=1e-2)
     apart = np.sum((rate - rate.mean(axis=1, keepdims=True)) ** 2) / 0.02**2
     assert found.cost[-1] + apart == pytest.approx(2 * best.cost, rel=1e-6)
 
@@ -91,9 +91,7 @@ def test_errors_have_the_size_fisher_information_says():
     for _ in range(30):
         motion, force, rate = simulate(rng, model, 20)
         found = calibrate_bcd(model, force, rate)
-        jacobian = oracles.joint_jacobian(
-            np.hstack(motion[:3]), array.relative, 2, 0.04, 0.02
-        )
+        jacobian = oracles.joint_jacobian(np.hstack(motion[:3]), array.relative, 2, 0.04, 0.02)
         error = (found.positions - array.relative)[1:].ravel()
         total += error @ oracles.position_information(jacobian, 12) @ error
     assert 0.63 < total / 360 < 1.5
@@ -128,7 +126,7 @@ def test_snapshots():
     """Positions after the iterations asked for, and the result for those never reached."""
     model, _, force, rate = problem()
     found = calibrate_bcd(model, force, rate, limit=20, tolerance=0.0, marks=(12, 3, 50))
-    for mark, snapshot in zip((3, 12, 20), found.snapshots):
+    for mark, snapshot in zip((3, 12, 20), found.snapshots, strict=True):
         short = calibrate_bcd(model, force, rate, limit=mark, tolerance=0.0)
         np.testing.assert_allclose(snapshot, short.positions, rtol=1e-13, atol=1e-16)
     assert np.abs(found.snapshots[0] - found.snapshots[1]).max() > 1e-9

@@ -73,9 +73,7 @@ def test_flat_phi_is_the_limit_of_a_wide_prior(form):
         lambda r: oracles.proper_log_likelihood(data[0], r, covariance, rates, phi_sd=3e3)
     )
     derived = difference(lambda r: Likelihood.of(model, *data).on(r, rates))
-    printed = difference(
-        lambda r: Likelihood.of(model, *data, determinant="printed").on(r, rates)
-    )
+    printed = difference(lambda r: Likelihood.of(model, *data, determinant="printed").on(r, rates))
     assert derived == pytest.approx(wide, abs=0.2)  # the prior is wide, not flat
     assert abs(printed - wide) > 3.0
 
@@ -106,8 +104,12 @@ def test_elimination_of_phi(form):
     collapsed = Collapsed.of(model, *data)
     C, b, X, phi, const, logdet, inverse = collapsed.reduce(positions)
     H = oracles.linear_matrix(positions)
-    w = np.stack([rates[0, :, i] * rates[0, :, j] for i, j in
-                  ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))])
+    w = np.stack(
+        [
+            rates[0, :, i] * rates[0, :, j]
+            for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+        ]
+    )
     h = oracles.nonlinear_part(rates[0], positions).T
     B = np.linalg.lstsq(w.T, h.T, rcond=None)[0].T
     y = (data[0] - data[0].mean(axis=1, keepdims=True)).reshape(len(data[0]), -1).T

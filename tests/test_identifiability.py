@@ -19,8 +19,9 @@ def motions(kind, seed=1) -> Motion:
     """Motions of SAMPLES instants, by where omega and omega_dot point."""
     rng = np.random.default_rng(seed)
     axis = directions(rng, ())
-    rate, acceleration = 10 * rng.standard_normal((SAMPLES, 1)), 300 * rng.standard_normal(
-        (SAMPLES, 1)
+    rate, acceleration = (
+        10 * rng.standard_normal((SAMPLES, 1)),
+        300 * rng.standard_normal((SAMPLES, 1)),
     )
     varying = directions(rng, (SAMPLES,))
     free = 300 * rng.standard_normal((SAMPLES, 3))

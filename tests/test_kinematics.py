@@ -115,19 +115,18 @@ def test_force_rate_is_the_time_derivative_at_each_triad():
     at = motion.at(times)
     force = np.stack([np.asarray(kinematics.specific_force(at.select(t), r)) for t in range(50)])
     exact = np.stack([np.asarray(kinematics.force_rate(at.select(t), r)) for t in range(4, 46)])
-    np.testing.assert_allclose(
-        stencil(force, FIRST, 1), exact, atol=1e-7 * np.abs(exact).max()
-    )
+    np.testing.assert_allclose(stencil(force, FIRST, 1), exact, atol=1e-7 * np.abs(exact).max())
 
 
 def test_random_motions_have_their_magnitudes():
     """Seed 6; sds of 30 000 normals are within 2.5 % (six sigma: false alarm 1e-8)."""
     rng = np.random.default_rng(6)
     sizes = (3.0, 40.0, 9.0)
-    for field, size in zip(sphere_motion(rng, (2, 50), *sizes), sizes):
+    for field, size in zip(sphere_motion(rng, (2, 50), *sizes)[:3], sizes, strict=True):
         assert field.shape == (2, 50, 3)
         np.testing.assert_allclose(np.linalg.norm(field, axis=-1), size, rtol=1e-13)
-    for field, size in zip(normal_motion(rng, (10000,), *sizes, 5.0, 7.0), (*sizes, 5.0, 7.0)):
+    five = (*sizes, 5.0, 7.0)
+    for field, size in zip(normal_motion(rng, (10000,), *five), five, strict=True):
         assert np.std(field) == pytest.approx(size, rel=0.025)
 
 

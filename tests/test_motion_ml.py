@@ -95,7 +95,7 @@ def test_noise_free_motion_is_recovered():
     model = ArrayModel.isotropic(mimu4444(), 0.04, 0.001)
     truth, force, rate = simulate(rng, model, 30, noise=False)
     found = estimate_motion(model, force, rate)
-    for exact, field in zip(truth[:3], found.motion[:3]):
+    for exact, field in zip(truth[:3], found.motion[:3], strict=True):
         np.testing.assert_allclose(field, exact, atol=1e-8 * np.abs(exact).max())
     assert found.converged.all()
     assert np.all(np.abs(found.cost) < 1e-4)

@@ -23,9 +23,7 @@ def test_forms_of_a_covariance():
         noise = Noise.of(2, 2, given, given)
         np.testing.assert_allclose(noise.accelerometer, expected, rtol=1e-14)
         np.testing.assert_allclose(noise.gyroscope, expected, rtol=1e-14)
-        np.testing.assert_allclose(
-            noise.accelerometer_precision @ expected, np.eye(6), atol=1e-9
-        )
+        np.testing.assert_allclose(noise.accelerometer_precision @ expected, np.eye(6), atol=1e-9)
 
 
 def test_triad_weights_only_for_isotropic_triads():

@@ -88,16 +88,15 @@ def test_seed_and_names_make_the_run(target, starts):
     one = run_chains(target, starts, STEP, 20, 5, seed=4, quiet=True)
     same(one, run_chains(target, starts, STEP, 20, 5, seed=4, quiet=True))
     for other in ({"seed": 5}, {"seed": 4, "names": ("else",)}):
-        assert np.any(run_chains(target, starts, STEP, 20, 5, quiet=True, **other).draws != one.draws)
+        two = run_chains(target, starts, STEP, 20, 5, quiet=True, **other)
+        assert np.any(two.draws != one.draws)
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_threads_do_not_change_the_run(target, workers, monkeypatch):
     starts = np.tile(target.prior.mean, (4, 1))
     expected = run_chains(target, starts, STEP, 30, 5, seed=5, quiet=True)
-    monkeypatch.setattr(
-        pmmh, "ThreadPoolExecutor", lambda max_workers: ThreadPoolExecutor(workers)
-    )
+    monkeypatch.setattr(pmmh, "ThreadPoolExecutor", lambda max_workers: ThreadPoolExecutor(workers))
     same(run_chains(target, starts, STEP, 30, 5, seed=5, quiet=True), expected)
 
 

@@ -32,4 +32,7 @@ def library(stage: str) -> list[str]:
 def effective(config: dict, scale: str, *sections: str) -> dict:
     """The part of the configuration a rule depends on, with one scale resolved."""
     names = ("seed", "array", "noise", *sections)
-    return {**{name: config[name] for name in names}, "scale": {"name": scale, **config["scales"][scale]}}
+    return {
+        **{name: config[name] for name in names},
+        "scale": {"name": scale, **config["scales"][scale]},
+    }

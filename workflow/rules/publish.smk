@@ -7,11 +7,11 @@ rule publish_figure:
         PUBLISHED.format("figures"),
     output:
         "paper_figures/{name}.{kind}",
+    log:
+        "results/logs/publish/{name}.{kind}.log",
     wildcard_constraints:
         name=r"\d{4}_fig\d",
         kind="pdf|png|csv",
-    log:
-        "results/logs/publish/{name}.{kind}.log",
     shell:
         "cp {input:q} {output:q} 2> {log:q}"
 
@@ -21,11 +21,11 @@ rule publish_table:
         PUBLISHED.format("tables"),
     output:
         "paper_figures/{name}.{kind}",
+    log:
+        "results/logs/publish/{name}.{kind}.log",
     wildcard_constraints:
         name=r"\d{4}_table\d",
         kind="csv|tex|md",
-    log:
-        "results/logs/publish/{name}.{kind}.log",
     shell:
         "cp {input:q} {output:q} 2> {log:q}"
 
@@ -35,9 +35,9 @@ rule publish_claims:
         "results/{}/claims/claims.{{kind}}".format(config["scale"]),
     output:
         "paper_figures/claims.{kind}",
-    wildcard_constraints:
-        kind="csv|md",
     log:
         "results/logs/publish/claims.{kind}.log",
+    wildcard_constraints:
+        kind="csv|md",
     shell:
         "cp {input:q} {output:q} 2> {log:q}"

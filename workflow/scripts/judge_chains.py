@@ -2,7 +2,7 @@
 
 from job import job
 
-with job(snakemake) as settings:  # noqa: F821
+with job(snakemake) as settings:
     import numpy as np
 
     from imuarray.posterior.store import read_chains
@@ -10,13 +10,13 @@ with job(snakemake) as settings:  # noqa: F821
     from imuarray.provenance import stamp, write_csv, write_json
     from imuarray.recording import read_truth
 
-    chains, tree = read_chains(snakemake.input.chains)  # noqa: F821
+    chains, tree = read_chains(snakemake.input.chains)
     labels = tree["posterior"]["accelerometer"].to_numpy().tolist()
-    truth = read_truth(snakemake.input.recording)["position"].to_numpy()[1:]  # noqa: F821
+    truth = read_truth(snakemake.input.recording)["position"].to_numpy()[1:]
     threshold = settings["paper2021"]["rhat_threshold"]
     verdict, table, burn_in = summarise(chains, labels, threshold, np.asarray(truth))
     for name in ("samples", "draws_per_sample"):
         verdict[name] = int(tree.attrs[name])
-    write_json(verdict | {"stamp": stamp(settings, settings["seed"])}, snakemake.output.verdict)  # noqa: F821
-    write_csv(table, snakemake.output.coordinates)  # noqa: F821
-    write_csv(burn_in, snakemake.output.burn_in)  # noqa: F821
+    write_json(verdict | {"stamp": stamp(settings, settings["seed"])}, snakemake.output.verdict)
+    write_csv(table, snakemake.output.coordinates)
+    write_csv(burn_in, snakemake.output.burn_in)

@@ -2,7 +2,7 @@
 
 from job import job
 
-with job(snakemake) as settings:  # noqa: F821
+with job(snakemake) as settings:
     import numpy as np
 
     from imuarray.config import model_from
@@ -15,6 +15,6 @@ with job(snakemake) as settings:  # noqa: F821
     motions = [(rate, acceleration, force) for force in np.array([0.0, 1.0, 10.0, 100.0])]
     table = rmse_against_motion(
         model_from(settings), settings["seed"], paper["fig5_samples"], motions,
-        options(settings, [max(paper["fig4_iterations"])]), snakemake.threads, quiet=False,  # noqa: F821
+        options(settings, [max(paper["fig4_iterations"])]), snakemake.threads, quiet=False,
     )  # fmt: skip
-    write_csv(table, snakemake.output[0])  # noqa: F821
+    write_csv(table, snakemake.output[0])

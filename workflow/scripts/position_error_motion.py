@@ -2,7 +2,7 @@
 
 from job import job
 
-with job(snakemake) as settings:  # noqa: F821
+with job(snakemake) as settings:
     import numpy as np
 
     from imuarray.config import model_from
@@ -18,6 +18,6 @@ with job(snakemake) as settings:  # noqa: F821
     ]
     table = rmse_against_motion(
         model_from(settings), settings["seed"], paper["fig5_samples"], motions,
-        options(settings, [paper["fig5_iterations"]]), snakemake.threads, quiet=False,  # noqa: F821
+        options(settings, [paper["fig5_iterations"]]), snakemake.threads, quiet=False,
     )  # fmt: skip
-    write_csv(table, snakemake.output[0])  # noqa: F821
+    write_csv(table, snakemake.output[0])

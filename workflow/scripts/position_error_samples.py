@@ -2,7 +2,7 @@
 
 from job import job
 
-with job(snakemake) as settings:  # noqa: F821
+with job(snakemake) as settings:
     from imuarray.config import model_from
     from imuarray.provenance import write_csv
     from imuarray.studies.position_error import rmse_against_samples
@@ -11,6 +11,6 @@ with job(snakemake) as settings:  # noqa: F821
     paper = settings["paper2017"]
     table = rmse_against_samples(
         model_from(settings), settings["seed"], paper["fig4_samples"], magnitudes(paper),
-        options(settings, paper["fig4_iterations"]), snakemake.threads, quiet=False,  # noqa: F821
+        options(settings, paper["fig4_iterations"]), snakemake.threads, quiet=False,
     )  # fmt: skip
-    write_csv(table, snakemake.output[0])  # noqa: F821
+    write_csv(table, snakemake.output[0])

@@ -2,7 +2,7 @@
 
 from job import job
 
-with job(snakemake) as settings:  # noqa: F821
+with job(snakemake) as settings:
     import numpy as np
 
     from imuarray.config import model_from
@@ -16,6 +16,6 @@ with job(snakemake) as settings:  # noqa: F821
         model_from(settings), settings["seed"], rates,
         np.radians(paper["angular_acceleration_dps2"]), paper["specific_force"],
         paper["fig3_position_sds"], scale["realisations"],
-        np.radians(paper["gyroscope_range_dps"]), snakemake.threads,  # noqa: F821
+        np.radians(paper["gyroscope_range_dps"]), snakemake.threads,
     )  # fmt: skip
-    write_csv(table, snakemake.output[0])  # noqa: F821
+    write_csv(table, snakemake.output[0])

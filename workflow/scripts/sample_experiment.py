@@ -5,10 +5,10 @@ N and sigma_q are tuned here, on the subset itself, as in section III-C.
 
 from job import job
 
-with job(snakemake) as settings:  # noqa: F821
+with job(snakemake) as settings:
     import numpy as np
-    from chains import sample_paired
 
+    from chains import sample_paired
     from imuarray.posterior import CompiledTarget
     from imuarray.posterior.tuning import (
         acceptance_sweep,
@@ -20,10 +20,10 @@ with job(snakemake) as settings:  # noqa: F821
     from imuarray.streams import stream
     from imuarray.studies.bayes import mode_of, select_disjoint, target_for
 
-    samples, kind = int(snakemake.wildcards.samples), snakemake.wildcards.kind  # noqa: F821
+    samples, kind = int(snakemake.wildcards.samples), snakemake.wildcards.kind
     paper, scale, seed = settings["paper2021"], settings["scale"], settings["seed"]
     names = ("experiment", kind, samples)
-    whole = read_recording(snakemake.input.recording)  # noqa: F821
+    whole = read_recording(snakemake.input.recording)
     recording = whole.select(select_disjoint(whole, paper["samples"])[samples])
     assumed = settings["experiment"]["accelerometer_sd"]
     target = target_for(settings, recording, 1, assumed, spread=True)
@@ -42,5 +42,5 @@ with job(snakemake) as settings:  # noqa: F821
     step = choose_step(steps, rates, paper["acceptance_target"])
     sample_paired(
         settings, recording, target, step, scale["experiment_transitions"][f"T{samples}"],
-        names, snakemake.output[0], {"samples": samples, "draws_per_sample": draws},  # noqa: F821
+        names, snakemake.output[0], {"samples": samples, "draws_per_sample": draws},
     )  # fmt: skip

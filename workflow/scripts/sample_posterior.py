@@ -2,21 +2,20 @@
 
 from job import job
 
-with job(snakemake) as settings:  # noqa: F821
+with job(snakemake) as settings:
     import json
 
     from chains import sample_paired
-
     from imuarray.recording import read_recording
     from imuarray.studies.bayes import target_for
 
-    samples = int(snakemake.wildcards.samples)  # noqa: F821
-    recording = read_recording(snakemake.input.recording)  # noqa: F821
-    with open(snakemake.input.tuning, encoding="utf-8") as handle:  # noqa: F821
+    samples = int(snakemake.wildcards.samples)
+    recording = read_recording(snakemake.input.recording)
+    with open(snakemake.input.tuning, encoding="utf-8") as handle:
         tuning = json.load(handle)
     target = target_for(settings, recording, tuning["draws"])
     sample_paired(
         settings, recording, target, tuning["step_length_m"],
         settings["scale"]["transitions"][f"T{samples}"], ("pmmh", samples),
-        snakemake.output[0], {"samples": samples, "draws_per_sample": tuning["draws"]},  # noqa: F821
+        snakemake.output[0], {"samples": samples, "draws_per_sample": tuning["draws"]},
     )  # fmt: skip

@@ -6,7 +6,7 @@ experiment; ``simulation`` really has the large noise that the analysis assumes.
 
 from job import job
 
-with job(snakemake) as settings:  # noqa: F821
+with job(snakemake) as settings:
     from imuarray.provenance import stamp
     from imuarray.recording import write_recording
     from imuarray.studies.bayes import simulate_twisting
@@ -14,8 +14,11 @@ with job(snakemake) as settings:  # noqa: F821
     noise = {
         "standin": settings["noise"]["accelerometer_sd"],
         "simulation": settings["experiment"]["accelerometer_sd"],
-    }[snakemake.wildcards.kind]  # noqa: F821
+    }[snakemake.wildcards.kind]
     recording, truth = simulate_twisting(settings, noise)
     write_recording(
-        recording, snakemake.output[0], truth, stamp(settings, settings["seed"])  # noqa: F821
+        recording,
+        snakemake.output[0],
+        truth,
+        stamp(settings, settings["seed"]),
     )

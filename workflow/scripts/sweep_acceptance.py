@@ -2,7 +2,7 @@
 
 from job import job
 
-with job(snakemake) as settings:  # noqa: F821
+with job(snakemake) as settings:
     import numpy as np
     import pandas as pd
 
@@ -12,9 +12,9 @@ with job(snakemake) as settings:  # noqa: F821
     from imuarray.streams import stream
     from imuarray.studies.bayes import mode_of, target_for
 
-    samples, paper = int(snakemake.wildcards.samples), settings["paper2021"]  # noqa: F821
-    recording = read_recording(snakemake.input.recording)  # noqa: F821
-    sweep = pd.read_csv(snakemake.input.variance)  # noqa: F821
+    samples, paper = int(snakemake.wildcards.samples), settings["paper2021"]
+    recording = read_recording(snakemake.input.recording)
+    sweep = pd.read_csv(snakemake.input.variance)
     draws = choose_draws(sweep.draws, sweep.variance, paper["variance_target"])
     target = target_for(settings, recording, draws)
     steps = np.geomspace(*(paper["sweep_steps"][key] for key in ("first", "last", "count")))
@@ -25,8 +25,12 @@ with job(snakemake) as settings:  # noqa: F821
     )  # fmt: skip
     table = pd.DataFrame(
         {
-            "samples": samples, "draws": draws, "step_length_m": steps, "acceptance": rates,
-            "acceptance_se": np.sqrt(rates * (1 - rates) / count), "transitions": count,
+            "samples": samples,
+            "draws": draws,
+            "step_length_m": steps,
+            "acceptance": rates,
+            "acceptance_se": np.sqrt(rates * (1 - rates) / count),
+            "transitions": count,
         }  # fmt: skip
     )
-    write_csv(table, snakemake.output[0])  # noqa: F821
+    write_csv(table, snakemake.output[0])

@@ -2,7 +2,7 @@
 
 from job import job
 
-with job(snakemake) as settings:  # noqa: F821
+with job(snakemake) as settings:
     import numpy as np
     import pandas as pd
 
@@ -12,8 +12,8 @@ with job(snakemake) as settings:  # noqa: F821
     from imuarray.streams import stream
     from imuarray.studies.bayes import target_for
 
-    samples, scale = int(snakemake.wildcards.samples), settings["scale"]  # noqa: F821
-    recording = read_recording(snakemake.input.recording)  # noqa: F821
+    samples, scale = int(snakemake.wildcards.samples), settings["scale"]
+    recording = read_recording(snakemake.input.recording)
     draws, count = settings["paper2021"]["sweep_draws"], scale["variance_realisations"]
     likelihood = target_for(settings, recording, 1).likelihood
     variances = variance_sweep(
@@ -22,8 +22,11 @@ with job(snakemake) as settings:  # noqa: F821
     )  # fmt: skip
     table = pd.DataFrame(
         {
-            "samples": samples, "draws": draws, "variance": variances,
-            "variance_se": variances * np.sqrt(2 / (count - 1)), "realisations": count,
+            "samples": samples,
+            "draws": draws,
+            "variance": variances,
+            "variance_se": variances * np.sqrt(2 / (count - 1)),
+            "realisations": count,
         }  # fmt: skip
     )
-    write_csv(table, snakemake.output[0])  # noqa: F821
+    write_csv(table, snakemake.output[0])

@@ -198,6 +198,7 @@ def calibrate_bcd(
         positions, tolerance, cost_tolerance, limit, marks, snapshots, cost, step,
     )  # fmt: skip
     explain(status)
+    require_rotation(data, positions)  # again: the start's errors no longer blur the motion
     motion = motion_from(data, positions)
     return Calibration(positions, motion, cost[:done], step[:done], status == 1, snapshots)
 
@@ -206,14 +207,20 @@ def require_rotation(data: Collapsed, positions) -> None:
     """Raise IdentifiabilityError where omega and omega_dot stay on one axis throughout.
 
     Every A_n = Omega(omega)^2 + Omega(omega_dot) is then blind along that axis (Lemma 1).
-    Noise and the start's wrong positions would hide this from a plain rank test, so the
-    motion off the common axis is compared with what they can feign: 5 sigma of noise, and
-    a tenth of the centrifugal and Euler terms (positions wrong by a tenth of the array).
+    The same where there is no angular rate: omega_dot alone leaves the scale free. Noise
+    and the start's wrong positions would hide this from a plain rank test, so the motion
+    off the common axis is compared with what they can feign: 5 sigma of noise, and a tenth
+    of the centrifugal and Euler terms (positions wrong by a tenth of the array).
     """
     axis = np.linalg.svd(data.mean.T, full_matrices=False)
     spread = axis[1] / np.sqrt(data.samples)
     informed = data.gyroscope_information[[0, 1, 2], [0, 1, 2]]
     noise = np.sqrt(1.0 / max(np.median(informed), 1e-300))
+    if spread[0] <= 5 * noise:
+        raise IdentifiabilityError(
+            "motion: expected rotation, found no angular rate above the gyroscopes' noise: the"
+            " array's scale is then undetermined"
+        )
     if spread[1] > max(1e-3 * spread[0], 5 * noise):
         return
     acceleration = motion_from(data, positions).motion.angular_acceleration

@@ -107,6 +107,10 @@ class Collapsed:
         kernels.weighted_moments(positions, self.weighted, moments)
         full = np.empty((12, self.samples))
         kernels.project(moments, known.rows, known.values, full)
-        b, phi, const = np.empty((6, self.samples)), np.empty((6, self.samples)), np.empty(self.samples)
+        b, phi, const = (
+            np.empty((6, self.samples)),
+            np.empty((6, self.samples)),
+            np.empty(self.samples),
+        )
         kernels.reduce_linear(full, X, inverse, b, phi, const, self.energy)
         return C, b, X, phi, const, logdet, inverse

@@ -83,6 +83,7 @@ def calibrate_gauss_newton(
     x, p, costs, steps, converged, covariance = _iterate(given, x, p, tolerance, limit)
     size = 3 * (model.array.accelerometers - 1)
     found = np.vstack([np.zeros(3), p[:size].reshape(-1, 3)])
+    require_rotation(data, found)
     motion = Motion.of(x[:, :3], x[:, 3:6], x[:, 6:9])
     flags = np.full(len(x), converged)
     estimate = MotionEstimate(motion, np.full(len(x), np.nan), np.full(len(x), len(costs)), flags)

@@ -147,8 +147,7 @@ def quadratic(x, y, z, C, b0, b1, b2, b3, b4, b5):
     )
     q += w5 * (
         C[5, 5] * w5
-        + 2.0
-        * (C[5, 0] * w0 + C[5, 1] * w1 + C[5, 2] * w2 + C[5, 3] * w3 + C[5, 4] * w4 - b5)
+        + 2.0 * (C[5, 0] * w0 + C[5, 1] * w1 + C[5, 2] * w2 + C[5, 3] * w3 + C[5, 4] * w4 - b5)
     )
     return q
 
@@ -172,9 +171,7 @@ def _rate_step(x, y, z, C, b, m, P, damping):
     jac = np.empty((6, 3))
     for a in range(6):
         c = C[a]
-        gradient[a] = (
-            c[0] * w0 + c[1] * w1 + c[2] * w2 + c[3] * w3 + c[4] * w4 + c[5] * w5 - b[a]
-        )
+        gradient[a] = c[0] * w0 + c[1] * w1 + c[2] * w2 + c[3] * w3 + c[4] * w4 + c[5] * w5 - b[a]
         jac[a, 0] = 2.0 * x * c[0] + y * c[3] + z * c[4]
         jac[a, 1] = 2.0 * y * c[1] + x * c[3] + z * c[5]
         jac[a, 2] = 2.0 * z * c[2] + x * c[4] + y * c[5]

@@ -79,7 +79,9 @@ def array_from_csv(path: str, gyroscopes: int | None = None) -> Array:
             if len(row) != 4 or not np.all(np.isfinite(values[-1])):
                 raise ValueError
         except ValueError:
-            raise InputError(f"{path}:{number}: expected label,x,y,z in metres, found {row}") from None
+            raise InputError(
+                f"{path}:{number}: expected label,x,y,z in metres, found {row}"
+            ) from None
         labels.append(row[0])
     return _checked(np.array(values).reshape(-1, 3), labels, gyroscopes, path)
 
@@ -95,7 +97,12 @@ def array_from_config(section: dict) -> Array:
     count = section.get("gyroscopes")
     boards = {"mimu4444": mimu4444, "mimu4444_corners": mimu4444_corners}
     if "positions" in section:
-        values = np.asarray(section["positions"], float)
+        try:
+            values = np.asarray(section["positions"], float)
+        except (TypeError, ValueError):
+            raise InputError(
+                f"array.positions: expected rows of three numbers, found {section['positions']}"
+            ) from None
         labels = [str(k + 1) for k in range(len(values))]
         return _checked(values, section.get("labels", labels), count, "array.positions")
     if "file" in section:
@@ -105,12 +112,18 @@ def array_from_config(section: dict) -> Array:
             f"array: expected board ({', '.join(boards)}), file or positions, found {section}"
         )
     board = boards[section["board"]]()
-    return board if count is None else Array(board.positions, board.labels, count, board.name)
+    checked = _checked(board.positions, board.labels, count, board.name)
+    return board if count is None else checked
 
 
 def _checked(values, labels, gyroscopes, where) -> Array:
     if values.ndim != 2 or values.shape[1] != 3:
         raise InputError(f"{where}: expected rows of x, y, z, found shape {values.shape}")
+    if not np.all(np.isfinite(values)):
+        row = int(np.argwhere(~np.isfinite(values))[0, 0]) + 1
+        raise InputError(
+            f"{where}: expected finite positions, found {values[row - 1]} in row {row}"
+        )
     if len(set(labels)) != len(values):
         raise InputError(f"{where}: expected {len(values)} different labels, found {list(labels)}")
     require_planar_extent(values, where)

@@ -39,9 +39,7 @@ class ArrayModel:
     @classmethod
     def isotropic(cls, array, accelerometer_sd, gyroscope_sd, effects=()) -> ArrayModel:
         """The papers' noise: one sd (m/s^2, rad/s) for all triads of a kind."""
-        noise = Noise.of(
-            array.accelerometers, array.gyroscopes, accelerometer_sd, gyroscope_sd
-        )
+        noise = Noise.of(array.accelerometers, array.gyroscopes, accelerometer_sd, gyroscope_sd)
         return cls(array, noise, tuple(effects))
 
     @cached_property
@@ -63,7 +61,10 @@ class ArrayModel:
     @cached_property
     def effect_prior_sd(self) -> np.ndarray:
         """Prior sd of every effect parameter, (P,), in the effects' units."""
-        parts = [np.full(int(np.prod(s)), e.prior_sd) for e, s in zip(self.chain, self.shapes, strict=True)]
+        parts = [
+            np.full(int(np.prod(s)), e.prior_sd)
+            for e, s in zip(self.chain, self.shapes, strict=True)
+        ]
         return np.concatenate([np.empty(0), *parts])
 
     @property
@@ -89,7 +90,9 @@ class ArrayModel:
         """Flat effect parameters from a dict; absent ones are zero, scalars are spread."""
         unknown = set(values) - set(self.effects)
         if unknown:
-            raise InputError(f"effects: expected values for {self.effects}, found {sorted(unknown)}")
+            raise InputError(
+                f"effects: expected values for {self.effects}, found {sorted(unknown)}"
+            )
         parts = [
             np.broadcast_to(np.asarray(values.get(item.id, 0.0), float), shape).ravel()
             for item, shape in zip(self.chain, self.shapes, strict=True)

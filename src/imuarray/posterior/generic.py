@@ -79,9 +79,16 @@ class GenericLikelihood:
         given = self.given
         return float(
             _estimate(
-                given.model, self.steps, self.start, np.asarray(parameters),
-                given.specific_force, given.angular_rate, given.keep,
-                given.whiten_force, given.whiten_rate, normals,
+                given.model,
+                self.steps,
+                self.start,
+                np.asarray(parameters),
+                given.specific_force,
+                given.angular_rate,
+                given.keep,
+                given.whiten_force,
+                given.whiten_rate,
+                normals,
             )  # fmt: skip
         )
 

@@ -90,7 +90,7 @@ class Likelihood:
 
         if threads == 1:
             return block((rng, 0, self.samples))
-        jobs = list(zip(rng.spawn(threads), edges[:-1], edges[1:]))
+        jobs = list(zip(rng.spawn(threads), edges[:-1], edges[1:], strict=True))
         return float(sum(_pool(threads).map(block, jobs)))
 
     def realisations(self, positions, draws: int, count: int, rng) -> np.ndarray:

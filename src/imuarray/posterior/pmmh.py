@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -100,38 +101,38 @@ def run_chains(
         A start with no finite log target, or a checkpoint that belongs to another key.
     """
     starts = np.atleast_2d(np.asarray(starts, float))
-    done = _load(checkpoint, key, starts.shape, thin) if checkpoint else None
-    if done is None:
-        values = [
-            target.log_target(start, stream(seed, *names, "start", chain))
-            for chain, start in enumerate(starts)
-        ]
-        if not np.all(np.isfinite(values)):
-            raise InputError(f"pmmh: expected a finite log target at every start, found {values}")
-        state = emcee.State(starts.copy(), log_prob=np.array(values))
-        past = [np.empty((len(starts), 0, starts.shape[1])), np.empty((len(starts), 0))]
-        accepted = np.zeros(len(starts), np.int64)
-    else:
-        past, accepted = [done["draws"], done["log_target"]], done["accepted"]
-        state = emcee.State(past[0][:, -1].copy(), log_prob=past[1][:, -1].copy())
+    done = _load(checkpoint, key, starts.shape, thin, draws) if checkpoint else None
+    past, state, accepted = _begin(target, starts, seed, names) if done is None else done
     move = PseudoMarginalMove(target, step, thin, seed, names, iteration=past[0].shape[1])
     move.accepted = accepted
-    sampler = emcee.EnsembleSampler(
-        len(starts), starts.shape[1], _never, moves=move, vectorize=True
-    )
+    sampler = emcee.EnsembleSampler(*starts.shape, _never, moves=move, vectorize=True)
     seldom = 0.2 if sys.stderr.isatty() else 15.0  # seconds; a log file needs few lines
-    done = past[0].shape[1]
-    with tqdm(total=draws, initial=done, disable=quiet, unit="draw", mininterval=seldom) as bar:
+    first = past[0].shape[1]
+    with tqdm(total=draws, initial=first, disable=quiet, unit="draw", mininterval=seldom) as bar:
         while past[0].shape[1] < draws:
             count = min(block, draws - past[0].shape[1])
             sampler.reset()
-            for state in sampler.sample(state, iterations=count, skip_initial_state_check=True):
+            for new in sampler.sample(state, iterations=count, skip_initial_state_check=True):
                 bar.update()
+            state = new
             past[0] = np.concatenate([past[0], sampler.get_chain().swapaxes(0, 1)], axis=1)
             past[1] = np.concatenate([past[1], sampler.get_log_prob().T], axis=1)
             if checkpoint:
                 _save(checkpoint, key, thin, past, move.accepted)
     return Chains(past[0], past[1], move.accepted / (thin * draws), thin, step)
+
+
+def _begin(target, starts, seed, names):
+    """Nothing drawn yet: ([draws, log target], emcee's state at the starts, accepted)."""
+    values = [
+        target.log_target(start, stream(seed, *names, "start", chain))
+        for chain, start in enumerate(starts)
+    ]
+    if not np.all(np.isfinite(values)):
+        raise InputError(f"pmmh: expected a finite log target at every start, found {values}")
+    past = [np.empty((len(starts), 0, starts.shape[1])), np.empty((len(starts), 0))]
+    state = emcee.State(starts.copy(), log_prob=np.array(values))
+    return past, state, np.zeros(len(starts), np.int64)
 
 
 def _never(theta):
@@ -141,17 +142,27 @@ def _never(theta):
 
 def _save(path, key, thin, past, accepted) -> None:
     with atomic_write(Path(path)) as temporary, open(temporary, "wb") as handle:
-        np.savez(
-            handle, key=key, thin=thin, draws=past[0], log_target=past[1], accepted=accepted
-        )
+        np.savez(handle, key=key, thin=thin, draws=past[0], log_target=past[1], accepted=accepted)
 
 
-def _load(path, key, shape, thin):
+def _load(path, key, shape, thin, draws):
+    """What `_begin` returns, from a checkpoint; None where there is none."""
     if not Path(path).exists():
         return None
-    with np.load(path, allow_pickle=False) as stored:
-        found = {name: stored[name] for name in stored.files}
-    matches = str(found["key"]) == key and int(found["thin"]) == thin
-    if not matches or found["draws"].shape[::2] != shape:
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            found = {name: stored[name] for name in stored.files}
+        matches = str(found["key"]) == key and int(found["thin"]) == thin
+        matches &= found["draws"].shape[::2] == shape and len(found["accepted"]) == shape[0]
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        raise InputError(f"{path}: expected a checkpoint, found a broken file; delete it") from None
+    if not matches:
         raise InputError(f"{path}: expected a checkpoint of this very run, found another's")
-    return found
+    if found["draws"].shape[1] > draws:
+        raise InputError(
+            f"{path}: expected at most {draws} draws, found {found['draws'].shape[1]}: the run"
+            " already went further"
+        )
+    past = [found["draws"], found["log_target"]]
+    state = emcee.State(past[0][:, -1].copy(), log_prob=past[1][:, -1].copy())
+    return past, state, found["accepted"]

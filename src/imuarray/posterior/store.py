@@ -23,7 +23,10 @@ def write_chains(path, chains: Chains, labels, prior, attrs: dict, effects=None)
     position = chains.draws[..., : 3 * count].reshape(shape)
     posterior = xr.Dataset({"position": (dims, position, {"units": "m"})}, coords)
     if effects:
-        posterior["effect_parameter"] = (("chain", "draw", "parameter"), chains.draws[..., 3 * count :])
+        posterior["effect_parameter"] = (
+            ("chain", "draw", "parameter"),
+            chains.draws[..., 3 * count :],
+        )
         posterior = posterior.assign_coords(parameter=list(effects))
     stats = xr.Dataset({"log_target": (dims[:2], chains.log_target)})
     stats["acceptance"] = (("chain",), chains.acceptance)

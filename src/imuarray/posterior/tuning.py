@@ -10,9 +10,7 @@ from imuarray.posterior.target import Target
 
 def variance_sweep(likelihood: Likelihood, positions, draws, count: int, rng) -> np.ndarray:
     """Variance of log p-hat at ``positions`` for each N in ``draws`` (figure 2), (len(draws),)."""
-    return np.array(
-        [likelihood.realisations(positions, n, count, rng).var(ddof=1) for n in draws]
-    )
+    return np.array([likelihood.realisations(positions, n, count, rng).var(ddof=1) for n in draws])
 
 
 def choose_draws(draws, variances, target: float = 0.1) -> int:

@@ -69,6 +69,4 @@ def simulate_recording(
 ):  # fmt: skip
     """A recording of a `SmoothMotion` at ``sampling_rate`` Hz for ``duration`` seconds."""
     time = np.arange(int(round(sampling_rate * duration))) / sampling_rate
-    return simulate_samples(
-        model, motion.at(time), positions, nominal, rng, time=time, **options
-    )
+    return simulate_samples(model, motion.at(time), positions, nominal, rng, time=time, **options)

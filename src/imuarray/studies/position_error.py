@@ -52,7 +52,9 @@ def _point(model, seed, names, options, samples, motion, threads, quiet):
             max(options["marks"]), options["tolerance"], options["marks"],
         )  # fmt: skip
 
-    parts = run_batches(job, batches(options["realisations"]), threads, quiet, "/".join(map(str, names)))
+    parts = run_batches(
+        job, batches(options["realisations"]), threads, quiet, "/".join(map(str, names))
+    )
     return [np.concatenate(part) for part in zip(*parts, strict=True)]
 
 
@@ -74,8 +76,12 @@ def rmse_against_samples(
             rmse, error = root_mean_square(squares[good, column])
             rows.append(
                 {
-                    "samples": samples, "iterations": mark, "rmse_m": rmse, "rmse_se_m": error,
-                    "realisations": int(good.sum()), "not_identifiable": int((~good).sum()),
+                    "samples": samples,
+                    "iterations": mark,
+                    "rmse_m": rmse,
+                    "rmse_se_m": error,
+                    "realisations": int(good.sum()),
+                    "not_identifiable": int((~good).sum()),
                     "converged_share": float(np.mean(status == 1)),
                     "median_iterations": float(np.median(iterations[good])),
                 }  # fmt: skip
@@ -99,8 +105,11 @@ def rmse_against_motion(
                 "angular_rate_dps": np.degrees(motion[0]),
                 "angular_acceleration_dps2": np.degrees(motion[1]),
                 "specific_force_mps2": motion[2],
-                "samples": samples, "iterations": options["marks"][-1],
-                "rmse_m": rmse, "rmse_se_m": error, "realisations": int(good.sum()),
+                "samples": samples,
+                "iterations": options["marks"][-1],
+                "rmse_m": rmse,
+                "rmse_se_m": error,
+                "realisations": int(good.sum()),
                 "converged_share": float(np.mean(status == 1)),
             }  # fmt: skip
         )

@@ -1,0 +1,137 @@
+"""Speed as ratios measured in one run: the compiled kernels against the slow, obvious forms.
+
+`make bench` or `python benchmarks/run.py [--out results/benchmarks.md]`. Times are medians
+of interleaved repetitions, so that a machine that slows down slows both sides.
+"""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from imuarray.config import model_from, read_config  # noqa: E402
+from imuarray.estimation import calibrate_bcd  # noqa: E402
+from imuarray.motion import normal_motion, sphere_motion  # noqa: E402
+from imuarray.posterior import Likelihood  # noqa: E402
+from imuarray.provenance import atomic_write  # noqa: E402
+from imuarray.simulation import measure  # noqa: E402
+from tests.oracles import direct_log_likelihood  # noqa: E402
+
+
+def interleaved(functions, repeats):
+    """Median seconds of each function, the functions taking turns."""
+    for function in functions:
+        function()
+    times = np.empty((repeats, len(functions)))
+    for row in times:
+        for i, function in enumerate(functions):
+            start = time.perf_counter()
+            function()
+            row[i] = time.perf_counter() - start
+    return np.median(times, axis=0)
+
+
+def dataset(model, samples, rng):
+    """2021 motion, measured at the nominal positions."""
+    sds = np.radians(1000.0), np.radians(35000.0), 20.0
+    motion = normal_motion(rng, (samples,), *sds)
+    return measure(model, motion, model.array.relative, rng)[:2]
+
+
+def against_direct(model, rng, samples=500, draws=100):
+    """Rows: the likelihood estimate, random draws included, against the 96-dimensional form."""
+    force, rate = dataset(model, samples, rng)
+    likelihood = Likelihood.of(model, force, rate)
+    mean = likelihood.data.mean.T
+    sd = np.sqrt(model.noise.gyroscope[0, 0] / model.array.gyroscopes)
+    positions = model.array.relative + 1e-4 * rng.standard_normal(model.array.positions.shape)
+    positions -= positions[0]
+    generator = np.random.Generator(np.random.PCG64DXSM(1))
+
+    def direct():
+        rates = mean[:, None] + sd * rng.standard_normal((samples, draws, 3))
+        return direct_log_likelihood(force, positions, model.noise.accelerometer, rates)
+
+    fast = [lambda n=n: likelihood.estimate(positions, draws, generator, n) for n in (1, 2)]
+    slow, one, two = interleaved([direct, *fast], 9)
+    rates = mean[:, None] + sd * rng.standard_normal((samples, draws, 3))
+    reference = direct_log_likelihood(force, positions, model.noise.accelerometer, rates)
+    error = abs(likelihood.on(positions, rates) / reference - 1)
+    return [
+        ("direct numpy form, T = 500, N = 100", f"{1e3 * slow:.1f} ms", "1"),
+        ("collapsed and compiled, one thread", f"{1e3 * one:.2f} ms", f"{slow / one:.0f}"),
+        ("collapsed and compiled, two threads", f"{1e3 * two:.2f} ms", f"{slow / two:.0f}"),
+        ("relative disagreement on given draws", f"{error:.1e}", ""),
+    ]
+
+
+def linearity(sizes, seconds) -> str:
+    """How well a + b n describes the times, and the exponent between the two largest sizes."""
+    fit = np.polyval(np.polyfit(sizes, seconds, 1), sizes)
+    off = np.max(np.abs(fit / seconds - 1))
+    last = np.log(seconds[-1] / seconds[-2]) / np.log(sizes[-1] / sizes[-2])
+    return f"a + b n within {100 * off:.0f} %, last exponent {last:.2f}"
+
+
+def growth(model, rng):
+    """Rows: the likelihood's time against T and N."""
+    generator = np.random.Generator(np.random.PCG64DXSM(1))
+    positions = model.array.relative
+    lengths, counts = [250, 500, 1000, 2000], [25, 50, 100, 200]
+    whole = dataset(model, max(lengths), rng)
+    parts = {n: Likelihood.of(model, *(y[:n] for y in whole)) for n in lengths}
+    by_length = [lambda n=n: parts[n].estimate(positions, 50, generator) for n in lengths]
+    by_count = [lambda n=n: parts[500].estimate(positions, n, generator) for n in counts]
+    rows = []
+    for name, sizes, jobs in (("T", lengths, by_length), ("N", counts, by_count)):
+        seconds = interleaved(jobs, 15)
+        listed = ", ".join(f"{n}: {1e3 * s:.2f} ms" for n, s in zip(sizes, seconds, strict=True))
+        rows.append((f"likelihood, growth in {name}", listed, linearity(sizes, seconds)))
+    return rows
+
+
+def descent(model, rng):
+    """Rows: ML-BCD per sample and iteration, and its growth in N."""
+    sizes, rows = [100, 300, 1000, 3000], []
+    motion = sphere_motion(rng, (max(sizes),), np.radians(2000), np.radians(2000), 10.0)
+    truth = model.array.relative + 1e-3 * rng.standard_normal(model.array.positions.shape)
+    force, rate, _ = measure(model, motion, truth - truth[0], rng)
+
+    def job(count, limit):
+        return lambda: calibrate_bcd(model, force[:count], rate[:count], tolerance=0.0, limit=limit)
+
+    short = interleaved([job(n, 20) for n in sizes], 5)
+    long = interleaved([job(n, 120) for n in sizes], 5)
+    seconds = (long - short) / 100
+    listed = ", ".join(f"{n}: {1e6 * s:.0f} us" for n, s in zip(sizes, seconds, strict=True))
+    name = "ML-BCD, one iteration, 32 triads, one core"
+    rows.append((name, listed, linearity(sizes, seconds)))
+    per = 1e6 * seconds[-1] / sizes[-1]
+    rows.append(("ML-BCD per sample and iteration", f"{per:.2f} us", ""))
+    return rows
+
+
+def main():
+    """Run all and print a table; write it where --out says."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("results/benchmarks.md"))
+    parser.add_argument("--config", type=Path, default=Path("config.yaml"))
+    arguments = parser.parse_args()
+    config = read_config(arguments.config)
+    model, rng = model_from(config), np.random.default_rng(config["seed"])
+    rows = against_direct(model, rng) + growth(model, rng) + descent(model, rng)
+    lines = ["| what | measured | ratio to the direct form, or growth |", "|---|---|---|"]
+    lines += [f"| {' | '.join(row)} |" for row in rows]
+    text = "\n".join(lines) + "\n"
+    print(text)
+    arguments.out.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_write(arguments.out) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,198 @@
+"""Paper 2021, figures 3 and 4: chains and posterior of IMU 2's position."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from scipy.stats import gaussian_kde, norm
+
+from imuarray.figures.style import BLACK, GREY, SKY, look, new_figure, styled
+
+TRACE_POINTS = 1000  # drawn per chain; more would not be seen
+BINS = 40
+GRID = 160
+
+
+def fig3_table(series, burn_in: int, thin: int, truth: float | None = None) -> pd.DataFrame:
+    """Trace, histogram and autocorrelation of chains ``series`` (chains, draws) in metres.
+
+    ``burn_in`` stored draws are left out of histogram and autocorrelation; a stored draw is
+    ``thin`` steps. Columns: panel (trace, histogram, autocorrelation, truth), chain (from 1),
+    step (of a draw, or the lag), low_um, high_um (of a histogram's bin), value (um, density
+    per um, or 1).
+    """
+    series = np.asarray(series, float) * 1e6
+    left = series[:, burn_in:]
+    every = max(1, series.shape[1] // TRACE_POINTS)
+    edges = np.linspace(left.min(), left.max(), BINS + 1)
+    correlation = _autocorrelations(left)
+    rows = []
+    for chain, draws in enumerate(series, start=1):
+        kept = np.arange(0, draws.size, every)
+        rows.append(_panel("trace", chain, step=(kept + 1) * thin, value=draws[kept]))
+        density = np.histogram(left[chain - 1], edges, density=True)[0]
+        rows.append(
+            _panel("histogram", chain, low_um=edges[:-1], high_um=edges[1:], value=density)
+        )
+        function = correlation[chain - 1]
+        rows.append(
+            _panel("autocorrelation", chain, step=np.arange(function.size) * thin, value=function)
+        )
+    if truth is not None:
+        rows.append(_panel("truth", 0, value=[1e6 * truth]))
+    columns = ["panel", "chain", "step", "low_um", "high_um", "value"]
+    return pd.concat(rows, ignore_index=True).reindex(columns=columns)
+
+
+def _panel(name, chain, **columns):
+    return pd.DataFrame({"panel": name, "chain": chain, **columns})
+
+
+def _autocorrelations(left) -> np.ndarray:
+    """Autocorrelations (chains, lags), up to three times the lag where all are below 0.05.
+
+    At most a quarter of the chain: what lies beyond is noise.
+    """
+    from imuarray.posterior.diagnostics import autocorrelation
+
+    longest = max(2, left.shape[1] // 4)
+    functions = np.array([autocorrelation(draws, longest) for draws in left])
+    low = np.flatnonzero((functions < 0.05).all(axis=0))
+    return functions[:, : max(20, 3 * low[0]) if low.size else longest]
+
+
+@styled
+def fig3(table: pd.DataFrame, burn_in_steps: int, name: str, footer=()):
+    """(a) whole traces, and at the scale of the posterior beside the histogram; (b) their ACF."""
+    figure = new_figure(footer, height=4.6)
+    mosaic = figure.subplot_mosaic(
+        [["whole", "whole"], ["trace", "histogram"], ["correlation", "correlation"]],
+        width_ratios=[4, 1], height_ratios=[1, 1.4, 1.2],
+    )  # fmt: skip
+    mosaic["histogram"].sharey(mosaic["trace"])
+    for panel in ("whole", "trace"):
+        _traces(mosaic[panel], table, burn_in_steps)
+    _histograms(mosaic["histogram"], table)
+    _correlations(mosaic["correlation"], table)
+    mosaic["whole"].set_title(f"(a) {name}: whole trace, and at the posterior's scale", size=8)
+    mosaic["whole"].tick_params(labelbottom=False)
+    bins = table[(table.panel == "histogram") & (table.value > 0)]
+    margin = 0.15 * (bins.high_um.max() - bins.low_um.min())
+    mosaic["trace"].set_ylim(bins.low_um.min() - margin, bins.high_um.max() + margin)
+    mosaic["trace"].set_xlabel("Step (count)")
+    for axis, place in (("whole", "upper right"), ("correlation", "upper right")):
+        mosaic[axis].legend(loc=place, ncols=2 if axis == "correlation" else 4)
+    return figure
+
+
+def _traces(axes, table, burn_in_steps):
+    for chain, rows in table[table.panel == "trace"].groupby("chain"):
+        axes.plot(rows.step, rows.value, linewidth=0.6, **_ink(chain), label=f"chain {chain}")
+    _truth(axes.axhline, table)
+    axes.axvspan(0, burn_in_steps, color="0.85", zorder=0, label="burn-in")
+    axes.set(xlim=(0, table[table.panel == "trace"].step.max()), ylabel="Position (µm)")
+
+
+def _histograms(axes, table):
+    for chain, rows in table[table.panel == "histogram"].groupby("chain"):
+        edges = [*rows.low_um, rows.high_um.iloc[-1]]
+        axes.stairs(rows.value, edges, orientation="horizontal", linewidth=0.9, **_ink(chain))
+    _truth(axes.axhline, table)
+    axes.tick_params(labelleft=False)
+    axes.set(xlabel="Density\n(1/µm)", xlim=(0, None))
+    axes.locator_params(axis="x", nbins=2)
+
+
+def _correlations(axes, table):
+    for chain, rows in table[table.panel == "autocorrelation"].groupby("chain"):
+        axes.plot(rows.step, rows.value, **_ink(chain), label=f"chain {chain}")
+    axes.axhline(0, color=GREY, linewidth=0.6)
+    axes.set(xlabel="Lag (steps)", ylabel="Autocorrelation (1)")
+    axes.set_xlim(left=0)
+    axes.set_title("(b) after burn-in", size=8)
+
+
+def _ink(chain: int) -> dict:
+    """Colour and dashes of a chain: blue and full, vermillion and dashed, ..."""
+    return look({1: 2, 2: 0}.get(int(chain), int(chain)), "marker")
+
+
+def _truth(line, table):
+    for value in table[table.panel == "truth"].value:
+        line(value, color=BLACK, linewidth=0.8, linestyle=(0, (1, 1)), label="truth")
+
+
+def fig4_table(posteriors: dict[int, np.ndarray], prior, truth) -> pd.DataFrame:
+    """Densities of a triad's coordinates around the truth (Gaussian kernels, Scott's rule).
+
+    ``posteriors[T]`` (chains, draws, 3) m after burn-in; ``prior`` mean and sd, each (3,) m;
+    ``truth`` (3,) m. Columns: distribution (prior, posterior), samples (0: prior), axis, chain
+    (0: prior), deviation_um, density_per_um, sd_um (of all chains together), truth_m.
+    """
+    rows = []
+    for number, axis in enumerate("xyz"):
+        centre, spread = (1e6 * (prior[0][number] - truth[number]), 1e6 * prior[1][number])
+        grid = centre + spread * np.linspace(-4, 4, GRID)
+        common = {"axis": axis, "truth_m": truth[number]}
+        rows.append(
+            pd.DataFrame(
+                {"distribution": "prior", "samples": 0, "chain": 0, "deviation_um": grid,
+                 "density_per_um": norm.pdf(grid, centre, spread), "sd_um": spread, **common}
+            )
+        )  # fmt: skip
+        for samples, draws in posteriors.items():
+            values = 1e6 * (draws[..., number] - truth[number])
+            for chain, one in enumerate(values, start=1):
+                grid = one.mean() + one.std(ddof=1) * np.linspace(-4, 4, GRID)
+                rows.append(
+                    pd.DataFrame(
+                        {"distribution": "posterior", "samples": samples, "chain": chain,
+                         "deviation_um": grid, "density_per_um": gaussian_kde(one)(grid),
+                         "sd_um": values.std(ddof=1), **common}
+                    )
+                )  # fmt: skip
+    return pd.concat(rows, ignore_index=True)
+
+
+@styled
+def fig4(table: pd.DataFrame, name: str, footer=()):
+    """Three panels, x, y, z; deviations on a symmetric logarithmic axis, each peak at 1."""
+    figure = new_figure(footer, height=5.0)
+    panels = figure.subplots(3, 1, sharex=True)
+    names = [samples for samples in sorted(table.samples.unique()) if samples > 0]
+    for letter, axes, (axis, rows) in zip("abc", panels, table.groupby("axis"), strict=True):
+        _density(axes, rows[rows.samples == 0], {"color": SKY, "linestyle": ":"}, "prior")
+        for index, samples in enumerate(names):
+            chosen = rows[rows.samples == samples]
+            _density(axes, chosen, look(index, "marker", "linestyle"), f"$T = {samples}$")
+        axes.axvline(0, color=BLACK, linewidth=0.8, linestyle=(0, (1, 1)), label="truth")
+        axes.set_xscale("symlog", linthresh=10, linscale=1)
+        axes.set(ylabel="Density / peak (1)", ylim=(0, 1.08))
+        truth = 1e3 * rows.truth_m.iloc[0]
+        axes.set_title(f"({letter}) {axis} of {name}, true value {truth:.4g} mm", size=8)
+        axes.text(
+            0.015, 0.94, _spreads(rows), transform=axes.transAxes, va="top", size=6.5,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1},
+        )  # fmt: skip
+    panels[-1].set_xlabel("Deviation from the true value (µm), linear within ±10")
+    panels[-1].set_xticks([-1e4, -1e3, -100, -10, 0, 10, 100, 1e3, 1e4])
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=5)
+    return figure
+
+
+def _density(axes, rows, style, label):
+    """The chains of one posterior, the first one full and the others dashed; common peak 1."""
+    peak = rows.density_per_um.max()
+    for number, (_, one) in enumerate(rows.groupby("chain")):
+        dashes = {"linestyle": "-" if number == 0 else (0, (4, 2))} | style
+        axes.plot(
+            one.deviation_um, one.density_per_um / peak, label=label if number == 0 else None,
+            **dashes,
+        )  # fmt: skip
+
+
+def _spreads(rows) -> str:
+    sds = rows.groupby("samples").sd_um.first()
+    lines = [f"$T={samples}$: {sd:.3g} µm" for samples, sd in sds.items() if samples > 0]
+    return "\n".join(["sd", *lines, f"prior: {sds[0]:.3g} µm"])

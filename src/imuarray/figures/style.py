@@ -1,0 +1,72 @@
+"""House style of all figures: sizes, colours, footers, and files with the same bytes each time."""
+
+from __future__ import annotations
+
+import functools
+import textwrap
+from pathlib import Path
+
+import matplotlib.style
+import pandas as pd
+from matplotlib.figure import Figure
+
+from imuarray.provenance import atomic_write, write_csv
+
+STYLE = Path(__file__).with_name("imuarray.mplstyle")
+COLUMN, PAGE = 3.5, 7.16  # inches: one column, both columns
+FOOTER_SIZE = 6.0  # pt
+# Okabe and Ito's palette without its yellow, which white paper swallows.
+VERMILLION, GREEN, BLUE, SKY = "#D55E00", "#009E73", "#0072B2", "#56B4E9"
+PURPLE, ORANGE, BLACK, GREY = "#CC79A7", "#E69F00", "#000000", "#7F7F7F"
+# Colour, marker and dashes of the first, second, ... series: none is told by colour alone.
+LOOKS = (
+    {"color": VERMILLION, "marker": "o", "linestyle": (0, (4, 1.5))},
+    {"color": GREEN, "marker": "s", "linestyle": (0, (6, 1.5, 1, 1.5))},
+    {"color": BLUE, "marker": "^", "linestyle": "-"},
+    {"color": PURPLE, "marker": "D", "linestyle": (0, (2, 1))},
+    {"color": ORANGE, "marker": "v", "linestyle": (0, (8, 2))},
+    {"color": SKY, "marker": "P", "linestyle": (0, (1, 1))},
+)
+MARKERS = "os^DvPX*<>hp"
+
+
+def look(index: int, *without: str) -> dict:
+    """Line properties of series ``index``, but for those named in ``without``."""
+    chosen = LOOKS[index % len(LOOKS)]
+    return {key: value for key, value in chosen.items() if key not in without}
+
+
+def styled(function):
+    """Run a drawing function under `imuarray.mplstyle` and matplotlib's defaults only."""
+
+    @functools.wraps(function)
+    def wrapper(*args, **kwargs):
+        with matplotlib.style.context(["default", str(STYLE)]):
+            return function(*args, **kwargs)
+
+    return wrapper
+
+
+def new_figure(footer=(), width: float = COLUMN, height: float = 2.8) -> Figure:
+    """An empty figure (inches) with small ``footer`` lines; ``height`` is without them."""
+    # 0.6 em: the mean advance of the font's letters and digits
+    characters = int((width - 0.12) * 72 / (0.57 * FOOTER_SIZE))
+    lines = [part for line in footer for part in textwrap.wrap(line, characters)]
+    space = (len(lines) * 1.25 * FOOTER_SIZE + 4) / 72 if lines else 0.0
+    figure = Figure(figsize=(width, height + space), layout="constrained")
+    share = space / (height + space)
+    figure.get_layout_engine().set(rect=(0, share, 1, 1 - share), w_pad=0.03, h_pad=0.03)
+    figure.text(
+        0.06 / width, 0.02 / (height + space), "\n".join(lines), size=FOOTER_SIZE, color="0.35",
+        va="bottom", linespacing=1.1,
+    )  # fmt: skip
+    return figure
+
+
+@styled
+def write_figure(figure: Figure, table: pd.DataFrame, pdf, png, csv) -> None:
+    """Write a figure and the numbers behind it; the same input gives the same bytes."""
+    for path, metadata in ((pdf, {"CreationDate": None}), (png, {"Software": None})):
+        with atomic_write(path) as temporary:
+            figure.savefig(temporary, metadata=metadata)
+    write_csv(table, csv)

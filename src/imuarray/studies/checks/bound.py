@@ -1,0 +1,42 @@
+"""The Cramer-Rao bound of the positions, motion unknown (left open in paper 2017)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from imuarray.motion import sphere_motion
+from imuarray.studies.batches import batch_stream, root_mean_square
+from imuarray.studies.checks.information import noise_of, position_information
+
+REPEATS = 20  # motions averaged over; the bound varies little between them
+
+
+def bound_squares(rng, model, samples: int, motion_sizes) -> np.ndarray:
+    """Mean bound variance (m^2) over coordinates for ``REPEATS`` random motions, (REPEATS,)."""
+    noise, out = noise_of(model), []
+    for _ in range(REPEATS):
+        motion = sphere_motion(rng, (samples,), *motion_sizes)
+        information, _ = position_information(model.array.relative, motion, noise)
+        values = np.linalg.eigvalsh(information)
+        floor = 1e-14 * values[-1]
+        out.append(np.mean(1.0 / np.maximum(values, floor)))
+    return np.array(out)
+
+
+def bound_table(model, seed, cases) -> pd.DataFrame:
+    """RMSE bound for each (samples, |omega|, |omega_dot|, |s|) in ``cases`` (SI units)."""
+    rows = []
+    for number, (samples, *sizes) in enumerate(cases):
+        rng = batch_stream(seed, "position bound", number)
+        bound, error = root_mean_square(bound_squares(rng, model, samples, sizes))
+        rows.append(
+            {
+                "samples": samples,
+                "angular_rate_dps": np.degrees(sizes[0]),
+                "angular_acceleration_dps2": np.degrees(sizes[1]),
+                "bound_m": bound,
+                "bound_se_m": error,
+            }  # fmt: skip
+        )
+    return pd.DataFrame(rows)

@@ -1,0 +1,178 @@
+"""What determines the positions and the motion: ranks, Lemma 1, invariances (paper 2017)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from imuarray.estimation import calibrate_bcd, estimate_motion
+from imuarray.motion import Motion, sphere_motion
+from imuarray.motion.random import directions
+from imuarray.simulation import measure
+from imuarray.studies.checks.information import (
+    Noise,
+    joint_singular_values,
+    lever_matrices,
+    motion_jacobian,
+    numerical_rank,
+    state_of,
+)
+
+UNIT = Noise(1.0, 1.0)  # ranks do not depend on the noise; this keeps them well conditioned
+
+
+def lemma(rng, count: int) -> dict:
+    """Lemma 1 on ``count`` random pairs: ranks, determinants, eigenvalues of A^2 + B.
+
+    det(Omega(w)^2 + Omega(a)) = -|w x a|^2, so A_n is singular only where they are parallel.
+    """
+    rate = 10 * rng.standard_normal((count, 3))
+    factor = 30 * rng.standard_normal((count, 1))
+    free = 300 * rng.standard_normal((count, 3))
+    nothing = np.zeros_like(rate)
+    matrices = {
+        name: lever_matrices(state_of(Motion.of(rate, second, nothing)))
+        for name, second in (("parallel", factor * rate), ("free", free))
+    }
+    ranks = {
+        name: [numerical_rank(np.linalg.svd(m, compute_uv=False)) for m in found]
+        for name, found in matrices.items()
+    }
+    area = np.sum(np.cross(rate, free) ** 2, axis=1)
+    size = np.linalg.norm(rate, axis=1)
+    expected = np.stack([-(size**2) + 1j * factor[:, 0] * size, 0 * size], axis=1)
+    values = np.linalg.eigvals(matrices["parallel"])
+    near = np.abs(values[:, :, None] - expected[:, None]).min(axis=1) / size[:, None] ** 2
+    return {
+        "draws": count,
+        "parallel_rank_2": ranks["parallel"].count(2),
+        "free_rank_3": ranks["free"].count(3),
+        "determinant_relative": float(np.max(np.abs(np.linalg.det(matrices["free"]) / area + 1))),
+        "eigenvalue_relative": float(near.max()),
+    }
+
+
+def ranks(rng, array, triads=(3, 4, 5, 6, 8), samples=(1, 2, 3, 4)) -> pd.DataFrame:
+    """Rank of the joint information, motion eliminated, over K and N (random geometry too)."""
+    rows = []
+    for count in (*triads, array.accelerometers):
+        for number in samples:
+            motion = sphere_motion(rng, (number,), 1.0, 1.0, 1.0)
+            if count == array.accelerometers:
+                positions = array.relative / np.abs(array.relative).max()
+            else:
+                positions = np.vstack([np.zeros(3), rng.standard_normal((count - 1, 3))])
+            values = joint_singular_values(positions, motion, UNIT)
+            rows.append(
+                {
+                    "triads": count,
+                    "samples": number,
+                    "unknowns": 3 * (count - 1),
+                    "rank": numerical_rank(values),
+                    "smallest": values[-1] / values[0],
+                    "measurements": 3 * (count + 1) * number,
+                    "all_unknowns": 3 * (count - 1) + 9 * number,
+                    "count_allows": number >= (count - 1) / (count - 2),
+                }  # fmt: skip
+            )
+    return pd.DataFrame(rows)
+
+
+def motion_needs(rng) -> dict:
+    """Rank (of 9) of the motion given positions, for arrays at and below the minimum."""
+    rate = 3 * directions(rng, (1,))
+    plane = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    arrays = {
+        "three spanning a plane": plane, "three on a line": plane[[0, 1]][[0, 1, 1]] * [[1], [1], [2]],
+        "two": plane[:2], "four in space": np.vstack([plane, [0, 0, 1]]),
+    }  # fmt: skip
+    found = {}
+    for name, positions in arrays.items():
+        force = motion_jacobian(positions, rate)[0]
+        gyroscope = np.eye(3, 9)
+        for label, rows in (("with gyroscope", np.vstack([force, gyroscope])), ("without", force)):
+            values = np.linalg.svd(rows, compute_uv=False)
+            found[f"{name}, {label}"] = numerical_rank(values)
+    mirrored = motion_jacobian(plane, rate)[0] - motion_jacobian(plane, -rate)[0]
+    found["sign_blind"] = bool(np.allclose(mirrored[:, 3:], 0) and np.allclose(
+        state_of(Motion.of(rate, rate, rate))[:, :6], state_of(Motion.of(-rate, rate, rate))[:, :6]
+    ))  # fmt: skip
+    found["rank without gyroscope at rest"] = numerical_rank(
+        np.linalg.svd(motion_jacobian(arrays["four in space"], 0 * rate)[0], compute_uv=False)
+    )
+    return found
+
+
+def common_axis(rng, positions, samples: int = 20) -> dict:
+    """Rank for omega and omega_dot parallel in each sample: one axis, or axes that vary."""
+    size = rng.standard_normal((2, samples, 1))
+    axes = {"one axis": directions(rng, ()), "axes vary": directions(rng, (samples,))}
+    nothing = np.zeros((samples, 3))
+    found = {"unknowns": 3 * (len(positions) - 1)}
+    for name, axis in axes.items():
+        motion = Motion.of(size[0] * axis, size[1] * axis, nothing)
+        found[name] = numerical_rank(joint_singular_values(positions, motion, UNIT))
+    still = Motion.of(nothing, nothing, rng.standard_normal((samples, 3)))
+    matrices = lever_matrices(state_of(still))
+    found["no rotation"] = int(np.any(matrices != 0.0))
+    return found
+
+
+def invariances(rng, model, motion_sizes) -> dict:
+    """What must not matter: the origin, the translation, theta for the gyroscopes; (9) once."""
+    positions, samples = model.array.relative, 10
+    motion = sphere_motion(rng, (samples,), *motion_sizes)
+    levers = lever_matrices(state_of(motion))
+    shift = rng.standard_normal(3)
+    moved = motion._replace(specific_force=motion.specific_force - levers @ shift)
+    before = model.predict_many(motion, positions)
+    after = model.predict_many(moved, positions + shift)
+    scale = np.abs(before.specific_force).max()
+    force, rate, _ = measure(model, motion, positions, rng)
+    extra = 1000.0 * rng.standard_normal((samples, 1, 3))
+    found = [calibrate_bcd(model, y, rate, limit=200).positions for y in (force, force + extra)]
+    shared = np.linalg.inv(np.einsum("tci,tcj->ij", levers, levers))
+    centred = force - motion.specific_force[:, None]
+    once = np.einsum("ij,tcj,tkc->ki", shared, levers, centred)
+    each = [np.linalg.lstsq(levers.reshape(-1, 3), centred[:, k].ravel(), rcond=None)[0]
+            for k in range(centred.shape[1])]  # fmt: skip
+    return {
+        "origin_relative": float(
+            np.abs(after.specific_force - before.specific_force).max() / scale
+        ),
+        "gyroscope_change": float(np.abs(after.angular_rate - before.angular_rate).max()),
+        "translation_position_change_m": float(np.abs(found[1] - found[0]).max()),
+        "shared_inverse_difference_m": float(np.abs(once - each).max()),
+        "normal_matrix_size": list(shared.shape),
+    }
+
+
+def measured_acceleration(rng, model, motion_sizes, rail, count: int) -> dict:
+    """Specific force in figure 4's motion, in g: the largest triad's and all triads'.
+
+    Also seen from the middle of the array (s there), and how often a gyroscope saturates.
+    """
+    motion = sphere_motion(rng, (count,), *motion_sizes)
+    found = {"specific_force_mps2": float(motion_sizes[2])}
+    for name, positions in (
+        ("reference", model.array.relative),
+        ("middle", model.array.positions - model.array.positions.mean(axis=0)),
+    ):
+        force, _, saturated = measure(model, motion, positions, rng, gyroscope_range=rail)
+        size = np.linalg.norm(force, axis=2) / 9.80665
+        for label, values in (("largest", size.max(axis=1)), ("all", size.ravel())):
+            found[f"{name}_{label}_quantiles_g"] = np.quantile(values, [0.05, 0.5, 0.95]).tolist()
+    found["saturated_share"] = float(saturated.any(axis=(1, 2)).mean())
+    return found
+
+
+def inner_steps(rng, model, motion_sizes, samples) -> pd.DataFrame:
+    """Gauss-Newton steps a sample in one iteration of Algorithm 1, over N: the only loop
+    whose length the data decide; all others are exactly N long."""
+    rows = []
+    for number in samples:
+        motion = sphere_motion(rng, (number,), *motion_sizes)
+        force, rate, _ = measure(model, motion, model.array.relative, rng)
+        steps = estimate_motion(model, force, rate).iterations
+        rows.append({"samples": number, "inner_steps": int(steps.sum())})
+    return pd.DataFrame(rows)

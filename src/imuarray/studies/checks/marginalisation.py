@@ -1,0 +1,192 @@
+"""The algebra and the estimator of paper 2021, section III-B, on numbers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from imuarray.geometry import Array
+from imuarray.model import ArrayModel
+from imuarray.model.structure import design, products
+from imuarray.motion import normal_motion
+from imuarray.posterior import Likelihood
+from imuarray.simulation import measure
+
+TINY = np.array(
+    [[0.0, 0.0, 0.0], [0.021, 0.002, -0.001], [-0.001, 0.019, 0.003], [0.017, 0.02, 0.002]]
+)
+
+
+def tiny_model(accelerometer_sd: float, gyroscope_sd: float) -> ArrayModel:
+    """Four triads some 2 cm apart and one gyroscope; sds in m/s^2 and rad/s."""
+    array = Array(TINY.copy(), tuple("1234"), 1, "tiny")
+    return ArrayModel.isotropic(array, accelerometer_sd, gyroscope_sd)
+
+
+def _density(y, positions, rate, precision, prior, beta):
+    """Quadratic form and log |M| of (18) for phi ~ N(f, beta F), by (20) and (21), and M."""
+    mean, covariance = prior
+    whole = design(positions)
+    B, H = whole[:, :6], whole[:, 6:]
+    Q = np.linalg.inv(precision)
+    inner = np.linalg.inv(covariance) / beta + H.T @ precision @ H
+    inverse = precision - precision @ H @ np.linalg.solve(inner, H.T @ precision)
+    parts = inner, beta * covariance, Q
+    logdet = sum(np.linalg.slogdet(part)[1] for part in parts)
+    off = y - B @ products(rate) - H @ mean
+    return off @ inverse @ off, logdet, Q + beta * H @ covariance @ H.T, inverse
+
+
+def limits(rng, model, sds) -> dict:
+    """SH = 0, (20), (21), and the limits (23) and (24) as beta grows.
+
+    ``sds``: |omega|, omega_dot and s sds in SI units for F_t and the data.
+    """
+    positions, precision = model.array.relative, model.noise.accelerometer_precision
+    motion = normal_motion(rng, (1,), *sds)
+    force, rate, _ = measure(model, motion, positions, rng)
+    covariance = np.diag(np.repeat(np.square(sds[1:]), 3))
+    prior = (np.sqrt(np.diag(covariance)) * rng.standard_normal(6), covariance)
+    H = design(positions)[:, 6:]
+    gram = H.T @ precision @ H
+    S = precision - precision @ H @ np.linalg.solve(gram, H.T @ precision)
+    plain = force[0].ravel() - design(positions)[:, :6] @ products(rate[0].mean(axis=0))
+    final = plain @ S @ plain
+    common = np.linalg.slogdet(covariance)[1] - np.linalg.slogdet(precision)[1]
+    table = []
+    for beta in np.geomspace(1e-3, 1e7, 11):
+        square, logdet, M, _ = _density(force[0].ravel(), positions, rate[0].mean(axis=0),
+                                        precision, prior, beta)  # fmt: skip
+        rest = logdet - common - 6 * np.log(beta) - np.linalg.slogdet(gram)[1]
+        table.append([beta, abs(square - final) / final, abs(np.expm1(rest))])
+    _, logdet, M, inverse = _density(plain, positions, rate[0].mean(axis=0), precision, prior, 1e-3)
+    return {
+        "SH_relative": float(np.abs(S @ H).max() / np.abs(precision @ H).max()),
+        "rank_S": int(np.linalg.matrix_rank(S / precision[0, 0], tol=1e-9)), "size": len(S),
+        "inverse_identity": float(np.abs(inverse @ M - np.eye(len(M))).max()),
+        "determinant_identity": float(abs(logdet - np.linalg.slogdet(M)[1])),
+        "beta_quadratic_determinant": table,
+    }  # fmt: skip
+
+
+def determinant_power(rng, model, sds, beta=1e6, pairs=200) -> dict:
+    """Power of 1 / |H' Lambda H| in the normalised density (19), from pairs of theta.
+
+    Regression of the density's change beyond the exponent on that of log |H' Lambda H|.
+    """
+    positions, precision = model.array.relative, model.noise.accelerometer_precision
+    covariance = np.diag(np.repeat(np.square(sds[1:]), 3))
+    gram, beyond = [], []
+    for _ in range(pairs):
+        moved = positions + 1e-3 * rng.standard_normal(positions.shape)
+        H = design(moved)[:, 6:]
+        gram.append(np.linalg.slogdet(H.T @ precision @ H)[1])
+        M = np.linalg.inv(precision) + beta * H @ covariance @ H.T
+        beyond.append(-0.5 * np.linalg.slogdet(M)[1])
+    slope, offset = np.polyfit(gram, beyond, 1)
+    misfit = np.abs(np.array(beyond) - slope * np.array(gram) - offset).max()
+    return {"power": float(-slope), "misfit": float(misfit), "pairs": pairs}
+
+
+def six_dimensions(rng, model, sds, samples=20, draws=8) -> dict:
+    """The collapsed estimate (6 numbers a sample) against (26a) written out in 3A numbers."""
+    positions, precision = model.array.relative, model.noise.accelerometer_precision
+    force, rate, _ = measure(model, normal_motion(rng, (samples,), *sds), positions, rng)
+    likelihood = Likelihood.of(model, force, rate)
+    mean = rate.mean(axis=1)[:, None]
+    rates = mean + np.sqrt(model.noise.gyroscope[0, 0] / rate.shape[1]) * rng.standard_normal(
+        (samples, draws, 3)
+    )
+    whole = design(positions)
+    H = whole[:, 6:]
+    gram = H.T @ precision @ H
+    S = precision - precision @ H @ np.linalg.solve(gram, H.T @ precision)
+    off = force.reshape(samples, 1, -1) - products(rates) @ whole[:, :6].T
+    exponents = -0.5 * np.einsum("tni,ij,tnj->tn", off, S, off)
+    direct = sum(recursive_log_sum_exp(row) - math.log(draws) for row in exponents)
+    direct -= 0.5 * samples * np.linalg.slogdet(gram)[1]
+    weak = np.linalg.svd(S @ whole[:, :6], compute_uv=False)
+    return {
+        "difference": float(abs(likelihood.on(positions, rates) - direct)),
+        "value": float(direct), "dimensions": int(np.sum(weak > 1e-9 * weak[0])),
+        "full": 3 * len(positions),
+    }  # fmt: skip
+
+
+def recursive_log_sum_exp(values) -> float:
+    """(32) applied recursively."""
+    total = float(values[0])
+    for value in values[1:]:
+        total = max(total, value) + math.log1p(math.exp(-abs(total - value)))
+    return total
+
+
+def log_sum_exp(rng, count=200) -> dict:
+    """(31)/(32) against exact summation, and the plain formula on exponents far below zero."""
+    worst, lost = 0.0, 0
+    for level in (0.0, -800.0, -1e5, 800.0):
+        for _ in range(count // 4):
+            values = level + 5 * rng.standard_normal(50)
+            exact = values.max() + math.log(math.fsum(np.exp(values - values.max())))
+            worst = max(worst, abs(recursive_log_sum_exp(values) - exact) / max(1.0, abs(exact)))
+            with np.errstate(divide="ignore", over="ignore"):
+                lost += not np.isfinite(np.log(np.sum(np.exp(values))))
+    return {"worst_relative": worst, "plain_fails": lost, "sums": count}
+
+
+def unbiased(rng, count: int, draws=(1, 2, 4, 8, 16, 32)) -> list[dict]:
+    """Mean and variance of p-hat over realisations, relative to p from very many draws."""
+    model = tiny_model(0.04, np.radians(0.06))
+    positions = model.array.relative
+    motion = normal_motion(rng, (2,), np.radians(1000.0), np.radians(35000.0), 20.0)
+    force, rate, _ = measure(model, motion, positions, rng)
+    likelihood = Likelihood.of(model, force, rate)
+    many = likelihood.realisations(positions, 20000, 50, rng)
+    level = many.mean()
+    reference = np.exp(many - level)
+    rows = []
+    for number in draws:
+        logs = likelihood.realisations(positions, number, count, rng) - level
+        ratio = np.exp(logs) / reference.mean()
+        error = np.hypot(ratio.std(ddof=1) / np.sqrt(count),
+                         reference.std(ddof=1) / np.sqrt(50) / reference.mean())  # fmt: skip
+        rows.append({"draws": number, "mean_ratio": ratio.mean(), "mean_se": error,
+                     "relative_variance": ratio.var(ddof=1), "log_mean": logs.mean(),
+                     "log_variance": logs.var(ddof=1), "realisations": count})  # fmt: skip
+    return rows
+
+
+def effective_draws(rng, model, sds, draws=4000, repeats=20) -> dict:
+    """Kish's effective number of ``draws``, median over samples, for three estimators of p(y_t).
+
+    naive (10): all motion from its prior; conditioned: omega from p(omega | y_g), the rest
+    from its prior; Rao-Blackwellised (26): the rest integrated.
+    """
+    positions, force_sd = model.array.relative, np.sqrt(model.noise.accelerometer[0, 0])
+    rate_sd = np.sqrt(model.noise.gyroscope[0, 0] / model.array.gyroscopes)
+    whole, precision = design(positions), model.noise.accelerometer_precision
+    H = whole[:, 6:]
+    S = precision - precision @ H @ np.linalg.solve(H.T @ precision @ H, H.T @ precision)
+    scale = np.repeat(sds[1:], 3)
+    found = {"naive": [], "conditioned": [], "rao_blackwellised": []}
+    for _ in range(repeats):
+        force, rate, _ = measure(model, normal_motion(rng, (1,), *sds), positions, rng)
+        y, centre = force[0].ravel(), rate[0].mean(axis=0)
+        wide = sds[0] * rng.standard_normal((draws, 3))
+        near = centre + rate_sd * rng.standard_normal((draws, 3))
+        rest = scale * rng.standard_normal((draws, 6))
+        for name, rates in (("naive", wide), ("conditioned", near)):
+            off = y - products(rates) @ whole[:, :6].T - rest @ H.T
+            logs = -0.5 * np.sum(off**2, axis=1) / force_sd**2
+            if name == "naive":
+                logs -= 0.5 * np.sum((rates - centre) ** 2, axis=1) / rate_sd**2
+            found[name].append(_kish(logs))
+        off = y - products(near) @ whole[:, :6].T
+        found["rao_blackwellised"].append(_kish(-0.5 * np.einsum("ni,ij,nj->n", off, S, off)))
+    return {"draws": draws} | {name: float(np.median(values)) for name, values in found.items()}
+
+
+def _kish(logs) -> float:
+    weights = np.exp(logs - logs.max())
+    return float(weights.sum() ** 2 / np.sum(weights**2))
