@@ -113,8 +113,8 @@ def run_chains(
             count = min(block, draws - past[0].shape[1])
             sampler.reset()
             for new in sampler.sample(state, iterations=count, skip_initial_state_check=True):
+                state = new
                 bar.update()
-            state = new
             past[0] = np.concatenate([past[0], sampler.get_chain().swapaxes(0, 1)], axis=1)
             past[1] = np.concatenate([past[1], sampler.get_log_prob().T], axis=1)
             if checkpoint:
