@@ -63,3 +63,36 @@ def model_from(settings: dict, accelerometer_sd: float | None = None, effects=()
     force = noise["accelerometer_sd"] if accelerometer_sd is None else accelerometer_sd
     rate = np.radians(noise["gyroscope_sd_dps"])
     return ArrayModel.isotropic(array_from_config(settings["array"]), force, rate, effects)
+
+
+def describe_schema() -> str:
+    """config/README.md: every key of the schema with its meaning, as Markdown."""
+    with open(SCHEMA, encoding="utf-8") as handle:
+        schema = yaml.safe_load(handle)
+    lines = [
+        "# Configuration",
+        "",
+        "`config.yaml` at the top is the one file to edit. Made from",
+        "`workflow/schemas/config.schema.yaml` by `python -m imuarray.config`; a test keeps the",
+        "two in step. Unknown keys are errors.",
+        "",
+        "| key | meaning |",
+        "|---|---|",
+    ]
+    return "\n".join([*lines, *_rows(schema, schema["$defs"], "")]) + "\n"
+
+
+def _rows(node, shared, prefix):
+    """A table row for each key below ``node``, depth first."""
+    for name, child in node.get("properties", {}).items():
+        target = shared.get(child.get("$ref", "").rpartition("/")[2], {})
+        whole = {**target, **child}
+        choices = f" (one of {', '.join(whole['enum'])})" if "enum" in whole else ""
+        yield f"| `{prefix}{name}` | {whole.get('description', 'section')}{choices} |"
+        yield from _rows(whole, shared, f"{prefix}{name}.")
+        if isinstance(whole.get("additionalProperties"), dict):
+            yield from _rows(whole["additionalProperties"], shared, f"{prefix}{name}.NAME.")
+
+
+if __name__ == "__main__":
+    print(describe_schema(), end="")

@@ -1,0 +1,55 @@
+"""`paper_figures/README.md`: every figure and table with its caption and its parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+
+from jinja2 import Environment, StrictUndefined
+
+HEAD = """# Figures and tables of the two papers
+
+Made by `snakemake` at scale `{scale}`, seed {seed}; do not edit. Every claim of the papers with
+our value and a verdict: [claims.md](claims.md), [claims.csv](claims.csv).
+
+The chains behind the figures and tables of 2021:
+
+{chains}
+"""
+
+
+def caption(template: str, settings: dict, **wildcards) -> str:
+    """The caption that the report shows too: a template that prints its parameters."""
+    environment = Environment(undefined=StrictUndefined, autoescape=False)
+    job = SimpleNamespace(
+        params=SimpleNamespace(settings=settings, **wildcards), wildcards=SimpleNamespace()
+    )
+    return environment.from_string(template).render(snakemake=job).strip()
+
+
+def title(name: str) -> str:
+    """'Paper 2021, figure 4' of '2021_fig4'."""
+    year, rest = name.split("_")
+    kind, number = rest[:-1], rest[-1]
+    words = {"fig": f"figure {number}", "table": f"table {'I' * int(number)}"}
+    return f"Paper {year}, {words[kind]}"
+
+
+def gallery(
+    figures: dict[str, str], tables: dict[str, tuple[str, str]], settings: dict,
+    chains: Sequence[str],
+) -> str:  # fmt: skip
+    """The page. ``figures``: caption by name; ``tables``: caption and Markdown by name."""
+    head = HEAD.format(
+        scale=settings["scale"]["name"], seed=settings["seed"],
+        chains="\n".join(f"- {line}" for line in chains),
+    )  # fmt: skip
+    parts = [head]
+    for name, text in figures.items():
+        links = f"[PDF]({name}.pdf), [PNG]({name}.png), [numbers (CSV)]({name}.csv)"
+        picture = f"![{title(name)}]({name}.png)"
+        parts.append(f"## {title(name)}\n\n{picture}\n\n{text}\n\n{links}\n")
+    for name, (text, body) in tables.items():
+        links = f"[LaTeX]({name}.tex), [Markdown]({name}.md), [numbers (CSV)]({name}.csv)"
+        parts.append(f"## {title(name)}\n\n{body.strip()}\n\n{text}\n\n{links}\n")
+    return "\n".join(parts)

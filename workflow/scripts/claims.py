@@ -1,0 +1,14 @@
+"""Every claim of the two papers against the results -> CSV and Markdown."""
+
+from job import job
+
+with job(snakemake) as settings:  # noqa: F821
+    from pathlib import Path
+
+    from imuarray.claims import Results, evaluate, write_markdown
+    from imuarray.provenance import write_csv
+
+    results = Results(Path(snakemake.output.table).parents[1], settings)  # noqa: F821
+    table = evaluate(results)
+    write_csv(table, snakemake.output.table)  # noqa: F821
+    write_markdown(table, settings, snakemake.output.page)  # noqa: F821

@@ -1,0 +1,20 @@
+"""RMSE of the angular rate without gyroscopes, over |omega| and position error -> CSV."""
+
+from job import job
+
+with job(snakemake) as settings:  # noqa: F821
+    import numpy as np
+
+    from imuarray.config import model_from
+    from imuarray.provenance import write_csv
+    from imuarray.studies.checks.accelerometers_only import accelerometers_only
+
+    paper = settings["paper2017"]
+    span, rail = paper["fig3_rates_dps"], paper["gyroscope_range_dps"]
+    rates = np.radians([0.1 * rail, 0.5 * rail, rail, span["last"]])
+    table = accelerometers_only(
+        model_from(settings), settings["seed"], rates,
+        np.radians(paper["angular_acceleration_dps2"]), paper["specific_force"],
+        paper["fig3_position_sds"], settings["scale"]["realisations"],
+    )  # fmt: skip
+    write_csv(table, snakemake.output[0])  # noqa: F821

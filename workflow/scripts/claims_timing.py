@@ -1,0 +1,42 @@
+"""Seconds an iteration (2017) over N and a transition (2021) over T take -> CSV.
+
+Also how the acceptance depends on N at the longest T -> CSV (that one is reproducible).
+"""
+
+from job import job
+
+with job(snakemake) as settings:  # noqa: F821
+    import json
+
+    import pandas as pd
+
+    from imuarray.config import model_from
+    from imuarray.posterior import CompiledTarget
+    from imuarray.provenance import write_csv
+    from imuarray.recording import read_recording, read_truth
+    from imuarray.streams import stream
+    from imuarray.studies.bayes import target_for
+    from imuarray.studies.checks import proposal, timing
+    from imuarray.studies.settings2017 import magnitudes
+
+    seed, paper = settings["seed"], settings["paper2017"]
+    costs = timing.iteration_costs(
+        stream(seed, "timing"), model_from(settings), magnitudes(paper), paper["fig4_samples"]
+    )
+    targets, thetas = {}, {}
+    for path, tuned in zip(snakemake.input.recordings, snakemake.input.tuning, strict=True):  # noqa: F821
+        with open(tuned, encoding="utf-8") as handle:
+            chosen = json.load(handle)
+        samples, draws = chosen["samples"], chosen["draws"]
+        targets[samples] = target_for(settings, read_recording(path), draws)
+        thetas[samples] = read_truth(path)["position"].to_numpy()[1:].ravel()
+    rng = stream(seed, "timing transitions")
+    moves = timing.transition_costs(targets, thetas, chosen["step_length_m"], rng)
+    write_csv(pd.concat([costs, moves]), snakemake.output.timing)  # noqa: F821
+    last = targets[samples]
+    table = proposal.acceptance_against_draws(
+        lambda number: CompiledTarget(last.likelihood, last.prior, number), thetas[samples],
+        chosen["step_length_m"], sorted({1, max(2, draws // 5), draws}),
+        settings["scale"]["acceptance_steps"], stream(seed, "acceptance over N"),
+    )  # fmt: skip
+    write_csv(pd.DataFrame(table), snakemake.output.acceptance)  # noqa: F821

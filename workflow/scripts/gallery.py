@@ -1,0 +1,30 @@
+"""paper_figures/README.md from the captions, the tables and the chains' verdicts."""
+
+from job import job
+
+with job(snakemake) as settings:  # noqa: F821
+    import json
+    from pathlib import Path
+
+    from imuarray.figures.gallery import caption, gallery
+    from imuarray.figures.notes import chain_lines
+    from imuarray.provenance import atomic_write
+
+    output, source = Path(snakemake.output[0]), snakemake.params.source  # noqa: F821
+    captions = {
+        Path(path).stem: caption(Path(path).read_text(encoding="utf-8"), settings, source=source)
+        for path in snakemake.input.captions  # noqa: F821
+    }
+    lines = []
+    for prefix, group in (("section IV-A", "verdicts"), (source, "experiment")):
+        read = [json.loads(Path(path).read_text(encoding="utf-8")) for path in snakemake.input[group]]  # noqa: F821
+        chains = chain_lines({verdict["samples"]: verdict for verdict in read})
+        lines += [f"{prefix}: {line}" for line in chains]
+    figures = {name: captions[name] for name in snakemake.params.figures}  # noqa: F821
+    tables = {
+        name: (captions[name], output.with_name(f"{name}.md").read_text(encoding="utf-8"))
+        for name in snakemake.params.tables  # noqa: F821
+    }
+    with atomic_write(output) as temporary:
+        page = gallery(figures, tables, settings, lines)
+        temporary.write_text(page, encoding="utf-8", newline="\n")
