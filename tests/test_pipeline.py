@@ -1,0 +1,138 @@
+"""The pipeline end to end: `quick` in a temporary directory, and one core against two."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+ROOT = Path(__file__).parents[1]
+
+pytestmark = pytest.mark.slow
+
+
+def snakemake(directory, *arguments, timeout=1500):
+    """Run the workflow with ``directory`` as its working directory; fail with its output."""
+    shutil.copy(ROOT / "config.yaml", directory)
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    command = [
+        *(sys.executable, "-m", "snakemake", "-s", str(ROOT / "Snakefile")),
+        *("--directory", str(directory), "--configfile", "config.yaml", "--quiet", "rules"),
+        *("--workflow-profile", "none", *arguments),
+    ]
+    done = subprocess.run(
+        command, cwd=directory, env={**os.environ, "PATH": path}, timeout=timeout,
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-6000:]
+    return done
+
+
+@pytest.fixture(scope="module")
+def quick(tmp_path_factory):
+    """Results of the whole quick pipeline on two cores."""
+    directory = tmp_path_factory.mktemp("quick")
+    snakemake(directory, "--cores", "2", "quick")
+    return directory / "results" / "quick"
+
+
+def test_every_figure_table_and_claim_is_there(quick):
+    figures = {path.name for path in (quick / "figures").iterdir()}
+    names = ["2017_fig3", "2017_fig4", "2017_fig5", *(f"2021_fig{i}" for i in range(1, 6))]
+    assert figures == {f"{name}.{kind}" for name in names for kind in ("pdf", "png", "csv")}
+    tables = {path.name for path in (quick / "tables").iterdir()}
+    assert tables == {f"2021_table{i}.{kind}" for i in (1, 2) for kind in ("csv", "tex", "md")}
+    claims = pd.read_csv(quick / "claims" / "claims.csv")
+    assert set(claims.verdict) <= {"holds", "does not hold", "cannot be tested here"}
+    for paper in (2017, 2021):
+        testable = (claims.paper == paper) & (claims.verdict != "cannot be tested here")
+        assert testable.sum() >= 12
+
+
+def test_figure_3_without_position_error_is_the_gyroscopes_average(quick):
+    """100 realisations x 3 axes: the RMSE's own sd is 4 %; 5 sd."""
+    table = pd.read_csv(quick / "calibration" / "rate_error.csv")
+    exact = table[(table.position_sd_m == 0) & (table.angular_rate_dps < 1000)]
+    assert len(exact) and np.allclose(exact.array_rmse_dps, 0.06 / np.sqrt(32), rtol=0.2)
+
+
+def test_figure_4_falls_with_the_square_root_of_the_samples(quick):
+    table = pd.read_csv(quick / "calibration" / "position_error_samples.csv")
+    last = table[(table.iterations == table.iterations.max()) & (table.samples >= 10)]
+    slope = np.polyfit(np.log(last.samples), np.log(last.rmse_m), 1)[0]
+    assert -0.56 < slope < -0.44
+    assert 1e-6 < last.rmse_m.iloc[-1] < 4e-6
+
+
+def test_figure_2_variance_is_inverse_in_the_draws(quick):
+    """200 realisations: each variance's sd is 10 %; the slope's about 0.05; 4 sd."""
+    for samples in (5, 50, 500):
+        table = pd.read_csv(quick / "tuning" / f"variance_T{samples}.csv")
+        regime = table[table.variance < 1]
+        slope = np.polyfit(np.log(regime.draws), np.log(regime.variance), 1)[0]
+        assert -1.2 < slope < -0.8
+
+
+def test_figure_1_is_the_board(quick):
+    table = pd.read_csv(quick / "figures" / "2021_fig1.csv")
+    assert len(table) == 32
+
+
+def test_results_carry_config_seed_and_versions(quick):
+    with xr.open_datatree(quick / "chains" / "T5.nc", engine="h5netcdf") as tree:
+        assert {"config", "seed", "versions", "thin", "step_length_m"} <= set(tree.attrs)
+        assert tree["posterior"]["position"].dims == ("chain", "draw", "accelerometer", "axis")
+
+
+def test_one_core_gives_the_bytes_of_two(quick, tmp_path):
+    targets = [
+        "calibration/rate_error.csv", "chains/T5.nc", "chains/standin_T5.nc", "tuning/T50.json"
+    ]  # fmt: skip
+    snakemake(tmp_path, "--cores", "1", *(f"results/quick/{name}" for name in targets))
+    for name in targets:
+        one, two = tmp_path / "results" / "quick" / name, quick / name
+        if name.endswith(".nc"):
+            with (
+                xr.open_datatree(one, engine="h5netcdf") as a,
+                xr.open_datatree(two, engine="h5netcdf") as b,
+            ):
+                xr.testing.assert_identical(a.load(), b.load())
+        else:
+            assert one.read_bytes() == two.read_bytes()
+
+
+def test_a_rule_reruns_alone(quick):
+    """Deleting one table makes its rule run again, and nothing upstream of it."""
+    table = quick / "tuning" / "T50.json"
+    before, upstream = table.read_bytes(), (quick / "tuning" / "acceptance_T50.csv").stat()
+    table.unlink()
+    snakemake(quick.parents[1], "--cores", "1", "results/quick/tuning/T50.json")
+    assert table.read_bytes() == before
+    assert (quick / "tuning" / "acceptance_T50.csv").stat().st_mtime_ns == upstream.st_mtime_ns
+
+
+def test_bad_configuration_is_one_clear_line(tmp_path):
+    text = (ROOT / "config.yaml").read_text().replace("gyroscope_sd_dps: 0.06", "gyroscope_sd: 1")
+    (tmp_path / "config.yaml").write_text(text)
+    done = subprocess.run(
+        [sys.executable, "-m", "snakemake", "-s", str(ROOT / "Snakefile"), "--cores", "1",
+         "--directory", str(tmp_path), "--workflow-profile", "none", "-n"],
+        capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    assert done.returncode != 0 and "gyroscope_sd" in done.stderr
+    assert not (tmp_path / "results").exists()
+
+
+def test_lint_is_clean(tmp_path):
+    shutil.copy(ROOT / "config.yaml", tmp_path)
+    done = subprocess.run(
+        [sys.executable, "-m", "snakemake", "-s", str(ROOT / "Snakefile"), "--lint",
+         "--directory", str(tmp_path), "--workflow-profile", "none"],
+        capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    assert "Congratulations" in done.stdout + done.stderr, done.stdout + done.stderr
