@@ -117,7 +117,7 @@ rule claims_timing:
         code=[*library("posterior"), *CHECKS],
     output:
         timing="results/{scale}/claims/timing.csv",
-        acceptance="results/{scale}/claims/acceptance_draws.csv",
+        acceptance="results/{scale}/claims/acceptance_variance.csv",
     log:
         "results/{scale}/logs/claims/timing.log",
     benchmark:
@@ -136,7 +136,12 @@ rule claims:
     input:
         calibration=expand(
             "results/{{scale}}/calibration/{name}.csv",
-            name=["position_error_samples", "position_error_motion", "position_error_force", "rate_error"],
+            name=[
+                "position_error_samples",
+                "position_error_motion",
+                "position_error_force",
+                "rate_error",
+            ],
         ),
         tuning=expand(
             "results/{{scale}}/tuning/{name}_T{samples}.csv",
@@ -148,7 +153,8 @@ rule claims:
             "results/{{scale}}/posterior/{name}.{kind}", name=POSTERIORS, kind=["csv", "json"]
         ),
         chains=expand("results/{{scale}}/chains/{name}.nc", name=POSTERIORS),
-        recordings=expand("results/{{scale}}/recordings/{name}.nc", name=SIMULATED),
+        benchmarks=expand("results/{{scale}}/benchmarks/chains/T{samples}.tsv", samples=SAMPLES),
+        burn_in=expand("results/{{scale}}/posterior/burn_in_T{samples}.csv", samples=SAMPLES),
         identifiability="results/{scale}/claims/identifiability.json",
         ranks="results/{scale}/claims/ranks.csv",
         work="results/{scale}/claims/inner_steps.csv",
@@ -158,7 +164,7 @@ rule claims:
         linearised="results/{scale}/claims/linearised.csv",
         determinant="results/{scale}/claims/determinant.csv",
         timing="results/{scale}/claims/timing.csv",
-        acceptance="results/{scale}/claims/acceptance_draws.csv",
+        acceptance="results/{scale}/claims/acceptance_variance.csv",
         code=library("claims"),
     output:
         table="results/{scale}/claims/claims.csv",

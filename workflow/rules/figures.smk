@@ -1,14 +1,16 @@
 from imuarray.figures.notes import SOURCES
+from support import PACKAGE
 
 # Figure 5 and table II: "measured" once there are chains of a measured recording.
 EXPERIMENT = "standin"
+DRAWING = [*library("figures"), str(PACKAGE / "figures" / "imuarray.mplstyle")]
 CAPTIONS = [workflow.source_path(f"../report/{name}.rst") for name in FIGURES + TABLES]
 
 
 rule figure_2017_fig3:
     input:
         rates="results/{scale}/calibration/rate_error.csv",
-        code=library("figures"),
+        code=DRAWING,
     output:
         pdf="results/{scale}/figures/2017_fig3.pdf",
         png=report(
@@ -34,7 +36,7 @@ rule figure_2017_fig3:
 rule figure_2017_fig4:
     input:
         errors="results/{scale}/calibration/position_error_samples.csv",
-        code=library("figures"),
+        code=DRAWING,
     output:
         pdf="results/{scale}/figures/2017_fig4.pdf",
         png=report(
@@ -60,7 +62,7 @@ rule figure_2017_fig4:
 rule figure_2017_fig5:
     input:
         errors="results/{scale}/calibration/position_error_motion.csv",
-        code=library("figures"),
+        code=DRAWING,
     output:
         pdf="results/{scale}/figures/2017_fig5.pdf",
         png=report(
@@ -85,7 +87,7 @@ rule figure_2017_fig5:
 
 rule figure_2021_fig1:
     input:
-        code=library("figures"),
+        code=DRAWING,
         geometry=library("simulation"),
     output:
         pdf="results/{scale}/figures/2021_fig1.pdf",
@@ -112,7 +114,7 @@ rule figure_2021_fig1:
 rule figure_2021_fig2:
     input:
         variances=expand("results/{{scale}}/tuning/variance_T{samples}.csv", samples=SAMPLES),
-        code=library("figures"),
+        code=DRAWING,
     output:
         pdf="results/{scale}/figures/2021_fig2.pdf",
         png=report(
@@ -140,7 +142,7 @@ rule figure_2021_fig3:
         chains=expand("results/{{scale}}/chains/T{samples}.nc", samples=max(SAMPLES)),
         verdict=expand("results/{{scale}}/posterior/T{samples}.json", samples=max(SAMPLES)),
         coordinates=expand("results/{{scale}}/posterior/T{samples}.csv", samples=max(SAMPLES)),
-        code=library("figures"),
+        code=DRAWING,
     output:
         pdf="results/{scale}/figures/2021_fig3.pdf",
         png=report(
@@ -168,7 +170,7 @@ rule figure_2021_fig4:
         chains=expand("results/{{scale}}/chains/T{samples}.nc", samples=SAMPLES),
         verdicts=expand("results/{{scale}}/posterior/T{samples}.json", samples=SAMPLES),
         coordinates=expand("results/{{scale}}/posterior/T{samples}.csv", samples=SAMPLES),
-        code=library("figures"),
+        code=DRAWING,
     output:
         pdf="results/{scale}/figures/2021_fig4.pdf",
         png=report(
@@ -202,7 +204,7 @@ rule figure_2021_fig5:
         coordinates=expand(
             "results/{{scale}}/posterior/{kind}_T{samples}.csv", kind=EXPERIMENT, samples=SAMPLES
         ),
-        code=library("figures"),
+        code=DRAWING,
     output:
         pdf="results/{scale}/figures/2021_fig5.pdf",
         png=report(

@@ -25,7 +25,9 @@ with job(snakemake) as settings:  # noqa: F821
             "common_axis": checks.common_axis(rng("axis"), model.array.relative),
             "invariances": checks.invariances(rng("invariances"), model, sizes),
             "accelerations": [
-                checks.measured_acceleration(rng("range"), model, (*sizes[:2], force), rail, 10 * count)
+                checks.measured_acceleration(
+                    rng("range"), model, (*sizes[:2], force), rail, 10 * count
+                )
                 for force in (0.0, sizes[2])
             ],
             "stamp": stamp(settings, seed),

@@ -26,7 +26,9 @@ with job(snakemake) as settings:  # noqa: F821
         tables.append(linearised.coordinates(*given, name))
         precision = model_from(settings, force_sd).noise.accelerometer_precision
         theta = truth["position"].to_numpy()[1:].ravel()
-        effect = linearised.determinant_effect(linearised.linearise(*given)[1], theta, samples, precision)
+        effect = linearised.determinant_effect(
+            linearised.linearise(*given)[1], theta, samples, precision
+        )
         effects.append({"name": name, "samples": samples, "method": "linearised"} | effect)
 
     for samples in paper["samples"]:

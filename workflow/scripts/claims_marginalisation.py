@@ -29,6 +29,7 @@ with job(snakemake) as settings:  # noqa: F821
         "log_sum_exp": checks.log_sum_exp(rng("log-sum-exp")),
         "unbiased": checks.unbiased(rng("unbiased"), count),
         "effective_draws": checks.effective_draws(rng("effective"), model, sds),
+        "spread": checks.spread_ratio(rng("spread"), model, sds),
         "theory": proposal.theory(),
         "random_walk": proposal.best_acceptance(rng("walk"), model.array.parameters.size),
         "stamp": stamp(settings, seed),

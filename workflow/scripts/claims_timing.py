@@ -1,6 +1,6 @@
-"""Seconds an iteration (2017) over N and a transition (2021) over T take -> CSV.
+"""Processor seconds an iteration (2017) over N and a transition (2021) over T take -> CSV.
 
-Also how the acceptance depends on N at the longest T -> CSV (that one is reproducible).
+Also how the acceptance depends on the variance at the longest T -> CSV (that one is reproducible).
 """
 
 from job import job
@@ -20,9 +20,11 @@ with job(snakemake) as settings:  # noqa: F821
     from imuarray.studies.settings2017 import magnitudes
 
     seed, paper = settings["seed"], settings["paper2017"]
+    longest = max(paper["fig4_samples"])
     costs = timing.iteration_costs(
-        stream(seed, "timing"), model_from(settings), magnitudes(paper), paper["fig4_samples"]
-    )
+        stream(seed, "timing"), model_from(settings), magnitudes(paper),
+        [longest // 10, longest // 3, longest, 3 * longest],
+    )  # fmt: skip
     targets, thetas = {}, {}
     for path, tuned in zip(snakemake.input.recordings, snakemake.input.tuning, strict=True):  # noqa: F821
         with open(tuned, encoding="utf-8") as handle:
@@ -33,10 +35,15 @@ with job(snakemake) as settings:  # noqa: F821
     rng = stream(seed, "timing transitions")
     moves = timing.transition_costs(targets, thetas, chosen["step_length_m"], rng)
     write_csv(pd.concat([costs, moves]), snakemake.output.timing)  # noqa: F821
-    last = targets[samples]
-    table = proposal.acceptance_against_draws(
-        lambda number: CompiledTarget(last.likelihood, last.prior, number), thetas[samples],
-        chosen["step_length_m"], sorted({1, max(2, draws // 5), draws}),
-        settings["scale"]["acceptance_steps"], stream(seed, "acceptance over N"),
+    # the wide p(omega | y_g) of (30b) makes the variance really high
+    sharp, wide = targets[samples], target_for(settings, read_recording(path), 1, spread=True)
+    table = proposal.acceptance_against_variance(
+        {
+            "tuned": sharp,
+            "one draw": CompiledTarget(sharp.likelihood, sharp.prior, 1),
+            "one draw, (30b)": wide,
+        },
+        thetas[samples], chosen["step_length_m"], 2 * settings["scale"]["acceptance_steps"],
+        stream(seed, "acceptance over variance"),
     )  # fmt: skip
     write_csv(pd.DataFrame(table), snakemake.output.acceptance)  # noqa: F821

@@ -16,5 +16,7 @@ with job(snakemake) as settings:  # noqa: F821
     footer = [scale_line(settings, f"{rates.realisations.max()} realisations per point")]
     saturation = settings["paper2017"]["gyroscope_range_dps"]
     write_figure(
-        calibration.fig3(table, saturation, footer), table, **dict(snakemake.output.items())  # noqa: F821
+        calibration.fig3(table, saturation, footer),
+        table,
+        **dict(snakemake.output.items()),  # noqa: F821
     )

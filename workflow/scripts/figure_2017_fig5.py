@@ -11,7 +11,7 @@ with job(snakemake) as settings:  # noqa: F821
 
     errors = pd.read_csv(snakemake.input.errors)  # noqa: F821
     table = calibration.fig5_table(errors)
-    counts = f"N = {errors.samples.max()}, {errors.iterations.max()} iterations"
-    footer = [scale_line(settings, f"{errors.realisations.max()} realisations per point", counts)]
+    counts = f"N = {errors.samples.max()} time samples, {errors.iterations.max()} iterations"
+    footer = [scale_line(settings, f"{errors.realisations.max()} realisations per point"), counts]
     start = settings["paper2017"]["position_sd"]
     write_figure(calibration.fig5(table, start, footer), table, **dict(snakemake.output.items()))  # noqa: F821

@@ -15,11 +15,11 @@ with job(snakemake) as settings:  # noqa: F821
         Path(path).stem: caption(Path(path).read_text(encoding="utf-8"), settings, source=source)
         for path in snakemake.input.captions  # noqa: F821
     }
-    lines = []
-    for prefix, group in (("section IV-A", "verdicts"), (source, "experiment")):
-        read = [json.loads(Path(path).read_text(encoding="utf-8")) for path in snakemake.input[group]]  # noqa: F821
-        chains = chain_lines({verdict["samples"]: verdict for verdict in read})
-        lines += [f"{prefix}: {line}" for line in chains]
+    lines = {}
+    for data, group in (("Section IV-A", "verdicts"), (f"Experiment ({source})", "experiment")):
+        paths = map(Path, snakemake.input[group])  # noqa: F821
+        read = [json.loads(path.read_text(encoding="utf-8")) for path in paths]
+        lines[data] = chain_lines({verdict["samples"]: verdict for verdict in read})
     figures = {name: captions[name] for name in snakemake.params.figures}  # noqa: F821
     tables = {
         name: (captions[name], output.with_name(f"{name}.md").read_text(encoding="utf-8"))

@@ -6,7 +6,7 @@ import matplotlib
 import numpy as np
 import pandas as pd
 
-from imuarray.figures.style import BLACK, GREY, MARKERS, look, new_figure, styled
+from imuarray.figures.style import BLACK, GREY, MARKERS, legend_items, look, new_figure, styled
 
 MICROMETRE = 1e-6  # m, the level that the paper's conclusions speak of
 
@@ -44,22 +44,21 @@ def fig3(table: pd.DataFrame, saturation_dps: float, footer=()):
     axes = figure.subplots()
     array = table[table.series == "array"]
     for index, (sd, rows) in enumerate(array.groupby("position_sd_m", sort=False)):
-        label = "none" if sd == 0 else _power(sd) + " m"
+        label = rf"$\sigma_r = {'0' if sd == 0 else _power(sd)}$ m"
         axes.errorbar(
             rows.angular_rate_dps, rows.rmse_dps, rows.rmse_se_dps, label=label,
             markerfacecolor="none", **look(index),
         )  # fmt: skip
-    for name, dashes, label in (
-        ("gyroscopes", (0, (5, 2)), "average of the gyroscopes"),
-        ("unsaturated", (0, (1, 2)), "the same without saturation"),
-    ):
+    averages = {
+        "average of the gyroscopes": ("gyroscopes", (0, (5, 2))),
+        "the same without saturation": ("unsaturated", (0, (1, 2))),
+    }
+    for label, (name, dashes) in averages.items():
         rows = table[table.series == name]
-        axes.plot(
-            rows.angular_rate_dps, rows.rmse_dps, color=BLACK, linestyle=dashes, label=label
-        )
+        axes.plot(rows.angular_rate_dps, rows.rmse_dps, color=BLACK, linestyle=dashes, label=label)
     axes.axvline(saturation_dps, color=GREY, linewidth=0.8)
     axes.annotate(
-        f"saturation\n{saturation_dps:g} deg/s", (saturation_dps, 0.97),
+        f"saturation\n{saturation_dps:g} deg/s", (saturation_dps, 0.5),
         xycoords=("data", "axes fraction"), xytext=(-3, 0), textcoords="offset points",
         ha="right", va="top", size=7, color="0.3",
     )  # fmt: skip
@@ -67,7 +66,7 @@ def fig3(table: pd.DataFrame, saturation_dps: float, footer=()):
         xscale="log", yscale="log", xlabel=r"Angular rate $\|\omega\|$ (deg/s)",
         ylabel="RMSE of the angular rate (deg/s)",
     )  # fmt: skip
-    axes.legend(loc="upper left", title=r"Position error $\sigma_r$", title_fontsize=7)
+    axes.legend(*legend_items(axes, averages), loc="upper left")
     return figure
 
 
@@ -114,7 +113,10 @@ def fig4(table: pd.DataFrame, footer=()):
         ylabel="RMSE of the positions (m)",
     )  # fmt: skip
     axes.set_ylim(bottom=min(0.7 * MICROMETRE, 0.7 * table.rmse_m.min()))
-    figure.legend(loc="outside upper center", ncols=4, title="Iterations", title_fontsize=7)
+    figure.legend(
+        *legend_items(axes, [r"$N^{-1/2}$"]), loc="outside upper center", ncols=4,
+        title="Iterations", title_fontsize=7,
+    )  # fmt: skip
     return figure
 
 
@@ -150,18 +152,16 @@ def fig5(table: pd.DataFrame, position_sd: float, footer=()):
         xscale="log", yscale="log", xlabel=r"Angular rate $\|\omega\|$ (deg/s)",
         ylabel="RMSE of the positions (m)",
     )  # fmt: skip
-    axes.legend(
-        loc="lower left", title=r"$\|\dot{\omega}\|$ (deg/s$^2$)", title_fontsize=7
-    )
+    axes.legend(loc="lower left", title=r"$\|\dot{\omega}\|$ (deg/s$^2$)", title_fontsize=7)
     return figure
 
 
 def _power(value: float) -> str:
-    """1e-5 as a power of ten, other numbers as a product with one."""
+    """TeX: 1e-5 as a power of ten, other numbers as a product with one."""
     factor, exponent = f"{value:.0e}".split("e")
     power = f"10^{{{int(exponent)}}}"
-    return f"${power}$" if factor == "1" else rf"${factor}\times{power}$"
+    return power if factor == "1" else rf"{factor}\times{power}"
 
 
 def _number(value: float) -> str:
-    return f"{value:.0f}" if value < 1e4 else _power(value)
+    return f"{value:.0f}" if value < 1e4 else f"${_power(value)}$"

@@ -4,13 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+from matplotlib.lines import Line2D
+from matplotlib.ticker import EngFormatter
 from scipy.stats import gaussian_kde, norm
 
-from imuarray.figures.style import BLACK, GREY, SKY, look, new_figure, styled
+from imuarray.figures.style import (
+    BLACK,
+    GREY,
+    PAGE,
+    SKY,
+    legend_items,
+    look,
+    new_figure,
+    significant,
+    styled,
+)
 
 TRACE_POINTS = 1000  # drawn per chain; more would not be seen
 BINS = 40
 GRID = 160
+LINEAR = 5.0  # um, where figure 4's axis turns from linear to logarithmic
 
 
 def fig3_table(series, burn_in: int, thin: int, truth: float | None = None) -> pd.DataFrame:
@@ -31,9 +44,7 @@ def fig3_table(series, burn_in: int, thin: int, truth: float | None = None) -> p
         kept = np.arange(0, draws.size, every)
         rows.append(_panel("trace", chain, step=(kept + 1) * thin, value=draws[kept]))
         density = np.histogram(left[chain - 1], edges, density=True)[0]
-        rows.append(
-            _panel("histogram", chain, low_um=edges[:-1], high_um=edges[1:], value=density)
-        )
+        rows.append(_panel("histogram", chain, low_um=edges[:-1], high_um=edges[1:], value=density))
         function = correlation[chain - 1]
         rows.append(
             _panel("autocorrelation", chain, step=np.arange(function.size) * thin, value=function)
@@ -70,18 +81,21 @@ def fig3(table: pd.DataFrame, burn_in_steps: int, name: str, footer=()):
         width_ratios=[4, 1], height_ratios=[1, 1.4, 1.2],
     )  # fmt: skip
     mosaic["histogram"].sharey(mosaic["trace"])
+    for panel in ("trace", "correlation"):  # steps as 200k, 1M
+        mosaic[panel].xaxis.set_major_formatter(EngFormatter(sep=""))
+        mosaic[panel].locator_params(axis="x", nbins=6)
     for panel in ("whole", "trace"):
         _traces(mosaic[panel], table, burn_in_steps)
     _histograms(mosaic["histogram"], table)
     _correlations(mosaic["correlation"], table)
-    mosaic["whole"].set_title(f"(a) {name}: whole trace, and at the posterior's scale", size=8)
+    mosaic["whole"].set_title(f"(a) {name}: whole trace, and zoomed", size=8)
     mosaic["whole"].tick_params(labelbottom=False)
     bins = table[(table.panel == "histogram") & (table.value > 0)]
     margin = 0.15 * (bins.high_um.max() - bins.low_um.min())
     mosaic["trace"].set_ylim(bins.low_um.min() - margin, bins.high_um.max() + margin)
     mosaic["trace"].set_xlabel("Step (count)")
-    for axis, place in (("whole", "upper right"), ("correlation", "upper right")):
-        mosaic[axis].legend(loc=place, ncols=2 if axis == "correlation" else 4)
+    figure.align_ylabels()
+    figure.legend(*legend_items(mosaic["whole"]), loc="outside upper center", ncols=4)
     return figure
 
 
@@ -100,7 +114,10 @@ def _histograms(axes, table):
     _truth(axes.axhline, table)
     axes.tick_params(labelleft=False)
     axes.set(xlabel="Density\n(1/µm)", xlim=(0, None))
-    axes.locator_params(axis="x", nbins=2)
+    peak = table[table.panel == "histogram"].value.max()
+    unit = 10.0 ** np.floor(np.log10(peak))
+    tick = unit * np.floor(peak / unit)  # the peak, rounded down to one digit
+    axes.set_xticks([0, tick], ["0", significant(tick)])
 
 
 def _correlations(axes, table):
@@ -156,43 +173,62 @@ def fig4_table(posteriors: dict[int, np.ndarray], prior, truth) -> pd.DataFrame:
 
 @styled
 def fig4(table: pd.DataFrame, name: str, footer=()):
-    """Three panels, x, y, z; deviations on a symmetric logarithmic axis, each peak at 1."""
-    figure = new_figure(footer, height=5.0)
-    panels = figure.subplots(3, 1, sharex=True)
-    names = [samples for samples in sorted(table.samples.unique()) if samples > 0]
-    for letter, axes, (axis, rows) in zip("abc", panels, table.groupby("axis"), strict=True):
-        _density(axes, rows[rows.samples == 0], {"color": SKY, "linestyle": ":"}, "prior")
-        for index, samples in enumerate(names):
-            chosen = rows[rows.samples == samples]
-            _density(axes, chosen, look(index, "marker", "linestyle"), f"$T = {samples}$")
-        axes.axvline(0, color=BLACK, linewidth=0.8, linestyle=(0, (1, 1)), label="truth")
-        axes.set_xscale("symlog", linthresh=10, linscale=1)
-        axes.set(ylabel="Density / peak (1)", ylim=(0, 1.08))
-        truth = 1e3 * rows.truth_m.iloc[0]
-        axes.set_title(f"({letter}) {axis} of {name}, true value {truth:.4g} mm", size=8)
-        axes.text(
-            0.015, 0.94, _spreads(rows), transform=axes.transAxes, va="top", size=6.5,
-            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1},
-        )  # fmt: skip
-    panels[-1].set_xlabel("Deviation from the true value (µm), linear within ±10")
-    panels[-1].set_xticks([-1e4, -1e3, -100, -10, 0, 10, 100, 1e3, 1e4])
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=5)
+    """Rows x, y, z: on the left as wide as the widest posterior, on the right with the prior.
+
+    The right axis is asinh, so that all widths are seen. The peak of each posterior is at 1.
+    """
+    figure = new_figure(footer, PAGE, 4.9)
+    panels = figure.subplots(3, 2, sharex="col", sharey=True)
+    for letter, row, (axis, rows) in zip("abc", panels, table.groupby("axis"), strict=True):
+        for axes in row:
+            _posteriors(axes, rows)
+        row[0].set(ylabel="Density / peak (1)", ylim=(0, 1.08))
+        truth = f"{1e3 * rows.truth_m.iloc[0]:.4g}".replace("-", "−")
+        row[0].set_title(f"({letter}) {axis} of {name}, true value {truth} mm")
+        row[1].set_title(_spreads(rows))
+    widest = table[table.samples > 0].deviation_um
+    panels[-1, 0].set(xlabel="Deviation from the true value (µm)")
+    panels[-1, 0].set_xlim(widest.min(), widest.max())
+    panels[-1, 1].set_xlabel("Deviation from the true value (µm), asinh scale")
+    panels[-1, 1].set_xscale("asinh", linear_width=LINEAR)
+    powers = [10.0**k for k in (1, 2, 3, 4)]
+    panels[-1, 1].set_xticks(
+        [*(-power for power in powers[::-1]), 0, *powers],
+        ["$-10^4$", "$-10^3$", "$-100$", "$-10$", "0", "10", "100", "$10^3$", "$10^4$"],
+    )
+    handles, labels = legend_items(panels[0, 0])
+    for number in range(2):
+        handles.append(Line2D([], [], color=GREY, linestyle=_dashes(number)))
+        labels.append(f"chain {number + 1}")
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
     return figure
+
+
+def _posteriors(axes, rows):
+    """Prior, posteriors and truth of one coordinate."""
+    names = [samples for samples in sorted(rows.samples.unique()) if samples > 0]
+    _density(axes, rows[rows.samples == 0], {"color": SKY, "linestyle": ":"}, "prior")
+    for index, samples in enumerate(names):
+        _density(axes, rows[rows.samples == samples], look(index, "linestyle"), f"$T = {samples}$")
+    axes.axvline(0, color=BLACK, linewidth=0.8, linestyle=(0, (1, 1)), label="truth")
 
 
 def _density(axes, rows, style, label):
     """The chains of one posterior, the first one full and the others dashed; common peak 1."""
     peak = rows.density_per_um.max()
     for number, (_, one) in enumerate(rows.groupby("chain")):
-        dashes = {"linestyle": "-" if number == 0 else (0, (4, 2))} | style
         axes.plot(
             one.deviation_um, one.density_per_um / peak, label=label if number == 0 else None,
-            **dashes,
+            markevery=(8 * number, 16), markersize=3, markerfacecolor="none",
+            **({"linestyle": _dashes(number)} | style),
         )  # fmt: skip
+
+
+def _dashes(number: int):
+    return "-" if number == 0 else (0, (4, 2))
 
 
 def _spreads(rows) -> str:
     sds = rows.groupby("samples").sd_um.first()
-    lines = [f"$T={samples}$: {sd:.3g} µm" for samples, sd in sds.items() if samples > 0]
-    return "\n".join(["sd", *lines, f"prior: {sds[0]:.3g} µm"])
+    parts = [f"$T={samples}$: {significant(sd)}" for samples, sd in sds.items() if samples > 0]
+    return f"sd (µm) {', '.join(parts)}"

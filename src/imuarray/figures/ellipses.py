@@ -24,7 +24,9 @@ def fig5_table(array: Array, posteriors: dict[int, np.ndarray], prior, truth=Non
     table = layout[["accelerometer", "side"]]
     for name in ("", "marker_"):
         for axis in "xy":
-            table = table.assign(**{f"{name or 'package_'}{axis}_mm": 1e3 * layout[f"{name}{axis}_m"]})
+            table = table.assign(
+                **{f"{name or 'package_'}{axis}_mm": 1e3 * layout[f"{name}{axis}_m"]}
+            )
     known = np.full((len(table), 2), np.nan) if truth is None else truth[:, :2] + origin
     table = table.assign(truth_x_mm=1e3 * known[:, 0], truth_y_mm=1e3 * known[:, 1])
     variances = np.zeros((len(table), 2, 2))
@@ -61,28 +63,56 @@ def fig5(table: pd.DataFrame, array: Array, level: float, kind: str, footer=()):
 
     Ellipses at their true size. ``kind`` (`notes.SOURCES`) is written over the figure.
     """
-    figure = new_figure(footer, PAGE, 3.9)
-    panels = figure.subplots(1, 2, sharex=True, sharey=True)
+    figure = new_figure(footer, PAGE, 6.6)
+    mosaic = figure.subplot_mosaic(
+        [["topside", "underside"], ["top zoom", "under zoom"], ["legend", "legend"]],
+        height_ratios=[3.3, 2.2, 0.2],
+    )  # fmt: skip
     names = sorted(samples for samples in table.samples.unique() if samples > 0)
     reference = layout_table(array).iloc[0]
-    for axes, side, title in zip(panels, ("topside", "underside"), "ab", strict=True):
-        rows = table[table.side == side]
+    for letter, side, zoom in (("a", "topside", "top zoom"), ("b", "underside", "under zoom")):
+        axes, rows = mosaic[side], table[table.side == side]
         _packages(axes, rows, array, reference if side == reference.side else None)
         for row in rows.itertuples():
             style = _style(names, row.samples)
-            axes.plot(*ellipse(row, level).T, linewidth=0.9, zorder=2 + row.samples / 1e6, **style)
+            axes.plot(*ellipse(row, level).T, linewidth=0.8, **style)
             if row.samples > 0:
-                axes.plot(row.mean_x_mm, row.mean_y_mm, ".", color=style["color"], markersize=2.5)
-        axes.plot(rows.truth_x_mm, rows.truth_y_mm, "x", color=BLACK, markersize=3, mew=0.5)
-        axes.set(aspect="equal", xlabel="x (mm)", title=f"({title}) {side}, seen from above")
+                axes.plot(row.mean_x_mm, row.mean_y_mm, ".", color=style["color"], markersize=1.5)
+        reach = 1e3 * np.abs(array.positions[:, :2]).max() + 4.4
+        axes.set(
+            aspect="equal", xlabel="x (mm)", ylabel="y (mm), downwards", xlim=(-reach, reach),
+            ylim=(reach, -reach), title=f"({letter}) {side}, seen from above",
+        )  # fmt: skip
         axes.grid(False)
-    panels[0].set_ylabel("y (mm), downwards")
-    reach = np.abs(array.positions[:, :2]).max() + 4.2e-3
-    panels[0].set(xlim=(-1e3 * reach, 1e3 * reach), ylim=(1e3 * reach, -1e3 * reach))
-    figure.suptitle(SOURCES.get(kind, kind).upper() if kind != "measured" else "Measured",
-                    size=8, color=BLACK if kind == "measured" else VERMILLION, weight="bold")  # fmt: skip
-    figure.legend(handles=_handles(names, level, table), loc="outside lower center", ncols=7)
+        _zoom(mosaic[zoom], rows[rows.samples == names[-1]], level, _style(names, names[-1]))
+        mosaic[zoom].set_title(f"({letter}) all packages laid over each other, $T = {names[-1]}$")
+    figure.suptitle(
+        SOURCES.get(kind, kind).upper(), size=8, weight="bold",
+        color=BLACK if kind == "measured" else VERMILLION,
+    )  # fmt: skip
+    mosaic["legend"].axis("off")
+    mosaic["legend"].legend(handles=_handles(names, level, table), loc="center", ncols=7)
     return figure
+
+
+def _zoom(axes, rows, level, style):
+    """Ellipses, means and truths about the packages' centres, as large as the panel allows."""
+    outlines = [np.zeros((1, 2))]
+    for row in rows.itertuples():
+        centre = np.array([row.package_x_mm, row.package_y_mm])
+        outlines.append(ellipse(row, level) - centre)
+        axes.plot(*outlines[-1].T, linewidth=0.7, **style)
+        axes.plot(*(np.array([row.mean_x_mm, row.mean_y_mm]) - centre), ".", color=style["color"])
+        truth = np.array([row.truth_x_mm, row.truth_y_mm]) - centre
+        axes.plot(*truth, "x", color=BLACK, markersize=3, markeredgewidth=0.6)
+        outlines.append(truth[None])
+    for line in (axes.axhline, axes.axvline):
+        line(0, linestyle=(0, (3, 2)), linewidth=0.5, color=GREY)
+    reach = 1.08 * np.nanmax(np.abs(np.concatenate(outlines))) or 1.0
+    axes.set(
+        aspect="equal", xlabel="x from the centre (mm)", ylabel="y from the centre (mm)",
+        xlim=(-reach, reach), ylim=(reach, -reach),
+    )  # fmt: skip
 
 
 def _style(names, samples) -> dict:
@@ -108,16 +138,21 @@ def _packages(axes, rows, array, reference):
         axes.plot([x - length / 2, x + length / 2], [y, y], **dashes)
         axes.plot([x, x], [y - width / 2, y + width / 2], **dashes)
         axes.plot(marker_x, marker_y, "o", color=BLACK, markersize=2.2)
-        axes.text(x - 0.47 * length, y - 0.46 * width, label, size=6.5, va="top", ha="left")
+        # in the gap above the package: inside, ellipses would cross it
+        axes.text(x - 0.5 * length, y - 0.53 * width, label, size=6.5, va="bottom", ha="left")
 
 
 def _handles(names, level, table):
     share = f"{100 * level:g} %"
     handles = [Line2D([], [], label=f"prior, {share}", **_style(names, 0))]
     for samples in names:
-        handles.append(Line2D([], [], label=f"$T = {samples}$", marker=".", **_style(names, samples)))
+        handles.append(
+            Line2D([], [], label=f"$T = {samples}$", marker=".", **_style(names, samples))
+        )
     if table.truth_x_mm.notna().any():
-        handles.append(Line2D([], [], linestyle="", marker="x", color=BLACK, markersize=3, label="truth"))
+        handles.append(
+            Line2D([], [], linestyle="", marker="x", color=BLACK, markersize=3, label="truth")
+        )
     handles.append(Line2D([], [], linestyle="", marker="*", color=BLACK, label="reference"))
     handles.append(Line2D([], [], linestyle="", marker="o", color=BLACK, markersize=2.2,
                           label="orientation marker"))  # fmt: skip

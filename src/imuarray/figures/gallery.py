@@ -37,12 +37,18 @@ def title(name: str) -> str:
 
 def gallery(
     figures: dict[str, str], tables: dict[str, tuple[str, str]], settings: dict,
-    chains: Sequence[str],
+    chains: dict[str, Sequence[str]],
 ) -> str:  # fmt: skip
-    """The page. ``figures``: caption by name; ``tables``: caption and Markdown by name."""
+    """The page. ``figures``: caption by name; ``tables``: caption and Markdown by name.
+
+    ``chains``: lines on how good the chains are, by the data they are of.
+    """
+    groups = []
+    for data, lines in chains.items():
+        groups.append("\n".join([f"{data}:\n", *(f"- {line}" for line in lines)]))
     head = HEAD.format(
         scale=settings["scale"]["name"], seed=settings["seed"],
-        chains="\n".join(f"- {line}" for line in chains),
+        chains="\n\n".join(groups),
     )  # fmt: skip
     parts = [head]
     for name, text in figures.items():

@@ -42,8 +42,8 @@ def layout_table(array: Array) -> pd.DataFrame:
 @styled
 def fig1(table: pd.DataFrame, footer=()):
     """Top view (y axis downwards) with numbers and pitch, and the side view under it."""
-    figure = new_figure(footer, height=4.5)
-    top, side = figure.subplots(2, 1, height_ratios=[5, 1.25], sharex=True)
+    figure = new_figure(footer, height=4.0)
+    top, side = figure.subplots(2, 1, height_ratios=[6.2, 1], sharex=True)
     _top_view(top, table)
     _side_view(side, table)
     return figure
@@ -63,12 +63,12 @@ def _top_view(axes, table):
             color="#9AD0F5" if under[row.Index] else "white", size=8,
             style="italic" if under[row.Index] else "normal",
         )  # fmt: skip
-    edge = max(mm.y_m.max(), mm.x_m.max()) + width
-    _dimension(axes, mm.x_m, mm.y_m.max() + width, "x")
-    _dimension(axes, mm.y_m, mm.x_m.min() - length, "y")
+    _dimension(axes, mm.x_m, mm.y_m.max() + 0.75 * width, "x")
+    _dimension(axes, mm.y_m, mm.x_m.min() - 0.75 * length, "y")
     axes.set(aspect="equal", ylabel="y (mm), downwards")
-    axes.set_ylim(edge + 0.6, mm.y_m.min() - width)
-    axes.set_xlim(mm.x_m.min() - 1.5 * length, mm.x_m.max() + length)
+    axes.set_ylim(mm.y_m.max() + 1.3 * width, mm.y_m.min() - 0.8 * width)
+    axes.set_xlim(mm.x_m.min() - 2.15 * length, mm.x_m.max() + length)
+    axes.grid(False)
     axes.set_title("Seen from above: upright topside, italic underside", size=8)
 
 
@@ -103,23 +103,33 @@ def _side_view(axes, table):
     if high - low > height:  # what is between the packages is the circuit board
         axes.add_patch(
             Rectangle(
-                (mm.x_m.min() - length, low + height / 2), np.ptp(mm.x_m) + 2 * length,
-                high - low - height, facecolor="#BFD8C6", edgecolor="0.4", linewidth=0.5,
+                (mm.x_m.min() - 0.7 * length, low + height / 2),
+                np.ptp(mm.x_m) + 1.4 * length,
+                high - low - height,
+                facecolor="#BFD8C6",
+                edgecolor="0.4",
+                linewidth=0.5,
             )  # fmt: skip
         )
     for x, z in sorted(set(zip(mm.x_m.round(6), mm.z_m.round(6), strict=True))):
         draw_package(axes, x, z, length, height, facecolor="0.35")
         axes.plot(x, z, "+", color="white", markersize=4)
-    place = mm.x_m.min() - 1.2 * length
+    if high > low:
+        _height(axes, mm.x_m.min() - 0.8 * length, mm.x_m.min() - length / 2, low, high)
+    axes.set(aspect="equal", xlabel="x (mm)", ylabel="z (mm)", ylim=(low - 1.2, high + 1.2))
+    axes.grid(False)
+    axes.set_title("Side view", size=8)
+
+
+def _height(axes, place, edge, low, high):
+    """The distance between the sides' centres: an arrow at ``place``, lines to ``edge``."""
     axes.annotate(
         "", (place, low), (place, high),
         arrowprops={"arrowstyle": "<->", "linewidth": 0.7, "shrinkA": 0, "shrinkB": 0},
     )  # fmt: skip
     for z in (low, high):
-        axes.plot([place, mm.x_m.min() - length / 2], [z, z], color=BLUE, linewidth=0.4)
+        axes.plot([place, edge], [z, z], color=BLUE, linewidth=0.4)
     axes.annotate(
-        f"{high - low:.1f} mm", (place, (low + high) / 2), xytext=(3, 0), size=7.5,
-        textcoords="offset points", va="center", ha="left",
+        f"{high - low:.1f} mm", (place, (low + high) / 2), xytext=(-3, 0), size=7.5,
+        textcoords="offset points", va="center", ha="right",
     )  # fmt: skip
-    axes.set(aspect="equal", xlabel="x (mm)", ylabel="z (mm)", ylim=(low - 1.2, high + 1.2))
-    axes.set_title("Side view", size=8)

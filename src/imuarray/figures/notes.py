@@ -17,24 +17,29 @@ def scale_line(settings: dict, *more: str) -> str:
 def chain_line(samples: int, verdict: dict) -> str:
     """How the chains of one T ran and how far they got, from `posterior/*.json`.
 
-    Only a verdict that says so is called converged.
+    R-hat and ESS are the largest and the smallest over all coordinates.
     """
     acceptance = "/".join(f"{share:.2f}" for share in verdict["acceptance"])
-    line = (
+    return (
         f"T={samples}: N={verdict['draws_per_sample']}, "
         f"σq={1e6 * verdict['step_length_m']:.3g} µm, {verdict['steps']} steps, "
-        f"acc. {acceptance}, max R-hat {verdict['rhat_max']:.3f}, "
-        f"min ESS {verdict['ess_min']:.0f}"
+        f"acc. {acceptance}, R-hat {verdict['rhat_max']:.3f}, "
+        f"ESS {verdict['ess_min']:.0f}"
     )
-    return line + (" (converged)" if verdict["converged"] else "")
 
 
 def chain_lines(verdicts: dict[int, dict]) -> list[str]:
-    """One line per T; a last one says what to make of chains that fail the criterion."""
+    """One line per T; the last says what R-hat is and which chains pass its criterion.
+
+    Only a verdict that says so is called converged.
+    """
     lines = [chain_line(samples, verdict) for samples, verdict in verdicts.items()]
-    failed = [samples for samples, verdict in verdicts.items() if not verdict["converged"]]
-    if failed:
-        threshold = verdicts[failed[0]]["rhat_threshold"]
-        names = ", ".join(str(samples) for samples in failed)
-        lines.append(f"R-hat is not below {threshold:g} for T = {names}: preliminary.")
-    return lines
+    good = [str(samples) for samples, verdict in verdicts.items() if verdict["converged"]]
+    bad = [str(samples) for samples, verdict in verdicts.items() if not verdict["converged"]]
+    threshold = max(verdict["rhat_threshold"] for verdict in verdicts.values())
+    last = "R-hat: the largest, ESS: the smallest over all coordinates."
+    if good:
+        last += f" R-hat < {threshold:g}, converged: T = {', '.join(good)}."
+    if bad:
+        last += f" R-hat not below {threshold:g}, preliminary: T = {', '.join(bad)}."
+    return [*lines, last]

@@ -20,8 +20,8 @@ VERMILLION, GREEN, BLUE, SKY = "#D55E00", "#009E73", "#0072B2", "#56B4E9"
 PURPLE, ORANGE, BLACK, GREY = "#CC79A7", "#E69F00", "#000000", "#7F7F7F"
 # Colour, marker and dashes of the first, second, ... series: none is told by colour alone.
 LOOKS = (
-    {"color": VERMILLION, "marker": "o", "linestyle": (0, (4, 1.5))},
-    {"color": GREEN, "marker": "s", "linestyle": (0, (6, 1.5, 1, 1.5))},
+    {"color": VERMILLION, "marker": "o", "linestyle": (0, (4, 1.2))},
+    {"color": GREEN, "marker": "s", "linestyle": (0, (3, 1, 1, 1))},
     {"color": BLUE, "marker": "^", "linestyle": "-"},
     {"color": PURPLE, "marker": "D", "linestyle": (0, (2, 1))},
     {"color": ORANGE, "marker": "v", "linestyle": (0, (8, 2))},
@@ -49,18 +49,37 @@ def styled(function):
 
 def new_figure(footer=(), width: float = COLUMN, height: float = 2.8) -> Figure:
     """An empty figure (inches) with small ``footer`` lines; ``height`` is without them."""
-    # 0.6 em: the mean advance of the font's letters and digits
-    characters = int((width - 0.12) * 72 / (0.57 * FOOTER_SIZE))
-    lines = [part for line in footer for part in textwrap.wrap(line, characters)]
-    space = (len(lines) * 1.25 * FOOTER_SIZE + 4) / 72 if lines else 0.0
+    # 0.54 em: the mean advance of the font's letters and digits, and some reserve
+    characters = int((width - 0.12) * 72 / (0.54 * FOOTER_SIZE))
+    lines = [
+        part
+        for line in footer
+        for part in textwrap.wrap(line, characters, subsequent_indent="    ")
+    ]
+    space = (len(lines) * 1.45 * FOOTER_SIZE + 4) / 72 if lines else 0.0
     figure = Figure(figsize=(width, height + space), layout="constrained")
     share = space / (height + space)
     figure.get_layout_engine().set(rect=(0, share, 1, 1 - share), w_pad=0.03, h_pad=0.03)
     figure.text(
         0.06 / width, 0.02 / (height + space), "\n".join(lines), size=FOOTER_SIZE, color="0.35",
-        va="bottom", linespacing=1.1,
+        va="bottom", linespacing=1.25,
     )  # fmt: skip
     return figure
+
+
+def legend_items(axes, last=()):
+    """Handles and labels of ``axes`` in the order drawn, those labelled as in ``last`` at the end.
+
+    Matplotlib puts error bars after plain lines.
+    """
+    handles, labels = axes.get_legend_handles_labels()
+    order = sorted(range(len(labels)), key=lambda i: (labels[i] in last, i))
+    return [handles[i] for i in order], [labels[i] for i in order]
+
+
+def significant(value: float) -> str:
+    """Three significant digits without an exponent: '2100', '31.4', '0.412'."""
+    return f"{float(f'{value:.3g}'):.10g}"
 
 
 @styled

@@ -93,7 +93,9 @@ def table2(sources: dict[str, dict[int, tuple[pd.DataFrame, dict, float]]]) -> p
             axes = coordinates.groupby("axis").sd_m.median()
             rows.append(
                 {
-                    "samples": samples, "source": source, "accelerometer_sd": accelerometer_sd,
+                    "samples": samples,
+                    "source": source,
+                    "accelerometer_sd": accelerometer_sd,
                     **{f"sd_{axis}_m": axes[axis] for axis in "xyz"},
                     "sd_median_m": coordinates.sd_m.median(),
                     "sd_mean_m": coordinates.sd_m.mean(),

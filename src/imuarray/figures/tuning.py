@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from imuarray.figures.style import GREY, look, new_figure, styled
+from imuarray.figures.style import GREY, legend_items, look, new_figure, styled
 
 
 def fig2_table(sweeps: list[pd.DataFrame]) -> pd.DataFrame:
@@ -39,5 +39,5 @@ def fig2(table: pd.DataFrame, target: float, footer=()):
         xscale="log", yscale="log", xlabel="Monte Carlo samples $N$ (count)",
         ylabel=r"Variance of $\log\,\hat{p}_N(y^{(a)}_{1:T}|\theta)$ (nat$^2$)",
     )  # fmt: skip
-    axes.legend(loc="lower left", ncols=2)
+    axes.legend(*legend_items(axes, [r"$\sim 1/N$"]), loc="lower left", ncols=2)
     return figure

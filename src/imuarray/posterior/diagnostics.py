@@ -52,14 +52,16 @@ class BurnIn:
 def find_burn_in(draws, log_target, threshold: float = 1.05, candidates: int = 20) -> BurnIn:
     """Burn-in from the paired chains alone, by cross-reference (2021, section III-C).
 
-    For each candidate (0 to half of the chain) the largest R-hat over all parameters and
-    the log target of what remains, and the smallest effective sample size, which a
+    No burn-in ends before each chain's log target has entered the range of the other
+    chain's second half. For each candidate from there to half of the chain: the largest
+    R-hat over all parameters and the log target of what remains, and the smallest effective sample size, which a
     transient left in the chains lowers. The burn-in is the candidate with the largest
     such size among those below ``threshold``; where none is below, the one with the
     smallest R-hat, and ``reached`` is False.
     """
     length = draws.shape[1]
-    cuts = np.unique(np.linspace(0, length // 2, candidates).astype(int))
+    first = min(_entry(log_target), length // 2)
+    cuts = np.unique(np.linspace(first, length // 2, candidates).astype(int))
     joined = np.concatenate([draws, log_target[..., None]], axis=2)
     rows = []
     for cut in cuts:
@@ -71,7 +73,6 @@ def find_burn_in(draws, log_target, threshold: float = 1.05, candidates: int = 2
                 "rhat_max": float(worst.max()),
                 "rhat_log_target": float(worst[-1]),
                 "ess_min": float(ess(left).min()),
-                "split_z_max": float(agreement(left[..., :-1]).max()),
             }
         )
     table = pd.DataFrame(rows)
@@ -79,6 +80,18 @@ def find_burn_in(draws, log_target, threshold: float = 1.05, candidates: int = 2
     best = passing.ess_min.idxmax() if len(passing) else table.rhat_max.idxmin()
     chosen = table.loc[best]
     return BurnIn(int(chosen.burn_in), bool(len(passing)), table)
+
+
+def _entry(log_target) -> int:
+    """First stored draw at which every chain has been inside the others' late range."""
+    length = log_target.shape[1]
+    entries = []
+    for chain, values in enumerate(log_target):
+        others = np.delete(log_target, chain, axis=0) if len(log_target) > 1 else log_target
+        floor = np.quantile(others[:, length // 2 :], 0.01)
+        inside = values >= floor
+        entries.append(int(inside.argmax()) if inside.any() else length)
+    return max(entries)
 
 
 def autocorrelation(series, lags: int) -> np.ndarray:

@@ -83,7 +83,7 @@ def motion_needs(rng) -> dict:
     rate = 3 * directions(rng, (1,))
     plane = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     arrays = {
-        "three spanning a plane": plane, "three on a line": plane[[0, 1]][[0, 1, 1]] * [[1], [1], [2]],
+        "three spanning a plane": plane, "three on a line": np.outer([0.0, 1, 2], [1.0, 0, 0]),
         "two": plane[:2], "four in space": np.vstack([plane, [0, 0, 1]]),
     }  # fmt: skip
     found = {}
@@ -162,6 +162,8 @@ def measured_acceleration(rng, model, motion_sizes, rail, count: int) -> dict:
         size = np.linalg.norm(force, axis=2) / 9.80665
         for label, values in (("largest", size.max(axis=1)), ("all", size.ravel())):
             found[f"{name}_{label}_quantiles_g"] = np.quantile(values, [0.05, 0.5, 0.95]).tolist()
+        medians = np.median(size.max(axis=1)[: count // 10 * 10].reshape(10, -1), axis=1)
+        found[f"{name}_largest_median_se_g"] = float(medians.std(ddof=1) / np.sqrt(10))
     found["saturated_share"] = float(saturated.any(axis=(1, 2)).mean())
     return found
 

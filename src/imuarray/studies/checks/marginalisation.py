@@ -12,6 +12,7 @@ from imuarray.model.structure import design, products
 from imuarray.motion import normal_motion
 from imuarray.posterior import Likelihood
 from imuarray.simulation import measure
+from imuarray.studies.bayes import sample_covariance
 
 TINY = np.array(
     [[0.0, 0.0, 0.0], [0.021, 0.002, -0.001], [-0.001, 0.019, 0.003], [0.017, 0.02, 0.002]]
@@ -185,6 +186,18 @@ def effective_draws(rng, model, sds, draws=4000, repeats=20) -> dict:
         off = y - products(near) @ whole[:, :6].T
         found["rao_blackwellised"].append(_kish(-0.5 * np.einsum("ni,ij,nj->n", off, S, off)))
     return {"draws": draws} | {name: float(np.median(values)) for name, values in found.items()}
+
+
+def spread_ratio(rng, model, sds, samples=200) -> dict:
+    """Covariance (30b) over that of p(omega_t | y_g) for G equal gyroscopes: mean ratio and se."""
+    motion = normal_motion(rng, (samples,), *sds)
+    rate = measure(model, motion, model.array.relative, rng)[1]
+    closed = model.noise.gyroscope[0, 0] / model.array.gyroscopes
+    ratios = np.trace(sample_covariance(rate)[1], axis1=1, axis2=2) / (3 * closed)
+    return {
+        "ratio": float(ratios.mean()), "se": float(ratios.std(ddof=1) / np.sqrt(samples)),
+        "gyroscopes": model.array.gyroscopes,
+    }  # fmt: skip
 
 
 def _kish(logs) -> float:

@@ -30,8 +30,14 @@ def theory() -> dict:
     }  # fmt: skip
 
 
-def best_acceptance(rng, size: int, chains=400, steps=60, points=13) -> dict:
+def best_acceptance(rng, size: int, repeats=4) -> dict:
     """Acceptance at the largest mean squared jump of a random walk on N(0, I), ``size`` dims."""
+    found = [_best_of_walks(rng, size) for _ in range(repeats)]
+    error = np.std(found, ddof=1) / np.sqrt(repeats)
+    return {"acceptance": float(np.mean(found)), "se": float(error), "size": size}
+
+
+def _best_of_walks(rng, size, chains=150, steps=40, points=13) -> float:
     scaled = np.geomspace(0.8, 6.0, points)
     rates, jumps = [], []
     for length in scaled / np.sqrt(size):
@@ -50,17 +56,34 @@ def best_acceptance(rng, size: int, chains=400, steps=60, points=13) -> dict:
     order = np.argsort(jumps)[-5:]
     fit = np.polyfit(np.log(scaled[order]), np.log(np.array(jumps)[order]), 2)
     best = np.exp(-fit[1] / (2 * fit[0]))
-    return {"acceptance": float(np.interp(best, scaled, rates)), "size": size}
+    return float(np.interp(best, scaled, rates))
 
 
-def acceptance_against_draws(target_of, theta, step, draws, count, rng) -> list[dict]:
-    """Acceptance at one step length for each N in ``draws``; ``target_of(N)`` gives the target."""
-    rows = []
-    for number in draws:
-        target = target_of(number)
+def acceptance_against_variance(targets, theta, step, count, rng) -> list[dict]:
+    """Acceptance at one step length for each target, with its variance of log p-hat at ``theta``.
+
+    ``targets`` maps a label to a `CompiledTarget`. The error allows for accepted proposals
+    coming in clusters: it is taken from 20 blocks of the run.
+    """
+    rows, blocks = [], 20
+    for label, target in targets.items():
         state = np.array(theta)
+        positions = np.vstack([np.zeros(3), state.reshape(-1, 3)])
+        logs = target.likelihood.realisations(positions, target.draws, 200, rng)
         value = target.log_target(state, rng)
         _, value = target.transitions(state, value, step, count // 2, rng)
-        accepted, _ = target.transitions(state, value, step, count, rng)
-        rows.append({"draws": int(number), "acceptance": accepted / count, "transitions": count})
+        shares = np.empty(blocks)
+        for block in range(blocks):
+            accepted, value = target.transitions(state, value, step, count // blocks, rng)
+            shares[block] = accepted / (count // blocks)
+        rows.append(
+            {
+                "target": label,
+                "draws": target.draws,
+                "log_variance": logs.var(ddof=1),
+                "acceptance": shares.mean(),
+                "transitions": blocks * (count // blocks),
+                "acceptance_se": shares.std(ddof=1) / np.sqrt(blocks),
+            }  # fmt: skip
+        )
     return rows

@@ -1,8 +1,9 @@
-"""Wall-clock costs. Not reproducible to the byte, and only for rough comparisons."""
+"""Processor time, by the clock: not reproducible to the byte, for rough comparisons only."""
 
 from __future__ import annotations
 
 import time
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -12,18 +13,27 @@ from imuarray.motion import sphere_motion
 from imuarray.simulation import measure
 
 
-def _fastest(function, repeats: int) -> float:
-    """Shortest of ``repeats`` runs after one to warm up, in seconds."""
+def _fastest(function, repeats: int) -> tuple[float, float]:
+    """Shortest of ``repeats`` runs after one to warm up, and their sd, in seconds.
+
+    The thread's own time, so that a busy machine matters less.
+    """
     function()
     spans = []
     for _ in range(repeats):
-        start = time.perf_counter()
+        start = time.thread_time()
         function()
-        spans.append(time.perf_counter() - start)
-    return min(spans)
+        spans.append(time.thread_time() - start)
+    return min(spans), float(np.std(spans, ddof=1))
 
 
-def iteration_costs(rng, model, motion_sizes, samples, iterations=10, repeats=5) -> pd.DataFrame:
+def _row(what, samples, seconds, spread, count) -> dict:
+    return {
+        "what": what, "samples": samples, "seconds": seconds / count, "spread_s": spread / count,
+    }  # fmt: skip
+
+
+def iteration_costs(rng, model, motion_sizes, samples, iterations=10, repeats=7) -> pd.DataFrame:
     """Seconds an iteration of Algorithm 1 (2017) takes, over N."""
     rows = []
     for number in samples:
@@ -34,9 +44,10 @@ def iteration_costs(rng, model, motion_sizes, samples, iterations=10, repeats=5)
             calibrate_bcd(model, force, rate, tolerance=0.0, limit=limit)
 
         # the difference leaves out arranging the data, which is done once
-        span = _fastest(lambda: run(2 * iterations), repeats)  # noqa: B023
-        span -= _fastest(lambda: run(iterations), repeats)  # noqa: B023
-        rows.append({"what": "iteration", "samples": number, "seconds": span / iterations})
+        long, short = (
+            _fastest(partial(run, limit), repeats) for limit in (2 * iterations, iterations)
+        )
+        rows.append(_row("iteration", number, long[0] - short[0], long[1] + short[1], iterations))
     return pd.DataFrame(rows)
 
 
@@ -50,7 +61,5 @@ def transition_costs(targets, thetas, step, rng, count=50, repeats=3) -> pd.Data
         def run(target=target, theta=theta, value=value):
             target.transitions(theta.copy(), value, step, count, rng)
 
-        rows.append(
-            {"what": "transition", "samples": samples, "seconds": _fastest(run, repeats) / count}
-        )
+        rows.append(_row("transition", samples, *_fastest(run, repeats), count))
     return pd.DataFrame(rows)

@@ -1,0 +1,42 @@
+"""Fits, comparisons and how numbers are written."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def show(value: float, digits: int = 3) -> str:
+    """A number with ``digits`` significant digits."""
+    return f"{value:.{digits}g}"
+
+
+def listed(values, digits: int = 3) -> str:
+    """Numbers side by side."""
+    return ", ".join(show(value, digits) for value in values)
+
+
+def by_samples(values: dict, digits: int = 3) -> str:
+    """T = ...: value; ..."""
+    return "; ".join(f"T = {samples}: {show(value, digits)}" for samples, value in values.items())
+
+
+def power_law(x, y, error) -> tuple[float, float]:
+    """Exponent of y ~ x^p and its standard error, from sds ``error`` of independent y's."""
+    x, y, error = (np.asarray(values, float) for values in (x, y, error))
+    weight = (y / error) ** 2
+    centred = np.log(x) - np.sum(weight * np.log(x)) / weight.sum()
+    spread = np.sum(weight * centred**2)
+    return float(np.sum(weight * centred * np.log(y)) / spread), float(spread**-0.5)
+
+
+def rises(values, errors, z: float = 3.0) -> int:
+    """How many steps of a sequence go up by more than ``z`` combined standard errors."""
+    values, errors = np.asarray(values, float), np.asarray(errors, float)
+    limit = z * np.hypot(errors[1:], errors[:-1])
+    return int(np.sum(np.diff(values) > limit))
+
+
+def ratio(a, a_error, b, b_error) -> tuple[float, float]:
+    """a / b and its standard error for independent a and b."""
+    value = a / b
+    return float(value), float(abs(value) * np.hypot(a_error / a, b_error / b))

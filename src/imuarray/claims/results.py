@@ -1,0 +1,94 @@
+"""The result files of one scale, read when a claim asks for them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from imuarray.errors import InputError
+
+
+class Results:
+    """Tables and summaries below ``root`` (results/<scale>), by path without the root.
+
+    ``settings`` is the effective configuration; ``given`` replaces or adds contents by path.
+    """
+
+    def __init__(self, root, settings: dict, given: dict | None = None):
+        self.root, self.settings = Path(root), settings
+        self._read = dict(given or {})
+
+    def replace(self, contents: dict) -> Results:
+        """A copy with other ``contents`` by path."""
+        return Results(self.root, self.settings, self._read | contents)
+
+    def _cached(self, path: str, suffix: str, reader):
+        if path not in self._read:
+            place = self.root / f"{path}{suffix}"
+            if not place.exists():
+                raise InputError(f"{place}: expected a result of this scale, found no file")
+            self._read[path] = reader(place)
+        return self._read[path]
+
+    def table(self, path: str) -> pd.DataFrame:
+        """A CSV file, by its path without the ending."""
+        return self._cached(path, ".csv", pd.read_csv)
+
+    def benchmark(self, path: str) -> pd.DataFrame:
+        """A Snakemake benchmark below benchmarks/."""
+        return self._cached(f"benchmarks/{path}", ".tsv", lambda p: pd.read_csv(p, sep="\t"))
+
+    def json(self, path: str) -> dict:
+        """A JSON file, by its path without the ending."""
+        # tables and summaries of one posterior differ only in their ending
+        return self._cached(f"{path}.json", "", lambda p: json.loads(p.read_text("utf-8")))
+
+    def draws(self, name: str) -> np.ndarray:
+        """Draws (n, A - 1, 3) m of both chains of chains/``name``, the burn-in left out."""
+
+        def read(place):
+            from imuarray.posterior.store import read_chains
+
+            return read_chains(place)[0].draws
+
+        chains = self._cached(f"chains/{name}", ".nc", read)
+        left = chains[:, self.json(f"posterior/{name}")["burn_in_draws"] :]
+        return left.reshape(-1, left.shape[-1] // 3, 3)
+
+    @property
+    def samples(self) -> list[int]:
+        """The T's of paper 2021, increasing."""
+        return sorted(self.settings["paper2021"]["samples"])
+
+    def posterior(self, name: str) -> tuple[pd.DataFrame, str]:
+        """Truth, mean and sd (m) per coordinate, and where they come from.
+
+        The chains where they have converged, else the linearised posterior.
+        """
+        if self.json(f"posterior/{name}")["converged"]:
+            return self.table(f"posterior/{name}"), "chains"
+        return self.linearised(name), "linearised"
+
+    def linearised(self, name: str) -> pd.DataFrame:
+        """The linearised posterior called ``name``, as in `posterior`."""
+        table = self.table("claims/linearised")
+        return table[table.name == name].reset_index(drop=True)
+
+    def unconverged(self, name: str) -> str:
+        """A remark on chains that have not converged."""
+        return (
+            f"chains {name} not converged (R-hat {self.json(f'posterior/{name}')['rhat_max']:.3g})"
+        )
+
+    def sources(self, names) -> str:
+        """A remark on where the posteriors ``names`` come from."""
+        worst = {name: self.json(f"posterior/{name}") for name in names}
+        short = [f"{n}: R-hat {v['rhat_max']:.3g}" for n, v in worst.items() if not v["converged"]]
+        if not short:
+            return "from the chains, all converged"
+        return (
+            f"chains not converged at this scale ({', '.join(short)}): linearised posterior there"
+        )

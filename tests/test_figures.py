@@ -1,0 +1,357 @@
+"""Figures and tables from small made-up tables: labels, numbers behind them, the same bytes."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+
+from imuarray.figures import calibration, chains, ellipses, layout, notes, tables, tuning
+from imuarray.figures.gallery import caption, gallery, title
+from imuarray.figures.style import significant, write_figure
+from imuarray.geometry import Array, mimu4444, mimu4444_corners
+
+ROOT = Path(__file__).parents[1]
+SAMPLES = (5, 50, 500)
+NAMES = [f"2017_fig{n}" for n in (3, 4, 5)] + [f"2021_fig{n}" for n in (1, 2, 3, 4, 5)]
+
+
+def verdict(samples=5, converged=False, **more):
+    return {
+        "samples": samples, "draws_per_sample": 3, "step_length_m": 4.1e-7, "steps": 8000,
+        "acceptance": [0.2, 0.19], "rhat_max": 1.01 if converged else 1.7, "ess_min": 12.3,
+        "ess_median": 40.0, "burn_in_steps": 400, "rhat_threshold": 1.05, "converged": converged,
+        **more,
+    }  # fmt: skip
+
+
+def rate_errors():
+    grid = [(rate, sd) for sd in (0.0, 1e-4) for rate in (10.0, 1000.0, 5000.0)]
+    table = pd.DataFrame(grid, columns=["angular_rate_dps", "position_sd_m"])
+    table["array_rmse_dps"] = [0.011, 0.012, 0.4, 0.013, 0.014, 4.5]
+    table["gyroscopes_rmse_dps"] = [0.01, 0.02, 900.0, 0.03, 0.02, 1000.0]
+    return table.assign(array_rmse_se_dps=1e-3, gyroscopes_rmse_se_dps=1e-3, realisations=10)
+
+
+def sample_errors():
+    rows = [(n, i, 1e-3 / (i * np.sqrt(n))) for n in (2, 10, 40, 160) for i in (1, 10)]
+    table = pd.DataFrame(rows, columns=["samples", "iterations", "rmse_m"])
+    return table.assign(rmse_se_m=table.rmse_m / 20, realisations=10)
+
+
+def motion_errors():
+    rows = [(r, a, 1 / (r * a)) for a in (200.00000000000003, 2e5) for r in (50.0, 2000.0)]
+    table = pd.DataFrame(rows, columns=["angular_rate_dps", "angular_acceleration_dps2", "rmse_m"])
+    return table.assign(rmse_se_m=table.rmse_m / 20)
+
+
+def sweep(samples):
+    draws = np.array([1, 2, 5, 10])
+    variance = 0.01 * samples / draws
+    return pd.DataFrame({"samples": samples, "draws": draws, "variance": variance}).assign(
+        variance_se=variance / 10, realisations=200
+    )
+
+
+def case(name, array=None):
+    """(table, figure) of one figure, drawn afresh."""
+    rng = np.random.default_rng(7)
+    footer = ["Scale test, seed 1", *notes.chain_lines({5: verdict()})]
+    array = array or mimu4444()
+    count = array.accelerometers - 1
+    if name == "2017_fig3":
+        table = calibration.fig3_table(rate_errors(), 0.06, 32)
+        return table, calibration.fig3(table, 2000.0, footer)
+    if name == "2017_fig4":
+        table = calibration.fig4_table(sample_errors())
+        return table, calibration.fig4(table, footer)
+    if name == "2017_fig5":
+        table = calibration.fig5_table(motion_errors())
+        return table, calibration.fig5(table, 1e-3, footer)
+    if name == "2021_fig1":
+        table = layout.layout_table(array)
+        return table, layout.fig1(table, footer)
+    if name == "2021_fig2":
+        table = tuning.fig2_table([sweep(samples) for samples in SAMPLES])
+        return table, tuning.fig2(table, 0.1, footer)
+    if name == "2021_fig3":
+        table = chains.fig3_table(1e-5 * rng.standard_normal((2, 200)), 40, 20, 1e-6)
+        return table, chains.fig3(table, 800, "x of IMU 2", footer)
+    prior = np.zeros((count, 3)), np.full((count, 3), 3e-3)
+    if name == "2021_fig4":
+        draws = {T: 1e-4 / T * rng.standard_normal((2, 100, 3)) for T in SAMPLES}
+        table = chains.fig4_table(draws, [part[0] for part in prior], np.full(3, -1e-6))
+        return table, chains.fig4(table, "IMU 2", footer)
+    prior = array.relative[1:], prior[1]
+    draws = {T: prior[0] + 1e-3 / T * rng.standard_normal((100, count, 3)) for T in SAMPLES}
+    table = ellipses.fig5_table(array, draws, prior, prior[0])
+    return table, ellipses.fig5(table, array, 0.5, "standin", footer)
+
+
+def save(name, folder):
+    folder.mkdir(exist_ok=True)
+    table, figure = case(name)
+    paths = {kind: folder / f"{name}.{kind}" for kind in ("pdf", "png", "csv")}
+    write_figure(figure, table, **paths)
+    return table, paths
+
+
+def curves(figure):
+    """Data (points, 2) of every line but for levels and the caps of error bars."""
+    lines = [line for axes in figure.axes for line in axes.get_lines() if line.get_marker() != "_"]
+    return [line.get_xydata() for line in lines if len(line.get_xydata()) > 2]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_labels_name_their_units(name):
+    _, figure = case(name)
+    labels = [text for axes in figure.axes for text in (axes.get_xlabel(), axes.get_ylabel())]
+    labels = [text for text in labels if text]
+    assert len(labels) >= 2
+    assert all(re.search(r"\(.+\)", text) for text in labels), labels
+    assert "Scale test" in figure.texts[0].get_text()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_same_bytes_and_csv_gives_the_table_back(name, tmp_path):
+    table, first = save(name, tmp_path / "a")
+    with matplotlib.rc_context({"font.size": 20, "lines.linewidth": 9, "savefig.dpi": 30}):
+        _, second = save(name, tmp_path / "b")
+    for kind in first:
+        assert first[kind].read_bytes() == second[kind].read_bytes(), kind
+    read = pd.read_csv(first["csv"], dtype={"accelerometer": str})
+    pd.testing.assert_frame_equal(read, table, check_dtype=False, check_exact=True)
+    assert b"CreationDate" not in first["pdf"].read_bytes()
+    assert b"Software" not in first["png"].read_bytes()
+    assert not list(tmp_path.glob("*/.*"))
+
+
+def rows_of(curve, table, x, y):
+    """Whether all of a curve's points are rows of the table."""
+    points = set(zip(table[x], table[y], strict=True))
+    return all((a, b) in points for a, b in curve)
+
+
+def test_2017_figures_plot_their_tables():
+    for name, x, y in (
+        ("2017_fig3", "angular_rate_dps", "rmse_dps"),
+        ("2017_fig4", "samples", "rmse_m"),
+    ):
+        table, figure = case(name)
+        drawn = curves(figure)
+        assert sum(map(len, drawn)) == len(table)
+        assert all(rows_of(curve, table, x, y) for curve in drawn)
+    table, figure = case("2017_fig5")
+    lines = [line for line in figure.axes[0].get_lines() if line.get_marker() in ("o", "s")]
+    assert len(lines) == 2
+    assert all(rows_of(x.get_xydata(), table, "angular_rate_dps", "rmse_m") for x in lines)
+    assert sorted(table.angular_acceleration_dps2.unique()) == [200.0, 2e5]
+
+
+def test_gyroscopes_are_averaged_over_position_errors():
+    table = calibration.fig3_table(rate_errors(), 0.06, 9)
+    means = table[table.series == "gyroscopes"]
+    np.testing.assert_allclose(means.rmse_dps, np.sqrt([5e-4, 4e-4, 905000.0]))
+    np.testing.assert_allclose(means.rmse_se_dps.iloc[1], 1e-3 / np.sqrt(2))
+    np.testing.assert_allclose(table[table.series == "unsaturated"].rmse_dps, 0.02)
+
+
+def test_reference_line_passes_through_the_last_line():
+    table = calibration.fig4_table(sample_errors())
+    last = table[(table.series == "bcd") & (table.iterations == 10)]
+    reference = table[table.series == "reference"]
+    np.testing.assert_allclose(reference.rmse_m, last.rmse_m)
+
+
+def test_2021_fig2_plots_its_table_with_the_fit():
+    table, figure = case("2021_fig2")
+    np.testing.assert_allclose(table.fit, table.variance)
+    drawn = curves(figure)
+    assert len(drawn) == 2 * len(SAMPLES)
+    for curve in drawn:
+        assert rows_of(curve, table, "draws", "variance") or rows_of(curve, table, "draws", "fit")
+
+
+def test_2021_fig3_plots_its_table():
+    table, figure = case("2021_fig3")
+    for panel in ("trace", "autocorrelation"):
+        for chain in (1, 2):
+            rows = table[(table.panel == panel) & (table.chain == chain)]
+            wanted = rows[["step", "value"]].to_numpy()
+            found = [curve for curve in curves(figure) if np.array_equal(curve, wanted)]
+            assert len(found) == (2 if panel == "trace" else 1)
+    bins = table[table.panel == "histogram"]
+    area = (bins.value * (bins.high_um - bins.low_um)).groupby(bins.chain).sum()
+    np.testing.assert_allclose(area, 1.0)
+    first = table[table.panel == "autocorrelation"].groupby("chain").value.first()
+    np.testing.assert_allclose(first, 1.0)
+
+
+def test_2021_fig3_leaves_the_burn_in_out_of_the_histogram():
+    draws = np.concatenate([np.full((2, 30), 1.0), np.zeros((2, 70))], axis=1)
+    draws += 1e-6 * np.random.default_rng(3).standard_normal(draws.shape)
+    table = chains.fig3_table(draws, 30, 10)
+    assert table.high_um.max() < 10 and table[table.panel == "trace"].value.max() > 9e5
+    assert not (table.panel == "truth").any()
+
+
+def test_2021_fig4_plots_its_table():
+    table, figure = case("2021_fig4")
+    for axes, axis in zip(figure.axes[::2], "xyz", strict=True):
+        rows = table[table.axis == axis]
+        drawn = [line.get_xydata() for line in axes.get_lines() if len(line.get_xydata()) > 2]
+        groups = list(rows.groupby(["samples", "chain"]))
+        assert len(drawn) == len(groups) == 7
+        for curve, ((samples, _), one) in zip(drawn, groups, strict=True):
+            peak = rows[rows.samples == samples].density_per_um.max()
+            np.testing.assert_array_equal(curve[:, 0], one.deviation_um)
+            np.testing.assert_array_equal(curve[:, 1], one.density_per_um / peak)
+            area = np.trapezoid(one.density_per_um, one.deviation_um)
+            assert abs(area - 1) < 0.01
+
+
+def test_2021_fig5_plots_its_table():
+    table, figure = case("2021_fig5")
+    board = [axes for axes in figure.axes if axes.get_title().endswith("from above")]
+    for axes, side in zip(board, ("topside", "underside"), strict=True):
+        rows = table[(table.side == side) & (table.samples > 0)]
+        dots = [line.get_xydata()[0] for line in axes.get_lines() if line.get_marker() == "."]
+        np.testing.assert_array_equal(dots, rows[["mean_x_mm", "mean_y_mm"]].to_numpy())
+        low, high = axes.get_ylim()
+        assert low > high  # y points down: IMU 1 is in the lower left
+    assert figure.get_suptitle() == "SIMULATED STAND-IN; MEASURED DATA: NOT YET"
+
+
+def test_ellipse_holds_its_share():
+    """Seed 11; 20000 draws, 4.5 sd: false alarm 1e-5."""
+    rng = np.random.default_rng(11)
+    covariance = np.array([[2.0, 0.9], [0.9, 1.0]])
+    draws = rng.multivariate_normal([3.0, -1.0], covariance, 20000)
+    row = pd.Series(
+        {
+            "mean_x_mm": 3.0,
+            "mean_y_mm": -1.0,
+            "cov_xx_mm2": 2.0,
+            "cov_xy_mm2": 0.9,
+            "cov_yy_mm2": 1.0,
+        }
+    )
+    outline = matplotlib.path.Path(ellipses.ellipse(row, 0.5, 721))
+    assert abs(outline.contains_points(draws).mean() - 0.5) < 4.5 * 0.5 / np.sqrt(20000)
+
+
+@pytest.mark.parametrize("name", ["2021_fig1", "2021_fig5"])
+def test_other_arrays_can_be_drawn(name, tmp_path):
+    flat = Array(
+        np.array([[0, 0, 0], [0.01, 0, 0], [0, 0.01, 0], [0.01, 0.02, 0]]), tuple("1234"), 4
+    )
+    for array in (mimu4444_corners(), flat):
+        table, figure = case(name, array)
+        write_figure(figure, table, tmp_path / "a.pdf", tmp_path / "a.png", tmp_path / "a.csv")
+
+
+def test_underside_lies_beneath_and_is_turned():
+    table = layout.layout_table(mimu4444())
+    assert (table.side == "underside").to_numpy().tolist() == [False, True] * 16
+    marker = table[["marker_x_m", "marker_y_m"]].to_numpy() - table[["x_m", "y_m"]].to_numpy()
+    np.testing.assert_allclose(marker[1::2], -marker[::2][:, ::-1])
+
+
+def test_only_converged_chains_are_called_so():
+    assert "converged" not in " ".join(notes.chain_lines({5: verdict(), 50: verdict(50)}))
+    lines = notes.chain_lines({5: verdict(converged=True), 50: verdict(50)})
+    assert "converged: T = 5." in lines[-1] and "preliminary: T = 50." in lines[-1]
+    assert "0.20/0.19" in lines[0] and "0.41 µm" in lines[0] and "R-hat 1.700" in lines[1]
+
+
+def test_significant():
+    assert [significant(x) for x in (2103.4, 31.44, 0.41151)] == ["2100", "31.4", "0.412"]
+
+
+DRAW_ALONE = """
+import sys
+import numpy as np, pandas as pd
+from imuarray.figures import calibration, chains, ellipses, gallery, layout, tables, tuning
+from imuarray.geometry import mimu4444
+trace = pd.DataFrame({"panel": "trace", "chain": 1, "step": [1, 2], "value": [0.0, 1.0]})
+bins = {"panel": "histogram", "chain": 1, "low_um": [0.0], "high_um": [1.0], "value": [1.0]}
+chains.fig3(pd.concat([trace, pd.DataFrame(bins)]), 1, "x")
+layout.fig1(layout.layout_table(mimu4444()))
+bad = ("emcee", "arviz", "numba", "jax", "imuarray.posterior", "imuarray.simulation")
+print([name for name in sys.modules if name.startswith(bad)])
+"""
+
+
+def test_drawing_does_not_touch_the_sampler():
+    done = subprocess.run([sys.executable, "-c", DRAW_ALONE], capture_output=True, text=True)
+    assert done.stdout.strip() == "[]", done.stdout + done.stderr
+
+
+def two_tables():
+    tunings = [
+        {"samples": T, "draws": 3, "step_length_m": 4.1e-7, "variance_nearest": 0.09}
+        for T in SAMPLES
+    ]
+    first = tables.table1(tunings, [verdict(T) for T in SAMPLES])
+    frames = [
+        pd.DataFrame({"axis": list("xyz"), "sd_m": np.array([1.0, 2.0, 3.0]) * scale})
+        for scale in (1e-4, 1.1e-4, 1e-6)
+    ]
+    sources = {
+        name: {T: (frame, verdict(T, converged=True), 0.79) for T in SAMPLES}
+        for name, frame in zip(tables.source_names("standin"), frames, strict=True)
+    }
+    return first, tables.table2(sources)
+
+
+def test_tables(tmp_path):
+    for number, (table, columns) in enumerate(
+        zip(two_tables(), (tables.TABLE1, tables.TABLE2), strict=True)
+    ):
+        paths = {kind: tmp_path / f"{number}.{kind}" for kind in ("csv", "tex", "md")}
+        tables.write_table(table, columns, "A caption, 50 %", ["A note."], **paths)
+        read = pd.read_csv(paths["csv"])
+        pd.testing.assert_frame_equal(read, table, check_dtype=False, check_exact=True)
+        lines = [line for line in paths["md"].read_text().splitlines() if line.startswith("|")]
+        assert len(lines) == len(table) + 2
+        assert {line.count("|") for line in lines} == {len(columns) + 1}
+        tex = paths["tex"].read_text()
+        assert r"50 \%" in tex and "A note." in tex and tex.count(r"\\") == len(table) + 1
+
+
+def test_table2_compares_with_the_last_source():
+    _, table = two_tables()
+    np.testing.assert_allclose(table.ratio, [100, 110, 1] * 3)
+    np.testing.assert_allclose(table.sd_median_m[:3], [2e-4, 2.2e-4, 2e-6])
+    assert "simulated stand-in; measured data: not yet" in table.source[0]
+    assert tables.unfinished(table, 1.05) == []
+    assert "3 of 3" in tables.unfinished(two_tables()[0], 1.05)[0]
+
+
+def effective():
+    config = yaml.safe_load((ROOT / "config.yaml").read_text(encoding="utf-8"))
+    return config | {"scale": {"name": "quick", **config["scales"]["quick"]}}
+
+
+def test_captions_and_gallery():
+    settings = effective()
+    captions = {
+        path.stem: caption(path.read_text(encoding="utf-8"), settings, source="stand-in")
+        for path in (ROOT / "workflow" / "report").glob("20*.rst")
+    }
+    names = ["2021_table1", "2021_table2"]
+    assert sorted(captions) == sorted(NAMES + names)
+    assert json.dumps(settings["paper2017"]["fig5_samples"]) in captions["2017_fig5"]
+    figures = {name: captions[name] for name in NAMES}
+    bodies = {name: (captions[name], "| T |") for name in names}
+    page = gallery(figures, bodies, settings, {"Section IV-A": ["T=5: ..."]})
+    for name in NAMES:
+        assert f"]({name}.png)" in page and f"[PDF]({name}.pdf)" in page and captions[name] in page
+    assert "(claims.md)" in page and "## Paper 2021, table II" in page and "- T=5: ..." in page
+    assert title("2017_fig3") == "Paper 2017, figure 3"
