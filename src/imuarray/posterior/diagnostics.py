@@ -53,15 +53,15 @@ def find_burn_in(draws, log_target, threshold: float = 1.05, candidates: int = 2
     """Burn-in from the paired chains alone, by cross-reference (2021, section III-C).
 
     No burn-in ends before each chain's log target has entered the range of the other
-    chain's second half. For each candidate from there to half of the chain: the largest
-    R-hat over all parameters and the log target of what remains, and the smallest effective sample size, which a
-    transient left in the chains lowers. The burn-in is the candidate with the largest
-    such size among those below ``threshold``; where none is below, the one with the
-    smallest R-hat, and ``reached`` is False.
+    chain's second half. For candidates from there to half of the chain, and for none: the
+    largest R-hat over all parameters and the log target of what remains, and the smallest
+    effective sample size, which a transient left in the chains lowers. The burn-in is the
+    candidate with the largest such size among those below ``threshold``; where none is
+    below, the one with the smallest R-hat, and ``reached`` is False.
     """
     length = draws.shape[1]
     first = min(_entry(log_target), length // 2)
-    cuts = np.unique(np.linspace(first, length // 2, candidates).astype(int))
+    cuts = np.unique([0, *np.linspace(first, length // 2, candidates - 1).astype(int)])
     joined = np.concatenate([draws, log_target[..., None]], axis=2)
     rows = []
     for cut in cuts:
@@ -76,8 +76,9 @@ def find_burn_in(draws, log_target, threshold: float = 1.05, candidates: int = 2
             }
         )
     table = pd.DataFrame(rows)
-    passing = table[table.rhat_max < threshold]
-    best = passing.ess_min.idxmax() if len(passing) else table.rhat_max.idxmin()
+    allowed = table[table.burn_in >= first]
+    passing = allowed[allowed.rhat_max < threshold]
+    best = passing.ess_min.idxmax() if len(passing) else allowed.rhat_max.idxmin()
     chosen = table.loc[best]
     return BurnIn(int(chosen.burn_in), bool(len(passing)), table)
 
