@@ -111,7 +111,7 @@ def descend(
         kernels.weighted_moments(positions, weighted, moments)
         kernels.project(moments, rows, values, full)
         kernels.reduce_linear(full, X, inverse, b, phi, const, energy)
-        kernels.angular_rates(rate, C, b, mean, P, 1e-10, 50, cost, counts)
+        kernels.angular_rates(rate, C, b, mean, P, 1e-7, 50, cost, counts)
         kernels.linear_motion(rate, X, phi, state)
         step = _position_block(force, state, rows, values, A, positions)
         if step < 0.0:
