@@ -3,6 +3,8 @@
 Nothing here knows the time of day: the same code, configuration and seed write the same bytes.
 """
 
+from __future__ import annotations
+
 import errno
 import hashlib
 import json
@@ -13,13 +15,15 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
-import xarray as xr
 
 import imuarray
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
 
 _LIBRARIES = ("numpy", "scipy", "jax", "numba", "emcee", "arviz")
 

@@ -3,11 +3,11 @@ rule sample_experiment:
         recording="results/{scale}/recordings/{kind}.nc",
         code=library("posterior"),
     output:
-        "results/{scale}/chains/{kind}_T{samples}.nc",
+        expand("results/{{scale}}/chains/{{kind}}_T{samples}.nc", samples=SAMPLES),
     log:
-        "results/{scale}/logs/chains/{kind}_T{samples}.log",
+        "results/{scale}/logs/chains/{kind}.log",
     benchmark:
-        "results/{scale}/benchmarks/chains/{kind}_T{samples}.tsv"
+        "results/{scale}/benchmarks/chains/{kind}.tsv"
     threads: 2
     resources:
         mem_mb=4000,
@@ -20,17 +20,19 @@ rule sample_experiment:
 
 rule judge_experiment:
     input:
-        recording="results/{scale}/recordings/{kind}.nc",
-        chains="results/{scale}/chains/{kind}_T{samples}.nc",
+        recordings="results/{scale}/recordings/{kind}.nc",
+        chains=expand("results/{{scale}}/chains/{{kind}}_T{samples}.nc", samples=SAMPLES),
         code=library("posterior"),
     output:
-        verdict="results/{scale}/posterior/{kind}_T{samples}.json",
-        coordinates="results/{scale}/posterior/{kind}_T{samples}.csv",
-        burn_in="results/{scale}/posterior/burn_in_{kind}_T{samples}.csv",
+        verdicts=expand("results/{{scale}}/posterior/{{kind}}_T{samples}.json", samples=SAMPLES),
+        coordinates=expand("results/{{scale}}/posterior/{{kind}}_T{samples}.csv", samples=SAMPLES),
+        burn_ins=expand(
+            "results/{{scale}}/posterior/burn_in_{{kind}}_T{samples}.csv", samples=SAMPLES
+        ),
     log:
-        "results/{scale}/logs/posterior/{kind}_T{samples}.log",
+        "results/{scale}/logs/posterior/{kind}.log",
     benchmark:
-        "results/{scale}/benchmarks/posterior/{kind}_T{samples}.tsv"
+        "results/{scale}/benchmarks/posterior/{kind}.tsv"
     threads: 1
     resources:
         mem_mb=4000,

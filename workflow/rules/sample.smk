@@ -21,17 +21,17 @@ rule sample_posterior:
 
 rule judge_chains:
     input:
-        recording="results/{scale}/recordings/T{samples}.nc",
-        chains="results/{scale}/chains/T{samples}.nc",
+        recordings=expand("results/{{scale}}/recordings/T{samples}.nc", samples=SAMPLES),
+        chains=expand("results/{{scale}}/chains/T{samples}.nc", samples=SAMPLES),
         code=library("posterior"),
     output:
-        verdict="results/{scale}/posterior/T{samples}.json",
-        coordinates="results/{scale}/posterior/T{samples}.csv",
-        burn_in="results/{scale}/posterior/burn_in_T{samples}.csv",
+        verdicts=expand("results/{{scale}}/posterior/T{samples}.json", samples=SAMPLES),
+        coordinates=expand("results/{{scale}}/posterior/T{samples}.csv", samples=SAMPLES),
+        burn_ins=expand("results/{{scale}}/posterior/burn_in_T{samples}.csv", samples=SAMPLES),
     log:
-        "results/{scale}/logs/posterior/T{samples}.log",
+        "results/{scale}/logs/posterior/samples.log",
     benchmark:
-        "results/{scale}/benchmarks/posterior/T{samples}.tsv"
+        "results/{scale}/benchmarks/posterior/samples.tsv"
     threads: 1
     resources:
         mem_mb=4000,

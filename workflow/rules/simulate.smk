@@ -2,11 +2,11 @@ rule simulate_samples:
     input:
         code=library("simulation"),
     output:
-        "results/{scale}/recordings/T{samples}.nc",
+        expand("results/{{scale}}/recordings/T{samples}.nc", samples=SAMPLES),
     log:
-        "results/{scale}/logs/recordings/T{samples}.log",
+        "results/{scale}/logs/recordings/samples.log",
     benchmark:
-        "results/{scale}/benchmarks/recordings/T{samples}.tsv"
+        "results/{scale}/benchmarks/recordings/samples.tsv"
     threads: 1
     resources:
         mem_mb=2000,

@@ -1,14 +1,14 @@
 rule sweep_variance:
     input:
-        recording="results/{scale}/recordings/T{samples}.nc",
+        recordings=expand("results/{{scale}}/recordings/T{samples}.nc", samples=SAMPLES),
         code=library("posterior"),
     output:
-        "results/{scale}/tuning/variance_T{samples}.csv",
+        expand("results/{{scale}}/tuning/variance_T{samples}.csv", samples=SAMPLES),
     log:
-        "results/{scale}/logs/tuning/variance_T{samples}.log",
+        "results/{scale}/logs/tuning/variance.log",
     benchmark:
-        "results/{scale}/benchmarks/tuning/variance_T{samples}.tsv"
-    threads: 1
+        "results/{scale}/benchmarks/tuning/variance.tsv"
+    threads: 2
     resources:
         mem_mb=2000,
         runtime=30,
@@ -20,16 +20,16 @@ rule sweep_variance:
 
 rule sweep_acceptance:
     input:
-        recording="results/{scale}/recordings/T{samples}.nc",
-        variance="results/{scale}/tuning/variance_T{samples}.csv",
+        recordings=expand("results/{{scale}}/recordings/T{samples}.nc", samples=SAMPLES),
+        variances=expand("results/{{scale}}/tuning/variance_T{samples}.csv", samples=SAMPLES),
         code=library("posterior"),
     output:
-        "results/{scale}/tuning/acceptance_T{samples}.csv",
+        expand("results/{{scale}}/tuning/acceptance_T{samples}.csv", samples=SAMPLES),
     log:
-        "results/{scale}/logs/tuning/acceptance_T{samples}.log",
+        "results/{scale}/logs/tuning/acceptance.log",
     benchmark:
-        "results/{scale}/benchmarks/tuning/acceptance_T{samples}.tsv"
-    threads: 1
+        "results/{scale}/benchmarks/tuning/acceptance.tsv"
+    threads: 2
     resources:
         mem_mb=2000,
         runtime=30,
@@ -41,15 +41,15 @@ rule sweep_acceptance:
 
 rule tune:
     input:
-        variance="results/{scale}/tuning/variance_T{samples}.csv",
-        acceptance="results/{scale}/tuning/acceptance_T{samples}.csv",
+        variances=expand("results/{{scale}}/tuning/variance_T{samples}.csv", samples=SAMPLES),
+        acceptances=expand("results/{{scale}}/tuning/acceptance_T{samples}.csv", samples=SAMPLES),
         code=library("posterior"),
     output:
-        "results/{scale}/tuning/T{samples}.json",
+        expand("results/{{scale}}/tuning/T{samples}.json", samples=SAMPLES),
     log:
-        "results/{scale}/logs/tuning/T{samples}.log",
+        "results/{scale}/logs/tuning/tune.log",
     benchmark:
-        "results/{scale}/benchmarks/tuning/T{samples}.tsv"
+        "results/{scale}/benchmarks/tuning/tune.tsv"
     threads: 1
     resources:
         mem_mb=2000,

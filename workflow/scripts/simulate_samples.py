@@ -1,4 +1,4 @@
-"""Simulate the 2021 dataset of T samples -> recording with its truth (NetCDF)."""
+"""Simulate the 2021 dataset of T samples for each T -> recordings with their truth (NetCDF)."""
 
 from job import job
 
@@ -7,10 +7,6 @@ with job(snakemake) as settings:
     from imuarray.recording import write_recording
     from imuarray.studies.bayes import simulate_dataset
 
-    recording, truth = simulate_dataset(settings, int(snakemake.wildcards.samples))
-    write_recording(
-        recording,
-        snakemake.output[0],
-        truth,
-        stamp(settings, settings["seed"]),
-    )
+    for samples, path in zip(settings["paper2021"]["samples"], snakemake.output, strict=True):
+        recording, truth = simulate_dataset(settings, samples)
+        write_recording(recording, path, truth, stamp(settings, settings["seed"]))

@@ -1,4 +1,4 @@
-"""Acceptance against sigma_q -> CSV: samples, draws, step_length_m, acceptance, acceptance_se."""
+"""Acceptance against sigma_q -> CSV per T: samples, draws, step_length_m, acceptance, its se."""
 
 from job import job
 
@@ -12,25 +12,22 @@ with job(snakemake) as settings:
     from imuarray.streams import stream
     from imuarray.studies.bayes import mode_of, target_for
 
-    samples, paper = int(snakemake.wildcards.samples), settings["paper2021"]
-    recording = read_recording(snakemake.input.recording)
-    sweep = pd.read_csv(snakemake.input.variance)
-    draws = choose_draws(sweep.draws, sweep.variance, paper["variance_target"])
-    target = target_for(settings, recording, draws)
+    paper, count = settings["paper2021"], settings["scale"]["acceptance_steps"]
     steps = np.geomspace(*(paper["sweep_steps"][key] for key in ("first", "last", "count")))
-    count = settings["scale"]["acceptance_steps"]
-    rates = acceptance_sweep(
-        target, mode_of(settings, recording), steps, count,
-        stream(settings["seed"], "acceptance sweep", samples),
-    )  # fmt: skip
-    table = pd.DataFrame(
-        {
-            "samples": samples,
-            "draws": draws,
-            "step_length_m": steps,
-            "acceptance": rates,
-            "acceptance_se": np.sqrt(rates * (1 - rates) / count),
-            "transitions": count,
-        }  # fmt: skip
-    )
-    write_csv(table, snakemake.output[0])
+    given = snakemake.input.recordings, snakemake.input.variances, snakemake.output
+    for samples, source, variance, path in zip(paper["samples"], *given, strict=True):
+        recording, sweep = read_recording(source), pd.read_csv(variance)
+        draws = choose_draws(sweep.draws, sweep.variance, paper["variance_target"])
+        rates = acceptance_sweep(
+            target_for(settings, recording, draws),
+            mode_of(settings, recording),
+            steps,
+            count,
+            stream(settings["seed"], "acceptance sweep", samples),
+            snakemake.threads,
+        )
+        table = pd.DataFrame(
+            {"samples": samples, "draws": draws, "step_length_m": steps, "acceptance": rates}
+        )
+        table["acceptance_se"] = np.sqrt(rates * (1 - rates) / count)
+        write_csv(table.assign(transitions=count), path)

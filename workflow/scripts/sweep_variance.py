@@ -1,4 +1,4 @@
-"""Variance of log p-hat at the prior mean -> CSV: samples, draws, variance, variance_se."""
+"""Variance of log p-hat at the prior mean -> CSV per T: samples, draws, variance, variance_se."""
 
 from job import job
 
@@ -12,21 +12,20 @@ with job(snakemake) as settings:
     from imuarray.streams import stream
     from imuarray.studies.bayes import target_for
 
-    samples, scale = int(snakemake.wildcards.samples), settings["scale"]
-    recording = read_recording(snakemake.input.recording)
-    draws, count = settings["paper2021"]["sweep_draws"], scale["variance_realisations"]
-    likelihood = target_for(settings, recording, 1).likelihood
-    variances = variance_sweep(
-        likelihood, recording.relative_positions(), draws, count,
-        stream(settings["seed"], "variance sweep", samples),
-    )  # fmt: skip
-    table = pd.DataFrame(
-        {
-            "samples": samples,
-            "draws": draws,
-            "variance": variances,
-            "variance_se": variances * np.sqrt(2 / (count - 1)),
-            "realisations": count,
-        }  # fmt: skip
-    )
-    write_csv(table, snakemake.output[0])
+    paper, count = settings["paper2021"], settings["scale"]["variance_realisations"]
+    files = zip(paper["samples"], snakemake.input.recordings, snakemake.output, strict=True)
+    for samples, source, path in files:
+        recording = read_recording(source)
+        variances = variance_sweep(
+            target_for(settings, recording, 1).likelihood,
+            recording.relative_positions(),
+            paper["sweep_draws"],
+            count,
+            stream(settings["seed"], "variance sweep", samples),
+            snakemake.threads,
+        )
+        table = pd.DataFrame(
+            {"samples": samples, "draws": paper["sweep_draws"], "variance": variances}
+        )
+        table["variance_se"] = variances * np.sqrt(2 / (count - 1))
+        write_csv(table.assign(realisations=count), path)

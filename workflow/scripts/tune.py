@@ -1,4 +1,4 @@
-"""Choose N and sigma_q from the sweeps -> JSON: samples, draws, step_length_m, ..."""
+"""Choose N and sigma_q from the sweeps -> JSON per T: samples, draws, step_length_m, ..."""
 
 from job import job
 
@@ -9,19 +9,18 @@ with job(snakemake) as settings:
     from imuarray.provenance import stamp, write_json
 
     paper = settings["paper2021"]
-    sweep = pd.read_csv(snakemake.input.acceptance)
-    variance = pd.read_csv(snakemake.input.variance)
-    draws = int(sweep.draws[0])
-    step = choose_step(sweep.step_length_m, sweep.acceptance, paper["acceptance_target"])
-    nearest = (variance.draws - draws).abs().idxmin()
-    write_json(
-        {
-            "samples": int(snakemake.wildcards.samples),
+    given = snakemake.input.acceptances, snakemake.input.variances, snakemake.output
+    for samples, acceptance, variance, path in zip(paper["samples"], *given, strict=True):
+        sweep, table = pd.read_csv(acceptance), pd.read_csv(variance)
+        draws = int(sweep.draws[0])
+        near = (table.draws - draws).abs().idxmin()
+        chosen = {
+            "samples": samples,
             "draws": draws,
-            "step_length_m": step,
-            "variance_nearest": float(variance.variance[nearest] * variance.draws[nearest] / draws),
+            "step_length_m": choose_step(
+                sweep.step_length_m, sweep.acceptance, paper["acceptance_target"]
+            ),
+            "variance_nearest": float(table.variance[near] * table.draws[near] / draws),
             "acceptance_target": paper["acceptance_target"],
-            "stamp": stamp(settings, settings["seed"]),
-        },
-        snakemake.output[0],
-    )
+        }
+        write_json(chosen | {"stamp": stamp(settings, settings["seed"])}, path)

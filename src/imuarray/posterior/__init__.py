@@ -1,14 +1,23 @@
-"""The positions' posterior: likelihood estimate, chains, tuning, diagnostics."""
+"""The positions' posterior: likelihood estimate, chains, tuning, diagnostics.
 
-from imuarray.posterior.likelihood import Likelihood
-from imuarray.posterior.pmmh import Chains, run_chains
-from imuarray.posterior.target import CompiledTarget, GaussianPrior, GenericTarget
+Names load when first used: a job that only reads tables needs no sampler.
+"""
 
-__all__ = [
-    "Chains",
-    "CompiledTarget",
-    "GaussianPrior",
-    "GenericTarget",
-    "Likelihood",
-    "run_chains",
-]
+from importlib import import_module
+
+_HOME = {
+    "Chains": "chains",
+    "CompiledTarget": "target",
+    "GaussianPrior": "target",
+    "GenericTarget": "target",
+    "Likelihood": "likelihood",
+    "run_chains": "pmmh",
+}
+
+__all__ = list(_HOME)
+
+
+def __getattr__(name):
+    if name in _HOME:
+        return getattr(import_module(f"imuarray.posterior.{_HOME[name]}"), name)
+    raise AttributeError(f"module 'imuarray.posterior' has no attribute {name!r}")

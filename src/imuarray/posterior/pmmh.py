@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
 
 import emcee
@@ -13,6 +12,7 @@ import numpy as np
 from tqdm import tqdm
 
 from imuarray.errors import InputError
+from imuarray.posterior.chains import Chains
 from imuarray.posterior.target import Target
 from imuarray.provenance import atomic_write
 from imuarray.streams import stream
@@ -52,26 +52,6 @@ class PseudoMarginalMove(emcee.moves.Move):
         coords = np.array([theta for theta, _, _ in results])
         log_prob = np.array([value for _, _, value in results])
         return emcee.State(coords, log_prob=log_prob), counts > 0
-
-
-@dataclass(frozen=True)
-class Chains:
-    """Paired chains: ``draws`` (chains, draws, size), ``log_target`` (chains, draws).
-
-    ``thin`` transitions lie between stored draws; ``acceptance`` (chains,) is the share
-    of accepted proposals over the whole run.
-    """
-
-    draws: np.ndarray
-    log_target: np.ndarray
-    acceptance: np.ndarray
-    thin: int
-    step: float
-
-    @property
-    def steps(self) -> int:
-        """Transitions made by each chain."""
-        return self.draws.shape[1] * self.thin
 
 
 def run_chains(

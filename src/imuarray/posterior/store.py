@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from imuarray.posterior.pmmh import Chains
+from imuarray.posterior.chains import Chains
 from imuarray.provenance import write_netcdf
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from imuarray.posterior import diagnostics
-from imuarray.posterior.pmmh import Chains
+from imuarray.posterior.chains import Chains
 
 QUANTILES = (0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975)
 

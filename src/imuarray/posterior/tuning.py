@@ -2,15 +2,35 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from imuarray.posterior.likelihood import Likelihood
-from imuarray.posterior.target import Target
+if TYPE_CHECKING:
+    from imuarray.posterior.likelihood import Likelihood
+    from imuarray.posterior.target import Target
 
 
-def variance_sweep(likelihood: Likelihood, positions, draws, count: int, rng) -> np.ndarray:
-    """Variance of log p-hat at ``positions`` for each N in ``draws`` (figure 2), (len(draws),)."""
-    return np.array([likelihood.realisations(positions, n, count, rng).var(ddof=1) for n in draws])
+def _each(function, jobs, threads: int) -> np.ndarray:
+    """``function`` of every job on ``threads`` threads; the kernels release the interpreter."""
+    with ThreadPoolExecutor(threads) as pool:
+        return np.array(list(pool.map(function, jobs)))
+
+
+def variance_sweep(
+    likelihood: Likelihood, positions, draws, count: int, rng, threads: int = 1
+) -> np.ndarray:
+    """Variance of log p-hat at ``positions`` for each N in ``draws`` (figure 2), (len(draws),).
+
+    Each N has a stream spawned from ``rng``, so the threads do not matter.
+    """
+
+    def one(job):
+        number, own = job
+        return likelihood.realisations(positions, number, count, own).var(ddof=1)
+
+    return _each(one, list(zip(draws, rng.spawn(len(draws)), strict=True)), threads)
 
 
 def choose_draws(draws, variances, target: float = 0.1) -> int:
@@ -34,9 +54,14 @@ def acceptance(target: Target, start, step: float, count: int, rng) -> float:
     return accepted / count
 
 
-def acceptance_sweep(target: Target, start, steps, count: int, rng) -> np.ndarray:
-    """`acceptance` for each sigma_q in ``steps`` (metres), (len(steps),)."""
-    return np.array([acceptance(target, start, step, count, rng) for step in steps])
+def acceptance_sweep(target: Target, start, steps, count: int, rng, threads: int = 1) -> np.ndarray:
+    """`acceptance` for each sigma_q in ``steps`` (metres), (len(steps),); streams as above."""
+
+    def one(job):
+        step, own = job
+        return acceptance(target, start, step, count, own)
+
+    return _each(one, list(zip(steps, rng.spawn(len(steps)), strict=True)), threads)
 
 
 def choose_step(steps, rates, target: float = 0.18) -> float:

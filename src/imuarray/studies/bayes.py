@@ -138,3 +138,35 @@ def starts_for(settings: dict, recording: Recording, names) -> np.ndarray:
     rng = stream(settings["seed"], *names, "starts")
     mean = recording.relative_positions()[1:].ravel()
     return mean + settings["paper2021"]["start_sd"] * rng.standard_normal((2, mean.size))
+
+
+def tuned_experiment(settings: dict, recording: Recording, names, threads: int = 1):
+    """(target, sigma_q) of section IV-B on a subset: sigma_a enlarged, (30a)/(30b), III-C."""
+    from imuarray.posterior import tuning
+
+    paper, scale, seed = settings["paper2021"], settings["scale"], settings["seed"]
+    assumed = settings["experiment"]["accelerometer_sd"]
+    likelihood = target_for(settings, recording, 1, assumed, spread=True).likelihood
+    counts = paper["sweep_draws"]
+    variances = tuning.variance_sweep(
+        likelihood,
+        recording.relative_positions(),
+        counts,
+        scale["variance_realisations"] // 4,
+        stream(seed, *names, "variance"),
+        threads,
+    )
+    draws = tuning.choose_draws(counts, variances, paper["variance_target"])
+    target = target_for(settings, recording, draws, assumed, spread=True)
+    sweep = paper["sweep_steps"]
+    # the enlarged noise widens the posterior, so the same sweep ten times longer
+    steps = 10 * np.geomspace(*(sweep[key] for key in ("first", "last", "count")))
+    rates = tuning.acceptance_sweep(
+        target,
+        mode_of(settings, recording, assumed),
+        steps,
+        scale["acceptance_steps"],
+        stream(seed, *names, "acceptance"),
+        threads,
+    )
+    return target, tuning.choose_step(steps, rates, paper["acceptance_target"])
