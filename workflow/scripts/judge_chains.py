@@ -9,9 +9,9 @@ with job(snakemake) as settings:
     from imuarray.recording import read_truth
 
     given, made = snakemake.input, snakemake.output
-    recordings = [
-        *([given.recordings] if isinstance(given.recordings, str) else given.recordings)
-    ] * (len(given.chains) // len(given.recordings))
+    # one recording for each chain file, or one for all of them (a single one comes as text)
+    sources = [given.recordings] if isinstance(given.recordings, str) else given.recordings
+    recordings = [*sources] * (len(given.chains) // len(sources))
     files = zip(
         given.chains, recordings, made.verdicts, made.coordinates, made.burn_ins, strict=True
     )

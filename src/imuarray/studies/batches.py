@@ -9,7 +9,7 @@ from tqdm import tqdm
 
 from imuarray.streams import stream
 
-BATCH = 50  # realisations; part of the streams' definition, so results hang on it
+BATCH = 25  # realisations; part of the streams' definition, so results hang on it
 
 
 def run_batches(function, jobs, threads: int, quiet: bool, label: str) -> list:
