@@ -49,7 +49,7 @@ class BurnIn:
     table: pd.DataFrame
 
 
-def find_burn_in(draws, log_target, threshold: float = 1.05, candidates: int = 20) -> BurnIn:
+def find_burn_in(draws, log_target, threshold: float = 1.05, candidates: int = 12) -> BurnIn:
     """Burn-in from the paired chains alone, by cross-reference (2021, section III-C).
 
     No burn-in ends before each chain's log target has entered the range of the other
