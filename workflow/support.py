@@ -30,9 +30,10 @@ def library(stage: str) -> list[str]:
 
 
 def effective(config: dict, scale: str, *sections: str) -> dict:
-    """The part of the configuration a rule depends on, with one scale resolved."""
+    """The part of the configuration a rule depends on, with one scale resolved.
+
+    Without the number of threads, which no result depends on.
+    """
     names = ("seed", "array", "noise", *sections)
-    return {
-        **{name: config[name] for name in names},
-        "scale": {"name": scale, **config["scales"][scale]},
-    }
+    sizes = {key: value for key, value in config["scales"][scale].items() if key != "threads"}
+    return {**{name: config[name] for name in names}, "scale": {"name": scale, **sizes}}

@@ -8,7 +8,7 @@ rule sample_experiment:
         "results/{scale}/logs/chains/{kind}.log",
     benchmark:
         "results/{scale}/benchmarks/chains/{kind}.tsv"
-    threads: 2
+    threads: lambda wc: config["scales"][wc.scale]["threads"]
     resources:
         mem_mb=4000,
         runtime=60,

@@ -9,7 +9,7 @@ rule sample_posterior:
         "results/{scale}/logs/chains/T{samples}.log",
     benchmark:
         "results/{scale}/benchmarks/chains/T{samples}.tsv"
-    threads: 2
+    threads: lambda wc: config["scales"][wc.scale]["threads"]
     resources:
         mem_mb=4000,
         runtime=90,

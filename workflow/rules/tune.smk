@@ -8,7 +8,7 @@ rule sweep_variance:
         "results/{scale}/logs/tuning/variance.log",
     benchmark:
         "results/{scale}/benchmarks/tuning/variance.tsv"
-    threads: 2
+    threads: lambda wc: config["scales"][wc.scale]["threads"]
     resources:
         mem_mb=2000,
         runtime=30,
@@ -29,7 +29,7 @@ rule sweep_acceptance:
         "results/{scale}/logs/tuning/acceptance.log",
     benchmark:
         "results/{scale}/benchmarks/tuning/acceptance.tsv"
-    threads: 2
+    threads: lambda wc: config["scales"][wc.scale]["threads"]
     resources:
         mem_mb=2000,
         runtime=30,
