@@ -232,6 +232,7 @@ FLIPS = [
     ("2021-33", scaled("posterior/T50", "mean_m", "sd_m > 0", 5.0)),
     ("2021-37", scaled("posterior/T500", "truth_m", "sd_m > 0", lambda old: old + 1e-4)),
     ("2021-43", scaled("posterior/simulation_T5", "sd_m", "sd_m > 0", 0.2)),
+    ("2021-54", scaled("posterior/standin_T500", "truth_m", "axis == 'x'", lambda old: old - 1e-2)),
     ("2021-47", scaled("posterior/simulation_T500", "sd_m", "sd_m > 0", 20.0)),
 ]
 

@@ -11,6 +11,7 @@ from imuarray.claims import (
     physics2017,
     posterior2021,
     rate2017,
+    size2021,
     theory2017,
     tuning2021,
 )
@@ -21,6 +22,7 @@ from imuarray.claims.results import Results
 MODULES = (
     error2017, rate2017, theory2017, physics2017,
     estimator2021, tuning2021, posterior2021, experiment2021,
+    size2021,
 )  # fmt: skip
 
 __all__ = [
