@@ -130,6 +130,27 @@ def test_generic_likelihood_equals_the_collapsed_one_up_to_a_constant():
     assert np.ptp(offsets) < 5 * np.max(errors) * 2**0.5 + 1e-4
 
 
+def test_no_reward_along_a_gauge_with_a_proper_motion_prior():
+    """omega -> omega / (1 + c), r -> r (1 + c)^2 leaves the data alone: log p-hat must be flat.
+
+    With the flat prior it is not: each sample then gains -9 log(1 + c), which this shows too.
+    """
+    model, force, rate, positions, _, motion = simulated(
+        ("gyroscope_scale",), lambda rng: {}, samples=60
+    )
+    normals = np.random.default_rng(2).standard_normal((60, 4, 3))
+    change = {}
+    for name, used in (("flat", model), ("proper", model.with_motion(motion))):
+        likelihood = GenericLikelihood(used, force, rate, pack_motion(model, motion), steps=6)
+        values = []
+        for c in (0.0, -0.03):
+            theta = np.concatenate([(positions[1:] * (1 + c) ** 2).ravel(), np.full(24, c)])
+            values.append(likelihood.on(theta, normals))
+        change[name] = values[1] - values[0]
+    assert change["flat"] == pytest.approx(-9 * 60 * np.log(0.97), rel=0.02)
+    assert abs(change["proper"]) < 3.0
+
+
 def test_gauss_newton_finds_the_optimum_of_bcd():
     model, force, rate, *_ = simulated((), lambda rng: {}, samples=40)
     joint = calibrate_gauss_newton(model, force, rate)

@@ -295,8 +295,7 @@ def test_drawing_does_not_touch_the_sampler():
 
 def two_tables():
     tunings = [
-        {"samples": T, "draws": 3, "step_length_m": 4.1e-7, "variance_nearest": 0.09}
-        for T in SAMPLES
+        {"samples": T, "draws": 3, "step_length_m": 4.1e-7, "variance": 0.09} for T in SAMPLES
     ]
     first = tables.table1(tunings, [verdict(T) for T in SAMPLES])
     frames = [

@@ -157,8 +157,7 @@ def sample(arguments) -> None:
     rng = _stream(arguments.seed, "starts")
     spread = target.prior.sd / 3
     starts = np.array([mode, mode + 0.0])
-    size = 3 * (model.array.accelerometers - 1)
-    starts[:, :size] += spread[:size] * rng.standard_normal((2, size))
+    starts += spread * rng.standard_normal(starts.shape)
     chains = run_chains(
         target, starts, step, max(4, steps // thin), thin, arguments.seed,
         checkpoint=checkpoint, key=key, quiet=arguments.quiet,
@@ -228,7 +227,7 @@ def _tuned_generic(recording, model, arguments):
     mode, found = _map_estimate(recording, model)
     start = pack_motion(model, found.motion.motion)
     estimate = GenericLikelihood(
-        model, recording.specific_force, recording.angular_rate, start, draws=2,
+        model.with_motion(found.motion.motion), recording.specific_force, recording.angular_rate, start, draws=2,
         saturated=recording.saturated_gyroscopes(),
     )  # fmt: skip
     sds = np.sqrt(np.diag(found.covariance))

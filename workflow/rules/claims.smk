@@ -70,6 +70,7 @@ rule claims_accelerometers_only:
 
 rule claims_marginalisation:
     input:
+        recording=expand("results/{{scale}}/recordings/T{samples}.nc", samples=min(SAMPLES)),
         code=[*library("posterior"), *CHECKS],
     output:
         "results/{scale}/claims/marginalisation.json",

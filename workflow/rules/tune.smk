@@ -41,7 +41,6 @@ rule sweep_acceptance:
 
 rule tune:
     input:
-        variances=expand("results/{{scale}}/tuning/variance_T{samples}.csv", samples=SAMPLES),
         acceptances=expand("results/{{scale}}/tuning/acceptance_T{samples}.csv", samples=SAMPLES),
         code=library("posterior"),
     output:

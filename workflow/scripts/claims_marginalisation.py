@@ -7,6 +7,7 @@ with job(snakemake) as settings:  # noqa: F821
 
     from imuarray.config import model_from
     from imuarray.provenance import stamp, write_json
+    from imuarray.recording import read_recording, read_truth
     from imuarray.streams import stream
     from imuarray.studies.checks import marginalisation as checks
     from imuarray.studies.checks import proposal
@@ -22,11 +23,23 @@ with job(snakemake) as settings:  # noqa: F821
     def rng(name):
         return stream(seed, "marginalisation", name)
 
+    path = snakemake.input.recording[0]  # noqa: F821
+    recording, nominal = read_recording(path), read_recording(path).relative_positions()
+    start = paper["start_sd"] * rng("start").standard_normal(nominal.shape)
+    start[0] = 0.0  # the reference stays where it is
+    places = {
+        "start": nominal + start, "prior mean": nominal,
+        "truth": read_truth(path)["position"].to_numpy(),
+    }  # fmt: skip
+
     found = {
         "limits": checks.limits(rng("limits"), model, sds),
         "determinant": checks.determinant_power(rng("determinant"), model, sds),
         "six_dimensions": checks.six_dimensions(rng("six"), model, sds),
         "log_sum_exp": checks.log_sum_exp(rng("log-sum-exp")),
+        "underflow": checks.underflow(
+            rng("underflow"), model, recording.specific_force, recording.angular_rate, places
+        ),
         "unbiased": checks.unbiased(rng("unbiased"), count),
         "effective_draws": checks.effective_draws(rng("effective"), model, sds),
         "spread": checks.spread_ratio(rng("spread"), model, sds),

@@ -14,7 +14,7 @@ with job(snakemake) as settings:
     rate, acceleration, _ = magnitudes(paper)
     motions = [(rate, acceleration, force) for force in np.array([0.0, 1.0, 10.0, 100.0])]
     table = rmse_against_motion(
-        model_from(settings), settings["seed"], paper["fig5_samples"], motions,
+        model_from(settings), settings["seed"], "force", paper["fig5_samples"], motions,
         options(settings, [max(paper["fig4_iterations"])]), snakemake.threads, quiet=False,
     )  # fmt: skip
     write_csv(table, snakemake.output[0])

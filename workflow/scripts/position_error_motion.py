@@ -17,7 +17,7 @@ with job(snakemake) as settings:
         for rate in paper["fig5_rates_dps"]
     ]
     table = rmse_against_motion(
-        model_from(settings), settings["seed"], paper["fig5_samples"], motions,
+        model_from(settings), settings["seed"], "motion", paper["fig5_samples"], motions,
         options(settings, [paper["fig5_iterations"]]), snakemake.threads, quiet=False,
     )  # fmt: skip
     write_csv(table, snakemake.output[0])

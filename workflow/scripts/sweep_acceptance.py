@@ -1,4 +1,4 @@
-"""Acceptance against sigma_q -> CSV per T: samples, draws, step_length_m, acceptance, its se."""
+"""Acceptance against sigma_q -> CSV per T, with the variance of log p-hat at the chosen N."""
 
 from job import job
 
@@ -18,8 +18,15 @@ with job(snakemake) as settings:
     for samples, source, variance, path in zip(paper["samples"], *given, strict=True):
         recording, sweep = read_recording(source), pd.read_csv(variance)
         draws = choose_draws(sweep.draws, sweep.variance, paper["variance_target"])
+        target = target_for(settings, recording, draws)
+        fresh = target.likelihood.realisations(  # not those that chose N
+            recording.relative_positions(),
+            draws,
+            settings["scale"]["variance_realisations"],
+            stream(settings["seed"], "variance at the chosen N", samples),
+        )
         rates = acceptance_sweep(
-            target_for(settings, recording, draws),
+            target,
             mode_of(settings, recording),
             steps,
             count,
@@ -30,4 +37,4 @@ with job(snakemake) as settings:
             {"samples": samples, "draws": draws, "step_length_m": steps, "acceptance": rates}
         )
         table["acceptance_se"] = np.sqrt(rates * (1 - rates) / count)
-        write_csv(table.assign(transitions=count), path)
+        write_csv(table.assign(transitions=count, variance=fresh.var(ddof=1)), path)

@@ -9,18 +9,16 @@ with job(snakemake) as settings:
     from imuarray.provenance import stamp, write_json
 
     paper = settings["paper2021"]
-    given = snakemake.input.acceptances, snakemake.input.variances, snakemake.output
-    for samples, acceptance, variance, path in zip(paper["samples"], *given, strict=True):
-        sweep, table = pd.read_csv(acceptance), pd.read_csv(variance)
-        draws = int(sweep.draws[0])
-        near = (table.draws - draws).abs().idxmin()
+    given = snakemake.input.acceptances, snakemake.output
+    for samples, acceptance, path in zip(paper["samples"], *given, strict=True):
+        sweep = pd.read_csv(acceptance)
         chosen = {
             "samples": samples,
-            "draws": draws,
+            "draws": int(sweep.draws[0]),
             "step_length_m": choose_step(
                 sweep.step_length_m, sweep.acceptance, paper["acceptance_target"]
             ),
-            "variance_nearest": float(table.variance[near] * table.draws[near] / draws),
+            "variance": float(sweep.variance[0]),
             "acceptance_target": paper["acceptance_target"],
         }
         write_json(chosen | {"stamp": stamp(settings, settings["seed"])}, path)

@@ -119,7 +119,8 @@ def attributed(results):
 def similar(results):
     stand_in, simulated = _sds(results, "standin_"), _sds(results, "simulation_")
     ratios = {t: stand_in[t] / simulated[t] for t in results.samples}
-    return untested(MEASURED, f"stand-in / simulation {by_samples(ratios)}")
+    source = results.sources(_all_names(results, "standin_", "simulation_"))
+    return untested(f"{MEASURED}; {source}", f"stand-in / simulation {by_samples(ratios)}")
 
 
 @claim(
@@ -130,7 +131,8 @@ def similar(results):
     "needs measured data",
 )
 def experiment_shrinks(results):
-    return untested(MEASURED, f"median sd {by_samples(_sds(results, 'standin_'))} m")
+    source = results.sources(_all_names(results, "standin_"))
+    return untested(f"{MEASURED}; {source}", f"median sd {by_samples(_sds(results, 'standin_'))} m")
 
 
 @claim(

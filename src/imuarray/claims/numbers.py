@@ -36,7 +36,7 @@ def rises(values, errors, z: float = 3.0) -> int:
     return int(np.sum(np.diff(values) > limit))
 
 
-def ratio(a, a_error, b, b_error) -> tuple[float, float]:
-    """a / b and its standard error for independent a and b."""
+def ratio(a, a_error, b, b_error):
+    """a / b and its standard error for independent a and b, numbers or columns."""
     value = a / b
-    return float(value), float(abs(value) * np.hypot(a_error / a, b_error / b))
+    return value, abs(value) * np.hypot(a_error / a, b_error / b)

@@ -59,12 +59,14 @@ def means_agree(results):
     "IV-A",
     "A burn-in period ends within the run.",
     "ends",
-    "R-hat falls below its threshold for some burn-in of at most half of the chain, every T",
+    "smallest R-hat over the candidates of burn-in, from the chains' entry to half of the chain,"
+    " below its threshold, every T",
 )
 def burn_in(results):
     found = {}
     for samples in results.samples:
         table = results.table(f"posterior/burn_in_T{samples}")
+        table = table[table.burn_in > 0]  # the first candidate is none, the second the entry
         found[samples] = (
             table.rhat_max.min(),
             results.json(f"posterior/T{samples}")["burn_in_steps"],

@@ -46,8 +46,8 @@ class Results:
         # tables and summaries of one posterior differ only in their ending
         return self._cached(f"{path}.json", "", lambda p: json.loads(p.read_text("utf-8")))
 
-    def draws(self, name: str) -> np.ndarray:
-        """Draws (n, A - 1, 3) m of both chains of chains/``name``, the burn-in left out."""
+    def chains(self, name: str) -> np.ndarray:
+        """Draws (chains, n, A - 1, 3) m of chains/``name``, the burn-in left out."""
 
         def read(place):
             from imuarray.posterior.store import read_chains
@@ -56,7 +56,12 @@ class Results:
 
         chains = self._cached(f"chains/{name}", ".nc", read)
         left = chains[:, self.json(f"posterior/{name}")["burn_in_draws"] :]
-        return left.reshape(-1, left.shape[-1] // 3, 3)
+        return left.reshape(*left.shape[:2], left.shape[-1] // 3, 3)
+
+    def draws(self, name: str) -> np.ndarray:
+        """`chains` with all chains in one row: (n, A - 1, 3) m."""
+        chains = self.chains(name)
+        return chains.reshape(-1, *chains.shape[2:])
 
     @property
     def samples(self) -> list[int]:

@@ -131,16 +131,17 @@ def not_parallel(results):
 @claim(
     "2017-32",
     "III",
-    "The positions are unique if omega and omega_dot are not parallel in all samples.",
+    "With the motion known, the positions in (9) are unique if omega and omega_dot are not"
+    " parallel in all samples.",
     "sufficient",
-    "stacked A_n of full rank in every such draw",
+    "A_n of rank 3 in every draw that is not parallel: then the stack of (9) has rank 3 too",
 )
 def unique(results):
     lemma, axis = _checks(results, "lemma"), _checks(results, "common_axis")
-    full = axis["unknowns"]
     remark = (
-        f"not necessary: parallel in each sample but with axes that vary gives rank"
-        f" {axis['axes vary']} of {full}; one common axis {axis['one axis']}"
+        "not necessary: parallel in each sample but with axes that vary the stack has rank"
+        f" {axis['axes vary, motion known']} of 3; with one common axis"
+        f" {axis['one axis, motion known']}; for unknown motion see 2017-35"
     )
     value = f"rank 3 in {lemma['free_rank_3']} of {lemma['draws']} draws"
     return Outcome(value, "", judge(lemma["free_rank_3"] == lemma["draws"]), remark)
@@ -203,4 +204,9 @@ def not_sufficient(results):
     lacking = table[table["rank"] < table.unknowns]
     which = listed(sorted(set(lacking.samples)))
     value = f"deficient for N = {which} in {len(lacking)} of {len(table)} cases"
-    return Outcome(value, "", judge(len(lacking) > 0))
+    axis = _checks(results, "common_axis")
+    remark = (
+        "joint rank, motion unknown; omega and omega_dot along one axis in all samples give"
+        f" {axis['one axis']} of {axis['unknowns']}, along axes that vary {axis['axes vary']}"
+    )
+    return Outcome(value, "", judge(len(lacking) > 0), remark)

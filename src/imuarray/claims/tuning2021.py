@@ -91,7 +91,7 @@ def target_variance(results):
     found = {}
     for samples in results.samples:
         tuned = results.json(f"tuning/T{samples}")
-        found[samples] = (tuned["variance_nearest"], tuned["draws"])
+        found[samples] = (tuned["variance"], tuned["draws"])
     stands = all(v <= 0.12 and (n == 1 or v * n / (n - 1) > 0.08) for v, n in found.values())
     value = by_samples({samples: pair[0] for samples, pair in found.items()})
     value += f" with N = {listed([pair[1] for pair in found.values()])}"

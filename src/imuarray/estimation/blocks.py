@@ -83,7 +83,7 @@ def pack_motion(model: ArrayModel, motion: Motion) -> np.ndarray:
 
 
 def residual(model, x, p, force, rate, keep, whiten_force, whiten_rate):
-    """Whitened residuals of one sample, (3A + 3G [+ 6],), its derivatives' prior included."""
+    """Whitened residuals of one sample, (3A + 3G [+ priors],), the motion's priors included."""
     shared = 3 * (model.array.accelerometers - 1)
     positions = jnp.concatenate([jnp.zeros((1, 3)), p[:shared].reshape(-1, 3)])
     predicted = model.predict(unpack_motion(x), positions, p[shared:])
@@ -91,6 +91,9 @@ def residual(model, x, p, force, rate, keep, whiten_force, whiten_rate):
         whiten_force @ (force - predicted.specific_force).ravel(),
         keep * (whiten_rate @ (rate - predicted.angular_rate).ravel()),
     ]
+    for place, sd in enumerate(model.motion_sd):
+        if np.isfinite(sd):
+            parts.append(x[3 * place : 3 * place + 3] / sd)
     if model.needs_derivatives:
         parts.append(x[9:12] / model.derivative_sd[0])
         parts.append(x[12:15] / model.derivative_sd[1])

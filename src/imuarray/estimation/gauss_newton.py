@@ -112,6 +112,8 @@ def _iterate(given, x, p, tolerance, limit):
             if trial.cost <= blocks.cost * (1 + 1e-12):
                 break
             length /= 2
+        else:
+            break  # no shorter step lowers the cost: not converged, and said so
         x, p, blocks = trial_x, trial_p, trial
         costs.append(blocks.cost)
         steps.append(float(np.max(np.abs(length * step[:size]))))

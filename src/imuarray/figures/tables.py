@@ -68,7 +68,7 @@ def table1(tunings: Sequence[dict], verdicts: Sequence[dict]) -> pd.DataFrame:
     rows = []
     for tuning, verdict in zip(tunings, verdicts, strict=True):
         row = {name: tuning[name] for name in ("samples", "draws", "step_length_m")}
-        row["variance"] = tuning["variance_nearest"]
+        row["variance"] = tuning["variance"]
         for number, share in enumerate(verdict["acceptance"], start=1):
             row[f"acceptance_{number}"] = share
         for name in ("steps", "burn_in_steps", "rhat_max", "ess_min", "ess_median", "converged"):

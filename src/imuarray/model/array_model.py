@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -29,12 +29,16 @@ class ArrayModel:
     derivative_sd : (float, float)
         Prior sd of omega double dot (rad/s^3) and s dot (m/s^3), used only where an effect
         needs them; the defaults are the papers' motion at 5 Hz.
+    motion_sd : (float, float, float)
+        Prior sd of omega (rad/s), omega_dot (rad/s^2) and s (m/s^2), infinite as in paper 2021.
+        With effects that have a gauge the flat prior is no posterior at all: see `with_motion`.
     """
 
     array: Array
     noise: Noise
     effects: tuple[str, ...] = ()
     derivative_sd: tuple[float, float] = (2e4, 600.0)
+    motion_sd: tuple[float, float, float] = (np.inf, np.inf, np.inf)
 
     @classmethod
     def isotropic(cls, array, accelerometer_sd, gyroscope_sd, effects=()) -> ArrayModel:
@@ -124,10 +128,21 @@ class ArrayModel:
         out = _predict_many(self, fields, positions, parameters)
         return Prediction(*(np.asarray(part) for part in out))
 
+    def with_motion(self, motion: Motion) -> ArrayModel:
+        """The same model with the motion prior of a recording: zero mean, its own size.
+
+        Under a flat prior each sample of the likelihood carries a power of the array's
+        size and of a common gyroscope scale, which the data do not push back; a prior of
+        the motion's own size does (docs/findings.md).
+        """
+        sds = [float(np.sqrt(np.mean(np.square(field)))) for field in motion[:3]]
+        return replace(self, motion_sd=tuple(sds))
+
     @property
     def _function(self) -> tuple:
         """All that `predict` and the compiled residuals depend on, noise excepted."""
-        return self.array.accelerometers, self.array.gyroscopes, self.chain, self.derivative_sd
+        counts = self.array.accelerometers, self.array.gyroscopes
+        return (*counts, self.chain, self.derivative_sd, self.motion_sd)
 
     def __hash__(self):
         return hash(self._function)

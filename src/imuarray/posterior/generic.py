@@ -4,7 +4,9 @@ For each sample the motion's mode and curvature are found by Gauss-Newton; omega
 from that Gaussian, the rest of the motion (omega_dot, s and, where effects need them,
 omega double dot and s dot: the 12-column H) is integrated analytically at each draw. The
 estimate of p(y | theta) is unbiased for models linear in that rest given omega, and its
-variance falls as 1/N as in (26a). For the papers' model it equals (26a) in expectation.
+variance falls as 1/N as in (26a). For the papers' model with its flat motion prior it equals
+(26a) in expectation, up to a constant. Effects that have a gauge need a proper motion prior
+(`ArrayModel.with_motion`): flat, each sample would carry a power of the gauge's scale.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from functools import partial
 
 import numpy as np
 
+from imuarray.errors import InputError
 from imuarray.estimation.blocks import Problem, problem, residual
 from imuarray.model import ArrayModel
 from imuarray.model.jax64 import jax, jnp
@@ -72,6 +75,12 @@ class GenericLikelihood:
         saturated=None,
     ):  # fmt: skip
         self.given: Problem = problem(model, specific_force, angular_rate, saturated)
+        seen = self.given.keep.reshape(len(self.given.keep), -1, 3).any(axis=1).all(axis=1)
+        if not seen.all():
+            raise InputError(
+                "gyroscopes: expected one unsaturated per axis in every sample, found none in"
+                f" sample {np.flatnonzero(~seen)[0]} (and {np.sum(~seen) - 1} more)"
+            )
         self.start, self.draws, self.steps = np.asarray(start), draws, steps
 
     def on(self, parameters, normals) -> float:

@@ -19,14 +19,17 @@ def summarise(chains: Chains, labels, threshold: float, truth=None):
     burn_in = diagnostics.find_burn_in(chains.draws, chains.log_target, threshold)
     left = chains.draws[:, burn_in.draws :]
     table = _coordinates(left, labels, truth)
+    # over every sampled parameter, effects included, and the log target
+    every = np.concatenate([left, chains.log_target[:, burn_in.draws :, None]], axis=2)
+    worst, sizes = diagnostics.rhat(every), diagnostics.ess(every[..., :-1])
     verdict = {
         "burn_in_steps": burn_in.draws * chains.thin,
         "burn_in_draws": burn_in.draws,
-        "converged": bool(table.rhat.max() < threshold),
-        "rhat_max": float(table.rhat.max()),
+        "converged": bool(worst.max() < threshold),
+        "rhat_max": float(worst.max()),
         "rhat_threshold": threshold,
-        "ess_min": float(table.ess.min()),
-        "ess_median": float(table.ess.median()),
+        "ess_min": float(sizes.min()),
+        "ess_median": float(np.median(sizes)),
         "split_z_max": float(table.split_z.max()),
         "acceptance": chains.acceptance.tolist(),
         "steps": chains.steps,

@@ -90,13 +90,15 @@ def rmse_against_samples(
 
 
 def rmse_against_motion(
-    model: ArrayModel, seed, samples, motions, options, threads=1, quiet=True
+    model: ArrayModel, seed, study, samples, motions, options, threads=1, quiet=True
 ) -> pd.DataFrame:
-    """Figure 5: RMSE for each (|omega|, |omega_dot|, |s|) in ``motions`` (SI units)."""
+    """Figure 5: RMSE for each (|omega|, |omega_dot|, |s|) in ``motions`` (SI units).
+
+    ``study`` names the random streams, so that two studies never share them."""
     rows = []
     for number, motion in enumerate(motions):
         squares, _, status = _point(
-            model, seed, ("position", "motion", number), options, samples, motion, threads, quiet
+            model, seed, ("position", study, number), options, samples, motion, threads, quiet
         )
         good = status >= 0
         rmse, error = root_mean_square(squares[good, -1])

@@ -104,7 +104,10 @@ def motion_needs(rng) -> dict:
 
 
 def common_axis(rng, positions, samples: int = 20) -> dict:
-    """Rank for omega and omega_dot parallel in each sample: one axis, or axes that vary."""
+    """Rank for omega and omega_dot parallel in each sample: one axis, or axes that vary.
+
+    Joint with the motion unknown (of 3 (A - 1)), and of (9) with it known (of 3).
+    """
     size = rng.standard_normal((2, samples, 1))
     axes = {"one axis": directions(rng, ()), "axes vary": directions(rng, (samples,))}
     nothing = np.zeros((samples, 3))
@@ -112,9 +115,10 @@ def common_axis(rng, positions, samples: int = 20) -> dict:
     for name, axis in axes.items():
         motion = Motion.of(size[0] * axis, size[1] * axis, nothing)
         found[name] = numerical_rank(joint_singular_values(positions, motion, UNIT))
+        stack = lever_matrices(state_of(motion)).reshape(-1, 3)  # of (9)
+        found[f"{name}, motion known"] = numerical_rank(np.linalg.svd(stack, compute_uv=False))
     still = Motion.of(nothing, nothing, rng.standard_normal((samples, 3)))
-    matrices = lever_matrices(state_of(still))
-    found["no rotation"] = int(np.any(matrices != 0.0))
+    found["no rotation"] = numerical_rank(joint_singular_values(positions, still, UNIT))
     return found
 
 
