@@ -6,6 +6,8 @@ import imuarray
 
 PACKAGE = Path(imuarray.__file__).parent
 
+BASE = ("config.py", "errors.py", "provenance.py", "streams.py")  # under every stage
+
 # Every stage rests on those before it: the package's folders are the path of the data.
 STAGES = {
     "simulation": ("geometry", "motion", "model", "simulation", "recording", "studies"),
@@ -26,7 +28,8 @@ def library(stage: str) -> list[str]:
             folders.extend(members)
             if name == stage:
                 break
-    return sorted(str(path) for folder in folders for path in (PACKAGE / folder).glob("*.py"))
+    files = [path for folder in folders for path in (PACKAGE / folder).glob("*.py")]
+    return sorted(str(path) for path in [*files, *(PACKAGE / name for name in BASE)])
 
 
 def effective(config: dict, scale: str, *sections: str) -> dict:

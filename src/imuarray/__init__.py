@@ -1,7 +1,8 @@
 """imuarray: calibration of inertial sensor arrays, with the uncertainty stated.
 
 The folders follow the path of the data: array geometry -> motion -> measurement
-model (and effects) -> simulation and recordings -> estimators -> figures.
+model (and effects) -> simulation and recordings -> estimation -> posterior -> studies ->
+figures and claims.
 Heavy modules load when they are first used.
 """
 
@@ -16,7 +17,8 @@ _HOME = {
     "Recording": "imuarray.recording",
     "read_recording": "imuarray.recording",
     "write_recording": "imuarray.recording",
-    "calibrate": "imuarray.estimation",
+    "calibrate_bcd": "imuarray.estimation",
+    "calibrate_gauss_newton": "imuarray.estimation",
     "estimate_motion": "imuarray.estimation",
 }
 

@@ -10,11 +10,13 @@ import xarray as xr
 from imuarray.errors import InputError
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
+from imuarray.model.effects import find_effects
 from imuarray.provenance import code_digest, digest, stamp, write_netcdf
 from imuarray.recording import Recording, read_recording, write_recording
 
 PMMH_STEPS = {True: 200_000, False: 10_000}  # compiled, any effects
 STORED = 2000
+RHAT_THRESHOLD = 1.05
 
 
 def simulate(arguments) -> None:
@@ -63,6 +65,7 @@ def calibrate(arguments) -> None:
     model = model_of(recording, arguments.effects)
     data = recording.specific_force, recording.angular_rate
     saturated = recording.saturated_gyroscopes()
+    find_effects(arguments.effects)  # an unknown one is named before anything else
     if arguments.method == "bcd":
         if arguments.effects:
             raise InputError(
@@ -146,14 +149,20 @@ def sample(arguments) -> None:
 
     recording = usable(read_recording(arguments.recording), arguments.quiet)
     model = model_of(recording, arguments.effects)
+    if not arguments.quiet:
+        print("tuning N and the step length ...", flush=True)
     target, mode, step, draws = _tuned(recording, model, arguments)
     steps = arguments.steps or PMMH_STEPS[not model.effects]
     thin = max(1, steps // STORED)
     key = digest(
-        recording.specific_force, recording.angular_rate, step, steps, arguments.seed,
-        list(model.effects), code_digest(),
+        recording.specific_force, recording.angular_rate, recording.accelerometer_position,
+        model.noise.accelerometer, model.noise.gyroscope, target.prior.mean, target.prior.sd,
+        draws, step, steps, arguments.seed, list(model.effects), code_digest(),
     )  # fmt: skip
     checkpoint = arguments.out.with_name(f".{arguments.out.name}.{key[:16]}.npz")
+    for other in arguments.out.parent.glob(f".{arguments.out.name}.*.npz"):
+        if other != checkpoint:
+            print(f"{other}: a checkpoint of other data, settings or code, not continued")
     rng = _stream(arguments.seed, "starts")
     spread = target.prior.sd / 3
     starts = np.array([mode, mode + 0.0])
@@ -163,12 +172,16 @@ def sample(arguments) -> None:
         checkpoint=checkpoint, key=key, quiet=arguments.quiet,
     )  # fmt: skip
     labels = recording.accelerometer_labels[1:]
-    verdict, _, _ = summarise(chains, labels, 1.05)
+    verdict, table, _ = summarise(chains, labels, RHAT_THRESHOLD)
     attrs = stamp({"recording": key, "draws_per_sample": draws}, arguments.seed)
     attrs |= {name: verdict[name] for name in ("burn_in_draws", "rhat_max", "ess_min")}
     write_chains(arguments.out, chains, labels, target.prior, attrs, effect_names(model))
     Path(checkpoint).unlink(missing_ok=True)
     if not arguments.quiet:
+        print("triad axis   mean mm   sd um")
+        for row in table.itertuples():
+            numbers = f"{1e3 * row.mean_m:9.4f} {1e6 * row.sd_m:7.2g}"
+            print(f"{row.accelerometer:>5} {row.axis:>4} {numbers}")
         state = "converged" if verdict["converged"] else "NOT converged: take more --steps"
         print(f"{state}: R-hat {verdict['rhat_max']:.3f}, smallest ESS {verdict['ess_min']:.0f},"
               f" burn-in {verdict['burn_in_steps']} of {verdict['steps']} steps")  # fmt: skip
@@ -181,7 +194,7 @@ def _stream(seed, name):
 
 
 def _tuned(recording, model, arguments):
-    """Target, a start near the mode, step length and N."""
+    """(target, start near the mode, step length, N), tuned as in section III-C."""
     from imuarray.posterior import CompiledTarget, GaussianPrior, Likelihood, tuning
 
     nominal, prior_sd = model.array.parameters, recording.position_prior_sd
@@ -227,8 +240,8 @@ def _tuned_generic(recording, model, arguments):
     mode, found = _map_estimate(recording, model)
     start = pack_motion(model, found.motion.motion)
     estimate = GenericLikelihood(
-        model.with_motion(found.motion.motion), recording.specific_force, recording.angular_rate, start, draws=2,
-        saturated=recording.saturated_gyroscopes(),
+        model.with_motion(found.motion.motion), recording.specific_force,
+        recording.angular_rate, start, draws=2, saturated=recording.saturated_gyroscopes(),
     )  # fmt: skip
     sds = np.sqrt(np.diag(found.covariance))
     size = 3 * (model.array.accelerometers - 1)

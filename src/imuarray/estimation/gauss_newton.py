@@ -31,7 +31,10 @@ def eliminate_motion(blocks: Blocks):
 
 
 def _checked_solve(information, gradient):
-    """The shared step, in parameters scaled to a unit diagonal (metres beside seconds)."""
+    """(step, covariance), solved in parameters scaled to a unit diagonal (metres beside seconds).
+
+    IdentifiabilityError where the scaled information is singular.
+    """
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     scaled = information / np.outer(scale, scale)
     values, vectors = np.linalg.eigh(scaled)
@@ -39,8 +42,8 @@ def _checked_solve(information, gradient):
         weak = np.flatnonzero(np.abs(vectors[:, 0]) > 0.3)
         raise IdentifiabilityError(
             "calibration: expected informative motion, found a direction of the parameters"
-            f" (components {weak.tolist()}) that the data do not determine; an effect with a"
-            " gauge needs --position-prior, or the motion is too poor"
+            f" (components {weak.tolist()}) that the data do not determine; the motion is"
+            " too poor, or an effect has a gauge that only a prior on the positions fixes"
         )
     inverse = (vectors / values) @ vectors.T / np.outer(scale, scale)
     return -inverse @ gradient, inverse

@@ -61,6 +61,8 @@ def effect(id, *, unit, prior_sd, shape, derivatives=False):
     """Register the decorated function as the effect ``id`` of the catalogue."""
 
     def register(function):
+        if id in EFFECTS:
+            raise ValueError(f"effect {id}: expected a new id, found it registered already")
         EFFECTS[id] = Effect(id, unit, prior_sd, shape, derivatives, function)
         return function
 
