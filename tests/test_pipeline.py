@@ -124,7 +124,8 @@ def test_bad_configuration_is_one_clear_line(tmp_path):
          "--directory", str(tmp_path), "--workflow-profile", "none", "-n"],
         capture_output=True, text=True, timeout=120,
     )  # fmt: skip
-    assert done.returncode != 0 and "gyroscope_sd" in done.stderr
+    said = done.stdout + done.stderr
+    assert done.returncode != 0 and "gyroscope_sd" in said and "Traceback" not in said
     assert not (tmp_path / "results").exists()
 
 
