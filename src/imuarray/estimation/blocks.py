@@ -27,7 +27,7 @@ class Problem(NamedTuple):
     angular_rate: np.ndarray  # (T, G, 3)
     keep: np.ndarray  # (T, 3G) 1.0 where the gyroscope axis is used, else 0.0
     whiten_force: np.ndarray  # (3A, 3A), upper Cholesky factor of the precision
-    whiten_rate: np.ndarray  # (3G, 3G)
+    whiten_rate: np.ndarray  # (1 or T, 3G, 3G)
     prior_mean: np.ndarray  # (P,)
     prior_sd: np.ndarray  # (P,), infinite where flat
 
@@ -44,12 +44,18 @@ class Blocks(NamedTuple):
 
 
 def problem(
-    model: ArrayModel, specific_force, angular_rate, saturated=None, position_prior=None
+    model: ArrayModel,
+    specific_force,
+    angular_rate,
+    saturated=None,
+    position_prior=None,
+    rate_covariance=None,
 ) -> Problem:
     """Arrange measurements (T, A, 3) m/s^2, (T, G, 3) rad/s for the general estimators.
 
     ``position_prior``: None for a flat one, or (mean (3 (A - 1),), sd) in metres. Effect
-    parameters always have theirs. InputError where saturated axes meet correlated
+    parameters always have theirs. ``rate_covariance`` (T, 3G, 3G) (rad/s)^2 replaces the
+    declared gyroscope noise by one for each sample, say that of (30b). InputError where saturated axes meet correlated
     gyroscopes, which only the papers' model supports.
     """
     keep = np.ones((len(angular_rate), 3 * model.array.gyroscopes))
@@ -61,10 +67,11 @@ def problem(
     size = 3 * (model.array.accelerometers - 1)
     mean, sd = (np.zeros(size), np.inf) if position_prior is None else position_prior
     spread = np.broadcast_to(sd, size)
+    covariance = model.noise.gyroscope[None] if rate_covariance is None else rate_covariance
     return Problem(
         model, np.asarray(specific_force), np.asarray(angular_rate), keep,
         np.linalg.cholesky(model.noise.accelerometer_precision).T,
-        np.linalg.cholesky(np.linalg.inv(model.noise.gyroscope)).T,
+        np.linalg.cholesky(np.linalg.inv(covariance)).transpose(0, 2, 1),
         np.concatenate([mean, np.zeros(model.effect_size)]),
         np.concatenate([spread, model.effect_prior_sd]),
     )  # fmt: skip
@@ -102,7 +109,7 @@ def residual(model, x, p, force, rate, keep, whiten_force, whiten_rate):
 
 @partial(jax.jit, static_argnums=0)
 def _chunk(model, x, p, force, rate, keep, use, whiten_force, whiten_rate):
-    def one(x, force, rate, keep, use):
+    def one(x, force, rate, keep, use, whiten_rate):
         def flat(both):
             return residual(
                 model, both[: x.size], both[x.size :], force, rate, keep, whiten_force, whiten_rate
@@ -114,13 +121,13 @@ def _chunk(model, x, p, force, rate, keep, use, whiten_force, whiten_rate):
         blocks = left.T @ left, left.T @ right, left.T @ value
         return (*blocks, use * (right.T @ right), use * (right.T @ value), use * (value @ value))
 
-    A, B, g, shared, gradient, cost = jax.vmap(one)(x, force, rate, keep, use)
+    A, B, g, shared, gradient, cost = jax.vmap(one)(x, force, rate, keep, use, whiten_rate)
     return A, B, g, shared.sum(0), gradient.sum(0), cost.sum()
 
 
 def normal_equations(given: Problem, x, p) -> Blocks:
     """Blocks at motion x (T, n) and shared parameters p (P,), priors included."""
-    samples = len(x)
+    samples, last = len(x), len(given.whiten_rate) - 1
     motion, cross, gradient = [], [], []
     weight = 1.0 / given.prior_sd**2
     offset = p - given.prior_mean
@@ -132,7 +139,7 @@ def normal_equations(given: Problem, x, p) -> Blocks:
         index = np.minimum(index, samples - 1)
         out = _chunk(
             given.model, x[index], p, given.specific_force[index], given.angular_rate[index],
-            given.keep[index], use, given.whiten_force, given.whiten_rate,
+            given.keep[index], use, given.whiten_force, given.whiten_rate[np.minimum(index, last)],
         )  # fmt: skip
         used = int(use.sum())
         motion.append(np.asarray(out[0])[:used])

@@ -14,7 +14,7 @@ import xarray as xr
 from imuarray.errors import InputError
 from imuarray.provenance import atomic_write
 from imuarray.recording import validate
-from imuarray.recording.validate import AXES, DIMENSIONS, NUMBERS, TEXTS, TRUTH, UNITS
+from imuarray.recording.validate import AXES, DIMENSIONS, FLAGS, NUMBERS, TEXTS, TRUTH, UNITS
 
 # A rail is a count; turning counts into SI units and back may cost the last digits.
 _RAIL_TOLERANCE = 1e-6
@@ -39,6 +39,8 @@ class Recording:
     position_prior_sd : float, metres
     stationary : ndarray (T,) bool, or None
         Still poses.
+    specific_force_saturated, angular_rate_saturated : ndarray (T, A or G, 3) bool, or None
+        Readings at a rail, where a correction moved them off the range (first-order calibration).
     title, source, license : str, empty if not known
     """
 
@@ -54,6 +56,8 @@ class Recording:
     gyroscope_range: float
     position_prior_sd: float
     stationary: np.ndarray | None = None
+    specific_force_saturated: np.ndarray | None = None
+    angular_rate_saturated: np.ndarray | None = None
     title: str = ""
     source: str = ""
     license: str = ""
@@ -64,8 +68,9 @@ class Recording:
             name: (DIMENSIONS[name], np.asarray(getattr(self, name), float), {"units": units[0]})
             for name, units in UNITS.items()
         }
-        if self.stationary is not None:
-            variables["stationary"] = (DIMENSIONS["stationary"], np.asarray(self.stationary, bool))
+        for name in FLAGS:
+            if getattr(self, name) is not None:
+                variables[name] = (DIMENSIONS[name], np.asarray(getattr(self, name), bool))
         coordinates = {
             "time": variables.pop("time"),
             "accelerometer": ("accelerometer", np.array(self.accelerometer_labels, object)),
@@ -85,30 +90,33 @@ class Recording:
 
     def saturated_gyroscopes(self) -> np.ndarray:
         """Which rates are at the gyroscopes' rail, (T, G, 3) bool."""
+        if self.angular_rate_saturated is not None:
+            return self.angular_rate_saturated
         return np.abs(self.angular_rate) >= self.gyroscope_range * (1 - _RAIL_TOLERANCE)
+
+    def saturated_accelerometers(self) -> np.ndarray:
+        """Which specific forces are at the accelerometers' rail, (T, A, 3) bool."""
+        if self.specific_force_saturated is not None:
+            return self.specific_force_saturated
+        return np.abs(self.specific_force) >= self.accelerometer_range * (1 - _RAIL_TOLERANCE)
 
     def select(self, index: Any) -> Recording:
         """The samples that `index` picks: a slice, a (T,) mask or an array of time indices."""
-        still = None if self.stationary is None else self.stationary[index]
-        return replace(
-            self,
-            time=self.time[index],
-            specific_force=self.specific_force[index],
-            angular_rate=self.angular_rate[index],
-            stationary=still,
-        )
+        names = ("time", "specific_force", "angular_rate", *FLAGS)
+        parts = {name: getattr(self, name) for name in names}
+        return replace(self, **{n: x[index] for n, x in parts.items() if x is not None})
 
 
 def from_dataset(dataset: xr.Dataset, where: str = "recording") -> Recording:
     """Turn the file's dataset into a recording; InputError, naming `where`, if it is not one."""
     validate.check_structure(dataset, where)
     arrays = {name: _in_si_units(dataset[name]) for name in UNITS}
-    still = dataset["stationary"].values.astype(bool) if "stationary" in dataset else None
+    flags = {name: dataset[name].values.astype(bool) for name in FLAGS if name in dataset}
     recording = Recording(
         **arrays,
         accelerometer_labels=_labels(dataset["accelerometer"]),
         gyroscope_labels=_labels(dataset["gyroscope"]),
-        stationary=still,
+        **flags,
         **{name: float(np.asarray(dataset.attrs[name]).item()) for name in NUMBERS},
         **{name: str(dataset.attrs.get(name, "")) for name in TEXTS},
     )

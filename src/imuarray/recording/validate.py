@@ -31,7 +31,12 @@ DIMENSIONS = {
     "angular_rate": ("time", "gyroscope", "axis"),
     "accelerometer_position": ("accelerometer", "axis"),
     "stationary": ("time",),
+    "specific_force_saturated": ("time", "accelerometer", "axis"),
+    "angular_rate_saturated": ("time", "gyroscope", "axis"),
 }
+
+# Optional variables that are true or false.
+FLAGS = ("stationary", "specific_force_saturated", "angular_rate_saturated")
 
 # Accepted values of the attribute `units`; the first is written, and is SI.
 UNITS = {
@@ -96,8 +101,9 @@ def check_structure(dataset: xr.Dataset, where: str) -> None:
     for name in LABELS:
         _check_text(dataset[name], where)
     _check_axis(dataset["axis"], where)
-    if "stationary" in dataset:
-        _check_boolean(dataset["stationary"], where)
+    for name in FLAGS:
+        if name in dataset:
+            _check_boolean(dataset[name], where)
     for name in NUMBERS:
         _check_number(dataset.attrs, name, where)
 
@@ -166,14 +172,16 @@ def _check_axis(coordinate: xr.DataArray, where: str) -> None:
 
 
 def _check_boolean(variable: xr.DataArray, where: str) -> None:
-    if variable.dims != DIMENSIONS["stationary"]:
+    expected = DIMENSIONS[variable.name]
+    if variable.dims != expected:
         raise InputError(
-            f"{where}: stationary: expected dimensions (time), found {_listed(variable.dims)}"
+            f"{where}: {variable.name}: expected dimensions {_listed(expected)}, "
+            f"found {_listed(variable.dims)}"
         )
     values = variable.values
     if values.dtype.kind not in "biu" or not np.isin(values, (0, 1)).all():
         raise InputError(
-            f"{where}: stationary: expected true or false (1 or 0) for each time, "
+            f"{where}: {variable.name}: expected true or false (1 or 0), "
             f"found type {values.dtype} with other values"
         )
 

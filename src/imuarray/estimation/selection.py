@@ -1,0 +1,109 @@
+"""Which samples of a recording to calibrate with: moving, off the rails, informative."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from imuarray.errors import InputError
+from imuarray.estimation.collapsed import Collapsed
+from imuarray.estimation.motion_ml import motion_from
+from imuarray.model import ArrayModel
+from imuarray.recording import Recording
+
+SLOWEST = np.radians(100.0)  # rad/s; slower samples say nearly nothing of the positions
+INFORMATIVE = 0.5  # the share of the moving, unsaturated samples that is kept
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Indices of the samples kept, and how many each criterion removed, in this order.
+
+    ``informative`` (n,) are the samples to calibrate with, ``usable`` (m,) all that move
+    and are off the rails; ``removed`` maps a criterion's words to a count of samples.
+    """
+
+    informative: np.ndarray
+    usable: np.ndarray
+    removed: dict[str, int]
+
+    def disjoint(self, counts) -> dict[int, np.ndarray]:
+        """Disjoint subsets of ``counts`` samples each, spread evenly over the recording.
+
+        InputError where there are too few informative samples.
+        """
+        left, need = self.informative, sum(counts)
+        if len(left) < need:
+            raise InputError(
+                f"recording: expected at least {need} informative samples, found {len(left)}"
+            )
+        chosen = {}
+        for count in sorted(counts, reverse=True):
+            picks = np.linspace(0, len(left) - 1, count).round().astype(int)
+            chosen[count] = left[picks]
+            left = np.delete(left, picks)
+        return chosen
+
+
+def neighbours(mask: np.ndarray) -> np.ndarray:
+    """Samples next to one in the mask, and those themselves."""
+    near = mask.copy()
+    near[1:] |= mask[:-1]
+    near[:-1] |= mask[1:]
+    return near
+
+
+def information(recording: Recording) -> np.ndarray:
+    """Size of A_t = Omega(omega)^2 + Omega(omega_dot), (T,) 1/s^2: how a position shows itself.
+
+    omega is the gyroscopes' mean; omega_dot comes from the accelerometers at their nominal
+    positions.
+    """
+    counts = recording.specific_force.shape[1], recording.angular_rate.shape[1]
+    sds = recording.accelerometer_noise_sd, recording.gyroscope_noise_sd
+    from imuarray.geometry import Array
+
+    array = Array(
+        recording.accelerometer_position, recording.accelerometer_labels, counts[1], "recording"
+    )
+    model = ArrayModel.isotropic(array, *sds)
+    data = Collapsed.of(model, recording.specific_force, recording.angular_rate)
+    turn = motion_from(data, array.relative).motion.angular_acceleration
+    rate = recording.angular_rate.mean(axis=1)
+    # |Omega(w)^2|_F^2 = 2 |w|^4, |Omega(w')|_F^2 = 2 |w'|^2, and the two are orthogonal
+    return np.sqrt(2 * np.sum(rate**2, axis=1) ** 2 + 2 * np.sum(turn**2, axis=1))
+
+
+def select_dynamic(
+    recording: Recording, slowest: float = SLOWEST, share: float = INFORMATIVE
+) -> Selection:
+    """Moving samples with no reading at a rail, nor next to one; of these the informative.
+
+    ``slowest`` rad/s; ``share`` of the usable samples, the largest by `information`.
+    """
+    speed = np.linalg.norm(recording.angular_rate.mean(axis=1), axis=1)
+    still = np.zeros(speed.shape, bool) if recording.stationary is None else recording.stationary
+    force, rate = recording.saturated_accelerometers(), recording.saturated_gyroscopes()
+    rails = force.any(axis=(1, 2)), rate.any(axis=(1, 2))
+    criteria = {
+        "still pose": still,
+        f"slower than {np.degrees(slowest):g} deg/s": speed < slowest,
+        "accelerometer at a rail": rails[0],
+        "gyroscope at a rail": rails[1],
+        "next to a rail": neighbours(rails[0] | rails[1]),
+    }
+    left, removed = np.ones(speed.shape, bool), {}
+    for words, bad in criteria.items():
+        removed[words] = int((left & bad).sum())
+        left &= ~bad
+    usable = np.flatnonzero(left)
+    if not len(usable):
+        raise InputError(
+            "recording: expected moving samples off the rails, found none ("
+            + ", ".join(f"{count} {words}" for words, count in removed.items()) + ")"
+        )  # fmt: skip
+    size = information(recording.select(usable))
+    keep = size >= np.quantile(size, 1 - share)
+    removed["less informative half" if share == 0.5 else "less informative"] = int((~keep).sum())
+    return Selection(usable[keep], usable, removed)

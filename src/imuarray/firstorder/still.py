@@ -1,0 +1,92 @@
+"""Find the still poses of a recording by itself: where array-averaged readings only show noise."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from imuarray.errors import InputError
+from imuarray.recording import Recording
+
+WINDOW = 1.0  # s, over which a reading's spread is judged
+SHORTEST = 3.0  # s, of a pose after its ends are cut
+THRESHOLD = 3.0  # times the noise floor
+FLOOR = 0.02  # quantile of the windows' spreads taken as the noise floor
+# A floor this many times the declared noise is motion, not noise: nothing was still.
+MOVING = 10.0
+
+
+def window_spread(readings: np.ndarray, window: int) -> np.ndarray:
+    """Root mean variance over axes of readings (T, 3) in a centred window of samples, (T,)."""
+    # cumulative sums of centred values keep the rounding far below the noise
+    centred = readings - readings.mean(axis=0)
+    sums = [np.vstack([np.zeros(3), np.cumsum(x, axis=0)]) for x in (centred, centred**2)]
+    index = np.arange(len(readings))
+    first = np.clip(index - window // 2, 0, max(len(readings) - window, 0))
+    last = np.minimum(first + window, len(readings))
+    count = (last - first)[:, None]
+    mean, square = ((total[last] - total[first]) / count for total in sums)
+    return np.sqrt(np.maximum(square - mean**2, 0.0).mean(axis=1))
+
+
+def runs(mask: np.ndarray) -> list[tuple[int, int]]:
+    """First and past-the-last index of each run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def still_poses(recording: Recording, window=WINDOW, shortest=SHORTEST) -> list[slice]:
+    """Index ranges in which the array does not move, in the order of time.
+
+    The spread of the array-averaged specific force and angular rate in a sliding window is
+    compared with its floor, the recording's own quietest windows; half a window is cut from
+    both ends of a pose, and a gap in time ends it. A declared mask ``stationary`` is used
+    instead where the recording has one.
+
+    Raises
+    ------
+    InputError
+        Where nothing is still: no run long enough, or a floor far above the declared noise.
+    """
+    step = float(np.median(np.diff(recording.time))) if len(recording.time) > 1 else np.inf
+    width = max(int(round(window / step)), 2)
+    if len(recording.time) < 2 * width:
+        raise InputError(
+            f"recording: expected at least {2 * window:g} s to look for still poses in,"
+            f" found {len(recording.time)} samples"
+        )
+    if recording.stationary is not None:
+        still, cut = recording.stationary.copy(), 0
+    else:
+        still, cut = _quiet(recording, width), width // 2
+    # a gap ends a pose: what happened meanwhile is not known
+    breaks = np.flatnonzero(np.diff(recording.time) > 1.5 * step) + 1
+    still[breaks] = False
+    least = int(round(shortest / step))
+    poses = [slice(a + cut, b - cut) for a, b in runs(still) if b - a - 2 * cut >= least]
+    if not poses:
+        raise InputError(
+            f"recording: expected still poses of at least {shortest:g} s for the first-order"
+            " calibration, found none"
+        )
+    return poses
+
+
+def _quiet(recording: Recording, width: int) -> np.ndarray:
+    """Samples whose window shows no more than THRESHOLD times the floor, (T,) bool."""
+    still = np.ones(len(recording.time), bool)
+    kinds = (
+        ("specific_force", recording.accelerometer_noise_sd),
+        ("angular_rate", recording.gyroscope_noise_sd),
+    )
+    for name, declared in kinds:
+        readings = getattr(recording, name)
+        spread = window_spread(readings.mean(axis=1), width)
+        floor = np.quantile(spread, FLOOR)
+        if floor > MOVING * declared:
+            raise InputError(
+                f"recording: expected still poses for the first-order calibration, found {name}"
+                f" to vary by {floor:.3g} in its quietest second, more than {MOVING:g} times the"
+                f" declared noise of {declared:.3g}"
+            )
+        still &= spread <= THRESHOLD * max(floor, 0.1 * declared / np.sqrt(readings.shape[1]))
+    return still

@@ -1,0 +1,229 @@
+"""Offset, scale, misalignment and orientation of accelerometer triads by maximum likelihood.
+
+All triads of a rigid array see the same specific force u_p in pose p, of known magnitude and
+unknown direction: y_kp = M_k u_p + b_k + e. The reference triad's matrix M_1 is upper
+triangular, which makes its axes the array frame (paper 2021, section IV-B, after its [18]).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from imuarray.errors import IdentifiabilityError
+from imuarray.model.jax64 import jax, jnp
+
+UPPER = np.triu_indices(3)
+
+OUTLIER = 5.0  # times the median size of a residual
+MOST_LEFT_OUT = 0.2  # of a triad's poses
+
+
+@dataclass(frozen=True)
+class TriadFit:
+    """What the still poses say of A accelerometer triads.
+
+    Attributes
+    ----------
+    matrix : (A, 3, 3), reading = matrix @ specific force + offset; the first upper triangular
+    offset : (A, 3) m/s^2
+    direction : (P, 3) unit vectors of the specific force in the poses
+    residual : (P, A, 3) m/s^2
+    covariance : (12 A, 12 A) of (matrix row by row, offset) triad by triad, scaled to the
+        residual; rows of the fixed zeros are zero
+    residual_ratio : float
+        Residual over what the noise of the poses' averages explains; 1 if nothing else is there.
+    used : (P, A) bool
+        False where a triad's reading in a pose was left out as an outlier.
+    """
+
+    matrix: np.ndarray
+    offset: np.ndarray
+    direction: np.ndarray
+    residual: np.ndarray
+    covariance: np.ndarray
+    residual_ratio: float
+    used: np.ndarray
+
+    @property
+    def residual_rms(self) -> np.ndarray:
+        """Root mean square over the poses used and axes, (A,) m/s^2."""
+        squares = np.mean(self.residual**2, axis=2)
+        return np.sqrt(np.sum(squares * self.used, axis=0) / self.used.sum(axis=0))
+
+    @property
+    def residual_rms_all(self) -> np.ndarray:
+        """The same over all poses, those left out included."""
+        return np.sqrt(np.mean(self.residual**2, axis=(0, 2)))
+
+    def parts(self) -> dict[str, np.ndarray]:
+        """Scale (A, 3), misalignment (A, 3: xy, xz, yz) and orientation (A, 3: rotation vector)."""
+        values = [_parts(matrix) for matrix in self.matrix]
+        return {name: np.array([value[name] for value in values]) for name in values[0]}
+
+    def parts_sd(self) -> dict[str, np.ndarray]:
+        """Standard deviations of `parts`, and of the offset."""
+        count = len(self.matrix)
+        blocks = self.covariance.reshape(count, 12, count, 12)
+        out = {name: [] for name in ("scale", "misalignment", "orientation", "offset")}
+        for k, matrix in enumerate(self.matrix):
+            covariance = blocks[k, :9, k, :9]
+            for name, slope in _part_slopes(matrix).items():
+                out[name].append(np.sqrt(np.diag(slope @ covariance @ slope.T)))
+            out["offset"].append(np.sqrt(np.diag(blocks[k, 9:, k, 9:])))
+        return {name: np.array(value) for name, value in out.items()}
+
+
+def _triangular_times_rotation(matrix):
+    """matrix = U R, U upper triangular with positive diagonal, R a rotation; from the last row up.
+
+    Closed form, so that its slopes come from automatic differentiation.
+    """
+    zero = jnp.zeros(())
+    u33 = jnp.sqrt(matrix[2] @ matrix[2])
+    r3 = matrix[2] / u33
+    u23 = matrix[1] @ r3
+    left = matrix[1] - u23 * r3
+    u22 = jnp.sqrt(left @ left)
+    r2 = left / u22
+    u13, u12 = matrix[0] @ r3, matrix[0] @ r2
+    left = matrix[0] - u13 * r3 - u12 * r2
+    # signed, so that R stays a rotation
+    r1 = jnp.cross(r2, r3)
+    u11 = left @ r1
+    upper = jnp.stack([u11, u12, u13, zero, u22, u23, zero, zero, u33]).reshape(3, 3)
+    return upper, jnp.stack([r1, r2, r3])
+
+
+def _named(upper, turn):
+    scale = jnp.diag(upper)
+    skew = jnp.stack([upper[0, 1] / scale[0], upper[0, 2] / scale[0], upper[1, 2] / scale[1]])
+    small = 0.5 * jnp.stack(
+        [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
+    )
+    return {"scale": scale, "misalignment": skew, "orientation": small}
+
+
+def _parts(matrix):
+    from scipy.spatial.transform import Rotation
+
+    upper, rotation = _triangular_times_rotation(jnp.asarray(matrix))
+    values = {name: np.asarray(value) for name, value in _named(upper, rotation).items()}
+    return values | {"orientation": Rotation.from_matrix(np.array(rotation)).as_rotvec()}
+
+
+def _part_slopes(matrix):
+    """Derivatives (3, 9) of each part in the matrix's entries, orientation as a small turn."""
+    _, reference = _triangular_times_rotation(jnp.asarray(matrix))
+
+    def parts(flat):
+        upper, rotation = _triangular_times_rotation(flat.reshape(3, 3))
+        return _named(upper, rotation @ reference.T)
+
+    slopes = jax.jacfwd(parts)(jnp.asarray(matrix).ravel())
+    return {name: np.asarray(slope) for name, slope in slopes.items()}
+
+
+def _unpack(p, triads):
+    """(matrices (A, 3, 3), offsets (A, 3), directions (P, 3) not normalised) from the flat p."""
+    first = jnp.zeros((3, 3)).at[UPPER].set(p[:6])
+    split = 6 + 9 * (triads - 1)
+    others = p[6:split].reshape(triads - 1, 3, 3)
+    offsets = p[split : split + 3 * triads].reshape(triads, 3)
+    return jnp.concatenate([first[None], others]), offsets, p[split + 3 * triads :].reshape(-1, 3)
+
+
+def _predict(p, triads, magnitude):
+    matrices, offsets, directions = _unpack(p, triads)
+    length = jnp.sqrt(jnp.sum(directions**2, axis=1, keepdims=True))
+    force = magnitude * directions / length
+    return jnp.einsum("kij,pj->pki", matrices, force) + offsets
+
+
+def fit_triads(mean, sd, magnitude: float) -> TriadFit:
+    """ML estimate from the poses' averages, without the readings that stand far out.
+
+    A triad whose offset has jumped or drifts (sensors settling after power-on do) spoils the
+    directions for all others. One reading of one triad in one pose is left out at a time, the
+    worst, as long as it is more than OUTLIER times the usual; never more than a fifth of a
+    triad's.
+
+    Parameters
+    ----------
+    mean : (P, A, 3) m/s^2, average reading in each pose
+    sd : (P, A, 3) m/s^2, standard deviation of that average
+    magnitude : float, m/s^2, gravity where the recording was made
+
+    Raises
+    ------
+    IdentifiabilityError
+        Where the poses are too few or too alike to determine all parameters.
+    """
+    used = np.ones(mean.shape[:2], bool)
+    while True:
+        found = _fit(mean, sd, magnitude, used)
+        size = np.sqrt(np.mean((found.residual / sd) ** 2, axis=2))
+        spare = (~used).sum(axis=0) < MOST_LEFT_OUT * len(mean)
+        candidates = np.where(used & spare, size, 0.0)
+        worst = np.unravel_index(np.argmax(candidates), size.shape)
+        if not candidates[worst] > OUTLIER * np.median(size[used]):
+            return found
+        used[worst] = False
+
+
+def _fit(mean, sd, magnitude, used) -> TriadFit:
+    """Least squares over the readings ``used``."""
+    poses, triads = mean.shape[:2]
+    weight = used[..., None] / sd
+    unit = mean.mean(axis=1) / magnitude
+    start = np.concatenate(
+        [np.eye(3)[UPPER], np.tile(np.eye(3).ravel(), triads - 1), np.zeros(3 * triads),
+         unit.ravel()]
+    )  # fmt: skip
+
+    @jax.jit
+    def residual(p):
+        misfit = ((mean - _predict(p, triads, magnitude)) * weight).ravel()
+        # fixes the directions' free lengths at 1; zero at the solution, so it costs nothing
+        lengths = jnp.sum(_unpack(p, triads)[2] ** 2, axis=1) - 1.0
+        return jnp.concatenate([misfit, lengths])
+
+    slopes = jax.jit(jax.jacfwd(residual))
+    found = least_squares(
+        lambda p: np.asarray(residual(p)), start, jac=lambda p: np.asarray(slopes(p)),
+        x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-12, max_nfev=200,
+    )  # fmt: skip
+    scaled = found.jac / np.linalg.norm(found.jac, axis=0)
+    rank = np.linalg.matrix_rank(scaled, tol=1e-7)
+    if rank < start.size:
+        raise IdentifiabilityError(
+            f"still poses: expected enough different ones to determine {start.size} unknowns,"
+            f" found {poses} poses that determine {rank} (turn the array to about twelve or more"
+            " directions)"
+        )
+    return _result(found, mean, used, magnitude)
+
+
+def _result(found, mean, used, magnitude) -> TriadFit:
+    poses, triads = used.shape
+    freedom = 3 * int(used.sum()) + poses - found.x.size
+    matrices, offsets, directions = (np.asarray(x) for x in _unpack(found.x, triads))
+    ratio = np.sqrt(2 * found.cost / freedom) if freedom > 0 else np.nan
+    scale = max(ratio, 1.0) if freedom > 0 else 1.0
+    shape = 12 * triads - 3
+    norm = np.linalg.norm(found.jac, axis=0)
+    scaled = found.jac / norm
+    small = np.linalg.inv(scaled.T @ scaled) / np.outer(norm, norm)
+    small = scale**2 * small[:shape, :shape]
+    place = np.concatenate(
+        [3 * UPPER[0] + UPPER[1]]
+        + [12 * k + np.arange(9) for k in range(1, triads)]
+        + [12 * k + 9 + np.arange(3) for k in range(triads)]
+    )
+    covariance = np.zeros((12 * triads, 12 * triads))
+    covariance[np.ix_(place, place)] = small
+    direction = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    residual = mean - np.asarray(_predict(found.x, triads, magnitude))
+    return TriadFit(matrices, offsets, direction, residual, covariance, float(ratio), used)
