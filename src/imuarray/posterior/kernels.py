@@ -15,8 +15,9 @@ class Data(NamedTuple):
     weighted: np.ndarray  # (A, 3, T) Lambda y
     energy: np.ndarray  # (T,) y' Lambda y
     base: np.ndarray  # (3, T) sum_k (Lambda y)_k
-    mean: np.ndarray  # (3, T) mean of p(omega_t | y_g)
+    mean: np.ndarray  # (3, T) mean of the density omega_t is drawn from, p(omega_t | y_g)
     factor: np.ndarray  # (6, T) its covariance's Cholesky factor: xx, yx, yy, zx, zy, zz
+    tilt: np.ndarray  # (10, T) log p - log of that density: 1, x, y, z, and the six products
     weights: np.ndarray  # (A,) 1 / sigma_k^2, empty for a general covariance
     precision: np.ndarray  # (3A, 3A) Lambda, empty for isotropic triads
     tensor: np.ndarray  # (4, 3, 12)
@@ -115,7 +116,8 @@ def fresh_draws(positions, data, rng, work, power, first, last):
     """log p-hat (26a) of samples first..last-1 with omega drawn anew from p(omega | y_g)."""
     logdet = _collapse(positions, data, work)
     total, C = 0.0, work.C
-    m, f = data.mean, data.factor
+    m, f, k = data.mean, data.factor, data.tilt
+    tilted = k.shape[1] > 0
     for t in range(first, last):
         b0, b1, b2 = work.b[0, t], work.b[1, t], work.b[2, t]
         b3, b4, b5 = work.b[3, t], work.b[4, t], work.b[5, t]
@@ -130,6 +132,12 @@ def fresh_draws(positions, data, rng, work, power, first, last):
             y = my + yx * u + yy * v
             z = mz + zx * u + zy * v + zz * w
             work.exponent[n] = -0.5 * kernels.quadratic(x, y, z, C, b0, b1, b2, b3, b4, b5)
+            if tilted:
+                work.exponent[n] += (
+                    k[0, t] + k[1, t] * x + k[2, t] * y + k[3, t] * z
+                    + k[4, t] * x * x + k[5, t] * y * y + k[6, t] * z * z
+                    + k[7, t] * x * y + k[8, t] * x * z + k[9, t] * y * z
+                )  # fmt: skip
         total += _log_mean_exp(work.exponent)
     return _assemble(total, work.const[first:last], logdet, power)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from imuarray.errors import InputError
 from imuarray.estimation.collapsed import Collapsed, tables
 from imuarray.model import ArrayModel, structure_tensor
 from imuarray.posterior import kernels
+from imuarray.posterior.proposals import proposals, tilts
 
 # (19) and (23) imply |H' Lambda H|^(-1/2) for each sample; (25) and (26a) print the
 # determinant without the root. "derived" is right; "printed" exists to show the difference.
@@ -21,11 +22,15 @@ DETERMINANTS = {"derived": 0.5, "printed": 1.0}
 class Likelihood:
     """p-hat(y_a | theta) for one recording under the papers' model.
 
-    Build it with `Likelihood.of`. ``power`` is the power of 1 / |H' Lambda H| a sample.
+    Build it with `Likelihood.of`. ``power`` is the power of 1 / |H' Lambda H| a sample;
+    ``rate_mean`` (T, 3) rad/s and ``rate_covariance`` (T, 3, 3) are those of p(omega_t | y_g).
     """
 
     data: kernels.Data
     power: float
+    collapsed: Collapsed
+    rate_mean: np.ndarray
+    rate_covariance: np.ndarray
 
     @classmethod
     def of(
@@ -60,7 +65,24 @@ class Likelihood:
         else:
             mean = np.ascontiguousarray(np.asarray(rate_distribution[0], float).T)
             covariance = np.asarray(rate_distribution[1], float)
-        return cls(_arrange(collapsed, mean, covariance), DETERMINANTS[determinant])
+        data = _arrange(collapsed, mean, covariance)
+        return cls(data, DETERMINANTS[determinant], collapsed, mean.T, covariance)
+
+    def centred(self, positions) -> Likelihood:
+        """The same likelihood, estimated with draws from where its integrand is.
+
+        omega_t is drawn around the integrand's mode at ``positions`` (A, 3) m, weighted by
+        p(omega_t | y_g) over that density: unbiased at every theta, and of far smaller
+        variance than (26a) where p(omega_t | y_g) is wide or lies off, as in measured data.
+        """
+        mean, covariance = proposals(
+            self.collapsed, self.rate_mean, self.rate_covariance, _contiguous(positions)
+        )
+        tilt = tilts(self.rate_mean, self.rate_covariance, mean, covariance)
+        data = self.data._replace(
+            mean=np.ascontiguousarray(mean.T), factor=_lower(covariance), tilt=tilt
+        )
+        return replace(self, data=data)
 
     @property
     def samples(self) -> int:
@@ -114,17 +136,22 @@ def _contiguous(positions) -> np.ndarray:
     return np.ascontiguousarray(positions - positions[0])
 
 
-def _arrange(collapsed: Collapsed, mean, covariance) -> kernels.Data:
+def _lower(covariance) -> np.ndarray:
+    """Cholesky factors of (T, 3, 3) as the kernels want them, (6, T)."""
     factor = np.linalg.cholesky(covariance)
-    lower = np.stack([factor[:, i, j] for i in range(3) for j in range(i + 1)])
+    return np.array([factor[:, i, j] for i in range(3) for j in range(i + 1)])
+
+
+def _arrange(collapsed: Collapsed, mean, covariance) -> kernels.Data:
     general = collapsed.weights is None
     known = tables()
     return kernels.Data(
         collapsed.weighted,
         collapsed.energy,
         np.ascontiguousarray(collapsed.moments[0]),
-        mean,
-        np.ascontiguousarray(lower),
+        np.ascontiguousarray(mean),
+        _lower(covariance),
+        np.empty((10, 0)),
         np.empty(0) if general else collapsed.weights,
         np.ascontiguousarray(collapsed.precision) if general else np.empty((0, 0)),
         np.array(structure_tensor()),

@@ -1,0 +1,162 @@
+"""Measured recordings of one board: positions, honest residuals, agreement between recordings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import pandas as pd
+from scipy.stats import norm
+
+from imuarray.estimation import calibrate_bcd, calibrate_gauss_newton
+from imuarray.estimation.bcd import Calibration
+from imuarray.estimation.blocks import normal_equations, pack_motion, problem
+from imuarray.geometry import Array
+from imuarray.model import ArrayModel
+from imuarray.recording import Recording
+from imuarray.studies.bayes import sample_covariance
+
+TOLERANCE = 1e-3  # of a position's own sd
+LIMIT = 500  # large residuals make Gauss-Newton converge linearly
+
+
+@dataclass(frozen=True)
+class Positions:
+    """MAP positions of a recording's samples with p(omega | y_g) from (30a) and (30b).
+
+    ``mean`` (A, 3) m relative to the reference triad, ``covariance`` (3 (A - 1),) squared,
+    ``accelerometer_sd`` what was assumed, ``residual_sd`` what the residuals say (m/s^2).
+    """
+
+    mean: np.ndarray
+    covariance: np.ndarray
+    accelerometer_sd: float
+    residual_sd: float
+    converged: bool
+    iterations: int
+
+    @property
+    def sd(self) -> np.ndarray:
+        """Of r_2 ... r_A, (A - 1, 3) m."""
+        return np.sqrt(np.diag(self.covariance)).reshape(-1, 3)
+
+
+def array_of(recording: Recording, gyroscopes: int) -> Array:
+    """The geometry a recording declares, with so many gyroscope triads."""
+    labels = recording.accelerometer_labels
+    return Array(recording.accelerometer_position, labels, gyroscopes, "recording")
+
+
+def locate(recording: Recording, accelerometer_sd: float | None = None) -> Positions:
+    """Posterior mode and its Gaussian width; sigma_a estimated from the residual where None.
+
+    The motion is estimated with the positions, omega with the prior N((30a), (30b)) of each
+    sample; the positions have the recording's prior. With sigma_a = None the estimate is
+    repeated with the residual's own size until that no longer changes by 1 %.
+    """
+    if accelerometer_sd is not None:
+        return _locate(recording, accelerometer_sd, None)[0]
+    assumed, start = recording.accelerometer_noise_sd, None
+    # from above: with a small sigma_a the gyroscopes' spread, not the data, sets the fit
+    assumed = max(assumed, 0.5)
+    for _ in range(20):
+        found, start = _locate(recording, assumed, start)
+        if abs(found.residual_sd / assumed - 1) < 0.01:
+            break
+        assumed = found.residual_sd
+    return found
+
+
+def _locate(recording, assumed, start) -> tuple[Positions, np.ndarray]:
+    mean, covariance = sample_covariance(recording.angular_rate)
+    array = array_of(recording, 1)
+    model = ArrayModel.isotropic(array, assumed, recording.gyroscope_noise_sd)
+    prior = (array.parameters, recording.position_prior_sd)
+    data = recording.specific_force, mean[:, None]
+    found = calibrate_gauss_newton(
+        model, *data, start=start, position_prior=prior, rate_covariance=covariance,
+        tolerance=TOLERANCE, limit=LIMIT,
+    )  # fmt: skip
+    residual = residual_force(model, recording, found)
+    given = problem(model, *data, position_prior=prior, rate_covariance=covariance)
+    blocks = normal_equations(given, pack_motion(model, found.motion.motion), found.positions[1:].ravel())  # fmt: skip
+    size = 3 * (array.accelerometers - 1)
+    freedom = residual.size - _explained(blocks, covariance) - size
+    sd = float(np.sqrt(np.sum(residual**2) / freedom))
+    positions = Positions(
+        found.positions, found.covariance[:size, :size], assumed, sd, found.converged,
+        len(found.cost),
+    )  # fmt: skip
+    return positions, found.positions
+
+
+def _explained(blocks, rate_covariance) -> float:
+    """Degrees of freedom of the accelerometers that the motion uses up: 9 a sample, less
+    what the prior of omega supplies of them."""
+    inverse = np.linalg.inv(blocks.motion)[:, :3, :3]
+    supplied = np.einsum("tij,tji->", inverse, np.linalg.inv(rate_covariance))
+    return 9 * len(inverse) - float(supplied)
+
+
+def residual_force(model: ArrayModel, recording: Recording, found: Calibration) -> np.ndarray:
+    """Measured less predicted specific force, (T, A, 3) m/s^2."""
+    return recording.specific_force - model.predict_many(found.motion.motion, found.positions)[0]
+
+
+def bcd_positions(recording: Recording, accelerometer_sd: float) -> Calibration:
+    """ML-BCD of the 2017 paper on the same samples; gyroscopes with the spread among them."""
+    _, covariance = sample_covariance(recording.angular_rate)
+    spread = float(np.sqrt(np.mean(np.einsum("tii->ti", covariance))))
+    array = array_of(recording, recording.angular_rate.shape[1])
+    model = ArrayModel.isotropic(array, accelerometer_sd, spread)
+    saturated = recording.saturated_gyroscopes()
+    return calibrate_bcd(
+        model, recording.specific_force, recording.angular_rate, saturated=saturated,
+        tolerance=1e-8, limit=20000,
+    )  # fmt: skip
+
+
+def position_table(found: Positions, labels, **columns) -> pd.DataFrame:
+    """One row a coordinate: accelerometer, axis, mean_m, sd_m and ``columns`` in front."""
+    rows = [(label, axis) for label in labels[1:] for axis in "xyz"]
+    table = pd.DataFrame(rows, columns=["accelerometer", "axis"])
+    table["mean_m"], table["sd_m"] = found.mean[1:].ravel(), found.sd.ravel()
+    for place, (name, value) in enumerate(columns.items()):
+        table.insert(place, name, value)
+    return table
+
+
+def pairwise(table: pd.DataFrame) -> pd.DataFrame:
+    """z-scores of the differences between recordings, one row a pair and coordinate.
+
+    ``table`` has recording, accelerometer, axis, mean_m and sd_m. Were the claimed widths
+    right, z would be standard normal: the board's positions are the same in all recordings.
+    """
+    wide = table.set_index(["accelerometer", "axis", "recording"])[["mean_m", "sd_m"]].unstack()
+    parts = []
+    for one, other in combinations(sorted(table.recording.unique()), 2):
+        difference = wide["mean_m"][one] - wide["mean_m"][other]
+        width = np.hypot(wide["sd_m"][one], wide["sd_m"][other])
+        part = pd.DataFrame({"difference_m": difference, "sd_m": width, "z": difference / width})
+        parts.append(part.reset_index().assign(recording=one, other=other))
+    return pd.concat(parts, ignore_index=True)
+
+
+def agreement(pairs: pd.DataFrame, table: pd.DataFrame) -> dict:
+    """Coverage of 50 and 95 % intervals of the differences, rms z, claimed and real spread.
+
+    ``spread_m`` is the sd between recordings, pooled over coordinates (rms); errors of the
+    shares are not given, as pairs share recordings and coordinates share a motion.
+    """
+    size = pairs.z.abs()
+    groups = table.groupby(["accelerometer", "axis"])
+    return {
+        "recordings": int(table.recording.nunique()),
+        "coverage_50": float(np.mean(size < norm.ppf(0.75))),
+        "coverage_95": float(np.mean(size < norm.ppf(0.975))),
+        "z_rms": float(np.sqrt(np.mean(pairs.z**2))),
+        "z_median_abs": float(size.median()),
+        "spread_m": float(np.sqrt(groups.mean_m.var(ddof=1).mean())),
+        "claimed_m": float(np.sqrt(np.mean(table.sd_m**2))),
+    }
