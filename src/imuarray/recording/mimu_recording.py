@@ -1,0 +1,91 @@
+"""From a MIMU stream and the board's geometry to a recording in the array frame."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+
+from imuarray.errors import InputError
+from imuarray.geometry.mimu4444 import UNDERSIDE_ROTATION
+from imuarray.recording.format import Recording
+from imuarray.recording.mimu import MimuStream
+
+GRAVITY = 9.80665  # m/s^2, the unit g of the data sheet
+COUNTS_PER_G = 2048.0
+COUNTS_PER_DPS = 16.4
+RAIL = 32767
+
+
+def read_positions(path: str | Path) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Nominal positions (A, 3) m and labels; a row an axis, a column an IMU, as published.
+
+    The first row names the IMUs ("IMU 1", ...), the first column the axes x, y, z. InputError
+    for anything else.
+    """
+    where = str(path)
+    expected = "expected a header 'axes, IMU 1, ...' and the rows x, y, z in metres"
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{where}: {expected}, found {error}") from None
+    rows = [[cell.strip() for cell in row] for row in csv.reader(text.splitlines()) if row]
+    if len(rows) != 4 or [row[0] for row in rows[1:]] != ["x", "y", "z"]:
+        raise InputError(f"{where}: {expected}, found {len(rows)} rows")
+    labels = tuple(name.removeprefix("IMU").strip() for name in rows[0][1:])
+    if any(len(row) != len(rows[0]) for row in rows):
+        raise InputError(f"{where}: {expected}, found rows of different lengths")
+    try:
+        values = np.array([[float(cell) for cell in row[1:]] for row in rows[1:]]).T
+    except ValueError as error:
+        raise InputError(f"{where}: {expected}, found {error}") from None
+    if not np.isfinite(values).all():
+        raise InputError(f"{where}: {expected}, found a value that is not finite")
+    return values, labels
+
+
+def turned_labels(labels, text: str | None) -> tuple[str, ...]:
+    """Underside IMUs: those listed, separated by commas; None for the even-numbered ones."""
+    if text is None:
+        return tuple(label for label in labels if label.isdigit() and int(label) % 2 == 0)
+    turned = tuple(part.strip() for part in text.split(",") if part.strip())
+    unknown = [label for label in turned if label not in labels]
+    if unknown:
+        raise InputError(f"--underside: expected labels of {', '.join(labels)}, found {unknown[0]}")
+    return turned
+
+
+def to_recording(
+    stream: MimuStream,
+    positions,
+    labels,
+    underside=None,
+    accelerometer_noise_sd: float = 0.04,
+    gyroscope_noise_sd: float = float(np.radians(0.06)),
+    position_prior_sd: float = 3e-3,
+    title: str = "",
+    source: str = "",
+) -> Recording:
+    """Counts to SI units, the underside's axes turned into the array frame.
+
+    ``positions`` (A, 3) m; ``underside`` labels turned by `UNDERSIDE_ROTATION`, None for the
+    even-numbered ones. InputError where the IMUs are not as many as the positions.
+    """
+    count = stream.counts.shape[1]
+    if count != len(labels):
+        raise InputError(f"positions: expected {count} IMUs, as the packets hold, found {len(labels)}")  # fmt: skip
+    turned = turned_labels(labels, None) if underside is None else tuple(underside)
+    force = stream.counts[..., :3] * (GRAVITY / COUNTS_PER_G)
+    rate = stream.counts[..., 3:] * np.radians(1 / COUNTS_PER_DPS)
+    under = np.array([label in turned for label in labels])
+    for values in (force, rate):
+        values[:, under] = values[:, under] @ UNDERSIDE_ROTATION.T
+    return Recording(
+        time=stream.time, specific_force=force, angular_rate=rate,
+        accelerometer_position=np.asarray(positions, float), accelerometer_labels=tuple(labels),
+        gyroscope_labels=tuple(labels), accelerometer_noise_sd=accelerometer_noise_sd,
+        gyroscope_noise_sd=gyroscope_noise_sd, position_prior_sd=position_prior_sd,
+        accelerometer_range=RAIL / COUNTS_PER_G * GRAVITY,
+        gyroscope_range=float(np.radians(RAIL / COUNTS_PER_DPS)), title=title, source=source,
+    )  # fmt: skip

@@ -1,0 +1,189 @@
+"""Anybody's logger: a CSV file, and a small YAML that names its columns and units."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import yaml
+
+from imuarray.errors import InputError
+from imuarray.recording.format import Recording
+from imuarray.recording.mimu_recording import GRAVITY
+
+UNITS = {
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
+    "length": {"m": 1.0, "mm": 1e-3},
+    "force": {"m/s^2": 1.0, "g": GRAVITY, "mg": 1e-3 * GRAVITY},
+    "rate": {"rad/s": 1.0, "deg/s": np.pi / 180, "mdeg/s": np.pi / 180e3},
+}
+KEYS = {
+    "delimiter": False, "comment": False, "time": True, "position_unit": False,
+    "position_prior": False, "accelerometers": True, "gyroscopes": True,
+}  # fmt: skip
+SENSOR_KEYS = {"unit": True, "noise": True, "range": True, "triads": True}
+TRIAD_KEYS = {"columns": True, "position": False, "axes": False}
+
+
+def read_columns(path: str | Path) -> dict[str, Any]:
+    """The YAML that describes a CSV; InputError for a missing file or a wrong key."""
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path}: expected a YAML file that names the columns, found none")
+    try:
+        layout = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: expected YAML, found {' '.join(str(error).split())}") from None
+    _require_keys(layout, KEYS, str(path))
+    for kind in ("accelerometers", "gyroscopes"):
+        _require_keys(layout[kind], SENSOR_KEYS, f"{path}: {kind}")
+        triads = layout[kind]["triads"]
+        if not isinstance(triads, dict) or not triads:
+            raise InputError(f"{path}: {kind}: expected triads by label, found {triads!r}")
+        for label, triad in triads.items():
+            needed = TRIAD_KEYS | {"position": kind == "accelerometers"}
+            _require_keys(triad, needed, f"{path}: {kind} {label!r}")
+    return layout
+
+
+def read_table(path: str | Path, columns: str | Path) -> Recording:
+    """Read ``path`` (CSV) as the YAML file ``columns`` says; see docs/convert.md.
+
+    InputError, with the row or the key, for anything that does not fit.
+    """
+    layout, where = read_columns(columns), str(path)
+    table = _load(path, layout)
+    unit = UNITS["length"]
+    length = _factor(unit, layout.get("position_unit", "m"), f"{columns}: position_unit")
+    force, labels = _sensors(table, layout, "accelerometers", "force", where, str(columns))
+    rate, rate_labels = _sensors(table, layout, "gyroscopes", "rate", where, str(columns))
+    places = [
+        _three(triad["position"], f"{columns}: accelerometers {label!r}: position")
+        for label, triad in layout["accelerometers"]["triads"].items()
+    ]
+    numbers = _numbers(layout, str(columns))
+    prior = _positive(layout.get("position_prior", 3e-3 / length), f"{columns}: position_prior")
+    return Recording(
+        time=_time(table, layout["time"], where, str(columns)), specific_force=force,
+        angular_rate=rate, accelerometer_position=length * np.array(places),
+        accelerometer_labels=labels, gyroscope_labels=rate_labels,
+        position_prior_sd=length * prior, source=Path(path).name, **numbers,
+    )  # fmt: skip
+
+
+def _require_keys(section: Any, keys: dict[str, bool], where: str) -> None:
+    if not isinstance(section, dict):
+        raise InputError(f"{where}: expected the keys {', '.join(keys)}, found {section!r}")
+    unknown = [key for key in section if key not in keys]
+    missing = [key for key, needed in keys.items() if needed and key not in section]
+    if unknown or missing:
+        found = f"an unknown key {unknown[0]!r}" if unknown else f"no {missing[0]!r}"
+        raise InputError(f"{where}: expected the keys {', '.join(keys)}, found {found}")
+
+
+def _load(path, layout) -> pd.DataFrame:
+    options = {"sep": str(layout.get("delimiter", ",")), "comment": layout.get("comment")}
+    try:
+        return pd.read_csv(path, skipinitialspace=True, **options)
+    except (OSError, ValueError, UnicodeDecodeError) as error:
+        message = " ".join(str(error).split())
+        raise InputError(f"{path}: expected a CSV file with a header, found {message}") from None
+
+
+def _column(table, name, where) -> np.ndarray:
+    if name not in table.columns:
+        have = ", ".join(map(str, table.columns))
+        raise InputError(f"{where}: expected a column {name!r}, found {have}")
+    values = pd.to_numeric(table[name], errors="coerce").to_numpy(float)
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        cell = table[name].iloc[bad[0]]
+        raise InputError(
+            f"{where}: column {name!r}: expected numbers, found {cell!r} in data row {bad[0] + 1}"
+            f" ({bad.size} of {values.size} rows)"
+        )
+    return values
+
+
+def _factor(units: dict[str, float], name, where: str) -> float:
+    if not isinstance(name, str) or name not in units:
+        raise InputError(f"{where}: expected a unit of {', '.join(units)}, found {name!r}")
+    return units[name]
+
+
+def _positive(value, where: str) -> float:
+    good = isinstance(value, int | float) and not isinstance(value, bool) and value > 0
+    if not good:
+        raise InputError(f"{where}: expected a positive number, found {value!r}")
+    return float(value)
+
+
+def _three(value, where: str) -> list[float]:
+    numbers = isinstance(value, list) and len(value) == 3
+    if not numbers or not all(isinstance(x, int | float) for x in value):
+        raise InputError(f"{where}: expected three numbers, found {value!r}")
+    return [float(x) for x in value]
+
+
+def _numbers(layout, where: str) -> dict[str, float]:
+    """Noise and range of both kinds in SI units."""
+    out = {}
+    for kind, units in (("accelerometers", "force"), ("gyroscopes", "rate")):
+        section, name = layout[kind], kind.removesuffix("s")
+        factor = _factor(UNITS[units], section["unit"], f"{where}: {kind}: unit")
+        for key, attribute in (("noise", "noise_sd"), ("range", "range")):
+            value = _positive(section[key], f"{where}: {kind}: {key}")
+            out[f"{name}_{attribute}"] = factor * value
+    return out
+
+
+def _sensors(table, layout, kind, units, where, layout_name):
+    """Readings (T, K, 3) in SI units in the array frame, and the labels."""
+    section = layout[kind]
+    factor = _factor(UNITS[units], section["unit"], f"{layout_name}: {kind}: unit")
+    parts = []
+    for label, triad in section["triads"].items():
+        place = f"{layout_name}: {kind} {label!r}"
+        names = triad["columns"]
+        if not isinstance(names, list) or len(names) != 3:
+            raise InputError(f"{place}: expected three columns, found {names!r}")
+        own = np.stack([_column(table, str(name), where) for name in names], axis=1)
+        parts.append(factor * own @ _turn(triad.get("axes", ["x", "y", "z"]), place).T)
+    return np.stack(parts, axis=1), tuple(str(label) for label in section["triads"])
+
+
+def _turn(axes, where: str) -> np.ndarray:
+    """Rotation from the sensor's axes to the array's: [-y, -x, -z] or a 3 x 3 matrix.
+
+    The shorthand lists, for the array's x, y and z, the sensor's axis that points along it.
+    """
+    expected = "expected axes such as [-y, -x, -z] or a 3 x 3 rotation matrix"
+    if not isinstance(axes, list) or len(axes) != 3:
+        raise InputError(f"{where}: {expected}, found {axes!r}")
+    if all(isinstance(row, str) for row in axes):
+        matrix = np.zeros((3, 3))
+        for row, name in enumerate(axes):
+            letter = name.lstrip("+-")
+            if letter not in ("x", "y", "z"):
+                raise InputError(f"{where}: {expected}, found {axes!r}")
+            matrix[row, "xyz".index(letter)] = -1.0 if name.startswith("-") else 1.0
+    else:
+        matrix = np.array([_three(row, where) for row in axes])
+    if not np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6) or np.linalg.det(matrix) < 0:
+        raise InputError(f"{where}: {expected}, found {axes!r}, which is no rotation")
+    return matrix
+
+
+def _time(table, section, where, layout_name) -> np.ndarray:
+    if isinstance(section, dict) and set(section) == {"rate"}:
+        return np.arange(len(table)) / _positive(section["rate"], f"{layout_name}: time: rate")
+    if not isinstance(section, dict) or set(section) != {"column", "unit"}:
+        raise InputError(
+            f"{layout_name}: time: expected 'column' and 'unit', or 'rate' in Hz, found {section!r}"
+        )
+    factor = _factor(UNITS["time"], section["unit"], f"{layout_name}: time: unit")
+    values = _column(table, str(section["column"]), where)
+    # from the first sample: microseconds since 1970 would cost the last digits
+    return factor * (values - values[0]) if values.size else values
