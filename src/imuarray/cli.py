@@ -81,11 +81,20 @@ def _check_output(arguments: argparse.Namespace) -> None:
         raise InputError(f"--out {out}: expected an existing folder, found no {out.parent}")
     if not os.access(out.parent, os.W_OK | os.X_OK):
         raise InputError(f"--out {out}: expected a folder one may write to, found {out.parent}")
-    source: Path = arguments.config if arguments.command == "simulate" else arguments.recording
-    if not source.is_file():
-        raise InputError(f"{source}: expected a file to read, found none")
-    if out.exists() and out.samefile(source):
-        raise InputError(f"--out {out}: expected another file than the input, found the same")
+    for source in _inputs(arguments):
+        if not source.is_file():
+            raise InputError(f"{source}: expected a file to read, found none")
+        if out.exists() and out.samefile(source):
+            raise InputError(f"--out {out}: expected another file than the input, found the same")
+
+
+def _inputs(arguments: argparse.Namespace) -> list[Path]:
+    """The files a command reads."""
+    found = []
+    for name in ("config", "data", "positions", "columns", "recording", "recordings"):
+        value = getattr(arguments, name, None)
+        found += value if isinstance(value, list) else [value] if value is not None else []
+    return found
 
 
 def _simulate(arguments: argparse.Namespace) -> None:
@@ -106,6 +115,17 @@ def _sample(arguments: argparse.Namespace) -> None:
     sample(arguments)
 
 
+def _later(name: str):
+    """A command of `imuarray.commands_measured`, loaded when it is called."""
+
+    def run(arguments: argparse.Namespace) -> None:
+        from imuarray import commands_measured
+
+        getattr(commands_measured, name)(arguments)
+
+    return run
+
+
 def _effects(text: str) -> tuple[str, ...]:
     """Comma-separated names; whether they exist is for the measurement model to say."""
     names = tuple(name.strip() for name in text.split(",") if name.strip())
@@ -124,6 +144,16 @@ def _at_least(least: int, text: str) -> int:
     return value
 
 
+def _positive(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"expected a positive number, found {text!r}")
+    return value
+
+
 def _count(text: str) -> int:
     return _at_least(1, text)
 
@@ -139,16 +169,22 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"imuarray {imuarray.__version__}")
     commands = parser.add_subparsers(dest="command", metavar="command", required=True)
     _add_simulate(commands)
+    _add_convert(commands)
+    _add_first_order(commands)
+    _add_select(commands)
     _add_calibrate(commands)
     _add_sample(commands)
+    _add_residuals(commands)
+    _add_repeat(commands)
     return parser
 
 
-def _add_command(commands, name, run, summary, example, out) -> argparse.ArgumentParser:
-    """One subcommand, with what all of them have."""
+def _add_command(commands, name, run, summary, example, out, full=None) -> argparse.ArgumentParser:
+    """One subcommand, with what all of them have; ``full`` is its name after another one."""
     parser = commands.add_parser(
-        name, help=summary, description=summary, epilog=f"example: imuarray {name} {example}"
-    )
+        name, help=summary, description=summary,
+        epilog=f"example: imuarray {full or name} {example}",
+    )  # fmt: skip
     parser.add_argument("--out", required=True, type=Path, metavar="FILE", help=out)
     parser.add_argument("--quiet", action="store_true", help="no progress, no summary")
     parser.set_defaults(run=run)
@@ -183,6 +219,114 @@ def _add_simulate(commands) -> None:
         "--config", required=True, type=Path, metavar="FILE", help="configuration (YAML)"
     )
     _add_effects(parser)
+
+
+def _add_convert(commands) -> None:
+    summary = "Turn a logger's file into a recording."
+    kinds = commands.add_parser("convert", help=summary, description=summary).add_subparsers(
+        dest="kind", metavar="format", required=True
+    )
+    mimu = _add_command(
+        kinds,
+        "mimu",
+        _later("convert_mimu"),
+        "Read the packets of a MIMU board; damage is located and counted.",
+        "data.bin --positions IMU_positions.csv --out rec.nc",
+        "recording to write (NetCDF-4)",
+        "convert mimu",
+    )
+    mimu.add_argument("data", type=Path, help="binary file of packets")
+    mimu.add_argument(
+        "--positions", required=True, type=Path, metavar="FILE",
+        help="CSV of nominal positions in m: header 'axes, IMU 1, ...', rows x, y, z",
+    )  # fmt: skip
+    mimu.add_argument(
+        "--underside", metavar="2,4", help="IMUs turned over (default: the even-numbered ones)"
+    )
+    csv = _add_command(
+        kinds,
+        "csv",
+        _later("convert_csv"),
+        "Read a table; a small YAML names its columns and units (docs/convert.md).",
+        "log.csv --columns columns.yaml --out rec.nc",
+        "recording to write (NetCDF-4)",
+        "convert csv",
+    )
+    csv.add_argument("data", type=Path, help="CSV file with a header")
+    csv.add_argument(
+        "--columns",
+        required=True,
+        type=Path,
+        metavar="FILE",
+        help="YAML: columns, units, positions",
+    )
+
+
+def _add_first_order(commands) -> None:
+    parser = _add_command(
+        commands,
+        "first-order",
+        _later("first_order"),
+        "Calibrate each triad by itself from the recording's still poses, and correct it.",
+        "rec.nc --gravity 9.818 --out corrected.nc",
+        "corrected recording to write (NetCDF-4), with the calibration in group 'first_order'",
+    )
+    parser.add_argument("recording", type=Path, help="NetCDF-4 recording to read")
+    parser.add_argument(
+        "--gravity", type=_positive, default=9.80665, metavar="G",
+        help="magnitude of gravity where it was recorded, m/s^2 (default: 9.80665)",
+    )  # fmt: skip
+
+
+def _add_select(commands) -> None:
+    parser = _add_command(
+        commands,
+        "select",
+        _later("select"),
+        "Keep moving, unsaturated, informative samples; says what each criterion removed.",
+        "corrected.nc --samples 500 --out subset.nc",
+        "recording to write (NetCDF-4)",
+    )
+    parser.add_argument("recording", type=Path, help="NetCDF-4 recording to read")
+    parser.add_argument(
+        "--samples", type=_count, default=None, metavar="T",
+        help="how many, spread evenly (default: all informative ones)",
+    )  # fmt: skip
+
+
+def _add_residuals(commands) -> None:
+    parser = _add_command(
+        commands,
+        "residuals",
+        _later("residuals"),
+        "Residuals of the papers' model beside those of the recording's own simulation.",
+        "corrected.nc --figure residuals.png --out residuals.csv",
+        "table to write (CSV)",
+    )
+    parser.add_argument("recording", type=Path, help="NetCDF-4 recording to read")
+    parser.add_argument("--figure", type=Path, metavar="FILE", help="figure to write (PNG or PDF)")
+    parser.add_argument("--seed", type=_seed, default=0, metavar="S", help="of the simulation")
+
+
+def _add_repeat(commands) -> None:
+    parser = _add_command(
+        commands,
+        "repeat",
+        _later("repeat"),
+        "Do several recordings of one board agree within their claimed widths?",
+        "one.nc two.nc three.nc --samples 500 --out agreement.csv",
+        "table to write (CSV): z-scores of all pairs",
+    )
+    parser.add_argument(
+        "recordings", type=Path, nargs="+", metavar="recording", help="two or more recordings"
+    )
+    parser.add_argument(
+        "--samples", type=_count, default=500, metavar="T", help="of each recording (default: 500)"
+    )
+    parser.add_argument(
+        "--accelerometer-noise", type=_positive, default=None, metavar="SD",
+        help="assumed sd, m/s^2 (default: estimated from each recording's residual)",
+    )  # fmt: skip
 
 
 def _add_calibrate(commands) -> None:

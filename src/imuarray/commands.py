@@ -48,8 +48,7 @@ def model_of(recording: Recording, effects=()) -> ArrayModel:
 
 def usable(recording: Recording, quiet: bool) -> Recording:
     """The recording without the samples in which an accelerometer is at its rail."""
-    rail = np.abs(recording.specific_force) >= recording.accelerometer_range * (1 - 1e-6)
-    lost = rail.any(axis=(1, 2))
+    lost = recording.saturated_accelerometers().any(axis=(1, 2))
     if lost.all():
         raise InputError("recording: expected samples off the rail, found every one at a rail")
     if lost.any() and not quiet:

@@ -55,8 +55,8 @@ def problem(
 
     ``position_prior``: None for a flat one, or (mean (3 (A - 1),), sd) in metres. Effect
     parameters always have theirs. ``rate_covariance`` (T, 3G, 3G) (rad/s)^2 replaces the
-    declared gyroscope noise by one for each sample, say that of (30b). InputError where saturated axes meet correlated
-    gyroscopes, which only the papers' model supports.
+    declared gyroscope noise by one for each sample, say that of (30b). InputError where
+    saturated axes meet correlated gyroscopes, which only the papers' model supports.
     """
     keep = np.ones((len(angular_rate), 3 * model.array.gyroscopes))
     if saturated is not None and np.any(saturated):

@@ -74,7 +74,9 @@ def to_recording(
     """
     count = stream.counts.shape[1]
     if count != len(labels):
-        raise InputError(f"positions: expected {count} IMUs, as the packets hold, found {len(labels)}")  # fmt: skip
+        raise InputError(
+            f"positions: expected {count} IMUs, as the packets hold, found {len(labels)}"
+        )
     turned = turned_labels(labels, None) if underside is None else tuple(underside)
     force = stream.counts[..., :3] * (GRAVITY / COUNTS_PER_G)
     rate = stream.counts[..., 3:] * np.radians(1 / COUNTS_PER_DPS)

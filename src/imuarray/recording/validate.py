@@ -25,6 +25,9 @@ AXES = ("x", "y", "z")
 # Group with what a simulated recording was made from.
 TRUTH = "truth"
 
+# Group with the per-triad calibration that a corrected recording went through.
+FIRST_ORDER = "first_order"
+
 DIMENSIONS = {
     "time": ("time",),
     "specific_force": ("time", "accelerometer", "axis"),

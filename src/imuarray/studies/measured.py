@@ -80,7 +80,8 @@ def _locate(recording, assumed, start) -> tuple[Positions, np.ndarray]:
     )  # fmt: skip
     residual = residual_force(model, recording, found)
     given = problem(model, *data, position_prior=prior, rate_covariance=covariance)
-    blocks = normal_equations(given, pack_motion(model, found.motion.motion), found.positions[1:].ravel())  # fmt: skip
+    unknowns = pack_motion(model, found.motion.motion), found.positions[1:].ravel()
+    blocks = normal_equations(given, *unknowns)
     size = 3 * (array.accelerometers - 1)
     freedom = residual.size - _explained(blocks, covariance) - size
     sd = float(np.sqrt(np.sum(residual**2) / freedom))

@@ -112,14 +112,27 @@ def _sizes(samples) -> dict[str, list[float]]:
     }
 
 
-def histogram(fit: Residuals, source: str, bins=np.linspace(-150, 150, 151)) -> pd.DataFrame:
+def histogram(fit: Residuals, source: str, reach: float = 300.0) -> pd.DataFrame:
     """Density of the standardised residuals: source, quantity, low, high, density."""
     parts = []
     for quantity in ("specific_force", "angular_rate"):
         values = getattr(fit, quantity)
         values = values[np.isfinite(values)]
-        counts, edges = np.histogram(values, bins)
+        # fine about zero, where the simulation is, and coarse far out
+        half = np.concatenate([np.linspace(0, 10, 21), np.geomspace(10, reach, 30)[1:]])
+        counts, edges = np.histogram(values, np.concatenate([-half[:0:-1], half]))
         density = counts / values.size / np.diff(edges)
         parts.append(pd.DataFrame({"source": source, "quantity": quantity, "low": edges[:-1],
                                    "high": edges[1:], "density": density}))  # fmt: skip
     return pd.concat(parts, ignore_index=True)
+
+
+def compare(recording: Recording, rng) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """(`residual_summary`, `histogram`) of the recording and of its simulation."""
+    fit = fit_residuals(recording)
+    simulated = simulate_like(recording, fit, rng)
+    again = fit_residuals(simulated)
+    pairs = ((fit, recording, "measured"), (again, simulated, "simulated"))
+    summaries = [residual_summary(one, data, source) for one, data, source in pairs]
+    shapes = [histogram(one, source) for one, _, source in pairs]
+    return pd.concat(summaries, ignore_index=True), pd.concat(shapes, ignore_index=True)
