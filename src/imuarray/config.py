@@ -35,10 +35,30 @@ def check_config(config, where: str = "config") -> dict:
         known = ", ".join(config["scales"])
         raise InputError(f"{where}: scale: expected one of {known}, found {config['scale']}")
     for name, scale in config["scales"].items():
-        for key in ("transitions", "experiment_transitions"):
+        for key in ("transitions", "experiment_transitions", "measured_transitions"):
             _check_lengths(scale[key], config["paper2021"]["samples"], scale["draws"],
                            f"{where}: scales.{name}.{key}")  # fmt: skip
+    _check_recordings(config, where)
     return config
+
+
+def _check_recordings(config, where) -> None:
+    """Each kind of file comes with what it takes to read it."""
+    needed = {".csv": "columns", ".bin": "positions", ".nc": None}
+    for name, entry in config["recordings"].items():
+        if "published" in entry:
+            continue
+        ending = Path(entry["file"]).suffix.lower()
+        if ending not in needed:
+            raise InputError(
+                f"{where}: recordings.{name}.file: expected a file that ends in"
+                f" {', '.join(needed)}, found {entry['file']}"
+            )
+        if needed[ending] is not None and needed[ending] not in entry:
+            raise InputError(
+                f"{where}: recordings.{name}: expected '{needed[ending]}' beside a {ending} file,"
+                " found none"
+            )
 
 
 def _check_lengths(lengths, samples, draws, where) -> None:

@@ -1,0 +1,73 @@
+"""Which measured recordings there are, once they have been fetched."""
+
+import json
+from pathlib import Path
+
+STANDIN = "standin"
+
+
+class Measured:
+    """Names and paths that depend on what the checkpoint `fetch_recordings` could get."""
+
+    def __init__(self, config, checkpoints):
+        self.config, self.checkpoints = config, checkpoints
+
+    def available(self) -> dict:
+        """By name, the files of each recording that is here."""
+        path = self.checkpoints.fetch_recordings.get().output[0]
+        return json.loads(Path(path).read_text(encoding="utf-8"))["available"]
+
+    def groups(self) -> dict[str, list[str]]:
+        """Recordings of one board, where there are two or more."""
+        groups = {}
+        for name in self.available():
+            groups.setdefault(self.config["recordings"][name].get("group", name), []).append(name)
+        return {group: names for group, names in groups.items() if len(names) > 1}
+
+    def experiment(self, scale: str) -> str:
+        """The recording drawn as the experiment, or the stand-in for it."""
+        name = self.config["experiment"]["recording"]
+        if scale == "quick" or name not in self.config["recordings"]:
+            return STANDIN
+        return name if name in self.available() else STANDIN
+
+    def is_measured(self, scale: str) -> bool:
+        """Whether the experiment's figures come from measured data."""
+        return self.experiment(scale) != STANDIN
+
+    def simulation(self, scale: str) -> str:
+        """The simulation that goes with the experiment."""
+        name = self.experiment(scale)
+        return "simulation" if name == STANDIN else f"simulated_{name}"
+
+    def posterior(self, scale: str, kind: str, folder: str, endings) -> list[str]:
+        """Files results/<scale>/<folder>/<kind>_T<samples>.<ending>."""
+        return [
+            f"results/{scale}/{folder}/{kind}_T{samples}.{ending}"
+            for samples in self.config["paper2021"]["samples"]
+            for ending in endings
+        ]
+
+    def targets(self) -> list[str]:
+        """What the default target asks of the measured data, for each recording and group."""
+        kinds = ("pdf", "png", "csv")
+        paths = []
+        for name in self.available():
+            paths += [f"results/measured/figures/residuals_{name}.{kind}" for kind in kinds]
+            paths += [f"results/measured/figures/noise_{name}.{kind}" for kind in kinds]
+            paths.append(f"results/measured/positions/{name}.csv")
+        for group in self.groups():
+            paths += [f"results/measured/figures/agreement_{group}.{kind}" for kind in kinds]
+            paths.append(f"results/measured/agreement/{group}.csv")
+        return paths
+
+    def published(self, scale: str) -> dict[str, str]:
+        """Names of the measured figures that go to paper_figures/, and what they copy."""
+        name = self.experiment(scale)
+        if name == STANDIN:
+            return {}
+        group = self.config["recordings"][name].get("group", name)
+        copies = {"measured_residuals": f"residuals_{name}", "measured_noise": f"noise_{name}"}
+        if group in self.groups():
+            copies["measured_agreement"] = f"agreement_{group}"
+        return copies
