@@ -35,6 +35,17 @@ class Measured:
         """Whether the experiment's figures come from measured data."""
         return self.experiment(scale) != STANDIN
 
+    def source(self, scale: str) -> str:
+        """What the experiment's data are, as `imuarray.figures.notes.SOURCES` calls it."""
+        return "measured" if self.is_measured(scale) else STANDIN
+
+    def recordings(self, scale: str) -> list[str]:
+        """The experiment's recordings, if they are measured: the array's geometry."""
+        if not self.is_measured(scale):
+            return []
+        samples = self.config["paper2021"]["samples"]
+        return [f"results/measured/subsets/{self.experiment(scale)}_T{t}.nc" for t in samples]
+
     def simulation(self, scale: str) -> str:
         """The simulation that goes with the experiment."""
         name = self.experiment(scale)

@@ -8,11 +8,10 @@ import numpy as np
 import xarray as xr
 
 from imuarray.errors import InputError
-from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.model.effects import find_effects
 from imuarray.provenance import code_digest, digest, stamp, write_netcdf
-from imuarray.recording import Recording, read_recording, write_recording
+from imuarray.recording import Recording, array_of, read_recording, write_recording
 
 PMMH_STEPS = {True: 200_000, False: 10_000}  # compiled, any effects
 STORED = 2000
@@ -35,14 +34,8 @@ def simulate(arguments) -> None:
 
 def model_of(recording: Recording, effects=()) -> ArrayModel:
     """The measurement model a recording declares: its geometry and noise."""
-    array = Array(
-        recording.accelerometer_position,
-        recording.accelerometer_labels,
-        recording.angular_rate.shape[1],
-        name="recording",
-    )
     return ArrayModel.isotropic(
-        array, recording.accelerometer_noise_sd, recording.gyroscope_noise_sd, effects
+        array_of(recording), recording.accelerometer_noise_sd, recording.gyroscope_noise_sd, effects
     )
 
 

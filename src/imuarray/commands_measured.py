@@ -132,7 +132,7 @@ def select(arguments) -> None:
 def residuals(arguments) -> None:
     """The papers' model against the recording, beside its simulation."""
     from imuarray.estimation.selection import select_dynamic
-    from imuarray.studies.residuals import compare
+    from imuarray.measured.residuals import compare
 
     recording = read_recording(arguments.recording)
     moving = recording.select(select_dynamic(recording).usable)
@@ -154,7 +154,7 @@ def residuals(arguments) -> None:
 def repeat(arguments) -> None:
     """z-scores between recordings of one board."""
     from imuarray.estimation.selection import select_dynamic
-    from imuarray.studies.measured import agreement, locate, pairwise, position_table
+    from imuarray.measured.positions import agreement, locate, pairwise, position_table
 
     if len(arguments.recordings) < 2:
         raise InputError("repeat: expected two or more recordings, found one")

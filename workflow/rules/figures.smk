@@ -1,10 +1,9 @@
 from imuarray.figures.notes import SOURCES
 from support import PACKAGE
 
-# Figure 5 and table II: "measured" once there are chains of a measured recording.
-EXPERIMENT = "standin"
 DRAWING = [*library("figures"), str(PACKAGE / "figures" / "imuarray.mplstyle")]
-CAPTIONS = [workflow.source_path(f"../report/{name}.rst") for name in FIGURES + TABLES]
+SHOWN = [*FIGURES, *TABLES, "measured_residuals", "measured_agreement", "measured_noise"]
+CAPTIONS = [workflow.source_path(f"../report/{name}.rst") for name in SHOWN]
 
 
 rule figure_2017_fig3:
@@ -195,15 +194,16 @@ rule figure_2021_fig4:
 
 rule figure_2021_fig5:
     input:
-        chains=expand(
-            "results/{{scale}}/chains/{kind}_T{samples}.nc", kind=EXPERIMENT, samples=SAMPLES
+        chains=lambda wc: MEASURED.posterior(
+            wc.scale, MEASURED.experiment(wc.scale), "chains", ["nc"]
         ),
-        verdicts=expand(
-            "results/{{scale}}/posterior/{kind}_T{samples}.json", kind=EXPERIMENT, samples=SAMPLES
+        verdicts=lambda wc: MEASURED.posterior(
+            wc.scale, MEASURED.experiment(wc.scale), "posterior", ["json"]
         ),
-        coordinates=expand(
-            "results/{{scale}}/posterior/{kind}_T{samples}.csv", kind=EXPERIMENT, samples=SAMPLES
+        coordinates=lambda wc: MEASURED.posterior(
+            wc.scale, MEASURED.experiment(wc.scale), "posterior", ["csv"]
         ),
+        recordings=lambda wc: MEASURED.recordings(wc.scale),
         code=DRAWING,
     output:
         pdf="results/{scale}/figures/2021_fig5.pdf",
@@ -223,8 +223,8 @@ rule figure_2021_fig5:
         runtime=10,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2021", "experiment"),
-        kind=EXPERIMENT,
-        source=SOURCES[EXPERIMENT],
+        kind=lambda wc: MEASURED.source(wc.scale),
+        source=lambda wc: SOURCES[MEASURED.source(wc.scale)],
     script:
         "../scripts/figure_2021_fig5.py"
 
@@ -258,16 +258,11 @@ rule table_2021_table1:
 
 rule table_2021_table2:
     input:
-        experiment=expand(
-            "results/{{scale}}/posterior/{kind}_T{samples}.{form}",
-            kind=EXPERIMENT,
-            samples=SAMPLES,
-            form=["csv", "json"],
+        experiment=lambda wc: MEASURED.posterior(
+            wc.scale, MEASURED.experiment(wc.scale), "posterior", ["csv", "json"]
         ),
-        simulation=expand(
-            "results/{{scale}}/posterior/simulation_T{samples}.{form}",
-            samples=SAMPLES,
-            form=["csv", "json"],
+        simulation=lambda wc: MEASURED.posterior(
+            wc.scale, MEASURED.simulation(wc.scale), "posterior", ["csv", "json"]
         ),
         ideal=expand(
             "results/{{scale}}/posterior/T{samples}.{form}", samples=SAMPLES, form=["csv", "json"]
@@ -291,8 +286,8 @@ rule table_2021_table2:
         runtime=10,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2021", "experiment"),
-        kind=EXPERIMENT,
-        source=SOURCES[EXPERIMENT],
+        kind=lambda wc: MEASURED.source(wc.scale),
+        source=lambda wc: SOURCES[MEASURED.source(wc.scale)],
     script:
         "../scripts/table_2021_table2.py"
 
@@ -305,11 +300,11 @@ rule gallery:
         verdicts=expand(
             "results/{scale}/posterior/T{samples}.json", scale=config["scale"], samples=SAMPLES
         ),
-        experiment=expand(
-            "results/{scale}/posterior/{kind}_T{samples}.json",
-            scale=config["scale"],
-            kind=EXPERIMENT,
-            samples=SAMPLES,
+        experiment=lambda wc: MEASURED.posterior(
+            config["scale"], MEASURED.experiment(config["scale"]), "posterior", ["json"]
+        ),
+        measured=lambda wc: expand(
+            "paper_figures/{name}.png", name=MEASURED.published(config["scale"])
         ),
         captions=CAPTIONS,
         code=library("figures"),
@@ -327,6 +322,7 @@ rule gallery:
         settings=effective(config, config["scale"], "paper2017", "paper2021", "experiment"),
         figures=FIGURES,
         tables=TABLES,
-        source=SOURCES[EXPERIMENT],
+        measured=lambda wc: list(MEASURED.published(config["scale"])),
+        source=lambda wc: SOURCES[MEASURED.source(config["scale"])],
     script:
         "../scripts/gallery.py"

@@ -41,3 +41,19 @@ rule publish_claims:
         kind="csv|md",
     shell:
         "cp {input:q} {output:q} 2> {log:q}"
+
+
+rule publish_measured:
+    input:
+        lambda wc: "results/measured/figures/{}.{}".format(
+            MEASURED.published(config["scale"])[wc.name], wc.kind
+        ),
+    output:
+        "paper_figures/{name}.{kind}",
+    log:
+        "results/logs/publish/{name}.{kind}.log",
+    wildcard_constraints:
+        name="measured_[a-z]+",
+        kind="pdf|png|csv",
+    shell:
+        "cp {input:q} {output:q} 2> {log:q}"

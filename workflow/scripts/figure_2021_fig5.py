@@ -13,8 +13,11 @@ with job(snakemake) as settings:  # noqa: F821
     from imuarray.figures.style import write_figure
     from imuarray.geometry import array_from_config
     from imuarray.posterior.store import read_chains
+    from imuarray.recording import array_of, read_recording
 
     array, kind = array_from_config(settings["array"]), snakemake.params.kind  # noqa: F821
+    if snakemake.input.recordings:  # noqa: F821
+        array = array_of(read_recording(snakemake.input.recordings[0]))  # noqa: F821
     posteriors, verdicts = {}, {}
     for path, verdict in zip(snakemake.input.chains, snakemake.input.verdicts, strict=True):  # noqa: F821
         _, tree = read_chains(path)

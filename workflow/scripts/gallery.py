@@ -20,7 +20,8 @@ with job(snakemake) as settings:  # noqa: F821
         paths = map(Path, snakemake.input[group])  # noqa: F821
         read = [json.loads(path.read_text(encoding="utf-8")) for path in paths]
         lines[data] = chain_lines({verdict["samples"]: verdict for verdict in read})
-    figures = {name: captions[name] for name in snakemake.params.figures}  # noqa: F821
+    shown = [*snakemake.params.figures, *snakemake.params.measured]  # noqa: F821
+    figures = {name: captions[name] for name in shown}
     tables = {
         name: (captions[name], output.with_name(f"{name}.md").read_text(encoding="utf-8"))
         for name in snakemake.params.tables  # noqa: F821

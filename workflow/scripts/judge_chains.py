@@ -6,7 +6,7 @@ with job(snakemake) as settings:
     from imuarray.posterior.store import read_chains
     from imuarray.posterior.summary import summarise
     from imuarray.provenance import stamp, write_csv, write_json
-    from imuarray.recording import read_truth
+    from imuarray.recording import has_truth, read_truth
 
     given, made = snakemake.input, snakemake.output
     # one recording for each chain file, or one for all of them (a single one comes as text)
@@ -18,7 +18,8 @@ with job(snakemake) as settings:
     for source, recording, *paths in files:
         chains, tree = read_chains(source)
         labels = tree["posterior"]["accelerometer"].to_numpy().tolist()
-        truth = read_truth(recording)["position"].to_numpy()[1:]
+        known = has_truth(recording)
+        truth = read_truth(recording)["position"].to_numpy()[1:] if known else None
         threshold = settings["paper2021"]["rhat_threshold"]
         verdict, table, burn_in = summarise(chains, labels, threshold, truth)
         for name in ("samples", "draws_per_sample"):

@@ -10,7 +10,7 @@ from imuarray.errors import InputError
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.motion_ml import motion_from
 from imuarray.model import ArrayModel
-from imuarray.recording import Recording
+from imuarray.recording import Recording, array_of
 
 SLOWEST = np.radians(100.0)  # rad/s; slower samples say nearly nothing of the positions
 INFORMATIVE = 0.5  # the share of the moving, unsaturated samples that is kept
@@ -60,13 +60,8 @@ def information(recording: Recording) -> np.ndarray:
     omega is the gyroscopes' mean; omega_dot comes from the accelerometers at their nominal
     positions.
     """
-    counts = recording.specific_force.shape[1], recording.angular_rate.shape[1]
     sds = recording.accelerometer_noise_sd, recording.gyroscope_noise_sd
-    from imuarray.geometry import Array
-
-    array = Array(
-        recording.accelerometer_position, recording.accelerometer_labels, counts[1], "recording"
-    )
+    array = array_of(recording)
     model = ArrayModel.isotropic(array, *sds)
     data = Collapsed.of(model, recording.specific_force, recording.angular_rate)
     turn = motion_from(data, array.relative).motion.angular_acceleration

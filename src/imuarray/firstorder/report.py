@@ -84,7 +84,7 @@ def allan_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
         kind = "accelerometer" if sensor == "specific_force" else "gyroscope"
         labels = getattr(recording, f"{kind}_labels")
         index = pd.MultiIndex.from_product(
-            [[sensor], taus, labels, "xyz"], names=["sensor", "tau_s", "triad", "axis"]
+            [[sensor], taus, labels, list("xyz")], names=["sensor", "tau_s", "triad", "axis"]
         )
         parts.append(pd.DataFrame({"deviation": deviation.ravel()}, index).reset_index())
     return pd.concat(parts, ignore_index=True)

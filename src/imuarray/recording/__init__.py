@@ -2,9 +2,11 @@
 
 from imuarray.recording.format import (
     Recording,
+    array_of,
+    has_truth,
     read_recording,
     read_truth,
     write_recording,
 )
 
-__all__ = ["Recording", "read_recording", "read_truth", "write_recording"]
+__all__ = ["Recording", "array_of", "has_truth", "read_recording", "read_truth", "write_recording"]

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.errors import InputError
+from imuarray.geometry import Array
 from imuarray.provenance import atomic_write
 from imuarray.recording import validate
 from imuarray.recording.validate import AXES, DIMENSIONS, FLAGS, NUMBERS, TEXTS, TRUTH, UNITS
@@ -107,6 +108,13 @@ class Recording:
         return replace(self, **{n: x[index] for n, x in parts.items() if x is not None})
 
 
+def array_of(recording: Recording, gyroscopes: int | None = None) -> Array:
+    """The geometry a recording declares, with its own or another number of gyroscope triads."""
+    count = recording.angular_rate.shape[1] if gyroscopes is None else gyroscopes
+    labels = recording.accelerometer_labels
+    return Array(recording.accelerometer_position, labels, count, "recording")
+
+
 def from_dataset(dataset: xr.Dataset, where: str = "recording") -> Recording:
     """Turn the file's dataset into a recording; InputError, naming `where`, if it is not one."""
     validate.check_structure(dataset, where)
@@ -145,6 +153,12 @@ def read_recording(path: str | Path) -> Recording:
     """
     path = _existing(path)
     return from_dataset(_load(path, group=None), str(path))
+
+
+def has_truth(path: str | Path) -> bool:
+    """Whether a recording is simulated and says from what; InputError if it can not be read."""
+    with _hdf5(_existing(path)) as file:
+        return isinstance(file.get(TRUTH), h5py.Group)
 
 
 def read_truth(path: str | Path) -> xr.Dataset:

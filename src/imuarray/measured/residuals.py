@@ -13,10 +13,10 @@ import numpy as np
 import pandas as pd
 
 from imuarray.estimation import calibrate_gauss_newton
+from imuarray.measured.positions import LIMIT
 from imuarray.model import ArrayModel
 from imuarray.motion import Motion
-from imuarray.recording import Recording
-from imuarray.studies.measured import LIMIT, array_of
+from imuarray.recording import Recording, array_of
 
 # The shape of the picture, not the positions' last micrometre, is wanted.
 TOLERANCE = 0.05
@@ -39,7 +39,7 @@ class Residuals:
 
 def fit_residuals(recording: Recording) -> Residuals:
     """Fit the papers' model with the recording's declared noise to all its samples."""
-    array = array_of(recording, recording.angular_rate.shape[1])
+    array = array_of(recording)
     sds = recording.accelerometer_noise_sd, recording.gyroscope_noise_sd
     model = ArrayModel.isotropic(array, *sds)
     saturated = recording.saturated_gyroscopes()
@@ -59,7 +59,7 @@ def fit_residuals(recording: Recording) -> Residuals:
 
 def simulate_like(recording: Recording, fit: Residuals, rng) -> Recording:
     """The recording as the papers' model would have given it, with its rails and noise."""
-    array = array_of(recording, recording.angular_rate.shape[1])
+    array = array_of(recording)
     sds = recording.accelerometer_noise_sd, recording.gyroscope_noise_sd
     predicted = ArrayModel.isotropic(array, *sds).predict_many(fit.motion, fit.positions)
     force, rate = (

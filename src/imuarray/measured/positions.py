@@ -12,9 +12,9 @@ from scipy.stats import norm
 from imuarray.estimation import calibrate_bcd, calibrate_gauss_newton
 from imuarray.estimation.bcd import Calibration
 from imuarray.estimation.blocks import normal_equations, pack_motion, problem
-from imuarray.geometry import Array
 from imuarray.model import ArrayModel
-from imuarray.recording import Recording
+from imuarray.recording import Recording, array_of
+from imuarray.simulation import simulate_samples
 from imuarray.studies.bayes import sample_covariance
 
 TOLERANCE = 1e-3  # of a position's own sd
@@ -40,12 +40,6 @@ class Positions:
     def sd(self) -> np.ndarray:
         """Of r_2 ... r_A, (A - 1, 3) m."""
         return np.sqrt(np.diag(self.covariance)).reshape(-1, 3)
-
-
-def array_of(recording: Recording, gyroscopes: int) -> Array:
-    """The geometry a recording declares, with so many gyroscope triads."""
-    labels = recording.accelerometer_labels
-    return Array(recording.accelerometer_position, labels, gyroscopes, "recording")
 
 
 def locate(recording: Recording, accelerometer_sd: float | None = None) -> Positions:
@@ -109,7 +103,7 @@ def bcd_positions(recording: Recording, accelerometer_sd: float) -> Calibration:
     """ML-BCD of the 2017 paper on the same samples; gyroscopes with the spread among them."""
     _, covariance = sample_covariance(recording.angular_rate)
     spread = float(np.sqrt(np.mean(np.einsum("tii->ti", covariance))))
-    array = array_of(recording, recording.angular_rate.shape[1])
+    array = array_of(recording)
     model = ArrayModel.isotropic(array, accelerometer_sd, spread)
     saturated = recording.saturated_gyroscopes()
     return calibrate_bcd(
@@ -118,7 +112,7 @@ def bcd_positions(recording: Recording, accelerometer_sd: float) -> Calibration:
     )  # fmt: skip
 
 
-def position_table(found: Positions, labels, **columns) -> pd.DataFrame:
+def position_table(found: Positions, labels, /, **columns) -> pd.DataFrame:
     """One row a coordinate: accelerometer, axis, mean_m, sd_m and ``columns`` in front."""
     rows = [(label, axis) for label in labels[1:] for axis in "xyz"]
     table = pd.DataFrame(rows, columns=["accelerometer", "axis"])
@@ -161,3 +155,54 @@ def agreement(pairs: pd.DataFrame, table: pd.DataFrame) -> dict:
         "spread_m": float(np.sqrt(groups.mean_m.var(ddof=1).mean())),
         "claimed_m": float(np.sqrt(np.mean(table.sd_m**2))),
     }
+
+
+def simulate_subset(recording: Recording, accelerometer_sd: float, rng):
+    """The same samples as the model would have given them: (recording, truth dataset).
+
+    Motion and positions are those of `locate`; accelerometers get the noise that the analysis
+    assumes (paper 2021, section IV-C), gyroscopes that which the recording declares.
+    """
+    mean, covariance = sample_covariance(recording.angular_rate)
+    array = array_of(recording, 1)
+    model = ArrayModel.isotropic(array, accelerometer_sd, recording.gyroscope_noise_sd)
+    found = calibrate_gauss_newton(
+        model, recording.specific_force, mean[:, None], rate_covariance=covariance,
+        position_prior=(array.parameters, recording.position_prior_sd), tolerance=TOLERANCE,
+        limit=LIMIT,
+    )  # fmt: skip
+    whole = array_of(recording)
+    return simulate_samples(
+        ArrayModel.isotropic(whole, accelerometer_sd, recording.gyroscope_noise_sd),
+        found.motion.motion, found.positions, recording.accelerometer_position, rng,
+        position_prior_sd=recording.position_prior_sd, title=f"simulated like {recording.title}",
+    )  # fmt: skip
+
+
+def locate_table(recording: Recording, sigmas, /, **columns) -> pd.DataFrame:
+    """`position_table` for each of ``sigmas``, for the estimated sigma_a, and of ML-BCD.
+
+    Columns ``method`` (map, bcd), ``assumed`` (a number as text, or residual),
+    ``accelerometer_sd``, ``residual_sd`` (m/s^2), ``converged``, ``iterations``, and
+    ``nominal_m``. Too few samples leave the residual no freedom: that row is then left out.
+    """
+    labels, parts = recording.accelerometer_labels, []
+    for assumed in [*sigmas, None]:
+        found = locate(recording, assumed)
+        parts.append(position_table(
+            found, labels, **columns, method="map",
+            assumed="residual" if assumed is None else f"{assumed:g}",
+            accelerometer_sd=found.accelerometer_sd, residual_sd=found.residual_sd,
+            converged=found.converged, iterations=found.iterations,
+        ))  # fmt: skip
+    found = bcd_positions(recording, sigmas[-1])
+    rows = Positions(found.positions, np.full((3 * len(labels) - 3,) * 2, np.nan), sigmas[-1],
+                     np.nan, found.converged, len(found.cost))  # fmt: skip
+    parts.append(position_table(
+        rows, labels, **columns, method="bcd", assumed=f"{sigmas[-1]:g}",
+        accelerometer_sd=sigmas[-1], residual_sd=np.nan, converged=found.converged,
+        iterations=len(found.cost),
+    ))  # fmt: skip
+    table = pd.concat(parts, ignore_index=True)
+    nominal = recording.relative_positions()[1:].ravel()
+    return table.assign(nominal_m=np.tile(nominal, len(parts)))

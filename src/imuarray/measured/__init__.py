@@ -1,0 +1,1 @@
+"""Measured data against the model: positions, agreement between recordings, residuals."""

@@ -1,0 +1,19 @@
+"""Per-triad calibration from still poses -> corrected recording, and its tables."""
+
+from job import job
+
+with job(snakemake):
+    from imuarray.commands_measured import write_corrected
+    from imuarray.firstorder import calibrate_first_order, report
+    from imuarray.firstorder.correct import STANDARD_GRAVITY
+    from imuarray.provenance import write_csv
+    from imuarray.recording import read_recording
+
+    entry, made = snakemake.params.entry, snakemake.output
+    recording = read_recording(snakemake.input.recording)
+    found = calibrate_first_order(recording, entry.get("gravity", STANDARD_GRAVITY))
+    write_csv(report.parameter_table(found, recording), made.parameters)
+    write_csv(report.residual_table(found, recording), made.residuals)
+    write_csv(report.noise_table(found, recording), made.noise)
+    write_csv(report.allan_table(found, recording), made.allan)
+    write_corrected(recording, found, made.recording)

@@ -1,0 +1,24 @@
+"""Chains of measured subsets or of their simulations, sigma_a enlarged: figure 5 and table II."""
+
+from job import job
+
+with job(snakemake) as settings:
+    from chains import sample_paired
+    from imuarray.recording import read_recording
+    from imuarray.studies.bayes import tuned_experiment
+
+    kind, counts = snakemake.wildcards.kind, settings["paper2021"]["samples"]
+    lengths = settings["scale"]["measured_transitions"]
+    for samples, source, path in zip(
+        counts, snakemake.input.recordings, snakemake.output, strict=True
+    ):
+        names = ("experiment", kind, samples)
+        recording = read_recording(source)
+        board = {"positions": recording.accelerometer_position.tolist(),
+                 "labels": list(recording.accelerometer_labels)}  # fmt: skip
+        given = {**settings, "array": board}
+        target, step = tuned_experiment(given, recording, names, snakemake.threads)
+        centred = target.likelihood.data.tilt.size > 0
+        attrs = {"samples": samples, "draws_per_sample": target.draws,
+                 "draws_from": "integrand's mode" if centred else "p(omega | y_g)"}  # fmt: skip
+        sample_paired(given, recording, target, step, lengths[f"T{samples}"], names, path, attrs)
