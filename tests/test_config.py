@@ -21,7 +21,7 @@ def test_every_leaf_of_the_shipped_config_is_described(config):
     text = describe_schema()
     for section, content in config.items():
         assert f"| `{section}`" in text
-        if isinstance(content, dict) and section != "scales":
+        if isinstance(content, dict) and section not in ("scales", "recordings"):
             for key in content:
                 assert f"| `{section}.{key}`" in text
 

@@ -59,6 +59,21 @@ class Measured:
             for ending in endings
         ]
 
+    def claims(self, scale: str) -> list[str]:
+        """What the claims on the experiment read, if it is measured."""
+        if not self.is_measured(scale):
+            return []
+        name = self.experiment(scale)
+        group = self.config["recordings"][name].get("group", name)
+        paths = [f"results/measured/positions/{name}.csv"]
+        paths.append(f"results/measured/first_order/{name}_noise.csv")
+        if group in self.groups():
+            paths.append(f"results/measured/agreement/{group}.csv")
+        for kind in (name, self.simulation(scale)):
+            paths += self.posterior(scale, kind, "posterior", ["csv", "json"])
+            paths += self.posterior(scale, kind, "chains", ["nc"])
+        return paths
+
     def targets(self) -> list[str]:
         """What the default target asks of the measured data, for each recording and group."""
         kinds = ("pdf", "png", "csv")

@@ -166,6 +166,7 @@ rule claims:
         determinant="results/{scale}/claims/determinant.csv",
         timing="results/{scale}/claims/timing.csv",
         acceptance="results/{scale}/claims/acceptance_variance.csv",
+        experiment=lambda wc: MEASURED.claims(wc.scale),
         code=library("claims"),
     output:
         table="results/{scale}/claims/claims.csv",
@@ -179,6 +180,10 @@ rule claims:
         mem_mb=4000,
         runtime=30,
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017", "paper2021", "experiment"),
+        settings=lambda wc: effective(
+            config, wc.scale, "paper2017", "paper2021", "experiment", "recordings"
+        ),
+        experiment=lambda wc: MEASURED.experiment(wc.scale),
+        simulation=lambda wc: MEASURED.simulation(wc.scale),
     script:
         "../scripts/claims.py"

@@ -24,6 +24,9 @@ with job(snakemake) as settings:
         verdict, table, burn_in = summarise(chains, labels, threshold, truth)
         for name in ("samples", "draws_per_sample"):
             verdict[name] = int(tree.attrs[name])
+        for name in ("draws_from", "variance_at_most_draws", "most_draws"):
+            if name in tree.attrs:
+                verdict[name] = tree.attrs[name]
         write_json(verdict | {"stamp": stamp(settings, settings["seed"])}, paths[0])
         write_csv(table, paths[1])
         write_csv(burn_in, paths[2])

@@ -16,7 +16,7 @@ with job(snakemake) as settings:
     for samples, path in zip(settings["paper2021"]["samples"], snakemake.output, strict=True):
         names = ("experiment", kind, samples)
         recording = whole.select(subsets[samples])
-        target, step = tuned_experiment(settings, recording, names, snakemake.threads)
-        attrs = {"samples": samples, "draws_per_sample": target.draws}
+        target, step, record = tuned_experiment(settings, recording, names, snakemake.threads)
+        attrs = {"samples": samples, "draws_per_sample": target.draws, **record}
         steps = lengths[f"T{samples}"]
         sample_paired(settings, recording, target, step, steps, names, path, attrs)

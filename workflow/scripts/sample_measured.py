@@ -17,8 +17,6 @@ with job(snakemake) as settings:
         board = {"positions": recording.accelerometer_position.tolist(),
                  "labels": list(recording.accelerometer_labels)}  # fmt: skip
         given = {**settings, "array": board}
-        target, step = tuned_experiment(given, recording, names, snakemake.threads)
-        centred = target.likelihood.data.tilt.size > 0
-        attrs = {"samples": samples, "draws_per_sample": target.draws,
-                 "draws_from": "integrand's mode" if centred else "p(omega | y_g)"}  # fmt: skip
+        target, step, record = tuned_experiment(given, recording, names, snakemake.threads)
+        attrs = {"samples": samples, "draws_per_sample": target.draws, **record}
         sample_paired(given, recording, target, step, lengths[f"T{samples}"], names, path, attrs)

@@ -8,6 +8,7 @@ from imuarray.claims import (
     error2017,
     estimator2021,
     experiment2021,
+    measured2021,
     physics2017,
     posterior2021,
     rate2017,
@@ -22,7 +23,7 @@ from imuarray.claims.results import Results
 MODULES = (
     error2017, rate2017, theory2017, physics2017,
     estimator2021, tuning2021, posterior2021, experiment2021,
-    size2021,
+    measured2021, size2021,
 )  # fmt: skip
 
 __all__ = [

@@ -14,16 +14,29 @@ from imuarray.errors import InputError
 class Results:
     """Tables and summaries below ``root`` (results/<scale>), by path without the root.
 
-    ``settings`` is the effective configuration; ``given`` replaces or adds contents by path.
+    ``settings`` is the effective configuration; ``given`` replaces or adds contents by path;
+    ``kinds`` names the chains of the experiment and of its simulation, by default simulated
+    stand-ins.
     """
 
-    def __init__(self, root, settings: dict, given: dict | None = None):
+    def __init__(self, root, settings: dict, given: dict | None = None, kinds: dict | None = None):
         self.root, self.settings = Path(root), settings
         self._read = dict(given or {})
+        self.kinds = kinds or {"experiment": "standin", "simulation": "simulation"}
+
+    @property
+    def measured(self) -> str | None:
+        """The recording that is the experiment, or None for a simulated stand-in."""
+        name = self.kinds["experiment"]
+        return None if name == "standin" else name
+
+    def measured_table(self, path: str) -> pd.DataFrame:
+        """A CSV file below results/measured, by its path without the ending."""
+        return self._cached(f"../measured/{path}", ".csv", pd.read_csv)
 
     def replace(self, contents: dict) -> Results:
         """A copy with other ``contents`` by path."""
-        return Results(self.root, self.settings, self._read | contents)
+        return Results(self.root, self.settings, self._read | contents, self.kinds)
 
     def _cached(self, path: str, suffix: str, reader):
         if path not in self._read:

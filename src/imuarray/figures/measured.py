@@ -121,7 +121,7 @@ def agreement_figure(summary: pd.DataFrame, pairs: pd.DataFrame, footer=()):
         right.axhline(nominal, color=BLACK, linewidth=0.6)
     right.set(xscale="log", ylim=(0, 102), xlabel="samples $T$", ylabel="covered (%)")
     right.set_title("95 % intervals (filled)\nand 50 % intervals (open)")
-    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=4)
     return figure
 
 

@@ -96,7 +96,7 @@ class GenericLikelihood:
                 given.angular_rate,
                 given.keep,
                 given.whiten_force,
-                given.whiten_rate,
+                given.whiten_rate[0],  # the declared noise, the same in every sample
                 normals,
             )  # fmt: skip
         )

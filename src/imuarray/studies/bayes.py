@@ -143,10 +143,11 @@ def starts_for(settings: dict, recording: Recording, names) -> np.ndarray:
 
 
 def tuned_experiment(settings: dict, recording: Recording, names, threads: int = 1):
-    """(target, sigma_q) of section IV-B on a subset: sigma_a enlarged, (30a)/(30b), III-C.
+    """(target, sigma_q, record) of section IV-B: sigma_a enlarged, (30a)/(30b), III-C.
 
     Where not even the largest N of the sweep brings the variance of log p-hat near its target,
-    as in measured data, omega is drawn around the integrand's mode instead (`centred`).
+    as in measured data, omega is drawn around the integrand's mode instead (`centred`);
+    ``record`` says which, and the variance with p(omega | y_g) at the largest N.
     """
     from imuarray.posterior import tuning
 
@@ -162,10 +163,15 @@ def tuned_experiment(settings: dict, recording: Recording, names, threads: int =
         )  # fmt: skip
 
     variances = sweep(likelihood, recording.relative_positions())
+    record = {
+        "draws_from": "p(omega | y_g)",
+        "variance_at_most_draws": float(variances[-1]), "most_draws": int(counts[-1]),
+    }  # fmt: skip
     if variances.min() > 2 * paper["variance_target"]:
         from imuarray.measured.positions import locate
 
         mode = locate(recording, assumed).mean
+        record["draws_from"] = "integrand's mode"
         likelihood = likelihood.centred(mode)
         variances = sweep(likelihood, mode)
     draws = tuning.choose_draws(counts, variances, paper["variance_target"])
@@ -182,4 +188,4 @@ def tuned_experiment(settings: dict, recording: Recording, names, threads: int =
         stream(seed, *names, "acceptance"),
         threads,
     )
-    return target, tuning.choose_step(steps, rates, paper["acceptance_target"])
+    return target, tuning.choose_step(steps, rates, paper["acceptance_target"]), record
