@@ -17,6 +17,15 @@ class Measured:
         path = self.checkpoints.fetch_recordings.get().output[0]
         return json.loads(Path(path).read_text(encoding="utf-8"))["available"]
 
+    def board(self, group: str) -> list[str]:
+        """All recordings of a board that went through the first-order calibration."""
+        entries = self.config["recordings"]
+        return [
+            name
+            for name in self.available()
+            if entries[name].get("group", name) == group and entries[name].get("first_order", True)
+        ]
+
     def groups(self) -> dict[str, list[str]]:
         """Recordings of one board, where there are two or more."""
         groups = {}
@@ -66,7 +75,8 @@ class Measured:
         name = self.experiment(scale)
         group = self.config["recordings"][name].get("group", name)
         paths = [f"results/measured/positions/{name}.csv"]
-        paths.append(f"results/measured/first_order/{name}_noise.csv")
+        if self.config["recordings"][name].get("first_order", True):
+            paths.append(f"results/measured/first_order/{name}_noise.csv")
         if group in self.groups():
             paths.append(f"results/measured/agreement/{group}.csv")
         for kind in (name, self.simulation(scale)):
@@ -76,16 +86,31 @@ class Measured:
 
     def targets(self) -> list[str]:
         """What the default target asks of the measured data, for each recording and group."""
-        kinds = ("pdf", "png", "csv")
-        paths = []
+        kinds, entries, paths = ("pdf", "png", "csv"), self.config["recordings"], []
         for name in self.available():
             paths += [f"results/measured/figures/residuals_{name}.{kind}" for kind in kinds]
-            paths += [f"results/measured/figures/noise_{name}.{kind}" for kind in kinds]
             paths.append(f"results/measured/positions/{name}.csv")
+            if entries[name].get("first_order", True):
+                paths += [f"results/measured/figures/noise_{name}.{kind}" for kind in kinds]
+                group = entries[name].get("group", name)
+                paths.append(f"results/measured/tables/first_order_{group}.md")
         for group in self.groups():
             paths += [f"results/measured/figures/agreement_{group}.{kind}" for kind in kinds]
-            paths.append(f"results/measured/agreement/{group}.csv")
-        return paths
+            paths.append(f"results/measured/tables/agreement_{group}.md")
+        return sorted(set(paths))
+
+    def published_tables(self, scale: str) -> dict[str, str]:
+        """Names of the measured tables that go to paper_figures/, and what they copy."""
+        name = self.experiment(scale)
+        if name == STANDIN:
+            return {}
+        group = self.config["recordings"][name].get("group", name)
+        copies = {}
+        if self.board(group):
+            copies["measured_first_order_table"] = f"first_order_{group}"
+        if group in self.groups():
+            copies["measured_agreement_table"] = f"agreement_{group}"
+        return copies
 
     def published(self, scale: str) -> dict[str, str]:
         """Names of the measured figures that go to paper_figures/, and what they copy."""
@@ -93,7 +118,9 @@ class Measured:
         if name == STANDIN:
             return {}
         group = self.config["recordings"][name].get("group", name)
-        copies = {"measured_residuals": f"residuals_{name}", "measured_noise": f"noise_{name}"}
+        copies = {"measured_residuals": f"residuals_{name}"}
+        if self.config["recordings"][name].get("first_order", True):
+            copies["measured_noise"] = f"noise_{name}"
         if group in self.groups():
             copies["measured_agreement"] = f"agreement_{group}"
         return copies

@@ -2,7 +2,14 @@ from imuarray.figures.notes import SOURCES
 from support import PACKAGE
 
 DRAWING = [*library("figures"), str(PACKAGE / "figures" / "imuarray.mplstyle")]
-SHOWN = [*FIGURES, *TABLES, "measured_residuals", "measured_agreement", "measured_noise"]
+MEASURED_SHOWN = [
+    "measured_residuals",
+    "measured_agreement",
+    "measured_noise",
+    "measured_first_order_table",
+    "measured_agreement_table",
+]
+SHOWN = [*FIGURES, *TABLES, *MEASURED_SHOWN]
 CAPTIONS = [workflow.source_path(f"../report/{name}.rst") for name in SHOWN]
 
 
@@ -306,6 +313,9 @@ rule gallery:
         measured=lambda wc: expand(
             "paper_figures/{name}.png", name=MEASURED.published(config["scale"])
         ),
+        measured_tables=lambda wc: expand(
+            "paper_figures/{name}.md", name=MEASURED.published_tables(config["scale"])
+        ),
         captions=CAPTIONS,
         code=library("figures"),
     output:
@@ -323,6 +333,7 @@ rule gallery:
         figures=FIGURES,
         tables=TABLES,
         measured=lambda wc: list(MEASURED.published(config["scale"])),
+        measured_tables=lambda wc: list(MEASURED.published_tables(config["scale"])),
         source=lambda wc: SOURCES[MEASURED.source(config["scale"])],
     script:
         "../scripts/gallery.py"

@@ -283,3 +283,58 @@ rule figure_agreement:
         settings=effective(config, config["scale"], scaled=False),
     script:
         "../scripts/figure_agreement.py"
+
+
+rule table_first_order:
+    input:
+        residuals=lambda wc: expand(
+            "results/measured/first_order/{name}_residuals.csv", name=MEASURED.board(wc.group)
+        ),
+        noise=lambda wc: expand(
+            "results/measured/first_order/{name}_noise.csv", name=MEASURED.board(wc.group)
+        ),
+        code=library("figures"),
+    output:
+        csv=report(
+            "results/measured/tables/first_order_{group}.csv",
+            caption="../report/measured_first_order_table.rst",
+            category="Measured",
+        ),
+        tex="results/measured/tables/first_order_{group}.tex",
+        md="results/measured/tables/first_order_{group}.md",
+    log:
+        "results/measured/logs/tables/first_order_{group}.log",
+    benchmark:
+        "results/measured/benchmarks/tables/first_order_{group}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        names=lambda wc: MEASURED.board(wc.group),
+    script:
+        "../scripts/table_first_order.py"
+
+
+rule table_agreement:
+    input:
+        summary="results/measured/agreement/{group}.csv",
+        code=library("figures"),
+    output:
+        csv=report(
+            "results/measured/tables/agreement_{group}.csv",
+            caption="../report/measured_agreement_table.rst",
+            category="Measured",
+        ),
+        tex="results/measured/tables/agreement_{group}.tex",
+        md="results/measured/tables/agreement_{group}.md",
+    log:
+        "results/measured/logs/tables/agreement_{group}.log",
+    benchmark:
+        "results/measured/benchmarks/tables/agreement_{group}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    script:
+        "../scripts/table_agreement.py"

@@ -53,7 +53,23 @@ rule publish_measured:
     log:
         "results/logs/publish/{name}.{kind}.log",
     wildcard_constraints:
-        name="measured_[a-z]+",
+        name="measured_(residuals|noise|agreement)",
         kind="pdf|png|csv",
+    shell:
+        "cp {input:q} {output:q} 2> {log:q}"
+
+
+rule publish_measured_table:
+    input:
+        lambda wc: "results/measured/tables/{}.{}".format(
+            MEASURED.published_tables(config["scale"])[wc.name], wc.kind
+        ),
+    output:
+        "paper_figures/{name}.{kind}",
+    log:
+        "results/logs/publish/{name}.{kind}.log",
+    wildcard_constraints:
+        name="measured_[a-z_]+_table",
+        kind="csv|tex|md",
     shell:
         "cp {input:q} {output:q} 2> {log:q}"

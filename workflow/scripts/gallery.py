@@ -24,7 +24,7 @@ with job(snakemake) as settings:  # noqa: F821
     figures = {name: captions[name] for name in shown}
     tables = {
         name: (captions[name], output.with_name(f"{name}.md").read_text(encoding="utf-8"))
-        for name in snakemake.params.tables  # noqa: F821
+        for name in [*snakemake.params.tables, *snakemake.params.measured_tables]  # noqa: F821
     }
     with atomic_write(output) as temporary:
         page = gallery(figures, tables, settings, lines)

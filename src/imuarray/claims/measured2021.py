@@ -143,6 +143,8 @@ def conservative(results):
 def noise(results):
     if results.measured is None:
         return untested("measured data needed")
+    if not results.settings["recordings"][results.measured].get("first_order", True):
+        return untested("a recording with still poses needed")
     table = results.measured_table(f"first_order/{results.measured}_noise")
     sds = table.groupby("sensor").sd.median()
     given = results.settings["noise"]

@@ -29,10 +29,10 @@ def caption(template: str, settings: dict, **wildcards) -> str:
 
 def title(name: str) -> str:
     """'Paper 2021, figure 4' of '2021_fig4'."""
-    year, rest = name.split("_")
+    year, *words = name.split("_")
     if year == "measured":
-        return f"Measured data: {rest}"
-    kind, number = rest[:-1], rest[-1]
+        return f"Measured data: {' '.join(words)}"
+    kind, number = words[0][:-1], words[0][-1]
     words = {"fig": f"figure {number}", "table": f"table {'I' * int(number)}"}
     return f"Paper {year}, {words[kind]}"
 
