@@ -1,0 +1,232 @@
+"""Importers at the edge: tables, published files, and the command `convert`."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from imuarray.cli import main
+from imuarray.errors import InputError
+from imuarray.recording import Recording, read_recording, write_recording
+from imuarray.recording import published as remote
+from imuarray.recording.table import read_table
+from tests.mimu_writer import packets, readings
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture
+def example(tmp_path):
+    """The documentation's own files."""
+    text = (ROOT / "docs" / "convert.md").read_text()
+    for name, language in (("log.csv", "csv"), ("columns.yaml", "yaml")):
+        block = re.search(rf"```{language}\n(.*?)```", text, re.DOTALL).group(1)
+        (tmp_path / name).write_text(block)
+    return tmp_path
+
+
+def test_the_documented_example(example):
+    found = read_table(example / "log.csv", example / "columns.yaml")
+    g = 9.80665
+    np.testing.assert_allclose(found.time, [0, 0.01, 0.02])
+    np.testing.assert_allclose(found.specific_force[0, 0], [0.01 * g, -0.02 * g, g])
+    # turned over: array x = -y, y = -x, z = -z of the sensor
+    np.testing.assert_allclose(found.specific_force[0, 1], [-0.01 * g, 0.02 * g, 1.01 * g])
+    np.testing.assert_allclose(np.degrees(found.angular_rate[0, 1]), [12.2, -3.1, 0.4])
+    np.testing.assert_allclose(found.accelerometer_position[2], [0.019, 0, 0.001])
+    assert found.accelerometer_noise_sd == pytest.approx(0.004 * g)
+    assert found.gyroscope_range == pytest.approx(np.radians(2000))
+    assert found.position_prior_sd == pytest.approx(3e-3)
+    assert found.gyroscope_labels == ("1", "2")
+
+
+def test_a_rate_instead_of_a_time_column(example):
+    layout = yaml.safe_load((example / "columns.yaml").read_text())
+    layout["time"] = {"rate": 100.0}
+    (example / "columns.yaml").write_text(yaml.safe_dump(layout))
+    found = read_table(example / "log.csv", example / "columns.yaml")
+    np.testing.assert_allclose(found.time, [0, 0.01, 0.02])
+
+
+def set_key(layout, path, value):
+    *way, last = path.split("/")
+    for step in way:
+        layout = layout[step]
+    if value is None:
+        del layout[last]
+    else:
+        layout[last] = value
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "words"),
+    [
+        ("time", None, "no 'time'"),
+        ("times", 3, "unknown key 'times'"),
+        ("time/unit", "minutes", "unit of s, ms, us, ns, found 'minutes'"),
+        ("time/column", "stamp", "expected a column 'stamp', found t, ax1"),
+        ("accelerometers/unit", "G", "expected a unit of m/s.2, g, mg, found 'G'"),
+        ("accelerometers/noise", -1, "positive number, found -1"),
+        ("accelerometers/noise", True, "positive number, found True"),
+        ("accelerometers/triads", [], "triads by label"),
+        ("accelerometers/triads/2/columns", ["ax2"], "three columns"),
+        ("accelerometers/triads/2/position", None, "no 'position'"),
+        ("accelerometers/triads/2/position", [1, "a", 2], "three numbers"),
+        ("accelerometers/triads/2/axes", ["x", "x", "z"], "no rotation"),
+        ("accelerometers/triads/2/axes", ["x", "q", "z"], "expected axes such as"),
+        ("gyroscopes/triads/1/columns", ["gx1", "gy1", "gone"], "expected a column 'gone'"),
+        ("position_unit", "cm", "unit of m, mm"),
+    ],
+)
+def test_a_wrong_layout_is_one_line(example, path, value, words):
+    layout = yaml.safe_load((example / "columns.yaml").read_text())
+    set_key(layout, path, value)
+    (example / "columns.yaml").write_text(yaml.safe_dump(layout))
+    with pytest.raises(InputError, match=words) as caught:
+        read_table(example / "log.csv", example / "columns.yaml")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("0.02,-0.02", "broken,-0.02", "'ax1': expected numbers, found 'broken' in data row 2"),
+        ("0.02,-0.02", ",-0.02", "data row 2"),
+        ("0.02,-0.02", "inf,-0.02", "data row 2"),
+    ],
+)
+def test_a_wrong_cell_is_named_by_row(example, old, new, words):
+    text = (example / "log.csv").read_text().replace(old, new, 1)
+    (example / "log.csv").write_text(text)
+    with pytest.raises(InputError, match=words):
+        read_table(example / "log.csv", example / "columns.yaml")
+
+
+def test_mutated_tables_are_refused_or_sound(example):
+    """Seed 3. 400 mutations of either file: InputError, or a recording that can be written."""
+    rng = np.random.default_rng(3)
+    originals = {name: (example / name).read_bytes() for name in ("log.csv", "columns.yaml")}
+    outcomes = {"refused": 0, "read": 0}
+    for _ in range(400):
+        name = ["log.csv", "columns.yaml"][rng.integers(2)]
+        data = bytearray(originals[name])
+        for _ in range(rng.integers(1, 3)):
+            at = int(rng.integers(len(data)))
+            if rng.integers(3):
+                # mostly text: bytes that are not end in one and the same refusal
+                data[at] = int(rng.integers(32, 127) if rng.integers(5) else rng.integers(256))
+            else:
+                del data[at : at + int(rng.integers(1, 20))]
+        (example / name).write_bytes(bytes(data))
+        try:
+            found = read_table(example / "log.csv", example / "columns.yaml")
+            assert isinstance(found, Recording)
+            write_recording(found, example / "rec.nc")
+            outcomes["read"] += 1
+        except InputError as error:
+            outcomes["refused"] += 1
+            assert "\n" not in str(error)
+        (example / name).write_bytes(originals[name])
+    assert min(outcomes.values()) > 20
+
+
+def test_convert_csv_on_the_command_line(example, capsys):
+    log, columns, out = (str(example / n) for n in ("log.csv", "columns.yaml", "rec.nc"))
+    assert main(["convert", "csv", log, "--columns", columns, "--out", out]) == 0
+    assert "3 samples of 3 IMUs, 100.00 Hz" in capsys.readouterr().out
+    assert read_recording(out).specific_force.shape == (3, 3, 3)
+
+
+def corners(folder):
+    """A positions file as published, of the board's eight corners."""
+    from imuarray.geometry import mimu4444_corners
+
+    board = mimu4444_corners()
+    rows = ["axes, " + ", ".join(f"IMU {label}" for label in board.labels)]
+    for axis, values in zip("xyz", board.positions.T, strict=True):
+        rows.append(", ".join([axis, *map(str, values)]))
+    (folder / "positions.csv").write_text("\n".join(rows) + "\n")
+    return str(folder / "positions.csv")
+
+
+def test_convert_mimu_on_the_command_line(tmp_path, capsys):
+    counts = readings(np.random.default_rng(0), 40, 8)
+    parts = packets(counts)
+    (tmp_path / "data.bin").write_bytes(b"".join(parts[:20] + parts[21:]))
+    arguments = ["convert", "mimu", str(tmp_path / "data.bin"), "--positions", corners(tmp_path)]
+    out = tmp_path / "rec.nc"
+    assert main([*arguments, "--out", str(out)]) == 0
+    text = capsys.readouterr().out
+    assert (
+        "39 samples of 8 IMUs, 62.50 Hz" in text and "1 packet(s) missing before sample 20" in text
+    )
+    assert len(read_recording(out).time) == 39
+
+
+@pytest.mark.parametrize(
+    ("content", "extra", "words"),
+    [
+        (b"nothing of the kind", [], "expected MIMU packets"),
+        (None, [], "expected a file to read"),
+        (b"\x00" * 50, ["--underside", "9"], "--underside: expected labels of"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(tmp_path, capsys, content, extra, words):
+    if content is not None:
+        (tmp_path / "data.bin").write_bytes(content)
+    arguments = ["convert", "mimu", str(tmp_path / "data.bin"), "--positions", corners(tmp_path)]
+    out = tmp_path / "rec.nc"
+    assert main([*arguments, "--out", str(out), *extra]) == 2
+    error = capsys.readouterr().err
+    assert words in error and error.count("\n") == 1 and not out.exists()
+
+
+@pytest.fixture
+def source(monkeypatch):
+    """A published set of one small file."""
+    import hashlib
+
+    files = {"a/data.bin": hashlib.sha256(b"content").hexdigest()}
+    made = remote.Source("https://example.invalid/", files, "title", "licence")
+    monkeypatch.setitem(remote.SOURCES, "board", made)
+    monkeypatch.delenv(remote.MIRROR, raising=False)
+    return made
+
+
+def test_mirror_and_cache_are_used_where_the_checksum_is_right(source, tmp_path, monkeypatch):
+    def no_network(*_, **__):
+        raise AssertionError("the network was asked")
+
+    monkeypatch.setattr("pooch.retrieve", no_network)
+    place = tmp_path / "board" / "a" / "data.bin"
+    place.parent.mkdir(parents=True)
+    place.write_bytes(b"content")
+    assert remote.fetch("board", "a/data.bin", tmp_path) == place
+    monkeypatch.setenv(remote.MIRROR, str(tmp_path))
+    assert remote.fetch("board", "a/data.bin", tmp_path / "elsewhere") == place
+    place.write_bytes(b"other")
+    with pytest.raises(InputError, match="expected sha256"):
+        remote.fetch("board", "a/data.bin", tmp_path)
+
+
+def test_download_goes_to_the_folder(source, tmp_path, monkeypatch):
+    def retrieve(url, known_hash, fname, path, downloader):
+        assert url == "https://example.invalid/a/data.bin" and known_hash.startswith("sha256:")
+        Path(path).mkdir(parents=True)
+        (Path(path) / fname).write_bytes(b"content")
+
+    monkeypatch.setattr("pooch.retrieve", retrieve)
+    assert remote.fetch("board", "a/data.bin", tmp_path).read_bytes() == b"content"
+
+
+def test_out_of_reach_says_why(source, tmp_path, monkeypatch):
+    def retrieve(*_, **__):
+        raise OSError("no route\nto host")
+
+    monkeypatch.setattr("pooch.retrieve", retrieve)
+    with pytest.raises(InputError, match="IMUARRAY_MIRROR.*no route to host"):
+        remote.fetch("board", "a/data.bin", tmp_path)
+    with pytest.raises(InputError, match="expected one of"):
+        remote.fetch("board", "b", tmp_path)

@@ -1,0 +1,226 @@
+"""The MIMU reader: whole files, every kind of damage, and a thousand mutated files."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from imuarray.errors import InputError
+from imuarray.geometry import mimu4444_corners
+from imuarray.recording.mimu import read_mimu
+from imuarray.recording.mimu_recording import read_positions, to_recording
+from tests.mimu_writer import PERIOD, acknowledgement, packet, packets, readings
+
+REAL = {1: 37439, 2: 39301, 3: 37541, 4: 38238, 5: 37257}
+
+
+def stored(tmp_path, content: bytes):
+    path = tmp_path / "data.bin"
+    path.write_bytes(content)
+    return path
+
+
+def adds_up(account) -> bool:
+    parts = account.packet_bytes + account.acknowledgement_bytes + account.garbage_bytes
+    return parts == account.file_bytes
+
+
+@pytest.mark.parametrize("imus", [1, 3, 8, 20])
+def test_a_whole_file_reads_back(tmp_path, imus):
+    counts = readings(np.random.default_rng(imus), 100, imus)
+    # number and time stamp both wrap on the way
+    parts = packets(counts, number=65500, ticks=2**32 - 50 * PERIOD)
+    content = acknowledgement(0x28) + b"".join(parts) + acknowledgement(0x22)
+    found = read_mimu(stored(tmp_path, content))
+    np.testing.assert_array_equal(found.counts, counts)
+    np.testing.assert_array_equal(found.numbers, 65500 + np.arange(100))
+    np.testing.assert_allclose(found.time, np.arange(100) * 0.016, atol=1e-12)
+    assert found.account.acknowledgement_bytes == 8 and adds_up(found.account)
+    assert not any(found.account.attributes().values())
+
+
+def test_a_flipped_byte_costs_one_packet(tmp_path):
+    counts = readings(np.random.default_rng(0), 50, 8)
+    parts = packets(counts)
+    damaged = bytearray(parts[20])
+    damaged[40] ^= 0x11
+    parts[20] = bytes(damaged)
+    found = read_mimu(stored(tmp_path, b"".join(parts)))
+    np.testing.assert_array_equal(found.counts, np.delete(counts, 20, axis=0))
+    assert found.account.bad == [20 * 106] and found.account.lost == [(20, 1)]
+    assert found.account.garbage == [(20 * 106, 106)] and adds_up(found.account)
+    assert np.diff(found.time).max() == pytest.approx(0.032)
+
+
+def test_garbage_between_packets_is_skipped_and_located(tmp_path):
+    counts = readings(np.random.default_rng(1), 30, 8)
+    parts = packets(counts)
+    content = b"".join(parts[:10]) + b"\x00\xaa\x07" * 5 + b"".join(parts[10:])
+    found = read_mimu(stored(tmp_path, content))
+    np.testing.assert_array_equal(found.counts, counts)
+    assert found.account.garbage == [(1060, 15)] and found.account.lost == []
+
+
+def test_cut_off_at_both_ends(tmp_path):
+    counts = readings(np.random.default_rng(2), 30, 8)
+    found = read_mimu(stored(tmp_path, b"".join(packets(counts))[17:-23]))
+    np.testing.assert_array_equal(found.counts, counts[1:-1])
+    assert found.account.garbage_bytes == 2 * 106 - 40 and found.account.bad == []
+
+
+def test_a_gap_longer_than_the_clocks_turn_keeps_the_time(tmp_path):
+    counts = readings(np.random.default_rng(3), 10_000, 1)
+    parts = packets(counts)
+    found = read_mimu(stored(tmp_path, b"".join(parts[:100] + parts[9000:])))
+    assert found.account.lost == [(100, 8900)]
+    assert found.time[100] == pytest.approx(9000 * 0.016)
+
+
+def test_a_repeated_block_is_dropped(tmp_path):
+    counts = readings(np.random.default_rng(4), 300, 2)
+    parts = packets(counts)
+    found = read_mimu(stored(tmp_path, b"".join(parts[:150] + parts[148:150] + parts[150:])))
+    np.testing.assert_array_equal(found.counts, counts)
+    assert len(found.account.out_of_sequence) == 2 and adds_up(found.account)
+
+
+def test_a_time_stamp_that_contradicts_its_number_is_dropped(tmp_path):
+    counts = readings(np.random.default_rng(5), 300, 2)
+    parts = packets(counts)
+    parts[77] = packet(77, 500 * PERIOD, counts[77])
+    found = read_mimu(stored(tmp_path, b"".join(parts)))
+    np.testing.assert_array_equal(found.counts, np.delete(counts, 77, axis=0))
+    assert found.account.out_of_sequence == [77 * len(parts[0])]
+
+
+def test_two_recordings_in_one_file_are_refused(tmp_path):
+    parts = packets(readings(np.random.default_rng(6), 100, 2))
+    again = packets(readings(np.random.default_rng(7), 60, 2), number=7, ticks=123_456_789)
+    with pytest.raises(InputError, match="one recording.*byte 3400"):
+        read_mimu(stored(tmp_path, b"".join(parts + again)))
+
+
+@pytest.mark.parametrize("content", [b"", b"\xaa" * 5000, b"hello, world\n" * 400, b"\x00" * 999])
+def test_foreign_files_are_refused(tmp_path, content):
+    with pytest.raises(InputError, match="expected MIMU packets"):
+        read_mimu(stored(tmp_path, content))
+
+
+def test_a_missing_file_is_one_line(tmp_path):
+    with pytest.raises(InputError, match="found none"):
+        read_mimu(tmp_path / "nothing.bin")
+
+
+def test_units_rails_and_the_underside(tmp_path):
+    counts = np.zeros((2, 8, 6), np.int16)
+    counts[0, 0] = [2048, 0, -32768, 164, 0, 32767]  # IMU 1, top
+    counts[0, 1] = [2048, 4096, 6144, 164, 328, 492]  # IMU 2, turned over
+    board = mimu4444_corners()
+    stream = read_mimu(stored(tmp_path, b"".join(packets(counts))))
+    found = to_recording(stream, board.positions, board.labels)
+    g, dps = 9.80665, np.pi / 180
+    np.testing.assert_allclose(found.specific_force[0, 0], [g, 0, -16 * g])
+    np.testing.assert_allclose(found.angular_rate[0, 0, 0], 10 * dps)
+    np.testing.assert_allclose(found.specific_force[0, 1], [-2 * g, -g, -3 * g])
+    np.testing.assert_allclose(found.angular_rate[0, 1], [-20 * dps, -10 * dps, -30 * dps])
+    assert found.saturated_accelerometers()[0, 0].tolist() == [False, False, True]
+    assert found.saturated_gyroscopes()[0, 0].tolist() == [False, False, True]
+    assert found.saturated_gyroscopes().sum() == 1
+
+
+def test_as_many_positions_as_imus(tmp_path):
+    stream = read_mimu(
+        stored(tmp_path, b"".join(packets(readings(np.random.default_rng(8), 9, 4))))
+    )
+    board = mimu4444_corners()
+    with pytest.raises(InputError, match="expected 4 IMUs.*found 8"):
+        to_recording(stream, board.positions, board.labels)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "a,b\n1,2\n", "axes,IMU 1\nx,1\ny,2\nz,q\n", "axes,IMU 1\nx,1\ny,2\nz,nan\n"]
+)
+def test_wrong_positions_are_one_line(tmp_path, text):
+    path = tmp_path / "positions.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match="expected a header"):
+        read_positions(path)
+
+
+def mutate(rng, content: bytes, size: int) -> bytes:
+    """One of the ways in which a logger's file goes wrong."""
+    data = bytearray(content)
+    kind = rng.integers(9)
+    at, length = int(rng.integers(len(data))), int(rng.integers(1, 400))
+    if kind == 0:
+        for place in rng.integers(0, len(data), rng.integers(1, 30)):
+            data[place] ^= int(rng.integers(1, 256))
+    elif kind == 1:
+        data = data[at:] if rng.integers(2) else data[:at]
+    elif kind == 2:
+        del data[at : at + length]
+    elif kind == 3:
+        data[at:at] = rng.bytes(length)
+    elif kind == 4:
+        data[at : at + length] = bytes(min(length, len(data) - at))
+    elif kind == 5:
+        data[at : at + length] = rng.bytes(min(length, len(data) - at))
+    elif kind == 6:
+        data[at:at] = data[at : at + int(rng.integers(1, 5)) * size]
+    elif kind == 7:
+        first = at // size * size
+        data[first : first + 2 * size] = (
+            data[first + size : first + 2 * size] + data[first : first + size]
+        )
+    else:
+        data = bytearray(rng.bytes(len(data)) if rng.integers(2) else b"\xaa" * len(data))
+    return bytes(data)
+
+
+def test_a_thousand_mutated_files_never_give_a_wrong_sample(tmp_path):
+    """Seed 11. A wrong sample would need a 16-bit sum to agree by chance: about 1 file in 10^4."""
+    rng = np.random.default_rng(11)
+    counts = readings(rng, 200, 2)
+    jitter = rng.integers(-20_000, 20_000, 200)
+    content = b"".join(packets(counts, number=65450, ticks=2**32 - 10**8, jitter=jitter))
+    size = len(content) // 200
+    true_time = {65450 + i: (i * PERIOD + jitter[i]) / 64e6 for i in range(200)}
+    refused = 0
+    for _ in range(1200):
+        mutated = mutate(rng, content, size)
+        path = stored(tmp_path, mutated)
+        try:
+            found = read_mimu(path)
+        except InputError:
+            refused += 1
+            continue
+        assert adds_up(found.account)
+        # numbers are unwrapped from the first one accepted
+        number = found.numbers + (65536 if found.numbers[0] < 30000 else 0)
+        np.testing.assert_array_equal(found.counts, counts[number - 65450])
+        expected = np.array([true_time[n] for n in number.tolist()])
+        np.testing.assert_allclose(found.time, expected - expected[0], atol=1e-9)
+        untouched = sum(mutated.count(content[i * size : (i + 1) * size]) > 0 for i in range(200))
+        dropped = len(found.account.out_of_sequence)
+        assert len(number) >= untouched - dropped
+        assert len(number) + found.account.lost_packets == number[-1] - number[0] + 1
+    assert 50 < refused < 600
+
+
+@pytest.mark.parametrize("number", REAL)
+def test_the_published_recordings(number):
+    mirror = os.environ.get("IMUARRAY_MIRROR")
+    if not mirror:
+        pytest.skip("IMUARRAY_MIRROR does not say where the published recordings are")
+    folder = Path(mirror) / "mimu4444"
+    found = read_mimu(folder / f"exp_{number}" / "data.bin")
+    assert len(found.counts) == REAL[number] and adds_up(found.account)
+    counts = found.account.attributes()
+    assert counts["packets_lost"] == counts["packets_bad"] == 0
+    assert counts["packets_out_of_sequence"] == 0
+    positions, labels = read_positions(folder / "IMU_positions.csv")
+    np.testing.assert_allclose(positions, mimu4444_corners().positions)
+    recording = to_recording(found, positions, labels)
+    still = np.linalg.norm(recording.specific_force[:600].mean(axis=0), axis=1)
+    assert np.all(np.abs(still - 9.8) < 0.6)  # raw offsets reach 0.6 m/s^2
