@@ -8,6 +8,7 @@ triangular, which makes its axes the array frame (paper 2021, section IV-B, afte
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -147,8 +148,8 @@ def fit_triads(mean, sd, magnitude: float) -> TriadFit:
 
     A triad whose offset has jumped or drifts (sensors settling after power-on do) spoils the
     directions for all others. One reading of one triad in one pose is left out at a time, the
-    worst, as long as it is more than OUTLIER times the usual; never more than a fifth of a
-    triad's.
+    one whose absence helps most, as long as that is more than OUTLIER squared times the usual;
+    never more than a fifth of a triad's.
 
     Parameters
     ----------
@@ -163,47 +164,60 @@ def fit_triads(mean, sd, magnitude: float) -> TriadFit:
     """
     used = np.ones(mean.shape[:2], bool)
     while True:
-        found = _fit(mean, sd, magnitude, used)
-        size = np.sqrt(np.mean((found.residual / sd) ** 2, axis=2))
+        found, gain = _fit(mean, sd, magnitude, used)
         spare = (~used).sum(axis=0) < MOST_LEFT_OUT * len(mean)
-        candidates = np.where(used & spare, size, 0.0)
-        worst = np.unravel_index(np.argmax(candidates), size.shape)
-        if not candidates[worst] > OUTLIER * np.median(size[used]):
+        candidates = np.where(used & spare, gain, 0.0)
+        worst = np.unravel_index(np.argmax(candidates), gain.shape)
+        if not candidates[worst] > OUTLIER**2 * np.median(gain[used]):
             return found
         used[worst] = False
 
 
-def _fit(mean, sd, magnitude, used) -> TriadFit:
-    """Least squares over the readings ``used``."""
+@partial(jax.jit, static_argnums=1)
+def _residual(p, triads, mean, weight, magnitude):
+    misfit = ((mean - _predict(p, triads, magnitude)) * weight).ravel()
+    # fixes the directions' free lengths at 1; zero at the solution, so it costs nothing
+    lengths = jnp.sum(_unpack(p, triads)[2] ** 2, axis=1) - 1.0
+    return jnp.concatenate([misfit, lengths])
+
+
+_slopes = jax.jit(jax.jacfwd(_residual), static_argnums=1)
+
+
+def _fit(mean, sd, magnitude, used) -> tuple[TriadFit, np.ndarray]:
+    """Least squares over the readings ``used``; also what leaving each one out would gain.
+
+    The gain (P, A) is how much the sum of squares would fall (by linear theory), so that a
+    reading which bends the fit to itself is seen for what it is.
+    """
     poses, triads = mean.shape[:2]
-    weight = used[..., None] / sd
+    given = mean, used[..., None] / sd, magnitude
     unit = mean.mean(axis=1) / magnitude
     start = np.concatenate(
         [np.eye(3)[UPPER], np.tile(np.eye(3).ravel(), triads - 1), np.zeros(3 * triads),
          unit.ravel()]
     )  # fmt: skip
-
-    @jax.jit
-    def residual(p):
-        misfit = ((mean - _predict(p, triads, magnitude)) * weight).ravel()
-        # fixes the directions' free lengths at 1; zero at the solution, so it costs nothing
-        lengths = jnp.sum(_unpack(p, triads)[2] ** 2, axis=1) - 1.0
-        return jnp.concatenate([misfit, lengths])
-
-    slopes = jax.jit(jax.jacfwd(residual))
     found = least_squares(
-        lambda p: np.asarray(residual(p)), start, jac=lambda p: np.asarray(slopes(p)),
+        lambda p: np.asarray(_residual(p, triads, *given)), start,
+        jac=lambda p: np.asarray(_slopes(p, triads, *given)),
         x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-12, max_nfev=200,
     )  # fmt: skip
-    scaled = found.jac / np.linalg.norm(found.jac, axis=0)
-    rank = np.linalg.matrix_rank(scaled, tol=1e-7)
+    norm = np.linalg.norm(found.jac, axis=0)
+    scaled = found.jac / np.where(norm > 0, norm, 1.0)
+    left, values, _ = np.linalg.svd(scaled, full_matrices=False)
+    rank = int(np.sum(values > 1e-7 * values[0]))
     if rank < start.size:
         raise IdentifiabilityError(
             f"still poses: expected enough different ones to determine {start.size} unknowns,"
             f" found {poses} poses that determine {rank} (turn the array to about twelve or more"
             " directions)"
         )
-    return _result(found, mean, used, magnitude)
+    rows = left[: mean.size].reshape(poses, triads, 3, -1)
+    free = np.eye(3) - np.einsum("pkin,pkjn->pkij", rows, rows)
+    misfit = found.fun[: mean.size].reshape(poses, triads, 3)
+    # a reading that alone determines something cannot be spared: its inverse is kept finite
+    solved = np.linalg.solve(free + 1e-9 * np.eye(3), misfit[..., None])[..., 0]
+    return _result(found, mean, used, magnitude), np.einsum("pki,pki->pk", misfit, solved)
 
 
 def _result(found, mean, used, magnitude) -> TriadFit:

@@ -1,0 +1,278 @@
+"""First-order calibration: still poses, triads, noise, and the recording it corrects."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from imuarray.errors import IdentifiabilityError, InputError
+from imuarray.firstorder import (
+    allan_deviation,
+    calibrate_first_order,
+    correct,
+    fit_triads,
+    still_poses,
+)
+from imuarray.firstorder.allan import lag_correlation, white_noise_sd
+from imuarray.firstorder.report import noise_table, parameter_table, residual_table
+from imuarray.firstorder.still import window_spread
+from imuarray.geometry import mimu4444_corners
+from imuarray.recording import Recording, read_recording, write_recording
+
+GRAVITY = 9.81
+RATE = 50.0
+
+
+def directions(count, rng):
+    """Unit vectors all over the sphere."""
+    points = rng.standard_normal((count, 3))
+    return points / np.linalg.norm(points, axis=1, keepdims=True)
+
+
+def triads(count, rng):
+    """Matrices (first upper triangular), offsets."""
+    matrix = np.eye(3) + 0.01 * rng.standard_normal((count, 3, 3))
+    matrix[0] = np.triu(matrix[0])
+    return matrix, 0.3 * rng.standard_normal((count, 3))
+
+
+def board(rng, poses=16, count=4, seconds=6.0, noise=0.04, rate_noise=1e-3):
+    """A recording: still poses of known direction, a second of waving in between."""
+    matrix, offset = triads(count, rng)
+    unit = directions(poses, rng)
+    still, moving = int(seconds * RATE), int(2 * RATE)
+    force, rate, marks = [], [], []
+    for pose in range(poses):
+        start, stop = unit[pose], unit[(pose + 1) % poses]
+        force.append(np.tile(GRAVITY * start, (still, 1)))
+        rate.append(np.zeros((still, 3)))
+        marks.append(np.ones(still, bool))
+        s = np.linspace(0, 1, moving)[:, None]
+        wave = np.sin(40 * s * np.array([1.0, 1.3, 0.7]))
+        force.append(GRAVITY * ((1 - s) * start + s * stop) + 3 * wave)
+        rate.append(2.0 * np.cos(25 * s) * np.ones(3) + 0.5)
+        marks.append(np.zeros(moving, bool))
+    true, turn = np.concatenate(force), np.concatenate(rate)
+    bias = np.radians(rng.standard_normal((count, 3)))
+    readings = np.einsum("kij,tj->tki", matrix, true) + offset
+    readings += noise * rng.standard_normal(readings.shape)
+    rates = turn[:, None] + bias + rate_noise * rng.standard_normal((len(turn), count, 3))
+    labels = tuple(str(k + 1) for k in range(count))
+    recording = Recording(
+        np.arange(len(true)) / RATE, readings, rates, mimu4444_corners().positions[[0, 2, 4, 7]],
+        labels, labels, noise, rate_noise, 157.0, 34.9, 3e-3,
+    )  # fmt: skip
+    return recording, matrix, offset, bias, unit, np.concatenate(marks)
+
+
+def test_every_pose_is_found_and_nothing_else():
+    recording, *_, marks = board(np.random.default_rng(0))
+    poses = still_poses(recording)
+    assert len(poses) == 16
+    for pose in poses:
+        assert marks[pose].all() and pose.stop - pose.start > 3.5 * RATE
+
+
+def test_window_spread_is_the_plain_one():
+    readings = np.random.default_rng(1).normal(5.0, 2.0, (200, 3))
+    found = window_spread(readings, 20)
+    for t in (10, 100, 180):
+        assert found[t] == pytest.approx(np.sqrt(readings[t - 10 : t + 10].var(axis=0).mean()))
+
+
+def test_declared_poses_are_used_as_they_are():
+    recording, *_, marks = board(np.random.default_rng(2))
+    poses = still_poses(replace(recording, stationary=marks))
+    assert [pose.stop - pose.start for pose in poses] == [300] * 16
+
+
+def test_a_gap_ends_a_pose():
+    recording, *_ = board(np.random.default_rng(3), seconds=12.0)
+    kept = np.ones(len(recording.time), bool)
+    kept[290:310] = False
+    assert len(still_poses(recording.select(kept))) == 17
+
+
+def test_nothing_still_is_one_line():
+    recording, *_ = board(np.random.default_rng(4))
+    rng = np.random.default_rng(5)
+    waved = recording.angular_rate + rng.standard_normal((len(recording.time), 1, 3))
+    with pytest.raises(InputError, match="expected still poses"):
+        still_poses(replace(recording, angular_rate=waved))
+    with pytest.raises(InputError, match="expected at least 2 s"):
+        still_poses(recording.select(slice(0, 40)))
+
+
+def test_the_truth_is_within_the_claimed_widths():
+    """40 fits, seed 6: mean squared z of 45 parameters; 6 sds of its law, false alarm 1e-8."""
+    squares = []
+    for seed in range(40):
+        rng = np.random.default_rng([6, seed])
+        matrix, offset = triads(4, rng)
+        unit = directions(14, rng)
+        sd = np.full((14, 4, 3), 2e-3)
+        mean = np.einsum("kij,pj->pki", matrix, GRAVITY * unit) + offset
+        found = fit_triads(mean + sd * rng.standard_normal(mean.shape), sd, GRAVITY)
+        errors = np.concatenate(
+            [(found.matrix - matrix).reshape(4, 9), found.offset - offset], axis=1
+        ).ravel()
+        free = np.diag(found.covariance) > 0
+        assert free.sum() == 45
+        covariance = found.covariance[np.ix_(free, free)] / max(found.residual_ratio, 1.0) ** 2
+        squares.append(errors[free] @ np.linalg.solve(covariance, errors[free]))
+    assert np.mean(squares) / 45 == pytest.approx(1.0, abs=6 * np.sqrt(2 / 45 / 40))
+
+
+def plain_fit(mean, sd, magnitude):
+    """The same by angles and numerical derivatives: the slow, obvious form."""
+    poses, count = mean.shape[:2]
+
+    def unpack(p):
+        matrix = p[: 9 * count].reshape(count, 3, 3)
+        matrix = np.concatenate([np.triu(matrix[:1]), matrix[1:]])
+        offset = p[9 * count : 12 * count].reshape(count, 3)
+        polar, azimuth = p[12 * count :].reshape(2, poses)
+        unit = np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth),
+                         np.cos(polar)], axis=1)  # fmt: skip
+        return matrix, offset, unit
+
+    def residual(p):
+        matrix, offset, unit = unpack(p)
+        predicted = magnitude * np.einsum("kij,pj->pki", matrix, unit) + offset
+        return ((mean - predicted) / sd).ravel()
+
+    unit = mean.mean(axis=1) / np.linalg.norm(mean.mean(axis=1), axis=1, keepdims=True)
+    start = np.concatenate(
+        [np.tile(np.eye(3).ravel(), count), np.zeros(3 * count), np.arccos(unit[:, 2]),
+         np.arctan2(unit[:, 1], unit[:, 0])]
+    )  # fmt: skip
+    return unpack(least_squares(residual, start, xtol=1e-15, ftol=1e-15).x)
+
+
+def test_the_fit_is_that_of_the_plain_form():
+    rng = np.random.default_rng(7)
+    matrix, offset = triads(3, rng)
+    unit = directions(15, rng)
+    sd = rng.uniform(1e-3, 3e-3, (15, 3, 3))
+    mean = np.einsum("kij,pj->pki", matrix, GRAVITY * unit) + offset
+    mean += sd * rng.standard_normal(mean.shape)
+    found, plain = fit_triads(mean, sd, GRAVITY), plain_fit(mean, sd, GRAVITY)
+    np.testing.assert_allclose(found.matrix, plain[0], atol=1e-7)
+    np.testing.assert_allclose(found.offset, plain[1], atol=1e-6)
+    np.testing.assert_allclose(found.direction, plain[2], atol=1e-7)
+
+
+def test_a_jumping_offset_is_left_out_where_it_jumps():
+    rng = np.random.default_rng(8)
+    matrix, offset = triads(4, rng)
+    unit = directions(16, rng)
+    sd = np.full((16, 4, 3), 1e-3)
+    mean = np.einsum("kij,pj->pki", matrix, GRAVITY * unit) + offset
+    mean += sd * rng.standard_normal(mean.shape)
+    mean[:2, 2] += [0.0, 0.01, 0.04]
+    found = fit_triads(mean, sd, GRAVITY)
+    expected = np.ones((16, 4), bool)
+    expected[:2, 2] = False
+    np.testing.assert_array_equal(found.used, expected)
+    np.testing.assert_allclose(found.matrix, matrix, atol=2e-3)
+    assert found.residual_rms[2] < 2e-3 < found.residual_rms_all[2]
+
+
+@pytest.mark.parametrize("count", [3, 5])
+def test_too_few_poses_are_refused(count):
+    rng = np.random.default_rng(9)
+    matrix, offset = triads(3, rng)
+    mean = np.einsum("kij,pj->pki", matrix, GRAVITY * directions(count, rng)) + offset
+    with pytest.raises(IdentifiabilityError, match=f"found {count} poses"):
+        fit_triads(mean, np.full(mean.shape, 1e-3), GRAVITY)
+
+
+def test_poses_in_one_plane_are_refused():
+    rng = np.random.default_rng(10)
+    matrix, offset = triads(3, rng)
+    angle = np.linspace(0, 6, 20)
+    unit = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    mean = np.einsum("kij,pj->pki", matrix, GRAVITY * unit) + offset
+    with pytest.raises(IdentifiabilityError, match="still poses"):
+        fit_triads(mean, np.full(mean.shape, 1e-3), GRAVITY)
+
+
+def test_the_parts_make_the_matrix_and_carry_its_errors():
+    rng = np.random.default_rng(11)
+    matrix, offset = triads(3, rng)
+    unit = directions(15, rng)
+    mean = np.einsum("kij,pj->pki", matrix, GRAVITY * unit) + offset
+    found = fit_triads(mean, np.full(mean.shape, 1e-3), GRAVITY)
+    parts = found.parts()
+    for k in range(3):
+        scale, (xy, xz, yz) = parts["scale"][k], parts["misalignment"][k]
+        upper = np.diag(scale) @ np.array([[1, xy, xz], [0, 1, yz], [0, 0, 1]])
+        rotation = Rotation.from_rotvec(parts["orientation"][k]).as_matrix()
+        np.testing.assert_allclose(upper @ rotation, matrix[k], atol=1e-8)
+    assert np.abs(parts["orientation"][0]).max() < 1e-8
+    # the sd of a scale, by drawing matrices: 5 % of 4000 draws, false alarm below 1e-4
+    block = found.covariance.reshape(3, 12, 3, 12)[1, :9, 1, :9]
+    draws = rng.multivariate_normal(found.matrix[1].ravel(), block, 4000).reshape(-1, 3, 3)
+    spread = np.linalg.norm(draws[:, 2], axis=1).std()
+    assert found.parts_sd()["scale"][1, 2] == pytest.approx(spread, rel=0.05)
+
+
+def test_corrected_readings_have_gravitys_size_and_keep_their_rails(tmp_path):
+    rng = np.random.default_rng(12)
+    recording, matrix, offset, bias, unit, _ = board(rng)
+    recording.specific_force[320, 1, 2] = 157.0
+    recording.angular_rate[321, 0, 0] = -34.9
+    found = calibrate_first_order(recording, GRAVITY)
+    done = correct(recording, found)
+    for pose, direction in zip(found.poses, unit, strict=True):
+        mean = done.specific_force[pose].mean(axis=0)
+        # sd of a mean of at least 200 readings: 3 mm/s^2; 6 of them, and the calibration's own
+        np.testing.assert_allclose(mean, np.tile(GRAVITY * direction, (4, 1)), atol=0.025)
+    np.testing.assert_allclose(found.gyroscope_offset, bias, atol=6e-4)
+    write_recording(done, tmp_path / "done.nc")
+    again = read_recording(tmp_path / "done.nc")
+    assert np.argwhere(again.saturated_accelerometers()).tolist() == [[320, 1, 2]]
+    assert np.argwhere(again.saturated_gyroscopes()).tolist() == [[321, 0, 0]]
+    assert again.stationary.sum() == sum(pose.stop - pose.start for pose in found.poses)
+    assert again.accelerometer_noise_sd == pytest.approx(0.04, rel=0.03)
+    assert again.gyroscope_noise_sd == pytest.approx(1e-3, rel=0.03)
+
+
+def test_tables_have_a_row_for_each_number():
+    recording, *_ = board(np.random.default_rng(13))
+    found = calibrate_first_order(recording, GRAVITY)
+    table = parameter_table(found, recording)
+    assert len(table) == 4 * 12 + 4 * 3 and np.isfinite(table[["value", "sd"]]).all(axis=None)
+    assert residual_table(found, recording).left_out.sum() == 0
+    noise = noise_table(found, recording)
+    np.testing.assert_allclose(noise.ratio, 1.0, atol=0.05)
+    assert np.abs(noise.correlation).max() < 0.1
+
+
+def slow_allan(x, n):
+    """Definition, with loops."""
+    means = [x[i : i + n].mean() for i in range(len(x) - n + 1)]
+    squares = [(means[i + n] - means[i]) ** 2 for i in range(len(means) - n)]
+    return np.sqrt(np.mean(squares) / 2)
+
+
+def test_allan_deviation_is_the_definition():
+    x = np.random.default_rng(14).standard_normal((120, 1)).cumsum(axis=0)
+    taus, deviation = allan_deviation([x], 0.1)
+    assert taus[:3] == pytest.approx([0.1, 0.2, 0.4])
+    for n, value in zip((1, 2, 4, 8), deviation[:, 0], strict=False):
+        assert value == pytest.approx(slow_allan(x[:, 0], n))
+
+
+def test_allan_deviation_of_white_noise_falls_as_its_law():
+    """Seed 15; 10 pieces of 2000: 5 sds of each point, false alarm below 1e-5."""
+    rng = np.random.default_rng(15)
+    pieces = [0.3 * rng.standard_normal((2000, 2)) for _ in range(10)]
+    taus, deviation = allan_deviation(pieces, 1.0)
+    for tau, values in zip(taus, deviation, strict=True):
+        error = 5 / np.sqrt(2 * 20000 / (1.5 * tau))
+        np.testing.assert_allclose(values * np.sqrt(tau) / 0.3, 1.0, atol=error)
+    np.testing.assert_allclose(white_noise_sd(pieces), 0.3, rtol=0.03)
+    assert np.abs(lag_correlation(pieces)).max() < 0.04
