@@ -16,6 +16,7 @@ from imuarray.recording import Recording, array_of, read_recording, write_record
 PMMH_STEPS = {True: 200_000, False: 10_000}  # compiled, any effects
 STORED = 2000
 RHAT_THRESHOLD = 1.05
+MISFIT = 1.5  # residual over declared noise from which the claimed widths are called too small
 
 
 def simulate(arguments) -> None:
@@ -40,12 +41,20 @@ def model_of(recording: Recording, effects=()) -> ArrayModel:
 
 
 def usable(recording: Recording, quiet: bool) -> Recording:
-    """The recording without the samples in which an accelerometer is at its rail."""
+    """The recording without still poses and samples with an accelerometer at its rail."""
     lost = recording.saturated_accelerometers().any(axis=(1, 2))
     if lost.all():
         raise InputError("recording: expected samples off the rail, found every one at a rail")
     if lost.any() and not quiet:
         print(f"left out {lost.sum()} of {lost.size} samples with an accelerometer at its rail")
+    if recording.stationary is not None and recording.stationary.any():
+        # they tell nothing of the positions, and cost as much as the others
+        still = recording.stationary & ~lost
+        if not quiet:
+            print(f"left out {still.sum()} of {lost.size} samples of still poses")
+        lost = lost | still
+        if lost.all():
+            raise InputError("recording: expected moving samples, found still poses only")
     return recording.select(~lost) if lost.any() else recording
 
 
@@ -73,6 +82,7 @@ def calibrate(arguments) -> None:
     write_netcdf(dataset, arguments.out)
     if not arguments.quiet:
         _report(recording, found, dataset)
+        _say_misfit(recording, found, saturated)
 
 
 def calibration_dataset(recording, model, found, saturated) -> xr.Dataset:
@@ -131,6 +141,17 @@ def _report(recording, found, dataset) -> None:
     for label, row, sd in zip(recording.accelerometer_labels, found.positions, sds, strict=True):
         values = "  ".join(f"{1e3 * value:8.4f}" for value in row)
         print(f"{label:>5} {values}    {', '.join(f'{1e6 * value:.2g}' for value in sd)}")
+
+
+def _say_misfit(recording, found, saturated) -> None:
+    """One line where the residual is not what the declared noise explains."""
+    samples, count = recording.specific_force.shape[:2]
+    values = 3 * samples * (count + recording.angular_rate.shape[1]) - int(saturated.sum())
+    freedom = values - 9 * samples - 3 * (count - 1)
+    ratio = float(np.sqrt(found.cost[-1] / freedom)) if freedom > 0 else 1.0
+    if ratio > MISFIT:
+        print(f"residual {ratio:.3g} times the declared noise: the model misses something, and the"
+              " sds above are too small, by that or more")  # fmt: skip
 
 
 def sample(arguments) -> None:
