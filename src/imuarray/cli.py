@@ -193,6 +193,13 @@ def _add_command(commands, name, run, summary, example, out, full=None) -> argpa
 
 def _add_recording(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recording", type=Path, help="NetCDF-4 recording to read")
+    parser.add_argument(
+        "--accelerometer-noise",
+        type=_positive,
+        default=None,
+        metavar="SD",
+        help="assumed sd, m/s^2 (default: as the recording declares)",
+    )
     _add_effects(parser)
 
 
@@ -362,6 +369,13 @@ def _add_sample(commands) -> None:
         choices=SAMPLING_METHODS,
         default="pmmh",
         help="pmmh: pseudo-marginal Metropolis-Hastings (default)",
+    )
+    parser.add_argument(
+        "--rates",
+        choices=("declared", "spread"),
+        default="declared",
+        help="p(omega | y_g) from the declared gyroscope noise (default), or from the spread among"
+        " the gyroscopes of each sample, as paper 2021 does with measured data (30)",
     )
     parser.add_argument(
         "--steps", type=_count, default=None, metavar="N", help="steps of each chain"

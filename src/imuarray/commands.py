@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from imuarray.recording import Recording, array_of, read_recording, write_record
 PMMH_STEPS = {True: 200_000, False: 10_000}  # compiled, any effects
 STORED = 2000
 RHAT_THRESHOLD = 1.05
+VARIANCE = 0.1  # wanted of log p-hat, section III-C of paper 2021
 MISFIT = 1.5  # residual over declared noise from which the claimed widths are called too small
 
 
@@ -38,6 +40,12 @@ def model_of(recording: Recording, effects=()) -> ArrayModel:
     return ArrayModel.isotropic(
         array_of(recording), recording.accelerometer_noise_sd, recording.gyroscope_noise_sd, effects
     )
+
+
+def assumed(recording: Recording, arguments) -> Recording:
+    """The recording with the accelerometer noise that the command line assumes, if it does."""
+    sd = arguments.accelerometer_noise
+    return recording if sd is None else replace(recording, accelerometer_noise_sd=sd)
 
 
 def usable(recording: Recording, quiet: bool) -> Recording:
@@ -63,6 +71,7 @@ def calibrate(arguments) -> None:
     from imuarray.estimation import calibrate_bcd, calibrate_gauss_newton
 
     recording = usable(read_recording(arguments.recording), arguments.quiet)
+    recording = assumed(recording, arguments)
     model = model_of(recording, arguments.effects)
     data = recording.specific_force, recording.angular_rate
     saturated = recording.saturated_gyroscopes()
@@ -161,7 +170,10 @@ def sample(arguments) -> None:
     from imuarray.posterior.summary import summarise
 
     recording = usable(read_recording(arguments.recording), arguments.quiet)
+    recording = assumed(recording, arguments)
     model = model_of(recording, arguments.effects)
+    if model.effects and arguments.rates == "spread":
+        raise InputError("--rates spread: expected no --effects with it, found some")
     if not arguments.quiet:
         print("tuning N and the step length ...", flush=True)
     target, mode, step, draws = _tuned(recording, model, arguments)
@@ -170,7 +182,7 @@ def sample(arguments) -> None:
     key = digest(
         recording.specific_force, recording.angular_rate, recording.accelerometer_position,
         model.noise.accelerometer, model.noise.gyroscope, target.prior.mean, target.prior.sd,
-        draws, step, steps, arguments.seed, list(model.effects), code_digest(),
+        draws, step, steps, arguments.seed, list(model.effects), arguments.rates, code_digest(),
     )  # fmt: skip
     checkpoint = arguments.out.with_name(f".{arguments.out.name}.{key[:16]}.npz")
     for other in arguments.out.parent.glob(f".{arguments.out.name}.*.npz"):
@@ -209,26 +221,40 @@ def _stream(seed, name):
 def _tuned(recording, model, arguments):
     """(target, start near the mode, step length, N), tuned as in section III-C."""
     from imuarray.posterior import CompiledTarget, GaussianPrior, Likelihood, tuning
+    from imuarray.studies.bayes import sample_covariance
 
     nominal, prior_sd = model.array.parameters, recording.position_prior_sd
     if model.effects:
         return _tuned_generic(recording, model, arguments)
+    spread = arguments.rates == "spread"
     likelihood = Likelihood.of(
-        model, recording.specific_force, recording.angular_rate, recording.saturated_gyroscopes()
-    )
+        model, recording.specific_force, recording.angular_rate, recording.saturated_gyroscopes(),
+        rate_distribution=sample_covariance(recording.angular_rate) if spread else None,
+    )  # fmt: skip
     prior = GaussianPrior.of(nominal, prior_sd)
-    counts, rng = [1, 2, 5, 10, 20, 50], _stream(arguments.seed, "tuning")
+    counts, rng = [1, 2, 5, 10, 20, 50, 100], _stream(arguments.seed, "tuning")
     variances = tuning.variance_sweep(likelihood, model.array.relative, counts, 200, rng)
-    draws = tuning.choose_draws(counts, variances)
+    mode = _mode(recording, model, spread)
+    if variances.min() > 2 * VARIANCE:
+        if not arguments.quiet:
+            print(f"variance of log p-hat {variances[-1]:.3g} at N = {counts[-1]}: omega is drawn"
+                  " around the integrand's mode instead")  # fmt: skip
+        centre = np.vstack([np.zeros(3), mode.reshape(-1, 3)])
+        likelihood = likelihood.centred(centre)
+        variances = tuning.variance_sweep(likelihood, centre, counts, 200, rng)
+    draws = tuning.choose_draws(counts, variances, VARIANCE)
     target = CompiledTarget(likelihood, prior, draws)
     steps = prior_sd * np.geomspace(1e-6, 0.3, 16)
-    mode = _mode(recording, model)
     rates = tuning.acceptance_sweep(target, mode, steps, 1000, rng)
     return target, mode, tuning.choose_step(steps, rates), draws
 
 
-def _mode(recording, model) -> np.ndarray:
-    """MAP (r_2 ... r_A, effects): the chains' starts spread around it."""
+def _mode(recording, model, spread: bool) -> np.ndarray:
+    """MAP (r_2 ... r_A): the chains' starts spread around it."""
+    from imuarray.measured.positions import locate
+
+    if spread:
+        return locate(recording, recording.accelerometer_noise_sd).mean[1:].ravel()
     return _map_estimate(recording, model)[0]
 
 
