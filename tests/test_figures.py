@@ -225,7 +225,7 @@ def test_2021_fig5_plots_its_table():
         np.testing.assert_array_equal(dots, rows[["mean_x_mm", "mean_y_mm"]].to_numpy())
         low, high = axes.get_ylim()
         assert low > high  # y points down: IMU 1 is in the lower left
-    assert figure.get_suptitle() == "SIMULATED STAND-IN; MEASURED DATA: NOT YET"
+    assert figure.get_suptitle() == "SIMULATED STAND-IN; NO MEASURED DATA HERE"
 
 
 def test_ellipse_holds_its_share():
@@ -328,7 +328,7 @@ def test_table2_compares_with_the_last_source():
     _, table = two_tables()
     np.testing.assert_allclose(table.ratio, [100, 110, 1] * 3)
     np.testing.assert_allclose(table.sd_median_m[:3], [2e-4, 2.2e-4, 2e-6])
-    assert "simulated stand-in; measured data: not yet" in table.source[0]
+    assert "simulated stand-in; no measured data here" in table.source[0]
     assert tables.unfinished(table, 1.05) == []
     assert "3 of 3" in tables.unfinished(two_tables()[0], 1.05)[0]
 

@@ -48,6 +48,11 @@ class Measured:
         """What the experiment's data are, as `imuarray.figures.notes.SOURCES` calls it."""
         return "measured" if self.is_measured(scale) else STANDIN
 
+    def label(self, scale: str, sources: dict[str, str]) -> str:
+        """The same in words, with the recording's name."""
+        words = sources[self.source(scale)]
+        return f"{words}, {self.experiment(scale)}" if self.is_measured(scale) else words
+
     def recordings(self, scale: str) -> list[str]:
         """The experiment's recordings, if they are measured: the array's geometry."""
         if not self.is_measured(scale):

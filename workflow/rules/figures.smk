@@ -231,7 +231,7 @@ rule figure_2021_fig5:
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2021", "experiment"),
         kind=lambda wc: MEASURED.source(wc.scale),
-        source=lambda wc: SOURCES[MEASURED.source(wc.scale)],
+        source=lambda wc: MEASURED.label(wc.scale, SOURCES),
     script:
         "../scripts/figure_2021_fig5.py"
 
@@ -294,7 +294,7 @@ rule table_2021_table2:
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2021", "experiment"),
         kind=lambda wc: MEASURED.source(wc.scale),
-        source=lambda wc: SOURCES[MEASURED.source(wc.scale)],
+        source=lambda wc: MEASURED.label(wc.scale, SOURCES),
     script:
         "../scripts/table_2021_table2.py"
 
@@ -334,6 +334,6 @@ rule gallery:
         tables=TABLES,
         measured=lambda wc: list(MEASURED.published(config["scale"])),
         measured_tables=lambda wc: list(MEASURED.published_tables(config["scale"])),
-        source=lambda wc: SOURCES[MEASURED.source(config["scale"])],
+        source=lambda wc: MEASURED.label(config["scale"], SOURCES),
     script:
         "../scripts/gallery.py"

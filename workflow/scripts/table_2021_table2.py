@@ -28,6 +28,7 @@ with job(snakemake) as settings:  # noqa: F821
     )
     notes = [
         f"Experiment: {snakemake.params.source}. {tables.NOT_IN_TEXT}",  # noqa: F821
+        tables.sizes(table),
         *tables.unfinished(table, settings["paper2021"]["rhat_threshold"]),
         scale_line(settings) + ".",
     ]

@@ -51,6 +51,8 @@ def ellipses(results):
     under = covered(draws[:, ~top], nominal[~top])
     chance = float(binom.cdf(inside, top.sum(), 1 - 1 / 31))
     remark = f"{under} of {(~top).sum()} on the underside; the board has {top.sum()} such IMUs here"
+    if chance >= 0.05:
+        return untested(f"too few to tell; {remark}", f"{inside} of {top.sum()}")
     return Outcome(f"{inside} of {top.sum()}", f"chance {show(chance, 2)}", judge(chance < 0.05),
                    remark)  # fmt: skip
 

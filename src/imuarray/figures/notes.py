@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 SOURCES = {
-    "standin": "simulated stand-in; measured data: not yet",
+    "standin": "simulated stand-in; no measured data here",
     "simulation": "simulation with the experiment's noise",
     "measured": "measured",
 }

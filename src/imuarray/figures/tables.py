@@ -95,6 +95,7 @@ def table2(sources: dict[str, dict[int, tuple[pd.DataFrame, dict, float]]]) -> p
                 {
                     "samples": samples,
                     "source": source,
+                    "accelerometers": len(coordinates) // 3 + 1,
                     "accelerometer_sd": accelerometer_sd,
                     **{f"sd_{axis}_m": axes[axis] for axis in "xyz"},
                     "sd_median_m": coordinates.sd_m.median(),
@@ -113,6 +114,12 @@ def source_names(kind: str) -> tuple[str, str, str]:
         "simulation, experiment's noise",
         "simulation, section IV-A",
     )
+
+
+def sizes(table: pd.DataFrame) -> str:
+    """A note on how many IMUs each source has, as widths depend on it."""
+    counts = table.groupby("source", sort=False).accelerometers.first()
+    return "IMUs: " + ", ".join(f"{count} ({source})" for source, count in counts.items()) + "."
 
 
 def unfinished(table: pd.DataFrame, threshold: float) -> list[str]:

@@ -1,0 +1,81 @@
+"""Claims that only measured data can judge, on made-up results with known verdicts."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from imuarray.claims import CLAIMS, Results
+from imuarray.geometry import mimu4444_corners
+
+BOARD = mimu4444_corners()
+SETTINGS = {
+    "paper2021": {"samples": [5, 50, 500], "variance_target": 0.1},
+    "experiment": {"accelerometer_sd": 0.79},
+    "noise": {"accelerometer_sd": 0.04, "gyroscope_sd_dps": 0.06},
+    "recordings": {"mine": {"file": "mine.nc", "group": "board"}},
+}
+VERDICT = {"converged": True, "burn_in_draws": 0, "most_draws": 100, "rhat_max": 1.0}
+
+
+def results(coverage=0.5, residual=2.0, noise=0.04, rate=0.001, variance=300.0, under=-5e-4):
+    """Results of one recording: positions off by ``under`` on the underside, and so on."""
+    rng = np.random.default_rng(0)
+    nominal = BOARD.relative[1:]
+    shift = np.where(nominal[:, 2:] < -1e-4, [under, under, 0.0], 0.0)
+    draws = nominal + shift + 1e-5 * rng.standard_normal((2, 400, 7, 3))
+    places = pd.DataFrame(
+        [(label, axis) for label in BOARD.labels[1:] for axis in "xyz"],
+        columns=["accelerometer", "axis"],
+    ).assign(nominal_m=nominal.ravel())
+    agreement = pd.DataFrame({
+        "samples": 500, "assumed": ["0.79", "residual"], "accelerometer_sd": [0.79, residual],
+        "recordings": 5, "coverage_95": [coverage, 0.95], "z_rms": [2.0, 1.0],
+        "claimed_m": 1e-5, "spread_m": 2e-5,
+    })  # fmt: skip
+    noises = pd.DataFrame({"sensor": ["specific_force", "angular_rate"], "sd": [noise, rate]})
+    given = {
+        "../measured/positions/mine": places, "../measured/agreement/board": agreement,
+        "../measured/first_order/mine_noise": noises, "chains/mine_T500": draws.reshape(2, 400, 21),
+    }  # fmt: skip
+    for t, sd in ((5, 4e-4), (50, 1e-4), (500, 4e-5)):
+        for name, factor in (("mine", 1.0), ("simulated_mine", 0.95)):
+            table = places.assign(sd_m=factor * sd, mean_m=0.0)
+            judged = VERDICT | {"variance_at_most_draws": variance}
+            given |= {f"posterior/{name}_T{t}": table, f"posterior/{name}_T{t}.json": judged}
+    kinds = {"experiment": "mine", "simulation": "simulated_mine"}
+    return Results("nowhere", SETTINGS, given, kinds)
+
+
+def verdict(name, **changes):
+    return CLAIMS[name].test(results(**changes))
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "expected"),
+    [
+        ("2021-45", {}, "holds"),
+        ("2021-46", {}, "holds"),
+        ("2021-49", {}, "holds"),
+        ("2021-49", {"under": 0.0}, "does not hold"),
+        ("2021-52", {"coverage": 0.5}, "holds"),
+        ("2021-52", {"coverage": 0.95}, "does not hold"),
+        ("2021-55", {"residual": 2.0}, "does not hold"),
+        ("2021-55", {"residual": 0.5}, "holds"),
+        ("2021-56", {"rate": 0.001}, "holds"),
+        ("2021-56", {"rate": 0.003}, "does not hold"),
+        ("2021-57", {"variance": 300.0}, "does not hold"),
+        ("2021-57", {"variance": 0.1}, "holds"),
+    ],
+)
+def test_verdicts_follow_the_numbers(name, changes, expected):
+    assert verdict(name, **changes).verdict == expected
+
+
+def test_three_packages_are_too_few_to_count_ellipses():
+    assert verdict("2021-48").verdict == "cannot be tested here"
+
+
+def test_without_measured_data_they_are_not_judged():
+    bare = Results("nowhere", SETTINGS)
+    for name in ("2021-49", "2021-52", "2021-55", "2021-56", "2021-57"):
+        assert CLAIMS[name].test(bare).verdict == "cannot be tested here"
