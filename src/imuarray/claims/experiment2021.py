@@ -212,4 +212,13 @@ def spread(results):
     "needs the other paper's results",
 )
 def consistent(results):
-    return untested("results of another paper on measured data")
+    reason = "results of another paper on measured data"
+    if results.measured is None:
+        return untested(reason)
+    t = results.samples[-1]
+    table = results.measured_table(f"positions/{results.measured}")
+    ml = table[(table.method == "bcd") & (table.samples == t)].mean_m.to_numpy()
+    posterior = results.table(f"posterior/{results.measured}_T{t}")
+    off = np.abs(ml - posterior.mean_m.to_numpy()) / posterior.sd_m.to_numpy()
+    value = f"ML-BCD of 2017 on the same {t} samples: within {show(off.max(), 2)} posterior sds"
+    return untested(f"{reason}; the value is ours", value)

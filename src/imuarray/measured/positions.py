@@ -62,22 +62,30 @@ def locate(recording: Recording, accelerometer_sd: float | None = None) -> Posit
     return found
 
 
-def _locate(recording, assumed, start) -> tuple[Positions, np.ndarray]:
+def _fit(recording: Recording, assumed: float, start=None):
+    """(model with one gyroscope, data, options of the prior, `Calibration`)."""
     mean, covariance = sample_covariance(recording.angular_rate)
     array = array_of(recording, 1)
     model = ArrayModel.isotropic(array, assumed, recording.gyroscope_noise_sd)
-    prior = (array.parameters, recording.position_prior_sd)
     data = recording.specific_force, mean[:, None]
+    given = {
+        "position_prior": (array.parameters, recording.position_prior_sd),
+        "rate_covariance": covariance,
+    }
     found = calibrate_gauss_newton(
-        model, *data, start=start, position_prior=prior, rate_covariance=covariance,
-        tolerance=TOLERANCE, limit=LIMIT,
-    )  # fmt: skip
+        model, *data, start=start, tolerance=TOLERANCE, limit=LIMIT, **given
+    )
+    return model, data, given, found
+
+
+def _locate(recording, assumed, start) -> tuple[Positions, np.ndarray]:
+    model, data, prior, found = _fit(recording, assumed, start)
     residual = residual_force(model, recording, found)
-    given = problem(model, *data, position_prior=prior, rate_covariance=covariance)
+    given = problem(model, *data, **prior)
     unknowns = pack_motion(model, found.motion.motion), found.positions[1:].ravel()
     blocks = normal_equations(given, *unknowns)
-    size = 3 * (array.accelerometers - 1)
-    freedom = residual.size - _explained(blocks, covariance) - size
+    size = 3 * (model.array.accelerometers - 1)
+    freedom = residual.size - _explained(blocks, prior["rate_covariance"]) - size
     sd = float(np.sqrt(np.sum(residual**2) / freedom))
     positions = Positions(
         found.positions, found.covariance[:size, :size], assumed, sd, found.converged,
@@ -163,14 +171,7 @@ def simulate_subset(recording: Recording, accelerometer_sd: float, rng):
     Motion and positions are those of `locate`; accelerometers get the noise that the analysis
     assumes (paper 2021, section IV-C), gyroscopes that which the recording declares.
     """
-    mean, covariance = sample_covariance(recording.angular_rate)
-    array = array_of(recording, 1)
-    model = ArrayModel.isotropic(array, accelerometer_sd, recording.gyroscope_noise_sd)
-    found = calibrate_gauss_newton(
-        model, recording.specific_force, mean[:, None], rate_covariance=covariance,
-        position_prior=(array.parameters, recording.position_prior_sd), tolerance=TOLERANCE,
-        limit=LIMIT,
-    )  # fmt: skip
+    *_, found = _fit(recording, accelerometer_sd)
     whole = array_of(recording)
     return simulate_samples(
         ArrayModel.isotropic(whole, accelerometer_sd, recording.gyroscope_noise_sd),
