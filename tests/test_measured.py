@@ -301,3 +301,14 @@ def test_bad_input_is_one_line_and_status_2(files, tmp_path, capsys, arguments, 
     assert main([a.format(*files) for a in arguments] + ["--out", str(out)]) == 2
     error = capsys.readouterr().err
     assert words in error and error.count("\n") == 1 and not out.exists()
+
+
+def test_few_gyroscopes_fall_back_on_the_declared_noise():
+    recording, truth = samples(np.random.default_rng(19))
+    few = replace(
+        recording, angular_rate=recording.angular_rate[:, :2], gyroscope_labels=("1", "2")
+    )
+    with pytest.raises(InputError, match="at least 4"):
+        sample_covariance(few.angular_rate)
+    z = (locate(few, 0.3).mean - truth["position"].to_numpy())[1:] / locate(few, 0.3).sd
+    assert np.abs(z).max() < 4.5

@@ -15,7 +15,7 @@ from imuarray.estimation.blocks import normal_equations, pack_motion, problem
 from imuarray.model import ArrayModel
 from imuarray.recording import Recording, array_of
 from imuarray.simulation import simulate_samples
-from imuarray.studies.bayes import sample_covariance
+from imuarray.studies.bayes import rate_distribution
 
 TOLERANCE = 1e-3  # of a position's own sd
 LIMIT = 500  # large residuals make Gauss-Newton converge linearly
@@ -46,8 +46,9 @@ def locate(recording: Recording, accelerometer_sd: float | None = None) -> Posit
     """Posterior mode and its Gaussian width; sigma_a estimated from the residual where None.
 
     The motion is estimated with the positions, omega with the prior N((30a), (30b)) of each
-    sample; the positions have the recording's prior. With sigma_a = None the estimate is
-    repeated with the residual's own size until that no longer changes by 1 %.
+    sample (the declared noise where there are fewer than 4 gyroscopes); the positions have the
+    recording's prior. With sigma_a = None the estimate is repeated with the residual's own size
+    until that no longer changes by 1 %.
     """
     if accelerometer_sd is not None:
         return _locate(recording, accelerometer_sd, None)[0]
@@ -64,7 +65,7 @@ def locate(recording: Recording, accelerometer_sd: float | None = None) -> Posit
 
 def _fit(recording: Recording, assumed: float, start=None):
     """(model with one gyroscope, data, options of the prior, `Calibration`)."""
-    mean, covariance = sample_covariance(recording.angular_rate)
+    mean, covariance = rate_distribution(recording)
     array = array_of(recording, 1)
     model = ArrayModel.isotropic(array, assumed, recording.gyroscope_noise_sd)
     data = recording.specific_force, mean[:, None]
@@ -109,7 +110,7 @@ def residual_force(model: ArrayModel, recording: Recording, found: Calibration) 
 
 def bcd_positions(recording: Recording, accelerometer_sd: float) -> Calibration:
     """ML-BCD of the 2017 paper on the same samples; gyroscopes with the spread among them."""
-    _, covariance = sample_covariance(recording.angular_rate)
+    _, covariance = rate_distribution(recording)
     spread = float(np.sqrt(np.mean(np.einsum("tii->ti", covariance))))
     array = array_of(recording)
     model = ArrayModel.isotropic(array, accelerometer_sd, spread)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from imuarray.config import model_from
+from imuarray.errors import InputError
 from imuarray.estimation import calibrate_bcd
 from imuarray.geometry import Array
 from imuarray.motion import hand_twisting, normal_motion
@@ -94,12 +95,26 @@ def select_disjoint(recording: Recording, counts) -> dict[int, np.ndarray]:
 def sample_covariance(angular_rate):
     """p(omega_t | y_g) from the spread among gyroscopes, (30a) and (30b): mean, covariance.
 
-    ``angular_rate`` (T, G, 3) with G > 3. The covariance is that of one gyroscope, as
-    the paper writes it.
+    ``angular_rate`` (T, G, 3) with G > 3, else InputError. The covariance is that of one
+    gyroscope, as the paper writes it.
     """
+    if angular_rate.shape[1] < 4:
+        raise InputError(
+            "gyroscopes: expected at least 4 for the spread among them (30b), found"
+            f" {angular_rate.shape[1]}"
+        )
     mean = angular_rate.mean(axis=1)
     off = angular_rate - mean[:, None]
     return mean, np.einsum("tgi,tgj->tij", off, off) / (angular_rate.shape[1] - 1)
+
+
+def rate_distribution(recording: Recording):
+    """`sample_covariance`, or the declared noise where there are fewer than 4 gyroscopes."""
+    rate = recording.angular_rate
+    if rate.shape[1] >= 4:
+        return sample_covariance(rate)
+    covariance = np.eye(3) * recording.gyroscope_noise_sd**2 / rate.shape[1]
+    return rate.mean(axis=1), np.broadcast_to(covariance, (len(rate), 3, 3))
 
 
 def target_for(
@@ -111,7 +126,7 @@ def target_for(
     from (30a)/(30b) instead of the declared noise.
     """
     model = model_from(settings, accelerometer_sd)
-    distribution = sample_covariance(recording.angular_rate) if spread else None
+    distribution = rate_distribution(recording) if spread else None
     likelihood = Likelihood.of(
         model, recording.specific_force, recording.angular_rate, rate_distribution=distribution
     )
