@@ -1,5 +1,6 @@
 """The measurement model, written once: forward functions, effects, noise."""
 
+from imuarray.model import catalogue  # registers the effects
 from imuarray.model.array_model import ArrayModel, Prediction
 from imuarray.model.effects import EFFECTS, Effect, effect
 from imuarray.model.noise import Noise
@@ -11,6 +12,7 @@ __all__ = [
     "Effect",
     "Noise",
     "Prediction",
+    "catalogue",
     "effect",
     "structure_tensor",
 ]

@@ -1,0 +1,108 @@
+"""The catalogue of effects that a sample's motion determines; ids are fixed.
+
+u is the true specific force at a triad, omega the true angular rate; each function says how the
+predicted measurement departs from them. Prior scales are those of consumer MEMS.
+"""
+
+from __future__ import annotations
+
+from imuarray.model import kinematics
+from imuarray.model.effects import effect
+from imuarray.model.jax64 import jnp
+
+# Rows and columns of the off-diagonal entries of a 3 x 3 matrix, row by row.
+OFF_ROWS, OFF_COLUMNS = jnp.array([0, 0, 1, 1, 2, 2]), jnp.array([1, 2, 0, 2, 0, 1])
+
+FULL_SCALE_FORCE = 157.0  # m/s^2, 16 g: non-linearity is given as a share of it
+FULL_SCALE_RATE = 34.9  # rad/s, 2000 deg/s
+
+
+def _off_diagonal(entries):
+    """(n, 3, 3) matrices from their (n, 6) off-diagonal entries."""
+    matrix = jnp.zeros((len(entries), 3, 3))
+    return matrix.at[:, OFF_ROWS, OFF_COLUMNS].set(entries)
+
+
+@effect("accelerometer_bias", unit="m s-2", prior_sd=0.05, shape=lambda a, g: (a, 3))
+def accelerometer_bias(bias, instant, predicted):
+    """u + b."""
+    return predicted._replace(specific_force=predicted.specific_force + bias)
+
+
+@effect("accelerometer_scale", unit="1", prior_sd=0.01, shape=lambda a, g: (a, 3))
+def accelerometer_scale(scale, instant, predicted):
+    """(1 + c_i) u_i at each axis."""
+    return predicted._replace(specific_force=(1.0 + scale) * predicted.specific_force)
+
+
+@effect("accelerometer_misalignment", unit="1", prior_sd=0.01, shape=lambda a, g: (a, 6))
+def accelerometer_misalignment(entries, instant, predicted):
+    """u + M u, M without diagonal: xy, xz, yx, yz, zx, zy."""
+    force = predicted.specific_force
+    return predicted._replace(
+        specific_force=force + jnp.einsum("kij,kj->ki", _off_diagonal(entries), force)
+    )
+
+
+@effect(
+    "accelerometer_nonlinearity", unit="s2 m-1", prior_sd=0.005 / FULL_SCALE_FORCE,
+    shape=lambda a, g: (a, 3),
+)  # fmt: skip
+def accelerometer_nonlinearity(curvature, instant, predicted):
+    """u_i + c_i u_i^2; the prior is 0.5 % of full scale, at full scale."""
+    force = predicted.specific_force
+    return predicted._replace(specific_force=force + curvature * force**2)
+
+
+@effect("size_effect", unit="m", prior_sd=5e-4, shape=lambda a, g: (a, 3, 3))
+def size_effect(offset, instant, predicted):
+    """Axis i of triad k sits at r_k + d_ki: its own lever arm; ``offset`` (A, axis, xyz)."""
+
+    def seen_by(axis):
+        moved = kinematics.specific_force(instant.motion, instant.positions + offset[:, axis])
+        here = kinematics.specific_force(instant.motion, instant.positions)
+        return (moved - here)[:, axis]
+
+    change = jnp.stack([seen_by(axis) for axis in range(3)], axis=1)
+    return predicted._replace(specific_force=predicted.specific_force + change)
+
+
+@effect("gyroscope_bias", unit="rad s-1", prior_sd=0.005, shape=lambda a, g: (g, 3))
+def gyroscope_bias(bias, instant, predicted):
+    """omega + b."""
+    return predicted._replace(angular_rate=predicted.angular_rate + bias)
+
+
+@effect("gyroscope_misalignment", unit="1", prior_sd=0.01, shape=lambda a, g: (g, 6))
+def gyroscope_misalignment(entries, instant, predicted):
+    """omega + M omega, M without diagonal: xy, xz, yx, yz, zx, zy."""
+    rate = predicted.angular_rate
+    return predicted._replace(
+        angular_rate=rate + jnp.einsum("kij,kj->ki", _off_diagonal(entries), rate)
+    )
+
+
+@effect("gyroscope_g_sensitivity", unit="rad s m-1", prior_sd=2e-4, shape=lambda a, g: (g, 3, 3))
+def gyroscope_g_sensitivity(matrix, instant, predicted):
+    """omega + G u, u the specific force at the same IMU."""
+    force = kinematics.specific_force(instant.motion, instant.positions)
+    at = jnp.arange(len(predicted.angular_rate)) % len(force)
+    change = jnp.einsum("kij,kj->ki", matrix, force[at])
+    return predicted._replace(angular_rate=predicted.angular_rate + change)
+
+
+@effect(
+    "gyroscope_nonlinearity", unit="s rad-1", prior_sd=0.002 / FULL_SCALE_RATE,
+    shape=lambda a, g: (g, 3),
+)  # fmt: skip
+def gyroscope_nonlinearity(curvature, instant, predicted):
+    """omega_i + c_i omega_i^2; the prior is 0.2 % of full scale, at full scale."""
+    rate = predicted.angular_rate
+    return predicted._replace(angular_rate=rate + curvature * rate**2)
+
+
+@effect("gyroscope_delay", unit="s", prior_sd=2e-3, shape=lambda a, g: (g,))
+def gyroscope_delay(delay, instant, predicted):
+    """Gyroscope k sampled tau_k late, accelerometers in time (their filters differ)."""
+    change = delay[:, None] * instant.motion.angular_acceleration
+    return predicted._replace(angular_rate=predicted.angular_rate + change)
