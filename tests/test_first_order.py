@@ -276,3 +276,12 @@ def test_allan_deviation_of_white_noise_falls_as_its_law():
         np.testing.assert_allclose(values * np.sqrt(tau) / 0.3, 1.0, atol=error)
     np.testing.assert_allclose(white_noise_sd(pieces), 0.3, rtol=0.03)
     assert np.abs(lag_correlation(pieces)).max() < 0.04
+
+
+@pytest.mark.parametrize("factor", [0.0, 1 / 9.81])
+def test_readings_in_g_or_dead_are_refused(factor):
+    rng = np.random.default_rng(16)
+    matrix, offset = triads(3, rng)
+    mean = factor * np.einsum("kij,pj->pki", matrix, GRAVITY * directions(15, rng))
+    with pytest.raises(InputError, match="are the units right"):
+        fit_triads(mean, np.full(mean.shape, 1e-3), GRAVITY)

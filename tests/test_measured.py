@@ -291,6 +291,7 @@ def test_residuals_on_the_command_line(files, tmp_path, capsys):
     [
         (["select", "{0}", "--samples", "100000"], "informative samples"),
         (["repeat", "{0}"], "two or more"),
+        (["repeat", "{0}", "{1}", "{0}"], "found one of them twice"),
         (["first-order", "{0}"], "expected still poses"),
         (["first-order", "{0}", "--gravity", "-9"], "expected a positive number"),
         (["residuals", "nothing.nc"], "expected a file to read"),

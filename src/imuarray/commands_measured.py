@@ -158,6 +158,9 @@ def repeat(arguments) -> None:
 
     if len(arguments.recordings) < 2:
         raise InputError("repeat: expected two or more recordings, found one")
+    names = [path.resolve() for path in arguments.recordings]
+    if len(set(names)) < len(names):
+        raise InputError("repeat: expected different recordings, found one of them twice")
     parts, labels = [], None
     for path in arguments.recordings:
         recording = read_recording(path)

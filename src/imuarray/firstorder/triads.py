@@ -13,12 +13,13 @@ from functools import partial
 import numpy as np
 from scipy.optimize import least_squares
 
-from imuarray.errors import IdentifiabilityError
+from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.model.jax64 import jax, jnp
 
 UPPER = np.triu_indices(3)
 
 OUTLIER = 5.0  # times the median size of a residual
+MOST_OFF = 0.5  # relative, of a pose's mean specific force from gravity
 MOST_LEFT_OUT = 0.2  # of a triad's poses
 
 
@@ -159,9 +160,18 @@ def fit_triads(mean, sd, magnitude: float) -> TriadFit:
 
     Raises
     ------
+    InputError
+        Where the mean over triads is nowhere near ``magnitude``.
     IdentifiabilityError
         Where the poses are too few or too alike to determine all parameters.
     """
+    size = np.linalg.norm(mean.mean(axis=1), axis=1) / magnitude
+    wild = np.flatnonzero(~(np.abs(size - 1) < MOST_OFF))
+    if wild.size:
+        raise InputError(
+            f"still poses: expected specific forces of about {magnitude:g} m/s^2, found"
+            f" {size[wild[0]] * magnitude:.3g} in pose {wild[0] + 1}; are the units right?"
+        )
     used = np.ones(mean.shape[:2], bool)
     while True:
         found, gain = _fit(mean, sd, magnitude, used)
