@@ -250,6 +250,14 @@ def _add_convert(commands) -> None:
     mimu.add_argument(
         "--underside", metavar="2,4", help="IMUs turned over (default: the even-numbered ones)"
     )
+    for name, default, unit in (
+        ("--accelerometer-noise", 0.04, "sd of one reading, m/s^2"),
+        ("--gyroscope-noise-dps", 0.06, "sd of one reading, deg/s"),
+        ("--position-prior", 3e-3, "sd of the nominal positions, m"),
+    ):
+        mimu.add_argument(
+            name, type=_positive, default=default, metavar="SD", help=f"{unit} (default: {default})"
+        )
     csv = _add_command(
         kinds,
         "csv",

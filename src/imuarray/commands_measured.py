@@ -20,7 +20,11 @@ def convert_mimu(arguments) -> None:
     positions, labels = read_positions(arguments.positions)
     underside = turned_labels(labels, arguments.underside)
     stream = read_mimu(arguments.data)
-    recording = to_recording(stream, positions, labels, underside, source=arguments.data.name)
+    recording = to_recording(
+        stream, positions, labels, underside, arguments.accelerometer_noise,
+        float(np.radians(arguments.gyroscope_noise_dps)), arguments.position_prior,
+        source=arguments.data.name,
+    )  # fmt: skip
     attrs = stamp({"source": str(arguments.data)}, 0) | stream.account.attributes()
     write_recording(recording, arguments.out, attrs=attrs)
     _say_converted(arguments, recording, stream.account.lines())

@@ -7,6 +7,7 @@ big endian. Acknowledgements (A0, a byte, their 16-bit sum) may stand between pa
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -19,6 +20,10 @@ CLOCK = 64e6  # Hz
 WRAP, NUMBERS = 1 << 32, 1 << 16
 # Share of packets out of sequence beyond which the file is not one recording.
 MOST_OUT_OF_SEQUENCE = 0.01
+# Relative error of the estimated period that a long gap may add up (real clocks: 1e-10).
+PERIOD_ERROR = 1e-4
+# A packet alone in a file this many packets long is likelier chance than a packet.
+MOST_AROUND_ONE = 64
 LISTED = 5  # places of damage named in a summary
 
 
@@ -28,8 +33,8 @@ class Account:
 
     ``bad``, ``garbage`` and ``out_of_sequence`` are lists of byte offsets (of garbage:
     offset and length), ``lost`` of (index of the sample after the gap, packets missing).
-    A bad packet has the right start and length where one was due, and the wrong checksum;
-    its bytes count as garbage too, and its number as lost.
+    A bad packet is whole, has the right start and length, and the wrong checksum; its bytes
+    count as garbage too, as do those of packets out of sequence, and its number as lost.
     """
 
     file_bytes: int
@@ -65,13 +70,16 @@ class Account:
             f"lost {counts['packets_lost']}, bad {counts['packets_bad']}, out of sequence"
             f" {counts['packets_out_of_sequence']}, garbage {counts['garbage_bytes']} bytes"
         ]
-        for index, count in self.lost[:LISTED]:
-            out.append(f"  {count} packet(s) missing before sample {index}")
-        for offset, length in self.garbage[:LISTED]:
-            out.append(f"  {length} bytes dropped at byte {offset}")
-        for offset in self.out_of_sequence[:LISTED]:
-            out.append(f"  packet out of sequence dropped at byte {offset}")
-        return out
+        out += _listed([f"{count} packet(s) missing before sample {i}" for i, count in self.lost])
+        out += _listed([f"{length} bytes dropped at byte {i}" for i, length in self.garbage])
+        return out + _listed(
+            [f"packet out of sequence dropped at byte {offset}" for offset in self.out_of_sequence]
+        )
+
+
+def _listed(places: list[str]) -> list[str]:
+    rest = len(places) - LISTED
+    return [f"  {place}" for place in places[:LISTED]] + [f"  and {rest} more"] * (rest > 0)
 
 
 @dataclass(frozen=True)
@@ -96,8 +104,9 @@ class MimuStream:
 def read_mimu(path: str | Path) -> MimuStream:
     """Parse a file; everything that is not a sound packet in sequence is dropped and counted.
 
-    InputError where the file is missing, holds no packets, or is not one recording. An
-    additive checksum cannot see bytes of one packet exchanged with each other.
+    InputError where the file is missing, holds no packets, or is not one recording. The
+    checksum cannot see bytes exchanged within a packet, nor one to two in a thousand of the
+    packets with several wrong bytes, as those that sum up to the same are not rare.
     """
     path = Path(path)
     if not path.is_file():
@@ -105,6 +114,11 @@ def read_mimu(path: str | Path) -> MimuStream:
     data = np.fromfile(path, np.uint8)
     starts, size = _sound_packets(data, str(path))
     accepted, number, ticks, strangers = _in_sequence(data, starts, str(path))
+    if len(accepted) == 1 and data.size > MOST_AROUND_ONE * size:
+        raise InputError(
+            f"{path}: expected MIMU packets that follow each other, found one alone, at byte"
+            f" {accepted[0]} of {data.size}"
+        )
     account = _account(data, accepted, size, strangers, number)
     packets = data[accepted[:, None] + np.arange(8, size - 2)]
     counts = packets.view(">i2").astype(np.int16).reshape(len(accepted), -1, 6)
@@ -162,35 +176,88 @@ def _in_sequence(data, starts, where):
     if len(starts) < 2:
         return starts, number, stamp, starts[:0]
     steps, passed = np.diff(number) % NUMBERS, np.diff(stamp) % WRAP
-    period = float(np.median(passed[steps == 1])) if (steps == 1).any() else float(passed[0])
+    period = _period(steps, passed)
     linked = _agree(steps, passed, period)
-    if linked.all():
-        kept = np.arange(len(starts))
-    else:
-        kept = _longest(number, stamp, period, linked)
+    kept = np.arange(len(starts))
+    if not linked.all():
+        kept = _advancing(number, stamp, period, linked)
+        # in step with the longest run is not yet in step with the neighbours
+        steps, passed = np.diff(number[kept]) % NUMBERS, np.diff(stamp[kept]) % WRAP
+        linked = _agree(steps, passed, period)
+        kept = kept[_longest(number[kept], stamp[kept], period, linked)]
     out = np.setdiff1d(np.arange(len(starts)), kept)
     if len(out) > max(MOST_OUT_OF_SEQUENCE * len(starts), 3):
         raise InputError(
             f"{where}: expected one recording, found {len(out)} of {len(starts)} packets out of"
             f" sequence, the first at byte {starts[out[0]]} (numbers or time stamps disagree)"
         )
-    steps = np.diff(number[kept]) % NUMBERS
-    expected = np.round(steps * period).astype(np.int64)
-    passed = np.diff(stamp[kept]) % WRAP
+    return starts[kept], *_unwrapped(number[kept], stamp[kept], period), starts[out]
+
+
+def _unwrapped(number, stamp, period) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers and ticks without their wraps, from the first ones on."""
+    steps, passed = np.diff(number) % NUMBERS, np.diff(stamp) % WRAP
     # the stamp says the time within a turn of its clock, the number how many turns
-    passed += WRAP * np.round((expected - passed) / WRAP).astype(np.int64)
-    unwrapped = [
-        np.concatenate([first[kept[:1]], first[kept[0]] + np.cumsum(step)])
-        for first, step in ((number, steps), (stamp, passed))
-    ]
-    return starts[kept], *unwrapped, starts[out]
+    turns = np.round((steps * period - passed) / WRAP).astype(np.int64)
+    return tuple(
+        np.concatenate([first[:1], first[0] + np.cumsum(step)])
+        for first, step in ((number, steps), (stamp, passed + WRAP * turns))
+    )
+
+
+def _period(steps, passed) -> float:
+    """Ticks from one packet to the next: the mean over those that are near the median.
+
+    Neighbours tell; where none has survived, the shortest gaps. The mean, as jitter of the
+    stamps cancels in it and not in the median.
+    """
+    near = steps == max(int(steps[steps > 0].min(initial=NUMBERS)), 1)
+    if not near.any():
+        return 0.0  # no number advances: nothing will agree
+    each = np.sort(passed[near] / steps[near])
+    # of an even count the lower one: the mean of a good and a wild value is neither
+    median = each[(len(each) - 1) // 2]
+    return float(each[np.abs(each - median) <= median / 2].mean())
 
 
 def _agree(steps, passed, period) -> np.ndarray:
     """Whether so many packets and so many ticks (modulo the clock's wrap) belong together."""
     off = (passed - np.round(steps * period).astype(np.int64) + WRAP // 2) % WRAP - WRAP // 2
     # a long gap lets the period's own error add up
-    return (steps > 0) & (steps < NUMBERS // 2) & (np.abs(off) < period * (0.5 + 1e-3 * steps))
+    allowed = period * (0.5 + PERIOD_ERROR * steps)
+    return (steps > 0) & (steps < NUMBERS // 2) & (np.abs(off) < allowed)
+
+
+def _advancing(number, stamp, period, linked) -> np.ndarray:
+    """Indices of the most packets that advance, of those in step with the longest run's middle.
+
+    The most, so that a repeated packet before a gap does not cost the sound ones before it.
+    """
+    edges = np.concatenate([[0], np.flatnonzero(~linked) + 1, [len(number)]])
+    best = int(np.diff(edges).argmax())
+    anchor = int(edges[best] + edges[best + 1]) // 2
+    steps = (np.diff(number) + NUMBERS // 2) % NUMBERS - NUMBERS // 2
+    place = np.concatenate([[0], np.cumsum(steps)])
+    away = place - place[anchor]
+    off = stamp - stamp[anchor] - np.round(away * period).astype(np.int64)
+    off = (off + WRAP // 2) % WRAP - WRAP // 2
+    fit = np.flatnonzero(np.abs(off) < period * (1 + PERIOD_ERROR * np.abs(away)))
+    return fit[_increasing(place[fit].tolist())] if fit.size else np.array([anchor])
+
+
+def _increasing(values: list[int]) -> list[int]:
+    """Indices of the longest strictly increasing subsequence; of equal values the first."""
+    tails, ends, before = [], [], []  # by length: its least last value, and where that is
+    for i, value in enumerate(values):
+        at = bisect_left(tails, value)
+        before.append(ends[at - 1] if at else -1)
+        if at < len(tails) and tails[at] == value:
+            continue
+        tails[at : at + 1], ends[at : at + 1] = [value], [i]
+    chain = [ends[-1]]
+    while before[chain[-1]] >= 0:
+        chain.append(before[chain[-1]])
+    return chain[::-1]
 
 
 def _longest(number, stamp, period, linked) -> np.ndarray:
@@ -217,23 +284,20 @@ def _account(data, accepted, size, strangers, number) -> Account:
     """Classify the bytes between the accepted packets."""
     ends = np.concatenate([[0], accepted + size])
     begins = np.concatenate([accepted, [data.size]])
+    known, dropped = _acknowledgements(data), set(strangers.tolist())
     acknowledged, garbage, bad = 0, [], []
     for gap in np.flatnonzero(begins > ends):
         first, last = int(ends[gap]), int(begins[gap])
-        while first < last:
-            if _is_acknowledgement(data, first, last):
-                acknowledged, first = acknowledged + 4, first + 4
-                continue
-            end = first + 1
-            while end < last and not _is_acknowledgement(data, end, last):
-                end += 1
-            garbage.append((first, end - first))
-            first = end
+        for at in known[slice(*np.searchsorted(known, [first, last - 3]))].tolist():
+            if at < first:
+                continue  # begins with the last byte of the one before
+            if at > first:
+                garbage.append((first, at - first))
+            acknowledged, first = acknowledged + 4, at + 4
+        if last > first:
+            garbage.append((first, last - first))
     for offset, length in garbage:
-        # a whole one: the rest of a packet that the file's end cuts off is no bad packet
-        sound = data[offset] == START and length >= size and data[offset + 3] == size - 6
-        if sound and offset not in strangers:
-            bad.append(offset)
+        bad += _bad_packets(data[offset : offset + length], offset, size, dropped)
     steps = np.diff(number)
     gaps = np.flatnonzero(steps > 1)
     lost = [(int(i) + 1, int(steps[i]) - 1) for i in gaps]
@@ -242,7 +306,21 @@ def _account(data, accepted, size, strangers, number) -> Account:
     )
 
 
-def _is_acknowledgement(data, at, last) -> bool:
-    if at + 4 > last or data[at] != ACKNOWLEDGEMENT:
-        return False
-    return int(data[at]) + int(data[at + 1]) == 256 * int(data[at + 2]) + int(data[at + 3])
+def _acknowledgements(data) -> np.ndarray:
+    """Offsets of A0, a byte and their 16-bit sum."""
+    at = np.flatnonzero(data[: max(data.size - 3, 0)] == ACKNOWLEDGEMENT)
+    return at[
+        _big_endian(data, at, 1) + _big_endian(data, at + 1, 1) == _big_endian(data, at + 2, 2)
+    ]
+
+
+def _bad_packets(piece, offset, size, strangers) -> list[int]:
+    """Whole packets in a piece of garbage that are not those out of sequence."""
+    begin = piece[: max(len(piece) - size + 1, 0)]
+    starts = np.flatnonzero((begin == START) & (piece[3 : 3 + len(begin)] == size - 6))
+    found, end = [], 0
+    for at in starts.tolist():
+        if at >= end:
+            end = at + size
+            found.append(offset + at)
+    return [at for at in found if at not in strangers]

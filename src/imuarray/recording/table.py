@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +20,25 @@ UNITS = {
     "force": {"m/s^2": 1.0, "g": GRAVITY, "mg": 1e-3 * GRAVITY},
     "rate": {"rad/s": 1.0, "deg/s": np.pi / 180, "mdeg/s": np.pi / 180e3},
 }
+WHITESPACE = r"\s+"  # the one delimiter longer than a character
 KEYS = {
     "delimiter": False, "comment": False, "time": True, "position_unit": False,
     "position_prior": False, "accelerometers": True, "gyroscopes": True,
 }  # fmt: skip
-SENSOR_KEYS = {"unit": True, "noise": True, "range": True, "triads": True}
+SENSOR_KEYS = {"unit": True, "scale": False, "noise": True, "range": True, "triads": True}
 TRIAD_KEYS = {"columns": True, "position": False, "axes": False}
+
+
+class _Loader(yaml.SafeLoader):
+    """Safe YAML that refuses a key given twice: the second would silently replace the first."""
+
+    def construct_mapping(self, node, deep=False):
+        keys = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
+        twice = next((key for i, key in enumerate(keys) if key in keys[:i]), None)
+        if twice is not None:
+            line = node.start_mark.line + 1
+            raise yaml.YAMLError(f"the key {twice!r} twice in the section at line {line}")
+        return super().construct_mapping(node, deep)
 
 
 def read_columns(path: str | Path) -> dict[str, Any]:
@@ -33,8 +47,9 @@ def read_columns(path: str | Path) -> dict[str, Any]:
     if not path.is_file():
         raise InputError(f"{path}: expected a YAML file that names the columns, found none")
     try:
-        layout = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        layout = yaml.load(path.read_text(encoding="utf-8"), _Loader)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        # ValueError: bytes that are no UTF-8, a date with a 13th month
         raise InputError(f"{path}: expected YAML, found {' '.join(str(error).split())}") from None
     _require_keys(layout, KEYS, str(path))
     for kind in ("accelerometers", "gyroscopes"):
@@ -54,7 +69,7 @@ def read_table(path: str | Path, columns: str | Path) -> Recording:
     InputError, with the row or the key, for anything that does not fit.
     """
     layout, where = read_columns(columns), str(path)
-    table = _load(path, layout)
+    table = _load(path, layout, columns)
     unit = UNITS["length"]
     length = _factor(unit, layout.get("position_unit", "m"), f"{columns}: position_unit")
     force, labels = _sensors(table, layout, "accelerometers", "force", where, str(columns))
@@ -83,25 +98,39 @@ def _require_keys(section: Any, keys: dict[str, bool], where: str) -> None:
         raise InputError(f"{where}: expected the keys {', '.join(keys)}, found {found}")
 
 
-def _load(path, layout) -> pd.DataFrame:
-    options = {"sep": str(layout.get("delimiter", ",")), "comment": layout.get("comment")}
+def _load(path, layout, columns) -> pd.DataFrame:
+    """The table; its columns are as the header names them, so that two of a name are seen."""
+    options = {"sep": layout.get("delimiter", ","), "comment": layout.get("comment")}
+    comment = "#" if options["comment"] is None else options["comment"]
+    for key, value in (("delimiter", options["sep"]), ("comment", comment)):
+        runs = key == "delimiter" and value == WHITESPACE
+        if not isinstance(value, str) or (len(value) != 1 and not runs):
+            raise InputError(f"{columns}: {key}: expected one character, found {value!r}")
     try:
-        return pd.read_csv(path, skipinitialspace=True, **options)
+        # Two rows: a first data row longer than the header is an error here, while with a header
+        # pandas would take its first cell for an index and move every name by one column.
+        head = pd.read_csv(path, skipinitialspace=True, header=None, nrows=2, dtype=str, **options)
+        table = pd.read_csv(path, skipinitialspace=True, **options)
+        table.columns = head.iloc[0].fillna("").str.strip()
     except (OSError, ValueError, UnicodeDecodeError) as error:
         message = " ".join(str(error).split())
         raise InputError(f"{path}: expected a CSV file with a header, found {message}") from None
+    return table
 
 
 def _column(table, name, where) -> np.ndarray:
     if name not in table.columns:
         have = ", ".join(map(str, table.columns))
         raise InputError(f"{where}: expected a column {name!r}, found {have}")
+    if list(table.columns).count(name) > 1:
+        raise InputError(f"{where}: expected one column {name!r}, found several of that name")
     values = pd.to_numeric(table[name], errors="coerce").to_numpy(float)
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size:
         cell = table[name].iloc[bad[0]]
+        shown = repr(cell) if isinstance(cell, str) else "inf" if np.isinf(cell) else "none or NaN"
         raise InputError(
-            f"{where}: column {name!r}: expected numbers, found {cell!r} in data row {bad[0] + 1}"
+            f"{where}: column {name!r}: expected numbers, found {shown} in data row {bad[0] + 1}"
             f" ({bad.size} of {values.size} rows)"
         )
     return values
@@ -113,16 +142,22 @@ def _factor(units: dict[str, float], name, where: str) -> float:
     return units[name]
 
 
+def _is_number(value) -> bool:
+    """Finite, as a float as well: YAML has integers of any length."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return abs(value) <= sys.float_info.max
+
+
 def _positive(value, where: str) -> float:
-    good = isinstance(value, int | float) and not isinstance(value, bool) and value > 0
-    if not good:
+    if not _is_number(value) or value <= 0:
         raise InputError(f"{where}: expected a positive number, found {value!r}")
     return float(value)
 
 
 def _three(value, where: str) -> list[float]:
     numbers = isinstance(value, list) and len(value) == 3
-    if not numbers or not all(isinstance(x, int | float) for x in value):
+    if not numbers or not all(map(_is_number, value)):
         raise InputError(f"{where}: expected three numbers, found {value!r}")
     return [float(x) for x in value]
 
@@ -143,14 +178,15 @@ def _sensors(table, layout, kind, units, where, layout_name):
     """Readings (T, K, 3) in SI units in the array frame, and the labels."""
     section = layout[kind]
     factor = _factor(UNITS[units], section["unit"], f"{layout_name}: {kind}: unit")
+    scale = _positive(section.get("scale", 1.0), f"{layout_name}: {kind}: scale")
     parts = []
     for label, triad in section["triads"].items():
         place = f"{layout_name}: {kind} {label!r}"
         names = triad["columns"]
-        if not isinstance(names, list) or len(names) != 3:
+        if not isinstance(names, list) or len(set(map(str, names))) != 3 or len(names) != 3:
             raise InputError(f"{place}: expected three columns, found {names!r}")
         own = np.stack([_column(table, str(name), where) for name in names], axis=1)
-        parts.append(factor * own @ _turn(triad.get("axes", ["x", "y", "z"]), place).T)
+        parts.append(factor * scale * own @ _turn(triad.get("axes", ["x", "y", "z"]), place).T)
     return np.stack(parts, axis=1), tuple(str(label) for label in section["triads"])
 
 
@@ -185,5 +221,13 @@ def _time(table, section, where, layout_name) -> np.ndarray:
         )
     factor = _factor(UNITS["time"], section["unit"], f"{layout_name}: time: unit")
     values = _column(table, str(section["column"]), where)
+    back = np.flatnonzero(np.diff(values) <= 0)
+    if back.size:
+        i = back[0]
+        raise InputError(
+            f"{where}: column {section['column']!r}: expected a time that increases, found"
+            f" {values[i + 1]:.15g} after {values[i]:.15g} in data row {i + 2}"
+            f" ({back.size} such steps)"
+        )
     # from the first sample: microseconds since 1970 would cost the last digits
     return factor * (values - values[0]) if values.size else values

@@ -1,0 +1,154 @@
+"""What loggers' tables get wrong: one line that names the place, never a shifted column."""
+
+import numpy as np
+import pytest
+import yaml
+
+from imuarray.errors import InputError
+from imuarray.recording.table import read_table
+
+HEADER = ["t", *(f"{kind}{axis}{i}" for i in (1, 2, 3) for kind in "ag" for axis in "xyz")]
+
+
+def layout() -> dict:
+    triads = {
+        kind: {
+            str(i): {"columns": [f"{kind}{axis}{i}" for axis in "xyz"]} for i in (1, 2, 3)
+        }
+        for kind in "ag"
+    }  # fmt: skip
+    for i, place in enumerate([[0, 0, 0], [10, 0, 0], [0, 10, 0]]):
+        triads["a"][str(i + 1)]["position"] = place
+    return {
+        "time": {"column": "t", "unit": "ms"}, "position_unit": "mm",
+        "accelerometers": {"unit": "g", "noise": 0.004, "range": 16, "triads": triads["a"]},
+        "gyroscopes": {"unit": "deg/s", "noise": 0.06, "range": 2000, "triads": triads["g"]},
+    }  # fmt: skip
+
+
+def table(rows=4) -> list[list[str]]:
+    """Header and rows of cells; each cell of a row differs."""
+    cells = [[str(10 * i), *(f"{0.1 * j + 0.01 * i:.2f}" for j in range(18))] for i in range(rows)]
+    return [HEADER, *cells]
+
+
+def read(folder, rows, columns=None, delimiter=","):
+    text = rows if isinstance(rows, str) else "\n".join(delimiter.join(row) for row in rows) + "\n"
+    (folder / "log.csv").write_text(text)
+    columns = layout() if columns is None else columns
+    text = columns if isinstance(columns, str) else yaml.safe_dump(columns)
+    (folder / "columns.yaml").write_text(text)
+    return read_table(folder / "log.csv", folder / "columns.yaml")
+
+
+@pytest.mark.parametrize("extra", ["7", ""])
+@pytest.mark.parametrize("which", [[1], [3], [1, 2, 3, 4]])
+def test_a_row_longer_than_the_header_is_refused(tmp_path, extra, which):
+    """With a rate there is no time column to betray that all columns moved by one."""
+    rows = [row + [extra] * (i in which) for i, row in enumerate(table())]
+    with pytest.raises(InputError, match=f"Expected 19 fields in line {which[0] + 1}, saw 20"):
+        read(tmp_path, rows, layout() | {"time": {"rate": 100.0}})
+
+
+def test_a_short_row_is_named(tmp_path):
+    rows = table()
+    rows[3] = rows[3][:-2]
+    with pytest.raises(
+        InputError, match="'gy3': expected numbers, found none or NaN in data row 3"
+    ):
+        read(tmp_path, rows)
+
+
+def test_two_columns_of_one_name_are_refused_where_they_are_asked_for(tmp_path):
+    rows = table()
+    rows[0] = ["gz3" if name == "gx3" else name for name in HEADER]
+    columns = layout()
+    columns["gyroscopes"]["triads"].pop("3")
+    assert read(tmp_path, rows, columns).angular_rate.shape == (4, 2, 3)
+    with pytest.raises(InputError, match="expected a column 'gx3', found t, ax1"):
+        read(tmp_path, rows)
+    columns = layout()
+    columns["gyroscopes"]["triads"]["3"]["columns"] = ["gy3", "ax1", "gz3"]
+    with pytest.raises(InputError, match="one column 'gz3', found several"):
+        read(tmp_path, rows, columns)
+
+
+@pytest.mark.parametrize(("stamp", "words"), [("10", "10 after 10"), ("5", "5 after 10")])
+def test_a_time_that_does_not_increase_is_named_by_row(tmp_path, stamp, words):
+    rows = table()
+    rows[3] = [stamp, *rows[3][1:]]
+    with pytest.raises(InputError, match=rf"log.csv: column 't'.*{words} in data row 3"):
+        read(tmp_path, rows)
+
+
+def test_nanoseconds_since_1970_and_a_byte_order_mark(tmp_path):
+    rows = [[str(1_700_000_000_000_000_000 + 10_000_000 * i), *row[1:]]
+            for i, row in enumerate(table()[1:])]  # fmt: skip
+    columns = layout() | {"time": {"column": "t", "unit": "ns"}}
+    text = "\ufeff" + "\r\n".join(map(",".join, [HEADER, *rows])) + "\r\n"
+    found = read(tmp_path, text, columns)
+    np.testing.assert_allclose(found.time, [0, 0.01, 0.02, 0.03], atol=1e-6)
+
+
+@pytest.mark.parametrize("delimiter", [";", "\t", " ", r"\s+"])
+def test_delimiters(tmp_path, delimiter):
+    between = "  " if delimiter in (" ", r"\s+") else delimiter
+    expected = read(tmp_path, table())
+    found = read(tmp_path, table(), layout() | {"delimiter": delimiter}, between)
+    np.testing.assert_array_equal(found.specific_force, expected.specific_force)
+    np.testing.assert_array_equal(found.time, expected.time)
+
+
+def test_scale_is_what_a_count_is_worth(tmp_path):
+    columns = layout()
+    columns["accelerometers"] |= {"scale": 1 / 2048}
+    plain, scaled = read(tmp_path, table()), read(tmp_path, table(), columns)
+    np.testing.assert_allclose(scaled.specific_force * 2048, plain.specific_force)
+    assert scaled.accelerometer_noise_sd == plain.accelerometer_noise_sd
+    assert scaled.accelerometer_range == plain.accelerometer_range
+    np.testing.assert_array_equal(scaled.angular_rate, plain.angular_rate)
+    columns["accelerometers"]["scale"] = 0
+    with pytest.raises(InputError, match="accelerometers: scale: expected a positive number"):
+        read(tmp_path, table(), columns)
+
+
+@pytest.mark.parametrize("key", ["delimiter", "comment"])
+@pytest.mark.parametrize("value", ["", "ab", 5, ["a"]])
+def test_delimiter_and_comment_are_one_character(tmp_path, key, value):
+    with pytest.raises(InputError, match=f"columns.yaml: {key}: expected one character"):
+        read(tmp_path, table(), layout() | {key: value})
+
+
+@pytest.mark.parametrize("value", [10**400, float("inf"), float("nan"), True])
+def test_numbers_that_are_none_as_floats(tmp_path, value):
+    columns = layout()
+    columns["accelerometers"]["noise"] = value
+    with pytest.raises(InputError, match="accelerometers: noise: expected a positive number"):
+        read(tmp_path, table(), columns)
+    columns = layout()
+    columns["accelerometers"]["triads"]["2"]["position"] = [0, value, 0]
+    with pytest.raises(InputError, match="accelerometers '2': position: expected three numbers"):
+        read(tmp_path, table(), columns)
+
+
+def test_one_column_named_thrice(tmp_path):
+    columns = layout()
+    columns["accelerometers"]["triads"]["1"]["columns"] = ["ax1", "ay1", "ax1"]
+    with pytest.raises(InputError, match="accelerometers '1': expected three columns"):
+        read(tmp_path, table(), columns)
+
+
+@pytest.mark.parametrize(
+    ("extra", "words"),
+    [
+        ("x: 2001-99-99\n", "month must be in"),
+        ("x: " + "[" * 3000 + "]" * 3000 + "\n", "expected YAML"),
+        ("position_unit: m\n", "the key 'position_unit' twice"),
+        ("x: {1: [0], '1': [1]}\n", "the key '1' twice"),
+    ],
+)
+def test_yaml_that_a_loader_stumbles_over(tmp_path, extra, words):
+    """A triad copied and its label forgotten would silently replace the first one."""
+    with pytest.raises(InputError, match=words) as caught:
+        read(tmp_path, table(), yaml.safe_dump(layout()) + extra)
+    assert "\n" not in str(caught.value)
