@@ -85,7 +85,9 @@ def calibrate(arguments) -> None:
         found = calibrate_bcd(model, *data, saturated=saturated, tolerance=1e-9)
     else:
         prior = (model.array.parameters, recording.position_prior_sd) if model.effects else None
-        found = calibrate_gauss_newton(model, *data, saturated=saturated, position_prior=prior)
+        found = calibrate_gauss_newton(
+            model, *data, saturated=saturated, position_prior=prior, time=recording.time
+        )
     dataset = calibration_dataset(recording, model, found, saturated)
     dataset.attrs |= {"method": arguments.method, **stamp({"recording": digest(*data)}, 0)}
     write_netcdf(dataset, arguments.out)
@@ -265,6 +267,7 @@ def _map_estimate(recording, model):
         model, recording.specific_force, recording.angular_rate,
         saturated=recording.saturated_gyroscopes(),
         position_prior=(model.array.parameters, recording.position_prior_sd),
+        time=recording.time,
     )  # fmt: skip
     extra = np.empty(0) if found.effect_parameters is None else found.effect_parameters
     return np.concatenate([found.positions[1:].ravel(), extra]), found
@@ -281,13 +284,15 @@ def _tuned_generic(recording, model, arguments):
     estimate = GenericLikelihood(
         model.with_motion(found.motion.motion), recording.specific_force,
         recording.angular_rate, start, draws=2, saturated=recording.saturated_gyroscopes(),
+        time=recording.time,
     )  # fmt: skip
-    sds = np.sqrt(np.diag(found.covariance))
     size = 3 * (model.array.accelerometers - 1)
     mean = np.concatenate([model.array.parameters, np.zeros(model.effect_size)])
     prior_sd = np.full(mean.size, recording.position_prior_sd)
     prior_sd[size:] = model.effect_prior_sd
-    target = GenericTarget(estimate, GaussianPrior.of(mean, prior_sd), sds)
+    target = GenericTarget(
+        estimate, GaussianPrior.of(mean, prior_sd), np.linalg.cholesky(found.covariance)
+    )
     steps = np.geomspace(1e-3, 1.0, 8)
     rng = _stream(arguments.seed, "tuning")
     rates = tuning.acceptance_sweep(target, mode, steps, 200, rng)

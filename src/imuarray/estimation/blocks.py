@@ -13,6 +13,7 @@ import numpy as np
 
 from imuarray.errors import InputError
 from imuarray.model import ArrayModel
+from imuarray.model.array_model import clock
 from imuarray.model.jax64 import jax, jnp
 from imuarray.motion.state import Motion
 
@@ -30,6 +31,8 @@ class Problem(NamedTuple):
     whiten_rate: np.ndarray  # (1 or T, 3G, 3G)
     prior_mean: np.ndarray  # (P,)
     prior_sd: np.ndarray  # (P,), infinite where flat
+    time: np.ndarray  # (T,) s since the first sample
+    span: float  # s
 
 
 class Blocks(NamedTuple):
@@ -50,12 +53,14 @@ def problem(
     saturated=None,
     position_prior=None,
     rate_covariance=None,
+    time=None,
 ) -> Problem:
     """Arrange measurements (T, A, 3) m/s^2, (T, G, 3) rad/s for the general estimators.
 
     ``position_prior``: None for a flat one, or (mean (3 (A - 1),), sd) in metres. Effect
     parameters always have theirs. ``rate_covariance`` (T, 3G, 3G) (rad/s)^2 replaces the
-    declared gyroscope noise by one for each sample, say that of (30b). InputError where
+    declared gyroscope noise by one for each sample, say that of (30b). ``time`` (T,) s is what
+    drifts and clocks look at. InputError where
     saturated axes meet correlated gyroscopes, which only the papers' model supports.
     """
     keep = np.ones((len(angular_rate), 3 * model.array.gyroscopes))
@@ -74,6 +79,7 @@ def problem(
         np.linalg.cholesky(np.linalg.inv(covariance)).transpose(0, 2, 1),
         np.concatenate([mean, np.zeros(model.effect_size)]),
         np.concatenate([spread, model.effect_prior_sd]),
+        *clock(np.zeros(len(angular_rate)) if time is None else time),
     )  # fmt: skip
 
 
@@ -89,11 +95,11 @@ def pack_motion(model: ArrayModel, motion: Motion) -> np.ndarray:
     return np.concatenate([np.asarray(f) for f in motion[: model.motion_size // 3]], axis=-1)
 
 
-def residual(model, x, p, force, rate, keep, whiten_force, whiten_rate):
+def residual(model, x, p, force, rate, keep, time, span, whiten_force, whiten_rate):
     """Whitened residuals of one sample, (3A + 3G [+ priors],), the motion's priors included."""
     shared = 3 * (model.array.accelerometers - 1)
     positions = jnp.concatenate([jnp.zeros((1, 3)), p[:shared].reshape(-1, 3)])
-    predicted = model.predict(unpack_motion(x), positions, p[shared:])
+    predicted = model.predict(unpack_motion(x), positions, p[shared:], time=time, span=span)
     parts = [
         whiten_force @ (force - predicted.specific_force).ravel(),
         keep * (whiten_rate @ (rate - predicted.angular_rate).ravel()),
@@ -108,12 +114,13 @@ def residual(model, x, p, force, rate, keep, whiten_force, whiten_rate):
 
 
 @partial(jax.jit, static_argnums=0)
-def _chunk(model, x, p, force, rate, keep, use, whiten_force, whiten_rate):
-    def one(x, force, rate, keep, use, whiten_rate):
+def _chunk(model, x, p, force, rate, keep, time, span, use, whiten_force, whiten_rate):
+    def one(x, force, rate, keep, time, use, whiten_rate):
         def flat(both):
             return residual(
-                model, both[: x.size], both[x.size :], force, rate, keep, whiten_force, whiten_rate
-            )
+                model, both[: x.size], both[x.size :], force, rate, keep, time, span,
+                whiten_force, whiten_rate,
+            )  # fmt: skip
 
         both = jnp.concatenate([x, p])
         value, jac = flat(both), jax.jacfwd(flat)(both)
@@ -121,7 +128,7 @@ def _chunk(model, x, p, force, rate, keep, use, whiten_force, whiten_rate):
         blocks = left.T @ left, left.T @ right, left.T @ value
         return (*blocks, use * (right.T @ right), use * (right.T @ value), use * (value @ value))
 
-    A, B, g, shared, gradient, cost = jax.vmap(one)(x, force, rate, keep, use, whiten_rate)
+    A, B, g, shared, gradient, cost = jax.vmap(one)(x, force, rate, keep, time, use, whiten_rate)
     return A, B, g, shared.sum(0), gradient.sum(0), cost.sum()
 
 
@@ -139,7 +146,8 @@ def normal_equations(given: Problem, x, p) -> Blocks:
         index = np.minimum(index, samples - 1)
         out = _chunk(
             given.model, x[index], p, given.specific_force[index], given.angular_rate[index],
-            given.keep[index], use, given.whiten_force, given.whiten_rate[np.minimum(index, last)],
+            given.keep[index], given.time[index], given.span, use, given.whiten_force,
+            given.whiten_rate[np.minimum(index, last)],
         )  # fmt: skip
         used = int(use.sum())
         motion.append(np.asarray(out[0])[:used])

@@ -57,6 +57,7 @@ def calibrate_gauss_newton(
     saturated=None,
     position_prior=None,
     rate_covariance=None,
+    time=None,
     tolerance: float = 1e-6,
     limit: int = 50,
 ) -> Calibration:
@@ -67,6 +68,7 @@ def calibrate_gauss_newton(
     start : (A, 3) m or None for the nominal positions
     position_prior : None, or (mean (3 (A - 1),), sd) in metres
     rate_covariance : None, or (T, 3G, 3G) (rad/s)^2 instead of the model's gyroscope noise
+    time : None, or (T,) s, which drifts, shifts and clocks look at
     tolerance : float
         Stop when no shared parameter moves by more than this many of its own sds.
 
@@ -82,7 +84,9 @@ def calibrate_gauss_newton(
     data = Collapsed.of(model, specific_force, angular_rate, saturated)
     require_rotation(data, positions)
     first = motion_from(data, positions)
-    given = problem(model, specific_force, angular_rate, saturated, position_prior, rate_covariance)
+    given = problem(
+        model, specific_force, angular_rate, saturated, position_prior, rate_covariance, time
+    )
     x = pack_motion(model, first.motion)
     p = np.concatenate([positions[1:].ravel(), np.zeros(model.effect_size)])
     x, p, costs, steps, converged, covariance = _iterate(given, x, p, tolerance, limit)

@@ -1,6 +1,6 @@
 """The measurement model, written once: forward functions, effects, noise."""
 
-from imuarray.model import catalogue  # registers the effects
+from imuarray.model import catalogue, timing  # register the effects
 from imuarray.model.array_model import ArrayModel, Prediction
 from imuarray.model.effects import EFFECTS, Effect, effect
 from imuarray.model.noise import Noise
@@ -15,4 +15,5 @@ __all__ = [
     "catalogue",
     "effect",
     "structure_tensor",
+    "timing",
 ]

@@ -66,7 +66,7 @@ class ArrayModel:
     def effect_prior_sd(self) -> np.ndarray:
         """Prior sd of every effect parameter, (P,), in the effects' units."""
         parts = [
-            np.full(int(np.prod(s)), e.prior_sd)
+            np.broadcast_to(e.prior_sd, s).ravel()
             for e, s in zip(self.chain, self.shapes, strict=True)
         ]
         return np.concatenate([np.empty(0), *parts])
@@ -103,29 +103,33 @@ class ArrayModel:
         ]
         return np.concatenate([np.empty(0), *parts])
 
-    def predict(self, motion: Motion, positions, parameters=()) -> Prediction:
+    def predict(self, motion: Motion, positions, parameters=(), **when) -> Prediction:
         """Noise-free measurement at one instant (traceable by JAX).
 
         ``motion`` fields (3,), ``positions`` (A, 3) metres relative to the reference
-        triad, ``parameters`` (P,) flat effect parameters.
+        triad, ``parameters`` (P,) flat effect parameters; ``when`` is what else an `Instant`
+        holds: time (s), span (s), second and third derivatives.
         """
         rate = jnp.broadcast_to(motion.angular_rate, (self.array.gyroscopes, 3))
         predicted = Prediction(kinematics.specific_force(motion, positions), rate)
-        instant = Instant(motion, positions)
+        instant = Instant(motion, positions, **when)
         values = self.split(jnp.asarray(parameters)) if self.effects else {}
         for item in self.chain:
             predicted = item.apply(values[item.id], instant, predicted)
         return predicted
 
-    def predict_many(self, motion: Motion, positions, parameters=()) -> Prediction:
+    def predict_many(self, motion: Motion, positions, parameters=(), time=None) -> Prediction:
         """`predict` over leading sample axes, compiled; returns numpy arrays (..., n, 3).
 
-        ``positions`` is (A, 3), or (realisations, A, 3) with motion (realisations, T, 3).
+        ``positions`` is (A, 3), or (realisations, A, 3) with motion (realisations, T, 3);
+        ``time`` (T,) s matters to drifts, shifts and clocks only, zero if not given.
         """
         fields = Motion(*(jnp.asarray(field) for field in motion))
         positions = jnp.asarray(positions)
         parameters = jnp.asarray(np.asarray(parameters, float))
-        out = _predict_many(self, fields, positions, parameters)
+        samples = fields.angular_rate.shape[-2]
+        time, span = clock(np.zeros(samples) if time is None else time)
+        out = _predict_many(self, fields, positions, parameters, time, span)
         return Prediction(*(np.asarray(part) for part in out))
 
     def with_motion(self, motion: Motion) -> ArrayModel:
@@ -152,9 +156,22 @@ class ArrayModel:
         return isinstance(other, ArrayModel) and self._function == other._function
 
 
+def clock(time) -> tuple[np.ndarray, float]:
+    """Seconds since the first sample (T,), and the length in seconds (1 where there is none)."""
+    since = np.asarray(time, float) - np.min(time)
+    return since, float(np.max(since)) or 1.0
+
+
 @partial(jax.jit, static_argnums=0)
-def _predict_many(model, motion, positions, parameters):
-    single = jax.vmap(model.predict, in_axes=(0, None, None))
+def _predict_many(model, motion, positions, parameters, time, span):
+    def at(motion, time, positions, parameters):
+        return model.predict(motion, positions, parameters, time=time, span=span)
+
+    several = jax.vmap(at, in_axes=(0, 0, None, None))
+
+    def single(motion, positions, parameters):
+        return several(motion, time, positions, parameters)
+
     if positions.ndim == 3:
         return jax.vmap(single, in_axes=(0, 0, None))(motion, positions, parameters)
     return single(motion, positions, parameters)

@@ -99,10 +99,3 @@ def gyroscope_nonlinearity(curvature, instant, predicted):
     """omega_i + c_i omega_i^2; the prior is 0.2 % of full scale, at full scale."""
     rate = predicted.angular_rate
     return predicted._replace(angular_rate=rate + curvature * rate**2)
-
-
-@effect("gyroscope_delay", unit="s", prior_sd=2e-3, shape=lambda a, g: (g,))
-def gyroscope_delay(delay, instant, predicted):
-    """Gyroscope k sampled tau_k late, accelerometers in time (their filters differ)."""
-    change = delay[:, None] * instant.motion.angular_acceleration
-    return predicted._replace(angular_rate=predicted.angular_rate + change)

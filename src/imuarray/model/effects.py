@@ -26,10 +26,18 @@ class Prediction(NamedTuple):
 
 
 class Instant(NamedTuple):
-    """The truth an effect may look at: the motion and where the triads are."""
+    """The truth an effect may look at: the motion, where the triads are and what time it is.
+
+    ``second`` and ``third`` are the ideal measurement's time derivatives of those orders, zero
+    where they are not known (only a recording's smooth motion tells them).
+    """
 
     motion: Motion
     positions: object  # (A, 3) m
+    time: object = 0.0  # s since the recording began
+    span: object = 1.0  # s, the recording's length
+    second: Prediction = Prediction(0.0, 0.0)
+    third: Prediction = Prediction(0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -40,30 +48,36 @@ class Effect:
     ----------
     shape : callable (A, G) -> tuple
         Shape of its parameters for A accelerometer and G gyroscope triads.
-    prior_sd : float
+        The first axis counts the triads, each of which its own row alone concerns.
+    prior_sd : float, or nested tuples that broadcast to ``shape``
         Prior standard deviation of each parameter around zero, in ``unit``.
     derivatives : bool
         Whether it needs omega double dot and s dot (12-column H instead of 6).
+    sensors : str
+        Whose reading it changes: accelerometer, gyroscope or imu (both).
     """
 
     id: str
     unit: str
-    prior_sd: float
+    prior_sd: float | tuple
     shape: Callable[[int, int], tuple[int, ...]]
     derivatives: bool
+    sensors: str
     apply: Callable[[object, Instant, Prediction], Prediction]
 
 
 EFFECTS: dict[str, Effect] = {}
+KINDS = ("accelerometer", "gyroscope")
 
 
-def effect(id, *, unit, prior_sd, shape, derivatives=False):
+def effect(id, *, unit, prior_sd, shape, derivatives=False, sensors=None):
     """Register the decorated function as the effect ``id`` of the catalogue."""
 
     def register(function):
         if id in EFFECTS:
             raise ValueError(f"effect {id}: expected a new id, found it registered already")
-        EFFECTS[id] = Effect(id, unit, prior_sd, shape, derivatives, function)
+        whose = sensors or (id.split("_")[0] if id.split("_")[0] in KINDS else "imu")
+        EFFECTS[id] = Effect(id, unit, prior_sd, shape, derivatives, whose, function)
         return function
 
     return register
@@ -81,17 +95,3 @@ def find_effects(ids) -> tuple[Effect, ...]:
 def gyroscope_scale(scale, instant, predicted):
     """(1 + c_i) omega_i at each gyroscope axis."""
     return predicted._replace(angular_rate=(1.0 + scale) * predicted.angular_rate)
-
-
-@effect(
-    "sensor_delay", unit="s", prior_sd=1e-3, shape=lambda a, g: (max(a, g) - 1,), derivatives=True
-)
-def sensor_delay(delay, instant, predicted):
-    """Both triads of IMU k sampled tau_k late (to first order); IMU 1 keeps the time."""
-    delay = jnp.concatenate([jnp.zeros(1), delay])[:, None]
-    force_rate = kinematics.force_rate(instant.motion, instant.positions)
-    accelerometers, gyroscopes = len(predicted.specific_force), len(predicted.angular_rate)
-    return Prediction(
-        predicted.specific_force + delay[:accelerometers] * force_rate,
-        predicted.angular_rate + delay[:gyroscopes] * instant.motion.angular_acceleration,
-    )

@@ -49,10 +49,10 @@ def _log_weight(flat, x, scale, draw):
 
 
 @partial(jax.jit, static_argnums=(0, 1))
-def _estimate(model, steps, start, p, force, rate, keep, whiten_force, whiten_rate, draws):
-    def one(x, force, rate, keep, draws):
+def _estimate(model, steps, start, p, data, span, whiten_force, whiten_rate, draws):
+    def one(x, data, draws):
         def flat(x):
-            return residual(model, x, p, force, rate, keep, whiten_force, whiten_rate)
+            return residual(model, x, p, *data, span, whiten_force, whiten_rate)
 
         x, factor = _mode(flat, x, steps)
         whole = solve_lower(factor, jnp.eye(x.size)[:, :3])
@@ -60,7 +60,7 @@ def _estimate(model, steps, start, p, force, rate, keep, whiten_force, whiten_ra
         weights = jax.vmap(lambda draw: _log_weight(flat, x, scale, draw))(draws)
         return jax.scipy.special.logsumexp(weights) - jnp.log(len(draws))
 
-    return jax.vmap(one)(start, force, rate, keep, draws).sum()
+    return jax.vmap(one)(start, data, draws).sum()
 
 
 class GenericLikelihood:
@@ -72,9 +72,9 @@ class GenericLikelihood:
 
     def __init__(
         self, model: ArrayModel, specific_force, angular_rate, start, draws=4, steps=3,
-        saturated=None,
+        saturated=None, time=None,
     ):  # fmt: skip
-        self.given: Problem = problem(model, specific_force, angular_rate, saturated)
+        self.given: Problem = problem(model, specific_force, angular_rate, saturated, time=time)
         seen = self.given.keep.reshape(len(self.given.keep), -1, 3).any(axis=1).all(axis=1)
         if not seen.all():
             raise InputError(
@@ -92,9 +92,8 @@ class GenericLikelihood:
                 self.steps,
                 self.start,
                 np.asarray(parameters),
-                given.specific_force,
-                given.angular_rate,
-                given.keep,
+                (given.specific_force, given.angular_rate, given.keep, given.time),
+                given.span,
                 given.whiten_force,
                 given.whiten_rate[0],  # the declared noise, the same in every sample
                 normals,

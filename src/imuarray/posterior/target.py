@@ -74,8 +74,8 @@ class CompiledTarget:
 class GenericTarget:
     """Any model: ``estimate(theta, rng)`` returns log p-hat; one Python step at a time.
 
-    ``scale`` (size,) turns the walk's one step length into a step per parameter, since
-    effects have units of their own.
+    ``scale``, (size,) or a lower factor (size, size), turns the walk's one step length into a
+    step per parameter: effects have units of their own, and gauges that tie them together.
     """
 
     estimate: object
@@ -91,11 +91,14 @@ class GenericTarget:
         """log prior + log p-hat with fresh draws."""
         return self.prior.log_density(theta) + self.estimate(theta, rng)
 
+    def _shaped(self, normals):
+        return self.scale @ normals if self.scale.ndim == 2 else self.scale * normals
+
     def transitions(self, theta, log_target, step, count, rng) -> tuple[int, float]:
         """`Target.transitions` in plain Python."""
         accepted = 0
         for _ in range(count):
-            proposal = theta + step * self.scale * rng.standard_normal(self.size)
+            proposal = theta + step * self._shaped(rng.standard_normal(self.size))
             value = self.log_target(proposal, rng)
             if np.log(rng.random()) < value - log_target:
                 theta[:], log_target = proposal, value

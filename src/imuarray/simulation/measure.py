@@ -15,7 +15,13 @@ def clip(values, rail):
 
 
 def measure(
-    model: ArrayModel, motion: Motion, positions, rng, parameters=(), gyroscope_range=np.inf
+    model: ArrayModel,
+    motion: Motion,
+    positions,
+    rng,
+    parameters=(),
+    gyroscope_range=np.inf,
+    time=None,
 ):
     """y_a, y_g and which gyroscope axes saturated, for motion fields (..., T, 3).
 
@@ -25,12 +31,13 @@ def measure(
         fields (realisations, T, 3)
     parameters : (P,) effect parameters
     gyroscope_range : float, rad/s
+    time : (T,) s, which drifts, shifts and clocks look at
 
     Returns
     -------
     specific_force (..., T, A, 3) m/s^2, angular_rate (..., T, G, 3) rad/s, saturated (same)
     """
-    ideal = model.predict_many(motion, positions, parameters)
+    ideal = model.predict_many(motion, positions, parameters, time)
     shape = np.shape(motion.angular_rate)[:-1]
     force_noise, rate_noise = model.noise.draw(rng, shape)
     rate, saturated = clip(ideal.angular_rate + rate_noise, gyroscope_range)

@@ -55,9 +55,10 @@ def simulate_samples(
     prior mean), both in metres; ``time`` (T,) s defaults to one sample a second.
     """
     relative = positions - positions[0]
-    force, rate, _ = measure(model, motion, relative, rng, parameters, gyroscope_range)
+    samples = len(motion.angular_rate)
+    time = np.arange(samples, dtype=float) if time is None else np.asarray(time, float)
+    force, rate, _ = measure(model, motion, relative, rng, parameters, gyroscope_range, time)
     force, _ = clip(force, accelerometer_range)
-    time = np.arange(len(force), dtype=float) if time is None else np.asarray(time, float)
     ranges = (accelerometer_range, gyroscope_range)
     recording = _recording(model, time, force, rate, nominal, ranges, position_prior_sd, title)
     return recording, _truth(motion, relative, parameters)
