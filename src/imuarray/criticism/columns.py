@@ -1,0 +1,96 @@
+"""Which parameter is which: columns of an IMU's derivative block, and where they live.
+
+Every parameter of the model, positions included, belongs to one IMU, and concerns its readings
+alone. So the derivative of a sample by all parameters is a block per IMU, (N, 6, m).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from imuarray.geometry import Array
+from imuarray.model import EFFECTS, ArrayModel
+from imuarray.model.noise import Noise
+
+POSITION = "position"
+# Effects that a score at zero cannot see: an instant or a frequency is to be found first.
+SCANNED = ("sensor_clock", "position_shift")
+HELD = {"position_shift": (3,)}  # parameters that the scan fixes: no derivative by an instant
+
+
+@dataclass(frozen=True)
+class Columns:
+    """The m columns of an IMU's block: ``names`` (m,) the effect of each, ``places`` (m,) where.
+
+    ``owner`` (N, m) says which IMUs have the parameter.
+    """
+
+    model: ArrayModel
+    names: tuple[str, ...]
+    places: tuple[tuple[int, ...], ...]
+    owner: np.ndarray
+    prior_sd: np.ndarray
+
+    def of(self, effect: str) -> np.ndarray:
+        """The columns of an effect (or of the positions)."""
+        return np.flatnonzero([name == effect for name in self.names])
+
+    @property
+    def size(self) -> int:
+        """m."""
+        return len(self.names)
+
+
+def full_model(array: Array, effects) -> ArrayModel:
+    """The model with all effects; its noise is not looked at."""
+    noise = Noise(np.eye(3 * array.accelerometers), np.eye(3 * array.gyroscopes))
+    return ArrayModel(array, noise, tuple(effects))
+
+
+def columns_of(array: Array, effects, position_sd: float) -> Columns:
+    """The columns for an array and a set of effects."""
+    model = full_model(array, effects)
+    count = max(array.accelerometers, array.gyroscopes)
+    names, places, owner, sds = [POSITION] * 3, [(i,) for i in range(3)], [], [position_sd] * 3
+    owner += [(np.arange(count) < array.accelerometers) & (np.arange(count) > 0)] * 3
+    for item, shape in zip(model.chain, model.shapes, strict=True):
+        spread = np.broadcast_to(item.prior_sd, shape)[0]
+        held = HELD.get(item.id, ())
+        for place in np.ndindex(*shape[1:]):
+            names.append(item.id)
+            places.append(place)
+            free = not (place and place[-1] in held)
+            owner.append((np.arange(count) < shape[0]) & free)
+            sds.append(float(spread[place]))
+    return Columns(model, tuple(names), tuple(places), np.array(owner).T, np.array(sds))
+
+
+@cache
+def tangents(model: ArrayModel) -> np.ndarray:
+    """(m, 3 A + P): each column's direction, the same for all IMUs at once."""
+    count = 3 * model.array.accelerometers
+    starts = count + np.concatenate([[0], np.cumsum([np.prod(s) for s in model.shapes])])
+    rows = []
+    for axis in range(3):
+        row = np.zeros(count + model.effect_size)
+        row[axis:count:3] = 1.0
+        rows.append(row)
+    for start, shape in zip(starts[:-1].astype(int), model.shapes, strict=True):
+        for place in np.ndindex(*shape[1:]):
+            row = np.zeros(count + model.effect_size)
+            block = np.zeros(shape)
+            block[(slice(None), *place)] = 1.0
+            row[start : start + block.size] = block.ravel()
+            rows.append(row)
+    return np.array(rows)
+
+
+def catalogue_effects(without=()) -> tuple[str, ...]:
+    """The mean effects that a diagnosis considers, in the catalogue's fixed order."""
+    return tuple(name for name in EFFECTS if name not in without)
+
+
+__all__ = ["POSITION", "SCANNED", "Columns", "catalogue_effects", "columns_of", "tangents"]

@@ -1,0 +1,213 @@
+"""Is anything left? Tests of the residual against what no named cause need explain.
+
+For each reading's axis, regressions on a wide set of features of the motion and of time, the
+fitted parameters and the motion projected out; and the residual's size, colour and company.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from imuarray.criticism.fit import Fit
+from imuarray.criticism.noise import Noise, standardised, tail_log_p
+from imuarray.criticism.scores import Evidence, log_tail, robust_inverse
+
+SEEN = 1e-4
+CROWD = 1.3  # axes' tests are not quite independent: variance of their sum against chi-square's
+
+
+class Check(NamedTuple):
+    """A test of what is left: name, statistic, log p with its multiplicity, whose."""
+
+    name: str
+    statistic: float
+    log_p: float
+    imus: tuple[int, ...]
+
+
+def features(fit: Fit, imu: int) -> dict[str, np.ndarray]:
+    """Groups of features of an IMU's own motion, each (T, n) with unit mean square."""
+    motion, state = fit.state.motion, fit.state
+    rate, turn = motion[:, :3], motion[:, 3:6]
+    place = state.positions[min(imu, len(state.positions) - 1)]
+    force = np.cross(rate, np.cross(rate, place)) + np.cross(turn, place) + motion[:, 6:]
+    jerk, force_rate = state.derivatives[0], state.derivatives[1]
+    time = 2 * fit.readings.time[:, None] / fit.readings.span - 1
+    pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
+    groups = {
+        "offset": np.ones((len(rate), 1)),
+        "force": force,
+        "force squared": np.stack([force[:, i] * force[:, j] for i, j in pairs], 1),
+        "force cubed": force**3,
+        "force's size": np.abs(force),
+        "rate": rate,
+        "rate squared": np.stack([rate[:, i] * rate[:, j] for i, j in pairs], 1),
+        "rate cubed": rate**3,
+        "omega dot": turn,
+        "omega dot squared": np.sum(turn**2, axis=1, keepdims=True),
+        "force rate": force_rate,
+        "omega double dot": jerk,
+        "force rate's sign": np.sign(force_rate),
+        "time": np.hstack([time, time**2, time**3]),
+        "force in time": time * force,
+        "rate in time": time * rate,
+    }
+    sizes = {name: np.sqrt(np.mean(value**2, axis=0)) for name, value in groups.items()}
+    return {n: v / np.where(sizes[n] > 0, sizes[n], 1.0) for n, v in groups.items()}
+
+
+def regression_checks(fit: Fit, given: Evidence, noise: Noise) -> list[Check]:
+    """Each group of features over all axes, and each IMU's axes over all features."""
+    active = given.places(fit.active)
+    inner = robust_inverse(given.information[np.ix_(active, active)] + np.diag(given.ridge[active]))
+    pairs = np.argwhere(fit.columns.owner)[active]
+    through = fit.through[:, :, pairs[:, 0], pairs[:, 1]]
+    samples, count = fit.residual.shape[:2]
+    basis = fit.basis.reshape(samples, count, 6, 9)
+    groups: dict[str, list] = {}
+    axes = []
+    for imu in range(count):
+        table = features(fit, imu)
+        names = np.repeat(list(table), [v.shape[1] for v in table.values()])
+        stacked = np.hstack(list(table.values()))
+        for axis in range(6):
+            if not fit.readings.exists[imu, axis // 3]:
+                continue
+            seen = -np.einsum("ti,tia->ta", basis[:, imu, axis], through)
+            own = np.flatnonzero(pairs[:, 0] == imu)
+            seen[:, own] += fit.whitened[:, imu, axis][:, pairs[own, 1]]
+            kept = fit.readings.keep[:, imu, axis].astype(float)
+            free = kept - np.sum(basis[:, imu, axis] ** 2, axis=1)
+            score = stacked.T @ fit.residual[:, imu, axis]
+            cross = stacked.T @ seen
+            block = stacked.T @ (free[:, None] * stacked) - cross @ inner @ cross.T
+            bare = np.diag(stacked.T @ (kept[:, None] * stacked))
+            # slow regressors see coloured noise larger than its sd, at most by this
+            rho = max(noise.correlation[imu, axis // 3], 0.0)
+            block = block * ((1 + rho) / (1 - rho))
+            for name in table:
+                chosen = np.flatnonzero(names == name)
+                groups.setdefault(name, []).append((imu, *_chi(block, score, bare, chosen)))
+            axes.append((imu, *_chi(block, score, bare, np.arange(len(names)))))
+    checks = [_pooled(f"residual against {name}", found) for name, found in groups.items()]
+    return [*checks, _pooled("residual against all", axes), _worst("an axis against all", axes)]
+
+
+def _chi(block, score, bare, chosen):
+    """(chi-square, degrees of freedom) of some features."""
+    scale = np.sqrt(np.maximum(bare[chosen], 1e-300))
+    values, vectors = np.linalg.eigh(block[np.ix_(chosen, chosen)] / np.outer(scale, scale))
+    seen = values > SEEN
+    along = vectors[:, seen].T @ (score[chosen] / scale)
+    return float(np.sum(along**2 / values[seen])), int(seen.sum())
+
+
+def _pooled(name, found) -> Check:
+    """All axes together: the sum of chi-squares, its variance widened by `CROWD`."""
+    total, freedom = sum(f[1] for f in found), max(sum(f[2] for f in found), 1)
+    widened = freedom + (total - freedom) / np.sqrt(CROWD)
+    worst = max(found, key=lambda f: f[1] - f[2])
+    return Check(name, total / freedom, log_tail(max(widened, 1e-9), freedom), (worst[0],))
+
+
+def _worst(name, found) -> Check:
+    """The worst axis, all of them allowed for."""
+    tested = [(log_tail(max(f[1], 1e-9), max(f[2], 1)), f) for f in found]
+    log_p, worst = min(tested, key=lambda t: t[0])
+    return Check(
+        name, worst[1] / max(worst[2], 1), min(log_p + np.log(len(found)), 0.0), (worst[0],)
+    )
+
+
+def size_checks(fit: Fit) -> list[Check]:
+    """Does the residual's size grow with the motion's? A regression of its square per triad."""
+    motion = fit.state.motion
+    sizes = {
+        "omega": motion[:, :3], "omega dot": motion[:, 3:6], "specific force": motion[:, 6:9],
+        "jerk": fit.state.derivatives[1],
+    }  # fmt: skip
+    unit = standardised(fit)
+    triads = np.argwhere(fit.readings.exists)
+    checks = []
+    for name, values in sizes.items():
+        size = np.sum(values**2, axis=1)
+        if not np.any(size):
+            continue
+        trend = (size - size.mean()) / size.std()
+        found = []
+        for imu, kind in triads:
+            square = unit[:, imu, 3 * kind : 3 * kind + 3] ** 2
+            average = np.nanmean(square)
+            excess = np.nan_to_num(square / average - 1).sum(axis=1)
+            spread = np.sqrt(np.sum((trend * excess) ** 2))
+            found.append((int(imu), float((trend @ excess) / spread)))
+        checks.append(_normal_checks(f"residual's size against {name}", found))
+    return checks
+
+
+def _normal_checks(name, found) -> Check:
+    """Worst and pooled of standard normals that are expected near zero."""
+    worst = max(found, key=lambda f: abs(f[1]))
+    single = norm.logsf(abs(worst[1])) + np.log(2 * len(found))
+    pooled = chi2.logsf(sum(z**2 for _, z in found), len(found))
+    return Check(name, worst[1], float(min(single, pooled, -np.log(2)) + np.log(2)), (worst[0],))
+
+
+def company_check(fit: Fit) -> Check:
+    """Correlations between axes beyond what the common motion explains."""
+    samples = len(fit.residual)
+    flat = np.where(fit.readings.keep, fit.residual, 0.0).reshape(samples, -1)
+    basis = fit.basis
+    kept = fit.readings.keep.reshape(samples, -1).astype(float)
+    expected = -np.einsum("tri,tsi->rs", basis, basis, optimize=True)
+    free = (kept - np.sum(basis**2, axis=2)) ** 0.5
+    spread = np.sqrt((free**2).T @ free**2)
+    there = np.flatnonzero(kept.any(axis=0))
+    z = (flat.T @ flat - expected) / np.maximum(spread, 1e-9)
+    upper = np.triu_indices(len(there), 1)
+    values = z[np.ix_(there, there)][upper]
+    place = int(np.argmax(np.abs(values)))
+    log_p = norm.logsf(abs(values[place])) + np.log(2 * len(values))
+    imus = sorted({int(there[i[place]] // 6) for i in upper})
+    return Check(
+        "correlation between sensors", float(values[place]), float(min(log_p, 0.0)), tuple(imus)
+    )
+
+
+def noise_checks(noise: Noise, exists) -> list[Check]:
+    """Outliers and colour that are still there."""
+    triads = np.argwhere(exists)
+    tails = tail_log_p(noise)
+    worst = min(triads, key=lambda t: tails[tuple(t)])
+    lone = Check(
+        "outliers", float(noise.outliers[tuple(worst)]),
+        float(min(tails[tuple(worst)] + np.log(len(triads)), 0.0)), (int(worst[0]),),
+    )  # fmt: skip
+    found = [(int(i), float(noise.slope[i, k])) for i, k in triads]
+    return [lone, _normal_checks("whiteness", found)]
+
+
+def resolution_check(fit: Fit) -> Check:
+    """Are readings coarser than their noise? The least step between values against the sd."""
+    readings, worst = fit.readings, (0.0, 0)
+    for imu, kind in np.argwhere(readings.exists):
+        values = readings.values[:, imu, 3 * kind]
+        distinct = np.unique(np.round(values, 9))
+        if len(distinct) < 0.5 * len(values):
+            step = float(np.median(np.diff(distinct)[np.diff(distinct) > 1e-9]))
+            worst = max(worst, (step / readings.sd[imu, kind], int(imu)))
+    return Check("resolution", worst[0], -50.0 if worst[0] > 2.0 else 0.0, (worst[1],))
+
+
+def all_checks(fit: Fit, given: Evidence, noise: Noise) -> list[Check]:
+    """Everything that is tested of a residual."""
+    return [
+        *regression_checks(fit, given, noise), *size_checks(fit), company_check(fit),
+        *noise_checks(noise, fit.readings.exists), resolution_check(fit),
+    ]  # fmt: skip
+
+
+__all__ = ["Check", "all_checks", "features"]

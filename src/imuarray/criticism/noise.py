@@ -1,0 +1,151 @@
+"""The noise of each triad: scale, colour and outliers, told apart from smooth misfit.
+
+Misfit that the motion causes is smooth in time, noise is not: fourth differences and the upper
+half of the spectrum show the noise whatever the means get wrong.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import norm, poisson
+
+from imuarray.criticism.fit import Fit
+from imuarray.criticism.readings import Readings
+
+DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / np.sqrt(70.0)
+HALF = len(DIFFERENCE) // 2
+# autocorrelations of differenced white noise at lags 1 ... 4
+ECHO = np.correlate(DIFFERENCE, DIFFERENCE, "full")[len(DIFFERENCE) :]
+# so many differences are worth one independent value in a mean square
+WORTH = float(1 + 2 * np.sum(ECHO**2))
+FAR = 4.0  # sds of a difference; beyond is an outlier's
+COLOURED = 4.5  # sds of the spectrum's slope from which noise is not white
+
+
+class Noise(NamedTuple):
+    """What the fast part of the residual says of each triad; arrays are (N, 2)."""
+
+    sd: np.ndarray  # noise sd, m/s^2 and rad/s
+    error: np.ndarray  # relative standard error of it
+    outliers: np.ndarray  # isolated far triad-samples
+    expected: np.ndarray  # of them in Gaussian noise
+    slope: np.ndarray  # log ratio of the top bands' power, in its sds
+    correlation: np.ndarray  # of the AR(1) that has this slope, 0 where it is not significant
+    far: np.ndarray  # (T, N, 2) bool, the outliers
+
+
+def fast_part(values, run) -> np.ndarray:
+    """Fourth differences centred on each sample (T, ...), unit gain for white noise.
+
+    NaN where the five samples are not in one run, or any is NaN.
+    """
+    out = np.full(values.shape, np.nan)
+    inner = len(values) - 2 * HALF
+    out[HALF : HALF + inner] = sum(tap * values[i : i + inner] for i, tap in enumerate(DIFFERENCE))
+    broken = run[2 * HALF :] != run[: -2 * HALF]
+    out[HALF : HALF + inner][broken] = np.nan
+    return out
+
+
+def per_triad(values) -> np.ndarray:
+    """(T, N, 6) as (N, 2, 3 T): a triad's samples and axes together."""
+    moved = values.reshape(len(values), -1, 2, 3)
+    return np.moveaxis(moved, 0, -1).reshape(moved.shape[1], 2, -1)
+
+
+def standardised(fit: Fit) -> np.ndarray:
+    """Residuals of unit variance where noise is as assumed (T, N, 6), NaN where left out."""
+    share = np.sqrt(np.maximum(1.0 - fit.leverage, 1e-6))
+    return np.where(fit.readings.keep, fit.residual / share, np.nan)
+
+
+def judge(fit: Fit) -> Noise:
+    """The noise of each triad from a fit's residual."""
+    readings = fit.readings
+    unit = standardised(fit)
+    fast = fast_part(unit, readings.run)
+    values = np.where(readings.exists[..., None], per_triad(fast), 1.0)
+    counts = np.maximum(np.sum(np.isfinite(values), axis=-1), 1)
+    core = np.nanmedian(np.abs(values), axis=-1) / norm.ppf(0.75)
+    scale = np.sqrt(np.nanmean(values**2, axis=-1))
+    far = _outliers(fast, core)
+    expected = 2 * norm.sf(FAR) * counts
+    slope, correlation = _colour(np.nan_to_num(unit), readings)
+    passed = 1 + 2 * sum(echo * correlation ** (lag + 1) for lag, echo in enumerate(ECHO))
+    tails = np.nanmean(values**4, axis=-1) / scale**4 - 3.0
+    error = np.sqrt(np.maximum(2 + tails, 1.0) * WORTH / counts) / 2
+    sd = readings.sd * np.where(readings.exists, scale / np.sqrt(passed), 1.0)
+    return Noise(sd, error, far.sum(axis=0), expected, slope, correlation, far)
+
+
+def _outliers(fast, core) -> np.ndarray:
+    """Triad-samples that stand out of their neighbours, (T, N, 2) bool."""
+    size = np.abs(np.nan_to_num(fast)) / np.repeat(core, 3, axis=1)
+    worst = size.reshape(len(size), -1, 2, 3).max(axis=-1)
+    peak = worst > FAR
+    for shift in range(1, HALF + 1):
+        peak[shift:] &= worst[shift:] >= worst[:-shift]
+        peak[:-shift] &= worst[:-shift] >= worst[shift:]
+    return peak
+
+
+def _colour(unit, readings: Readings):
+    """(slope in sds, AR(1) correlation) from the upper spectrum of each triad, (N, 2)."""
+    power = np.abs(np.fft.rfft(unit, axis=0)) ** 2
+    part = np.fft.rfftfreq(len(unit))
+    low, high = (part >= 0.2) & (part < 0.35), part >= 0.35
+    bands = [power[band].reshape(band.sum(), -1, 2, 3) for band in (low, high)]
+    means = [np.maximum(b.mean(axis=(0, 3)), 1e-12) for b in bands]
+    ratio = np.log(means[1] / means[0])
+    error = np.sqrt(1 / (3 * low.sum()) + 1 / (3 * high.sum()))
+    slope = np.where(readings.exists, ratio / error, 0.0)
+    grid = np.linspace(-0.95, 0.98, 194)
+    expected = np.array([_ar_ratio(rho, part[low], part[high]) for rho in grid])
+    correlation = grid[np.argmin(np.abs(expected[:, None, None] - ratio), axis=0)]
+    return slope, np.where(np.abs(slope) > COLOURED, correlation, 0.0)
+
+
+def _ar_ratio(rho, low, high) -> float:
+    """Expected log ratio of the two bands' mean power for an AR(1)."""
+    power = [1 / (1 + rho**2 - 2 * rho * np.cos(2 * np.pi * f)) for f in (low, high)]
+    return float(np.log(power[1].mean() / power[0].mean()))
+
+
+def tail_log_p(noise: Noise) -> np.ndarray:
+    """log p of so many outliers in Gaussian noise, (N, 2)."""
+    return poisson.logsf(noise.outliers - 1, noise.expected)
+
+
+def coloured_meat(fit: Fit, information, correlation) -> np.ndarray | None:
+    """Covariance of the score (K, K) where triads have AR(1) noise; None where all is white."""
+    if not np.any(correlation):
+        return None
+    owner = fit.columns.owner
+    pairs = np.argwhere(owner)
+    through = fit.through[:, :, pairs[:, 0], pairs[:, 1]]
+    samples, count = fit.residual.shape[:2]
+    basis = fit.basis.reshape(samples, count, 6, 9)
+    meat = information.copy()
+    for imu, kind in np.argwhere(correlation != 0):
+        rows = slice(3 * kind, 3 * kind + 3)
+        seen = -(basis[:, imu, rows] @ through)
+        own = np.flatnonzero(pairs[:, 0] == imu)
+        seen[..., own] += fit.whitened[:, imu, rows][..., pairs[own, 1]]
+        spread = _ar_sum(seen, correlation[imu, kind])
+        flat = seen.reshape(-1, len(pairs))
+        meat += flat.T @ spread.reshape(-1, len(pairs))
+    return (meat + meat.T) / 2
+
+
+def _ar_sum(values, rho) -> np.ndarray:
+    """Sum over lags other than zero of rho^|lag| values, along the first axis."""
+    out = np.zeros_like(values)
+    for order in (slice(None), slice(None, None, -1)):
+        carried = np.zeros_like(values[0])
+        series, target = values[order], out[order]
+        for t in range(1, len(values)):
+            carried = rho * (carried + series[t - 1])
+            target[t] += carried
+    return out

@@ -1,0 +1,163 @@
+"""Effects that a score at zero cannot see: an instant or a frequency is to be found first."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from imuarray.criticism.columns import POSITION
+from imuarray.criticism.fit import Fit, normal
+from imuarray.criticism.scores import Candidate, Evidence, Score, log_tail, robust_inverse
+
+CUTS = 24  # instants tried at first
+LEAST_TURNS = 3  # of a clock against the host's; fewer are a drift of the delay
+
+
+class Found(NamedTuple):
+    """A scanned candidate's test and where its nonlinear parameters begin, by IMU."""
+
+    score: Score
+    values: dict[int, np.ndarray]
+
+
+def delay_score(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+    """Each sample's score and information of each IMU's delay, (T, N) each, motion projected."""
+    column = int(fit.columns.of("sensor_delay")[0])
+    along, through = fit.whitened[..., column], fit.through[..., column]
+    score = np.einsum("tki,tki->tk", along, fit.residual)
+    information = np.sum(along**2, axis=2) - np.sum(through**2, axis=1)
+    return score, np.maximum(information, 1e-300)
+
+
+def scan_clocks(fit: Fit, imus) -> list[Found]:
+    """A sawtooth age for each IMU and for all: periodogram of the delay's score, then its shape."""
+    score, information = delay_score(fit)
+    time, each = fit.readings.time, {}
+    for imu in imus:
+        each[imu] = _sawtooth(time, score[:, imu], information[:, imu])
+    found = [
+        Found(_clock_score((imu,), [gain], len(time), len(imus)), {imu: values})
+        for imu, (gain, values) in each.items()
+    ]
+    if len(imus) > 1:
+        gains = [gain for gain, _ in each.values()]
+        values = {imu: value for imu, (_, value) in each.items()}
+        found.append(Found(_clock_score(tuple(imus), gains, len(time), 1, True), values))
+    return found
+
+
+def _clock_score(imus, gains, samples, count, whole=False) -> Score:
+    freedom = 4 * len(imus)
+    log_p = log_tail(sum(gains), freedom) + len(imus) * np.log(samples) + np.log(2 * count)
+    return Score(
+        Candidate("sensor_clock", imus, whole=whole), float(sum(gains)), freedom, min(log_p, 0.0)
+    )
+
+
+def _sawtooth(time, score, information):
+    """(gain in chi-square, (P, f, phi, c)) of the best sawtooth age of one IMU."""
+    step = np.median(np.diff(time))
+    place = np.round((time - time[0]) / step).astype(int)
+    size = 2 ** int(np.ceil(np.log2(4 * (place[-1] + 1))))
+    grid = np.zeros(size)
+    np.add.at(grid, place, score - information * score.sum() / information.sum())
+    power = np.abs(np.fft.rfft(grid)) ** 2
+    frequency = np.fft.rfftfreq(size, step)
+    power[frequency * (time[-1] - time[0]) < LEAST_TURNS] = 0.0
+    best = (0.0, np.array([0.0, 0.0, 0.0, 0.0]))
+    width = frequency[1]
+    for guess in frequency[np.argsort(power)[-3:]]:
+        for fine in (1.0, 0.25, 0.06):
+            around = best[1][1] if fine < 1 and best[0] > 0 else guess
+            for trial in around + fine * width * np.linspace(-1, 1, 9):
+                best = max(best, _shape(time, score, information, trial), key=lambda b: b[0])
+    return best
+
+
+def _shape(time, score, information, frequency, phases=32):
+    """Best phase of a sawtooth of given frequency: period and offset by weighted least squares."""
+    turns = frequency * time
+    start = np.arange(phases) / phases
+    shape = np.mod(turns[:, None] + start, 1.0) - 0.5
+    weighted = information[:, None] * shape
+    a, b, c = np.sum(weighted * shape, 0), weighted.sum(0), information.sum()
+    # the reading is taken age earlier: the delay is minus the age
+    right, total = -(score @ shape), -score.sum()
+    determinant = np.maximum(a * c - b**2, 1e-300)
+    period, offset = (c * right - b * total) / determinant, (a * total - b * right) / determinant
+    gain = period * right + offset * total
+    k = int(np.argmax(gain))
+    values = np.array([period[k], frequency, start[k], offset[k]])
+    if values[0] < 0:  # the same sawtooth with time reversed has a positive period
+        values = np.array([-period[k], -frequency, -start[k], offset[k]])
+    return float(gain[k]), values
+
+
+def scan_shifts(fit: Fit, given: Evidence, imus) -> list[Found]:
+    """A step of each triad's position, at the instant where it gains most."""
+    active = given.places(fit.active)
+    chosen = fit.columns.of(POSITION)
+    outside = robust_inverse(
+        given.information[np.ix_(active, active)] + np.diag(given.ridge[active])
+    )
+    edges = np.linspace(0, len(fit.residual), CUTS + 1).astype(int)
+    found = []
+    for imu in imus:
+        mask = fit.active.copy()
+        mask[imu, chosen] = True
+        parts = [normal(fit.residual, fit.whitened, fit.through, mask, slice(a, b))
+                 for a, b in zip(edges[:-1], edges[1:], strict=True)]  # fmt: skip
+        own, rest = _places(mask, fit.active, imu, chosen)
+        best = (0.0, 0, np.zeros(3))
+        for cut in range(1, CUTS):
+            gain, shift = _step_gain(parts[cut:], own, rest, outside)
+            best = max(best, (gain, edges[cut], shift), key=lambda b: b[0])
+        gain, place, shift = best
+        log_p = log_tail(gain, 3) + np.log(2 * len(imus) * CUTS)
+        score = Score(Candidate("position_shift", (imu,)), gain, 3, min(log_p, 0.0))
+        found.append(Found(score, {imu: np.append(shift, fit.readings.time[place])}))
+    return found
+
+
+def _places(mask, active, imu, chosen):
+    """Places in the mask's parameters of the IMU's position, and of the active ones."""
+    number = np.full(mask.shape, -1)
+    number[mask] = np.arange(mask.sum())
+    return number[imu, chosen], number[active]
+
+
+def _step_gain(parts, own, rest, outside):
+    """(chi-square, shift (3,) m) of a position step over the given stretches of time."""
+    information = sum(part[0] for part in parts)
+    score = sum(part[1] for part in parts)[own]
+    cross = information[np.ix_(own, rest)]
+    block = information[np.ix_(own, own)] - cross @ outside @ cross.T
+    inverse = robust_inverse(block)
+    shift = inverse @ score
+    return float(score @ shift), shift
+
+
+def refine_instant(fit: Fit, imu: int, around: float) -> float:
+    """The instant of an adopted step, to a sample: where moving it gains most.
+
+    The step's derivative, taken from the residual sample by sample, is added before or removed
+    after; the shift itself stays.
+    """
+    columns, state = fit.columns, fit.state
+    place = np.flatnonzero(columns.of(POSITION) >= 0)
+    chosen = columns.of(POSITION)[place]
+    shift = columns.model.split(state.parameters)["position_shift"][imu, :3]
+    along = fit.whitened[:, imu][..., chosen] @ shift
+    through = fit.through[:, :, imu, chosen] @ shift
+    linear = np.einsum("ti,ti->t", along, fit.residual[:, imu])
+    square = np.sum(along**2, axis=1) - np.sum(through**2, axis=1)
+    after = fit.readings.time >= around
+    # switching the step off where it is on costs s + i / 2, on where it is off -s + i / 2
+    change = np.where(after, linear + square / 2, -(linear - square / 2))
+    # cost of starting at sample n instead: samples between change their state
+    first = int(np.argmax(after)) if after.any() else len(after) - 1
+    forward = np.concatenate([[0.0], np.cumsum(change[first:])])
+    backward = np.concatenate([[0.0], np.cumsum(-(linear - square / 2)[:first][::-1])])[::-1]
+    cost = np.concatenate([backward[:-1], forward[:-1]])
+    return float(fit.readings.time[int(np.argmin(cost))])
