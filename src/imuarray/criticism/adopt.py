@@ -59,6 +59,7 @@ class Search:
     given: Evidence | None = None
     refused: set = field(default_factory=set)
     excess: float = 0.0  # of the misfit, before any cause
+    allowed: np.ndarray | None = None  # readings that count, outliers included
     trace: list = field(default_factory=list)
 
     @property
@@ -95,6 +96,7 @@ class Search:
         """The papers' model."""
         first = start(self.readings, self.columns)
         self.smooth = is_smooth(self.readings, first.motion)
+        self.allowed = self.readings.keep
         self.refit(first)
         self.excess = max(self.fit.misfit - self.fit.free, 0.0)
 
@@ -119,7 +121,10 @@ def proposals(search: Search):
     taken = {(c.effect, k) for c in search.causes for k in c.imus}
     if "sensor_clock" in search.effects and search.smooth:
         imus = [k for k in both if ("sensor_clock", k) not in taken]
-        found += scan_clocks(search.fit, imus) if imus else []
+        delays = {
+            s.candidate.imus: s.statistic for s, _ in found if s.candidate.effect == "sensor_delay"
+        }
+        found += scan_clocks(search.fit, imus, delays) if imus else []
     if "position_shift" in search.effects:
         imus = [int(k) for k in np.flatnonzero(exists[:, 0]) if ("position_shift", k) not in taken]
         found += scan_shifts(search.fit, search.given, imus)

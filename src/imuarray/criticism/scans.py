@@ -11,6 +11,8 @@ from imuarray.criticism.fit import Fit, normal
 from imuarray.criticism.scores import Candidate, Evidence, Score, log_tail, robust_inverse
 
 CUTS = 24  # instants tried at first
+BELIEVED = -8.0  # log p of a sawtooth beyond a constant delay
+FAIR = 0.05  # of the constant delay's chi-square
 LEAST_TURNS = 3  # of a clock against the host's; fewer are a drift of the delay
 
 
@@ -30,33 +32,49 @@ def delay_score(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     return score, np.maximum(information, 1e-300)
 
 
-def scan_clocks(fit: Fit, imus) -> list[Found]:
-    """A sawtooth age for each IMU and for all: periodogram of the delay's score, then its shape."""
+def scan_clocks(fit: Fit, imus, delays: dict) -> list[Found]:
+    """A sawtooth age for each IMU, and for those together that show one beyond a constant delay.
+
+    ``delays`` (imu tuple -> chi-square of a constant delay) is what a clock must go beyond: its
+    sawtooth counts on top, and must be worth a fair share of it (a delay that is large leaves a
+    little that a sawtooth can use, until it is adopted).
+    """
     score, information = delay_score(fit)
     time, each = fit.readings.time, {}
     for imu in imus:
-        each[imu] = _sawtooth(time, score[:, imu], information[:, imu])
+        gain, values = _sawtooth(time, score[:, imu], information[:, imu])
+        log_p = log_tail(max(gain, 1e-9), 3) + np.log(2 * len(time) * len(imus))
+        if log_p < BELIEVED and gain > FAIR * delays.get((imu,), 0.0):
+            each[imu] = (gain, values)
+    for imu in list(each):
+        if any(_echo(each[imu], other) for other in each.values()):
+            del each[imu]
     found = [
-        Found(_clock_score((imu,), [gain], len(time), len(imus)), {imu: values})
+        Found(_clock_score((imu,), gain, delays, len(time), len(imus)), {imu: values})
         for imu, (gain, values) in each.items()
     ]
-    if len(imus) > 1:
-        gains = [gain for gain, _ in each.values()]
-        values = {imu: value for imu, (_, value) in each.items()}
-        found.append(Found(_clock_score(tuple(imus), gains, len(time), 1, True), values))
+    if len(each) > 1:
+        gain = sum(gain for gain, _ in each.values())
+        several = _clock_score(tuple(each), gain, delays, len(time), 1)
+        found.append(Found(several, {imu: values for imu, (_, values) in each.items()}))
     return found
 
 
-def _clock_score(imus, gains, samples, count, whole=False) -> Score:
+def _echo(one, other) -> bool:
+    """Whether a sawtooth is what a far stronger one of the same frequency leaves elsewhere."""
+    same = abs(abs(one[1][1]) - abs(other[1][1])) < 0.1
+    return same and one[0] < 0.2 * other[0]
+
+
+def _clock_score(imus, gain, delays, samples, count) -> Score:
     freedom = 4 * len(imus)
-    log_p = log_tail(sum(gains), freedom) + len(imus) * np.log(samples) + np.log(2 * count)
-    return Score(
-        Candidate("sensor_clock", imus, whole=whole), float(sum(gains)), freedom, min(log_p, 0.0)
-    )
+    statistic = gain + delays.get(imus, sum(delays.get((imu,), 0.0) for imu in imus))
+    log_p = log_tail(statistic, freedom) + len(imus) * np.log(samples) + np.log(2 * count)
+    return Score(Candidate("sensor_clock", imus), float(statistic), freedom, min(log_p, 0.0))
 
 
 def _sawtooth(time, score, information):
-    """(gain in chi-square, (P, f, phi, c)) of the best sawtooth age of one IMU."""
+    """(gain over a constant in chi-square, (P, f, phi, c)) of one IMU's best sawtooth age."""
     step = np.median(np.diff(time))
     place = np.round((time - time[0]) / step).astype(int)
     size = 2 ** int(np.ceil(np.log2(4 * (place[-1] + 1))))
@@ -86,7 +104,7 @@ def _shape(time, score, information, frequency, phases=32):
     right, total = -(score @ shape), -score.sum()
     determinant = np.maximum(a * c - b**2, 1e-300)
     period, offset = (c * right - b * total) / determinant, (a * total - b * right) / determinant
-    gain = period * right + offset * total
+    gain = period * right + offset * total - total**2 / np.maximum(c, 1e-300)
     k = int(np.argmax(gain))
     values = np.array([period[k], frequency, start[k], offset[k]])
     if values[0] < 0:  # the same sawtooth with time reversed has a positive period
