@@ -1,0 +1,195 @@
+"""Effects of the catalogue on the sensors' mean: bias, scale, axes, curvature, place.
+
+u is the true specific force at a triad and w the true angular rate, at the sensor's own instants.
+Each function returns the parts of a `Change`; ``size`` is the sd of the drawn entries.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from imuarray.blind.change import (
+    UNIT_FORCE,
+    UNIT_RATE,
+    Parameter,
+    applied,
+    effect,
+    entries,
+    kind_names,
+    which_kinds,
+)
+from imuarray.blind.scene import ACCELEROMETER_RAIL, GYROSCOPE_RAIL, Pair
+
+DEGREE = float(np.radians(1.0))
+GRAVITY = 9.80665  # m/s^2
+# What a drift of amplitude 1 adds up to in the course of a recording.
+DRIFT_FORCE, DRIFT_RATE = 0.1, 0.3 * DEGREE
+
+
+def _off_diagonal(rng, sensors, size) -> np.ndarray:
+    """Matrices (n, 3, 3) without diagonal."""
+    return entries(rng, sensors, size, 3, 3) * (1 - np.eye(3))
+
+
+@effect(UNIT_FORCE, 0.01, 0.1)
+def accelerometer_bias(scene, rng, sensors, size):
+    """u + b; size in m/s^2."""
+    bias = entries(rng, sensors, size)
+    return {
+        "parameters": {"bias": Parameter(bias, UNIT_FORCE)},
+        "force_error": lambda field: bias,
+    }
+
+
+@effect("1", 1e-3, 0.03)
+def accelerometer_scale(scene, rng, sensors, size):
+    """(1 + c_i) u_i."""
+    scale = entries(rng, sensors, size)
+    return {
+        "parameters": {"scale": Parameter(scale, "1")},
+        "force_error": lambda field: scale * field.force[:, list(sensors)],
+    }
+
+
+@effect("1", 1e-3, 0.02)
+def accelerometer_misalignment(scene, rng, sensors, size):
+    """u + M u, M without diagonal."""
+    matrix = _off_diagonal(rng, sensors, size)
+    return {
+        "parameters": {"misalignment": Parameter(matrix, "1")},
+        "force_error": lambda field: applied(matrix, field.force[:, list(sensors)]),
+    }
+
+
+@effect("s2 m-1", 0.0015 / ACCELEROMETER_RAIL, 0.005 / ACCELEROMETER_RAIL)
+def accelerometer_nonlinearity(scene, rng, sensors, size):
+    """u_i + c_i u_i^2; size in s^2/m."""
+    curvature = entries(rng, sensors, size)
+    return {
+        "parameters": {"curvature": Parameter(curvature, "s2 m-1")},
+        "force_error": lambda field: curvature * field.force[:, list(sensors)] ** 2,
+    }
+
+
+@effect("m", 1e-4, 1.5e-3)
+def size_effect(scene, rng, sensors, size):
+    """Axis i of triad k sits at r_k + d_k,i; size in metres; value (n, axis i, 3)."""
+    arms = entries(rng, sensors, size, 3, 3)
+
+    def error(field):
+        seen = [field.lever(arms[:, axis], sensors)[..., axis] for axis in range(3)]
+        return np.stack(seen, axis=-1)
+
+    return {"parameters": {"lever_arm": Parameter(arms, "m")}, "force_error": error}
+
+
+@effect(UNIT_RATE, 0.01 * DEGREE, DEGREE)
+def gyroscope_bias(scene, rng, sensors, size):
+    """w + b; size in rad/s."""
+    bias = entries(rng, sensors, size)
+    return {
+        "parameters": {"bias": Parameter(bias, UNIT_RATE)},
+        "rate_error": lambda field: bias,
+    }
+
+
+@effect("1", 1e-3, 0.03)
+def gyroscope_scale(scene, rng, sensors, size):
+    """(1 + c_i) w_i."""
+    scale = entries(rng, sensors, size)
+    return {
+        "parameters": {"scale": Parameter(scale, "1")},
+        "rate_error": lambda field: scale * field.rate[:, list(sensors)],
+    }
+
+
+@effect("1", 1e-3, 0.02)
+def gyroscope_misalignment(scene, rng, sensors, size):
+    """w + M w, M without diagonal."""
+    matrix = _off_diagonal(rng, sensors, size)
+    return {
+        "parameters": {"misalignment": Parameter(matrix, "1")},
+        "rate_error": lambda field: applied(matrix, field.rate[:, list(sensors)]),
+    }
+
+
+@effect("rad s m-1", 0.03 * DEGREE / GRAVITY, 0.3 * DEGREE / GRAVITY)
+def gyroscope_g_sensitivity(scene, rng, sensors, size):
+    """w + G u, u the specific force at the same IMU; size in rad/s per m/s^2."""
+    matrix = entries(rng, sensors, size, 3, 3)
+    return {
+        "parameters": {"sensitivity": Parameter(matrix, "rad s m-1")},
+        "rate_error": lambda field: applied(matrix, field.force_at_gyroscopes[:, list(sensors)]),
+    }
+
+
+@effect("s rad-1", 0.0006 / GYROSCOPE_RAIL, 0.002 / GYROSCOPE_RAIL)
+def gyroscope_nonlinearity(scene, rng, sensors, size):
+    """w_i + c_i w_i^2; size in s/rad."""
+    curvature = entries(rng, sensors, size)
+    return {
+        "parameters": {"curvature": Parameter(curvature, "s rad-1")},
+        "rate_error": lambda field: curvature * field.rate[:, list(sensors)] ** 2,
+    }
+
+
+@effect("0.1 m s-2 or 0.3 deg s-1", 0.33, 3.3)
+def bias_drift(scene, rng, sensors, size):
+    """u + b f(t), w + b f(t) with f from 0 to 1: a line, or a warm-up 1 - exp(-t / tau)."""
+    kinds = which_kinds(rng)
+    warming = rng.random() < 0.5
+    constant = rng.uniform(0.15, 0.4) * scene.duration
+    past = scene.time - scene.time[0]
+    shape = 1 - np.exp(-past / constant) if warming else past
+    shape = (shape / shape[-1])[:, None, None]
+    parts = {"parameters": {"form": Parameter("exponential" if warming else "linear", "1")}}
+    if warming:
+        parts["parameters"]["time_constant"] = Parameter(constant, "s")
+    units = ((DRIFT_FORCE, UNIT_FORCE, "force"), (DRIFT_RATE, UNIT_RATE, "rate"))
+    for (unit, name, what), chosen in zip(units, kinds, strict=True):
+        end = entries(rng, sensors, size * unit)
+        if chosen:
+            parts["parameters"][f"{what}_drift"] = Parameter(end, name)
+            parts[f"{what}_error"] = lambda field, end=end: end * shape
+    return parts
+
+
+@effect("1", 1.0, 1.0, scalable=False)
+def axis_swap(scene, rng, sensors, size):
+    """Two axes exchanged or a sign wrong; the amplitude means nothing."""
+    kinds = which_kinds(rng)
+    tables = np.stack([_wrong_axes(rng) for _ in sensors])
+
+    def relabel(readings):
+        turned = []
+        for values, chosen in zip(readings, kinds, strict=True):
+            values = values.copy()
+            if chosen:
+                values[:, list(sensors)] = applied(tables, values[:, list(sensors)])
+            turned.append(values)
+        return Pair(*turned)
+
+    said = {"reading_from_true": Parameter(tables, "1"), "of": kind_names(kinds)}
+    return {"parameters": said, "relabel": relabel}
+
+
+def _wrong_axes(rng) -> np.ndarray:
+    """A signed permutation (3, 3): two axes exchanged, or one reversed."""
+    table = np.eye(3)
+    if rng.random() < 0.5:
+        return table[[[1, 0, 2], [2, 1, 0], [0, 2, 1]][rng.integers(3)]]
+    table[(axis := rng.integers(3)), axis] = -1.0
+    return table
+
+
+@effect("m", 1e-4, 3e-3)
+def position_shift(scene, rng, sensors, size):
+    """r_k + d_k from one instant on; size in metres; the instant is the same for all."""
+    shift = entries(rng, sensors, size)
+    instant = scene.time[0] + rng.uniform(0.25, 0.75) * scene.duration
+    later = (scene.time >= instant)[:, None, None]
+    said = {"shift": Parameter(shift, "m"), "instant": Parameter(float(instant), "s")}
+    return {
+        "parameters": said,
+        "force_error": lambda field: np.where(later, field.lever(shift, sensors), 0.0),
+    }

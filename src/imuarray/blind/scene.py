@@ -1,0 +1,234 @@
+"""A scene: one array, one smooth motion, the true positions; what ideal sensors would read.
+
+The rigid-body formula is written out here once more, on purpose: an injector that shared the
+measurement model with the diagnosis would share its mistakes too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from imuarray.geometry import Array, mimu4444, mimu4444_corners
+from imuarray.motion import SmoothMotion, hand_twisting
+
+GYROSCOPE_RAIL = np.radians(2000.0)  # rad/s
+ACCELEROMETER_RAIL = 156.9  # m/s^2, 16 g
+POSITION_ERROR_SD = 5e-4  # m, between nominal and true positions
+
+
+class Pair(NamedTuple):
+    """Something for the accelerometers and the same for the gyroscopes."""
+
+    force: np.ndarray | None  # (T, A, 3) m/s^2
+    rate: np.ndarray | None  # (T, G, 3) rad/s
+
+
+class States(NamedTuple):
+    """Motion of the reference triad at (T, K) instants (K = 1: the same for all sensors)."""
+
+    rate: np.ndarray  # w, (T, K, 3) rad/s
+    acceleration: np.ndarray  # w', (T, K, 3) rad/s^2
+    force: np.ndarray  # s, (T, K, 3) m/s^2
+
+    def columns(self, sensors) -> States:
+        """The states at the instants of some sensors, (T, n, 3)."""
+        if self.rate.shape[1] == 1:
+            return self
+        return States(*(x[:, list(sensors)] for x in self))
+
+    def lever(self, arms: np.ndarray) -> np.ndarray:
+        """w x (w x r) + w' x r for arms r (K, 3) or (T, K, 3) in metres; (T, K, 3) m/s^2."""
+        inner = np.cross(self.rate, arms)
+        return np.cross(self.rate, inner) + np.cross(self.acceleration, arms)
+
+
+def _waves(waves, time: np.ndarray, orders) -> list[np.ndarray]:
+    """Derivatives of a sum of sinusoids at ``time`` (T,), each (T, 3).
+
+    Equal to ``SmoothMotion.at`` (a test holds them together); one sine and one cosine a wave
+    instead of thirty make an IMU with a clock of its own affordable.
+    """
+    angle = np.multiply.outer(time, waves.frequency)
+    sine, cosine = np.sin(angle), np.cos(angle)
+    found = []
+    for order in orders:
+        gain = waves.amplitude * waves.frequency[:, None] ** order
+        turned = waves.phase + order * np.pi / 2
+        found.append(sine @ (gain * np.cos(turned)) + cosine @ (gain * np.sin(turned)))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What is there before any effect is injected.
+
+    Attributes
+    ----------
+    array : Array
+        Nominal geometry; as many gyroscopes as accelerometers.
+    sampling_rate : float, Hz
+    duration : float, seconds
+    motion : SmoothMotion
+    positions : ndarray (A, 3), metres
+        True, relative to the reference triad; row 0 is zero.
+    accelerometer_noise_sd, gyroscope_noise_sd : float, m/s^2 and rad/s
+    accelerometer_range, gyroscope_range : float, m/s^2 and rad/s, may be infinite
+    position_prior_sd : float, metres
+    """
+
+    array: Array
+    sampling_rate: float
+    duration: float
+    motion: SmoothMotion
+    positions: np.ndarray
+    accelerometer_noise_sd: float = 0.04
+    gyroscope_noise_sd: float = float(np.radians(0.06))
+    accelerometer_range: float = np.inf
+    gyroscope_range: float = np.inf
+    position_prior_sd: float = 3e-3
+    measured = False  # a class attribute: see `measured.MeasuredScene`
+
+    @classmethod
+    def draw(
+        cls, rng, imus: int = 8, sampling_rate=125.0, duration=24.0, rails: bool = False
+    ) -> Scene:
+        """Draw motion and true positions; ``imus`` is 8 or 32, ``rails`` wants 2000 deg/s, 16 g."""
+        boards = {8: mimu4444_corners, 32: mimu4444}
+        if imus not in boards:
+            raise ValueError(f"imus: expected 8 or 32, found {imus}")
+        if not 62.5 <= sampling_rate <= 500:
+            raise ValueError(f"sampling_rate: expected 62.5 to 500 Hz, found {sampling_rate}")
+        array = boards[imus]()
+        error = POSITION_ERROR_SD * rng.standard_normal((imus, 3))
+        error[0] = 0.0
+        limits = {"accelerometer_range": ACCELEROMETER_RAIL, "gyroscope_range": GYROSCOPE_RAIL}
+        motion = _draw_motion(
+            rng, np.arange(round(duration * sampling_rate)) / sampling_rate, rails
+        )
+        return cls(
+            array, sampling_rate, duration, motion, array.relative + error,
+            **(limits if rails else {}),
+        )  # fmt: skip
+
+    @cached_property
+    def time(self) -> np.ndarray:
+        """Instants at which the host reads, (T,) seconds."""
+        return np.arange(round(self.duration * self.sampling_rate)) / self.sampling_rate
+
+    @property
+    def accelerometers(self) -> int:
+        """Number A of accelerometer triads, and of gyroscope triads."""
+        return len(self.positions)
+
+    @property
+    def noise(self) -> tuple[float, float]:
+        """Declared noise of accelerometers (m/s^2) and gyroscopes (rad/s)."""
+        return self.accelerometer_noise_sd, self.gyroscope_noise_sd
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Declared ranges of accelerometers (m/s^2) and gyroscopes (rad/s)."""
+        return self.accelerometer_range, self.gyroscope_range
+
+    def _states_at(self, time: np.ndarray) -> list[np.ndarray]:
+        """w, w', s at ``time`` (T,), each (T, 3)."""
+        return _waves(self.motion.rotation, time, (0, 1)) + _waves(self.motion.force, time, (0,))
+
+    @cached_property
+    def nominal(self) -> States:
+        """Motion at the host's instants, (T, 1, 3)."""
+        return States(*(x[:, None] for x in self._states_at(self.time)))
+
+    def states(self, times: np.ndarray | None = None) -> States:
+        """Exact motion at each sensor's own instants ``times`` (T, K); None for the host's."""
+        if times is None:
+            return self.nominal
+        late = [bool((column != self.time).any()) for column in times.T]
+        if not any(late):
+            return self.nominal
+        columns = [
+            self._states_at(column) if moved else [x[:, 0] for x in self.nominal]
+            for moved, column in zip(late, times.T, strict=True)
+        ]
+        return States(*(np.stack(x, axis=1) for x in zip(*columns, strict=True)))
+
+    def ideal(
+        self, times: np.ndarray | None = None, gyroscope_times: np.ndarray | None = None
+    ) -> Pair:
+        """Readings without noise or error: u_k (T, A, 3) m/s^2 and w (T, G, 3) rad/s.
+
+        ``times`` (T, A) seconds are the instants of each IMU, or of its accelerometers alone if
+        ``gyroscope_times`` (T, G) is given.
+        """
+        turning = self.states(times if gyroscope_times is None else gyroscope_times).rate
+        shape = (len(self.time), self.accelerometers, 3)
+        return Pair(force_at(self.states(times), self.positions), np.broadcast_to(turning, shape))
+
+    def field(self, ages: Pair) -> Field:
+        """What the sensors meet at their own instants, the host's plus ``ages``."""
+        return Field(self, ages)
+
+
+class Field:
+    """True quantities at each sensor's own instants, for the errors to be computed from."""
+
+    def __init__(self, scene: Scene, ages: Pair):
+        """``ages`` in seconds, added to the host's instants: (T, A) and (T, G), or None."""
+        self.scene = scene
+        self._times = [None if age is None else scene.time[:, None] + age for age in ages]
+        self._same = ages.force is ages.rate or np.array_equal(ages.force, ages.rate)
+
+    @cached_property
+    def states(self) -> States:
+        """Motion at the accelerometers' instants, (T, A or 1, 3)."""
+        return self.scene.states(self._times[0])
+
+    @cached_property
+    def turning(self) -> States:
+        """Motion at the gyroscopes' instants, (T, G or 1, 3)."""
+        return self.states if self._same else self.scene.states(self._times[1])
+
+    @cached_property
+    def force(self) -> np.ndarray:
+        """u_k at the accelerometers' instants, (T, A, 3) m/s^2."""
+        return force_at(self.states, self.scene.positions)
+
+    @cached_property
+    def rate(self) -> np.ndarray:
+        """w at the gyroscopes' instants, (T, G, 3) rad/s."""
+        shape = (len(self.scene.time), self.scene.accelerometers, 3)
+        return np.broadcast_to(self.turning.rate, shape)
+
+    @cached_property
+    def force_at_gyroscopes(self) -> np.ndarray:
+        """u_k of each IMU at its gyroscope's instants, (T, G, 3) m/s^2."""
+        return self.force if self._same else force_at(self.turning, self.scene.positions)
+
+    def lever(self, arms: np.ndarray, sensors) -> np.ndarray:
+        """Specific force that arms (n, 3) or (T, n, 3) add at some triads, (T, n, 3) m/s^2."""
+        return self.states.columns(sensors).lever(arms)
+
+
+def force_at(states: States, positions: np.ndarray) -> np.ndarray:
+    """u_k = w x (w x r_k) + w' x r_k + s, (T, A, 3) m/s^2."""
+    return states.lever(positions) + states.force
+
+
+def _draw_motion(rng, time: np.ndarray, rails: bool) -> SmoothMotion:
+    """Twisting by hand; with ``rails`` a gyroscope is at its rail in 2 to 8 % of the samples."""
+    rate = np.radians(rng.uniform(400.0, 700.0))
+    force = rng.uniform(8.0, 12.0)
+    bandwidth = rng.uniform(3.0, 5.0)
+    share = rng.uniform(0.02, 0.08)
+    seed = rng.integers(2**63)
+    motion = hand_twisting(np.random.default_rng(seed), rate, force, bandwidth)
+    if not rails:
+        return motion
+    # the motion is linear in its sd, so the quantile says by how much to turn faster
+    peak = np.abs(_waves(motion.rotation, time, (0,))[0]).max(axis=1)
+    rate *= GYROSCOPE_RAIL / np.quantile(peak, 1 - share)
+    return hand_twisting(np.random.default_rng(seed), rate, force, bandwidth)

@@ -1,0 +1,51 @@
+"""Effects of the catalogue on the instants at which sensors sample: delays and clocks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from imuarray.blind.change import Parameter, effect, spread
+from imuarray.blind.scene import Pair
+
+CLOCK_PERIOD = 1e-3  # s, P of a free-running IMU
+
+
+@effect("s", 1e-5, 5e-3)
+def sensor_delay(scene, rng, sensors, size):
+    """Both sensors of IMU k sampled at t + tau_k; size in seconds."""
+    delay = size * rng.standard_normal(len(sensors))
+    ages = spread(scene, sensors, delay)
+    return {"parameters": {"delay": Parameter(delay, "s")}, "ages": Pair(ages, ages)}
+
+
+@effect("s", 1e-4, 5e-3)
+def gyroscope_delay(scene, rng, sensors, size):
+    """Gyroscopes at t + tau_k, accelerometers at t; if all are chosen, half the time one tau."""
+    common = len(sensors) == scene.accelerometers and rng.random() < 0.5
+    own = rng.standard_normal(len(sensors))
+    # a common delay has no companions to make up for a small draw
+    delay = size * (np.sign(own[0]) * np.ones(len(sensors)) if common else own)
+    said = {"delay": Parameter(delay, "s"), "common": Parameter(bool(common), "1")}
+    return {"parameters": said, "ages": Pair(None, spread(scene, sensors, delay))}
+
+
+@effect("s", CLOCK_PERIOD, CLOCK_PERIOD)
+def sensor_clock(scene, rng, sensors, size):
+    """IMU k samples at phi + n P (1 + eps); the host gets the newest sample not after t.
+
+    At size = P = 1 ms, the realistic one, this is exact. Other sizes keep the clocks and make the
+    sawtooth of the age higher or lower: a shorter period would have another pattern of ages, and
+    its size would not grow smoothly with it.
+    """
+    offset = rng.uniform(0.01, 0.05, len(sensors)) * rng.choice([-1.0, 1.0], len(sensors))
+    period = CLOCK_PERIOD * (1 + offset)
+    phase = rng.random(len(sensors)) * period
+    waiting = np.mod(scene.time[:, None] - phase, period)
+    ages = spread(scene, sensors, -waiting * (size / CLOCK_PERIOD))
+    said = {
+        "period": Parameter(period, "s"),
+        "clock_offset": Parameter(offset, "1"),
+        "phase": Parameter(phase, "s"),
+        "largest_age": Parameter(size * (1 + offset), "s"),
+    }
+    return {"parameters": said, "ages": Pair(ages, ages)}
