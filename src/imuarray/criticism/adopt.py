@@ -9,9 +9,9 @@ import numpy as np
 
 from imuarray.criticism import noise as noises
 from imuarray.criticism.columns import POSITION, SCANNED, Columns
-from imuarray.criticism.fit import Fit, fit, flat_parameters, from_flat, normal
+from imuarray.criticism.fit import Fit, at, fit, flat_parameters, from_flat, normal
 from imuarray.criticism.readings import Readings
-from imuarray.criticism.scans import refine_instant, scan_clocks, scan_shifts
+from imuarray.criticism.scans import refine_clock, refine_instant, scan_clocks, scan_shifts
 from imuarray.criticism.scores import (
     Candidate,
     Evidence,
@@ -27,6 +27,7 @@ from imuarray.model import EFFECTS
 
 BLOCKS = 10  # of time, held out in turn
 MOST = 12  # causes
+EDGE = 0.03  # of a turn: how near to a clock's jump a reading is left out
 STEADY = 0.02  # relative change of a noise sd below which a fit is not repeated
 
 
@@ -59,6 +60,7 @@ class Search:
     given: Evidence | None = None
     refused: set = field(default_factory=set)
     excess: float = 0.0  # of the misfit, before any cause
+    jumps: np.ndarray | bool = False  # readings left out near a clock's jump
     allowed: np.ndarray | None = None  # readings that count, outliers included
     trace: list = field(default_factory=list)
 
@@ -75,15 +77,49 @@ class Search:
     def refit(self, state=None, steps=25) -> None:
         """Fit what is adopted, with the noise that the residual's fast part shows."""
         state = self.fit.state if state is None else state
-        for _ in range(3):
+        for turn in range(3 + 2 * bool(self.clocks)):
+            self.edges(state, EDGE / (1 + turn))
             made = fit(self.readings, self.columns, self.active, state, self.smooth, steps)
             judged = noises.judge(made)
+            made = self.rewound(made)
             change = np.max(np.abs(judged.sd / self.readings.sd - 1)[self.readings.exists])
             self.fit, self.noise = made, judged
-            if change < STEADY:
+            if change < STEADY and (turn > 1 or not self.clocks):
                 break
             self.readings, state = self.readings.with_sd(judged.sd), made.state
+        else:
+            self.fit = at(self.readings, self.columns, self.active, state, made.converged)
+            self.noise = noises.judge(self.fit)
         self.weigh()
+
+    @property
+    def clocks(self) -> tuple[int, ...]:
+        """IMUs with an adopted clock."""
+        return next((c.imus for c in self.causes if c.effect == "sensor_clock"), ())
+
+    def rewound(self, made: Fit) -> Fit:
+        """The fit with its clocks' frequency and phase where the ages say."""
+        if not self.clocks:
+            return made
+        whole = flat_parameters(self.columns, made.state)
+        chosen = self.columns.of("sensor_clock")
+        # the readings near the jumps are those that tell the phase
+        readings = replace(made.readings, keep=made.readings.keep | self.jumps)
+        every = at(readings, self.columns, made.active, made.state, made.converged)
+        for imu in self.clocks:
+            whole[imu, chosen] = refine_clock(every, imu)
+        return replace(made, state=from_flat(self.columns, made.state, whole))
+
+    def edges(self, state, width) -> None:
+        """Leave out a clocked IMU's samples near the sawtooth's jump: which side is a gamble."""
+        near = np.zeros(self.readings.keep.shape, bool)
+        values = self.columns.model.split(np.asarray(state.parameters))
+        for imu in self.clocks:
+            _, frequency, phase, _ = values["sensor_clock"][imu]
+            turns = frequency * self.readings.time + phase
+            near[:, imu] = (np.abs(turns - np.round(turns)) < width)[:, None]
+        self.readings = replace(self.readings, keep=(self.readings.keep | self.jumps) & ~near)
+        self.jumps = near & self.allowed
 
     def weigh(self) -> None:
         """The evidence at the present fit."""
@@ -95,8 +131,8 @@ class Search:
     def begin(self) -> None:
         """The papers' model."""
         first = start(self.readings, self.columns)
-        self.smooth = is_smooth(self.readings, first.motion)
         self.allowed = self.readings.keep
+        self.smooth = is_smooth(self.readings, first.motion)
         self.refit(first)
         self.excess = max(self.fit.misfit - self.fit.free, 0.0)
 

@@ -18,7 +18,8 @@ from imuarray.model.noise import Noise
 POSITION = "position"
 # Effects that a score at zero cannot see: an instant or a frequency is to be found first.
 SCANNED = ("sensor_clock", "position_shift")
-HELD = {"position_shift": (3,)}  # parameters that the scan fixes: no derivative by an instant
+# Parameters that the scans fix: an instant, a clock's frequency and phase (its sawtooth jumps).
+HELD = {"position_shift": (3,), "sensor_clock": (1, 2)}
 
 
 @dataclass(frozen=True)

@@ -156,7 +156,7 @@ def _normal_checks(name, found) -> Check:
     return Check(name, worst[1], float(min(single, pooled, -np.log(2)) + np.log(2)), (worst[0],))
 
 
-def company_check(fit: Fit) -> Check:
+def company_check(fit: Fit, noise: Noise) -> Check:
     """Correlations between axes beyond what the common motion explains."""
     samples = len(fit.residual)
     flat = np.where(fit.readings.keep, fit.residual, 0.0).reshape(samples, -1)
@@ -165,6 +165,10 @@ def company_check(fit: Fit) -> Check:
     expected = -np.einsum("tri,tsi->rs", basis, basis, optimize=True)
     free = (kept - np.sum(basis**2, axis=2)) ** 0.5
     spread = np.sqrt((free**2).T @ free**2)
+    # products of two memories vary more
+    memory = np.repeat(noise.correlation, 3, axis=1).ravel()
+    memory = np.outer(memory, memory)
+    spread = spread * np.sqrt((1 + memory) / (1 - memory))
     there = np.flatnonzero(kept.any(axis=0))
     z = (flat.T @ flat - expected) / np.maximum(spread, 1e-9)
     upper = np.triu_indices(len(there), 1)
@@ -205,7 +209,7 @@ def resolution_check(fit: Fit) -> Check:
 def all_checks(fit: Fit, given: Evidence, noise: Noise) -> list[Check]:
     """Everything that is tested of a residual."""
     return [
-        *regression_checks(fit, given, noise), *size_checks(fit), company_check(fit),
+        *regression_checks(fit, given, noise), *size_checks(fit), company_check(fit, noise),
         *noise_checks(noise, fit.readings.exists), resolution_check(fit),
     ]  # fmt: skip
 

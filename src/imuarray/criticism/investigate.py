@@ -1,4 +1,4 @@
-"""The whole procedure on one recording: readings, means, noise, what is left, who else it may be."""
+"""The whole procedure on one recording: readings, means, noise, what is left, who else it is."""
 
 from __future__ import annotations
 
@@ -11,18 +11,22 @@ from imuarray.criticism import noise as noises
 from imuarray.criticism import variance
 from imuarray.criticism.adopt import Search, adopt, clear, freed_places, need
 from imuarray.criticism.columns import catalogue_effects, columns_of
-from imuarray.criticism.fit import Fit
+from imuarray.criticism.fit import Fit, fit
 from imuarray.criticism.gate import Check, all_checks
 from imuarray.criticism.readings import Readings, arrange
+from imuarray.criticism.scans import delay_score, sawtooth
 from imuarray.criticism.scores import candidates, log_tail, mask_of, score_all
 from imuarray.criticism.structure import Structural, find_structural
 from imuarray.criticism.thresholds import Thresholds, read_thresholds
 from imuarray.recording import Recording
 
-NESTED = {  # an effect, and those that contain it
+NESTED = {  # an effect, and those that contain it or are contained
     "accelerometer_bias": ("bias_drift",), "gyroscope_bias": ("bias_drift",),
-    "sensor_delay": ("sensor_clock",),
+    "sensor_delay": ("sensor_clock",), "bias_drift": ("accelerometer_bias", "gyroscope_bias"),
+    "sensor_clock": ("sensor_delay", "gyroscope_delay"),
 }  # fmt: skip
+TAILED = 0.25  # log ratio by which a mixture's core may miss the noise
+DELAYED = 0.1  # log ratio of noise that an adopted delay may bring with it
 
 
 @dataclass
@@ -62,8 +66,11 @@ def investigate(
     adopt(search)
     clear(search)
     tails, in_noise = settle(search, without)
-    in_noise += named_noise(search, without, tails)
+    if "coloured_noise" not in without:
+        remember(search)
     checks = all_checks(search.fit, search.given, search.noise)
+    calm_ = not any(c.log_p < thresholds.check for c in checks if c.name.startswith("residual"))
+    in_noise += named_noise(search, without, tails, calm_)
     explained, failing = judged(search, base, checks, in_noise)
     found = Found(search, base, base_checks, structural, in_noise, checks, explained, failing, raw)
     found.rivals = {c.effect: rivals(search, c.effect) for c in search.causes}
@@ -79,48 +86,73 @@ def calm(search: Search) -> None:
         search.refit()
 
 
-def settle(search: Search, without) -> tuple[np.ndarray, list]:
+def settle(search: Search, without) -> tuple[list, list]:
     """Heavy tails: judged on all readings once the means are known, then left out of the fit."""
     whole = replace(search.readings, keep=search.allowed)
     search.readings = whole
     search.refit()
     if "heavy_tails" in without:
-        return np.zeros((0, 2), int), []
-    named, hit = variance.heavy_tails(
-        search.fit, search.noise, search.thresholds.limit("heavy_tails")
-    )
+        return [], []
+    named, hits = variance.heavy_tails(search.fit, search.thresholds.limit("heavy_tails"))
     if named is None:
-        return hit, []
-    lost, sd = np.zeros(whole.keep.shape, bool), search.readings.sd.copy()
-    for imu, kind in hit:
-        mix = variance.mixture(search.fit, imu, kind)
-        lost[:, imu, 3 * kind : 3 * kind + 3] = mix.outlier[:, None] > 0.5
-        sd[imu, kind] *= mix.core
-    search.readings = whole.without(lost).with_sd(sd)
+        return [], []
+    far = np.zeros((*whole.keep.shape[:2], 2), bool)
+    for imu, kind, mix in hits:
+        far[:, imu, kind] = mix.outlier > 0.5
+    search.readings = whole.without(np.repeat(noises.few_at_once(far), 3, axis=2))
     before = len(search.causes)
     search.refit()
     adopt(search)
     if len(search.causes) > before:
         clear(search)
-    return hit, [named]
+    return hits, [named]
 
 
-def named_noise(search: Search, without, tails) -> list:
+def remember(search: Search) -> None:
+    """Where the spectrum says that noise is coloured, take its size and memory from all of it."""
+    hits = np.argwhere(search.noise.correlation != 0)
+    if not len(hits):
+        return
+    correlation, sd = search.noise.correlation.copy(), search.readings.sd.copy()
+    for imu, kind in hits:
+        correlation[imu, kind] = variance.autocorrelation(search.fit, imu, kind)[0]
+        sd[imu, kind] *= np.sqrt(np.nanmean(variance.triad(search.fit, imu, kind) ** 2))
+    search.readings = search.readings.with_sd(sd)
+    search.fit = fit(
+        search.readings, search.columns, search.active, search.fit.state, search.smooth
+    )
+    search.noise = search.noise._replace(correlation=correlation, sd=sd)
+    search.weigh()
+
+
+def named_noise(search: Search, without, tails, calm) -> list:
     """Scale and colour of the noise, where they depart from what is declared."""
-    found = []
+    found, made = [], search.fit
     for kind, name in enumerate(("accelerometer_noise", "gyroscope_noise")):
         if name not in without:
-            skip = [int(imu) for imu, k in tails if k == kind]
-            named = variance.noise_scale(
-                search.fit, search.noise, kind, search.thresholds.limit(name), skip
-            )
+            # the mixture's core is the noise of a triad with heavy tails
+            skip = [
+                imu for imu, k, mix in tails
+                if k == kind and abs(np.log(mix.core * search.readings.sd[imu, k]
+                                            / search.readings.declared[imu, k])) < TAILED
+            ]  # fmt: skip
+            limit = search.thresholds.limit(name)
+            named = variance.noise_scale(made, search.noise, kind, limit, timed(search), skip)
             found += [named] if named else []
     if "coloured_noise" not in without:
-        named = variance.coloured(
-            search.fit, search.noise, search.thresholds.limit("coloured_noise")
-        )
+        limit = search.thresholds.limit("coloured_noise")
+        named = variance.coloured(made, search.noise, limit, calm)
         found += [named] if named else []
     return sorted(found, key=lambda item: item.log_p)
+
+
+def timed(search: Search) -> np.ndarray:
+    """Log ratios of noise not to be believed (N,): delays carry the derivatives' own noise."""
+    least = np.zeros(len(search.readings.labels))
+    for cause in search.causes:
+        if cause.effect in ("sensor_delay", "gyroscope_delay", "sensor_clock"):
+            least[list(cause.imus)] = DELAYED
+    return least
 
 
 def judged(search: Search, base: Fit, checks, in_noise) -> tuple[float, bool]:
@@ -172,7 +204,18 @@ def rivals(search: Search, effect: str) -> list[str]:
         )
         if close or alike:
             found.append(candidate.effect)
+    if effect == "sensor_delay" and "sensor_clock" in search.effects:
+        found += ["sensor_clock"] if maybe_clock(search, cause, own) else []
     return found
+
+
+def maybe_clock(search: Search, cause, own) -> bool:
+    """Whether a clock, whose sawtooth has a third of its constant's power, is not ruled out."""
+    score, information = delay_score(search.fit)
+    gains = [
+        sawtooth(search.readings.time, score[:, imu], information[:, imu])[0] for imu in cause.imus
+    ]
+    return bool(np.sum(gains) > own / 6)
 
 
 def _shared(given, fit_, candidate, left, signal) -> float:

@@ -21,6 +21,8 @@ ECHO = np.correlate(DIFFERENCE, DIFFERENCE, "full")[len(DIFFERENCE) :]
 # so many differences are worth one independent value in a mean square
 WORTH = float(1 + 2 * np.sum(ECHO**2))
 FAR = 4.0  # sds of a difference; beyond is an outlier's
+FLAT = 0.02  # autocorrelation too small to speak of
+BANDS = (0.2, 0.35)  # of the sampling rate, where the two bands begin
 COLOURED = 4.5  # sds of the spectrum's slope from which noise is not white
 
 
@@ -88,23 +90,48 @@ def _outliers(fast, core) -> np.ndarray:
     for shift in range(1, HALF + 1):
         peak[shift:] &= worst[shift:] >= worst[:-shift]
         peak[:-shift] &= worst[:-shift] >= worst[shift:]
-    return peak
+    return few_at_once(peak)
+
+
+def few_at_once(far) -> np.ndarray:
+    """Outliers (T, N, 2) bool without the samples where a quarter of a kind stands out at once.
+
+    Those are events of the whole array, and leaving them out would leave no motion.
+    """
+    crowd = far.sum(axis=1, keepdims=True) > max(1, far.shape[1] // 4)
+    return far & ~crowd
 
 
 def _colour(unit, readings: Readings):
     """(slope in sds, AR(1) correlation) from the upper spectrum of each triad, (N, 2)."""
     power = np.abs(np.fft.rfft(unit, axis=0)) ** 2
-    part = np.fft.rfftfreq(len(unit))
-    low, high = (part >= 0.2) & (part < 0.35), part >= 0.35
+    part, low, high = _bands(len(unit))
     bands = [power[band].reshape(band.sum(), -1, 2, 3) for band in (low, high)]
     means = [np.maximum(b.mean(axis=(0, 3)), 1e-12) for b in bands]
     ratio = np.log(means[1] / means[0])
-    error = np.sqrt(1 / (3 * low.sum()) + 1 / (3 * high.sum()))
+    error = _slope_error(low, high)
     slope = np.where(readings.exists, ratio / error, 0.0)
     grid = np.linspace(-0.95, 0.98, 194)
     expected = np.array([_ar_ratio(rho, part[low], part[high]) for rho in grid])
     correlation = grid[np.argmin(np.abs(expected[:, None, None] - ratio), axis=0)]
     return slope, np.where(np.abs(slope) > COLOURED, correlation, 0.0)
+
+
+def _bands(samples):
+    """Frequencies in units of the sampling rate, and which are in the two bands."""
+    part = np.fft.rfftfreq(samples)
+    return part, (part >= BANDS[0]) & (part < BANDS[1]), part >= BANDS[1]
+
+
+def _slope_error(low, high) -> float:
+    """sd of the log ratio of two bands' mean power over a triad's three axes."""
+    return float(np.sqrt(1 / (3 * low.sum()) + 1 / (3 * high.sum())))
+
+
+def expected_ratio(rho: float, samples: int) -> float:
+    """The slope, in its sds, that an AR(1) of this correlation has."""
+    part, low, high = _bands(samples)
+    return _ar_ratio(rho, part[low], part[high]) / _slope_error(low, high)
 
 
 def _ar_ratio(rho, low, high) -> float:

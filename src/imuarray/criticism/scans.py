@@ -10,6 +10,7 @@ from imuarray.criticism.columns import POSITION
 from imuarray.criticism.fit import Fit, normal
 from imuarray.criticism.scores import Candidate, Evidence, Score, log_tail, robust_inverse
 
+PHASES = np.arange(32) / 32  # of a turn, tried at first
 CUTS = 24  # instants tried at first
 BELIEVED = -8.0  # log p of a sawtooth beyond a constant delay
 FAIR = 0.05  # of the constant delay's chi-square
@@ -42,7 +43,7 @@ def scan_clocks(fit: Fit, imus, delays: dict) -> list[Found]:
     score, information = delay_score(fit)
     time, each = fit.readings.time, {}
     for imu in imus:
-        gain, values = _sawtooth(time, score[:, imu], information[:, imu])
+        gain, values = sawtooth(time, score[:, imu], information[:, imu])
         log_p = log_tail(max(gain, 1e-9), 3) + np.log(2 * len(time) * len(imus))
         if log_p < BELIEVED and gain > FAIR * delays.get((imu,), 0.0):
             each[imu] = (gain, values)
@@ -73,7 +74,7 @@ def _clock_score(imus, gain, delays, samples, count) -> Score:
     return Score(Candidate("sensor_clock", imus), float(statistic), freedom, min(log_p, 0.0))
 
 
-def _sawtooth(time, score, information):
+def sawtooth(time, score, information):
     """(gain over a constant in chi-square, (P, f, phi, c)) of one IMU's best sawtooth age."""
     step = np.median(np.diff(time))
     place = np.round((time - time[0]) / step).astype(int)
@@ -93,10 +94,9 @@ def _sawtooth(time, score, information):
     return best
 
 
-def _shape(time, score, information, frequency, phases=32):
+def _shape(time, score, information, frequency, start=PHASES, signed=False):
     """Best phase of a sawtooth of given frequency: period and offset by weighted least squares."""
     turns = frequency * time
-    start = np.arange(phases) / phases
     shape = np.mod(turns[:, None] + start, 1.0) - 0.5
     weighted = information[:, None] * shape
     a, b, c = np.sum(weighted * shape, 0), weighted.sum(0), information.sum()
@@ -107,9 +107,37 @@ def _shape(time, score, information, frequency, phases=32):
     gain = period * right + offset * total - total**2 / np.maximum(c, 1e-300)
     k = int(np.argmax(gain))
     values = np.array([period[k], frequency, start[k], offset[k]])
-    if values[0] < 0:  # the same sawtooth with time reversed has a positive period
+    if values[0] < 0 and not signed:  # the same sawtooth with time reversed has a positive period
         values = np.array([-period[k], -frequency, -start[k], offset[k]])
     return float(gain[k]), values
+
+
+def refine_clock(fit: Fit, imu: int) -> np.ndarray:
+    """(P, f, phi, c) of an adopted clock, from each sample's own age; P and c are for the fit.
+
+    The residual says how far each age is off; frequency and phase are searched around where they
+    are, the grid drawing in.
+    """
+    columns, readings = fit.columns, fit.readings
+    clock = columns.model.split(np.asarray(fit.state.parameters))["sensor_clock"][imu].copy()
+    score, information = (part[:, imu] for part in delay_score(fit))
+    turns = clock[1] * readings.time + clock[2]
+    age = clock[3] + clock[0] * (turns - np.floor(turns) - 0.5)
+    middle = readings.span / 2
+    age_score = score - information * age  # of a delay counted from nothing
+    reach, slope = 0.05, 0.3 / readings.span
+    best = (-np.inf, clock)
+    for _ in range(4):
+        centre = best[1] if np.isfinite(best[0]) else clock
+        for frequency in centre[1] + slope * np.linspace(-1, 1, 9):
+            # the phase in the middle of the recording is what the data hold
+            phase = centre[2] + (centre[1] - frequency) * middle
+            starts = phase + reach * np.linspace(-1, 1, 17)
+            gain, values = _shape(readings.time, age_score, information, frequency, starts, True)
+            if gain > best[0]:
+                best = (gain, values)
+        reach, slope = reach / 4, slope / 4
+    return best[1]
 
 
 def scan_shifts(fit: Fit, given: Evidence, imus) -> list[Found]:

@@ -14,7 +14,7 @@ from imuarray.model.structure import design, products
 
 KINDS = ("accelerometer", "gyroscope")
 LEAST_REPEATS = 4
-LEAST_CLIPPED = 4
+LEAST_CLIPPED = 3
 RARE = -12.0  # log p from which repeats are no chance of a coarse converter
 NEAR = 0.5  # a signed permutation is believed when the triad's matrix is this near to it
 TURNS = [
@@ -75,7 +75,7 @@ def find_rails(readings: Readings):
         lost[:, imu, 3 * kind : 3 * kind + 3] = at
         hit.append(int(imu))
         rails.setdefault(kind, []).append(rail)
-        logs.append(-3.0 * at.sum())
+        logs.append(-9.0 * (at.sum() - 1))
     if not hit:
         return [], lost
     units = ("m s-2", "rad s-1")
@@ -99,7 +99,8 @@ def _pile(values, kept):
     # a coarse converter has ties by chance: the next values below must have far fewer
     below = np.unique(size[size < top * (1 - 1e-9)])[-5:]
     rivals = [int(np.sum(size == value)) for value in below]
-    return (top, at) if count > 3 * max(rivals, default=0) + 1 else (None, None)
+    most = max(rivals, default=0)
+    return (top, at) if most <= 1 or count > 3 * most + 1 else (None, None)
 
 
 def find_swaps(readings: Readings):

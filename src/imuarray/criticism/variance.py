@@ -5,24 +5,25 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.stats import norm
 
 from imuarray.criticism.fit import Fit
-from imuarray.criticism.noise import Noise, standardised, tail_log_p
+from imuarray.criticism.noise import FLAT, Noise, expected_ratio, standardised
 from imuarray.criticism.scores import log_tail
 
 KINDS = ("accelerometer", "gyroscope")
-UNITS = ("m s-2", "rad s-1")
+FEW = 4  # outliers; so few are an accident, not a law
+AGREE = 3.5  # sds within which two estimates are of one thing
 
 
 class Named(NamedTuple):
-    """A cause in the noise: whose, log p, numbers and their meaning."""
+    """A cause in the noise: whose, log p, numbers, and what it gains on held-out time."""
 
     effect: str
     imus: tuple[int, ...]
     log_p: float
     parameters: dict  # name -> (value, sd, unit)
-    gain: float  # nats against white Gaussian noise of the declared sd
+    gain: float  # nats
     gain_se: float
 
 
@@ -33,135 +34,179 @@ class Mixture(NamedTuple):
     factor: float
     core: float  # sd of the rest, in assumed sds
     outlier: np.ndarray  # (T,) probability of being of the share
+    gain: float  # twice the log likelihood above a single normal's
 
 
-def _hits(z, exists, limit):
-    """(triads far from zero, log p of worst or all) for standard normals z (N,)."""
-    there = np.flatnonzero(exists)
-    single = norm.logsf(np.abs(z[there])) + np.log(2)
-    pooled = log_tail(float(np.sum(z[there] ** 2)), len(there))
-    log_p = min(single.min() + np.log(2 * len(there)), pooled + np.log(2))
-    level = limit + np.log(2) if pooled < single.min() + np.log(len(there)) else limit
-    return [
-        int(k) for k, p in zip(there, single, strict=True) if p + np.log(len(there)) < level
-    ], log_p
+def triad(fit: Fit, imu: int, kind: int) -> np.ndarray:
+    """A triad's standardised residual (T, 3), NaN where left out."""
+    return standardised(fit)[:, imu, 3 * kind : 3 * kind + 3]
 
 
-def noise_scale(fit: Fit, noise: Noise, kind: int, limit: float, without=()) -> Named | None:
-    """A triad's (0 accelerometer, 1 gyroscope) noise against the declared one, or None."""
-    readings = fit.readings
-    ratio = noise.sd[:, kind] / readings.declared[:, kind]
-    z = np.log(ratio) / noise.error[:, kind]
-    exists = readings.exists[:, kind].copy()
-    exists[list(without)] = False
-    if not exists.any():
-        return None
-    hits, log_p = _hits(z, exists, limit)
-    if log_p > limit:
-        return None
-    imus = hits or [int(k) for k in np.flatnonzero(exists)]
-    squares = np.sum(standardised(fit)[:, imus, 3 * kind : 3 * kind + 3] ** 2, axis=2)
-    scale = readings.sd[imus, kind] / readings.declared[imus, kind]
-    nats = np.nansum(squares * (scale**2 - 1) / 2 - 3 * np.log(scale), axis=1)
-    name = f"{KINDS[kind]}_noise"
-    numbers = {
-        f"ratio_{readings.labels[k]}": (
-            float(ratio[k]),
-            float(ratio[k] * noise.error[k, kind]),
-            "1",
-        )
-        for k in imus
-    }
-    return Named(name, tuple(imus), float(log_p), numbers, *_gain(nats))
-
-
-def _gain(nats, blocks=10):
+def held_out(nats, blocks=10) -> tuple[float, float]:
     """Sum over samples with the standard error that blocks of time show."""
     parts = [part.sum() for part in np.array_split(nats, blocks)]
     return float(np.sum(parts)), float(np.std(parts, ddof=1) * np.sqrt(blocks))
 
 
-def mixture(fit: Fit, imu: int, kind: int, steps=100) -> Mixture:
+def verdict(z, exists, limit):
+    """(triads far from zero, log p of the worst or of all) for standard normals z (N,)."""
+    there = np.flatnonzero(exists)
+    single = norm.logsf(np.abs(z[there])) + np.log(2)
+    pooled = log_tail(float(np.sum(z[there] ** 2)), len(there))
+    log_p = min(single.min() + np.log(2 * len(there)), pooled + np.log(2), 0.0)
+    hits = [int(k) for k, p in zip(there, single, strict=True) if p + np.log(len(there)) < limit]
+    return hits, float(log_p)
+
+
+def autocorrelation(fit: Fit, imu: int, kind: int) -> tuple[float, int]:
+    """(lag-one autocorrelation, number of pairs) of a triad's residual."""
+    unit = triad(fit, imu, kind)
+    together = (np.diff(fit.readings.run) == 0)[:, None]
+    pairs = np.where(together, unit[1:] * unit[:-1], np.nan)
+    return float(np.nanmean(pairs) / np.nanmean(unit**2)), int(np.isfinite(pairs).sum())
+
+
+def scales(fit: Fit, noise: Noise, kind: int) -> tuple[np.ndarray, np.ndarray]:
+    """(log ratio to the declared sd, its error) of each triad, (N,).
+
+    From the whole residual where that agrees with its fast part, else from the fast part, which
+    smooth misfit does not reach.
+    """
+    readings = fit.readings
+    count = len(readings.labels)
+    log_ratio, error = np.zeros(count), np.ones(count)
+    fast = np.log(noise.sd[:, kind] / readings.declared[:, kind])
+    for imu in np.flatnonzero(readings.exists[:, kind]):
+        unit = triad(fit, imu, kind)
+        square = np.nanmean(unit**2)
+        number = np.isfinite(unit).sum()
+        tails = max(np.nanmean(unit**4) / square**2 - 1.0, 1.0)
+        rho = autocorrelation(fit, imu, kind)[0]
+        spread = np.sqrt(tails / number * (1 + rho**2) / (1 - rho**2)) / 2
+        whole = np.log(readings.sd[imu, kind] / readings.declared[imu, kind]) + np.log(square) / 2
+        apart = np.sqrt(max(noise.error[imu, kind] ** 2 - spread**2, spread**2))
+        agree = noise.correlation[imu, kind] != 0 or abs(whole - fast[imu]) < AGREE * apart
+        log_ratio[imu] = whole if agree else fast[imu]
+        error[imu] = spread if agree else noise.error[imu, kind]
+    return log_ratio, error
+
+
+def noise_scale(fit: Fit, noise: Noise, kind: int, limit, least, skip=()) -> Named | None:
+    """A triad's (0 accelerometer, 1 gyroscope) noise against the declared one, or None.
+
+    ``least`` (N,) log ratios below which a departure is not believed, ``skip`` IMUs to leave out.
+    """
+    readings = fit.readings
+    log_ratio, error = scales(fit, noise, kind)
+    exists = readings.exists[:, kind] & (np.abs(log_ratio) > least)
+    exists[list(skip)] = False
+    if not exists.any():
+        return None
+    hits, log_p = verdict(log_ratio / error, exists, limit)
+    log_p += np.log(readings.exists[:, kind].sum() / exists.sum())
+    if log_p > limit:
+        return None
+    imus = hits or [int(k) for k in np.flatnonzero(exists)]
+    nats = np.zeros(len(fit.residual))
+    for imu in imus:
+        square = np.nan_to_num(triad(fit, imu, kind)) ** 2
+        own = np.exp(log_ratio[imu]) * readings.declared[imu, kind] / readings.sd[imu, kind]
+        bare = readings.declared[imu, kind] / readings.sd[imu, kind]
+        nats += np.sum(square / bare**2 - square / own**2, axis=1) / 2 - 3 * np.log(own / bare)
+    numbers = {
+        f"ratio_{readings.labels[k]}": (float(np.exp(log_ratio[k])), float(error[k]), "1")
+        for k in imus
+    }
+    return Named(f"{KINDS[kind]}_noise", tuple(imus), log_p, numbers, *held_out(nats))
+
+
+def mixture(fit: Fit, imu: int, kind: int, steps=60) -> Mixture:
     """EM for a triad's standardised residual, its three axes together."""
-    unit = standardised(fit)[:, imu, 3 * kind : 3 * kind + 3]
-    axes = np.sum(np.isfinite(unit), axis=1)
-    square = np.nansum(unit**2, axis=1)
-    core = max(float(np.nanmedian(np.abs(unit)) / norm.ppf(0.75)), 1e-6)
-    share, factor = 0.02, 8.0
+    unit = triad(fit, imu, kind)
+    axes, square = np.sum(np.isfinite(unit), axis=1), np.nansum(unit**2, axis=1)
+    plain = np.sqrt(np.sum(square) / max(np.sum(axes), 1))
+    share, factor, core = 0.05, 3.0, float(np.nanmedian(np.abs(unit)) / norm.ppf(0.75))
     for _ in range(steps):
         odds = np.log(share / (1 - share)) - axes * np.log(factor)
         odds = odds + square / (2 * core**2) * (1 - 1 / factor**2)
-        outlier = 1 / (1 + np.exp(-np.clip(odds, -500, 500)))
-        outlier[axes == 0] = 0.0
-        weight = np.maximum(np.sum(outlier * axes), 1e-9)
-        share = np.clip(np.sum(outlier[axes > 0]) / max(np.sum(axes > 0), 1), 1e-5, 0.5)
-        core = np.sqrt(np.sum((1 - outlier) * square) / max(np.sum((1 - outlier) * axes), 1))
-        factor = max(np.sqrt(np.sum(outlier * square) / weight) / core, 2.0)
-    return Mixture(float(share), float(factor), float(core), outlier)
+        outlier = np.where(axes > 0, 1 / (1 + np.exp(-np.clip(odds, -500, 500))), 0.0)
+        share = float(np.clip(outlier[axes > 0].mean(), 1e-5, 0.5))
+        rest = np.sum((1 - outlier) * axes)
+        core = float(np.sqrt(np.sum((1 - outlier) * square) / max(rest, 1)))
+        wide = np.sum(outlier * square) / max(np.sum(outlier * axes), 1e-9)
+        factor = max(float(np.sqrt(wide)) / core, 1.05)
+    nats = _tail_nats(axes, square, share, factor, core, plain)
+    return Mixture(share, factor, core, outlier, 2 * float(nats.sum()))
 
 
-def heavy_tails(fit: Fit, noise: Noise, limit: float):
-    """(Named or None, triads (n, 2)) with more outliers than Gaussian noise has."""
-    triads = np.argwhere(fit.readings.exists)
-    logs = tail_log_p(noise)
-    log_p = np.array([logs[tuple(t)] for t in triads]) + np.log(len(triads))
-    if log_p.min() > limit:
-        return None, triads[:0]
-    hit = triads[log_p < limit]
-    found = [mixture(fit, *triad) for triad in hit]
-    nats = np.zeros(len(fit.residual))
-    numbers = {}
-    for (imu, kind), mix in zip(hit, found, strict=True):
-        name = f"{KINDS[kind]}_{fit.readings.labels[imu]}"
-        count = len(fit.residual)
-        error = float(np.sqrt(mix.share * (1 - mix.share) / count))
-        numbers[f"share_{name}"] = (mix.share, error, "1")
-        few = max(3 * mix.share * count, 1.0)
-        numbers[f"factor_{name}"] = (mix.factor, float(mix.factor / np.sqrt(2 * few)), "1")
-        nats += _tail_nats(fit, imu, kind, mix)
-    imus = tuple(sorted({int(imu) for imu, _ in hit}))
-    return Named("heavy_tails", imus, float(log_p.min()), numbers, *_gain(nats)), hit
-
-
-def _tail_nats(fit: Fit, imu, kind, mix: Mixture) -> np.ndarray:
-    """Log density of the mixture less that of a normal of the same variance, by sample."""
-    unit = standardised(fit)[:, imu, 3 * kind : 3 * kind + 3]
-    axes, square = np.sum(np.isfinite(unit), axis=1), np.nansum(unit**2, axis=1)
-    sds = (mix.core, mix.core * mix.factor)
-    logs = [-axes * np.log(sd) - square / (2 * sd**2) for sd in sds]
-    both = np.logaddexp(np.log1p(-mix.share) + logs[0], np.log(mix.share) + logs[1])
-    plain = np.sqrt(np.sum(square) / max(np.sum(axes), 1))
+def _tail_nats(axes, square, share, factor, core, plain) -> np.ndarray:
+    """Log density of the mixture less that of a single normal, by sample."""
+    logs = [-axes * np.log(sd) - square / (2 * sd**2) for sd in (core, core * factor)]
+    both = np.logaddexp(np.log1p(-share) + logs[0], np.log(share) + logs[1])
     return both - (-axes * np.log(plain) - square / (2 * plain**2))
 
 
-def coloured(fit: Fit, noise: Noise, limit: float) -> Named | None:
-    """Noise correlated in time: a spectrum that is not flat above the motion's frequencies."""
-    exists = noise.correlation != 0
-    if not exists.any():
-        return None
-    number = fit.readings.exists.sum()
-    single = norm.logsf(np.abs(noise.slope)) + np.log(2 * number)
-    log_p = float(single[exists].min())
-    hits = np.argwhere(exists & (single < limit))
-    if log_p > limit or not len(hits):
-        return None
-    numbers, nats = {}, np.zeros(len(fit.residual))
-    step = float(np.median(np.diff(fit.readings.time)))
-    unit = np.nan_to_num(standardised(fit))
-    for imu, kind in hits:
-        rho = float(noise.correlation[imu, kind])
+def heavy_tails(fit: Fit, limit: float):
+    """(Named or None, [(imu, kind, Mixture)]): triads that a mixture describes better."""
+    triads = np.argwhere(fit.readings.exists)
+    tried = [(int(i), int(k), mixture(fit, i, k)) for i, k in triads]
+    several = [m.share * len(fit.residual) > FEW for *_, m in tried]
+    logs = np.array(
+        [log_tail(max(m.gain, 1e-9), 2) if s else 0.0
+         for (*_, m), s in zip(tried, several, strict=True)]
+    ) + np.log(len(triads))  # fmt: skip
+    if logs.min() > limit:
+        return None, []
+    hits = [item for item, log_p in zip(tried, logs, strict=True) if log_p < limit]
+    nats, numbers, count = np.zeros(len(fit.residual)), {}, len(fit.residual)
+    for imu, kind, mix in hits:
+        unit = triad(fit, imu, kind)
+        axes, square = np.sum(np.isfinite(unit), axis=1), np.nansum(unit**2, axis=1)
+        plain = np.sqrt(np.sum(square) / max(np.sum(axes), 1))
+        nats += _tail_nats(axes, square, mix.share, mix.factor, mix.core, plain)
         name = f"{KINDS[kind]}_{fit.readings.labels[imu]}"
-        error = abs(rho / noise.slope[imu, kind])
-        numbers[f"correlation_{name}"] = (rho, float(error), "1")
+        error = float(np.sqrt(mix.share * (1 - mix.share) / count))
+        numbers[f"share_{name}"] = (mix.share, error, "1")
+        far = max(6 * mix.share * count, 1.0)
+        numbers[f"factor_{name}"] = (mix.factor, float(mix.factor / np.sqrt(far)), "1")
+    imus = tuple(sorted({imu for imu, *_ in hits}))
+    return Named("heavy_tails", imus, float(logs.min()), numbers, *held_out(nats)), hits
+
+
+def coloured(fit: Fit, noise: Noise, limit: float, calm: bool) -> Named | None:
+    """Noise correlated in time: neighbours alike, and a spectrum that agrees with it.
+
+    ``calm``: no check finds the residual tied to the motion; else only the spectrum above the
+    motion's frequencies counts.
+    """
+    readings, number = fit.readings, int(fit.readings.exists.sum())
+    hits, nats, numbers, logs = [], np.zeros(len(fit.residual)), {}, []
+    step = float(np.median(np.diff(readings.time)))
+    triads = np.argwhere(readings.exists)
+    memories = [autocorrelation(fit, *pair) for pair in triads]
+    # the common motion passes a little of one triad's memory on to the others
+    loudest = max(abs(rho) for rho, _ in memories)
+    for (imu, kind), (rho, pairs) in zip(triads, memories, strict=True):
+        slope = noise.slope[imu, kind]
+        sharp = norm.logsf(abs(slope)) + np.log(2 * number)
+        alike = abs(slope - expected_ratio(rho, len(fit.residual))) < AGREE
+        plain = norm.logsf(abs(rho) * np.sqrt(pairs)) + np.log(2 * number)
+        log_p = min(sharp, plain if calm and alike else 0.0)
+        if log_p > limit or (sharp > limit and abs(rho) < max(FLAT, loudest / 5)):
+            continue
+        hits.append((int(imu), int(kind)))
+        logs.append(float(log_p))
+        name = f"{KINDS[kind]}_{readings.labels[imu]}"
+        error = float(np.sqrt((1 - rho**2) / pairs))
+        numbers[f"correlation_{name}"] = (rho, error, "1")
         if rho > 0:
-            time = -step / np.log(rho)
-            numbers[f"correlation_time_{name}"] = (time, time * error / (rho * -np.log(rho)), "s")
-        values = unit[:, imu, 3 * kind : 3 * kind + 3]
-        values = values / max(values.std(), 1e-9)
-        jump = (values[1:] - rho * values[:-1]) ** 2 / (1 - rho**2)
-        nats[1:] += np.sum(values[1:] ** 2 - jump - np.log1p(-(rho**2)), axis=1) / 2
-    imus = tuple(sorted({int(imu) for imu, _ in hits}))
-    return Named("coloured_noise", imus, log_p, numbers, *_gain(nats))
-
-
-__all__ = ["Mixture", "Named", "chi2", "coloured", "heavy_tails", "mixture", "noise_scale"]
+            late = -step / np.log(rho)
+            numbers[f"correlation_time_{name}"] = (late, late * error / -(rho * np.log(rho)), "s")
+        unit = np.nan_to_num(triad(fit, imu, kind))
+        unit = unit / max(unit.std(), 1e-9)
+        jump = (unit[1:] - rho * unit[:-1]) ** 2 / (1 - rho**2)
+        nats[1:] += np.sum(unit[1:] ** 2 - jump - np.log1p(-(rho**2)), axis=1) / 2
+    if not hits:
+        return None
+    imus = tuple(sorted({imu for imu, _ in hits}))
+    return Named("coloured_noise", imus, min(logs), numbers, *held_out(nats))
