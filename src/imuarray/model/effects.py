@@ -13,8 +13,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from imuarray.errors import InputError
-from imuarray.model import kinematics
-from imuarray.model.jax64 import jnp
 from imuarray.motion.state import Motion
 
 
