@@ -5,13 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from imuarray.criticism.columns import POSITION, Columns
-from imuarray.criticism.linearise import Linear, State, derivatives, linearise, no_derivatives
+from imuarray.criticism.linearise import (
+    KNOWN,
+    Eliminated,
+    Loose,
+    State,
+    derivatives,
+    linearise,
+    no_derivatives,
+)
 from imuarray.criticism.readings import Readings
 
 STEPS = 25
+ROUGH = 1e-4  # of the misfit that a step must gain while causes are looked for
 SETTLED = 0.02  # of a parameter's own sd
+NEAR = 9  # samples that tell the size of the motion's third derivatives
 
 
 @dataclass(frozen=True)
@@ -23,10 +34,10 @@ class Fit:
     active : (N, m) bool, the parameters that were fitted
     residual : (T, N, 6) in the units of the noise sd, the motion's share taken out
     whitened : (T, N, 6, m) derivative by the shared parameters, in those units
-    basis : (T, 6 N, 9) orthonormal basis of what the motion can explain
-    through : (T, 9, N, m) the derivative's coordinates in that basis
+    basis : (T, 6 N, D) basis of what the motion can explain, orthonormal with its prior's
+    through : (T, N, D, m) the derivative's coordinates in that basis
     log_volume : (T,) log determinant of the motion's information
-    misfit : sum of squared residuals
+    misfit : sum of squared residuals, the motion's prior included
     """
 
     readings: Readings
@@ -53,29 +64,14 @@ class Fit:
         return used - 9 * len(self.residual) - int(self.active.sum())
 
 
-def eliminate(readings: Readings, linear: Linear):
-    """(residual, whitened, basis, through, log volume, motion's step) at a state."""
-    samples, count = readings.values.shape[:2]
-    weights = readings.weights
-    residual = weights * (readings.values - linear.predicted)
-    motion = (weights[..., None] * linear.motion).reshape(samples, 6 * count, 9)
-    factor = np.linalg.cholesky(np.swapaxes(motion, 1, 2) @ motion)
-    inverse = np.linalg.inv(factor)
-    basis = motion @ np.swapaxes(inverse, 1, 2)
-    whitened = weights[..., None] * linear.shared
-    blocks = np.swapaxes(basis.reshape(samples, count, 6, 9), 2, 3) @ whitened
-    through = np.ascontiguousarray(np.swapaxes(blocks, 1, 2))
-    flat = residual.reshape(samples, -1)
-    taken = np.einsum("tri,tr->ti", basis, flat)
-    left = (flat - np.einsum("tri,ti->tr", basis, taken)).reshape(residual.shape)
-    volume = 2 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(1)
-    return left, whitened, basis, through, volume, (inverse, taken)
-
-
 def pick(through, chosen) -> tuple[np.ndarray, np.ndarray]:
-    """The (imu, column) pairs (n, 2) of ``chosen`` (N, m) bool, and through's columns (T, 9, n)."""
+    """The (imu, column) pairs (n, 2) of ``chosen`` (N, m) bool, and through's columns (T, D, n)."""
     pairs = np.argwhere(chosen)
-    return pairs, through[:, :, pairs[:, 0], pairs[:, 1]]
+    seen = np.empty((len(through), through.shape[2], len(pairs)))
+    for imu in np.unique(pairs[:, 0]):
+        own = np.flatnonzero(pairs[:, 0] == imu)
+        seen[..., own] = through[:, imu][..., pairs[own, 1]]
+    return pairs, seen
 
 
 def normal(residual, whitened, through, chosen, part=slice(None)):
@@ -94,53 +90,64 @@ def normal(residual, whitened, through, chosen, part=slice(None)):
 
 
 def fit(
-    readings: Readings, columns: Columns, active, state: State, smooth=True, steps=STEPS
+    readings: Readings, columns: Columns, active, state: State, smooth=True, rough=False
 ) -> Fit:
     """Gauss-Newton over motion and the active parameters from a state, priors included.
 
-    ``smooth`` says whether the motion's time derivatives may be had from its neighbours.
+    ``smooth`` says whether the motion's time derivatives may be had from its neighbours, ``rough``
+    that it may stop when a step gains little.
     """
     prior_mean = prior_means(readings, columns)[active]
     precision = 1.0 / np.broadcast_to(columns.prior_sd, active.shape)[active] ** 2
     wanted = np.flatnonzero(active.any(axis=0))
-    few, converged, last = active[:, wanted], False, np.inf
-    for number in range(steps):
+    converged, last, seen = False, np.inf, None
+    enough = ROUGH if rough else 0.0
+    for number in range(STEPS):
         state = with_derivatives(readings, state, smooth)
-        linear = linearise(readings, columns, state, wanted)
-        residual, whitened, _, through, _, (inverse, taken) = eliminate(readings, linear)
-        information, score = normal(residual, whitened, through, few)
+        seen = linearise(readings, columns, state, wanted, seen)
+        few = padded(active[:, wanted], seen.whitened.shape[-1])
+        misfit = float(np.sum(seen.misfit))
+        information, score = normal(seen.residual, seen.whitened, seen.through, few)
         offset = flat_parameters(columns, state)[active] - prior_mean
         score = score - precision * offset
         step, sds = scaled_solve(information + np.diag(precision), score)
-        moved, astray = np.max(np.abs(step) / sds, initial=0.0), float(np.sum(taken**2))
-        if (moved < SETTLED and astray < 0.01 * len(residual)) or score @ step + astray < 1e-3:
+        moved, astray = np.max(np.abs(step) / sds, initial=0.0), float(np.sum(seen.taken**2))
+        if (moved < SETTLED and astray < 0.01 * len(seen.taken)) or score @ step + astray < max(
+            1e-3, enough * misfit
+        ):
             converged = True
             break
-        cost = float(np.sum(residual**2)) + astray + float(precision @ offset**2)
+        cost = misfit + astray + float(precision @ offset**2)
         if number > 6 and cost > last * (1 - 1e-5):
             break  # it wanders around the optimum, by less than anything told apart here
         last = cost
-        state = advance(columns, state, active, step, few, through, inverse, taken)
+        state = advance(columns, state, active, step, few, seen)
     return at(readings, columns, active, state, converged)
 
 
 def at(readings: Readings, columns: Columns, active, state: State, converged: bool) -> Fit:
     """The fit's quantities at a state, with the derivative by every parameter."""
-    linear = linearise(readings, columns, state)
-    residual, whitened, basis, through, volume, _ = eliminate(readings, linear)
+    seen = linearise(readings, columns, state)
     return Fit(
-        readings, columns, state, active, residual, whitened, basis, through, volume,
-        float(np.sum(residual**2)), converged,
+        readings, columns, state, active, seen.residual, seen.whitened, seen.basis, seen.through,
+        seen.log_volume, float(np.sum(seen.misfit)), converged,
     )  # fmt: skip
 
 
-def advance(columns, state, active, step, few, through, inverse, taken) -> State:
+def advance(columns, state, active, step, few, seen: Eliminated) -> State:
     """The state after a step of the active parameters, and the motion's own."""
-    _, seen = pick(through, few)
-    move = np.einsum("tji,tj->ti", inverse, taken - seen @ step)
+    blocks = np.zeros(few.shape)
+    blocks[few] = step
+    moved = np.einsum("tkdm,km->td", seen.through, blocks, optimize=True)
+    move = np.einsum("tji,tj->ti", seen.inverse, seen.taken - moved)
     whole = flat_parameters(columns, state)
     whole[active] += step
     return from_flat(columns, state._replace(motion=state.motion + move), whole)
+
+
+def padded(mask, size) -> np.ndarray:
+    """A mask (N, n) with columns of False up to a size."""
+    return np.pad(mask, ((0, 0), (0, size - mask.shape[1])))
 
 
 def scaled_solve(information, right):
@@ -153,12 +160,30 @@ def scaled_solve(information, right):
 
 
 def with_derivatives(readings, state, smooth) -> State:
-    """The state with the time derivatives of its own motion, or none."""
-    if smooth:
-        found = derivatives(readings, state.motion, state.positions)
-    else:
-        found = no_derivatives(len(state.motion), len(state.positions))
+    """The state with the time derivatives of its own motion, if they are not free."""
+    if not smooth:
+        return state
+    found = derivatives(readings, state.motion, state.positions)
     return state._replace(derivatives=found)
+
+
+def loosened(readings: Readings, state: State) -> State:
+    """The state with omega double dot and s dot free: neighbours tell them only roughly.
+
+    Their prior has the polynomials' mean, and for sd the size of the differences near by.
+    """
+    motion, dt = state.motion[:, :KNOWN], np.median(np.diff(readings.time))
+    found = derivatives(readings, motion, state.positions)
+    mean = np.hstack(found[:2])
+    steps = np.diff(motion[:, 3:], axis=0, append=motion[-1:, 3:]) / dt
+    steps[np.diff(readings.run, append=readings.run[-1]) > 0] = 0.0
+    near = uniform_filter1d(np.mean(steps.reshape(-1, 2, 3) ** 2, axis=-1), NEAR, axis=0)
+    sd = np.repeat(np.sqrt(near) + 0.1 * np.sqrt(near.mean(axis=0)), 3, axis=1)
+    nothing = no_derivatives(len(motion), len(state.positions))
+    free = mean if state.loose is None else state.motion[:, KNOWN:]
+    return state._replace(
+        motion=np.hstack([motion, free]), derivatives=nothing, loose=Loose(mean, sd)
+    )
 
 
 def flat_parameters(columns: Columns, state: State) -> np.ndarray:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import chi2, norm
 
-from imuarray.criticism.fit import Fit
+from imuarray.criticism.fit import Fit, pick
 from imuarray.criticism.noise import Noise, standardised, tail_log_p
 from imuarray.criticism.scores import Evidence, log_tail, robust_inverse
 
@@ -33,8 +33,8 @@ def features(fit: Fit, imu: int) -> dict[str, np.ndarray]:
     motion, state = fit.state.motion, fit.state
     rate, turn = motion[:, :3], motion[:, 3:6]
     place = state.positions[min(imu, len(state.positions) - 1)]
-    force = np.cross(rate, np.cross(rate, place)) + np.cross(turn, place) + motion[:, 6:]
-    jerk, force_rate = state.derivatives[0], state.derivatives[1]
+    force = np.cross(rate, np.cross(rate, place)) + np.cross(turn, place) + motion[:, 6:9]
+    jerk, force_rate = state.jerk
     time = 2 * fit.readings.time[:, None] / fit.readings.span - 1
     pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
     groups = {
@@ -63,10 +63,9 @@ def regression_checks(fit: Fit, given: Evidence, noise: Noise) -> list[Check]:
     """Each group of features over all axes, and each IMU's axes over all features."""
     active = given.places(fit.active)
     inner = robust_inverse(given.information[np.ix_(active, active)] + np.diag(given.ridge[active]))
-    pairs = np.argwhere(fit.columns.owner)[active]
-    through = fit.through[:, :, pairs[:, 0], pairs[:, 1]]
+    pairs, through = pick(fit.through, fit.active & fit.columns.owner)
     samples, count = fit.residual.shape[:2]
-    basis = fit.basis.reshape(samples, count, 6, 9)
+    basis = fit.basis.reshape(samples, count, 6, -1)
     groups: dict[str, list] = {}
     axes = []
     for imu in range(count):
@@ -127,7 +126,7 @@ def size_checks(fit: Fit) -> list[Check]:
     motion = fit.state.motion
     sizes = {
         "omega": motion[:, :3], "omega dot": motion[:, 3:6], "specific force": motion[:, 6:9],
-        "jerk": fit.state.derivatives[1],
+        "jerk": fit.state.jerk[1],
     }  # fmt: skip
     unit = standardised(fit)
     triads = np.argwhere(fit.readings.exists)

@@ -64,6 +64,7 @@ def investigate(
     base_checks = all_checks(base, search.given, search.noise)
     calm(search)
     adopt(search)
+    search.polish()
     clear(search)
     tails, in_noise = settle(search, without)
     if "coloured_noise" not in without:
@@ -181,7 +182,7 @@ def rivals(search: Search, effect: str) -> list[str]:
     freed = freed_places(search, effect)
     whole = len(cause.imus) > len(fit_.readings.exists) / 2
     tried = [
-        c for c in candidates(fit_.columns, fit_.readings.exists, search.effects, search.smooth)
+        c for c in candidates(fit_.columns, fit_.readings.exists, search.effects)
         if c.effect != effect and (c.whole if whole else c.imus == cause.imus)
     ]  # fmt: skip
     present = {c.effect for c in search.causes}

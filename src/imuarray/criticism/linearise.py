@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import NamedTuple
 
@@ -14,29 +15,56 @@ from imuarray.model.effects import Prediction
 from imuarray.model.jax64 import jax, jnp
 from imuarray.motion.state import Motion
 
+KNOWN = 9  # the motion that the papers' model knows: omega, omega_dot, s
 CHUNK = 256  # samples per compiled call: one compiled shape, bounded memory
+
+
+class Loose(NamedTuple):
+    """Normal prior of omega double dot and s dot at each sample: mean and sd, (T, 6) each."""
+
+    mean: np.ndarray
+    sd: np.ndarray
 
 
 class State(NamedTuple):
     """Where the model is linearised."""
 
-    motion: np.ndarray  # (T, 9): omega, omega_dot, s
+    motion: np.ndarray  # (T, D): omega, omega_dot, s; omega double dot, s dot where they are free
     positions: np.ndarray  # (A, 3) m, relative to the reference
     parameters: np.ndarray  # (P,) of the model with all effects
     derivatives: tuple  # omega double dot, s dot (T, 3); second, third of (force, rate)
+    loose: Loose | None = None  # prior of omega double dot and s dot where they are free
+
+    @property
+    def jerk(self) -> tuple[np.ndarray, np.ndarray]:
+        """omega double dot and s dot (T, 3), free or from neighbours."""
+        if self.loose is None:
+            return self.derivatives[0], self.derivatives[1]
+        return self.motion[:, KNOWN : KNOWN + 3], self.motion[:, KNOWN + 3 :]
 
 
-class Linear(NamedTuple):
-    """A linearised recording."""
+class Eliminated(NamedTuple):
+    """A linearised recording, whitened, the motion eliminated sample by sample.
 
-    predicted: np.ndarray  # (T, N, 6)
-    motion: np.ndarray  # (T, N, 6, 9)
-    shared: np.ndarray  # (T, N, 6, m), each IMU's readings by its own parameters
+    Where the motion has a prior, it counts as so many readings more.
+    """
+
+    residual: np.ndarray  # (T, N, 6), the motion's share taken out
+    whitened: np.ndarray  # (T, N, 6, m), each IMU's readings by its own parameters
+    basis: np.ndarray  # (T, 6 N, D) of what the motion can explain, orthonormal with its prior's
+    through: np.ndarray  # (T, N, D, m), the derivative's coordinates in that basis
+    inverse: np.ndarray  # (T, D, D) of the factor of the motion's information
+    taken: np.ndarray  # (T, D) the residual's coordinates in the basis
+    log_volume: np.ndarray  # (T,) log determinant of the motion's information
+    misfit: np.ndarray  # (T,) squared residuals, the prior's included
 
 
 def _reading(model, count, x, positions, parameters, extra, time, span):
     """(N, 6) predicted readings of one sample."""
     jerk, force_rate, second, third = extra
+    if len(x) > KNOWN:
+        jerk, force_rate = x[9:12], x[12:15]
+        second = second._replace(angular_rate=jerk[None])
     motion = Motion(x[:3], x[3:6], x[6:9], jerk, force_rate)
     out = model.predict(
         motion, positions, parameters, time=time, span=span, second=second, third=third
@@ -47,7 +75,7 @@ def _reading(model, count, x, positions, parameters, extra, time, span):
 
 
 @partial(jax.jit, static_argnums=(0, 1))
-def _chunk(model, count, x, extra, time, span, positions, parameters, directions):
+def _chunk(model, count, x, extra, time, span, positions, parameters, directions, data):
     split = positions.size
 
     def one(x, extra, time):
@@ -62,35 +90,94 @@ def _chunk(model, count, x, extra, time, span, positions, parameters, directions
         )
         return flat(x, shared), jax.jacfwd(flat)(x, shared), along
 
-    return jax.vmap(one)(x, extra, time)
+    predicted, motion, shared = jax.vmap(one)(x, extra, time)
+    values, weights = data
+    motion = (weights[..., None] * motion).reshape(len(x), 6 * count, -1)
+    gram = jnp.einsum("tri,trj->tij", motion, motion)
+    return weights * (values - predicted), motion, weights[..., None] * shared, gram
 
 
-BUCKETS = (4, 16, 48)  # numbers of columns a compiled derivative is made for
+@jax.jit
+def _projected(residual, motion, whitened, inverse, bare, sd):
+    samples, count = residual.shape[:2]
+    flat = residual.reshape(samples, -1)
+    basis = jnp.einsum("trj,tij->tri", motion, inverse)
+    expected = inverse[:, :, KNOWN:] / sd[:, None]
+    taken = jnp.einsum("tri,tr->ti", basis, flat) + jnp.einsum("tij,tj->ti", expected, bare)
+    left = flat - jnp.einsum("tri,ti->tr", basis, taken)
+    unexpected = bare - jnp.einsum("tij,ti->tj", expected, taken)
+    through = jnp.einsum("tkid,tkim->tkdm", basis.reshape(samples, count, 6, -1), whitened)
+    misfit = jnp.sum(left**2, axis=1) + jnp.sum(unexpected**2, axis=1)
+    return left.reshape(residual.shape), basis, through, taken, misfit
 
 
-def linearise(readings: Readings, columns: Columns, state: State, wanted=None) -> Linear:
-    """Prediction (T, N, 6) and derivatives at a state, in SI units.
+def _eliminated(model, count, x, extra, time, span, shared, data, prior) -> Eliminated:
+    """A chunk; its factorisations are LAPACK's, called from here (see `jax64`)."""
+    positions, parameters, directions = shared
+    residual, motion, whitened, gram = _chunk(
+        model, count, x, extra, time, span, positions, parameters, directions, data
+    )
+    mean, sd = prior
+    gram = np.array(gram)
+    free = np.arange(KNOWN, gram.shape[1])
+    gram[:, free, free] += sd**-2.0
+    factor = np.linalg.cholesky(gram)
+    inverse = np.linalg.inv(factor)
+    bare = (mean - x[:, KNOWN:]) / sd
+    left, basis, through, taken, misfit = _projected(residual, motion, whitened, inverse, bare, sd)
+    volume = 2 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+    return Eliminated(left, whitened, basis, through, inverse, taken, volume, misfit)
 
-    ``wanted`` : indices of the columns to differentiate by, all if None.
+
+BUCKETS = (4, 16, 32)  # numbers of columns a compiled derivative is made for
+THREADS = 2
+
+
+def linearise(
+    readings: Readings, columns: Columns, state: State, wanted=None, spare=None
+) -> Eliminated:
+    """Residual and derivatives at a state, the motion eliminated.
+
+    ``wanted`` : indices of the columns to differentiate by, all if None; zeros may follow them.
+    ``spare`` : a former answer whose memory may be used again. LinAlgError where the readings do
+    not determine the motion.
     """
     samples, count = readings.values.shape[:2]
     directions = tangents(columns.model)
-    number = len(directions)
     if wanted is not None:
-        number = len(wanted)
-        room = min([size for size in BUCKETS if size >= number], default=len(directions))
+        number, whole = len(wanted), len(directions)
+        room = min([size for size in BUCKETS if size >= number], default=whole)
         directions = np.vstack([directions[wanted], np.zeros((room - number, directions.shape[1]))])
-    parts = []
-    for start in range(0, samples, CHUNK):
+    nothing = np.zeros((samples, 0))
+    prior = (nothing, nothing) if state.loose is None else state.loose
+    shared, weights = (state.positions, state.parameters, directions), readings.weights
+
+    def one(start):
         index = np.minimum(np.arange(start, start + CHUNK), samples - 1)
-        extra = jax.tree.map(lambda field, index=index: field[index], state.derivatives)
-        out = _chunk(
-            columns.model, count, state.motion[index], extra, readings.time[index],
-            readings.span, state.positions, state.parameters, directions,
+        extra = jax.tree.map(lambda field: field[index], state.derivatives)
+        return _eliminated(
+            columns.model, count, state.motion[index], extra, readings.time[index], readings.span,
+            shared, (readings.values[index], weights[index]), (prior[0][index], prior[1][index]),
         )  # fmt: skip
-        parts.append([np.asarray(part)[: samples - start] for part in out])
-    predicted, motion, shared = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return Linear(predicted, motion, shared[..., :number])
+
+    return _joined(one, samples, spare)
+
+
+def _joined(one, samples, spare) -> Eliminated:
+    """All chunks, one after the other, without the last one's padding."""
+    first = one(0)
+    shapes = [(samples, *part.shape[1:]) for part in first]
+    reused = spare is not None and [part.shape for part in spare] == shapes
+    out = spare if reused else Eliminated(*(np.empty(shape) for shape in shapes))
+
+    def put(start, found=None):
+        for target, part in zip(out, one(start) if found is None else found, strict=True):
+            target[start : start + CHUNK] = np.asarray(part)[: samples - start]
+
+    put(0, first)
+    with ThreadPoolExecutor(THREADS) as pool:
+        list(pool.map(put, range(CHUNK, samples, CHUNK)))
+    return out
 
 
 def derivatives(readings: Readings, motion, positions) -> tuple:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import norm, poisson
 
-from imuarray.criticism.fit import Fit
+from imuarray.criticism.fit import Fit, pick
 from imuarray.criticism.readings import Readings
 
 DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / np.sqrt(70.0)
@@ -149,11 +149,9 @@ def coloured_meat(fit: Fit, information, correlation) -> np.ndarray | None:
     """Covariance of the score (K, K) where triads have AR(1) noise; None where all is white."""
     if not np.any(correlation):
         return None
-    owner = fit.columns.owner
-    pairs = np.argwhere(owner)
-    through = fit.through[:, :, pairs[:, 0], pairs[:, 1]]
+    pairs, through = pick(fit.through, fit.columns.owner)
     samples, count = fit.residual.shape[:2]
-    basis = fit.basis.reshape(samples, count, 6, 9)
+    basis = fit.basis.reshape(samples, count, 6, -1)
     meat = information.copy()
     for imu, kind in np.argwhere(correlation != 0):
         rows = slice(3 * kind, 3 * kind + 3)

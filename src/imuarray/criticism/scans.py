@@ -12,7 +12,8 @@ from imuarray.criticism.scores import Candidate, Evidence, Score, log_tail, robu
 
 PHASES = np.arange(32) / 32  # of a turn, tried at first
 CUTS = 24  # instants tried at first
-BELIEVED = -8.0  # log p of a sawtooth beyond a constant delay
+BELIEVED = -10.0  # log p of a sawtooth beyond a constant delay
+MANY = 2.6  # log of the independent sawtooths per sample, from simulated white scores
 FAIR = 0.05  # of the constant delay's chi-square
 LEAST_TURNS = 3  # of a clock against the host's; fewer are a drift of the delay
 
@@ -29,7 +30,7 @@ def delay_score(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     column = int(fit.columns.of("sensor_delay")[0])
     along, through = fit.whitened[..., column], fit.through[..., column]
     score = np.einsum("tki,tki->tk", along, fit.residual)
-    information = np.sum(along**2, axis=2) - np.sum(through**2, axis=1)
+    information = np.sum(along**2, axis=2) - np.sum(through**2, axis=2)
     return score, np.maximum(information, 1e-300)
 
 
@@ -44,7 +45,7 @@ def scan_clocks(fit: Fit, imus, delays: dict) -> list[Found]:
     time, each = fit.readings.time, {}
     for imu in imus:
         gain, values = sawtooth(time, score[:, imu], information[:, imu])
-        log_p = log_tail(max(gain, 1e-9), 3) + np.log(2 * len(time) * len(imus))
+        log_p = log_tail(max(gain, 1e-9), 3) + MANY + np.log(len(time) * len(imus))
         if log_p < BELIEVED and gain > FAIR * delays.get((imu,), 0.0):
             each[imu] = (gain, values)
     for imu in list(each):
@@ -70,7 +71,7 @@ def _echo(one, other) -> bool:
 def _clock_score(imus, gain, delays, samples, count) -> Score:
     freedom = 4 * len(imus)
     statistic = gain + delays.get(imus, sum(delays.get((imu,), 0.0) for imu in imus))
-    log_p = log_tail(statistic, freedom) + len(imus) * np.log(samples) + np.log(2 * count)
+    log_p = log_tail(statistic, freedom) + len(imus) * (MANY + np.log(samples)) + np.log(count)
     return Score(Candidate("sensor_clock", imus), float(statistic), freedom, min(log_p, 0.0))
 
 
@@ -155,9 +156,10 @@ def scan_shifts(fit: Fit, given: Evidence, imus) -> list[Found]:
         parts = [normal(fit.residual, fit.whitened, fit.through, mask, slice(a, b))
                  for a, b in zip(edges[:-1], edges[1:], strict=True)]  # fmt: skip
         own, rest = _places(mask, fit.active, imu, chosen)
+        ridge = np.diag(1.0 / fit.columns.prior_sd[fit.columns.of("position_shift")[:3]] ** 2)
         best = (0.0, 0, np.zeros(3))
         for cut in range(1, CUTS):
-            gain, shift = _step_gain(parts[cut:], own, rest, outside)
+            gain, shift = _step_gain(parts[cut:], own, rest, outside, ridge)
             best = max(best, (gain, edges[cut], shift), key=lambda b: b[0])
         gain, place, shift = best
         log_p = log_tail(gain, 3) + np.log(2 * len(imus) * CUTS)
@@ -173,12 +175,12 @@ def _places(mask, active, imu, chosen):
     return number[imu, chosen], number[active]
 
 
-def _step_gain(parts, own, rest, outside):
+def _step_gain(parts, own, rest, outside, ridge):
     """(chi-square, shift (3,) m) of a position step over the given stretches of time."""
     information = sum(part[0] for part in parts)
     score = sum(part[1] for part in parts)[own]
     cross = information[np.ix_(own, rest)]
-    block = information[np.ix_(own, own)] - cross @ outside @ cross.T
+    block = information[np.ix_(own, own)] - cross @ outside @ cross.T + ridge
     inverse = robust_inverse(block)
     shift = inverse @ score
     return float(score @ shift), shift
@@ -195,7 +197,7 @@ def refine_instant(fit: Fit, imu: int, around: float) -> float:
     chosen = columns.of(POSITION)[place]
     shift = columns.model.split(state.parameters)["position_shift"][imu, :3]
     along = fit.whitened[:, imu][..., chosen] @ shift
-    through = fit.through[:, :, imu, chosen] @ shift
+    through = fit.through[:, imu][..., chosen] @ shift
     linear = np.einsum("ti,ti->t", along, fit.residual[:, imu])
     square = np.sum(along**2, axis=1) - np.sum(through**2, axis=1)
     after = fit.readings.time >= around

@@ -68,11 +68,11 @@ def mask_of(columns: Columns, candidate: Candidate) -> np.ndarray:
     return out & columns.owner
 
 
-def candidates(columns: Columns, exists, effects, smooth: bool) -> list[Candidate]:
-    """Every effect that a score can see, on all IMUs and on each; delays need smooth motion."""
+def candidates(columns: Columns, exists, effects) -> list[Candidate]:
+    """Every effect that a score can see, on all IMUs and on each."""
     found = []
     for effect in effects:
-        if effect in SCANNED or (effect.endswith("_delay") and not smooth):
+        if effect in SCANNED:
             continue
         kind = EFFECTS[effect].sensors
         able = exists.any(axis=1) if kind == "imu" else exists[:, int(kind == "gyroscope")]

@@ -48,14 +48,13 @@ def held_out(nats, blocks=10) -> tuple[float, float]:
     return float(np.sum(parts)), float(np.std(parts, ddof=1) * np.sqrt(blocks))
 
 
-def verdict(z, exists, limit):
-    """(triads far from zero, log p of the worst or of all) for standard normals z (N,)."""
-    there = np.flatnonzero(exists)
-    single = norm.logsf(np.abs(z[there])) + np.log(2)
-    pooled = log_tail(float(np.sum(z[there] ** 2)), len(there))
-    log_p = min(single.min() + np.log(2 * len(there)), pooled + np.log(2), 0.0)
-    hits = [int(k) for k, p in zip(there, single, strict=True) if p + np.log(len(there)) < limit]
-    return hits, float(log_p)
+def verdict(log_ratio, covariance, limit):
+    """(places far from zero, log p of the worst or of all) for normals (n,) of a covariance."""
+    number = len(log_ratio)
+    single = norm.logsf(np.abs(log_ratio) / np.sqrt(np.diag(covariance))) + np.log(2)
+    pooled = log_tail(float(log_ratio @ np.linalg.solve(covariance, log_ratio)), number)
+    log_p = min(single.min() + np.log(2 * number), pooled + np.log(2), 0.0)
+    return np.flatnonzero(single + np.log(number) < limit), float(log_p)
 
 
 def autocorrelation(fit: Fit, imu: int, kind: int) -> tuple[float, int]:
@@ -66,29 +65,57 @@ def autocorrelation(fit: Fit, imu: int, kind: int) -> tuple[float, int]:
     return float(np.nanmean(pairs) / np.nanmean(unit**2)), int(np.isfinite(pairs).sum())
 
 
-def scales(fit: Fit, noise: Noise, kind: int) -> tuple[np.ndarray, np.ndarray]:
-    """(log ratio to the declared sd, its error) of each triad, (N,).
+def whole_scales(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+    """(log ratio to the sd in use (n,), covariance (n, n)) of the n triads that exist.
+
+    One step of restricted maximum likelihood: the residual's squares against what the motion
+    leaves of them, and the information of all triads' variances together.
+    """
+    readings = fit.readings
+    samples, count = fit.residual.shape[:2]
+    score, information = np.zeros(2 * count), np.zeros((2 * count, 2 * count))
+    kept = readings.keep.reshape(samples, -1).astype(float)
+    for start in range(0, samples, 256):
+        part = slice(start, start + 256)
+        basis, mask = fit.basis[part], kept[part]
+        left = -np.einsum("tri,tsi->trs", basis, basis)
+        rows = np.arange(left.shape[1])
+        left[:, rows, rows] += mask
+        left *= mask[:, :, None] * mask[:, None, :]
+        squares = np.sum(left**2, axis=0).reshape(2 * count, 3, 2 * count, 3)
+        information += 2 * squares.sum(axis=(1, 3))
+        surplus = fit.residual[part].reshape(-1, 6 * count) ** 2 * mask - left[:, rows, rows]
+        score += surplus.sum(axis=0).reshape(2 * count, 3).sum(axis=1)
+    there = readings.exists.ravel()
+    covariance = np.linalg.inv(information[np.ix_(there, there)])
+    wide = np.array([_width(fit, int(i), int(k)) for i, k in np.argwhere(readings.exists)])
+    return covariance @ score[there], covariance * np.outer(wide, wide)
+
+
+def _width(fit: Fit, imu: int, kind: int) -> float:
+    """By how much a scale's error exceeds that of white normal noise."""
+    unit = triad(fit, imu, kind)
+    tails = np.nanmean(unit**4) / np.nanmean(unit**2) ** 2 - 1.0
+    rho = autocorrelation(fit, imu, kind)[0]
+    return float(np.sqrt(max(tails / 2, 1.0) * (1 + rho**2) / (1 - rho**2)))
+
+
+def scales(fit: Fit, noise: Noise) -> tuple[np.ndarray, np.ndarray]:
+    """(log ratio to the declared sd (n,), covariance (n, n)) of the n triads that exist.
 
     From the whole residual where that agrees with its fast part, else from the fast part, which
     smooth misfit does not reach.
     """
-    readings = fit.readings
-    count = len(readings.labels)
-    log_ratio, error = np.zeros(count), np.ones(count)
-    fast = np.log(noise.sd[:, kind] / readings.declared[:, kind])
-    for imu in np.flatnonzero(readings.exists[:, kind]):
-        unit = triad(fit, imu, kind)
-        square = np.nanmean(unit**2)
-        number = np.isfinite(unit).sum()
-        tails = max(np.nanmean(unit**4) / square**2 - 1.0, 1.0)
-        rho = autocorrelation(fit, imu, kind)[0]
-        spread = np.sqrt(tails / number * (1 + rho**2) / (1 - rho**2)) / 2
-        whole = np.log(readings.sd[imu, kind] / readings.declared[imu, kind]) + np.log(square) / 2
-        apart = np.sqrt(max(noise.error[imu, kind] ** 2 - spread**2, spread**2))
-        agree = noise.correlation[imu, kind] != 0 or abs(whole - fast[imu]) < AGREE * apart
-        log_ratio[imu] = whole if agree else fast[imu]
-        error[imu] = spread if agree else noise.error[imu, kind]
-    return log_ratio, error
+    there = fit.readings.exists
+    whole, covariance = whole_scales(fit)
+    whole = whole + np.log(fit.readings.sd / fit.readings.declared)[there]
+    fast = np.log(noise.sd / fit.readings.declared)[there]
+    spread, rough = np.diag(covariance), noise.error[there] ** 2
+    apart = np.sqrt(np.maximum(rough - spread, spread))
+    agree = (noise.correlation[there] != 0) | (np.abs(whole - fast) < AGREE * apart)
+    own = np.diag(np.where(agree, spread, rough))
+    covariance = np.where(np.outer(agree, agree), covariance, own)
+    return np.where(agree, whole, fast), covariance
 
 
 def noise_scale(fit: Fit, noise: Noise, kind: int, limit, least, skip=()) -> Named | None:
@@ -97,27 +124,32 @@ def noise_scale(fit: Fit, noise: Noise, kind: int, limit, least, skip=()) -> Nam
     ``least`` (N,) log ratios below which a departure is not believed, ``skip`` IMUs to leave out.
     """
     readings = fit.readings
-    log_ratio, error = scales(fit, noise, kind)
-    exists = readings.exists[:, kind] & (np.abs(log_ratio) > least)
-    exists[list(skip)] = False
-    if not exists.any():
+    pairs = np.argwhere(readings.exists)
+    log_ratio, covariance = scales(fit, noise)
+    chosen = np.flatnonzero(
+        (pairs[:, 1] == kind)
+        & (np.abs(log_ratio) > np.asarray(least)[pairs[:, 0]])
+        & ~np.isin(pairs[:, 0], list(skip))
+    )
+    if not len(chosen):
         return None
-    hits, log_p = verdict(log_ratio / error, exists, limit)
-    log_p += np.log(readings.exists[:, kind].sum() / exists.sum())
+    hits, log_p = verdict(log_ratio[chosen], covariance[np.ix_(chosen, chosen)], limit)
+    log_p += np.log(readings.exists[:, kind].sum() / len(chosen))
     if log_p > limit:
         return None
-    imus = hits or [int(k) for k in np.flatnonzero(exists)]
-    nats = np.zeros(len(fit.residual))
-    for imu in imus:
+    chosen = chosen[hits] if len(hits) else chosen
+    nats, numbers = np.zeros(len(fit.residual)), {}
+    for place in chosen:
+        imu = pairs[place, 0]
         square = np.nan_to_num(triad(fit, imu, kind)) ** 2
-        own = np.exp(log_ratio[imu]) * readings.declared[imu, kind] / readings.sd[imu, kind]
         bare = readings.declared[imu, kind] / readings.sd[imu, kind]
+        own = np.exp(log_ratio[place]) * bare
         nats += np.sum(square / bare**2 - square / own**2, axis=1) / 2 - 3 * np.log(own / bare)
-    numbers = {
-        f"ratio_{readings.labels[k]}": (float(np.exp(log_ratio[k])), float(error[k]), "1")
-        for k in imus
-    }
-    return Named(f"{KINDS[kind]}_noise", tuple(imus), log_p, numbers, *held_out(nats))
+        ratio = float(np.exp(log_ratio[place]))
+        error = ratio * float(np.sqrt(covariance[place, place]))
+        numbers[f"ratio_{readings.labels[imu]}"] = (ratio, error, "1")
+    imus = tuple(int(k) for k in pairs[chosen, 0])
+    return Named(f"{KINDS[kind]}_noise", imus, log_p, numbers, *held_out(nats))
 
 
 def mixture(fit: Fit, imu: int, kind: int, steps=60) -> Mixture:
