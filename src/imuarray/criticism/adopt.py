@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from imuarray.model import EFFECTS
 BLOCKS = 10  # of time, held out in turn
 MOST = 12  # causes
 KEPT = 0.05  # of the gain that a test promises must be there on held-out time
+LEAST_Z = 1.5  # standard errors that a gain on held-out time must have
 SURE = 50.0  # nats; smaller promises may break
 EDGE = 0.03  # of a turn: how near to a clock's jump a reading is left out
 STEADY = 0.02  # relative change of a noise sd below which a fit is not repeated
@@ -43,7 +45,17 @@ class Cause:
     log_p: float
     gain: float = 0.0
     gain_se: float = 0.0
-    rivals: list[str] = field(default_factory=list)
+
+
+class Rung(NamedTuple):
+    """One adoption: what, its test, its gain on held-out time, the misfit after it."""
+
+    effect: str
+    imus: tuple[int, ...]
+    log_p: float
+    gain: float
+    gain_se: float
+    misfit: float
 
 
 @dataclass
@@ -64,7 +76,7 @@ class Search:
     excess: float = 0.0  # of the misfit, before any cause
     jumps: np.ndarray | bool = False  # readings left out near a clock's jump
     allowed: np.ndarray | None = None  # readings that count, outliers included
-    trace: list = field(default_factory=list)
+    trace: list[Rung] = field(default_factory=list)
 
     @property
     def active(self) -> np.ndarray:
@@ -81,19 +93,17 @@ class Search:
         state = self.fit.state if state is None else state
         if state.loose is not None:
             state = loosened(self.readings, state)
-        for turn in range(turns + bool(self.clocks)):
+        turns += bool(self.clocks)
+        for turn in range(2 * turns):
             self.edges(state, EDGE / (1 + turn))
             made = fit(self.readings, self.columns, self.active, state, self.smooth, rough)
             judged = noises.judge(made)
-            made = self.rewound(made)
             change = np.max(np.abs(judged.sd / self.readings.sd - 1)[self.readings.exists])
             self.fit, self.noise = made, judged
-            if change < STEADY and (turn > 0 or not self.clocks):
+            enough = turn > 0 or not self.clocks
+            if (change < STEADY and enough) or (turn + 1 >= turns and change < 5 * STEADY):
                 break
-            self.readings, state = self.readings.with_sd(judged.sd), made.state
-        else:
-            self.fit = at(self.readings, self.columns, self.active, state, made.converged)
-            self.noise = noises.judge(self.fit)
+            self.readings, state = self.readings.with_sd(judged.sd), self.rewound(made).state
         self.weigh()
 
     @property
@@ -136,9 +146,11 @@ class Search:
         """The same fit to the end."""
         self.refit(turns=4, rough=False)
 
-    def begin(self) -> None:
-        """The papers' model."""
+    def begin(self, parameters=None, positions=None) -> None:
+        """The papers' model, or what another search came to."""
         first = start(self.readings, self.columns)
+        if parameters is not None:
+            first = first._replace(positions=positions, parameters=parameters)
         self.allowed = self.readings.keep
         self.smooth = is_smooth(self.readings, first.motion)
         self.refit(first if self.smooth else loosened(self.readings, first))
@@ -210,22 +222,17 @@ def attempt(search: Search, score, values) -> bool:
     prune(search, candidate.effect)
     gain, error = heldout_gain(search, candidate.effect)
     words = f"{candidate.effect} {candidate.variant} of {label(search, candidate)}"
-    if gain <= 0 or gain < KEPT * (score.statistic / 2 - SURE):
+    if gain <= LEAST_Z * error or gain < KEPT * (score.statistic / 2 - SURE):
         search.readings, search.fit, search.noise, search.given, search.causes = before
         search.refused.add((candidate.effect, candidate.imus, candidate.variant))
-        search.say(f"refused {words}: held-out gain {gain:.1f} nats")
+        search.say(f"refused {words}: held-out gain {gain:.1f} +- {error:.1f}")
         return False
     search.trace.append(
-        (
-            candidate.effect,
-            candidate.imus,
-            score.log_p,
-            gain,
-            error,
-            search.fit.misfit - search.fit.free,
-        )
+        Rung(candidate.effect, candidate.imus, score.log_p, gain, error, search.fit.misfit)
     )
-    search.say(f"adopted {words}: log p {score.log_p:.0f}, held-out gain {gain:.0f} nats")
+    search.say(
+        f"adopted {words}: log p {score.log_p:.0f}, held-out gain {gain:.0f} +- {error:.0f} nats"
+    )
     return True
 
 

@@ -22,6 +22,7 @@ from imuarray.criticism.readings import Readings
 STEPS = 25
 ROUGH = 1e-4  # of the misfit that a step must gain while causes are looked for
 SETTLED = 0.02  # of a parameter's own sd
+SHORTEST = 0.2  # share of a Gauss-Newton step
 NEAR = 9  # samples that tell the size of the motion's third derivatives
 
 
@@ -37,7 +38,7 @@ class Fit:
     basis : (T, 6 N, D) basis of what the motion can explain, orthonormal with its prior's
     through : (T, N, D, m) the derivative's coordinates in that basis
     log_volume : (T,) log determinant of the motion's information
-    misfit : sum of squared residuals, the motion's prior included
+    misfits : (T,) sums of squared residuals, the motion's prior included
     """
 
     readings: Readings
@@ -49,8 +50,13 @@ class Fit:
     basis: np.ndarray
     through: np.ndarray
     log_volume: np.ndarray
-    misfit: float
+    misfits: np.ndarray
     converged: bool
+
+    @property
+    def misfit(self) -> float:
+        """Of all samples."""
+        return float(np.sum(self.misfits))
 
     @property
     def leverage(self) -> np.ndarray:
@@ -100,7 +106,7 @@ def fit(
     prior_mean = prior_means(readings, columns)[active]
     precision = 1.0 / np.broadcast_to(columns.prior_sd, active.shape)[active] ** 2
     wanted = np.flatnonzero(active.any(axis=0))
-    converged, last, seen = False, np.inf, None
+    converged, last, length, seen = False, np.inf, 1.0, None
     enough = ROUGH if rough else 0.0
     for number in range(STEPS):
         state = with_derivatives(readings, state, smooth)
@@ -118,10 +124,12 @@ def fit(
             converged = True
             break
         cost = misfit + astray + float(precision @ offset**2)
-        if number > 6 and cost > last * (1 - 1e-5):
+        if number > 6 and abs(cost - last) < 1e-5 * last:
             break  # it wanders around the optimum, by less than anything told apart here
+        # full steps may leap to and fro across a valley: half of them lead into it
+        length = max(length / 2, SHORTEST) if cost > last else min(1.0, 1.2 * length)
         last = cost
-        state = advance(columns, state, active, step, few, seen)
+        state = advance(columns, state, active, step, few, seen, length)
     return at(readings, columns, active, state, converged)
 
 
@@ -130,12 +138,16 @@ def at(readings: Readings, columns: Columns, active, state: State, converged: bo
     seen = linearise(readings, columns, state)
     return Fit(
         readings, columns, state, active, seen.residual, seen.whitened, seen.basis, seen.through,
-        seen.log_volume, float(np.sum(seen.misfit)), converged,
+        seen.log_volume, seen.misfit, converged,
     )  # fmt: skip
 
 
-def advance(columns, state, active, step, few, seen: Eliminated) -> State:
-    """The state after a step of the active parameters, and the motion's own."""
+def advance(columns, state, active, step, few, seen: Eliminated, length) -> State:
+    """The state after a step of the active parameters, and the motion's own.
+
+    ``length`` is the share of the parameters' step that is taken.
+    """
+    step = length * step
     blocks = np.zeros(few.shape)
     blocks[few] = step
     moved = np.einsum("tkdm,km->td", seen.through, blocks, optimize=True)

@@ -13,7 +13,7 @@ from imuarray.criticism.adopt import Search, adopt, clear, freed_places, need
 from imuarray.criticism.columns import catalogue_effects, columns_of
 from imuarray.criticism.fit import Fit, fit
 from imuarray.criticism.gate import Check, all_checks
-from imuarray.criticism.readings import Readings, arrange
+from imuarray.criticism.readings import Readings, arrange, part_of
 from imuarray.criticism.scans import delay_score, sawtooth
 from imuarray.criticism.scores import candidates, log_tail, mask_of, score_all
 from imuarray.criticism.structure import Structural, find_structural
@@ -25,6 +25,7 @@ NESTED = {  # an effect, and those that contain it or are contained
     "sensor_delay": ("sensor_clock",), "bias_drift": ("accelerometer_bias", "gyroscope_bias"),
     "sensor_clock": ("sensor_delay", "gyroscope_delay"),
 }  # fmt: skip
+LONG = 3500  # samples; longer recordings are looked at in part first
 TAILED = 0.25  # log ratio by which a mixture's core may miss the noise
 DELAYED = 0.1  # log ratio of noise that an adopted delay may bring with it
 
@@ -60,8 +61,10 @@ def investigate(
     columns = columns_of(readings.array, effects, readings.position_prior_sd)
     search = Search(readings, columns, effects, thresholds, say)
     search.begin()
-    base = search.fit
+    base, excess = search.fit, search.excess
     base_checks = all_checks(base, search.given, search.noise)
+    if len(readings.time) > LONG:
+        search = looked_ahead(search, part_of(readings, LONG), excess)
     calm(search)
     adopt(search)
     search.polish()
@@ -76,6 +79,20 @@ def investigate(
     found = Found(search, base, base_checks, structural, in_noise, checks, explained, failing, raw)
     found.rivals = {c.effect: rivals(search, c.effect) for c in search.causes}
     return found
+
+
+def looked_ahead(whole: Search, part: Readings, excess: float) -> Search:
+    """The whole recording's search, begun with the causes that a part of it shows."""
+    ahead = Search(part, whole.columns, whole.effects, whole.thresholds, whole.say)
+    ahead.begin()
+    calm(ahead)
+    adopt(ahead)
+    search = Search(whole.readings, whole.columns, whole.effects, whole.thresholds, whole.say)
+    search.causes, state = ahead.causes, ahead.fit.state
+    search.begin(state.parameters, state.positions)
+    search.excess = excess
+    search.trace = ahead.trace
+    return search
 
 
 def calm(search: Search) -> None:

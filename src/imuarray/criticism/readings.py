@@ -12,6 +12,7 @@ from imuarray.geometry import Array
 from imuarray.recording import Recording, array_of
 
 LEAST = 200  # samples; fewer tell next to nothing of any effect
+STRETCH = 128  # samples
 WINDOW = 0.04  # s, length of the polynomials that give time derivatives
 
 
@@ -60,6 +61,23 @@ class Readings:
     def without(self, lost) -> Readings:
         """The same without the readings in ``lost`` (T, N, 6) bool."""
         return replace(self, keep=self.keep & ~lost)
+
+
+def part_of(readings: Readings, most: int) -> Readings:
+    """Stretches of a recording, spread evenly, of some ``most`` samples in all."""
+    samples = len(readings.time)
+    every = -(-samples // most)
+    stretch = np.arange(samples) // STRETCH
+    used = stretch % every == 0
+    both = readings.run[used] * (stretch[-1] + 1) + stretch[used]
+    run = np.unique(both, return_inverse=True)[1]
+    long = np.bincount(run)[run] >= readings.window
+    used[used] = long
+    run = np.unique(both[long], return_inverse=True)[1]
+    return replace(
+        readings, time=readings.time[used], values=readings.values[used],
+        keep=readings.keep[used], run=run,
+    )  # fmt: skip
 
 
 def odd_window(time) -> int:

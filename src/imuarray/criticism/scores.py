@@ -134,13 +134,16 @@ class Evidence:
         scale = self.scale[chosen]
         block = information[np.ix_(chosen, chosen)] / np.outer(scale, scale)
         values, vectors = np.linalg.eigh(block)
-        seen = values > SEEN
-        along = vectors[:, seen].T @ (score[chosen] / scale)
+        # a parameter stays within its prior: near a gauge, data alone would take it anywhere
+        ridge = vectors.T @ ((self.ridge[chosen] / scale**2)[:, None] * vectors)
+        seen = values > np.maximum(SEEN, np.diag(ridge))
+        along, ridge = vectors[:, seen].T @ (score[chosen] / scale), ridge[np.ix_(seen, seen)]
         if meat is information:
-            return float(np.sum(along**2 / values[seen])), int(seen.sum())
-        spread = vectors[:, seen].T @ (meat[np.ix_(chosen, chosen)] / np.outer(scale, scale))
-        spread = spread @ vectors[:, seen]
-        return float(along @ robust_inverse(spread) @ along), int(seen.sum())
+            spread = np.diag(values[seen])
+        else:
+            spread = vectors[:, seen].T @ (meat[np.ix_(chosen, chosen)] / np.outer(scale, scale))
+            spread = spread @ vectors[:, seen]
+        return float(along @ robust_inverse(spread + ridge) @ along), int(seen.sum())
 
 
 def robust_inverse(matrix) -> np.ndarray:

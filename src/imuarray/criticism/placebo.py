@@ -1,0 +1,52 @@
+"""Placebos: an adopted cause with its numbers given to other IMUs must gain nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from imuarray.criticism.adopt import Cause, Search
+from imuarray.criticism.fit import flat_parameters
+from imuarray.criticism.scans import delay_score
+
+
+def placebo_gain(search: Search, cause: Cause) -> tuple[float, float]:
+    """(nats the cause gains, nats it gains with each IMU's numbers given to the next).
+
+    Against the same model with the cause's parameters at zero, all others refitted (quadratic).
+    A clock's ages pass to the next IMU as they are.
+    """
+    if cause.effect == "sensor_clock":
+        return _of_ages(search)
+    given, columns = search.given, search.columns
+    every = np.zeros(search.active.shape, bool)
+    every[:, columns.of(cause.effect)] = search.active[:, columns.of(cause.effect)].any(axis=0)
+    every &= columns.owner
+    flat = flat_parameters(columns, search.fit.state)
+    rows = np.flatnonzero(every.any(axis=1))
+    moved = flat.copy()
+    moved[rows] = flat[np.roll(rows, 1)]
+    places = given.places(every)
+    active = np.setdiff1d(given.places(search.active), places)
+    information, score, _ = given.conditional(active)
+    block, slope = information[np.ix_(places, places)], score[places]
+
+    def nats(values):
+        step = values - flat[every]
+        return slope @ step - step @ block @ step / 2
+
+    nothing = nats(np.zeros(len(places)))
+    return float(-nothing), float(nats(moved[every]) - nothing)
+
+
+def _of_ages(search: Search) -> tuple[float, float]:
+    score, information = delay_score(search.fit)
+    clocks = search.columns.model.split(np.asarray(search.fit.state.parameters))["sensor_clock"]
+    turns = clocks[:, 1] * search.readings.time[:, None] + clocks[:, 2]
+    delay = -(clocks[:, 3] + clocks[:, 0] * (turns - np.floor(turns) - 0.5))
+    imus = list(search.clocks)
+    bare = score[:, imus] + information[:, imus] * delay[:, imus]
+
+    def nats(values):
+        return float(np.sum(bare * values - information[:, imus] * values**2 / 2))
+
+    return nats(delay[:, imus]), nats(np.roll(delay[:, imus], 1, axis=1)) if len(imus) > 1 else 0.0
