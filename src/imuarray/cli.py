@@ -75,7 +75,10 @@ def _warnings_in_one_line() -> Iterator[None]:
 def _check_output(arguments: argparse.Namespace) -> None:
     """Refuse an output that cannot be written now, not after an hour of sampling."""
     out: Path = arguments.out
-    if out.is_dir():
+    if getattr(arguments, "folder", False):
+        if out.exists() and not out.is_dir():
+            raise InputError(f"--out {out}: expected a folder, found a file")
+    elif out.is_dir():
         raise InputError(f"--out {out}: expected a file to write, found a folder")
     if not out.parent.is_dir():
         raise InputError(f"--out {out}: expected an existing folder, found no {out.parent}")
@@ -84,14 +87,14 @@ def _check_output(arguments: argparse.Namespace) -> None:
     for source in _inputs(arguments):
         if not source.is_file():
             raise InputError(f"{source}: expected a file to read, found none")
-        if out.exists() and out.samefile(source):
+        if out.is_file() and out.samefile(source):
             raise InputError(f"--out {out}: expected another file than the input, found the same")
 
 
 def _inputs(arguments: argparse.Namespace) -> list[Path]:
     """The files a command reads."""
     found = []
-    for name in ("config", "data", "positions", "columns", "recording", "recordings"):
+    for name in ("config", "data", "positions", "columns", "diagnosis", "recording", "recordings"):
         value = getattr(arguments, name, None)
         found += value if isinstance(value, list) else [value] if value is not None else []
     return found
@@ -113,6 +116,12 @@ def _sample(arguments: argparse.Namespace) -> None:
     from imuarray.commands import sample
 
     sample(arguments)
+
+
+def _diagnose(arguments: argparse.Namespace) -> None:
+    from imuarray.commands_criticism import diagnose
+
+    diagnose(arguments)
 
 
 def _later(name: str):
@@ -176,6 +185,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_sample(commands)
     _add_residuals(commands)
     _add_repeat(commands)
+    _add_diagnose(commands)
     return parser
 
 
@@ -210,6 +220,13 @@ def _add_effects(parser: argparse.ArgumentParser) -> None:
         default=(),
         metavar="A,B",
         help="effects that extend the measurement model, separated by commas (default: none)",
+    )
+    parser.add_argument(
+        "--diagnosis",
+        type=Path,
+        default=None,
+        metavar="FILE",
+        help="diagnosis.json whose extended model to use: its effects, their values, its noise",
     )
 
 
@@ -342,6 +359,26 @@ def _add_repeat(commands) -> None:
         "--accelerometer-noise", type=_positive, default=None, metavar="SD",
         help="assumed sd, m/s^2 (default: estimated from each recording's residual)",
     )  # fmt: skip
+
+
+def _add_diagnose(commands) -> None:
+    parser = _add_command(
+        commands,
+        "diagnose",
+        _diagnose,
+        "What does the simulation get wrong, why, and what does the extended model gain?",
+        "corrected.nc --out diagnosis/",
+        "folder to write: diagnosis.json, report.html, figures",
+    )
+    parser.set_defaults(folder=True)
+    parser.add_argument("recording", type=Path, help="NetCDF-4 recording to read")
+    parser.add_argument(
+        "--without", type=_effects, default=(), metavar="A,B",
+        help="effects to strike from the catalogue, separated by commas (default: none)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--seed", type=_seed, default=0, metavar="S", help="of the replicates (default: 0)"
+    )
 
 
 def _add_calibrate(commands) -> None:

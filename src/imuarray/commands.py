@@ -28,7 +28,7 @@ def simulate(arguments) -> None:
 
     config = read_config(arguments.config)
     noise = config["noise"]["accelerometer_sd"]
-    recording, truth = simulate_twisting(config, noise, arguments.effects)
+    recording, truth = simulate_twisting(config, noise, arguments.effects, extension_of(arguments))
     write_recording(recording, arguments.out, truth, stamp(config, config["seed"]))
     if not arguments.quiet:
         samples, accelerometers = recording.specific_force.shape[:2]
@@ -66,21 +66,50 @@ def usable(recording: Recording, quiet: bool) -> Recording:
     return recording.select(~lost) if lost.any() else recording
 
 
+def extension_of(arguments):
+    """The `Extension` of a diagnosis that the command was given, or None."""
+    if arguments.diagnosis is None:
+        return None
+    from imuarray.criticism.extension import read_extension
+
+    if arguments.effects:
+        raise InputError("--effects: expected none beside --diagnosis, found some")
+    extension = read_extension(arguments.diagnosis)
+    if "axis_swap" in extension.before:
+        raise InputError(
+            f"{arguments.diagnosis}: expected right axes, found an axis_swap; mend the recording"
+        )
+    for name in extension.before:
+        print(f"{name}: concerns readings, not the model; they are used as they are")
+    return extension
+
+
+def chosen_model(recording: Recording, arguments) -> ArrayModel:
+    """The recording's measurement model with the effects, or the diagnosis, asked for."""
+    extension = extension_of(arguments)
+    if extension is None:
+        return model_of(recording, arguments.effects)
+    from imuarray.criticism.extension import extended_model
+
+    labels = recording.accelerometer_labels, recording.gyroscope_labels
+    return extended_model(extension, model_of(recording), labels)
+
+
 def calibrate(arguments) -> None:
     """Positions and motion by maximum likelihood; see `calibration_dataset` for the output."""
     from imuarray.estimation import calibrate_bcd, calibrate_gauss_newton
 
     recording = usable(read_recording(arguments.recording), arguments.quiet)
     recording = assumed(recording, arguments)
-    model = model_of(recording, arguments.effects)
+    model = chosen_model(recording, arguments)
     data = recording.specific_force, recording.angular_rate
     saturated = recording.saturated_gyroscopes()
     find_effects(arguments.effects)  # an unknown one is named before anything else
     if arguments.method == "bcd":
-        if arguments.effects:
+        if model.effects:
             raise InputError(
                 "--effects: expected --method gauss-newton (bcd is for the papers' model), found"
-                f" bcd with {', '.join(arguments.effects)}"
+                f" bcd with {', '.join(model.effects)}"
             )
         found = calibrate_bcd(model, *data, saturated=saturated, tolerance=1e-9)
     else:
@@ -173,7 +202,7 @@ def sample(arguments) -> None:
 
     recording = usable(read_recording(arguments.recording), arguments.quiet)
     recording = assumed(recording, arguments)
-    model = model_of(recording, arguments.effects)
+    model = chosen_model(recording, arguments)
     if model.effects and arguments.rates == "spread":
         raise InputError("--rates spread: expected no --effects with it, found some")
     if not arguments.quiet:
@@ -287,7 +316,7 @@ def _tuned_generic(recording, model, arguments):
         time=recording.time,
     )  # fmt: skip
     size = 3 * (model.array.accelerometers - 1)
-    mean = np.concatenate([model.array.parameters, np.zeros(model.effect_size)])
+    mean = np.concatenate([model.array.parameters, model.effect_prior_mean])
     prior_sd = np.full(mean.size, recording.position_prior_sd)
     prior_sd[size:] = model.effect_prior_sd
     target = GenericTarget(

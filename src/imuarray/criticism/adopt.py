@@ -166,6 +166,7 @@ def tried(search: Search) -> list[Candidate]:
         c for c in found
         if (c.effect, c.imus, c.variant) not in search.refused
         and not all((c.effect, k, c.variant) in there for k in c.imus)
+        and not (c.effect == "sensor_delay" and set(c.imus) <= set(search.clocks))
     ]  # fmt: skip
 
 

@@ -77,7 +77,7 @@ def problem(
         model, np.asarray(specific_force), np.asarray(angular_rate), keep,
         np.linalg.cholesky(model.noise.accelerometer_precision).T,
         np.linalg.cholesky(np.linalg.inv(covariance)).transpose(0, 2, 1),
-        np.concatenate([mean, np.zeros(model.effect_size)]),
+        np.concatenate([mean, model.effect_prior_mean]),
         np.concatenate([spread, model.effect_prior_sd]),
         *clock(np.zeros(len(angular_rate)) if time is None else time),
     )  # fmt: skip

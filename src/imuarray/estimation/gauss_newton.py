@@ -88,7 +88,7 @@ def calibrate_gauss_newton(
         model, specific_force, angular_rate, saturated, position_prior, rate_covariance, time
     )
     x = pack_motion(model, first.motion)
-    p = np.concatenate([positions[1:].ravel(), np.zeros(model.effect_size)])
+    p = np.concatenate([positions[1:].ravel(), model.effect_start])
     x, p, costs, steps, converged, covariance = _iterate(given, x, p, tolerance, limit)
     size = 3 * (model.array.accelerometers - 1)
     found = np.vstack([np.zeros(3), p[:size].reshape(-1, 3)])

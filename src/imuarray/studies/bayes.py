@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from imuarray.config import model_from
+from imuarray.criticism.extension import extended_model
 from imuarray.errors import InputError
 from imuarray.estimation import calibrate_bcd
 from imuarray.geometry import Array
@@ -45,16 +46,20 @@ def prior_mean(array: Array, error_sd: float, rng) -> np.ndarray:
     return array.positions + errors
 
 
-def simulate_twisting(settings: dict, accelerometer_sd: float, effects=()):
+def simulate_twisting(settings: dict, accelerometer_sd: float, effects=(), extension=None):
     """A recording of the board twisted by hand, as section IV-C describes the experiment.
 
     Stands in for measured data until there are some. ``accelerometer_sd`` (m/s^2) is the
-    noise that is really there; effects get parameters drawn from their priors.
+    noise that is really there; effects get parameters drawn from their priors,
+    those of an ``extension`` (`imuarray.criticism.extension`) its values, and its noise.
     """
     paper, experiment, seed = settings["paper2021"], settings["experiment"], settings["seed"]
     model = model_from(settings, accelerometer_sd, effects)
     sizes = model.effect_prior_sd
     parameters = sizes * stream(seed, "effects").standard_normal(sizes.shape)
+    if extension is not None:
+        model = extended_model(extension, model, (model.array.labels, model.array.labels))
+        parameters = model.effect_start
     motion = hand_twisting(
         stream(seed, "twisting"),
         np.radians(paper["angular_rate_sd_dps"]) / 2,
