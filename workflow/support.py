@@ -19,6 +19,10 @@ STAGES = {
     "figures": ("figures",),
     "claims": ("claims",),
 }
+# The blind study's, which the papers' figures do not rest on, and of these the grading, which
+# the diagnoses do not rest on.
+DIAGNOSING = ("geometry", "motion", "model", "recording", "estimation", "criticism", "blind")
+GRADING = ("grade.py", "summary.py", "bars.py")
 
 
 def library(stage: str) -> list[str]:
@@ -32,6 +36,23 @@ def library(stage: str) -> list[str]:
             if name == stage:
                 break
     files = [path for folder in folders for path in (PACKAGE / folder).glob("*.py")]
+    files = [path for path in files if not path.name.startswith("blind")]
+    return sorted(str(path) for path in [*files, *(PACKAGE / name for name in BASE)])
+
+
+def diagnosing() -> list[str]:
+    """Source files and thresholds that the blind study's diagnoses rest on."""
+    files = [path for name in DIAGNOSING for path in (PACKAGE / name).glob("*.py")]
+    apart = [PACKAGE / "blind" / name for name in GRADING]
+    files = [path for path in files if path not in apart]
+    files.append(PACKAGE / "criticism" / "thresholds.json")
+    return sorted(str(path) for path in [*files, *(PACKAGE / name for name in BASE)])
+
+
+def grading(*figures: str) -> list[str]:
+    """Source files that the blind study's grades and tables rest on, and files of figures/."""
+    files = [PACKAGE / "blind" / name for name in GRADING]
+    files += [PACKAGE / "figures" / name for name in figures]
     return sorted(str(path) for path in [*files, *(PACKAGE / name for name in BASE)])
 
 
@@ -47,11 +68,21 @@ def attempt(path: str) -> float:
 def effective(config: dict, scale: str, *sections: str, scaled: bool = True) -> dict:
     """The part of the configuration a rule depends on, with one scale resolved.
 
-    Without the number of threads, which no result depends on; ``scaled=False`` leaves the scale
-    out, for results that all scales share.
+    Without the number of threads, which no result depends on, and the blind study's keys, which
+    only its own do; ``scaled=False`` leaves the scale out, for results that all scales share.
     """
     names = ("seed", "array", "noise", *sections)
     if not scaled:
         return {name: config[name] for name in names}
-    sizes = {key: value for key, value in config["scales"][scale].items() if key != "threads"}
+    sizes = {
+        key: value
+        for key, value in config["scales"][scale].items()
+        if key != "threads" and not key.startswith("blind_")
+    }
     return {**{name: config[name] for name in names}, "scale": {"name": scale, **sizes}}
+
+
+def blind_settings(config: dict, scale: str) -> dict:
+    """The part of the configuration that the blind study depends on: it has scenes of its own."""
+    cases = config["scales"][scale]["blind_cases"]
+    return {"seed": config["seed"], "scale": {"name": scale, "cases": cases}}

@@ -73,3 +73,32 @@ rule publish_measured_table:
         kind="csv|tex|md",
     shell:
         "cp {input:q} {output:q} 2> {log:q}"
+
+
+# Only `snakemake blind` asks for these two.
+rule publish_blind_figure:
+    input:
+        "results/blind/{}/figures/{{name}}.{{kind}}".format(config["scale"]),
+    output:
+        "paper_figures/{name}.{kind}",
+    log:
+        "results/logs/publish/{name}.{kind}.log",
+    wildcard_constraints:
+        name="blind_confusion",
+        kind="pdf|png|csv",
+    shell:
+        "cp {input:q} {output:q} 2> {log:q}"
+
+
+rule publish_blind_table:
+    input:
+        "results/blind/{}/tables/{{name}}.{{kind}}".format(config["scale"]),
+    output:
+        "paper_figures/{name}.{kind}",
+    log:
+        "results/logs/publish/{name}.{kind}.log",
+    wildcard_constraints:
+        name="blind_bars",
+        kind="csv|tex|md",
+    shell:
+        "cp {input:q} {output:q} 2> {log:q}"

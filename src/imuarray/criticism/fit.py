@@ -83,7 +83,7 @@ def pick(through, chosen) -> tuple[np.ndarray, np.ndarray]:
 def normal(residual, whitened, through, chosen, part=slice(None)):
     """Information (n, n) and score (n,) of the chosen parameters, motion projected out."""
     pairs, seen = pick(through[part], chosen)
-    flat = seen.reshape(-1, len(pairs))
+    flat = seen.reshape(seen.shape[0] * seen.shape[1], len(pairs))
     information = -(flat.T @ flat)
     score = np.empty(len(pairs))
     for imu in np.unique(pairs[:, 0]):

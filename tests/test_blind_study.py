@@ -1,0 +1,402 @@
+"""The blind study: what the diagnosis is told, the grades, the bars, tables and figures."""
+
+import ast
+import json
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+
+import imuarray.blind
+from imuarray.blind import Case, bars, grade, study, summary
+from imuarray.blind.inject import CATALOGUE, EFFECTS
+from imuarray.figures import blind as drawing
+from imuarray.figures import blind_tables
+from imuarray.figures.style import write_figure
+from imuarray.figures.tables import write_table
+
+ROOT = Path(__file__).parents[1]
+POSITIONS = [[0.0, 0.0, 0.0], [0.02, 0.0, 0.0], [0.0, 0.02, 0.001]]
+SHORT = {"duration": 2.0}
+
+
+def cause(effect, sensors=("3",), rivals=()):
+    return {
+        "effect": effect, "sensors": list(sensors), "indistinguishable_from": list(rivals),
+        "p_value": 1e-9,
+    }  # fmt: skip
+
+
+def model(error=1e-4, sd=1e-4, shift=0.0):
+    """Positions off by ``error`` in each coordinate, all moved by ``shift``, metres."""
+    found = np.array(POSITIONS) + shift
+    found[1:] += error
+    return {"positions_m": found.tolist(), "positions_sd_m": np.full((3, 3), sd).tolist()}
+
+
+def answer(causes=(), unexplained=False, gain=0.5):
+    keys = [f"{key}{end}" for key in grade.GAINS.values() for end in ("", "_se")]
+    return {
+        "base": model(3e-4), "inflated": model(2e-4), "extended": model(), "causes": list(causes),
+        "unexplained": unexplained, "remaining": [], "gain": dict(zip(keys, (gain, 0.1) * 2,
+                                                                      strict=True)),
+    }  # fmt: skip
+
+
+def truth_of(kind, names, sigma=20.0, sensors=("3",), **settings):
+    """The truth of a made-up case with these effects, all of one size."""
+    case = {"kind": kind, "imus": 8, "sampling_rate": 125.0, "duration": 24.0, "rails": False}
+    effects = [
+        {"effect": name, "sensors": list(sensors), "sigma": sigma, "sigma_exact": sigma,
+         "amplitude": {"value": 0.01 * sigma, "unit": "m"}, "parameters": {}}
+        for name in names
+    ]  # fmt: skip
+    return {
+        "case": case | {"sigma": sigma} | settings, "effects": effects, "positions_m": POSITIONS,
+        "sigma": sigma * len(names), "sigma_exact": sigma * len(names),
+        "struck": list(names) if kind == "struck" else [],
+    }  # fmt: skip
+
+
+NUMBER = iter(range(10**6))
+
+
+def graded(kind, names, *given, size=20.0, seconds=20.0, **settings):
+    """A row; ``given``: causes and unexplained, or "crash"."""
+    crash = given == ("crash",)
+    return grade.grade(
+        {
+            "case": f"{kind}-{next(NUMBER):04d}",
+            "truth": truth_of(kind, names, size, **settings),
+            "diagnosis": None if crash else answer(*given),
+            "error": "ValueError: nothing" if crash else None,
+            "seconds": seconds,
+        }
+    )
+
+
+BIAS, SCALE, DELAY = "accelerometer_bias", "accelerometer_scale", "sensor_delay"
+CLOCKLIKE = cause("sensor_clock", rivals=[DELAY])
+
+
+@pytest.mark.parametrize(
+    ("kind", "names", "causes", "unexplained", "expected"),
+    [
+        ("clean", [], [], False, "clean"),
+        ("clean", [], [], True, "unexplained"),
+        ("clean", [], [cause(BIAS)], True, "false alarm"),
+        ("one", [BIAS], [cause(BIAS)], True, "right"),
+        ("one", [DELAY], [CLOCKLIKE], False, "right"),
+        ("one", [DELAY], [CLOCKLIKE, cause(DELAY)], False, "inexact"),
+        ("one", [BIAS], [cause(SCALE)], False, "wrong"),
+        ("one", [BIAS], [cause(SCALE), cause(BIAS)], False, "right and wrong"),
+        ("one", [BIAS], [], False, "nothing"),
+        ("one", [BIAS], [], True, "unexplained"),
+        ("pair", [BIAS, SCALE], [cause(SCALE), cause(BIAS)], False, "right"),
+        ("pair", [BIAS, DELAY], [CLOCKLIKE, cause(BIAS)], False, "right"),
+        ("pair", [BIAS, SCALE], [cause(SCALE, rivals=[BIAS])], False, "inexact"),
+        ("pair", [BIAS, SCALE], [cause(SCALE)], False, "inexact"),
+        ("pair", [BIAS, SCALE], [cause(SCALE), cause(DELAY)], False, "right and wrong"),
+        ("pair", [BIAS, SCALE], [cause(SCALE), cause(SCALE, ["4"])], False, "inexact"),
+        ("gauge", ["gauge_sensor_delay"], [], False, "nothing"),
+        ("gauge", ["gauge_sensor_delay"], [cause(DELAY)], False, "confident"),
+        ("gauge", ["gauge_sensor_delay"], [cause(DELAY)], True, "flagged"),
+        ("gauge", ["gauge_sensor_delay"], [CLOCKLIKE], False, "class"),
+        ("gauge", ["gauge_sensor_delay"], [CLOCKLIKE, cause(BIAS)], False, "confident"),
+        ("outside", ["outside_cubic"], [CLOCKLIKE], False, "confident"),
+        ("outside", ["outside_cubic"], [CLOCKLIKE], True, "flagged"),
+        ("struck", [BIAS], [cause(SCALE)], False, "confident"),
+        ("struck", [BIAS], [], True, "unexplained"),
+    ],
+)
+def test_grades(kind, names, causes, unexplained, expected):
+    row = graded(kind, names, causes, unexplained)
+    assert row["grade"] == expected and expected in grade.GRADES
+    if kind in ("gauge", "outside", "struck"):
+        assert row["confident"] == (expected == "confident")
+    json.dumps(row, allow_nan=False)
+
+
+def test_found_by_class_named_by_itself_and_on_the_right_sensors():
+    def seen(causes, sensors=("3",)):
+        effect = graded("one", [DELAY], causes, sensors=sensors)["truth"][0]
+        return effect["found"], effect["named"], effect["sensors_right"]
+
+    assert seen([cause(DELAY)]) == (True, True, True)
+    assert seen([CLOCKLIKE]) == (True, False, True)
+    assert seen([cause(DELAY, ["3", "4"])]) == (True, True, False)
+    assert seen([cause(DELAY, ["3"]), cause(DELAY, ["4"])], ["3", "4"]) == (True, True, True)
+    assert seen([cause(DELAY, map(str, range(8)))], ["all"]) == (True, True, True)
+    assert seen([cause(DELAY, ["all"])]) == (True, True, False)
+    assert seen([cause(BIAS)]) == (False, False, False)
+    # the one named itself decides on the sensors
+    assert seen([cause("sensor_clock", ["5"], [DELAY]), cause(DELAY)]) == (True, True, True)
+
+
+def test_wrong_names_are_those_whose_class_has_nothing_of_the_truth():
+    row = graded("pair", [BIAS, DELAY], [CLOCKLIKE, cause(SCALE, rivals=["size_effect"])])
+    assert row["wrong_names"] == [SCALE] and not row["right_set"]
+    # three causes for two effects are not the set, even without a wrong name
+    many = [cause(BIAS), CLOCKLIKE, cause(DELAY)]
+    row = graded("pair", [BIAS, DELAY], many)
+    assert row["wrong_names"] == [] and not row["right_set"]
+
+
+def test_accuracy_is_relative_to_the_first_triad():
+    """Errors 1e-4 m: sds of 1e-4 / 1.96 cover just so."""
+    sd = 1.001e-4 / 1.96
+    assert grade.accuracy(model(1e-4, sd), POSITIONS)["covered"] == 6
+    assert grade.accuracy(model(1e-4, 0.99 * sd), POSITIONS)["covered"] == 0
+    moved = grade.accuracy(model(1e-4, sd, shift=0.3), POSITIONS)
+    assert moved["coordinates"] == 6 and moved["position_rmse_m"] == pytest.approx(1e-4)
+    with pytest.raises(ValueError, match="positions"):
+        grade.accuracy(model(), POSITIONS[:2])
+
+
+def spy(document, told):
+    def diagnose(recording, **options):
+        told.append((recording, options))
+        if document is None:
+            raise ZeroDivisionError("no motion")
+        return SimpleNamespace(document=document)
+
+    return diagnose
+
+
+def words_of(recording) -> str:
+    """All texts of a recording and the options."""
+    return repr([value for value in vars(recording).values() if not isinstance(value, np.ndarray)])
+
+
+def test_diagnosis_is_told_nothing_of_the_case():
+    told = []
+    document = answer() | {"discrepancies": ["figures"], "seed": 7}
+    case = Case("one-0001-accelerometer_bias", ((BIAS, (2,)),), 20.0, kind="one", **SHORT)
+    entry = study.diagnosed(case, 7, spy(document, told))
+    (recording, options), = told  # fmt: skip
+    assert options == {"seed": 7, "without": ()}
+    assert case.id not in words_of(recording) and BIAS not in words_of(recording)
+    assert entry["truth"]["effects"][0]["effect"] == BIAS and entry["case"] == case.id
+    assert set(entry["diagnosis"]) == set(study.KEPT) and entry["error"] is None
+    assert entry["seconds"] > 0
+    struck = Case("struck", ((BIAS, (2,)),), 20.0, kind="struck", **SHORT)
+    study.diagnosed(struck, 7, spy(document, told))
+    assert told[-1][1]["without"] == (BIAS,)
+    outside = Case("x", (("outside_cubic", (2,)),), kind="outside")
+    assert study.struck(outside) == () == study.struck(case)
+
+
+def test_a_crash_is_a_row(capsys):
+    clean = Case("clean-0001", **SHORT)
+    entry = study.diagnosed(clean, 7, spy(None, []))
+    assert entry["diagnosis"] is None and entry["error"] == "ZeroDivisionError: no motion"
+    assert "Traceback" in capsys.readouterr().err
+    row = graded("one", [BIAS], "crash")
+    assert row["grade"] == "crash" and not row["truth"][0]["found"] and row["gain"] is None
+    bad = answer() | {"gain": {"heldout_log_score_nats_per_sample": float("nan")}}
+    assert study.diagnosed(clean, 7, spy(bad, []))["error"].startswith("ValueError")
+    short = {"causes": []}
+    assert study.diagnosed(clean, 7, spy(short, []))["error"].startswith("KeyError")
+
+
+@pytest.mark.parametrize("batches", [1, 7, 26])
+def test_batches_hold_every_case_once(batches):
+    cases = imuarray.blind.matrix("default")
+    dealt = [study.batch_of(cases, batch, batches) for batch in range(batches)]
+    assert sorted(c.id for part in dealt for c in part) == sorted(c.id for c in cases)
+    assert max(map(len, dealt)) - min(map(len, dealt)) <= 1
+    with pytest.raises(ValueError, match="batch"):
+        study.batch_of(cases, batches, batches)
+
+
+def test_limits_of_shares():
+    """Clopper and Pearson: none of n has the upper limit 1 - 0.025^(1/n)."""
+    assert summary.share_limits(0, 80) == pytest.approx((0.0, 1 - 0.025 ** (1 / 80)))
+    assert summary.share_limits(20, 400) == pytest.approx((0.0308, 0.0762), abs=5e-4)
+    assert summary.share_limits(0, 0) == (0.0, 1.0)
+
+
+def bars_of(rows):
+    table = bars.bars(summary.recordings(rows))
+    return {row["id"]: row for row in table.to_dict("records")}
+
+
+def test_bars_count_the_recordings_they_are_set_for():
+    one = [BIAS]
+    rows = [graded("one", one, [cause(BIAS)]) for _ in range(8)]
+    rows += [graded("one", one, [cause(SCALE)]), graded("one", one, "crash")]
+    rows += [graded("one", one, [], size=4.0), graded("one", one, [], imus=32)]
+    found = bars_of(rows)
+    assert (found["one_found"]["recordings"], found["one_found"]["count"]) == (10, 8)
+    assert found["one_found"]["verdict"] == "short by 10.0 points"
+    assert found["one_found"]["sure"] is False
+    # the crash is no wrong name, and not counted among the others
+    assert (found["one_wrong"]["recordings"], found["one_wrong"]["count"]) == (9, 1)
+    assert found["one_found"]["all_recordings"] == 11
+    assert (found["crashes"]["recordings"], found["crashes"]["count"]) == (11, 1)
+    assert found["crashes"]["verdict"].startswith("short")
+    assert found["pair_set"]["verdict"] == bars.NONE
+    # 7.95 sigma was 8 when asked for, 7 was not
+    near = [graded("one", one, [], size=size) for size in (7.95, 7.0)]
+    assert bars_of(near)["one_found"]["recordings"] == 1
+
+
+def test_bars_of_the_other_sets():
+    rows = [graded("clean", [], []) for _ in range(38)]
+    rows += [graded("clean", [], [cause(BIAS)]), graded("clean", [], [], True)]
+    rows += [graded("pair", [BIAS, SCALE], [cause(BIAS), cause(SCALE)], size=12.0)] * 6
+    rows += [graded("pair", [BIAS, SCALE], [cause(BIAS)], size=12.0)]
+    rows += [graded("pair", [BIAS, SCALE], [], size=9.0)]
+    rows += [graded("gauge", ["gauge_lever_arm"], [cause(BIAS)])]
+    rows += [graded("outside", ["outside_cubic"], [cause(BIAS)], True, seconds=61.0)]
+    rows += [graded("struck", [BIAS], [cause(SCALE)])]
+    found = bars_of(rows)
+    assert found["false_alarms"]["share"] == pytest.approx(1 / 40)
+    assert found["false_alarms"]["verdict"] == "pass" and not found["false_alarms"]["sure"]
+    assert found["clean_unexplained"]["count"] == 1 and found["clean_unexplained"]["verdict"] == ""
+    assert found["false_alarms_limit"]["verdict"] == "needs 400"
+    assert (found["pair_set"]["count"], found["pair_set"]["recordings"]) == (6, 7)
+    assert found["gauge"]["verdict"] == "short by 100.0 points"
+    assert found["outside"]["verdict"] == "pass" and found["struck"]["count"] == 1
+    assert found["time"]["count"] == 1 and found["time"]["verdict"].startswith("short")
+    many = bars_of([graded("clean", [], [cause(BIAS)] if i < 24 else []) for i in range(400)])
+    # 24 of 400: 6 %, upper limit 8.8 %
+    assert many["false_alarms"]["verdict"] == "short by 1.0 points"
+    assert many["false_alarms_limit"]["verdict"] == "short by 1.3 points"
+
+
+def test_coverage_is_judged_between_recordings():
+    rows = [graded("clean", [], []) for _ in range(10)]
+    for number, row in enumerate(rows):
+        row["extended"] = {"position_rmse_m": 1e-4, "covered": 95 - number % 2, "coordinates": 100}
+    found = bars_of(rows)["coverage_clean"]
+    assert found["share"] == pytest.approx(0.945) and found["verdict"] == "pass" and found["sure"]
+    assert found["high"] - found["low"] == pytest.approx(2 * 1.96 * 0.00527 / np.sqrt(10), rel=1e-2)
+    for row in rows:
+        row["extended"]["covered"] = 100
+    found = bars_of(rows)["coverage_clean"]
+    assert found["verdict"] == "short by 2.0 points" and found["sure"]
+
+
+def test_gain_table_weighs_and_pools():
+    rows = [graded("one", [BIAS], [cause(BIAS)], False, gain) for gain in (1.0, 3.0)]
+    rows += [graded("one", [BIAS], "crash"), graded("clean", [], [])]
+    table = summary.gain_table(summary.recordings(rows)).set_index(["kind", "effect"])
+    line = table.loc["one", BIAS]
+    assert line.recordings == 2 and line.gain == 2.0
+    # 0.1 each: root 2 of it over 2
+    assert line.gain_se == pytest.approx(0.1 / np.sqrt(2))
+    assert line.extended_position_rmse_m == pytest.approx(1e-4)
+    assert line.base_coverage == 0.0 and line.extended_coverage == 1.0
+    assert list(table.index) == [("clean", summary.ALL), ("one", summary.ALL), ("one", BIAS)]
+
+
+def test_detection_bins():
+    sizes = [4.0, 4.0, 7.95, 12.0, 20.0, 50.0, 300.0, 5000.0]
+    rows = [graded("one", [BIAS], [cause(BIAS)] if s > 5 else [], size=s) for s in sizes]
+    rows += [graded("one", ["axis_swap"], [cause(SCALE)], size=2000.0) for _ in range(9)]
+    effects = summary.effects([*rows, graded("pair", [BIAS, SCALE], [])])
+    table = summary.detection(effects, "sigma")
+    bias = table[table.effect == BIAS]
+    assert bias.recordings.tolist() == [2, 1, 1, 1, 1, 1, 1] and bias.share.tolist()[:2] == [0, 1]
+    assert bias.centre.tolist() == pytest.approx([4, 7.95, 12, 20, 50, 300, 5000])
+    swap = table[table.effect == "axis_swap"]
+    assert swap.wrong_share.tolist() == [1.0] and swap.found.sum() == 0
+    assert table[table.effect == summary.ALL].recordings.sum() == 17
+    own = summary.detection(effects, "amplitude")
+    assert own[own.effect == BIAS].recordings.tolist() == [4, 4] and summary.ALL not in {
+        *own.effect
+    }
+    assert len(summary.detection(summary.effects([]), "sigma")) == 0
+
+
+def test_confusion_counts_right_and_wrong_names_apart():
+    rows = [graded("one", [DELAY], [CLOCKLIKE]), graded("one", [DELAY], [cause(DELAY)], True)]
+    rows += [graded("one", [DELAY], [cause(BIAS)]), graded("one", [DELAY], [])]
+    rows += [graded("one", [DELAY], "crash"), graded("one", [DELAY], [cause(BIAS)], size=4.0)]
+    rows += [graded("clean", [], []), graded("outside", ["outside_cubic"], [], True)]
+    table = summary.confusion(rows).set_index(["truth", "named"])
+    line = table.loc[DELAY]
+    assert set(line.recordings) == {5}
+    assert line.right.to_dict() == {"sensor_clock": 1, DELAY: 1, "unexplained": 0, BIAS: 0,
+                                    "nothing": 0, "crash": 0}  # fmt: skip
+    assert line.wrong.to_dict() == {"sensor_clock": 0, DELAY: 0, "unexplained": 1, BIAS: 1,
+                                    "nothing": 1, "crash": 1}  # fmt: skip
+    assert table.loc[("clean", "nothing"), "right"] == 1
+    assert table.loc[("outside_cubic", "unexplained"), "right_share"] == 1.0
+
+
+def study_of_everything():
+    """Rows with every effect in each role; seed 1 decides what is found."""
+    rng, rows = np.random.default_rng(1), [graded("clean", [], []) for _ in range(4)]
+    for name in EFFECTS:
+        kind = {"gauge": "gauge", "outside": "outside"}.get(name.split("_")[0], "one")
+        for size in (4.0, 8.0, 50.0):
+            named = name if rng.random() < 0.7 else str(rng.choice(CATALOGUE))
+            rows.append(graded(kind, [name], [cause(named)], rng.random() < 0.2, size=size))
+            if kind == "one":
+                rows.append(graded("struck", [name], [], True, size=size))
+    return rows
+
+
+def test_figures_and_tables(tmp_path):
+    rows = study_of_everything()
+    effects, table = summary.effects(rows), summary.recordings(rows)
+    for against in ("sigma", "amplitude"):
+        bins = summary.detection(effects, against)
+        figure = drawing.detection_figure(bins, effects, ["Scale quick"])
+        titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
+        assert len(titles) == len(CATALOGUE) + (against == "sigma")
+    confusion = summary.confusion(rows)
+    figure = drawing.confusion_figure(confusion, ["Scale quick"])
+    axes = figure.axes[0]
+    labels = [label.get_text() for label in axes.get_yticklabels()]
+    assert len(labels) == len(EFFECTS) + 2 and labels[-1] == f"{drawing.STRUCK} (66)"
+    cells = {(round(t.get_position()[0]), round(t.get_position()[1])) for t in axes.texts}
+    assert len(cells) >= len(labels)
+    paths = {kind: tmp_path / f"confusion.{kind}" for kind in ("pdf", "png", "csv")}
+    write_figure(figure, confusion, **paths)
+    assert all(path.stat().st_size > 1000 for path in paths.values())
+    paths = {kind: tmp_path / f"bars.{kind}" for kind in ("csv", "tex", "md")}
+    notes = blind_tables.bars_notes(table, "Scale quick, seed 1")
+    write_table(blind_tables.shown(bars.bars(table)), blind_tables.BARS, "Bars", notes, **paths)
+    lines = [line for line in paths["md"].read_text().splitlines() if line.startswith("|")]
+    assert {line.count("|") for line in lines} == {len(blind_tables.BARS) + 1}
+    assert any("short by" in line for line in lines)
+    paths["tex"].read_text().encode("latin-1")  # what LaTeX reads as it is
+    write_table(summary.gain_table(table), blind_tables.GAIN, "Gain", ["A note."], **paths)
+    assert len(pd.read_csv(paths["csv"])) == len(EFFECTS) + len(CATALOGUE) + 5
+
+
+def test_config_names_matrices_that_exist():
+    config = yaml.safe_load((ROOT / "config.yaml").read_text(encoding="utf-8"))
+    for scale in config["scales"].values():
+        assert scale["blind_batches"] <= len(imuarray.blind.matrix(scale["blind_cases"]))
+
+
+def test_papers_do_not_rest_on_the_blind_study_nor_diagnoses_on_grades():
+    sys.path.insert(0, str(ROOT / "workflow"))
+    try:
+        import support
+    finally:
+        sys.path.remove(str(ROOT / "workflow"))
+    config = yaml.safe_load((ROOT / "config.yaml").read_text(encoding="utf-8"))
+    assert not any("blind" in key for key in support.effective(config, "quick")["scale"])
+    for stage in ("figures", "claims", "measured"):
+        assert not any("blind" in Path(path).parts[-2:] or Path(path).name.startswith("blind")
+                       for path in support.library(stage))  # fmt: skip
+    names = {Path(path).relative_to(support.PACKAGE).as_posix() for path in support.diagnosing()}
+    assert {"blind/study.py", "criticism/diagnosis.py", "criticism/thresholds.json"} <= names
+    assert not {f"blind/{name}" for name in support.GRADING} & names
+    # what is imported by the diagnosis is in the list
+    folders = {name.split("/")[0] for name in names if "/" in name}
+    for path in (*(support.PACKAGE / "criticism").glob("*.py"), *map(Path, support.diagnosing())):
+        if path.suffix == ".py":
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("imuarray."):
+                    part = node.module.split(".")[1]
+                    assert part in folders or f"{part}.py" in names, f"{path}: {node.module}"
