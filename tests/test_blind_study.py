@@ -74,7 +74,8 @@ def graded(kind, names, *given, size=20.0, seconds=20.0, **settings):
             "truth": truth_of(kind, names, size, **settings),
             "diagnosis": None if crash else answer(*given),
             "error": "ValueError: nothing" if crash else None,
-            "seconds": seconds,
+            "seconds": 1000.0,
+            "cpu_seconds": seconds,
         }
     )
 
@@ -182,7 +183,7 @@ def test_diagnosis_is_told_nothing_of_the_case():
     assert case.id not in words_of(recording) and BIAS not in words_of(recording)
     assert entry["truth"]["effects"][0]["effect"] == BIAS and entry["case"] == case.id
     assert set(entry["diagnosis"]) == set(study.KEPT) and entry["error"] is None
-    assert entry["seconds"] > 0
+    assert entry["seconds"] > 0 and entry["cpu_seconds"] >= 0
     struck = Case("struck", ((BIAS, (2,)),), 20.0, kind="struck", **SHORT)
     study.diagnosed(struck, 7, spy(document, told))
     assert told[-1][1]["without"] == (BIAS,)
@@ -351,6 +352,9 @@ def test_figures_and_tables(tmp_path):
         figure = drawing.detection_figure(bins, effects, ["Scale quick"])
         titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
         assert len(titles) == len(CATALOGUE) + (against == "sigma")
+        for axes in figure.axes[: len(titles)]:
+            low, high = axes.get_xlim()
+            assert high > 2.9 * low and len(axes.get_xticks())
     confusion = summary.confusion(rows)
     figure = drawing.confusion_figure(confusion, ["Scale quick"])
     axes = figure.axes[0]

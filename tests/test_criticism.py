@@ -15,6 +15,7 @@ from imuarray.criticism import variance
 from imuarray.criticism.adopt import Search
 from imuarray.criticism.columns import catalogue_effects, columns_of
 from imuarray.criticism.fit import Fit, fit, flat_parameters, from_flat, normal
+from imuarray.criticism.gauges import prior_precision
 from imuarray.criticism.heldout import edges_of, log_scores
 from imuarray.criticism.linearise import linearise
 from imuarray.criticism.readings import LEAST, arrange, part_of
@@ -52,7 +53,7 @@ def scaled():
 
 
 def ridge_of(made: Fit):
-    return 1.0 / np.broadcast_to(made.columns.prior_sd, made.active.shape)[made.active] ** 2
+    return prior_precision(made.columns, made.active)
 
 
 def test_derivatives_are_those_of_finite_differences(clean):
@@ -136,7 +137,7 @@ def jacobian_pattern(samples, count):
 def information_of(made):
     given = evidence(made, flat_parameters(made.columns, made.state))
     places = given.places(made.active)
-    return given.information[np.ix_(places, places)] + np.diag(ridge_of(made))
+    return given.information[np.ix_(places, places)] + ridge_of(made)
 
 
 def test_a_score_is_what_a_refit_gains(scaled):
@@ -193,9 +194,7 @@ def test_heldout_scores_are_those_of_refits_without_each_block(clean):
         information, score = normal(*(part[~inside] for part in whole), made.active)
         values = flat_parameters(made.columns, made.state)[made.active]
         offset = values - nominal_of(made)[made.active]
-        step = np.linalg.solve(
-            information + np.diag(ridge_of(made)), score - ridge_of(made) * offset
-        )
+        step = np.linalg.solve(information + ridge_of(made), score - ridge_of(made) @ offset)
         flat = flat_parameters(made.columns, made.state)
         flat[made.active] += step
         state = from_flat(made.columns, made.state, flat)

@@ -91,8 +91,6 @@ class Search:
     def refit(self, state=None, turns=2, rough=True) -> None:
         """Fit what is adopted, with the noise that the residual's fast part shows."""
         state = self.fit.state if state is None else state
-        if state.loose is not None:
-            state = loosened(self.readings, state)
         turns += bool(self.clocks)
         for turn in range(2 * turns):
             self.edges(state, EDGE / (1 + turn))
@@ -353,7 +351,7 @@ def heldout_gain(search: Search, effect: str | None) -> tuple[float, float]:
     given, mask = search.given, search.active
     places = given.places(mask)
     freed = np.isin(places, freed_places(search, effect))
-    ridge, values = given.ridge[places], given.values[places]
+    ridge, values = given.precision[np.ix_(places, places)], given.values[places]
     edges = np.linspace(0, len(search.fit.residual), BLOCKS + 1).astype(int)
     parts = [
         normal(search.fit.residual, search.fit.whitened, search.fit.through, mask, slice(a, b))
@@ -362,7 +360,7 @@ def heldout_gain(search: Search, effect: str | None) -> tuple[float, float]:
     information, score = sum(p[0] for p in parts), sum(p[1] for p in parts)
     gains = []
     for block, slope in parts:
-        trained = information - block + np.diag(ridge), score - slope
+        trained = information - block + ridge, score - slope
         without = _solve(*trained, values, freed, 0.0)
         full = _solve(*trained, values, freed, None)
         found = (full + values)[freed]

@@ -13,6 +13,7 @@ import imuarray
 from imuarray.criticism import describe
 from imuarray.criticism.adopt import heldout_gain, need
 from imuarray.criticism.fit import Fit, at, fit, flat_parameters
+from imuarray.criticism.gauges import prior_precision
 from imuarray.criticism.heldout import Scores, gain, log_scores
 from imuarray.criticism.investigate import Found, investigate
 from imuarray.criticism.noise import coloured_meat, standardised
@@ -79,8 +80,9 @@ def diagnose(
     base, inflated = rivals_of(found)
     rng = stream(seed, "diagnose", "replicates")
     say("replicating the recording")
-    base.discrepancies = discrepancies(base.fit, ridge_of(base.fit), rng, replicates)
-    extended.discrepancies = discrepancies(extended.fit, ridge_of(extended.fit), rng, replicates)
+    for model in (base, extended):
+        precision = precision_of(model.fit)
+        model.discrepancies = discrepancies(model.fit, precision, rng, replicates)
     document = {
         "recording": str(recording_path),
         "seed": int(seed),
@@ -100,9 +102,9 @@ def diagnose(
     return Diagnosis(document, found, base, inflated, extended)
 
 
-def ridge_of(made: Fit) -> np.ndarray:
-    """Prior precisions of a fit's active parameters."""
-    return 1.0 / np.broadcast_to(made.columns.prior_sd, made.active.shape)[made.active] ** 2
+def precision_of(made: Fit) -> np.ndarray:
+    """Prior precision of a fit's active parameters, gauges pinned."""
+    return prior_precision(made.columns, made.active)
 
 
 def fitted(made: Fit, correlation=None) -> Fitted:
@@ -111,18 +113,19 @@ def fitted(made: Fit, correlation=None) -> Fitted:
     Where noise is coloured (``correlation`` (N, 2)) the sds are those of the sandwich.
     """
     given = evidence(made, flat_parameters(made.columns, made.state))
-    places, ridge = given.places(made.active), ridge_of(made)
+    # gauges are pinned for the fit; what is known of them is what the priors say
+    places, ridge = given.places(made.active), np.diag(given.ridge[given.places(made.active)])
     inner = given.information[np.ix_(places, places)]
-    covariance = robust_inverse(inner + np.diag(ridge))
+    covariance = robust_inverse(inner + ridge)
     meat = None
     if correlation is not None:
         meat = coloured_meat(made, given.information, correlation)
     if meat is not None:
-        middle = meat[np.ix_(places, places)] + np.diag(ridge)
+        middle = meat[np.ix_(places, places)] + ridge
         covariance = covariance @ middle @ covariance
     sds = np.zeros(made.active.shape)
     sds[made.active] = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    return Fitted(made, log_scores(made, ridge), sds)
+    return Fitted(made, log_scores(made, precision_of(made)), sds)
 
 
 def rivals_of(found: Found) -> tuple[Fitted, Fitted]:

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from imuarray.criticism.columns import POSITION, Columns
+from imuarray.criticism.gauges import prior_precision
 from imuarray.criticism.linearise import (
-    KNOWN,
     Eliminated,
     Loose,
     State,
@@ -23,6 +23,7 @@ STEPS = 25
 ROUGH = 1e-4  # of the misfit that a step must gain while causes are looked for
 SETTLED = 0.02  # of a parameter's own sd
 SHORTEST = 0.2  # share of a Gauss-Newton step
+WIDE = 10.0  # prior sd of the third derivatives, in sizes of the differences near by
 NEAR = 9  # samples that tell the size of the motion's third derivatives
 
 
@@ -104,7 +105,7 @@ def fit(
     that it may stop when a step gains little.
     """
     prior_mean = prior_means(readings, columns)[active]
-    precision = 1.0 / np.broadcast_to(columns.prior_sd, active.shape)[active] ** 2
+    precision = prior_precision(columns, active)
     wanted = np.flatnonzero(active.any(axis=0))
     converged, last, length, seen = False, np.inf, 1.0, None
     enough = ROUGH if rough else 0.0
@@ -115,15 +116,15 @@ def fit(
         misfit = float(np.sum(seen.misfit))
         information, score = normal(seen.residual, seen.whitened, seen.through, few)
         offset = flat_parameters(columns, state)[active] - prior_mean
-        score = score - precision * offset
-        step, sds = scaled_solve(information + np.diag(precision), score)
+        score = score - precision @ offset
+        step, sds = scaled_solve(information + precision, score)
         moved, astray = np.max(np.abs(step) / sds, initial=0.0), float(np.sum(seen.taken**2))
         if (moved < SETTLED and astray < 0.01 * len(seen.taken)) or score @ step + astray < max(
             1e-3, enough * misfit
         ):
             converged = True
             break
-        cost = misfit + astray + float(precision @ offset**2)
+        cost = misfit + astray + float(offset @ precision @ offset)
         if number > 6 and abs(cost - last) < 1e-5 * last:
             break  # it wanders around the optimum, by less than anything told apart here
         # full steps may leap to and fro across a valley: half of them lead into it
@@ -182,19 +183,19 @@ def with_derivatives(readings, state, smooth) -> State:
 def loosened(readings: Readings, state: State) -> State:
     """The state with omega double dot and s dot free: neighbours tell them only roughly.
 
-    Their prior has the polynomials' mean, and for sd the size of the differences near by.
+    Their prior has the polynomials' mean, and for sd ten times the size of the differences near by.
+    It is that of the first motion and stays: one that followed the fit would shrink with it.
     """
-    motion, dt = state.motion[:, :KNOWN], np.median(np.diff(readings.time))
-    found = derivatives(readings, motion, state.positions)
+    dt = np.median(np.diff(readings.time))
+    found = derivatives(readings, state.motion, state.positions)
     mean = np.hstack(found[:2])
-    steps = np.diff(motion[:, 3:], axis=0, append=motion[-1:, 3:]) / dt
+    steps = np.diff(state.motion[:, 3:], axis=0, append=state.motion[-1:, 3:]) / dt
     steps[np.diff(readings.run, append=readings.run[-1]) > 0] = 0.0
     near = uniform_filter1d(np.mean(steps.reshape(-1, 2, 3) ** 2, axis=-1), NEAR, axis=0)
-    sd = np.repeat(np.sqrt(near) + 0.1 * np.sqrt(near.mean(axis=0)), 3, axis=1)
-    nothing = no_derivatives(len(motion), len(state.positions))
-    free = mean if state.loose is None else state.motion[:, KNOWN:]
+    sd = WIDE * np.repeat(np.sqrt(near) + 0.1 * np.sqrt(near.mean(axis=0)), 3, axis=1)
+    nothing = no_derivatives(len(mean), len(state.positions))
     return state._replace(
-        motion=np.hstack([motion, free]), derivatives=nothing, loose=Loose(mean, sd)
+        motion=np.hstack([state.motion, mean]), derivatives=nothing, loose=Loose(mean, sd)
     )
 
 

@@ -62,7 +62,8 @@ def features(fit: Fit, imu: int) -> dict[str, np.ndarray]:
 def regression_checks(fit: Fit, given: Evidence, noise: Noise) -> list[Check]:
     """Each group of features over all axes, and each IMU's axes over all features."""
     active = given.places(fit.active)
-    inner = robust_inverse(given.information[np.ix_(active, active)] + np.diag(given.ridge[active]))
+    both = given.information + given.precision
+    inner = robust_inverse(both[np.ix_(active, active)])
     pairs, through = pick(fit.through, fit.active & fit.columns.owner)
     samples, count = fit.residual.shape[:2]
     basis = fit.basis.reshape(samples, count, 6, -1)

@@ -34,7 +34,7 @@ def log_scores(fit: Fit, ridge) -> Scores:
     The motion is integrated out sample by sample, with a flat prior where it has none (so only
     differences between models of the same readings mean anything); noise sds are those of the
     whole recording. Training without a block is one Gauss-Newton step from the optimum.
-    ``ridge`` (n,) prior precisions of the active parameters.
+    ``ridge`` (n, n) prior precision of the active parameters.
     """
     readings = fit.readings
     edges = edges_of(len(fit.residual))
@@ -51,7 +51,7 @@ def log_scores(fit: Fit, ridge) -> Scores:
     nats = []
     for (block, slope), first, last in zip(parts, edges[:-1], edges[1:], strict=True):
         # at the optimum score and prior balance: without the block, minus its score is left
-        left = information - block + np.diag(ridge)
+        left = information - block + ridge
         step = np.linalg.solve(left, (score - slope) - score) if len(score) else np.zeros(0)
         better = slope @ step - step @ block @ step / 2
         misfit = np.sum(fit.misfits[first:last])

@@ -49,7 +49,7 @@ class Replicator:
     def __init__(self, fit: Fit, ridge):
         self.fit, self.pairs = fit, np.argwhere(fit.active)
         information, _ = normal(fit.residual, fit.whitened, fit.through, fit.active)
-        self.inverse = np.linalg.pinv(information + np.diag(ridge), hermitian=True)
+        self.inverse = np.linalg.pinv(information + ridge, hermitian=True)
         self.seen = pick(fit.through, fit.active)[1]
 
     def draw(self, rng) -> np.ndarray:
@@ -189,12 +189,20 @@ def _compare(name, quantity: Quantity, drawn):
     limit = np.quantile(others, 0.95)
     sensors = [quantity.sensors[k] for k in np.flatnonzero(away > limit)]
     value = float(quantity.values[worst])
-    place = "within" if band["q025"] <= value <= band["q975"] else "outside"
-    says = (
-        f"{_first_up(quantity.words)} is {value:.3g} at {quantity.sensors[worst]}, {place} the"
-        f" simulated {band['q025']:.3g} to {band['q975']:.3g}."
-    )
+    place = f"{_first_up(quantity.words)} is {value:.3g} at IMU {quantity.sensors[worst]}"
+    says = f"{place}, {_beside(value, band, p_value)}."
     return float(away[worst] / limit), Discrepancy(name, value, band, float(p_value), sensors, says)
+
+
+def _beside(value, band, p_value) -> str:
+    """Where a value lies: the worst of many sensors may leave its own band as often as not."""
+    simulated = f"simulated {band['q025']:.3g} to {band['q975']:.3g}"
+    within = band["q025"] <= value <= band["q975"]
+    if p_value <= 0.05:
+        return f"{'at the edge of' if within else 'outside'} the {simulated}"
+    if within:
+        return f"within the {simulated}"
+    return f"{simulated} there; in {100 * p_value:.0f} % of simulations some sensor is as far out"
 
 
 def _first_up(text: str) -> str:

@@ -146,7 +146,7 @@ def scan_shifts(fit: Fit, given: Evidence, imus) -> list[Found]:
     active = given.places(fit.active)
     chosen = fit.columns.of(POSITION)
     outside = robust_inverse(
-        given.information[np.ix_(active, active)] + np.diag(given.ridge[active])
+        given.information[np.ix_(active, active)] + given.precision[np.ix_(active, active)]
     )
     edges = np.linspace(0, len(fit.residual), CUTS + 1).astype(int)
     found = []

@@ -11,6 +11,7 @@ from scipy.stats import chi2
 
 from imuarray.criticism.columns import POSITION, SCANNED, Columns
 from imuarray.criticism.fit import Fit, normal
+from imuarray.criticism.gauges import prior_precision
 from imuarray.model import EFFECTS
 
 SEEN = 1e-5  # of a parameter's own information must survive the projection to count
@@ -88,7 +89,8 @@ class Evidence:
     """The quadratic form of the misfit around a fit, in all parameters at once.
 
     ``information`` (K, K), ``score`` (K,) at the fit, ``index`` (N, m) place of each parameter
-    (-1 where there is none), ``values`` (K,) of the parameters, ``ridge`` (K,) prior precision.
+    (-1 where there is none), ``values`` (K,) of the parameters, ``ridge`` (K,) prior precision,
+    ``precision`` (K, K) that of what is fitted, gauges pinned.
     ``meat`` (K, K) is the score's covariance where noise is not white, else None.
     """
 
@@ -97,6 +99,7 @@ class Evidence:
     index: np.ndarray
     values: np.ndarray
     ridge: np.ndarray
+    precision: np.ndarray
     meat: np.ndarray | None = None
 
     @cached_property
@@ -118,7 +121,7 @@ class Evidence:
         if freed is not None and len(freed):
             score = score + self.information[:, freed] @ self.values[freed]
         cross = self.information[:, active]
-        inner = cross[active] + np.diag(self.ridge[active])
+        inner = cross[active] + self.precision[np.ix_(active, active)]
         gain = cross @ robust_inverse(inner)
         left = self.information - gain @ cross.T
         score = score - gain @ score[active]
@@ -160,7 +163,9 @@ def evidence(fit: Fit, flat, meat=None) -> Evidence:
     index = np.full(owner.shape, -1)
     index[owner] = np.arange(owner.sum())
     ridge = 1.0 / np.broadcast_to(fit.columns.prior_sd, owner.shape)[owner] ** 2
-    return Evidence(information, score, index, flat[owner], ridge, meat)
+    precision, places = np.diag(ridge), index[fit.active]
+    precision[np.ix_(places, places)] = prior_precision(fit.columns, fit.active)
+    return Evidence(information, score, index, flat[owner], ridge, precision, meat)
 
 
 def score_all(given: Evidence, fit: Fit, tried: list[Candidate], freed=()) -> list[Score]:
