@@ -1,7 +1,8 @@
 """The blind study: what the diagnosis is told, the grades, the bars, tables and figures."""
 
-import ast
 import json
+import re
+import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -382,25 +383,39 @@ def test_config_names_matrices_that_exist():
         assert scale["blind_batches"] <= len(imuarray.blind.matrix(scale["blind_cases"]))
 
 
-def test_papers_do_not_rest_on_the_blind_study_nor_diagnoses_on_grades():
+def workflow_support():
     sys.path.insert(0, str(ROOT / "workflow"))
     try:
         import support
     finally:
         sys.path.remove(str(ROOT / "workflow"))
+    return support
+
+
+def test_papers_do_not_rest_on_the_blind_study_nor_diagnoses_on_grades():
+    support = workflow_support()
     config = yaml.safe_load((ROOT / "config.yaml").read_text(encoding="utf-8"))
     assert not any("blind" in key for key in support.effective(config, "quick")["scale"])
     for stage in ("figures", "claims", "measured"):
         assert not any("blind" in Path(path).parts[-2:] or Path(path).name.startswith("blind")
                        for path in support.library(stage))  # fmt: skip
-    names = {Path(path).relative_to(support.PACKAGE).as_posix() for path in support.diagnosing()}
-    assert {"blind/study.py", "criticism/diagnosis.py", "criticism/thresholds.json"} <= names
-    assert not {f"blind/{name}" for name in support.GRADING} & names
-    # what is imported by the diagnosis is in the list
-    folders = {name.split("/")[0] for name in names if "/" in name}
-    for path in (*(support.PACKAGE / "criticism").glob("*.py"), *map(Path, support.diagnosing())):
-        if path.suffix == ".py":
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-                if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("imuarray."):
-                    part = node.module.split(".")[1]
-                    assert part in folders or f"{part}.py" in names, f"{path}: {node.module}"
+    found = support.resting_on("criticism/diagnosis.py", "blind/study.py")
+    names = {Path(path).relative_to(support.PACKAGE).as_posix() for path in found}
+    assert {"criticism/fit.py", "model/catalogue.py", "blind/errors.py", "errors.py"} <= names
+    assert {"__init__.py", "recording/__init__.py", "recording/format.py"} <= names
+    assert not {"blind/grade.py", "blind/summary.py", "figures/style.py", "cli.py"} & names
+    rules = (ROOT / "workflow" / "rules" / "blind.smk").read_text(encoding="utf-8")
+    for name in re.findall(r'"((?:blind|figures|criticism)/[^"]+)"', rules):
+        assert (support.PACKAGE / name).is_file()
+
+
+def test_files_a_script_rests_on_are_all_that_it_imports():
+    """Against what Python itself has loaded."""
+    code = (
+        "import sys, imuarray.blind.study, imuarray.figures.blind, imuarray.blind.bars;"
+        "print(*(m.__file__ for n, m in sys.modules.items() if n.split('.')[0] == 'imuarray'))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    support = workflow_support()
+    found = support.resting_on("blind/study.py", "figures/blind.py", "blind/bars.py")
+    assert set(done.stdout.split()) <= set(found)

@@ -1,5 +1,6 @@
 """What the rules share: effective settings and the library files a rule rests on."""
 
+import ast
 import json
 import time
 from pathlib import Path
@@ -19,10 +20,6 @@ STAGES = {
     "figures": ("figures",),
     "claims": ("claims",),
 }
-# The blind study's, which the papers' figures do not rest on, and of these the grading, which
-# the diagnoses do not rest on.
-DIAGNOSING = ("geometry", "motion", "model", "recording", "estimation", "criticism", "blind")
-GRADING = ("grade.py", "summary.py", "bars.py")
 
 
 def library(stage: str) -> list[str]:
@@ -36,24 +33,34 @@ def library(stage: str) -> list[str]:
             if name == stage:
                 break
     files = [path for folder in folders for path in (PACKAGE / folder).glob("*.py")]
-    files = [path for path in files if not path.name.startswith("blind")]
+    # drawings of the criticism: nothing of the papers rests on them
+    files = [path for path in files if not path.name.startswith(("blind", "criticism"))]
     return sorted(str(path) for path in [*files, *(PACKAGE / name for name in BASE)])
 
 
-def diagnosing() -> list[str]:
-    """Source files and thresholds that the blind study's diagnoses rest on."""
-    files = [path for name in DIAGNOSING for path in (PACKAGE / name).glob("*.py")]
-    apart = [PACKAGE / "blind" / name for name in GRADING]
-    files = [path for path in files if path not in apart]
-    files.append(PACKAGE / "criticism" / "thresholds.json")
-    return sorted(str(path) for path in [*files, *(PACKAGE / name for name in BASE)])
+def resting_on(*names: str) -> list[str]:
+    """The package's files ``names`` and all of its files that they import, however far down."""
+    found, waiting = set(), [PACKAGE / name for name in names]
+    while waiting:
+        path = waiting.pop()
+        if path not in found:
+            found.add(path)
+            waiting += imported(path) if path.suffix == ".py" else []
+    return sorted(map(str, found))
 
 
-def grading(*figures: str) -> list[str]:
-    """Source files that the blind study's grades and tables rest on, and files of figures/."""
-    files = [PACKAGE / "blind" / name for name in GRADING]
-    files += [PACKAGE / "figures" / name for name in figures]
-    return sorted(str(path) for path in [*files, *(PACKAGE / name for name in BASE)])
+def imported(path: Path) -> list[Path]:
+    """Files of the package that a file of it imports, those of the packages on the way too."""
+    names = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+        elif isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+    parts = [name.split(".")[1:] for name in names if name.split(".")[0] == "imuarray"]
+    steps = {PACKAGE.joinpath(*part[:depth]) for part in parts for depth in range(len(part) + 1)}
+    files = [place for step in steps for place in (step / "__init__.py", step.with_suffix(".py"))]
+    return [file for file in files if file.is_file() and PACKAGE in file.parents]
 
 
 def attempt(path: str) -> float:

@@ -110,12 +110,16 @@ def sentence(effect: str, sensors, parameters: dict, gain, rivals) -> str:
     return text + "."
 
 
+# Components that are told apart by name; all others of a unit are one size.
+NAMED = ("period", "frequency", "delay", "ratio", "share", "factor", "correlation", "time")
+
+
 def _size(parameters: dict) -> str:
     """Root mean squares of the parameters, by kind of component with a unit."""
     groups: dict[tuple[str, str], list[float]] = {}
     for name, item in parameters.items():
-        kind = name.rsplit("_", 1)[0]
-        kind = kind if kind in ("period", "frequency", "delay", "ratio", "share") else ""
+        kind = "correlation time" if name.startswith("correlation_time") else name.split("_")[0]
+        kind = kind if kind.split(" ")[0] in NAMED else ""
         if name.startswith(("phase", "offset")):
             continue
         groups.setdefault((kind, item["unit"]), []).append(item["value"])

@@ -155,7 +155,7 @@ def named_noise(search: Search, without, tails, calm) -> list:
                                             / search.readings.declared[imu, k])) < TAILED
             ]  # fmt: skip
             limit = search.thresholds.limit(name)
-            named = variance.noise_scale(made, search.noise, kind, limit, timed(search), skip)
+            named = variance.noise_scale(made, search.noise, kind, limit, timed(search), skip, calm)
             found += [named] if named else []
     if "coloured_noise" not in without:
         limit = search.thresholds.limit("coloured_noise")

@@ -100,10 +100,11 @@ def _width(fit: Fit, imu: int, kind: int) -> float:
     return float(np.sqrt(max(tails / 2, 1.0) * (1 + rho**2) / (1 - rho**2)))
 
 
-def scales(fit: Fit, noise: Noise) -> tuple[np.ndarray, np.ndarray]:
+def scales(fit: Fit, noise: Noise, calm: bool) -> tuple[np.ndarray, np.ndarray]:
     """(log ratio to the declared sd (n,), covariance (n, n)) of the n triads that exist.
 
-    From the whole residual where that agrees with its fast part, else from the fast part, which
+    From the whole residual where that agrees with its fast part, or where nothing ties it to the
+    motion (``calm``) and its spectrum is that of its own memory; else from the fast part, which
     smooth misfit does not reach.
     """
     there = fit.readings.exists
@@ -113,19 +114,29 @@ def scales(fit: Fit, noise: Noise) -> tuple[np.ndarray, np.ndarray]:
     spread, rough = np.diag(covariance), noise.error[there] ** 2
     apart = np.sqrt(np.maximum(rough - spread, spread))
     agree = (noise.correlation[there] != 0) | (np.abs(whole - fast) < AGREE * apart)
+    if calm:
+        agree |= np.array([alike(fit, noise, int(i), int(k)) for i, k in np.argwhere(there)])
     own = np.diag(np.where(agree, spread, rough))
     covariance = np.where(np.outer(agree, agree), covariance, own)
     return np.where(agree, whole, fast), covariance
 
 
-def noise_scale(fit: Fit, noise: Noise, kind: int, limit, least, skip=()) -> Named | None:
+def alike(fit: Fit, noise: Noise, imu: int, kind: int) -> bool:
+    """Whether a triad's spectrum has the slope that its lag-one correlation implies."""
+    rho = autocorrelation(fit, imu, kind)[0]
+    return bool(abs(noise.slope[imu, kind] - expected_ratio(rho, len(fit.residual))) < AGREE)
+
+
+def noise_scale(
+    fit: Fit, noise: Noise, kind: int, limit, least, skip=(), calm=True
+) -> Named | None:
     """A triad's (0 accelerometer, 1 gyroscope) noise against the declared one, or None.
 
     ``least`` (N,) log ratios below which a departure is not believed, ``skip`` IMUs to leave out.
     """
     readings = fit.readings
     pairs = np.argwhere(readings.exists)
-    log_ratio, covariance = scales(fit, noise)
+    log_ratio, covariance = scales(fit, noise, calm)
     chosen = np.flatnonzero(
         (pairs[:, 1] == kind)
         & (np.abs(log_ratio) > np.asarray(least)[pairs[:, 0]])
@@ -221,9 +232,8 @@ def coloured(fit: Fit, noise: Noise, limit: float, calm: bool) -> Named | None:
     for (imu, kind), (rho, pairs) in zip(triads, memories, strict=True):
         slope = noise.slope[imu, kind]
         sharp = norm.logsf(abs(slope)) + np.log(2 * number)
-        alike = abs(slope - expected_ratio(rho, len(fit.residual))) < AGREE
         plain = norm.logsf(abs(rho) * np.sqrt(pairs)) + np.log(2 * number)
-        log_p = min(sharp, plain if calm and alike else 0.0)
+        log_p = min(sharp, plain if calm and alike(fit, noise, imu, kind) else 0.0)
         if log_p > limit or (sharp > limit and abs(rho) < max(FLAT, loudest / 5)):
             continue
         hits.append((int(imu), int(kind)))

@@ -1,0 +1,254 @@
+"""The four answers of a diagnosis in plain words, from its document."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from imuarray.criticism.cause_words import cause_in_words, equation, whose_short, words
+from imuarray.criticism.quantities import (
+    NARROW,
+    joined,
+    number,
+    plus_minus,
+    quantity,
+    ratio,
+    span,
+    symbols,
+)
+from imuarray.figures.criticism_tables import KINDS, imu_labels, in_noise_sds, position_table
+
+if TYPE_CHECKING:
+    from imuarray.criticism.diagnosis import Diagnosis
+
+USUAL = 0.05  # p-value of a check that is as expected
+FEW = 3  # checks that are quoted, causes that are named with their IMUs
+PAPERS = "specific force ω × (ω × r) + dω/dt × r + s, angular rate ω, and white noise"
+
+
+class Answer(NamedTuple):
+    """A question, its answer, details, and what must not be overlooked ("" if nothing)."""
+
+    question: str
+    lead: str
+    items: list[str]
+    loud: str = ""
+
+
+def answers(diagnosis: Diagnosis) -> list[Answer]:
+    """What is wrong, why, the extended model, its gain."""
+    return [wrong(diagnosis), why(diagnosis), extended(diagnosis), gained(diagnosis)]
+
+
+def verdict(diagnosis: Diagnosis) -> str:
+    """The whole diagnosis in one sentence."""
+    document = diagnosis.document
+    named = [
+        f"{' or '.join(map(words, [c['effect'], *c['indistinguishable_from']]))}"
+        f" ({whose_short(c['sensors'])})"
+        for c in document["causes"]
+    ]
+    if document["unexplained"]:
+        left = "the simulation still differs from the recording"
+        if not named:
+            return f"Unexplained: {left}, and no known cause was found."
+        if len(named) > FEW:
+            named = [words(c["effect"]) for c in document["causes"]]
+        return f"Unexplained: {left} after {counted(named)} ({', '.join(named)})."
+    if not named:
+        return "Nothing: the papers' model simulates this recording as far as it can be told."
+    rest = "little else is left" if document["remaining"] else "nothing else is left"
+    return f"{counted(named)}: {joined(named)}; {rest}."
+
+
+def counted(named) -> str:
+    """'1 cause', '2 causes'."""
+    return f"{len(named)} cause{'s' * (len(named) > 1)}"
+
+
+def clean(document: dict) -> bool:
+    """Nothing named and nothing left."""
+    return not document["causes"] and not document["unexplained"]
+
+
+def of_noise(sizes: dict[str, float]) -> str:
+    """'1.02 times the assumed noise in the accelerometers and ... in the gyroscopes'."""
+    first, *rest = sizes.items()
+    parts = [f"{ratio(first[1])} times the assumed noise in the {first[0]}s"]
+    return joined(parts + [f"{ratio(value)} times in the {kind}s" for kind, value in rest])
+
+
+def wrong(diagnosis: Diagnosis) -> Answer:
+    """What does the simulation get wrong?"""
+    document = diagnosis.document
+    checks = document["discrepancies"]
+    out = [check for check in checks if check["p_value"] <= USUAL]
+    chance = max(round(USUAL * len(checks)), 1)
+    lead = (
+        f"Fitted to the recording, the papers' model leaves a residual of"
+        f" {of_noise(in_noise_sds(diagnosis.base))}. Of {len(checks)} checks of that residual"
+        f" {len(out) or 'none'} {'lies' if len(out) == 1 else 'lie'} outside what 95 % of"
+        f" simulations give; chance alone puts about {chance} there."
+    )
+    if clean(document):
+        lead = f"Nothing that this recording shows. {lead}"
+        if out:
+            says = quoted(checks[0], diagnosis)
+            lead += f" The most striking, as there always is one: {says[:1].lower()}{says[1:]}"
+        return Answer("What does the simulation get wrong?", lead, [])
+    items = [quoted(check, diagnosis) for check in out[:FEW]]
+    return Answer("What does the simulation get wrong?", lead, items)
+
+
+def quoted(check: dict, diagnosis: Diagnosis) -> str:
+    """A check's sentence with its p-value."""
+    return f"{symbols(check['says'])[:-1]} (p{NARROW}{least(check['p_value'], diagnosis)})."
+
+
+def least(p_value: float, diagnosis: Diagnosis) -> str:
+    """A Monte Carlo p-value; the least possible one is a bound."""
+    floor = min(
+        d.p_value for d in (*diagnosis.base.discrepancies, *diagnosis.extended.discrepancies)
+    )
+    return f"{'≤' if p_value <= floor else '='}{NARROW}{number(p_value, 2)}"
+
+
+def why(diagnosis: Diagnosis) -> Answer:
+    """Why? The causes in their order; what is left is said loudly."""
+    document = diagnosis.document
+    read = {item.effect: item.says for item in diagnosis.found.structural}
+    items = [cause_in_words(c, imu_labels(diagnosis), read.get(c["effect"], ""))
+             for c in document["causes"]]  # fmt: skip
+    loud = ""
+    if document["unexplained"]:
+        loud = (
+            "Something is left that no known cause explains. Checks that still fail:"
+            f" {some(document['remaining'])}. Take the causes named here with caution: an unknown"
+            " effect can pass for a known one."
+        )
+    if clean(document):
+        lead = "There is nothing to explain: no effect of the catalogue is significant, and what"
+        return Answer("Why?", f"{lead} is left passes every check.", [])
+    if not items:
+        return Answer("Why?", "No effect of the catalogue explains it.", [], loud)
+    lead = f"{len(items)} causes, in the order in which they were found:"
+    lead = lead if len(items) > 1 else "One cause:"
+    if document["remaining"] and not loud:
+        share = 100 * diagnosis.found.explained
+        lead = (
+            f"{number(share, 4)} % of the excess misfit is explained, so these checks, which still"
+            f" fail, count little: {some(document['remaining'])}. {lead}"
+        )
+    return Answer("Why?", lead, items, loud)
+
+
+def some(checks, most=8) -> str:
+    """Names of checks, the first few of many."""
+    names = [symbols(name) for name in checks]
+    more = [f"{len(names) - most} more (diagnosis.json has all)"] * (len(names) > most)
+    return joined([*names[:most], *more])
+
+
+def extended(diagnosis: Diagnosis) -> Answer:
+    """What does the extended model look like?"""
+    document = diagnosis.document
+    question = "What does the extended model look like?"
+    noise = noise_in_words(diagnosis)
+    if not document["causes"]:
+        lead = f"It is the papers' model as it stands, {PAPERS}."
+        return Answer(question, lead, [noise])
+    items = [
+        f"{words(cause['effect'])} ({whose_short(cause['sensors'])}): {equation(cause['effect'])}"
+        for cause in document["causes"]
+    ]
+    fits = diagnosis.base.fit, diagnosis.extended.fit
+    more = int(fits[1].active.sum()) - int(fits[0].active.sum())
+    lead = (
+        f"The papers' model, {PAPERS}, and {more or 'no'} more parameter{'s' * (more != 1)} beside"
+        f" the {int(fits[0].active.sum())} of the positions. u is the true specific force at a"
+        " triad:"
+    )
+    return Answer(question, lead, [*items, noise])
+
+
+def noise_in_words(diagnosis: Diagnosis) -> str:
+    """The extended model's noise, by kind, beside the declared one."""
+    readings, parts = diagnosis.found.search.readings, []
+    for kind, name in enumerate(KINDS):
+        there = readings.exists[:, kind]
+        if not there.any():
+            continue
+        unit = ("m s-2", "rad s-1")[kind]
+        size, declared = (
+            span(float(sd[there, kind].min()), float(sd[there, kind].max()), unit)
+            for sd in (readings.sd, readings.declared)
+        )
+        parts.append(f"{name}s {size}, declared {declared}")
+    return f"noise sd of the triads, as the residual shows it: {'; '.join(parts)}"
+
+
+def gained(diagnosis: Diagnosis) -> Answer:
+    """What did it gain? Prediction, residual, positions and their widths."""
+    document, gain = diagnosis.document, diagnosis.document["gain"]
+    question, samples = "What did it gain?", document["samples"]
+    over_base, over_inflated = (
+        plus_minus(gain[key], gain[f"{key}_se"])
+        for key in ("heldout_log_score_nats_per_sample", "over_inflated_noise_nats_per_sample")
+    )
+    if clean(document):
+        lead = "Nothing, and there was nothing to gain."
+        items = [
+            "On held-out time, estimating each triad's noise is worth"
+            f" {over_base} nats per sample over the declared noise, {over_inflated} over noise of"
+            " the residual's size."
+        ]
+        return Answer(question, lead, [*items, positions_in_words(diagnosis)])
+    total = number(samples * gain["over_inflated_noise_nats_per_sample"])
+    lead = (
+        f"Each of the {samples} samples, predicted from the other stretches of time, is"
+        f" {over_base} nats more likely than under the papers' model, and {over_inflated} nats more"
+        f" than under its honest rival, the papers' model with noise inflated to its residual"
+        f" ({total} nats in all)."
+    )
+    items = [residual_in_words(diagnosis), positions_in_words(diagnosis)]
+    if diagnosis.found.structural:
+        items.append("Readings that are left out or turned back do not count in these numbers.")
+    loud = ""
+    if document["unexplained"]:
+        loud = "Widths are those of the extended model: what is unexplained is not in them."
+    return Answer(question, lead, items, loud)
+
+
+def residual_in_words(diagnosis: Diagnosis) -> str:
+    """By how much the residual shrank."""
+    shrunk = diagnosis.document["gain"]["residual_sd_ratio"]
+    after = in_noise_sds(diagnosis.extended)
+    names = {"specific_force": "accelerometer", "angular_rate": "gyroscope"}
+    parts = [
+        f"to {number(100 * shrunk[key])} % in the {kind}s (now {ratio(after[kind])} times the"
+        " assumed noise)"
+        for key, kind in names.items() if kind in after
+    ]  # fmt: skip
+    return f"The residual's sd went {joined(parts)}."
+
+
+def positions_in_words(diagnosis: Diagnosis) -> str:
+    """How far the positions moved, and their widths before and after."""
+    gain, table = diagnosis.document["gain"], position_table(diagnosis)
+    widths = [
+        quantity(float(np.sqrt(np.mean(np.square(sds)))), None, "m")
+        for sds in (
+            table.base_sd, table.extended_sd, diagnosis.document["inflated"]["positions_sd_m"][1:]
+        )
+    ]  # fmt: skip
+    if clean(diagnosis.document):
+        return f"The positions stay; their sds are {widths[1]} (rms)."
+    largest = table.loc[table.change.abs().idxmax()]
+    moved = quantity(gain["position_change_m"], None, "m")
+    return (
+        f"The positions moved by {moved} (rms), {number(gain['position_change_sd'], 2)} of the sds"
+        f" that the papers' model claims for them; most: {largest['axis']} of IMU {largest.imu}, by"
+        f" {quantity(float(largest.change), None, 'm')}. Claimed sds were {widths[0]} (rms),"
+        f" {widths[2]} with inflated noise, now {widths[1]}."
+    )

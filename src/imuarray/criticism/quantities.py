@@ -1,0 +1,130 @@
+"""Numbers with units as people read them: SI in the files, degrees and micrometres on the page."""
+
+from __future__ import annotations
+
+import math
+
+from imuarray.model.catalogue import FULL_SCALE_FORCE, FULL_SCALE_RATE
+
+DEGREE = math.degrees(1.0)
+NARROW = "\u00a0"  # a space at which no line is broken
+STANDARD_GRAVITY = 9.80665  # m/s^2
+# A parameter's unit as files have it -> (factor, unit) pairs to be shown, the first that makes the
+# value at least 0.1, then what is said beside it.
+SHOWN = {
+    "m s-2": (((1.0, "m/s²"), (1e3, "mm/s²")), None),
+    "rad s-1": (((1.0, "rad/s"), (1e3, "mrad/s"), (1e6, "µrad/s")), (DEGREE, "deg/s")),
+    "rad s m-1": (
+        ((1.0, "rad/s per m/s²"), (1e3, "mrad/s per m/s²"), (1e6, "µrad/s per m/s²")),
+        (DEGREE * STANDARD_GRAVITY, "deg/s per g"),
+    ),
+    "s2 m-1": (((1e6, "ppm per m/s²"),), (100 * FULL_SCALE_FORCE, "% at 16 g")),
+    "s rad-1": (((1e6, "ppm per rad/s"),), (100 * FULL_SCALE_RATE, "% at 2000 deg/s")),
+    "m": (((1e3, "mm"), (1e6, "µm")), None),
+    "s": (((1.0, "s"), (1e3, "ms"), (1e6, "µs")), None),
+    "Hz": (((1.0, "Hz"),), None),
+    "rad": (((1e3, "mrad"), (1e6, "µrad")), (DEGREE, "deg")),
+    "%": (((100.0, "%"), (1e6, "ppm")), None),
+    "1": (((1.0, ""),), None),
+}
+SHARES = ("scale", "share")  # of effects and parameters without a unit, those that are shares
+
+
+def unit_shown(effect: str, name: str, unit: str) -> str:
+    """The key of `SHOWN` for a parameter: what "1" means depends on whose it is."""
+    if unit == "1" and effect.endswith("misalignment"):
+        return "rad"
+    if unit == "1" and (effect.endswith(SHARES[0]) or name.startswith(SHARES[1])):
+        return "%"
+    return unit if unit in SHOWN else "1"
+
+
+def number(value: float, digits: int = 3) -> str:
+    """Some significant digits, no exponent between 10^-4 and 10^6, a true minus sign."""
+    if not math.isfinite(value):
+        return "not known"
+    if value != 0 and not 1e-4 <= abs(value) < 1e6:
+        power = math.floor(math.log10(abs(value)))
+        digit = number(value / 10.0**power, digits)
+        return f"{digit}{NARROW}·{NARROW}{power_of_ten(power)}"
+    text = f"{float(f'{value:.{digits}g}'):.12g}"
+    return text.replace("-", "−")
+
+
+def power_of_ten(power: int) -> str:
+    """'10⁻⁷⁷'."""
+    return "10" + str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def plus_minus(value: float, error: float | None) -> str:
+    """A value with its error, both to the error's second digit; without one, three digits."""
+    if error is None or not math.isfinite(error) or error <= 0 or not math.isfinite(value):
+        return number(value)
+    if max(abs(value), error) >= 1e6:
+        power = math.floor(math.log10(max(abs(value), error)))
+        inner = plus_minus(value / 10.0**power, error / 10.0**power)
+        return f"({inner}){NARROW}·{NARROW}{power_of_ten(power)}"
+    places = 1 - math.floor(math.log10(error))
+    shown = [round(value, places), round(error, places)]
+    texts = [f"{v:.{max(places, 0)}f}".replace("-", "−") for v in shown]
+    return f"{texts[0]}{NARROW}±{NARROW}{texts[1]}"
+
+
+def quantity(value: float, error: float | None, unit: str, size: float | None = None) -> str:
+    """A value in SI with its error as a page shows it, degrees beside radians.
+
+    ``unit``: a key of `SHOWN`; ``size``: what chooses the prefix, the value itself if None.
+    """
+    choices, beside = SHOWN[unit]
+    size = abs(value) if size is None else size
+    large = [choice for choice in choices if choice[0] * size >= 0.0999]
+    factor, name = large[0] if large else choices[-1]
+    error = None if error is None else abs(error)
+    text = plus_minus(factor * value, None if error is None else factor * error)
+    text = f"{text}{NARROW}{name}" if name else text
+    if beside is None:
+        return text
+    also = plus_minus(beside[0] * value, None if error is None else beside[0] * error)
+    return f"{text} ({also}{NARROW}{beside[1]})"
+
+
+def span(low: float, high: float, unit: str) -> str:
+    """'1.02 to 1.07 mrad/s (0.0586 to 0.0612 deg/s)'; one value where both read alike."""
+    choices, beside = SHOWN[unit]
+    size = max(abs(low), abs(high))
+    large = [choice for choice in choices if choice[0] * size >= 0.0999]
+    parts = [large[0] if large else choices[-1], *([beside] if beside else [])]
+    texts = []
+    for factor, name in parts:
+        ends = [number(factor * end) for end in (low, high)]
+        unit_text = f"{NARROW}{name}" if name else ""
+        texts.append(f"{' to '.join(dict.fromkeys(ends))}{unit_text}")
+    return texts[0] if beside is None else f"{texts[0]} ({texts[1]})"
+
+
+def ratio(value: float) -> str:
+    """Two decimals where it is near one, so that 1.00 is seen to be no round number."""
+    return f"{value:.2f}" if 0.1 <= value < 10 else number(value)
+
+
+def symbols(text: str) -> str:
+    """Greek letters and true minus signs for what files spell out."""
+    for plain, symbol in (
+        ("omega double dot", "d²ω/dt²"), ("omega dot", "dω/dt"), ("omega_dot", "dω/dt"),
+        ("omega", "ω"), ("tau", "τ"), ("phi", "φ"), (" -", " −"),
+    ):  # fmt: skip
+        text = text.replace(plain, symbol)
+    return text
+
+
+def probability(log10_p: float) -> str:
+    """'0.012', or a power of ten."""
+    if log10_p > -4:
+        return number(10.0**log10_p, 2)
+    return power_of_ten(math.ceil(log10_p)) if log10_p > -1e5 else "0"
+
+
+def joined(items) -> str:
+    """'a', 'a and b', 'a, b and c'."""
+    items = [str(item) for item in items]
+    return " and ".join([", ".join(items[:-1]), items[-1]] if len(items) > 1 else items)

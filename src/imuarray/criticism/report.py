@@ -1,0 +1,212 @@
+"""The report of a diagnosis: diagnosis.json, report.html and the figures, in one folder."""
+
+from __future__ import annotations
+
+import base64
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+import imuarray
+from imuarray.criticism.answers import answers, verdict
+from imuarray.criticism.cause_words import whose_short, words
+from imuarray.criticism.page import render
+from imuarray.criticism.report_tables import tables
+from imuarray.figures import criticism as drawn
+from imuarray.figures import criticism_tables as numbers
+from imuarray.figures.criticism_causes import cause_figure
+from imuarray.figures.criticism_model import ALIKE, position_figure, separability_figure
+from imuarray.figures.criticism_panels import cause_table
+from imuarray.figures.style import styled
+from imuarray.provenance import atomic_write
+
+if TYPE_CHECKING:
+    from imuarray.criticism.diagnosis import Diagnosis
+
+FIGURES = {
+    "discrepancies": (numbers.discrepancy_table, drawn.discrepancy_figure),
+    "residual": (numbers.residual_table, drawn.residual_figure),
+    "gain": (numbers.gain_table, drawn.gain_figure),
+    "separability": (numbers.separability_table, separability_figure),
+    "positions": (numbers.position_table, position_figure),
+}
+SUFFIXES = ("pdf", "png", "csv")
+CAPTIONS = {
+    "discrepancies": (
+        "Measured against simulated",
+        "Each check of the residual at its worst sensor, in sds of the band that simulations of the"
+        " fitted model give there; the grey band is where the worst sensor is in 95 % of"
+        " simulations, if sensors are independent. Filled: p at most 0.05, from simulations.",
+    ),
+    "residual": (
+        "Residual before and after",
+        "rms residual of each triad in units of the declared noise, corrected for what the fitted"
+        " motion takes up: 1 is what the declared noise gives.",
+    ),
+    "gain": (
+        "What each cause gains",
+        "Nats gained on blocks of time that the model was not trained on; above the line by each"
+        " cause, in the order of adoption, below it by the extended model over the papers' model"
+        " with declared and with inflated noise. A placebo ought to gain nothing.",
+    ),
+    "separability": (
+        "What this recording can tell apart",
+        "Squared canonical correlation of the effects' signals, each on all IMUs, motion and"
+        f" positions projected out. Framed: above {ALIKE}, one class. Below the diagonal the"
+        " two most alike forms of two effects, above it the mean over the forms of the smaller"
+        " effect: 1 below and little above means that a single form is a gauge.",
+    ),
+    "positions": (
+        "Positions",
+        "Where the extended model puts each triad, relative to the papers' model; bars are 95 %"
+        " intervals as each model claims them.",
+    ),
+}
+CAUSE_CAPTION = (
+    "What would be back in the residual without this cause, motion and all else refitted (points:"
+    " means of bins with two standard errors), and what the cause predicts (lines); where points"
+    " leave the lines, the cause does not fit. Left: all readings that it touches. Right: {}."
+)
+BESIDE = {
+    "sensor_clock": "the age of the readings from each sample alone, against the time within a turn"
+    " of the sawtooth, drawn twice",
+    "position_shift": "the triad's position in blocks of time",
+    "bias_drift": "the axes that it changes most, against time",
+    "accelerometer_bias": "the axes that it changes most, against time",
+    "gyroscope_bias": "the axes that it changes most, against time",
+    "gyroscope_delay": "the gyroscope along dω/dt against its size; the slope is the delay",
+    "sensor_delay": "the gyroscope along dω/dt against its size; the slope is the delay",
+}
+
+
+class Drawing(NamedTuple):
+    """A figure's name, texts and files by suffix."""
+
+    name: str
+    title: str
+    caption: str
+    files: dict[str, bytes]
+
+    @property
+    def base64(self) -> str:
+        """The PNG as a page embeds it."""
+        return base64.b64encode(self.files["png"]).decode("ascii")
+
+
+def write_report(diagnosis: Diagnosis, folder: str | Path) -> None:
+    """Write figures (PDF, PNG and the numbers as CSV), report.html and, last, diagnosis.json.
+
+    Everything is made before the first file is written, so that an error leaves the folder as it
+    was; it is made if it does not exist.
+    """
+    drawings = draw(diagnosis)
+    page, document = html(diagnosis, drawings), diagnosis.to_json() + "\n"
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    for drawing in drawings:
+        for suffix, content in drawing.files.items():
+            _write(folder / f"{drawing.name}.{suffix}", content)
+    _remove_former(folder, {drawing.name for drawing in drawings})
+    _write(folder / "report.html", page.encode())
+    _write(folder / "diagnosis.json", document.encode())
+
+
+def _write(path: Path, content: bytes) -> None:
+    with atomic_write(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def _remove_former(folder: Path, names) -> None:
+    """Figures of a former report that this one does not have."""
+    for suffix in SUFFIXES:
+        for path in [*folder.glob(f"cause_[0-9][0-9]_*.{suffix}"), folder / f"gain.{suffix}"]:
+            if path.stem not in names:
+                path.unlink(missing_ok=True)
+
+
+def draw(diagnosis: Diagnosis) -> list[Drawing]:
+    """All figures in the report's order; those of causes only where there are any."""
+    document = diagnosis.document
+    footer = (
+        f"{drawn.plain(shortened(document['recording']))}; {document['samples']} samples,"
+        f" seed {document['seed']}, imuarray {document['version']}",
+    )
+    found = [_drawing("discrepancies", diagnosis, footer), _drawing("residual", diagnosis, footer)]
+    if document["causes"]:
+        found.append(_drawing("gain", diagnosis, footer))
+    for number, cause in enumerate(diagnosis.found.search.causes):
+        table = cause_table(diagnosis, cause)
+        labels = numbers.imu_labels(diagnosis)
+        sensors = ["all"] if len(cause.imus) == len(labels) else [labels[k] for k in cause.imus]
+        found.append(Drawing(
+            f"cause_{number + 1:02d}_{cause.effect}",
+            f"Cause: {words(cause.effect)}, {whose_short(sensors)}",
+            CAUSE_CAPTION.format(BESIDE.get(
+                cause.effect, "the most certain parameters, against what each multiplies"
+            )),
+            files(cause_figure(table, footer), table),
+        ))  # fmt: skip
+    return [*found, _drawing("separability", diagnosis, footer),
+            _drawing("positions", diagnosis, footer)]  # fmt: skip
+
+
+def _drawing(name: str, diagnosis: Diagnosis, footer) -> Drawing:
+    """One of the figures that every report has."""
+    make_table, make_figure = FIGURES[name]
+    table = make_table(diagnosis)
+    figure = make_figure(table, footer)
+    return Drawing(name, *CAPTIONS[name], files(figure, table))
+
+
+def shortened(path: str, most: int = 70) -> str:
+    """A path's end, on one line."""
+    text = " ".join(str(path).split()) or "a recording"
+    return text if len(text) <= most else f"…{text[1 - most :]}"
+
+
+@styled
+def files(figure: Figure, table: pd.DataFrame) -> dict[str, bytes]:
+    """A figure as PDF and PNG, the same bytes each time, and its numbers as CSV."""
+    found = {"csv": table.to_csv(index=False, lineterminator="\n").encode()}
+    for suffix, metadata in (("pdf", {"CreationDate": None}), ("png", {"Software": None})):
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format=suffix, metadata=metadata)
+        found[suffix] = buffer.getvalue()
+    return found
+
+
+def html(diagnosis: Diagnosis, drawings: list[Drawing]) -> str:
+    """report.html."""
+    document = diagnosis.document
+    return render(
+        recording=str(document["recording"]) or "a recording",
+        facts=facts(diagnosis),
+        verdict=verdict(diagnosis),
+        unexplained=document["unexplained"],
+        answers=answers(diagnosis),
+        figures=drawings,
+        tables=tables(diagnosis),
+        foot=[
+            "A nat is a unit of log likelihood: one nat more makes the readings e times as likely."
+            " Errors after ± are standard errors or posterior sds (one sigma). p-values are not"
+            " probabilities of a cause.",
+            f"imuarray {imuarray.__version__}, seed {document['seed']}. All numbers, in SI units:"
+            " diagnosis.json.",
+        ],
+    )
+
+
+def facts(diagnosis: Diagnosis) -> str:
+    """Samples, duration and sensors in a line."""
+    readings = diagnosis.found.raw
+    accelerometers, gyroscopes = (int(n) for n in readings.exists.sum(axis=0))
+    rate = 1.0 / np.median(np.diff(readings.time))
+    return (
+        f"{len(readings.time)} moving samples within {readings.span:.1f} s at {rate:.4g} Hz;"
+        f" {accelerometers} accelerometer triads, {gyroscopes} gyroscope triads"
+        f" ({', '.join(readings.labels)})."
+    )

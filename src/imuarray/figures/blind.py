@@ -1,0 +1,193 @@
+"""The blind study: how small an effect is found, and what it is taken for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.ticker import NullFormatter
+
+from imuarray.blind.inject import CATALOGUE
+from imuarray.blind.summary import ALL, CRASH, NOTHING, UNEXPLAINED
+from imuarray.figures.style import BLACK, BLUE, PAGE, SKY, VERMILLION, new_figure, styled
+
+COLUMNS = 6  # panels in a row
+FOUND, WRONG = {"color": BLUE, "marker": "o"}, {"color": VERMILLION, "marker": "s"}
+# Amplitudes without a unit, said instead of "1".
+MEANING = {
+    "accelerometer_scale": "share", "accelerometer_misalignment": "share",
+    "gyroscope_scale": "share", "gyroscope_misalignment": "share",
+    "accelerometer_noise": "ln of noise / declared", "gyroscope_noise": "ln of noise / declared",
+    "heavy_tails": "factor − 1", "coloured_noise": "coefficient", "saturation": "share cut off",
+    "stale_samples": "share", "axis_swap": "no amplitude",
+    "bias_drift": "0.1 m/s² or 0.3 deg/s",
+}  # fmt: skip
+UNITS = {"m s-2": "m/s²", "rad s-1": "rad/s", "s2 m-1": "s²/m", "s rad-1": "s/rad",
+         "rad s m-1": "rad/s per m/s²"}  # fmt: skip
+GROUPS = {
+    "one": "one effect,\n8 σ or more", "clean": "", "gauge": "gauges",
+    "outside": "outside the\ncatalogue", "struck": "",
+}  # fmt: skip
+STRUCK = "struck effects, all"
+TEXT = 5.0  # pt, in cells
+
+
+def words(name: str) -> str:
+    """An effect's id to be read: 'accel. scale', without what the group says."""
+    for prefix in ("gauge_", "outside_"):
+        name = name.removeprefix(prefix)
+    return name.replace("accelerometer", "accel.").replace("gyroscope", "gyro.").replace("_", " ")
+
+
+@styled
+def detection_figure(bins: pd.DataFrame, effects: pd.DataFrame, footer=()):
+    """Share found over size, a panel for each effect; ticks are single recordings.
+
+    ``bins``: `imuarray.blind.summary.detection`; ``effects``: the same's `effects`.
+    """
+    against = bins.against.iloc[0]
+    names = list(dict.fromkeys(bins.effect))
+    lines = -(-(len(names) + 1) // COLUMNS)
+    figure = new_figure(footer, PAGE, 0.1 + 1.25 * lines)
+    grid = figure.subplots(lines, COLUMNS, sharey=True, sharex=against == "sigma", squeeze=False)
+    panels = grid.ravel()
+    for axes, name in zip(panels, names, strict=False):
+        part = effects[effects.kind == "one"]
+        part = part if name == ALL else part[part.effect == name]
+        _detection_panel(axes, bins[bins.effect == name], part, against, name)
+    # last: shared limits grow with each panel
+    for axes in panels[: len(names)]:
+        _ticks(axes)
+    for axes in panels[len(names) :]:
+        axes.axis("off")
+    _detection_legend(panels[len(names)])
+    for axes in grid[:, 0]:
+        axes.set_ylabel("recordings (%)", size=6, labelpad=1)
+    if against == "sigma":
+        for axes in grid[-1]:
+            axes.set_xlabel("size (σ)", size=6, labelpad=1)
+    return figure
+
+
+def _detection_panel(axes, bins, effects, against, name):
+    error = 100 * np.array([bins.share - bins.low, bins.high - bins.share])
+    axes.errorbar(bins.centre, 100 * bins.share, error, linestyle="-", linewidth=0.9,
+                  markersize=3, elinewidth=0.6, ecolor=SKY, **FOUND)  # fmt: skip
+    axes.plot(bins.centre, 100 * bins.wrong_share, linestyle=(0, (2, 1)), linewidth=0.8,
+              markersize=2, **WRONG)  # fmt: skip
+    for found, height in ((True, 108), (False, -8)):
+        seen = effects[effects.found == found]
+        axes.plot(seen[against], np.full(len(seen), height), "|", color=BLACK, markersize=3,
+                  markeredgewidth=0.4)  # fmt: skip
+    axes.set(xscale="log", ylim=(-16, 116))
+    axes.set_yticks([0, 50, 100])
+    axes.tick_params(labelsize=5.5)
+    axes.set_title(name if name == ALL else words(name), size=6, pad=2)
+    if against != "sigma":
+        unit = bins.unit.iloc[0]
+        axes.set_xlabel(MEANING.get(name, UNITS.get(unit, unit)), size=5.5, labelpad=1)
+
+
+def _ticks(axes, most=3) -> None:
+    """Few labels, at powers of ten where there are two of them, written out."""
+    low, high = axes.get_xlim()
+    if high < 3 * low:
+        low, high = low / 3, high * 3
+    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+    places = [m * 10.0**e for e in decades for m in (1, 2, 5) if low <= m * 10.0**e <= high]
+    tens = [place for place in places if np.isclose(np.log10(place) % 1, [0, 1]).any()]
+    places = tens if len(tens) > 1 else places
+    places = places[:: -(-len(places) // most) or 1]
+    axes.set_xticks(places, [f"{place:g}" for place in places])
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set_xlim(low, high)
+
+
+def _detection_legend(axes) -> None:
+    axes.plot([], [], linestyle="-", label="right class", **FOUND)
+    axes.plot([], [], linestyle=(0, (2, 1)), markersize=3, label="a wrong name", **WRONG)
+    axes.plot([], [], "|", color=BLACK, label="a recording: found\n(top) or not (bottom)")
+    axes.legend(loc="center", fontsize=5.5, frameon=False)
+
+
+def confusion_rows(table: pd.DataFrame) -> pd.DataFrame:
+    """The figure's lines: those of `imuarray.blind.summary.confusion`, struck effects added up."""
+    struck = table[table.kind == "struck"]
+    rest = table[table.kind != "struck"]
+    if struck.empty:
+        return rest
+    number = struck.drop_duplicates("truth").recordings.sum()
+    added = struck.groupby("named", sort=False)[["right", "wrong"]].sum().reset_index()
+    added = added.assign(kind="struck", truth=STRUCK, recordings=number)
+    for side in ("right", "wrong"):
+        added[f"{side}_share"] = added[side] / number
+    return pd.concat([rest, added], ignore_index=True)
+
+
+def names_of(table: pd.DataFrame) -> list[str]:
+    """The matrix' columns: the catalogue, what else is named, then what is no effect."""
+    last = [NOTHING, UNEXPLAINED, *([CRASH] if CRASH in set(table.named) else [])]
+    others = [name for name in dict.fromkeys(table.named) if name not in (*CATALOGUE, *last)]
+    return [*CATALOGUE, *others, *last]
+
+
+@styled
+def confusion_figure(table: pd.DataFrame, footer=()):
+    """Truth by name, percent of recordings; blue where the name is right, vermillion where not.
+
+    ``table``: `imuarray.blind.summary.confusion`.
+    """
+    table = confusion_rows(table)
+    columns = names_of(table)
+    lines = list(dict.fromkeys(zip(table.kind, table.truth, strict=True)))
+    figure = new_figure(footer, PAGE, 1.3 + 0.165 * len(lines))
+    axes = figure.subplots()
+    counts = table.drop_duplicates(["kind", "truth"]).recordings
+    place = {line: number for number, line in enumerate(lines)}
+    for row in table.itertuples():
+        _cell(axes, columns.index(row.named), place[row.kind, row.truth], row)
+    labels = [f"{words(truth)} ({n})" for (_, truth), n in zip(lines, counts, strict=True)]
+    axes.set_yticks(range(len(lines)), labels, size=6)
+    axes.set_xticks(range(len(columns)), map(words, columns), size=6, rotation=90)
+    axes.xaxis.tick_top()
+    axes.set(xlim=(-0.5, len(columns) - 0.5), ylim=(len(lines) - 0.5, -0.5))
+    _separate(axes, lines, columns)
+    return figure
+
+
+def _shade(color: str, share: float):
+    """White to ``color``; half of it already for a small share, so that it is seen."""
+    shades = LinearSegmentedColormap.from_list("shades", ["white", color])
+    return shades(0.12 + 0.88 * share) if share > 0 else "white"
+
+
+def _cell(axes, column: int, line: int, row) -> None:
+    """One cell: coloured by the larger part, the number in bold where any of it is wrong."""
+    right = row.right_share >= row.wrong_share
+    share = row.right_share + row.wrong_share
+    color = _shade(BLUE if right else VERMILLION, share)
+    axes.fill_between([column - 0.5, column + 0.5], line - 0.5, line + 0.5, color=color, lw=0)
+    dark = share > (0.55 if right else 0.8)
+    axes.text(
+        column, line, f"{100 * share:.0f}", size=TEXT, ha="center", va="center_baseline",
+        color="white" if dark else BLACK, weight="bold" if row.wrong else "normal",
+    )  # fmt: skip
+
+
+def _separate(axes, lines, columns) -> None:
+    """Thin lines between cells, thick ones between groups, and the groups' names."""
+    axes.grid(False)
+    axes.tick_params(length=0)
+    for edge in np.arange(len(lines) + 1) - 0.5:
+        axes.axhline(edge, color="0.9", linewidth=0.3, zorder=3)
+    for edge in np.arange(len(columns) + 1) - 0.5:
+        axes.axvline(edge, color="0.9", linewidth=0.3, zorder=3)
+    effects = next(i for i, name in enumerate(columns) if name == NOTHING)
+    axes.axvline(effects - 0.5, color=BLACK, linewidth=0.8, zorder=4)
+    kinds = [kind for kind, _ in lines]
+    for kind, text in GROUPS.items():
+        if kind in kinds:
+            first, last = kinds.index(kind), len(kinds) - 1 - kinds[::-1].index(kind)
+            axes.axhline(last + 0.5, color=BLACK, linewidth=0.8, zorder=4)
+            axes.annotate(text, (1.005, 1 - ((first + last) / 2 + 0.5) / len(lines)),
+                          xycoords="axes fraction", size=6, rotation=-90, va="center")  # fmt: skip

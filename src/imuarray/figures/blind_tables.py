@@ -1,0 +1,84 @@
+"""Tables of the blind study: the bars; gain, position error and coverage."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from imuarray.figures.tables import Column
+
+BARS = (
+    Column("bar", "set and what is counted", "set and what is counted"),
+    Column("aim", "bar", "bar"),
+    Column("recordings", "recordings", "n"),
+    Column("share", "measured (%)", r"measured (\%)", "{:.1f}", 100.0),
+    Column("low", "95 % limits: from", "from", "{:.1f}", 100.0),
+    Column("high", "to", "to", "{:.1f}", 100.0),
+    Column("verdict", "verdict", "verdict"),
+    Column("sure", "certain at 95 %", "sure"),
+    Column("all_recordings", "all settings: recordings", "n, all"),
+    Column("all_share", "all settings: measured (%)", r"all (\%)", "{:.1f}", 100.0),
+)
+
+GAIN = (
+    Column("kind", "set", "set"),
+    Column("effect", "effect", "effect"),
+    Column("recordings", "recordings", "n"),
+    Column("gain", "held-out gain (nats per sample)", "gain", "{:.3g}"),
+    Column("gain_se", "its standard error", "se", "{:.2g}"),
+    Column("gain_median", "median", "median", "{:.3g}"),
+    Column("gain_over_inflated", "gain over the base model with larger noise", "over", "{:.3g}"),
+    Column("gain_over_inflated_se", "its standard error", "se", "{:.2g}"),
+    Column("base_position_rmse_m", "position RMSE, base (µm)", r"base ($\mu$m)", "{:.3g}", 1e6),
+    Column("inflated_position_rmse_m", "base, larger noise (µm)", "larger noise", "{:.3g}", 1e6),
+    Column(
+        "extended_position_rmse_m", "extended (µm)", r"extended ($\mu$m)", "{:.3g}", 1e6
+    ),
+    Column("base_coverage", "95 % intervals cover, base (%)", r"base (\%)", "{:.1f}", 100.0),
+    Column(
+        "inflated_coverage", "base, larger noise (%)", r"larger noise (\%)", "{:.1f}", 100.0
+    ),
+    Column("extended_coverage", "extended (%)", r"extended (\%)", "{:.1f}", 100.0),
+)  # fmt: skip
+
+
+def shown(table: pd.DataFrame) -> pd.DataFrame:
+    """The bars with words for yes and no, empty where a bar has no such thing."""
+    words = {True: "yes", False: "no"}
+    return table.assign(sure=[words.get(value, "") for value in table.sure])
+
+
+def time_line(recordings: pd.DataFrame) -> str:
+    """How long the diagnoses took, from `imuarray.blind.summary.recordings`."""
+    part = recordings[recordings.standard & ~recordings.crash]
+    if part.empty:
+        return "No diagnosis of 8 IMUs, 125 Hz, 24 s."
+    return (
+        f"8 IMUs, 125 Hz, 24 s: {part.least_seconds.median():.0f} s for a diagnosis in the median,"
+        f" {part.least_seconds.max():.0f} s at most, of wall or CPU time of all threads, whichever"
+        " is less: machines are shared."
+    )
+
+
+def bars_notes(recordings: pd.DataFrame, scale: str) -> list[str]:
+    """The small print under the bars."""
+    return [
+        f"{scale}; {len(recordings)} recordings, {int(recordings.crash.sum())} without an answer."
+        " Measured: on 8 IMUs, 125 Hz, 24 s, for which the bars are set; all settings beside it."
+        " Limits: Clopper and Pearson's; of the coverage, from the spread between recordings.",
+        "Right class: the effect is named, or among those that the named one is said to be"
+        " indistinguishable from. A wrong name: in its class there is nothing of the truth. A"
+        " crash counts as a miss where a bar is a least share, and has a bar of its own. In a"
+        " gauge the array is not determined, and no intervals around one answer can cover.",
+        time_line(recordings),
+    ]
+
+
+def gain_notes(scale: str) -> list[str]:
+    """The small print under gain and coverage."""
+    return [
+        f"{scale}. Gains over the base model (and over the same with its noise enlarged to what"
+        " its residual shows) are means over recordings, their errors those of the recordings'"
+        " own. RMSE: pooled over recordings and coordinates. Coverage: mean share of the"
+        " intervals of all coordinates; errors between recordings, medians and the rest are in"
+        " the CSV file. In a gauge, the array is not determined: no model can cover.",
+    ]

@@ -1,0 +1,19 @@
+"""Diagnoses of one batch of blind cases, with the truth beside them -> JSON."""
+
+from job import job
+
+with job(snakemake) as settings:
+    from imuarray.blind import matrix
+    from imuarray.blind.study import batch_of, diagnosed
+    from imuarray.criticism.diagnosis import diagnose
+    from imuarray.provenance import stamp, write_json
+
+    cases = batch_of(
+        matrix(settings["scale"]["cases"]), int(snakemake.wildcards.batch), snakemake.params.batches
+    )
+    entries = []
+    for number, case in enumerate(cases, start=1):
+        entries.append(diagnosed(case, settings["seed"], diagnose))
+        print(f"{number} of {len(cases)}: {case.id}, {entries[-1]['seconds']:.1f} s")
+    found = {"cases": entries, "stamp": stamp(settings, settings["seed"])}
+    write_json(found, snakemake.output[0])
