@@ -26,6 +26,7 @@ NESTED = {  # an effect, and those that contain it or are contained
     "sensor_clock": ("sensor_delay", "gyroscope_delay"),
 }  # fmt: skip
 LONG = 3500  # samples; longer recordings are looked at in part first
+CLEAR = 2.5  # sds of a triad's memory, where all together are beyond doubt
 TAILED = 0.25  # log ratio by which a mixture's core may miss the noise
 DELAYED = 0.1  # log ratio of noise that an adopted delay may bring with it
 
@@ -56,13 +57,15 @@ def investigate(
     """
     thresholds = thresholds or read_thresholds()
     raw = arrange(recording)
-    structural, readings = find_structural(raw, without)
+    structural, readings, mended = find_structural(raw, without)
     effects = catalogue_effects(without)
     columns = columns_of(readings.array, effects, readings.position_prior_sd)
     search = Search(readings, columns, effects, thresholds, say)
     search.begin()
     base, excess = search.fit, search.excess
     base_checks = all_checks(base, search.given, search.noise)
+    if not mended:
+        return Found(search, base, base_checks, structural, [], base_checks, 0.0, True, raw)
     if len(readings.time) > LONG:
         search = looked_ahead(search, part_of(readings, LONG), excess)
     calm(search)
@@ -127,13 +130,21 @@ def settle(search: Search, without) -> tuple[list, list]:
 
 
 def remember(search: Search) -> None:
-    """Where the spectrum says that noise is coloured, take its size and memory from all of it."""
-    hits = np.argwhere(search.noise.correlation != 0)
-    if not len(hits):
+    """Where the spectrum says that noise is coloured, take its size and memory from all of it.
+
+    Many triads with a little memory each count together.
+    """
+    triads = np.argwhere(search.readings.exists)
+    memories = np.array([variance.autocorrelation(search.fit, *pair) for pair in triads])
+    limit = search.thresholds.limit("coloured_noise")
+    coloured = search.noise.correlation[search.readings.exists] != 0
+    if variance.pooled_memory(search.fit, search.noise, memories) < limit:
+        coloured |= np.abs(memories[:, 0]) * np.sqrt(memories[:, 1]) > CLEAR
+    if not coloured.any():
         return
     correlation, sd = search.noise.correlation.copy(), search.readings.sd.copy()
-    for imu, kind in hits:
-        correlation[imu, kind] = variance.autocorrelation(search.fit, imu, kind)[0]
+    for (imu, kind), (rho, _) in zip(triads[coloured], memories[coloured], strict=True):
+        correlation[imu, kind] = rho
         sd[imu, kind] *= np.sqrt(np.nanmean(variance.triad(search.fit, imu, kind) ** 2))
     search.readings = search.readings.with_sd(sd)
     search.fit = fit(

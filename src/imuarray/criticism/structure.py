@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import poisson
 
+from imuarray.criticism.linearise import polynomial_derivative
 from imuarray.criticism.readings import Readings
-from imuarray.model.structure import design, products
 
 KINDS = ("accelerometer", "gyroscope")
 LEAST_REPEATS = 4
@@ -104,42 +104,72 @@ def _pile(values, kept):
 
 
 def find_swaps(readings: Readings):
-    """Triads with exchanged or reversed axes: (causes, turns (N, 2, 3, 3))."""
-    turns = np.tile(np.eye(3), (len(readings.exists), 2, 1, 1))
-    rate = np.median(part(readings, 1)[:, readings.exists[:, 1]], axis=1)
-    hit = []
-    for imu, kind in np.argwhere(readings.exists):
-        reference = rate if kind else _force_elsewhere(readings, rate, imu)
-        matrix = np.linalg.lstsq(reference, part(readings, kind)[:, imu], rcond=None)[0].T
-        nearest = min(TURNS, key=lambda turn: np.linalg.norm(turn - matrix))
-        near = np.linalg.norm(matrix - nearest) < min(NEAR, np.linalg.norm(matrix - np.eye(3)) / 2)
-        if near and not np.array_equal(nearest, np.eye(3)):
-            turns[imu, kind] = nearest
-            hit.append((int(imu), int(kind)))
-    turned = {kind: [i for i, k in hit if k == kind] for kind in (0, 1)}
-    for kind, imus in turned.items():
-        if 2 * len(imus) > readings.exists[:, kind].sum():
-            # most of them: it is the others that differ, and the frame is the gyroscopes'
-            turns[:, kind] = np.eye(3)
-            hit = [pair for pair in hit if pair[1] != kind]
+    """Triads with exchanged or reversed axes: (causes, turns (N, 2, 3, 3), whether mended).
+
+    Axes are those that most triads of a kind agree on; without such a majority the turns stay
+    unknown and nothing is mended.
+    """
+    count = len(readings.exists)
+    turns, hit, mended = np.tile(np.eye(3), (count, 2, 1, 1)), [], True
+    lever = np.zeros((len(readings.time), count, 3))
+    for kind in (1, 0):
+        there = np.flatnonzero(readings.exists[:, kind])
+        values = part(readings, kind)
+        against = {j: _against(values, lever, j, there) for j in there}
+        best = max(there, key=lambda j: sum(map(_is_straight, against[j].values())))
+        agreeing = [k for k in there if _is_straight(against[best][k])]
+        if 2 * len(agreeing) <= len(there) and len(there) > 2:
+            mended = False
+            hit += [(int(k), kind) for k in there]
+            continue
+        common = np.median(values[:, agreeing] - lever[:, agreeing], axis=1)
+        for imu in there:
+            matrix = _matrix(common + lever[:, imu], values[:, imu])
+            nearest = min(TURNS, key=lambda turn: np.linalg.norm(turn - matrix))
+            limit = min(NEAR, np.linalg.norm(matrix - np.eye(3)) / 2)
+            if not _is_straight(nearest) and np.linalg.norm(matrix - nearest) < limit:
+                turns[imu, kind] = nearest
+                hit.append((int(imu), kind))
+        if kind:
+            lever = _lever(readings, common)
     if not hit:
-        return [], turns
+        return [], turns, True
     says = "; ".join(
         f"{KINDS[kind]} {readings.labels[imu]}: {_axes(turns[imu, kind])}" for imu, kind in hit
     )
-    return [Structural("axis_swap", unique([imu for imu, _ in hit]), -1e6, {}, says)], turns
+    if not mended:
+        turns[:] = np.eye(3)
+        says = "no majority of the triads agrees on the axes: put them right first"
+    found = Structural("axis_swap", unique([imu for imu, _ in hit]), -1e6, {}, says)
+    return [found], turns, mended
 
 
-def _force_elsewhere(readings: Readings, rate, imu) -> np.ndarray:
-    """The specific force at an IMU's nominal place from the median of all triads, (T, 3).
+def _matrix(reference, values) -> np.ndarray:
+    """The matrix that turns a reference (T, 3) into a triad's readings (T, 3)."""
+    return np.linalg.lstsq(reference, values, rcond=None)[0].T
 
-    The centrifugal part is that of the gyroscopes; what omega_dot adds averages out.
-    """
-    there = readings.exists[:, 0]
-    centrifugal = products(rate) @ design(readings.array.relative)[:, :6].T
-    centrifugal = centrifugal.reshape(len(rate), -1, 3)
-    common = np.median(part(readings, 0)[:, there] - centrifugal, axis=1)
-    return common + centrifugal[:, imu]
+
+def _against(values, lever, one, there) -> dict:
+    """Signed permutations nearest to what each triad reads where triad ``one`` is right."""
+    found = {}
+    for k in there:
+        matrix = _matrix(values[:, one] - lever[:, one] + lever[:, k], values[:, k])
+        found[k] = min(TURNS, key=lambda turn: np.linalg.norm(turn - matrix))
+    return found
+
+
+def _is_straight(turn) -> bool:
+    return np.array_equal(turn, np.eye(3))
+
+
+def _lever(readings: Readings, rate) -> np.ndarray:
+    """What rotation adds to the specific force at the nominal places, (T, N, 3)."""
+    turning = polynomial_derivative(readings.time, readings.run, rate, readings.window, 1)
+    places = np.zeros((len(readings.exists), 3))
+    places[: readings.array.accelerometers] = readings.array.relative
+    return np.cross(rate[:, None], np.cross(rate[:, None], places)) + np.cross(
+        turning[:, None], places
+    )
 
 
 def _axes(turn) -> str:
@@ -163,15 +193,15 @@ def unique(imus) -> tuple[int, ...]:
 
 
 def find_structural(readings: Readings, without=()):
-    """(causes, readings put right): stale samples and rails left out, axes turned back."""
-    causes = []
+    """(causes, readings put right, whether they could be): axes turned back, the rest left out."""
+    causes, mended = [], True
     for name, find in (("stale_samples", find_repeats), ("saturation", find_rails)):
         if name not in without:
             found, lost = find(readings)
             causes += found
             readings = readings.without(lost)
     if "axis_swap" not in without:
-        found, turns = find_swaps(readings)
+        found, turns, mended = find_swaps(readings)
         causes += found
         readings = undo_swaps(readings, turns)
-    return causes, readings
+    return causes, readings, mended

@@ -216,6 +216,19 @@ def heavy_tails(fit: Fit, limit: float):
     return Named("heavy_tails", imus, float(logs.min()), numbers, *held_out(nats)), hits
 
 
+def pooled_memory(fit: Fit, noise: Noise, memories) -> float:
+    """log p of all triads' lag-one correlations (n, 2: value, pairs), 0 where spectra disagree."""
+    rho, pairs = np.asarray(memories).T
+    statistic = float(np.sum(rho**2 * pairs))
+    slopes = noise.slope[fit.readings.exists]
+    implied = np.array([expected_ratio(value, len(fit.residual)) for value in rho])
+    root = np.sqrt(len(rho))
+    signed = np.sign(rho)
+    apart = abs(np.sum(signed * (slopes - implied))) / root
+    there = -np.sum(signed * slopes) / root
+    return log_tail(statistic, len(rho)) if apart < AGREE < there else 0.0
+
+
 def coloured(fit: Fit, noise: Noise, limit: float, calm: bool) -> Named | None:
     """Noise correlated in time: neighbours alike, and a spectrum that agrees with it.
 
@@ -234,7 +247,10 @@ def coloured(fit: Fit, noise: Noise, limit: float, calm: bool) -> Named | None:
         sharp = norm.logsf(abs(slope)) + np.log(2 * number)
         plain = norm.logsf(abs(rho) * np.sqrt(pairs)) + np.log(2 * number)
         log_p = min(sharp, plain if calm and alike(fit, noise, imu, kind) else 0.0)
-        if log_p > limit or (sharp > limit and abs(rho) < max(FLAT, loudest / 5)):
+        remembered = noise.correlation[imu, kind] != 0
+        if (log_p > limit and not remembered) or (
+            sharp > limit and abs(rho) < max(FLAT, loudest / 5)
+        ):
             continue
         hits.append((int(imu), int(kind)))
         logs.append(float(log_p))
@@ -251,4 +267,5 @@ def coloured(fit: Fit, noise: Noise, limit: float, calm: bool) -> Named | None:
     if not hits:
         return None
     imus = tuple(sorted({imu for imu, _ in hits}))
-    return Named("coloured_noise", imus, min(logs), numbers, *held_out(nats))
+    best = min(*logs, pooled_memory(fit, noise, memories), 0.0)
+    return Named("coloured_noise", imus, best, numbers, *held_out(nats))
