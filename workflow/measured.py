@@ -104,6 +104,14 @@ class Measured:
             paths.append(f"results/measured/tables/agreement_{group}.md")
         return sorted(set(paths))
 
+    def diagnoses(self) -> list[str]:
+        """Diagnoses of all recordings, and their agreement where a board has several."""
+        folder = "results/measured"
+        paths = [f"{folder}/diagnosis/{name}/diagnosis.json" for name in self.available()]
+        for group in self.groups():
+            paths += [f"{folder}/figures/diagnosis_{group}.{k}" for k in ("pdf", "png", "csv")]
+        return paths
+
     def published_tables(self, scale: str) -> dict[str, str]:
         """Names of the measured tables that go to paper_figures/, and what they copy."""
         name = self.experiment(scale)

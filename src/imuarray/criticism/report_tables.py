@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from imuarray.criticism.answers import USUAL, least
+from imuarray.criticism.answers import USUAL
 from imuarray.criticism.cause_words import part_in_words, split_name, whose_short, words
 from imuarray.criticism.quantities import (
     number,
@@ -67,10 +67,10 @@ def checks(diagnosis: Diagnosis) -> Table:
     for item in diagnosis.base.discrepancies:
         then = after.get(item.check)
         cells = [
-            symbols(item.says), least(item.p_value, diagnosis).removeprefix("=").strip(),
+            symbols(item.says), number(item.p_value, 2),
             ", ".join(item.sensors),
             number(then.statistic) if then else "",
-            least(then.p_value, diagnosis).removeprefix("=").strip() if then else "",
+            number(then.p_value, 2) if then else "",
         ]  # fmt: skip
         rows.append(Row(cells, item.p_value <= USUAL))
     columns = [
@@ -79,7 +79,8 @@ def checks(diagnosis: Diagnosis) -> Table:
     ]  # fmt: skip
     caption = (
         "Each quantity at its worst sensor, beside what the fitted model simulates; p allows for"
-        " the choice of the worst sensor. In bold: p at most 0.05."
+        " the choice of the worst sensor and is 1 / (simulations + 1) at least. In bold: p at most"
+        " 0.05."
     )
     return Table("Checks of the residual", caption, columns, rows)
 

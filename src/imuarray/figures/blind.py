@@ -64,7 +64,9 @@ def detection_figure(bins: pd.DataFrame, effects: pd.DataFrame, footer=()):
     for axes in grid[:, 0]:
         axes.set_ylabel("recordings (%)", size=6, labelpad=1)
     if against == "sigma":
-        for axes in grid[-1]:
+        # the lowest panel of each column: below some of them there is none
+        for axes in panels[max(len(names) - COLUMNS, 0) : len(names)]:
+            axes.tick_params(labelbottom=True)
             axes.set_xlabel("size (σ)", size=6, labelpad=1)
     return figure
 

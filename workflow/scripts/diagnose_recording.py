@@ -1,0 +1,17 @@
+"""What the papers' model gets wrong on a recording -> diagnosis.json, report, figures."""
+
+from job import job
+
+with job(snakemake) as settings:
+    from pathlib import Path
+
+    from imuarray.criticism.diagnosis import diagnose
+    from imuarray.criticism.report import write_report
+    from imuarray.recording import read_recording
+
+    recording = read_recording(snakemake.input.recording)
+    found = diagnose(
+        recording, settings["seed"], recording_path=snakemake.input.recording,
+        say=lambda text: print(text, flush=True),
+    )  # fmt: skip
+    write_report(found, Path(snakemake.output.diagnosis).parent)
