@@ -1,0 +1,260 @@
+"""Hidden effects must be found: recordings of the independent injector, the truth opened last."""
+
+import json
+
+import numpy as np
+import pytest
+
+from imuarray.blind import Case
+from imuarray.blind.cases import make
+from imuarray.cli import main
+from imuarray.criticism.describe import MEANING
+from imuarray.criticism.diagnosis import diagnose
+from imuarray.criticism.extension import extended_model, read_extension
+from imuarray.criticism.structure import find_structural
+from imuarray.model import EFFECTS, ArrayModel
+from imuarray.model.effects import effect
+from imuarray.recording import write_recording
+
+SEED = 41
+DURATION = 8.0  # s
+SIZES = np.random.default_rng(SEED)
+REPLICATES = 9
+
+
+def hidden(*effects, kind="one", realistic=False, **setting):
+    """A case of effects (id, IMUs), its total size drawn between 14 and 30 sigma."""
+    size = None if realistic else float(SIZES.uniform(14, 30))
+    setting = {"duration": DURATION} | setting
+    return Case(
+        "test-" + "-".join(name for name, _ in effects), effects, size, kind=kind, **setting
+    )
+
+
+def found_in(case, seed=SEED, without=()):
+    """(diagnosis.json as a dict, the truth), the diagnosis made without looking at the truth."""
+    recording, truth = make(case, seed)
+    struck = tuple(truth.struck) or tuple(without)
+    return diagnose(recording, seed, struck, replicates=REPLICATES).document, truth
+
+
+def named(document):
+    return {cause["effect"] for cause in document["causes"]}
+
+
+ALL = tuple(range(8))
+ONE = [
+    hidden(("gyroscope_scale", (2,))),
+    hidden(("gyroscope_g_sensitivity", (5,))),
+    hidden(("accelerometer_bias", (4,))),
+    hidden(("accelerometer_nonlinearity", ALL)),
+    hidden(("size_effect", ALL)),
+    hidden(("bias_drift", (6,))),
+    hidden(("position_shift", (3,))),
+    hidden(("gyroscope_noise", (1,))),
+    hidden(("coloured_noise", (7,))),
+    hidden(("sensor_clock", (2,)), realistic=True),
+    hidden(("heavy_tails", (0,)), realistic=True),
+    hidden(("stale_samples", (3,)), realistic=True),
+    hidden(("axis_swap", (5,)), realistic=True),
+    hidden(("gyroscope_misalignment", (2,)), rails=True),
+]
+
+
+@pytest.mark.parametrize("case", ONE, ids=lambda case: case.effects[0][0])
+def test_one_effect_is_named_with_its_sensors(case):
+    document, truth = found_in(case)
+    name, imus = case.effects[0]
+    assert named(document) == {name}
+    assert not document["unexplained"], document["remaining"]
+    labels = [str(k + 1) for k in imus]
+    assert document["causes"][0]["sensors"] == (["all"] if len(imus) == 8 else labels)
+    assert document["causes"][0]["heldout_gain_nats"] > 0
+    assert document["gain"]["heldout_log_score_nats_per_sample"] > 0
+    assert truth.effects[0]["effect"] == name
+
+
+@pytest.mark.parametrize("case", ONE[:3], ids=lambda case: case.effects[0][0])
+def test_parameters_are_within_the_widths_they_claim(case):
+    document, truth = found_in(case)
+    value = np.array(truth.effects[0]["parameters"][parameter_of(truth)]["value"]).ravel()
+    items = list(document["causes"][0]["parameters"].values())
+    z = [(item["value"] - v) / item["sd"] for item, v in zip(items, value, strict=True)]
+    assert np.max(np.abs(z)) < 4.5
+
+
+def parameter_of(truth):
+    """The first parameter whose size is that of the effect's."""
+    names = truth.effects[0]["parameters"]
+    return max(names, key=lambda name: np.size(names[name]["value"]))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_clean_recording_has_no_cause(seed):
+    document, _ = found_in(Case("test-clean", duration=DURATION, rails=seed == 2), seed)
+    assert document["causes"] == []
+    assert not document["unexplained"]
+    assert document["gain"]["heldout_log_score_nats_per_sample"] == pytest.approx(0, abs=0.05)
+
+
+def test_two_effects_at_once():
+    case = hidden(("gyroscope_bias", (1,)), ("accelerometer_scale", (6,)), kind="pair")
+    document, _ = found_in(case)
+    assert named(document) == {"gyroscope_bias", "accelerometer_scale"}
+    assert not document["unexplained"]
+
+
+def test_a_delay_is_named_with_what_cannot_be_told_from_it():
+    document, _ = found_in(hidden(("sensor_delay", (4,))))
+    cause = document["causes"][0]
+    assert len(document["causes"]) == 1
+    assert {"sensor_delay", "gyroscope_delay"} <= {
+        cause["effect"],
+        *cause["indistinguishable_from"],
+    }
+
+
+def test_a_gauge_is_no_confident_cause():
+    document, _ = found_in(hidden(("gauge_gyroscope_scale", ALL), kind="gauge"))
+    assert document["unexplained"] or not any(
+        not cause["indistinguishable_from"] for cause in document["causes"]
+    )
+
+
+def test_what_is_outside_the_catalogue_is_unexplained_until_it_is_added():
+    """The documentation's example: one function, and the diagnosis names it."""
+    case = Case("test-cubic", (("outside_cubic", ALL),), 60.0, kind="outside", duration=DURATION)
+    document, _ = found_in(case)
+    assert document["unexplained"] or not document["causes"]
+
+    @effect("accelerometer_cubic", unit="s4 m-2", prior_sd=2e-7, shape=lambda a, g: (a, 3))
+    def accelerometer_cubic(curvature, instant, predicted):
+        """u_i + c_i u_i^3."""
+        force = predicted.specific_force
+        return predicted._replace(specific_force=force + curvature * force**3)
+
+    try:
+        document, _ = found_in(case)
+        assert named(document) == {"accelerometer_cubic"}
+        assert not document["unexplained"]
+    finally:
+        del EFFECTS["accelerometer_cubic"]
+
+
+def test_an_effect_struck_from_the_catalogue_leaves_something_unexplained():
+    case = hidden(("gyroscope_g_sensitivity", ALL), kind="struck")
+    document, truth = found_in(case)
+    assert truth.struck == ["gyroscope_g_sensitivity"]
+    assert "gyroscope_g_sensitivity" not in named(document)
+    assert document["unexplained"] or not document["causes"]
+
+
+def test_most_triads_decide_which_axes_are_right():
+    from imuarray.criticism.readings import arrange
+
+    recording, _ = make(Case("test-axes", (("axis_swap", (0, 1, 2)),), None, kind="one",
+                             duration=DURATION), SEED)  # fmt: skip
+    causes, _, mended = find_structural(arrange(recording))
+    assert mended and causes[0].imus == (0, 1, 2)
+    recording, _ = make(Case("test-axes", (("axis_swap", ALL),), None, kind="one",
+                             duration=DURATION), SEED)  # fmt: skip
+    causes, _, mended = find_structural(arrange(recording))
+    assert causes[0].effect == "axis_swap"
+    assert not mended or len(causes[0].imus) < 8
+
+
+# -- the command -----------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def diagnosed(tmp_path_factory):
+    """A recording with a scaled gyroscope, diagnosed by the command."""
+    folder = tmp_path_factory.mktemp("diagnose")
+    recording, _ = make(ONE[0], SEED)
+    write_recording(recording, folder / "rec.nc")
+    status = main(["diagnose", str(folder / "rec.nc"), "--out", str(folder / "out"), "--quiet"])
+    assert status == 0
+    return folder
+
+
+def test_the_command_writes_a_complete_folder(diagnosed):
+    document = json.loads((diagnosed / "out" / "diagnosis.json").read_text())
+    assert document["recording"].endswith("rec.nc")
+    for section in ("base", "extended"):
+        assert {
+            "heldout_log_score_per_sample",
+            "residual_sd",
+            "positions_m",
+            "positions_sd_m",
+        } <= set(document[section])
+    for item in document["discrepancies"]:
+        assert {"check", "statistic", "simulated", "p_value", "sensors", "says"} <= set(item)
+        assert set(item["simulated"]) == {"median", "q025", "q975"}
+    for cause in document["causes"]:
+        assert cause["effect"] in MEANING and cause["says"].endswith(".")
+        assert all({"value", "sd", "unit"} == set(p) for p in cause["parameters"].values())
+    assert (diagnosed / "out" / "report.html").stat().st_size > 10_000
+
+
+def test_the_extended_model_is_one_option_away(diagnosed):
+    out = diagnosed / "cal.nc"
+    status = main([
+        "calibrate", str(diagnosed / "rec.nc"), "--method", "gauss-newton", "--quiet",
+        "--diagnosis", str(diagnosed / "out" / "diagnosis.json"), "--out", str(out),
+    ])  # fmt: skip
+    assert status == 0
+    import xarray as xr
+
+    document = json.loads((diagnosed / "out" / "diagnosis.json").read_text())
+    with xr.open_dataset(out) as found:
+        place = [str(name).startswith("gyroscope_scale[2") for name in found.parameter.values]
+        values, sds = found.effect_parameter.values[place], found.effect_sd.values[place]
+        others = found.effect_parameter.values[~np.array(place)]
+        positions = found.position.values
+    wanted = [p["value"] for p in document["causes"][0]["parameters"].values()]
+    np.testing.assert_allclose(values, wanted, atol=0.2 * sds.max())
+    assert np.abs(others).max() < 1e-6
+    claimed = np.array(document["extended"]["positions_sd_m"])[1:]
+    away = (positions - np.array(document["extended"]["positions_m"]))[1:] / claimed
+    assert np.abs(away).max() < 0.3
+
+
+def test_an_extension_of_another_board_is_refused(diagnosed):
+    from imuarray.errors import InputError
+    from imuarray.geometry import mimu4444_corners
+
+    extension = read_extension(diagnosed / "out" / "diagnosis.json")
+    model = ArrayModel.isotropic(mimu4444_corners(), 0.04, 1e-3)
+    labels = tuple("abcdefgh")
+    with pytest.raises(InputError, match="expected IMUs a, b"):
+        extended_model(extension, model, (labels, labels))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--without", "gremlin"], "--without: expected any of"),
+        (["--seed", "-1"], "expected an integer of at least 0"),
+    ],
+)
+def test_a_wrong_option_is_one_line(diagnosed, capsys, arguments, message):
+    status = main(
+        ["diagnose", str(diagnosed / "rec.nc"), "--out", str(diagnosed / "no"), *arguments]
+    )
+    captured = capsys.readouterr().err
+    assert status == 2 and message in captured and captured.count("\n") == 1
+    assert not (diagnosed / "no").exists()
+
+
+def test_a_file_in_the_folder_s_place_is_refused(diagnosed, capsys):
+    status = main(["diagnose", str(diagnosed / "rec.nc"), "--out", str(diagnosed / "rec.nc")])
+    assert status == 2 and "expected a folder, found a file" in capsys.readouterr().err
+
+
+def test_a_diagnosis_that_is_none_is_refused(diagnosed, capsys):
+    status = main([
+        "calibrate", str(diagnosed / "rec.nc"), "--method", "gauss-newton",
+        "--diagnosis", str(diagnosed / "rec.nc"), "--out", str(diagnosed / "never.nc"),
+    ])  # fmt: skip
+    assert status == 2 and "expected a diagnosis.json" in capsys.readouterr().err
+    assert not (diagnosed / "never.nc").exists()
