@@ -272,16 +272,26 @@ def test_bars_of_the_other_sets():
 
 
 def test_coverage_is_judged_between_recordings():
-    rows = [graded("clean", [], []) for _ in range(10)]
-    for number, row in enumerate(rows):
-        row["extended"] = {"position_rmse_m": 1e-4, "covered": 95 - number % 2, "coordinates": 100}
-    found = bars_of(rows)["coverage_clean"]
+    def line(covered, coordinates):
+        rows = [graded("clean", [], []) for _ in covered]
+        for row, count in zip(rows, covered, strict=True):
+            row["extended"] = {
+                "position_rmse_m": 1e-4, "covered": count, "coordinates": coordinates
+            }  # fmt: skip
+        return bars_of(rows)["coverage_clean"]
+
+    # shares 0.94 and 0.95 in turn: sd 0.00527; Student's t for 9 degrees of freedom 2.262
+    found = line([9400, 9500] * 5, 10_000)
     assert found["share"] == pytest.approx(0.945) and found["verdict"] == "pass" and found["sure"]
-    assert found["high"] - found["low"] == pytest.approx(2 * 1.96 * 0.00527 / np.sqrt(10), rel=1e-2)
-    for row in rows:
-        row["extended"]["covered"] = 100
-    found = bars_of(rows)["coverage_clean"]
+    width = 2 * 2.262 * 0.00527 / np.sqrt(10)
+    assert found["high"] - found["low"] == pytest.approx(width, rel=1e-2)
+    found = line([10_000] * 10, 10_000)
     assert found["verdict"] == "short by 2.0 points" and found["sure"]
+    # three recordings that agree are not sure of it: 0.0275 for 63 coordinates, t 4.303
+    found = line([21] * 3, 21)
+    assert found["verdict"] == "short by 2.0 points" and not found["sure"]
+    assert found["low"] == pytest.approx(1 - 4.303 * np.sqrt(0.95 * 0.05 / 63), abs=1e-3)
+    assert line([21], 21)["sure"] is None
 
 
 def test_gain_table_weighs_and_pools():

@@ -7,9 +7,10 @@ from collections import Counter
 import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
+from scipy.stats import t as student
 
 from imuarray.blind.cases import KINDS
-from imuarray.blind.grade import GAINS, MODELS, QUANTILE
+from imuarray.blind.grade import GAINS, MODELS
 from imuarray.blind.inject import EFFECTS
 from imuarray.blind.matrix import SIZES
 
@@ -17,6 +18,7 @@ NOTHING, UNEXPLAINED, CRASH = "nothing", "unexplained", "crash"
 ALL = "all effects"
 STANDARD = {"imus": 8, "sampling_rate": 125.0, "duration": 24.0}  # what the bars are set for
 LARGE = 8.0  # sigma, from which an effect is to be found
+LEVEL = 0.95  # of all intervals
 REACHED = 0.98  # of a size that was asked for counts as that size
 AMPLITUDE_BINS, PER_BIN = 6, 4  # at most so many bins, with at least so many recordings
 
@@ -25,7 +27,7 @@ def share_limits(count: int, number: int) -> tuple[float, float]:
     """Clopper and Pearson's 95 % limits of a share; 0 and 1 where there is no recording."""
     if not number:
         return 0.0, 1.0
-    limits = binomtest(int(count), int(number)).proportion_ci(0.95, method="exact")
+    limits = binomtest(int(count), int(number)).proportion_ci(LEVEL, method="exact")
     return float(limits.low), float(limits.high)
 
 
@@ -238,6 +240,12 @@ def coverage(part: pd.DataFrame, model: str) -> tuple[float, float]:
 
 
 def coverage_limits(part: pd.DataFrame, model: str) -> tuple[float, float, float]:
-    """Mean coverage with 95 % limits; none where there are fewer than two recordings."""
+    """Mean coverage with 95 % limits (Student's t over the recordings).
+
+    The error is no less than that of independent coordinates covered as they should be: a few
+    recordings may agree by chance. No limits where there are fewer than two recordings.
+    """
     share, error = coverage(part, model)
-    return share, max(share - QUANTILE * error, 0.0), min(share + QUANTILE * error, 1.0)
+    least = np.sqrt(LEVEL * (1 - LEVEL) / part[f"{model}_coordinates"].sum())
+    reach = student.ppf((1 + LEVEL) / 2, len(part) - 1) * np.fmax(error, least)
+    return share, float(np.maximum(share - reach, 0.0)), float(np.minimum(share + reach, 1.0))
