@@ -10,9 +10,24 @@ import numpy as np
 
 from imuarray.criticism import noise as noises
 from imuarray.criticism.columns import POSITION, SCANNED, Columns
-from imuarray.criticism.fit import Fit, at, fit, flat_parameters, from_flat, loosened, normal
+from imuarray.criticism.fit import (
+    Fit,
+    at,
+    flat_parameters,
+    from_flat,
+    loosened,
+    normal,
+    search_optimum,
+)
+from imuarray.criticism.linearise import linearise
 from imuarray.criticism.readings import Readings
-from imuarray.criticism.scans import refine_clock, refine_instant, scan_clocks, scan_shifts
+from imuarray.criticism.scans import (
+    delay_parts,
+    refine_clock,
+    refine_instant,
+    scan_clocks,
+    scan_shifts,
+)
 from imuarray.criticism.scores import (
     Candidate,
     Evidence,
@@ -92,16 +107,19 @@ class Search:
         """Fit what is adopted, with the noise that the residual's fast part shows."""
         state = self.fit.state if state is None else state
         turns += bool(self.clocks)
-        for turn in range(2 * turns):
+        for turn in range(turns + 2):
             self.edges(state, EDGE / (1 + turn))
-            made = fit(self.readings, self.columns, self.active, state, self.smooth, rough)
-            judged = noises.judge(made)
+            state, converged, seen = search_optimum(
+                self.readings, self.columns, self.active, state, self.smooth, rough
+            )
+            judged = noises.judge_parts(self.readings, seen.residual, seen.basis)
             change = np.max(np.abs(judged.sd / self.readings.sd - 1)[self.readings.exists])
-            self.fit, self.noise = made, judged
             enough = turn > 0 or not self.clocks
             if (change < STEADY and enough) or (turn + 1 >= turns and change < 5 * STEADY):
                 break
-            self.readings, state = self.readings.with_sd(judged.sd), self.rewound(made).state
+            self.readings, state = self.readings.with_sd(judged.sd), self.rewound(state)
+        self.fit = at(self.readings, self.columns, self.active, state, converged)
+        self.noise = noises.judge(self.fit)
         self.weigh()
 
     @property
@@ -109,18 +127,19 @@ class Search:
         """IMUs with an adopted clock."""
         return next((c.imus for c in self.causes if c.effect == "sensor_clock"), ())
 
-    def rewound(self, made: Fit) -> Fit:
-        """The fit with its clocks' frequency and phase where the ages say."""
+    def rewound(self, state):
+        """The state with its clocks' frequency and phase where the ages say."""
         if not self.clocks:
-            return made
-        whole = flat_parameters(self.columns, made.state)
-        chosen = self.columns.of("sensor_clock")
+            return state
         # the readings near the jumps are those that tell the phase
-        readings = replace(made.readings, keep=made.readings.keep | self.jumps)
-        every = at(readings, self.columns, made.active, made.state, made.converged)
+        readings = replace(self.readings, keep=self.readings.keep | self.jumps)
+        seen = linearise(readings, self.columns, state, self.columns.of("sensor_delay")[:1])
+        parts = delay_parts(seen.residual, seen.whitened[..., 0], seen.through[..., 0])
+        whole, chosen = flat_parameters(self.columns, state), self.columns.of("sensor_clock")
         for imu in self.clocks:
-            whole[imu, chosen] = refine_clock(every, imu)
-        return replace(made, state=from_flat(self.columns, made.state, whole))
+            own = (part[:, imu] for part in parts)
+            whole[imu, chosen] = refine_clock(readings, whole[imu, chosen], *own)
+        return from_flat(self.columns, state, whole)
 
     def edges(self, state, width) -> None:
         """Leave out a clocked IMU's samples near the sawtooth's jump: which side is a gamble."""
@@ -142,7 +161,7 @@ class Search:
 
     def polish(self) -> None:
         """The same fit to the end."""
-        self.refit(turns=4, rough=False)
+        self.refit(turns=2, rough=False)
 
     def begin(self, parameters=None, positions=None) -> None:
         """The papers' model, or what another search came to."""

@@ -77,6 +77,11 @@ def diagnose(
     search = found.search
     say("fitting the papers' model to the same readings")
     extended = fitted(search.fit, search.noise.correlation)
+    for item in found.in_noise:
+        if item.effect == "coloured_noise":
+            # the score of a fit takes noise for white; what its memory tells comes on top
+            nats = extended.scores.nats + item.blocks
+            extended.scores = extended.scores._replace(nats=nats)
     base, inflated = rivals_of(found)
     rng = stream(seed, "diagnose", "replicates")
     say("replicating the recording")
@@ -139,10 +144,12 @@ def rivals_of(found: Found) -> tuple[Fitted, Fitted]:
     if found.structural:
         # as read: the rivals know neither of rails nor of repeats nor of exchanged axes
         bare = replace(bare, values=found.raw.values)
-    declared = fit(bare, search.columns, alone, start, search.smooth)
+    declared = fit(bare, search.columns, alone, start, search.smooth, rough=True)
     size = np.sqrt(np.nanmean(triads(standardised(declared)) ** 2, axis=-1))
     inflated_sd = bare.declared * np.where(bare.exists, np.maximum(size, 1e-3), 1.0)
-    again = fit(bare.with_sd(inflated_sd), search.columns, alone, declared.state, search.smooth)
+    again = fit(
+        bare.with_sd(inflated_sd), search.columns, alone, declared.state, search.smooth, True
+    )
     return fitted(declared), fitted(again)
 
 

@@ -19,7 +19,8 @@ from imuarray.criticism.linearise import (
 )
 from imuarray.criticism.readings import Readings
 
-STEPS = 25
+STEPS = 15
+LITTLE = 0.02  # nats; a step that promises less is not taken
 ROUGH = 1e-4  # of the misfit that a step must gain while causes are looked for
 SETTLED = 0.02  # of a parameter's own sd
 SHORTEST = 0.2  # share of a Gauss-Newton step
@@ -104,6 +105,12 @@ def fit(
     ``smooth`` says whether the motion's time derivatives may be had from its neighbours, ``rough``
     that it may stop when a step gains little.
     """
+    state, converged, _ = search_optimum(readings, columns, active, state, smooth, rough)
+    return at(readings, columns, active, state, converged)
+
+
+def search_optimum(readings, columns, active, state, smooth, rough):
+    """(state, whether it converged, the recording linearised there or a step before)."""
     prior_mean = prior_means(readings, columns)[active]
     precision = prior_precision(columns, active)
     wanted = np.flatnonzero(active.any(axis=0))
@@ -120,7 +127,7 @@ def fit(
         step, sds = scaled_solve(information + precision, score)
         moved, astray = np.max(np.abs(step) / sds, initial=0.0), float(np.sum(seen.taken**2))
         if (moved < SETTLED and astray < 0.01 * len(seen.taken)) or score @ step + astray < max(
-            1e-3, enough * misfit
+            LITTLE, enough * misfit
         ):
             converged = True
             break
@@ -131,7 +138,7 @@ def fit(
         length = max(length / 2, SHORTEST) if cost > last else min(1.0, 1.2 * length)
         last = cost
         state = advance(columns, state, active, step, few, seen, length)
-    return at(readings, columns, active, state, converged)
+    return state, converged, seen
 
 
 def at(readings: Readings, columns: Columns, active, state: State, converged: bool) -> Fit:

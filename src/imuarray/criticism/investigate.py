@@ -27,6 +27,7 @@ NESTED = {  # an effect, and those that contain it or are contained
 }  # fmt: skip
 LONG = 3500  # samples; longer recordings are looked at in part first
 CLEAR = 2.5  # sds of a triad's memory, where all together are beyond doubt
+LITTLE = 0.03  # of the noise's own misfit: so little left over may be forgiven
 TAILED = 0.25  # log ratio by which a mixture's core may miss the noise
 DELAYED = 0.1  # log ratio of noise that an adopted delay may bring with it
 
@@ -59,7 +60,9 @@ def investigate(
     raw = arrange(recording)
     structural, readings, mended = find_structural(raw, without)
     effects = catalogue_effects(without)
-    columns = columns_of(readings.array, effects, readings.position_prior_sd)
+    # clocks are scanned for by what a delay would gain, whether or not it is a candidate
+    described = effects if "sensor_delay" in effects else (*effects, "sensor_delay")
+    columns = columns_of(readings.array, described, readings.position_prior_sd)
     search = Search(readings, columns, effects, thresholds, say)
     search.begin()
     base, excess = search.fit, search.excess
@@ -70,16 +73,20 @@ def investigate(
         search = looked_ahead(search, part_of(readings, LONG), excess)
     calm(search)
     adopt(search)
+    say("fitting to the end")
     search.polish()
     clear(search)
+    say("judging the noise")
     tails, in_noise = settle(search, without)
     if "coloured_noise" not in without:
         remember(search)
+    say("testing what is left")
     checks = all_checks(search.fit, search.given, search.noise)
     calm_ = not any(c.log_p < thresholds.check for c in checks if c.name.startswith("residual"))
     in_noise += named_noise(search, without, tails, calm_)
     explained, failing = judged(search, base, checks, in_noise)
     found = Found(search, base, base_checks, structural, in_noise, checks, explained, failing, raw)
+    say("looking for what cannot be told apart")
     found.rivals = {c.effect: rivals(search, c.effect) for c in search.causes}
     return found
 
@@ -193,9 +200,9 @@ def judged(search: Search, base: Fit, checks, in_noise) -> tuple[float, bool]:
     if "coloured_noise" in named:
         failing = [c for c in failing if c.name != "whiteness"]
     large = search.excess > 30 * np.sqrt(2 * search.fit.free)
-    forgiven = large and explained > search.thresholds.explained and not {"outliers"} & {
-        c.name for c in failing
-    }  # fmt: skip
+    small = left < LITTLE * search.fit.free
+    forgiven = large and small and explained > search.thresholds.explained
+    forgiven = forgiven and "outliers" not in {c.name for c in failing}
     return explained, bool(failing) and not forgiven
 
 

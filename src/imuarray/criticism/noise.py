@@ -59,14 +59,24 @@ def per_triad(values) -> np.ndarray:
 
 def standardised(fit: Fit) -> np.ndarray:
     """Residuals of unit variance where noise is as assumed (T, N, 6), NaN where left out."""
-    share = np.sqrt(np.maximum(1.0 - fit.leverage, 1e-6))
-    return np.where(fit.readings.keep, fit.residual / share, np.nan)
+    return to_unit(fit.readings, fit.residual, fit.basis)
+
+
+def to_unit(readings: Readings, residual, basis) -> np.ndarray:
+    """The same from residual (T, N, 6) and the motion's basis (T, 6 N, D)."""
+    leverage = np.einsum("tij,tij->ti", basis, basis).reshape(residual.shape)
+    share = np.sqrt(np.maximum(1.0 - leverage, 1e-6))
+    return np.where(readings.keep, residual / share, np.nan)
 
 
 def judge(fit: Fit) -> Noise:
     """The noise of each triad from a fit's residual."""
-    readings = fit.readings
-    unit = standardised(fit)
+    return judge_parts(fit.readings, fit.residual, fit.basis)
+
+
+def judge_parts(readings: Readings, residual, basis) -> Noise:
+    """The same from residual and basis."""
+    unit = to_unit(readings, residual, basis)
     fast = fast_part(unit, readings.run)
     values = np.where(readings.exists[..., None], per_triad(fast), 1.0)
     counts = np.maximum(np.sum(np.isfinite(values), axis=-1), 1)

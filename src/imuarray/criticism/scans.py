@@ -8,6 +8,7 @@ import numpy as np
 
 from imuarray.criticism.columns import POSITION
 from imuarray.criticism.fit import Fit, normal
+from imuarray.criticism.readings import Readings
 from imuarray.criticism.scores import Candidate, Evidence, Score, log_tail, robust_inverse
 
 PHASES = np.arange(32) / 32  # of a turn, tried at first
@@ -28,8 +29,12 @@ class Found(NamedTuple):
 def delay_score(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     """Each sample's score and information of each IMU's delay, (T, N) each, motion projected."""
     column = int(fit.columns.of("sensor_delay")[0])
-    along, through = fit.whitened[..., column], fit.through[..., column]
-    score = np.einsum("tki,tki->tk", along, fit.residual)
+    return delay_parts(fit.residual, fit.whitened[..., column], fit.through[..., column])
+
+
+def delay_parts(residual, along, through) -> tuple[np.ndarray, np.ndarray]:
+    """The same from the residual and the derivative by the delay, whitened and projected."""
+    score = np.einsum("tki,tki->tk", along, residual)
     information = np.sum(along**2, axis=2) - np.sum(through**2, axis=2)
     return score, np.maximum(information, 1e-300)
 
@@ -113,15 +118,12 @@ def _shape(time, score, information, frequency, start=PHASES, signed=False):
     return float(gain[k]), values
 
 
-def refine_clock(fit: Fit, imu: int) -> np.ndarray:
+def refine_clock(readings: Readings, clock, score, information) -> np.ndarray:
     """(P, f, phi, c) of an adopted clock, from each sample's own age; P and c are for the fit.
 
-    The residual says how far each age is off; frequency and phase are searched around where they
-    are, the grid drawing in.
+    The residual, by its ``score`` and ``information`` of the delay (T,), says how far each age
+    is off; frequency and phase are searched around where they are, the grid drawing in.
     """
-    columns, readings = fit.columns, fit.readings
-    clock = columns.model.split(np.asarray(fit.state.parameters))["sensor_clock"][imu].copy()
-    score, information = (part[:, imu] for part in delay_score(fit))
     turns = clock[1] * readings.time + clock[2]
     age = clock[3] + clock[0] * (turns - np.floor(turns) - 0.5)
     middle = readings.span / 2

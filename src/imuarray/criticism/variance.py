@@ -8,6 +8,7 @@ import numpy as np
 from scipy.stats import norm
 
 from imuarray.criticism.fit import Fit
+from imuarray.criticism.heldout import edges_of
 from imuarray.criticism.noise import FLAT, Noise, expected_ratio, standardised
 from imuarray.criticism.scores import log_tail
 
@@ -25,6 +26,7 @@ class Named(NamedTuple):
     parameters: dict  # name -> (value, sd, unit)
     gain: float  # nats
     gain_se: float
+    blocks: np.ndarray  # nats of each held-out block
 
 
 class Mixture(NamedTuple):
@@ -42,10 +44,11 @@ def triad(fit: Fit, imu: int, kind: int) -> np.ndarray:
     return standardised(fit)[:, imu, 3 * kind : 3 * kind + 3]
 
 
-def held_out(nats, blocks=10) -> tuple[float, float]:
-    """Sum over samples with the standard error that blocks of time show."""
-    parts = [part.sum() for part in np.array_split(nats, blocks)]
-    return float(np.sum(parts)), float(np.std(parts, ddof=1) * np.sqrt(blocks))
+def held_out(nats) -> tuple[float, float, np.ndarray]:
+    """Sum over samples, the standard error that blocks of time show, and the blocks' sums."""
+    edges = edges_of(len(nats))
+    parts = np.array([nats[a:b].sum() for a, b in zip(edges[:-1], edges[1:], strict=True)])
+    return float(parts.sum()), float(np.std(parts, ddof=1) * np.sqrt(len(parts))), parts
 
 
 def verdict(log_ratio, covariance, limit):
