@@ -6,6 +6,7 @@ import numpy as np
 
 from imuarray.criticism.describe import MEANING, whose
 from imuarray.criticism.quantities import (
+    NARROW,
     joined,
     plus_minus,
     probability,
@@ -48,7 +49,8 @@ def cause_in_words(cause: dict, labels, says="") -> str:
     size = says or sizes(cause, labels)
     text += f"; {size}" if size else ""
     gain = plus_minus(cause["heldout_gain_nats"], cause["heldout_gain_se"])
-    text += f". Gain on held-out time {gain} nats, p = {probability(cause['log10_p_value'])}."
+    p_value = probability(cause["log10_p_value"])
+    text += f". Gain on held-out time {gain} nats, p{NARROW}={NARROW}{p_value}."
     if 0 < DOUBTFUL * cause.get("gain_in_sample_nats", 0.0) < cause.get("placebo_gain_nats", 0.0):
         text += (
             " Its placebo, the same numbers at other IMUs, gains too: it is doubtful whose it is."
@@ -90,7 +92,9 @@ def _group(kind, unit, items) -> str:
     if len(items) <= FEW:
         size = np.max(np.abs(values))
         return ", ".join(
-            f"{part}{f' of IMU {label}' if several and label else ''} ".replace("value ", "")
+            f"{part_in_words(part)}{f' of IMU {label}' if several and label else ''} ".replace(
+                "value ", ""
+            )
             + quantity(value, item["sd"], unit, size)
             for value, (part, label, item) in zip(values, items, strict=True)
         )

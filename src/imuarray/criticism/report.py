@@ -40,8 +40,8 @@ CAPTIONS = {
         "Measured against simulated",
         "Each check of the residual at its worst sensor, in sds of the band that simulations of the"
         " fitted model give there; the grey band is where the worst sensor is in 95 % of"
-        " simulations, if sensors are independent. Filled: p at most 0.05, from simulations that allow"
-        " for the choice of the sensor.",
+        " simulations, if sensors are independent. Filled: p at most 0.05, the choice of the sensor"
+        " allowed for.",
     ),
     "residual": (
         "Residual before and after",

@@ -32,6 +32,16 @@ def plain(text) -> str:
     return str(text).replace("$", r"\$")
 
 
+def imu_ticks(axes, labels, most=16) -> float:
+    """IMUs along the abscissa, every n-th named where they are many; a size for their marks."""
+    step = -(-len(labels) // most)
+    places = range(0, len(labels), step)
+    axes.set_xticks(places, [plain(labels[place]) for place in places])
+    axes.grid(False, axis="x")
+    axes.set_xlabel("IMU")
+    return 5.0 if len(labels) <= most else 2.5
+
+
 def legend_above(figure, handles) -> None:
     """One legend for all panels."""
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
@@ -115,7 +125,7 @@ def residual_figure(table: pd.DataFrame, footer=()):
     for axes, kind in zip(panels, kinds, strict=True):
         part = table[table.kind == kind]
         _residuals(axes, part)
-        axes.set(xlabel="IMU", title=KINDS[kind])
+        axes.set_title(KINDS[kind])
     panels[0].set_ylabel("rms residual / declared noise")
     axes = panels[0]
     handles = [
@@ -131,6 +141,7 @@ def residual_figure(table: pd.DataFrame, footer=()):
 
 def _residuals(axes, table):
     labels = list(dict.fromkeys(table.imu))
+    large = imu_ticks(axes, labels)
     triads, single = table[table["axis"] == "all"], table[table["axis"] != "all"]
     for row in triads[triads.model == "extended"].itertuples():
         place = labels.index(row.imu)
@@ -140,13 +151,11 @@ def _residuals(axes, table):
                           color="0.87", lw=0)  # fmt: skip
     for model, shift in (("base", -0.17), ("extended", 0.17)):
         style = MODELS[model]
-        for part, size, mark in ((single, 3.5, "_"), (triads, 5, style["marker"])):
+        for part, size, mark in ((single, 0.7 * large, "_"), (triads, large, style["marker"])):
             part = part[part.model == model]
             places = np.array([labels.index(name) for name in part.imu]) + shift
             axes.plot(places, part.rms, linestyle="", marker=mark, markersize=size,
                       color=style["color"], zorder=3)  # fmt: skip
-    axes.set_xticks(range(len(labels)), map(plain, labels), size=7.5 if len(labels) < 20 else 5)
-    axes.grid(False, axis="x")
     _log_scale(axes, [*table.rms, *table.noise, *(1 - triads.half_width)])
 
 

@@ -7,7 +7,7 @@ import pandas as pd
 from matplotlib.colors import LinearSegmentedColormap
 
 from imuarray.figures.blind import words
-from imuarray.figures.criticism import MODELS, NAMES, legend_above, plain
+from imuarray.figures.criticism import MODELS, NAMES, imu_ticks, legend_above
 from imuarray.figures.style import BLACK, BLUE, PAGE, VERMILLION, new_figure, styled
 
 ALIKE = 0.64  # squared correlation from which two effects are one class
@@ -27,17 +27,16 @@ def position_figure(table: pd.DataFrame, footer=()):
     for axes, axis in zip(panels, "xyz", strict=True):
         part = table[table["axis"] == axis]
         places = np.array([labels.index(name) for name in part.imu])
+        size = imu_ticks(axes, labels, 10)
         for model, shift, centre in (
             ("base", -0.15, 0 * part.change),
             ("extended", 0.15, part.change),
         ):
             axes.errorbar(places + shift, factor * centre, factor * 1.96 * part[f"{model}_sd"],
-                          linestyle="", markersize=4, elinewidth=0.9, label=NAMES[model],
+                          linestyle="", markersize=0.8 * size, elinewidth=0.9, label=NAMES[model],
                           **MODELS[model])  # fmt: skip
         axes.axhline(0, color=BLACK, linewidth=0.5)
-        axes.set(title=axis, xlabel="IMU")
-        axes.set_xticks(range(len(labels)), map(plain, labels), size=7.5 if len(labels) < 14 else 5)
-        axes.grid(False, axis="x")
+        axes.set_title(axis)
     panels[0].set_ylabel(f"change of position ({unit})")
     legend_above(figure, panels[0].get_legend_handles_labels()[0])
     return figure
