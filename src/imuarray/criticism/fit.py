@@ -22,6 +22,7 @@ from imuarray.criticism.readings import Readings
 STEPS = 15
 LITTLE = 0.02  # nats; a step that promises less is not taken
 ROUGH = 1e-4  # of the misfit that a step must gain while causes are looked for
+FINE = 3e-6  # the same at the end
 SETTLED = 0.02  # of a parameter's own sd
 SHORTEST = 0.2  # share of a Gauss-Newton step
 WIDE = 10.0  # prior sd of the third derivatives, in sizes of the differences near by
@@ -115,7 +116,7 @@ def search_optimum(readings, columns, active, state, smooth, rough):
     precision = prior_precision(columns, active)
     wanted = np.flatnonzero(active.any(axis=0))
     converged, last, length, seen = False, np.inf, 1.0, None
-    enough = ROUGH if rough else 0.0
+    enough = ROUGH if rough else FINE
     for number in range(STEPS):
         state = with_derivatives(readings, state, smooth)
         seen = linearise(readings, columns, state, wanted, seen)
@@ -126,13 +127,15 @@ def search_optimum(readings, columns, active, state, smooth, rough):
         score = score - precision @ offset
         step, sds = scaled_solve(information + precision, score)
         moved, astray = np.max(np.abs(step) / sds, initial=0.0), float(np.sum(seen.taken**2))
-        if (moved < SETTLED and astray < 0.01 * len(seen.taken)) or score @ step + astray < max(
-            LITTLE, enough * misfit
-        ):
+        promised = score @ step + astray
+        still = moved < SETTLED and astray < 0.01 * len(seen.taken)
+        if still or promised < max(LITTLE, enough * misfit):
+            # what the last step leaves is of second order in what it promised
+            state = advance(columns, state, active, step, few, seen, 1.0)
             converged = True
             break
         cost = misfit + astray + float(offset @ precision @ offset)
-        if number > 6 and abs(cost - last) < 1e-5 * last:
+        if number > 3 and abs(cost - last) < 0.3 * enough * last:
             break  # it wanders around the optimum, by less than anything told apart here
         # full steps may leap to and fro across a valley: half of them lead into it
         length = max(length / 2, SHORTEST) if cost > last else min(1.0, 1.2 * length)

@@ -98,7 +98,7 @@ def looked_ahead(whole: Search, part: Readings, excess: float) -> Search:
     calm(ahead)
     adopt(ahead)
     search = Search(whole.readings, whole.columns, whole.effects, whole.thresholds, whole.say)
-    search.causes, state = ahead.causes, ahead.fit.state
+    search.causes, search.refused, state = ahead.causes, ahead.refused, ahead.fit.state
     search.begin(state.parameters, state.positions)
     search.excess = excess
     search.trace = ahead.trace
