@@ -123,11 +123,11 @@ def test_a_gauge_is_no_confident_cause():
 
 def test_what_is_outside_the_catalogue_is_unexplained_until_it_is_added():
     """The documentation's example: one function, and the diagnosis names it."""
-    case = Case("test-cubic", (("outside_cubic", ALL),), 60.0, kind="outside", duration=DURATION)
+    case = Case("test-cubic", (("outside_cubic", ALL),), 40.0, kind="outside", duration=DURATION)
     document, _ = found_in(case)
     assert document["unexplained"] or not document["causes"]
 
-    @effect("accelerometer_cubic", unit="s4 m-2", prior_sd=2e-7, shape=lambda a, g: (a, 3))
+    @effect("accelerometer_cubic", unit="s4 m-2", prior_sd=2e-6, shape=lambda a, g: (a, 3))
     def accelerometer_cubic(curvature, instant, predicted):
         """u_i + c_i u_i^3."""
         force = predicted.specific_force

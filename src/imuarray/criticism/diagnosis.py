@@ -78,8 +78,8 @@ def diagnose(
     say("fitting the papers' model to the same readings")
     extended = fitted(search.fit, search.noise.correlation)
     for item in found.in_noise:
-        if item.effect == "coloured_noise":
-            # the score of a fit takes noise for white; what its memory tells comes on top
+        if item.effect in ("coloured_noise", "heavy_tails"):
+            # a fit's score takes noise for white and normal; what is known better comes on top
             nats = extended.scores.nats + item.blocks
             extended.scores = extended.scores._replace(nats=nats)
     base, inflated = rivals_of(found)
@@ -215,6 +215,8 @@ def causes_of(found: Found, extended: Fitted) -> list[dict]:
     causes = []
     for item in found.structural:
         nats = structural_gain(found, item)
+        if item.effect == "stale_samples" and nats[0] <= 0:
+            continue  # a coarse converter at rest repeats itself, too, and is right
         causes.append(_entry(item, labels, item.parameters, nats, [], item.says))
     for cause in search.causes:
         parameters = describe.parameters_of(search, cause, extended.sds)

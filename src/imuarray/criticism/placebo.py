@@ -39,14 +39,26 @@ def placebo_gain(search: Search, cause: Cause) -> tuple[float, float]:
 
 
 def _of_ages(search: Search) -> tuple[float, float]:
-    score, information = delay_score(search.fit)
-    clocks = search.columns.model.split(np.asarray(search.fit.state.parameters))["sensor_clock"]
+    """All IMUs' ages at once: what they have in common the motion takes up."""
+    fit, column = search.fit, search.columns.of("sensor_delay")[0]
+    along, through = fit.whitened[..., column], fit.through[..., column]
+    score, _ = delay_score(fit)
+    clocks = search.columns.model.split(np.asarray(fit.state.parameters))["sensor_clock"]
     turns = clocks[:, 1] * search.readings.time[:, None] + clocks[:, 2]
     delay = -(clocks[:, 3] + clocks[:, 0] * (turns - np.floor(turns) - 0.5))
+
+    def informed(values):
+        common = np.einsum("tkd,tk->td", through, values)
+        own = np.sum(along**2, axis=2) * values
+        return own - np.einsum("tkd,td->tk", through, common)
+
     imus = list(search.clocks)
-    bare = score[:, imus] + information[:, imus] * delay[:, imus]
+    own, moved = np.zeros_like(delay), np.zeros_like(delay)
+    own[:, imus] = delay[:, imus]
+    moved[:, imus] = np.roll(delay[:, imus], 1, axis=1)
+    bare = score + informed(own)
 
     def nats(values):
-        return float(np.sum(bare * values - information[:, imus] * values**2 / 2))
+        return float(np.sum(values * (bare - informed(values) / 2)))
 
-    return nats(delay[:, imus]), nats(np.roll(delay[:, imus], 1, axis=1)) if len(imus) > 1 else 0.0
+    return nats(own), nats(moved) if len(imus) > 1 else 0.0

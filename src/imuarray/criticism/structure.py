@@ -13,7 +13,7 @@ from imuarray.criticism.linearise import polynomial_derivative
 from imuarray.criticism.readings import Readings
 
 KINDS = ("accelerometer", "gyroscope")
-LEAST_REPEATS = 4
+LEAST_REPEATS = 1
 LEAST_CLIPPED = 3
 RARE = -12.0  # log p from which repeats are no chance of a coarse converter
 NEAR = 0.5  # a signed permutation is believed when the triad's matrix is this near to it
