@@ -2,10 +2,11 @@
 
     python benchmarks/thresholds.py --count 400 --out clean.csv
 
-One row a recording: what was named, whether `unexplained`, the smallest log p of the effects' tests on the papers'
-model and of the checks at the end. The summary says how often each would pass the thresholds in
-src/imuarray/criticism/thresholds.json, and what the smallest of so many recordings reached: a threshold below
-that of most tests, by a margin, keeps all of them together under 5 % false alarms.
+One row a recording: what was named, whether `unexplained`, the smallest log p of the effects'
+tests on the papers' model and of the checks at the end. The summary says how often each would pass
+the thresholds in src/imuarray/criticism/thresholds.json, and what the smallest of so many
+recordings reached: a threshold below that of most tests, by a margin, keeps all of them together
+under 5 % false alarms.
 """
 
 from __future__ import annotations
