@@ -20,6 +20,7 @@ from imuarray.criticism.noise import coloured_meat, standardised
 from imuarray.criticism.placebo import placebo_gain
 from imuarray.criticism.replicates import Discrepancy, discrepancies
 from imuarray.criticism.scores import evidence, robust_inverse
+from imuarray.criticism.variance import held_out
 from imuarray.recording import Recording
 from imuarray.streams import stream
 
@@ -77,11 +78,12 @@ def diagnose(
     search = found.search
     say("fitting the papers' model to the same readings")
     extended = fitted(search.fit, search.noise.correlation)
-    for item in found.in_noise:
-        if item.effect in ("coloured_noise", "heavy_tails"):
-            # a fit's score takes noise for white and normal; what is known better comes on top
-            nats = extended.scores.nats + item.blocks
-            extended.scores = extended.scores._replace(nats=nats)
+    # a fit's score takes noise for white and normal, and knows nothing of the readings that were
+    # left out of it; what is known better comes on top
+    beside = [i.blocks for i in found.in_noise if i.effect in ("coloured_noise", "heavy_tails")]
+    beside += [structural_gain(found, item)[2] for item in found.structural]
+    nats = extended.scores.nats + sum(blocks for blocks in beside if np.sum(blocks) > 0)
+    extended.scores = extended.scores._replace(nats=nats)
     base, inflated = rivals_of(found)
     rng = stream(seed, "diagnose", "replicates")
     say("replicating the recording")
@@ -214,7 +216,7 @@ def causes_of(found: Found, extended: Fitted) -> list[dict]:
     search, labels = found.search, found.search.readings.labels
     causes = []
     for item in found.structural:
-        nats = structural_gain(found, item)
+        nats = structural_gain(found, item)[:2]
         if item.effect == "stale_samples" and nats[0] <= 0:
             continue  # a coarse converter at rest repeats itself, too, and is right
         causes.append(_entry(item, labels, item.parameters, nats, [], item.says))
@@ -258,9 +260,10 @@ def _entry(item, labels, parameters, nats, rivals, says=None) -> dict:
     }
 
 
-def structural_gain(found: Found, item) -> tuple[float, float]:
-    """Nats by which the readings, as they were recorded, miss the extended model's prediction.
+def structural_gain(found: Found, item) -> tuple[float, float, np.ndarray]:
+    """Nats by which the readings, as recorded, miss the extended model's prediction.
 
+    Returns their sum, its standard error and each held-out block's share.
     Nothing was fitted to the readings that were left out, so this is held out as it stands.
     """
     search, raw = found.search, found.raw
@@ -271,6 +274,4 @@ def structural_gain(found: Found, item) -> tuple[float, float]:
     mine[:, list(item.imus)] = touched[:, list(item.imus)]
     readings = replace(search.readings, values=raw.values, keep=search.readings.keep | mine)
     seen = at(readings, search.columns, search.active, search.fit.state, True)
-    nats = (np.sum(seen.misfits) - search.fit.misfit - mine.sum()) / 2
-    by_sample = (seen.misfits - search.fit.misfits - mine.sum(axis=(1, 2))) / 2
-    return float(nats), float(np.std(by_sample) * np.sqrt(len(by_sample)))
+    return held_out((seen.misfits - search.fit.misfits - mine.sum(axis=(1, 2))) / 2)
