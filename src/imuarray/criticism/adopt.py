@@ -44,6 +44,7 @@ from imuarray.model import EFFECTS
 BLOCKS = 10  # of time, held out in turn
 MOST = 12  # causes
 KEPT = 0.05  # of the gain that a test promises must be there on held-out time
+TRACE = 2e-5  # of the excess there was at first
 LEAST_Z = 1.5  # standard errors that a gain on held-out time must have
 SURE = 50.0  # nats; smaller promises may break
 EDGE = 0.03  # of a turn: how near to a clock's jump a reading is left out
@@ -159,6 +160,14 @@ class Search:
         meat = noises.coloured_meat(self.fit, plain.information, self.noise.correlation)
         self.given = plain if meat is None else replace(plain, meat=meat)
 
+    def least(self) -> float:
+        """The least chi-square of a cause: a share of what is left, and a trace of what there was.
+
+        The second order of a huge effect leaves something that smaller ones would take up.
+        """
+        left = max(self.fit.misfit - self.fit.free, 0.0)
+        return max(self.thresholds.share * left, TRACE * self.excess)
+
     def polish(self) -> None:
         """The same fit to the end."""
         self.refit(turns=2, rough=False)
@@ -218,7 +227,7 @@ def adopt(search: Search) -> None:
         limit = search.thresholds.limit(best.candidate.effect) if best else 0.0
         if best is None or best.log_p > limit:
             break
-        if best.statistic < search.thresholds.share * search.excess:
+        if best.statistic < search.least():
             break
         attempt(search, best, values)
 
@@ -435,7 +444,7 @@ def clear(search: Search) -> None:
     for cause in list(search.causes):
         statistic, freedom = need(search, cause.effect)
         limit = search.thresholds.limit(cause.effect)
-        small = statistic < search.thresholds.share * search.excess
+        small = statistic < search.least()
         if not freedom or log_tail(statistic, freedom) > limit or small:
             search.causes.remove(cause)
             search.say(f"dropped {cause.effect}: not needed beside the others")

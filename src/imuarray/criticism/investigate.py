@@ -174,11 +174,11 @@ def named_noise(search: Search, without, tails, calm) -> list:
             ]  # fmt: skip
             limit = search.thresholds.limit(name)
             named = variance.noise_scale(made, search.noise, kind, limit, timed(search), skip, calm)
-            found += [named] if named else []
+            found += [named] if named and named.gain > 0 else []
     if "coloured_noise" not in without:
         limit = search.thresholds.limit("coloured_noise")
         named = variance.coloured(made, search.noise, limit, calm)
-        found += [named] if named else []
+        found += [named] if named and named.gain > 0 else []
     return sorted(found, key=lambda item: item.log_p)
 
 
