@@ -12,7 +12,6 @@ from imuarray.blind import Case
 from imuarray.blind.cases import make
 from imuarray.criticism import noise as noises
 from imuarray.criticism import variance
-from imuarray.criticism.adopt import Search
 from imuarray.criticism.columns import catalogue_effects, columns_of
 from imuarray.criticism.fit import Fit, fit, flat_parameters, from_flat, normal
 from imuarray.criticism.gauges import prior_precision
@@ -22,6 +21,7 @@ from imuarray.criticism.readings import LEAST, arrange, part_of
 from imuarray.criticism.replicates import Replicator, discrepancies
 from imuarray.criticism.scans import sawtooth
 from imuarray.criticism.scores import candidates, evidence, log_tail, mask_of, score_all
+from imuarray.criticism.search import Search
 from imuarray.criticism.start import start
 from imuarray.criticism.thresholds import read_thresholds
 from imuarray.errors import InputError

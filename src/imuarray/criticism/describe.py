@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from imuarray.criticism.adopt import Cause, Search
 from imuarray.criticism.columns import HELD
 from imuarray.criticism.fit import flat_parameters
+from imuarray.criticism.search import Cause, Search
 from imuarray.model import EFFECTS
 
 AXES = "xyz"

@@ -11,7 +11,6 @@ import numpy as np
 
 import imuarray
 from imuarray.criticism import describe
-from imuarray.criticism.adopt import heldout_gain, need
 from imuarray.criticism.fit import Fit, at, fit, flat_parameters
 from imuarray.criticism.gauges import prior_precision
 from imuarray.criticism.heldout import Scores, gain, log_scores
@@ -21,6 +20,7 @@ from imuarray.criticism.placebo import placebo_gain
 from imuarray.criticism.replicates import Discrepancy, discrepancies
 from imuarray.criticism.scores import evidence, robust_inverse
 from imuarray.criticism.variance import held_out
+from imuarray.criticism.worth import heldout_gain, need
 from imuarray.recording import Recording
 from imuarray.streams import stream
 

@@ -28,6 +28,15 @@ def edges_of(samples: int, blocks=BLOCKS) -> np.ndarray:
     return np.linspace(0, samples, blocks + 1).astype(int)
 
 
+def normal_blocks(fit: Fit, active) -> list[tuple[np.ndarray, np.ndarray]]:
+    """(information (n, n), score (n,)) of the n ``active`` (N, m) parameters from each block."""
+    edges = edges_of(len(fit.residual))
+    return [
+        normal(fit.residual, fit.whitened, fit.through, active, slice(a, b))
+        for a, b in zip(edges[:-1], edges[1:], strict=True)
+    ]
+
+
 def log_scores(fit: Fit, ridge) -> Scores:
     """The log density of each block's readings, parameters trained on the other blocks.
 
@@ -38,10 +47,7 @@ def log_scores(fit: Fit, ridge) -> Scores:
     """
     readings = fit.readings
     edges = edges_of(len(fit.residual))
-    parts = [
-        normal(fit.residual, fit.whitened, fit.through, fit.active, slice(a, b))
-        for a, b in zip(edges[:-1], edges[1:], strict=True)
-    ]
+    parts = normal_blocks(fit, fit.active)
     information, score = sum(p[0] for p in parts), sum(p[1] for p in parts)
     fixed = np.where(readings.keep, np.repeat(np.log(readings.sd), 3, axis=1), 0.0)
     constant = fixed.sum(axis=(1, 2)) + fit.log_volume / 2

@@ -9,15 +9,17 @@ import numpy as np
 
 from imuarray.criticism import noise as noises
 from imuarray.criticism import variance
-from imuarray.criticism.adopt import Search, adopt, clear, freed_places, need
+from imuarray.criticism.adopt import adopt
 from imuarray.criticism.columns import catalogue_effects, columns_of
 from imuarray.criticism.fit import Fit, fit
 from imuarray.criticism.gate import Check, all_checks
 from imuarray.criticism.readings import Readings, arrange, part_of
 from imuarray.criticism.scans import delay_score, sawtooth
 from imuarray.criticism.scores import candidates, log_tail, mask_of, score_all
+from imuarray.criticism.search import Search
 from imuarray.criticism.structure import Structural, find_structural
 from imuarray.criticism.thresholds import Thresholds, read_thresholds
+from imuarray.criticism.worth import clear, freed_places, need
 from imuarray.recording import Recording
 
 NESTED = {  # an effect, and those that contain it or are contained

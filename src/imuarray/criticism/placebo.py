@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from imuarray.criticism.adopt import Cause, Search
 from imuarray.criticism.fit import flat_parameters
 from imuarray.criticism.scans import delay_score
+from imuarray.criticism.search import Cause, Search
 
 
 def placebo_gain(search: Search, cause: Cause) -> tuple[float, float]:
