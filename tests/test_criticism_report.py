@@ -193,6 +193,23 @@ def test_answers_hold_the_document_s_numbers(found):
     assert base == pytest.approx(sd / declared, rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("effect", "gain", "words"),
+    [
+        ("stale_samples", 5.0, ["Readings that are left out count in the nats"]),
+        ("saturation", 5.0, ["Readings that are left out count in the nats"]),
+        ("axis_swap", 5.0, ["Axes that are turned back count in all"]),
+        ("axis_swap", 0.0, []),
+        ("gyroscope_scale", 5.0, []),
+    ],
+)
+def test_where_readings_count_is_said(found, effect, gain, words):
+    cause = found.document["causes"][0] | {"effect": effect, "heldout_gain_nats": gain}
+    said = answers(of(found, causes=[cause]))[3].items[2:]
+    assert len(said) == len(words)
+    assert all(text.startswith(start) for text, start in zip(said, words, strict=True))
+
+
 def test_a_class_is_told_as_one(found):
     cause = found.document["causes"][0] | {"indistinguishable_from": ["sensor_delay"]}
     assert "cannot be told from sensor delay" in cause_in_words(cause, ("1", "2", "3"))

@@ -9,8 +9,9 @@ from imuarray.blind import Case
 from imuarray.blind.cases import make
 from imuarray.cli import main
 from imuarray.criticism.describe import MEANING
-from imuarray.criticism.diagnosis import diagnose
+from imuarray.criticism.diagnosis import diagnose, precision_of, structural_gain
 from imuarray.criticism.extension import extended_model, read_extension
+from imuarray.criticism.heldout import gain, log_scores
 from imuarray.criticism.structure import find_structural
 from imuarray.model import EFFECTS, ArrayModel
 from imuarray.model.effects import effect
@@ -161,6 +162,34 @@ def test_most_triads_decide_which_axes_are_right():
     causes, _, mended = find_structural(arrange(recording))
     assert causes[0].effect == "axis_swap"
     assert not mended or len(causes[0].imus) < 8
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        (("axis_swap", (5,)),),
+        (("stale_samples", (3,)),),
+        (("axis_swap", (5,)), ("stale_samples", (3,))),
+    ],
+    ids=lambda effects: "+".join(name for name, _ in effects),
+)
+def test_readings_count_once(effects):
+    """Those left out beside the extended fit's score, exchanged axes in the rivals' alone."""
+    case = hidden(*effects, kind="pair" if len(effects) > 1 else "one", realistic=True, duration=4)
+    made = diagnose(make(case, SEED)[0], SEED, replicates=2)
+    parts = {i.effect: structural_gain(made.found, i)[2] for i in made.found.structural}
+    assert set(parts) == {name for name, _ in effects}
+    assert all(blocks.sum() > 1e5 for blocks in parts.values())
+    made_fit = made.extended.fit
+    alone = log_scores(made_fit, precision_of(made_fit))
+    expected = parts.get("stale_samples", np.zeros(len(alone.nats)))
+    np.testing.assert_allclose(made.extended.scores.nats - alone.nats, expected, rtol=1e-9)
+    if "stale_samples" not in parts:
+        over = made.document["gain"]["over_inflated_noise_nats_per_sample"]
+        assert over == gain(made.inflated.scores, alone)[0] and 0 < over < 1e3
+    elif len(parts) > 1:
+        # a swap in another IMU is no part of what repeats miss
+        assert expected.sum() < 0.01 * parts["axis_swap"].sum()
 
 
 # -- the command -----------------------------------------------------------------------------

@@ -17,6 +17,7 @@ from imuarray.criticism.quantities import (
     span,
     symbols,
 )
+from imuarray.criticism.structure import LEFT_OUT
 from imuarray.figures.criticism_tables import KINDS, imu_labels, in_noise_sds, position_table
 
 if TYPE_CHECKING:
@@ -210,12 +211,28 @@ def gained(diagnosis: Diagnosis) -> Answer:
         f" ({total} nats in all)."
     )
     items = [residual_in_words(diagnosis), positions_in_words(diagnosis)]
-    if diagnosis.found.structural:
-        items.append("Readings that are left out or turned back do not count in these numbers.")
+    items += readings_in_words(document["causes"])
     loud = ""
     if document["unexplained"]:
         loud = "Widths are those of the extended model: what is unexplained is not in them."
     return Answer(question, lead, items, loud)
+
+
+def readings_in_words(causes) -> list[str]:
+    """Where readings count that were left out or turned back."""
+    effects = {cause["effect"] for cause in causes if cause["heldout_gain_nats"] > 0}
+    said = []
+    if effects & set(LEFT_OUT):
+        said.append(
+            "Readings that are left out count in the nats, by how far they miss what the extended"
+            " model predicts; neither the residuals nor the positions have them."
+        )
+    if "axis_swap" in effects:
+        said.append(
+            "Axes that are turned back count in all of these numbers: the papers' model takes the"
+            " readings as they were recorded."
+        )
+    return said
 
 
 def residual_in_words(diagnosis: Diagnosis) -> str:

@@ -13,12 +13,13 @@ import imuarray
 from imuarray.criticism import describe
 from imuarray.criticism.fit import Fit, at, fit, flat_parameters
 from imuarray.criticism.gauges import prior_precision
-from imuarray.criticism.heldout import Scores, gain, log_scores
+from imuarray.criticism.heldout import BLOCKS, Scores, gain, log_scores
 from imuarray.criticism.investigate import Found, investigate
 from imuarray.criticism.noise import coloured_meat, standardised
 from imuarray.criticism.placebo import placebo_gain
 from imuarray.criticism.replicates import Discrepancy, discrepancies
 from imuarray.criticism.scores import evidence, robust_inverse
+from imuarray.criticism.structure import LEFT_OUT
 from imuarray.criticism.variance import held_out
 from imuarray.criticism.worth import heldout_gain, need
 from imuarray.recording import Recording
@@ -78,11 +79,7 @@ def diagnose(
     search = found.search
     say("fitting the papers' model to the same readings")
     extended = fitted(search.fit, search.noise.correlation)
-    # a fit's score takes noise for white and normal, and knows nothing of the readings that were
-    # left out of it; what is known better comes on top
-    beside = [i.blocks for i in found.in_noise if i.effect in ("coloured_noise", "heavy_tails")]
-    beside += [structural_gain(found, item)[2] for item in found.structural]
-    nats = extended.scores.nats + sum(blocks for blocks in beside if np.sum(blocks) > 0)
+    nats = extended.scores.nats + nats_beside(found)
     extended.scores = extended.scores._replace(nats=nats)
     base, inflated = rivals_of(found)
     rng = stream(seed, "diagnose", "replicates")
@@ -107,6 +104,17 @@ def diagnose(
         "gain": gains(base, inflated, extended),
     }
     return Diagnosis(document, found, base, inflated, extended)
+
+
+def nats_beside(found: Found) -> np.ndarray:
+    """Nats of each held-out block that the extended fit's own score does not have, (blocks,)."""
+    # a fit's score takes noise for white and normal
+    beside = [i.blocks for i in found.in_noise if i.effect in ("coloured_noise", "heavy_tails")]
+    # nor has any model's score the readings left out; exchanged axes are in the rivals' scores,
+    # which take the readings as they are
+    left_out = [item for item in found.structural if item.effect in LEFT_OUT]
+    beside += [structural_gain(found, item)[2] for item in left_out]
+    return sum((blocks for blocks in beside if np.sum(blocks) > 0), np.zeros(BLOCKS))
 
 
 def precision_of(made: Fit) -> np.ndarray:
@@ -265,13 +273,14 @@ def structural_gain(found: Found, item) -> tuple[float, float, np.ndarray]:
 
     Returns their sum, its standard error and each held-out block's share.
     Nothing was fitted to the readings that were left out, so this is held out as it stands.
+    What the other effects of whole readings did stays mended: theirs is not counted here.
     """
     search, raw = found.search, found.raw
-    touched = raw.keep & ~search.allowed
+    touched, values = raw.keep & ~search.allowed, search.readings.values
     if item.effect == "axis_swap":
-        touched = raw.keep & (raw.values != search.readings.values)
+        touched, values = raw.keep & (raw.values != values), raw.values
     mine = np.zeros_like(touched)
     mine[:, list(item.imus)] = touched[:, list(item.imus)]
-    readings = replace(search.readings, values=raw.values, keep=search.readings.keep | mine)
+    readings = replace(search.readings, values=values, keep=search.readings.keep | mine)
     seen = at(readings, search.columns, search.active, search.fit.state, True)
     return held_out((seen.misfits - search.fit.misfits - mine.sum(axis=(1, 2))) / 2)

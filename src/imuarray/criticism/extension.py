@@ -10,13 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.criticism.describe import component
+from imuarray.criticism.structure import LEFT_OUT
 from imuarray.errors import InputError
 from imuarray.model import EFFECTS, ArrayModel
 from imuarray.model.array_model import EffectPrior
 from imuarray.model.noise import Noise
 
 PINNED = 1e-6  # of a prior sd: parameters that the diagnosis fixed, or found no need of
-BEFORE = ("axis_swap", "stale_samples", "saturation")  # mended in the data, not in the model
+BEFORE = ("axis_swap", *LEFT_OUT)  # mended in the data, not in the model
 
 
 class Extension(NamedTuple):

@@ -13,6 +13,7 @@ from imuarray.criticism.linearise import polynomial_derivative
 from imuarray.criticism.readings import Readings
 
 KINDS = ("accelerometer", "gyroscope")
+LEFT_OUT = ("stale_samples", "saturation")  # their readings; exchanged axes are turned back
 LEAST_REPEATS = 1
 LEAST_CLIPPED = 3
 RARE = -12.0  # log p from which repeats are no chance of a coarse converter
