@@ -28,7 +28,7 @@ def simulate(arguments) -> None:
 
     config = read_config(arguments.config)
     noise = config["noise"]["accelerometer_sd"]
-    recording, truth = simulate_twisting(config, noise, arguments.effects, extension_of(arguments))
+    recording, truth = simulate_twisting(config, noise, arguments.effects, extender(arguments))
     write_recording(recording, arguments.out, truth, stamp(config, config["seed"]))
     if not arguments.quiet:
         samples, accelerometers = recording.specific_force.shape[:2]
@@ -66,11 +66,15 @@ def usable(recording: Recording, quiet: bool) -> Recording:
     return recording.select(~lost) if lost.any() else recording
 
 
-def extension_of(arguments):
-    """The `Extension` of a diagnosis that the command was given, or None."""
+def extender(arguments):
+    """What gives a model the effects and the noise of the diagnosis asked for, or None.
+
+    A function of the model and of the labels of accelerometers and gyroscopes, the model's own
+    by default.
+    """
     if arguments.diagnosis is None:
         return None
-    from imuarray.criticism.extension import read_extension
+    from imuarray.criticism.extension import extended_model, read_extension
 
     if arguments.effects:
         raise InputError("--effects: expected none beside --diagnosis, found some")
@@ -81,18 +85,21 @@ def extension_of(arguments):
         )
     for name in extension.before:
         print(f"{name}: concerns readings, not the model; they are used as they are")
-    return extension
+
+    def extended(model: ArrayModel, labels=None) -> ArrayModel:
+        return extended_model(extension, model, labels or (model.array.labels,) * 2)
+
+    return extended
 
 
 def chosen_model(recording: Recording, arguments) -> ArrayModel:
     """The recording's measurement model with the effects, or the diagnosis, asked for."""
-    extension = extension_of(arguments)
-    if extension is None:
+    extended = extender(arguments)
+    if extended is None:
         return model_of(recording, arguments.effects)
-    from imuarray.criticism.extension import extended_model
-
-    labels = recording.accelerometer_labels, recording.gyroscope_labels
-    return extended_model(extension, model_of(recording), labels)
+    return extended(
+        model_of(recording), (recording.accelerometer_labels, recording.gyroscope_labels)
+    )
 
 
 def calibrate(arguments) -> None:

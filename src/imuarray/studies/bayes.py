@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from imuarray.config import model_from
-from imuarray.criticism.extension import extended_model
 from imuarray.errors import InputError
 from imuarray.estimation import calibrate_bcd
 from imuarray.geometry import Array
+from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting, normal_motion
 from imuarray.posterior import CompiledTarget, GaussianPrior, Likelihood
 from imuarray.recording import Recording
@@ -46,19 +47,22 @@ def prior_mean(array: Array, error_sd: float, rng) -> np.ndarray:
     return array.positions + errors
 
 
-def simulate_twisting(settings: dict, accelerometer_sd: float, effects=(), extension=None):
+def simulate_twisting(
+    settings: dict, accelerometer_sd: float, effects=(),
+    extended: Callable[[ArrayModel], ArrayModel] | None = None,
+):  # fmt: skip
     """A recording of the board twisted by hand, as section IV-C describes the experiment.
 
     Stands in for measured data until there are some. ``accelerometer_sd`` (m/s^2) is the
-    noise that is really there; effects get parameters drawn from their priors,
-    those of an ``extension`` (`imuarray.criticism.extension`) its values, and its noise.
+    noise that is really there; effects get parameters drawn from their priors.
+    ``extended`` gives the model effects and noise of its own, whose starting values are the truth.
     """
     paper, experiment, seed = settings["paper2021"], settings["experiment"], settings["seed"]
     model = model_from(settings, accelerometer_sd, effects)
     sizes = model.effect_prior_sd
     parameters = sizes * stream(seed, "effects").standard_normal(sizes.shape)
-    if extension is not None:
-        model = extended_model(extension, model, (model.array.labels, model.array.labels))
+    if extended is not None:
+        model = extended(model)
         parameters = model.effect_start
     motion = hand_twisting(
         stream(seed, "twisting"),
