@@ -39,7 +39,9 @@ rule diagnosis_agreement:
         diagnoses=lambda wc: expand(
             "results/measured/diagnosis/{name}/diagnosis.json", name=MEASURED.groups()[wc.group]
         ),
-        code=resting_on("criticism/repeatability.py", "figures/repeatability.py", "provenance.py"),
+        code=resting_on(
+            "criticism/repeatability.py", "figures/criticism_repeatability.py", "provenance.py"
+        ),
     output:
         positions="results/measured/tables/diagnosis_positions_{group}.csv",
         parameters="results/measured/tables/diagnosis_parameters_{group}.csv",

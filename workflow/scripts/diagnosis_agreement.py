@@ -7,7 +7,7 @@ with job(snakemake):
     from pathlib import Path
 
     from imuarray.criticism.repeatability import parameters_agreement, positions_agreement
-    from imuarray.figures.repeatability import repeatability_figure
+    from imuarray.figures.criticism_repeatability import repeatability_figure
     from imuarray.figures.style import write_figure
     from imuarray.provenance import write_csv
 

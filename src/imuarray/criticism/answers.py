@@ -18,7 +18,8 @@ from imuarray.criticism.quantities import (
     symbols,
 )
 from imuarray.criticism.structure import LEFT_OUT
-from imuarray.figures.criticism_tables import KINDS, imu_labels, in_noise_sds, position_table
+from imuarray.figures.criticism_tables import imu_labels, in_noise_sds, position_table
+from imuarray.model.effects import KINDS
 
 if TYPE_CHECKING:
     from imuarray.criticism.diagnosis import Diagnosis

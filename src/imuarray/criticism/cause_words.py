@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from imuarray.criticism.describe import MEANING, whose
+from imuarray.criticism.describe import MEANING, first_up, whose
 from imuarray.criticism.quantities import (
     NARROW,
     joined,
@@ -58,7 +58,7 @@ def cause_in_words(cause: dict, labels, says="") -> str:
     if cause["indistinguishable_from"]:
         rivals = joined(words(name) for name in cause["indistinguishable_from"])
         text += f" On this recording it cannot be told from {rivals}: one class."
-    return text[:1].upper() + text[1:]
+    return first_up(text)
 
 
 def split_name(name: str, labels) -> tuple[str, str]:

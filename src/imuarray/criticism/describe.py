@@ -8,14 +8,14 @@ from imuarray.criticism.columns import HELD
 from imuarray.criticism.fit import flat_parameters
 from imuarray.criticism.search import Cause, Search
 from imuarray.model import EFFECTS
+from imuarray.model.effects import KINDS
+from imuarray.recording.validate import AXES
 
-AXES = "xyz"
 OFF_DIAGONAL = ("xy", "xz", "yx", "yz", "zx", "zy")
 COMPONENTS = {
     "sensor_clock": ("period", "frequency", "phase", "offset"),
     "position_shift": ("x", "y", "z", "time"),
 }
-KINDS = ("accelerometer", "gyroscope")
 
 # What an effect is, in the words of one who holds the board.
 MEANING = {
@@ -100,7 +100,7 @@ def whose(sensors) -> str:
 def sentence(effect: str, sensors, parameters: dict, gain, rivals) -> str:
     """What a cause is, how large, and what cannot be told from it."""
     meaning = MEANING.get(effect, effect.replace("_", " "))
-    text = f"{_first_up(meaning)} ({whose(sensors)})"
+    text = f"{first_up(meaning)} ({whose(sensors)})"
     size = _size(parameters)
     text += f"; {size}" if size else ""
     if gain is not None:
@@ -130,5 +130,6 @@ def _size(parameters: dict) -> str:
     return ", ".join(words)
 
 
-def _first_up(text: str) -> str:
+def first_up(text: str) -> str:
+    """With a capital."""
     return text[:1].upper() + text[1:]

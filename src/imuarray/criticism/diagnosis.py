@@ -15,13 +15,14 @@ from imuarray.criticism.fit import Fit, at, fit, flat_parameters
 from imuarray.criticism.gauges import prior_precision
 from imuarray.criticism.heldout import BLOCKS, Scores, gain, log_scores
 from imuarray.criticism.investigate import Found, investigate
-from imuarray.criticism.noise import coloured_meat, standardised
+from imuarray.criticism.noise import coloured_meat, per_triad, standardised
 from imuarray.criticism.placebo import placebo_gain
 from imuarray.criticism.replicates import Discrepancy, discrepancies
 from imuarray.criticism.scores import evidence, robust_inverse
 from imuarray.criticism.structure import LEFT_OUT
 from imuarray.criticism.variance import held_out
 from imuarray.criticism.worth import heldout_gain, need
+from imuarray.model.effects import KINDS
 from imuarray.recording import Recording
 from imuarray.streams import stream
 
@@ -155,18 +156,12 @@ def rivals_of(found: Found) -> tuple[Fitted, Fitted]:
         # as read: the rivals know neither of rails nor of repeats nor of exchanged axes
         bare = replace(bare, values=found.raw.values)
     declared = fit(bare, search.columns, alone, start, search.smooth, rough=True)
-    size = np.sqrt(np.nanmean(triads(standardised(declared)) ** 2, axis=-1))
+    size = np.sqrt(np.nanmean(per_triad(standardised(declared)) ** 2, axis=-1))
     inflated_sd = bare.declared * np.where(bare.exists, np.maximum(size, 1e-3), 1.0)
     again = fit(
         bare.with_sd(inflated_sd), search.columns, alone, declared.state, search.smooth, True
     )
     return fitted(declared), fitted(again)
-
-
-def triads(values) -> np.ndarray:
-    """(T, N, 6) as (N, 2, 3 T)."""
-    moved = values.reshape(len(values), -1, 2, 3)
-    return np.moveaxis(moved, 0, -1).reshape(moved.shape[1], 2, -1)
 
 
 def residual_sd(made: Fit) -> dict:
@@ -185,7 +180,6 @@ def _rms(values) -> float:
 def noise_of(found: Found) -> dict:
     """The noise sds of the extended model, by kind and IMU, and their correlation in time."""
     readings, noise = found.search.readings, found.search.noise
-    names = ("accelerometer", "gyroscope")
     return {
         name: {
             readings.labels[k]: {
@@ -193,7 +187,7 @@ def noise_of(found: Found) -> dict:
             }
             for k in np.flatnonzero(readings.exists[:, kind])
         }
-        for kind, name in enumerate(names)
+        for kind, name in enumerate(KINDS)
     }  # fmt: skip
 
 

@@ -14,6 +14,7 @@ from imuarray.criticism.structure import LEFT_OUT
 from imuarray.errors import InputError
 from imuarray.model import EFFECTS, ArrayModel
 from imuarray.model.array_model import EffectPrior
+from imuarray.model.effects import KINDS
 from imuarray.model.noise import Noise
 
 PINNED = 1e-6  # of a prior sd: parameters that the diagnosis fixed, or found no need of
@@ -43,10 +44,7 @@ def read_extension(path: Path) -> Extension:
             c["effect"]: {n: (float(p["value"]), p["sd"]) for n, p in c["parameters"].items()}
             for c in causes if c["effect"] in EFFECTS
         }  # fmt: skip
-        sds = [
-            {label: float(item["sd"]) for label, item in noise[kind].items()}
-            for kind in ("accelerometer", "gyroscope")
-        ]
+        sds = [{label: float(item["sd"]) for label, item in noise[kind].items()} for kind in KINDS]
         before = tuple(c["effect"] for c in causes if c["effect"] in BEFORE)
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: expected a diagnosis.json, found no text") from error

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from itertools import combinations
-
 import numpy as np
 import pandas as pd
 
+from imuarray.measured.positions import agreement, pairwise
+from imuarray.recording.validate import AXES
+
 MODELS = ("base", "inflated", "extended")
-WITHIN = 1.959964  # sds of a 95 % interval
 
 
 def positions_agreement(documents: dict[str, dict]) -> pd.DataFrame:
@@ -19,22 +19,25 @@ def positions_agreement(documents: dict[str, dict]) -> pd.DataFrame:
     """
     rows = []
     for model in MODELS:
-        apart, claimed = [], []
-        for one, other in combinations(documents.values(), 2):
-            found = [np.array(d[model]["positions_m"])[1:] for d in (one, other)]
-            sds = [np.array(d[model]["positions_sd_m"])[1:] for d in (one, other)]
-            apart.append((found[0] - found[1]).ravel())
-            claimed.append(np.hypot(*sds).ravel())
-        apart, claimed = np.concatenate(apart), np.concatenate(claimed)
+        table = pd.concat([coordinates(d[model], name) for name, d in documents.items()])
+        pairs = pairwise(table)
+        found = agreement(pairs, table)
         rows.append({
-            "model": model, "recordings": len(documents), "differences": len(apart),
-            "apart_rms_m": float(np.sqrt(np.mean(apart**2))),
-            "apart_median_m": float(np.median(np.abs(apart))),
-            "claimed_rms_m": float(np.sqrt(np.mean(claimed**2))),
-            "z_rms": float(np.sqrt(np.mean((apart / claimed) ** 2))),
-            "coverage_95": float(np.mean(np.abs(apart) < WITHIN * claimed)),
+            "model": model, "recordings": len(documents), "differences": len(pairs),
+            "apart_rms_m": float(np.sqrt(np.mean(pairs.difference_m**2))),
+            "apart_median_m": float(pairs.difference_m.abs().median()),
+            "claimed_rms_m": float(np.sqrt(np.mean(pairs.sd_m**2))),
+            "z_rms": found["z_rms"], "coverage_95": found["coverage_95"],
         })  # fmt: skip
     return pd.DataFrame(rows)
+
+
+def coordinates(section: dict, recording: str) -> pd.DataFrame:
+    """A model's positions as `imuarray.measured.positions.pairwise` takes them, m."""
+    means, sds = (np.array(section[key])[1:] for key in ("positions_m", "positions_sd_m"))
+    rows = [(number, axis) for number in range(len(means)) for axis in AXES]
+    table = pd.DataFrame(rows, columns=["accelerometer", "axis"])
+    return table.assign(recording=recording, mean_m=means.ravel(), sd_m=sds.ravel())
 
 
 def parameters_agreement(documents: dict[str, dict]) -> pd.DataFrame:

@@ -10,13 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from imuarray.criticism.describe import first_up
 from imuarray.criticism.fit import Fit, normal, pick
 from imuarray.criticism.noise import standardised
 from imuarray.criticism.readings import Readings
+from imuarray.model.effects import KINDS
 
 REPLICATES = 99
-KINDS = ("accelerometer", "gyroscope")
-PLURAL = {"accelerometer": "accelerometers", "gyroscope": "gyroscopes"}
 
 
 class Quantity(NamedTuple):
@@ -80,7 +80,7 @@ def quantities(fit: Fit, unit) -> dict[str, Quantity]:
         there = np.flatnonzero(readings.exists[:, kind])
         labels = tuple(readings.labels[k] for k in there)
         part = unit[:, there, 3 * kind : 3 * kind + 3]
-        whose = f"the {PLURAL[name]}' residual"
+        whose = f"the {name}s' residual"
         rms = np.sqrt(np.nanmean(part**2, axis=0)).ravel()
         axes = tuple(f"{label}{axis}" for label in labels for axis in "xyz")
         found[f"{name} residual"] = Quantity(rms, axes, f"{whose}, in assumed sds,")
@@ -189,7 +189,7 @@ def _compare(name, quantity: Quantity, drawn):
     limit = np.quantile(others, 0.95)
     sensors = [quantity.sensors[k] for k in np.flatnonzero(away > limit)]
     value = float(quantity.values[worst])
-    place = f"{_first_up(quantity.words)} is {value:.3g} at IMU {quantity.sensors[worst]}"
+    place = f"{first_up(quantity.words)} is {value:.3g} at IMU {quantity.sensors[worst]}"
     says = f"{place}, {_beside(value, band, p_value)}."
     return float(away[worst] / limit), Discrepancy(name, value, band, float(p_value), sensors, says)
 
@@ -203,7 +203,3 @@ def _beside(value, band, p_value) -> str:
     if within:
         return f"within the {simulated}"
     return f"{simulated} there; in {100 * p_value:.0f} % of simulations some sensor is as far out"
-
-
-def _first_up(text: str) -> str:
-    return text[:1].upper() + text[1:]

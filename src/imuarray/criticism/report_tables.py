@@ -17,12 +17,12 @@ from imuarray.criticism.quantities import (
     unit_shown,
 )
 from imuarray.figures.criticism_tables import (
-    KINDS,
     imu_labels,
     position_table,
     residual_table,
     score_table,
 )
+from imuarray.model.effects import KINDS
 
 if TYPE_CHECKING:
     from imuarray.criticism.diagnosis import Diagnosis

@@ -11,8 +11,9 @@ from scipy.stats import poisson
 
 from imuarray.criticism.linearise import polynomial_derivative
 from imuarray.criticism.readings import Readings
+from imuarray.model.effects import KINDS
+from imuarray.recording.validate import AXES
 
-KINDS = ("accelerometer", "gyroscope")
 LEFT_OUT = ("stale_samples", "saturation")  # their readings; exchanged axes are turned back
 LEAST_REPEATS = 1
 LEAST_CLIPPED = 3
@@ -175,7 +176,7 @@ def _lever(readings: Readings, rate) -> np.ndarray:
 
 def _axes(turn) -> str:
     """A signed permutation in words: reads (+y, +x, +z)."""
-    names = ["+-"[int(row.sum() < 0)] + "xyz"[int(np.argmax(np.abs(row)))] for row in turn]
+    names = ["+-"[int(row.sum() < 0)] + AXES[int(np.argmax(np.abs(row)))] for row in turn]
     return f"reads ({', '.join(names)})"
 
 

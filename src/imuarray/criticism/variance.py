@@ -11,8 +11,8 @@ from imuarray.criticism.fit import Fit
 from imuarray.criticism.heldout import edges_of
 from imuarray.criticism.noise import FLAT, Noise, expected_ratio, standardised
 from imuarray.criticism.scores import log_tail
+from imuarray.model.effects import KINDS
 
-KINDS = ("accelerometer", "gyroscope")
 FEW = 4  # outliers; so few are an accident, not a law
 AGREE = 3.5  # sds within which two estimates are of one thing
 

@@ -17,8 +17,8 @@ from imuarray.figures.style import (
     new_figure,
     styled,
 )
+from imuarray.model.effects import KINDS
 
-KINDS = {"accelerometer": "accelerometers", "gyroscope": "gyroscopes"}
 MODELS = {
     "base": {"color": VERMILLION, "marker": "o"},
     "extended": {"color": BLUE, "marker": "s"},
@@ -63,7 +63,7 @@ def discrepancy_figure(table: pd.DataFrame, footer=()):
         for model, shift in (("base", -0.16), ("extended", 0.16)):
             _dots(axes, part[part.model == model], names, shift, MODELS[model])
         axes.set(xlabel="sds of the simulated band", ylim=(len(names) - 0.4, -0.6))
-        axes.set_title(KINDS[kind])
+        axes.set_title(f"{kind}s")
         _wide_scale(axes, part.standardised)
     panels[0].set_yticks(range(len(names)), names)
     _discrepancy_legend(figure, panels[0])
@@ -125,7 +125,7 @@ def residual_figure(table: pd.DataFrame, footer=()):
     for axes, kind in zip(panels, kinds, strict=True):
         part = table[table.kind == kind]
         _residuals(axes, part)
-        axes.set_title(KINDS[kind])
+        axes.set_title(f"{kind}s")
     panels[0].set_ylabel("rms residual / declared noise")
     axes = panels[0]
     handles = [

@@ -12,6 +12,7 @@ from imuarray.criticism.describe import component
 from imuarray.criticism.scans import delay_score
 from imuarray.criticism.scores import robust_inverse
 from imuarray.figures.criticism_signals import BINS, Signal, binned, signal_of
+from imuarray.recording.validate import AXES
 
 if TYPE_CHECKING:
     from imuarray.criticism.diagnosis import Diagnosis
@@ -21,7 +22,6 @@ VAGUE = 12.0  # times the best block's sd, from which a block tells nothing of a
 BLOCKS = 12  # of time, in which a position is estimated again
 IN_TIME = ("accelerometer_bias", "gyroscope_bias", "bias_drift")
 DELAYS = ("gyroscope_delay", "sensor_delay")
-AXES = "xyz"
 # From SI to what the figures show, and its unit; the smaller unit for small signals.
 FORCE = ((1.0, "m/s²"), (1e3, "mm/s²"))
 RATE = ((np.degrees(1.0), "deg/s"), (1e3 * np.degrees(1.0), "10⁻³ deg/s"))

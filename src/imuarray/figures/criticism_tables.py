@@ -13,11 +13,11 @@ from imuarray.criticism.noise import standardised
 from imuarray.criticism.scans import scan_clocks, scan_shifts
 from imuarray.criticism.scores import candidates, evidence, score_all
 from imuarray.criticism.separability import separability
+from imuarray.model.effects import KINDS
 
 if TYPE_CHECKING:
     from imuarray.criticism.diagnosis import Diagnosis, Fitted
 
-KINDS = ("accelerometer", "gyroscope")
 BAND = norm.ppf(0.975)  # sds of a 95 % band
 # A check's name, without its kind, as a figure says it; in the order drawn.
 CHECKS = {

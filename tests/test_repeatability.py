@@ -1,0 +1,63 @@
+"""Diagnoses of one board's recordings: do positions and the causes' numbers repeat?"""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from imuarray.criticism.repeatability import MODELS, parameters_agreement, positions_agreement
+from imuarray.figures.criticism_repeatability import repeatability_figure
+
+
+def document(rng, scale):
+    """A diagnosis of 11 triads, sds around 1 mm; seed 3 throughout."""
+    sds = 1e-3 * rng.uniform(0.5, 2.0, (11, 3))
+    section = {
+        "positions_m": (sds * rng.standard_normal((11, 3))).tolist(),
+        "positions_sd_m": sds.tolist(),
+    }
+    parameter = {"value": scale, "sd": 1e-4, "unit": "1"}
+    cause = {"effect": "gyroscope_scale", "parameters": {"x_1": parameter, "y_1": parameter}}
+    return {model: section for model in MODELS} | {"causes": [cause]}
+
+
+@pytest.fixture
+def documents():
+    rng = np.random.default_rng(3)
+    return {name: document(rng, 1e-2 * (1 + number)) for number, name in enumerate("bca")}
+
+
+def test_positions_agree_as_all_pairs_do(documents):
+    """Against the differences written out."""
+    places, sds = (
+        np.array([d["base"][key][1:] for d in documents.values()])
+        for key in ("positions_m", "positions_sd_m")
+    )
+    pairs = list(combinations(range(3), 2))
+    apart = np.array([places[i] - places[j] for i, j in pairs])
+    claimed = np.array([np.hypot(sds[i], sds[j]) for i, j in pairs])
+    found = positions_agreement(documents).set_index("model")
+    assert list(found.index) == list(MODELS)
+    row = found.loc["base"]
+    assert (row.recordings, row.differences) == (3, apart.size)
+    assert row.apart_rms_m == pytest.approx(np.sqrt(np.mean(apart**2)))
+    assert row.apart_median_m == pytest.approx(np.median(np.abs(apart)))
+    assert row.claimed_rms_m == pytest.approx(np.sqrt(np.mean(claimed**2)))
+    assert row.z_rms == pytest.approx(np.sqrt(np.mean((apart / claimed) ** 2)))
+    assert row.coverage_95 == np.mean(np.abs(apart) < 1.959964 * claimed)
+
+
+def test_a_cause_s_numbers_repeat_by_their_spread(documents):
+    row = parameters_agreement(documents).iloc[0]
+    assert (row.effect, row.recordings, row.parameters) == ("gyroscope_scale", 3, 2)
+    assert row["size"] == pytest.approx(0.02)
+    assert row.spread == pytest.approx(0.01 * np.sqrt(2 / 3))
+
+
+def test_the_figure_has_every_coordinate(documents):
+    figure = repeatability_figure(documents, positions_agreement(documents))
+    figure.draw_without_rendering()
+    left = figure.axes[0]
+    assert sum(len(line.get_ydata()) for line in left.lines if len(line.get_ydata()) > 2) == (
+        3 * 3 * 30
+    )
