@@ -13,12 +13,8 @@ from scipy.linalg import subspace_angles
 
 from imuarray.blind import Case
 from imuarray.blind.cases import make
-from imuarray.criticism import report
-from imuarray.criticism.answers import answers, verdict
-from imuarray.criticism.cause_words import cause_in_words, equation, sizes, split_name
 from imuarray.criticism.describe import MEANING, sentence
 from imuarray.criticism.diagnosis import diagnose
-from imuarray.criticism.quantities import number, plus_minus, probability, quantity, span
 from imuarray.criticism.replicates import _beside
 from imuarray.criticism.separability import (
     conditional,
@@ -32,6 +28,10 @@ from imuarray.figures.criticism_causes import cause_figure
 from imuarray.figures.criticism_panels import abscissa, cause_table
 from imuarray.figures.criticism_signals import binned, signal_of
 from imuarray.model import EFFECTS
+from imuarray.report import write as report
+from imuarray.report.answers import answers, verdict
+from imuarray.report.cause_words import cause_in_words, equation, sizes, split_name
+from imuarray.report.quantities import number, plus_minus, probability, quantity, span
 
 PATH = "a folder/<script>alert(1)</script> & $x$_{.nc"
 ALWAYS = {"discrepancies", "residual", "separability", "positions"}

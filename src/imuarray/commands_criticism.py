@@ -7,9 +7,9 @@ import time
 
 from imuarray.criticism.describe import MEANING
 from imuarray.criticism.diagnosis import diagnose as criticise
-from imuarray.criticism.report import write_report
 from imuarray.errors import InputError
 from imuarray.recording import read_recording
+from imuarray.report.write import write_report
 
 
 def diagnose(arguments) -> None:

@@ -1,7 +1,7 @@
 # What the papers' model gets wrong on each measured recording; its own target, `diagnose`.
 DIAGNOSED = resting_on(
     "criticism/diagnosis.py",
-    "criticism/report.py",
+    "report/write.py",
     "criticism/thresholds.json",
     "provenance.py",
 )

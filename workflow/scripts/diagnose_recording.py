@@ -6,8 +6,8 @@ with job(snakemake) as settings:
     from pathlib import Path
 
     from imuarray.criticism.diagnosis import diagnose
-    from imuarray.criticism.report import write_report
     from imuarray.recording import read_recording
+    from imuarray.report.write import write_report
 
     recording = read_recording(snakemake.input.recording)
     found = diagnose(

@@ -6,16 +6,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from imuarray.criticism.answers import USUAL
-from imuarray.criticism.cause_words import part_in_words, split_name, whose_short, words
-from imuarray.criticism.quantities import (
-    number,
-    plus_minus,
-    probability,
-    quantity,
-    symbols,
-    unit_shown,
-)
 from imuarray.figures.criticism_tables import (
     imu_labels,
     position_table,
@@ -23,6 +13,16 @@ from imuarray.figures.criticism_tables import (
     score_table,
 )
 from imuarray.model.effects import KINDS
+from imuarray.report.answers import USUAL
+from imuarray.report.cause_words import part_in_words, split_name, whose_short, words
+from imuarray.report.quantities import (
+    number,
+    plus_minus,
+    probability,
+    quantity,
+    symbols,
+    unit_shown,
+)
 
 if TYPE_CHECKING:
     from imuarray.criticism.diagnosis import Diagnosis

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from imuarray.criticism.describe import MEANING, first_up, whose
-from imuarray.criticism.quantities import (
+from imuarray.model import EFFECTS
+from imuarray.report.quantities import (
     NARROW,
     joined,
     plus_minus,
@@ -15,7 +16,6 @@ from imuarray.criticism.quantities import (
     symbols,
     unit_shown,
 )
-from imuarray.model import EFFECTS
 
 DOUBTFUL = 0.5  # share of a cause's gain that a placebo must not have
 FEW = 3  # parameters that are told one by one

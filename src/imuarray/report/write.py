@@ -12,10 +12,6 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 import imuarray
-from imuarray.criticism.answers import answers, verdict
-from imuarray.criticism.cause_words import whose_short, words
-from imuarray.criticism.page import render
-from imuarray.criticism.report_tables import tables
 from imuarray.figures import criticism as drawn
 from imuarray.figures import criticism_tables as numbers
 from imuarray.figures.criticism_causes import cause_figure
@@ -23,6 +19,10 @@ from imuarray.figures.criticism_model import ALIKE, position_figure, separabilit
 from imuarray.figures.criticism_panels import cause_table
 from imuarray.figures.style import styled
 from imuarray.provenance import atomic_write
+from imuarray.report.answers import answers, verdict
+from imuarray.report.cause_words import whose_short, words
+from imuarray.report.page import render
+from imuarray.report.tables import tables
 
 if TYPE_CHECKING:
     from imuarray.criticism.diagnosis import Diagnosis

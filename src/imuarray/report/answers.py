@@ -6,8 +6,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from imuarray.criticism.cause_words import cause_in_words, equation, whose_short, words
-from imuarray.criticism.quantities import (
+from imuarray.criticism.structure import LEFT_OUT
+from imuarray.figures.criticism_tables import imu_labels, in_noise_sds, position_table
+from imuarray.model.effects import KINDS
+from imuarray.report.cause_words import cause_in_words, equation, whose_short, words
+from imuarray.report.quantities import (
     NARROW,
     joined,
     number,
@@ -17,9 +20,6 @@ from imuarray.criticism.quantities import (
     span,
     symbols,
 )
-from imuarray.criticism.structure import LEFT_OUT
-from imuarray.figures.criticism_tables import imu_labels, in_noise_sds, position_table
-from imuarray.model.effects import KINDS
 
 if TYPE_CHECKING:
     from imuarray.criticism.diagnosis import Diagnosis
