@@ -1,0 +1,42 @@
+"""What a command line's texts become; each refuses a wrong one with what was expected."""
+
+import argparse
+
+
+def effects(text: str) -> tuple[str, ...]:
+    """Comma-separated names; whether they exist is for the measurement model to say."""
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    if len(set(names)) != len(names):
+        raise argparse.ArgumentTypeError(f"expected each effect once, found {text!r}")
+    return names
+
+
+def _at_least(least: int, text: str) -> int:
+    try:
+        value = int(text)
+    except ValueError:
+        value = None
+    if value is None or value < least:
+        raise argparse.ArgumentTypeError(f"expected an integer of at least {least}, found {text!r}")
+    return value
+
+
+def positive(text: str) -> float:
+    """A finite number above 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"expected a positive number, found {text!r}")
+    return value
+
+
+def count(text: str) -> int:
+    """An integer of at least 1."""
+    return _at_least(1, text)
+
+
+def seed(text: str) -> int:
+    """An integer of at least 0."""
+    return _at_least(0, text)
