@@ -248,6 +248,34 @@ def test_the_extended_model_is_one_option_away(diagnosed):
     assert np.abs(away).max() < 0.3
 
 
+@pytest.mark.parametrize("command", ["calibrate", "sample"])
+def test_a_noise_beside_a_diagnosis_is_refused(diagnosed, capsys, command):
+    """The diagnosis has the noise; two of them would leave one without a word."""
+    out = diagnosed / f"{command}.nc"
+    status = main([
+        command, str(diagnosed / "rec.nc"), "--accelerometer-noise", "0.1", "--out", str(out),
+        "--diagnosis", str(diagnosed / "out" / "diagnosis.json"),
+    ])  # fmt: skip
+    captured = capsys.readouterr().err
+    assert status == 2 and captured.count("\n") == 1 and not out.exists()
+    assert captured.startswith("imuarray: --accelerometer-noise: expected none beside --diagnosis")
+
+
+@pytest.mark.parametrize("quiet", [True, False])
+def test_effects_of_whole_readings_are_told_unless_quiet(diagnosed, capsys, quiet):
+    document = json.loads((diagnosed / "out" / "diagnosis.json").read_text())
+    document["causes"].append({"effect": "stale_samples", "parameters": {}})
+    odd = diagnosed / "stale.json"
+    odd.write_text(json.dumps(document))
+    status = main([
+        "calibrate", str(diagnosed / "rec.nc"), "--method", "gauss-newton",
+        "--diagnosis", str(odd), "--out", str(diagnosed / "stale.nc"), *["--quiet"] * quiet,
+    ])  # fmt: skip
+    said = capsys.readouterr().out
+    assert status == 0
+    assert said == "" if quiet else "stale_samples: concerns readings, not the model" in said
+
+
 def test_an_extension_of_another_board_is_refused(diagnosed):
     from imuarray.errors import InputError
     from imuarray.geometry import mimu4444_corners

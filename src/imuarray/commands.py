@@ -78,13 +78,20 @@ def extender(arguments):
 
     if arguments.effects:
         raise InputError("--effects: expected none beside --diagnosis, found some")
+    noise = getattr(arguments, "accelerometer_noise", None)
+    if noise is not None:
+        raise InputError(
+            "--accelerometer-noise: expected none beside --diagnosis, whose noise is used, found"
+            f" {noise:g}"
+        )
     extension = read_extension(arguments.diagnosis)
     if "axis_swap" in extension.before:
         raise InputError(
             f"{arguments.diagnosis}: expected right axes, found an axis_swap; mend the recording"
         )
-    for name in extension.before:
-        print(f"{name}: concerns readings, not the model; they are used as they are")
+    if not arguments.quiet:
+        for name in extension.before:
+            print(f"{name}: concerns readings, not the model; they are used as they are")
 
     def extended(model: ArrayModel, labels=None) -> ArrayModel:
         return extended_model(extension, model, labels or (model.array.labels,) * 2)
