@@ -19,7 +19,7 @@ POSITION = "position"
 # Effects that a score at zero cannot see: an instant or a frequency is to be found first.
 SCANNED = ("sensor_clock", "position_shift")
 # Parameters that the scans fix: an instant, a clock's frequency and phase (its sawtooth jumps).
-HELD = {"position_shift": (3,), "sensor_clock": (1, 2)}
+HELD = {"position_shift": (3,), "sensor_clock": (1, 2, 4)}
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from imuarray.recording.validate import AXES
 
 OFF_DIAGONAL = ("xy", "xz", "yx", "yz", "zx", "zy")
 COMPONENTS = {
-    "sensor_clock": ("period", "frequency", "phase", "offset"),
+    "sensor_clock": ("period", "frequency", "phase", "offset", "drift"),
     "position_shift": ("x", "y", "z", "time"),
 }
 

@@ -24,8 +24,11 @@ LITTLE = 0.02  # nats; a step that promises less is not taken
 ROUGH = 1e-4  # of the misfit that a step must gain while causes are looked for
 FINE = 3e-6  # the same at the end
 SETTLED = 0.02  # of a parameter's own sd
+HELD_SD = 1e-8  # s, of a period that is not to move
 SHORTEST = 0.2  # share of a Gauss-Newton step
 WIDE = 10.0  # prior sd of the third derivatives, in sizes of the differences near by
+OWN = 2.0  # prior sd of what turning the gyroscopes see alone, in steps of omega dot
+TIED = 1e-5  # of that, as long as it is not free
 NEAR = 9  # samples that tell the size of the motion's third derivatives
 
 
@@ -114,6 +117,9 @@ def search_optimum(readings, columns, active, state, smooth, rough):
     """(state, whether it converged, the recording linearised there or a step before)."""
     prior_mean = prior_means(readings, columns)[active]
     precision = prior_precision(columns, active)
+    held = held_periods(columns, active) if state.loose is not None and state.loose.free else None
+    if held is not None:
+        precision[held, held] += HELD_SD**-2
     wanted = np.flatnonzero(active.any(axis=0))
     converged, last, length, seen = False, np.inf, 1.0, None
     enough = ROUGH if rough else FINE
@@ -124,6 +130,8 @@ def search_optimum(readings, columns, active, state, smooth, rough):
         misfit = float(np.sum(seen.misfit))
         information, score = normal(seen.residual, seen.whitened, seen.through, few)
         offset = flat_parameters(columns, state)[active] - prior_mean
+        if held is not None:
+            offset[held] = 0.0
         score = score - precision @ offset
         step, sds = scaled_solve(information + precision, score)
         moved, astray = np.max(np.abs(step) / sds, initial=0.0), float(np.sum(seen.taken**2))
@@ -142,6 +150,16 @@ def search_optimum(readings, columns, active, state, smooth, rough):
         last = cost
         state = advance(columns, state, active, step, few, seen, length)
     return state, converged, seen
+
+
+def held_periods(columns: Columns, active) -> np.ndarray:
+    """Which of the active parameters are clocks' periods, (n,) bool.
+
+    A period and the fast turning that it multiplies are one where the motion is rough.
+    """
+    mask = np.zeros_like(active)
+    mask[:, columns.of("sensor_clock")[:1]] = True
+    return mask[active]
 
 
 def at(readings: Readings, columns: Columns, active, state: State, converged: bool) -> Fit:
@@ -195,17 +213,21 @@ def loosened(readings: Readings, state: State) -> State:
 
     Their prior has the polynomials' mean, and for sd ten times the size of the differences near by.
     It is that of the first motion and stays: one that followed the fit would shrink with it.
+    What the gyroscopes' omega dot may have of its own is as large as twice the step from a sample
+    to the next, once it is `freed`.
     """
     dt = np.median(np.diff(readings.time))
     found = derivatives(readings, state.motion, state.positions)
-    mean = np.hstack(found[:2])
+    mean = np.hstack([*found[:2], np.zeros_like(found[0])])
     steps = np.diff(state.motion[:, 3:], axis=0, append=state.motion[-1:, 3:]) / dt
     steps[np.diff(readings.run, append=readings.run[-1]) > 0] = 0.0
     near = uniform_filter1d(np.mean(steps.reshape(-1, 2, 3) ** 2, axis=-1), NEAR, axis=0)
-    sd = WIDE * np.repeat(np.sqrt(near) + 0.1 * np.sqrt(near.mean(axis=0)), 3, axis=1)
+    size = np.repeat(np.sqrt(near) + 0.1 * np.sqrt(near.mean(axis=0)), 3, axis=1)
+    own = OWN * dt * size[:, :3]
+    sd = np.hstack([WIDE * size, TIED * own])
     nothing = no_derivatives(len(mean), len(state.positions))
     return state._replace(
-        motion=np.hstack([state.motion, mean]), derivatives=nothing, loose=Loose(mean, sd)
+        motion=np.hstack([state.motion, mean]), derivatives=nothing, loose=Loose(mean, sd, own)
     )
 
 
@@ -223,7 +245,8 @@ def flat_parameters(columns: Columns, state: State) -> np.ndarray:
 
 def from_flat(columns: Columns, state: State, whole) -> State:
     """The inverse of `flat_parameters`, into a state."""
-    shapes = dict(zip(columns.model.effects, columns.model.shapes, strict=True))
+    model = columns.model
+    shapes = {e.id: s for e, s in zip(model.chain, model.shapes, strict=True)}
     values = {n: whole[: s[0], columns.of(n)].reshape(s) for n, s in shapes.items()}
     positions = whole[: len(state.positions), columns.of(POSITION)]
     return state._replace(positions=positions, parameters=columns.model.join(values))

@@ -11,7 +11,8 @@ import numpy as np
 
 from imuarray.criticism.columns import Columns
 
-STIFF = 0.02  # of a parameter's prior sd: the sd that a pinned mean keeps
+STIFF = 1e-3  # of a parameter's prior sd: the sd that a pinned mean keeps
+OFFSET = 3  # which of a clock's parameters
 COMMON = {  # effects whose mean over all IMUs is a gauge, and over which of their columns
     "gyroscope_scale": "together", "accelerometer_scale": "together", "sensor_delay": "together",
     "sensor_clock": "offset", "size_effect": "each",
@@ -37,7 +38,7 @@ def gauge_masks(columns: Columns, active) -> list[np.ndarray]:
             continue
         own = columns.of(effect)
         if how == "offset":
-            own = own[-1:]
+            own = own[OFFSET : OFFSET + 1]
         for chosen in own[:, None] if how == "each" else [own]:
             mask = np.zeros_like(active)
             mask[:, chosen] = columns.owner[:, chosen]

@@ -20,27 +20,41 @@ CHUNK = 256  # samples per compiled call: one compiled shape, bounded memory
 
 
 class Loose(NamedTuple):
-    """Normal prior of omega double dot and s dot at each sample: mean and sd, (T, 6) each."""
+    """Normal prior of what rough motion adds to a sample's unknowns: mean and sd, (T, 9) each.
+
+    omega double dot, s dot, and by how much the gyroscopes' omega dot differs: they and the
+    accelerometers have filters, and what is too fast for the samples passes them differently.
+    """
 
     mean: np.ndarray
     sd: np.ndarray
+    own: np.ndarray  # (T, 3) sd of what the gyroscopes' omega dot has of its own, once free
+
+    def freed(self) -> Loose:
+        """The gyroscopes' omega dot free."""
+        return self._replace(sd=np.hstack([self.sd[:, :6], self.own]))
+
+    @property
+    def free(self) -> bool:
+        """Whether the gyroscopes' omega dot is free."""
+        return bool(np.any(self.sd[:, 6:] == self.own))
 
 
 class State(NamedTuple):
     """Where the model is linearised."""
 
-    motion: np.ndarray  # (T, D): omega, omega_dot, s; omega double dot, s dot where they are free
+    motion: np.ndarray  # (T, D): omega, omega_dot, s, and what is `Loose`
     positions: np.ndarray  # (A, 3) m, relative to the reference
     parameters: np.ndarray  # (P,) of the model with all effects
     derivatives: tuple  # omega double dot, s dot (T, 3); second, third of (force, rate)
-    loose: Loose | None = None  # prior of omega double dot and s dot where they are free
+    loose: Loose | None = None  # where the motion is rough
 
     @property
     def jerk(self) -> tuple[np.ndarray, np.ndarray]:
         """omega double dot and s dot (T, 3), free or from neighbours."""
         if self.loose is None:
             return self.derivatives[0], self.derivatives[1]
-        return self.motion[:, KNOWN : KNOWN + 3], self.motion[:, KNOWN + 3 :]
+        return self.motion[:, 9:12], self.motion[:, 12:15]
 
 
 class Eliminated(NamedTuple):
@@ -62,13 +76,12 @@ class Eliminated(NamedTuple):
 def _reading(model, count, x, positions, parameters, extra, time, span):
     """(N, 6) predicted readings of one sample."""
     jerk, force_rate, second, third = extra
+    turn = None
     if len(x) > KNOWN:
-        jerk, force_rate = x[9:12], x[12:15]
-        second = second._replace(angular_rate=jerk[None])
+        jerk, force_rate, turn = x[9:12], x[12:15], x[3:6] + x[15:18]
     motion = Motion(x[:3], x[3:6], x[6:9], jerk, force_rate)
-    out = model.predict(
-        motion, positions, parameters, time=time, span=span, second=second, third=third
-    )
+    when = {"time": time, "span": span, "second": second, "third": third, "gyroscope_turn": turn}
+    out = model.predict(motion, positions, parameters, **when)
     force = jnp.zeros((count, 3)).at[: len(out.specific_force)].set(out.specific_force)
     rate = jnp.zeros((count, 3)).at[: len(out.angular_rate)].set(out.angular_rate)
     return jnp.concatenate([force, rate], axis=1)

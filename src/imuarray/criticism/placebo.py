@@ -7,6 +7,7 @@ import numpy as np
 from imuarray.criticism.fit import flat_parameters
 from imuarray.criticism.scans import delay_score
 from imuarray.criticism.search import Cause, Search
+from imuarray.model.timing import clock_turns
 
 
 def placebo_gain(search: Search, cause: Cause) -> tuple[float, float]:
@@ -44,7 +45,8 @@ def _of_ages(search: Search) -> tuple[float, float]:
     along, through = fit.whitened[..., column], fit.through[..., column]
     score, _ = delay_score(fit)
     clocks = search.columns.model.split(np.asarray(fit.state.parameters))["sensor_clock"]
-    turns = clocks[:, 1] * search.readings.time[:, None] + clocks[:, 2]
+    readings = search.readings
+    turns = clock_turns(clocks.T, readings.time[:, None], readings.span)
     delay = -(clocks[:, 3] + clocks[:, 0] * (turns - np.floor(turns) - 0.5))
 
     def informed(values):

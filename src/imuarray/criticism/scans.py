@@ -10,6 +10,7 @@ from imuarray.criticism.columns import POSITION
 from imuarray.criticism.fit import Fit, normal
 from imuarray.criticism.readings import Readings
 from imuarray.criticism.scores import Candidate, Evidence, Score, log_tail, robust_inverse
+from imuarray.model.timing import clock_turns
 
 PHASES = np.arange(32) / 32  # of a turn, tried at first
 CUTS = 24  # instants tried at first
@@ -81,7 +82,7 @@ def _clock_score(imus, gain, delays, samples, count) -> Score:
 
 
 def sawtooth(time, score, information):
-    """(gain over a constant in chi-square, (P, f, phi, c)) of one IMU's best sawtooth age."""
+    """(gain over a constant in chi-square, (P, f, phi, c, g)) of one IMU's best sawtooth age."""
     step = np.median(np.diff(time))
     place = np.round((time - time[0]) / step).astype(int)
     size = 2 ** int(np.ceil(np.log2(4 * (place[-1] + 1))))
@@ -90,19 +91,24 @@ def sawtooth(time, score, information):
     power = np.abs(np.fft.rfft(grid)) ** 2
     frequency = np.fft.rfftfreq(size, step)
     power[frequency * (time[-1] - time[0]) < LEAST_TURNS] = 0.0
-    best = (0.0, np.array([0.0, 0.0, 0.0, 0.0]))
+    best = (0.0, np.zeros(5))
     width = frequency[1]
     for guess in frequency[np.argsort(power)[-3:]]:
         for fine in (1.0, 0.25, 0.06):
             around = best[1][1] if fine < 1 and best[0] > 0 else guess
             for trial in around + fine * width * np.linspace(-1, 1, 9):
-                best = max(best, _shape(time, score, information, trial), key=lambda b: b[0])
+                gain, (period, phase, offset) = _shape(trial * time, score, information)
+                if gain > best[0]:
+                    turn = np.sign(period)  # the same sawtooth with time reversed
+                    best = (gain, np.array([turn * period, turn * trial, turn * phase, offset, 0]))
     return best
 
 
-def _shape(time, score, information, frequency, start=PHASES, signed=False):
-    """Best phase of a sawtooth of given frequency: period and offset by weighted least squares."""
-    turns = frequency * time
+def _shape(turns, score, information, start=PHASES):
+    """(gain, (P, phi, c)): best phase of a sawtooth of given turns (T,), by least squares.
+
+    A negative period is the same sawtooth with time reversed.
+    """
     shape = np.mod(turns[:, None] + start, 1.0) - 0.5
     weighted = information[:, None] * shape
     a, b, c = np.sum(weighted * shape, 0), weighted.sum(0), information.sum()
@@ -112,35 +118,41 @@ def _shape(time, score, information, frequency, start=PHASES, signed=False):
     period, offset = (c * right - b * total) / determinant, (a * total - b * right) / determinant
     gain = period * right + offset * total - total**2 / np.maximum(c, 1e-300)
     k = int(np.argmax(gain))
-    values = np.array([period[k], frequency, start[k], offset[k]])
-    if values[0] < 0 and not signed:  # the same sawtooth with time reversed has a positive period
-        values = np.array([-period[k], -frequency, -start[k], offset[k]])
-    return float(gain[k]), values
+    return float(gain[k]), np.array([period[k], start[k], offset[k]])
 
 
 def refine_clock(readings: Readings, clock, score, information) -> np.ndarray:
-    """(P, f, phi, c) of an adopted clock, from each sample's own age; P and c are for the fit.
+    """(P, f, phi, c, g) of an adopted clock, from each sample's own age; P and c are for the fit.
 
     The residual, by its ``score`` and ``information`` of the delay (T,), says how far each age
-    is off; frequency and phase are searched around where they are, the grid drawing in.
+    is off; phase, frequency and drift are searched around where they are, along polynomials of
+    time that the data tell apart, the grid drawing in.
     """
-    turns = clock[1] * readings.time + clock[2]
+    time, span = readings.time, readings.span
+    turns = clock_turns(clock, time, span)
     age = clock[3] + clock[0] * (turns - np.floor(turns) - 0.5)
-    middle = readings.span / 2
     age_score = score - information * age  # of a delay counted from nothing
-    reach, slope = 0.05, 0.3 / readings.span
-    best = (-np.inf, clock)
-    for _ in range(4):
-        centre = best[1] if np.isfinite(best[0]) else clock
-        for frequency in centre[1] + slope * np.linspace(-1, 1, 9):
-            # the phase in the middle of the recording is what the data hold
-            phase = centre[2] + (centre[1] - frequency) * middle
-            starts = phase + reach * np.linspace(-1, 1, 17)
-            gain, values = _shape(readings.time, age_score, information, frequency, starts, True)
-            if gain > best[0]:
-                best = (gain, values)
-        reach, slope = reach / 4, slope / 4
-    return best[1]
+    powers = np.stack([np.ones_like(time), time, (time - span / 2) ** 2 / 2], axis=1)
+    root = np.sqrt(information)[:, None]
+    mixed = np.linalg.inv(np.linalg.qr(root * powers)[1])
+    mixed = mixed / np.abs(powers @ mixed).max(axis=0)  # each reaches one turn at most
+    along, reach, best = powers @ mixed, 0.06, (-np.inf, np.zeros(3), clock[[0, 2, 3]])
+    for _ in range(5):
+        for order, number in ((1, 9), (2, 9)):
+            centre = best[1].copy()
+            for part in reach * np.linspace(-1, 1, number):
+                moved = centre.copy()
+                moved[order] += part
+                starts = moved[0] + reach * np.linspace(-1, 1, 17)
+                path = turns + along[:, 1:] @ moved[1:]
+                gain, values = _shape(path, age_score, information, starts)
+                if gain > best[0]:
+                    moved[0] = values[1]
+                    best = (gain, moved, values)
+        reach /= 3
+    _, moved, (period, _, offset) = best
+    shift = mixed @ moved
+    return np.array([period, clock[1] + shift[1], clock[2] + shift[0], offset, clock[4] + shift[2]])
 
 
 def scan_shifts(fit: Fit, given: Evidence, imus) -> list[Found]:

@@ -24,9 +24,12 @@ from imuarray.criticism.scans import delay_parts, refine_clock
 from imuarray.criticism.scores import Candidate, Evidence, evidence, mask_of
 from imuarray.criticism.start import is_smooth, start
 from imuarray.criticism.thresholds import Thresholds
+from imuarray.criticism.winding import wind
+from imuarray.model.timing import clock_turns
 
 TRACE = 2e-5  # of the excess there was at first
 EDGE = 0.03  # of a turn: how near to a clock's jump a reading is left out
+JITTER = 0.04  # the same where clocks were wound by the gyroscopes
 STEADY = 0.02  # relative change of a noise sd below which a fit is not repeated
 
 
@@ -86,7 +89,7 @@ class Search:
         state = self.fit.state if state is None else state
         turns += bool(self.clocks)
         for turn in range(turns + 2):
-            self.edges(state, EDGE / (1 + turn))
+            self.edges(state, JITTER if own_turning(state) else EDGE / (1 + turn))
             state, converged, seen = search_optimum(
                 self.readings, self.columns, self.active, state, self.smooth, rough
             )
@@ -107,7 +110,7 @@ class Search:
 
     def rewound(self, state):
         """The state with its clocks' frequency and phase where the ages say."""
-        if not self.clocks:
+        if not self.clocks or own_turning(state):
             return state
         # the readings near the jumps are those that tell the phase
         readings = replace(self.readings, keep=self.readings.keep | self.jumps)
@@ -124,8 +127,7 @@ class Search:
         near = np.zeros(self.readings.keep.shape, bool)
         values = self.columns.model.split(np.asarray(state.parameters))
         for imu in self.clocks:
-            _, frequency, phase, _ = values["sensor_clock"][imu]
-            turns = frequency * self.readings.time + phase
+            turns = clock_turns(values["sensor_clock"][imu], self.readings.time, self.readings.span)
             near[:, imu] = (np.abs(turns - np.round(turns)) < width)[:, None]
         self.readings = replace(self.readings, keep=(self.readings.keep | self.jumps) & ~near)
         self.jumps = near & self.allowed
@@ -169,7 +171,16 @@ def started(search: Search, candidate: Candidate, values):
         held[:, columns.of(name)] = True
     whole[~search.active & ~held] = 0.0
     whole[: len(search.fit.state.positions), columns.of(POSITION)] = search.fit.state.positions
+    state = search.fit.state
+    if candidate.effect == "sensor_clock" and values is not None and state.loose is not None:
+        values = wind(search.readings, state.motion[:, 3:6], values)
+        state = state._replace(loose=state.loose.freed())
     if values is not None:
         for imu, value in values.items():
             whole[imu, columns.of(candidate.effect)] = value
-    return from_flat(columns, search.fit.state, whole)
+    return from_flat(columns, state, whole)
+
+
+def own_turning(state) -> bool:
+    """Whether the gyroscopes' omega dot is free."""
+    return state.loose is not None and state.loose.free

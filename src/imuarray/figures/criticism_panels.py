@@ -12,6 +12,7 @@ from imuarray.criticism.describe import component
 from imuarray.criticism.scans import delay_score
 from imuarray.criticism.scores import robust_inverse
 from imuarray.figures.criticism_signals import BINS, Signal, binned, signal_of
+from imuarray.model.timing import clock_turns
 from imuarray.recording.validate import AXES
 
 if TYPE_CHECKING:
@@ -179,8 +180,8 @@ def clock_panels(signal: Signal) -> list[pd.DataFrame]:
     clocks = made.columns.model.split(np.asarray(made.state.parameters))["sensor_clock"]
     score, information = delay_score(made)
     for imu in sorted(signal.imus, key=lambda k: -abs(clocks[k][0]))[:PANELS]:
-        period, frequency, phase, offset = map(float, clocks[imu])
-        turns = frequency * made.readings.time + phase
+        period, frequency, _, offset, _ = map(float, clocks[imu])
+        turns = clock_turns(clocks[imu], made.readings.time, made.readings.span)
         part = (turns - np.floor(turns)) if frequency > 0 else 1 - (turns - np.floor(turns))
         age = offset + period * (turns - np.floor(turns) - 0.5)
         place = np.clip((part * 2 * BINS).astype(int), 0, 2 * BINS - 1)

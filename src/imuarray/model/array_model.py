@@ -34,7 +34,8 @@ class ArrayModel:
     array : Array
     noise : Noise
     effects : tuple of str
-        Ids from `imuarray.model.EFFECTS`, applied in this order; empty is the papers' model.
+        Ids from `imuarray.model.EFFECTS`; empty is the papers' model. They are applied in this
+        order, but first those that say when and where a triad samples.
     derivative_sd : (float, float)
         Prior sd of omega double dot (rad/s^3) and s dot (m/s^3), used only where an effect
         needs them; the defaults are the papers' motion at 5 Hz.
@@ -61,7 +62,7 @@ class ArrayModel:
     @cached_property
     def chain(self) -> tuple[Effect, ...]:
         """The effects themselves; InputError for an unknown id."""
-        return find_effects(self.effects)
+        return tuple(sorted(find_effects(self.effects), key=lambda item: not item.sampling))
 
     @cached_property
     def shapes(self) -> tuple[tuple[int, ...], ...]:

@@ -54,7 +54,7 @@ def accelerometer_nonlinearity(curvature, instant, predicted):
     return predicted._replace(specific_force=force + curvature * force**2)
 
 
-@effect("size_effect", unit="m", prior_sd=5e-4, shape=lambda a, g: (a, 3, 3))
+@effect("size_effect", unit="m", prior_sd=5e-4, shape=lambda a, g: (a, 3, 3), sampling=True)
 def size_effect(offset, instant, predicted):
     """Axis i of triad k sits at r_k + d_ki: its own lever arm; ``offset`` (A, axis, xyz)."""
 

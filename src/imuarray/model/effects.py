@@ -27,7 +27,8 @@ class Instant(NamedTuple):
     """The truth an effect may look at: the motion, where the triads are and what time it is.
 
     ``second`` and ``third`` are the ideal measurement's time derivatives of those orders, zero
-    where they are not known (only a recording's smooth motion tells them).
+    where they are not known (only a recording's smooth motion tells them). Where it is rough, what
+    the gyroscopes' filters let pass may turn otherwise than what the accelerometers' do.
     """
 
     motion: Motion
@@ -36,6 +37,7 @@ class Instant(NamedTuple):
     span: object = 1.0  # s, the recording's length
     second: Prediction = Prediction(0.0, 0.0)
     third: Prediction = Prediction(0.0, 0.0)
+    gyroscope_turn: object = None  # omega dot as the gyroscopes see it, where that is free
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,8 @@ class Effect:
         Whether it needs omega double dot and s dot (12-column H instead of 6).
     sensors : str
         Whose reading it changes: accelerometer, gyroscope or imu (both).
+    sampling : bool
+        Whether it says when or where a triad samples: that comes before the triad's own errors.
     """
 
     id: str
@@ -62,20 +66,21 @@ class Effect:
     derivatives: bool
     sensors: str
     apply: Callable[[object, Instant, Prediction], Prediction]
+    sampling: bool = False
 
 
 EFFECTS: dict[str, Effect] = {}
 KINDS = ("accelerometer", "gyroscope")
 
 
-def effect(id, *, unit, prior_sd, shape, derivatives=False, sensors=None):
+def effect(id, *, unit, prior_sd, shape, derivatives=False, sensors=None, sampling=False):
     """Register the decorated function as the effect ``id`` of the catalogue."""
 
     def register(function):
         if id in EFFECTS:
             raise ValueError(f"effect {id}: expected a new id, found it registered already")
         whose = sensors or (id.split("_")[0] if id.split("_")[0] in KINDS else "imu")
-        EFFECTS[id] = Effect(id, unit, prior_sd, shape, derivatives, whose, function)
+        EFFECTS[id] = Effect(id, unit, prior_sd, shape, derivatives, whose, function, sampling)
         return function
 
     return register
