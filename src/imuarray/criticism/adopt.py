@@ -12,6 +12,7 @@ from imuarray.criticism.scores import Candidate, candidates, score_all
 from imuarray.criticism.search import Cause, Rung, Search, started
 from imuarray.criticism.worth import heldout_gain, prune
 
+PATIENCE = 8  # refusals in a row: what is left is none of the catalogue
 MOST = 12  # causes
 KEPT = 0.05  # of the gain that a test promises must be there on held-out time
 LEAST_Z = 1.5  # standard errors that a gain on held-out time must have
@@ -57,14 +58,15 @@ def proposals(search: Search):
 
 def adopt(search: Search) -> None:
     """Forward: adopt while a test is significant, large enough and gains on held-out time."""
-    while len(search.causes) < MOST:
+    vain = 0
+    while len(search.causes) < MOST and vain < PATIENCE:
         best, values = (proposals(search) or [(None, None)])[0]
         limit = search.thresholds.limit(best.candidate.effect) if best else 0.0
         if best is None or best.log_p > limit:
             break
         if best.statistic < search.least():
             break
-        attempt(search, best, values)
+        vain = 0 if attempt(search, best, values) else vain + 1
 
 
 def attempt(search: Search, score, values) -> bool:

@@ -144,11 +144,11 @@ def size_checks(fit: Fit) -> list[Check]:
             excess = np.nan_to_num(square / average - 1).sum(axis=1)
             spread = np.sqrt(np.sum((trend * excess) ** 2))
             found.append((int(imu), float((trend @ excess) / spread)))
-        checks.append(_normal_checks(f"residual's size against {name}", found))
+        checks.append(normal_checks(f"residual's size against {name}", found))
     return checks
 
 
-def _normal_checks(name, found) -> Check:
+def normal_checks(name, found) -> Check:
     """Worst and pooled of standard normals that are expected near zero."""
     worst = max(found, key=lambda f: abs(f[1]))
     single = norm.logsf(abs(worst[1])) + np.log(2 * len(found))
@@ -191,7 +191,7 @@ def noise_checks(noise: Noise, exists) -> list[Check]:
         float(min(tails[tuple(worst)] + np.log(len(triads)), 0.0)), (int(worst[0]),),
     )  # fmt: skip
     found = [(int(i), float(noise.slope[i, k])) for i, k in triads]
-    return [lone, _normal_checks("whiteness", found)]
+    return [lone, normal_checks("whiteness", found)]
 
 
 def resolution_check(fit: Fit) -> Check:
@@ -214,4 +214,4 @@ def all_checks(fit: Fit, given: Evidence, noise: Noise) -> list[Check]:
     ]  # fmt: skip
 
 
-__all__ = ["Check", "all_checks", "features"]
+__all__ = ["Check", "all_checks", "features", "normal_checks"]

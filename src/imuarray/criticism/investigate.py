@@ -14,6 +14,7 @@ from imuarray.criticism.columns import catalogue_effects, columns_of
 from imuarray.criticism.fit import Fit, fit
 from imuarray.criticism.gate import Check, all_checks
 from imuarray.criticism.readings import Readings, arrange, part_of
+from imuarray.criticism.remainder import judged, outlier_checks, plausibility_checks
 from imuarray.criticism.scans import delay_score, sawtooth
 from imuarray.criticism.scores import candidates, log_tail, mask_of, score_all
 from imuarray.criticism.search import Search
@@ -29,7 +30,6 @@ NESTED = {  # an effect, and those that contain it or are contained
 }  # fmt: skip
 LONG = 3500  # samples; longer recordings are looked at in part first
 CLEAR = 2.5  # sds of a triad's memory, where all together are beyond doubt
-LITTLE = 0.03  # of the noise's own misfit: so little left over may be forgiven
 TAILED = 0.25  # log ratio by which a mixture's core may miss the noise
 DELAYED = 0.1  # log ratio of noise that an adopted delay may bring with it
 
@@ -84,9 +84,10 @@ def investigate(
         remember(search)
     say("testing what is left")
     checks = all_checks(search.fit, search.given, search.noise)
+    checks += [*outlier_checks(search), *plausibility_checks(search)]
     calm_ = not any(c.log_p < thresholds.check for c in checks if c.name.startswith("residual"))
     in_noise += named_noise(search, without, tails, calm_)
-    explained, failing = judged(search, base, checks, in_noise)
+    explained, failing = judged(search, checks, in_noise)
     found = Found(search, base, base_checks, structural, in_noise, checks, explained, failing, raw)
     say("looking for what cannot be told apart")
     found.rivals = {c.effect: rivals(search, c.effect) for c in search.causes}
@@ -191,21 +192,6 @@ def timed(search: Search) -> np.ndarray:
         if cause.effect in ("sensor_delay", "gyroscope_delay", "sensor_clock"):
             least[list(cause.imus)] = DELAYED
     return least
-
-
-def judged(search: Search, base: Fit, checks, in_noise) -> tuple[float, bool]:
-    """(share of the base's excess that is explained, whether checks fail beyond forgiveness)."""
-    left = max(search.fit.misfit - search.fit.free, 0.0)
-    explained = 1.0 - left / search.excess if search.excess > 0 else 1.0
-    named = {item.effect for item in in_noise}
-    failing = [c for c in checks if c.log_p < search.thresholds.check]
-    if "coloured_noise" in named:
-        failing = [c for c in failing if c.name != "whiteness"]
-    large = search.excess > 30 * np.sqrt(2 * search.fit.free)
-    small = left < LITTLE * search.fit.free
-    forgiven = large and small and explained > search.thresholds.explained
-    forgiven = forgiven and "outliers" not in {c.name for c in failing}
-    return explained, bool(failing) and not forgiven
 
 
 def rivals(search: Search, effect: str) -> list[str]:

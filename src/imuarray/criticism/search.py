@@ -24,7 +24,7 @@ from imuarray.criticism.scans import delay_parts, refine_clock
 from imuarray.criticism.scores import Candidate, Evidence, evidence, mask_of
 from imuarray.criticism.start import is_smooth, start
 from imuarray.criticism.thresholds import Thresholds
-from imuarray.criticism.winding import wind
+from imuarray.criticism.winding import ENOUGH, wind
 from imuarray.model.timing import clock_turns
 
 TRACE = 2e-5  # of the excess there was at first
@@ -158,7 +158,11 @@ class Search:
             first = first._replace(positions=positions, parameters=parameters)
         self.allowed = self.readings.keep
         self.smooth = is_smooth(self.readings, first.motion)
-        self.refit(first if self.smooth else loosened(self.readings, first))
+        if not self.smooth:
+            first = loosened(self.readings, first)
+            if len(self.clocks) >= ENOUGH:
+                first = first._replace(loose=first.loose.freed())
+        self.refit(first)
         self.excess = max(self.fit.misfit - self.fit.free, 0.0)
 
 
@@ -172,7 +176,7 @@ def started(search: Search, candidate: Candidate, values):
     whole[~search.active & ~held] = 0.0
     whole[: len(search.fit.state.positions), columns.of(POSITION)] = search.fit.state.positions
     state = search.fit.state
-    if candidate.effect == "sensor_clock" and values is not None and state.loose is not None:
+    if state.loose is not None and candidate.effect == "sensor_clock" and len(values) >= ENOUGH:
         values = wind(search.readings, state.motion[:, 3:6], values)
         state = state._replace(loose=state.loose.freed())
     if values is not None:

@@ -35,14 +35,12 @@ class Gyroscopes(NamedTuple):
 
 
 def wind(readings: Readings, turning, clocks: dict) -> dict:
-    """{imu: (P, f, phi, c, g)} from first guesses of the same form; too few are left as they are.
+    """{imu: (P, f, phi, c, g)} from first guesses of the same form, `ENOUGH` of them at least.
 
     ``turning`` (T, 3): omega_dot by the accelerometers. The period that all get makes what the
     gyroscopes see turn as much as what the accelerometers see.
     """
     imus = sorted(clocks)
-    if len(imus) < ENOUGH:
-        return clocks
     seen = informative(readings, turning, imus)
     guess = np.array([clocks[imu] for imu in imus])
     guess[:, 0], guess[:, 3] = UNIT, 0.0

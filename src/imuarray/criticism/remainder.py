@@ -1,0 +1,68 @@
+"""What is left after the last cause: is it forgiven, and are the causes what they seem?"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import norm
+
+from imuarray.criticism import variance
+from imuarray.criticism.fit import at, flat_parameters
+from imuarray.criticism.gate import Check, normal_checks
+from imuarray.criticism.search import Search
+
+LITTLE = 0.03  # of the noise's own misfit: so little left over may be forgiven
+IMPLAUSIBLE = 10.0  # prior sds
+UNFORGIVEN = ("outliers", "size of")  # checks that a small remainder does not excuse
+
+
+def outlier_checks(search: Search) -> list[Check]:
+    """Readings left out as outliers: is what they miss tied to the reading's own change?
+
+    Tails of the noise are not; a reading that came late, or twice, is.
+    """
+    away = search.allowed & ~search.readings.keep & ~search.jumps
+    whole = replace(search.readings, keep=search.allowed)
+    seen = at(whole, search.columns, search.active, search.fit.state, True)
+    predicted = np.nan_to_num(whole.values) / np.repeat(whole.sd, 3, axis=1) - seen.residual
+    change = np.diff(predicted, axis=0, prepend=predicted[:1])
+    change[np.diff(whole.run, prepend=whole.run[0]) > 0] = 0.0
+    products = np.where(away, seen.residual * change, 0.0).reshape(len(away), -1, 2, 3)
+    found = []
+    for imu, kind in np.argwhere(whole.exists):
+        own = products[:, imu, kind].sum(axis=1)
+        if np.count_nonzero(own) > variance.FEW:
+            found.append((int(imu), float(own.sum() / np.sqrt(np.sum(own**2)))))
+    return [normal_checks("outliers against the reading's change", found)] if found else []
+
+
+def plausibility_checks(search: Search) -> list[Check]:
+    """Causes whose parameters are larger than such sensors have: another cause in their clothes."""
+    columns, found = search.columns, []
+    whole = flat_parameters(columns, search.fit.state) / columns.prior_sd
+    for cause in search.causes:
+        free = search.active[:, columns.of(cause.effect)]
+        sizes = np.where(free, np.abs(whole[:, columns.of(cause.effect)]), 0.0)
+        if sizes.max() > IMPLAUSIBLE:
+            imu = int(np.argmax(sizes.max(axis=1)))
+            largest = float(sizes.max())
+            found.append(
+                Check(f"size of {cause.effect}", largest, float(norm.logsf(largest)), (imu,))
+            )
+    return found
+
+
+def judged(search: Search, checks, in_noise) -> tuple[float, bool]:
+    """(share of the base's excess that is explained, whether checks fail beyond forgiveness)."""
+    left = max(search.fit.misfit - search.fit.free, 0.0)
+    explained = 1.0 - left / search.excess if search.excess > 0 else 1.0
+    named = {item.effect for item in in_noise}
+    failing = [c for c in checks if c.log_p < search.thresholds.check]
+    if "coloured_noise" in named:
+        failing = [c for c in failing if c.name != "whiteness"]
+    large = search.excess > 30 * np.sqrt(2 * search.fit.free)
+    small = left < LITTLE * search.fit.free
+    forgiven = large and small and explained > search.thresholds.explained
+    forgiven = forgiven and not any(c.name.startswith(UNFORGIVEN) for c in failing)
+    return explained, bool(failing) and not forgiven
