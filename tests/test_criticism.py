@@ -259,11 +259,12 @@ def test_sawtooth_finds_its_period_frequency_and_offset():
     information = rng.gamma(2.0, 1e8, 3000)
     age = 2e-5 + 1e-3 * ((0.83 * time + 0.3) % 1 - 0.5)
     score = -information * age + np.sqrt(information) * rng.standard_normal(3000)
-    gain, (period, frequency, phase, offset) = sawtooth(time, score, information)
+    gain, (period, frequency, _, offset, drift) = sawtooth(time, score, information)
     assert gain > 1000
     assert period == pytest.approx(1e-3, rel=0.05)
     assert abs(frequency) == pytest.approx(0.83, abs=0.01)
     assert offset == pytest.approx(2e-5, abs=2e-5)
+    assert drift == 0.0
     null = sawtooth(time, np.sqrt(information) * rng.standard_normal(3000), information)[0]
     assert null < 45
 

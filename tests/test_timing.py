@@ -38,7 +38,8 @@ def departures(name, values, times):
 
 def sawtooth(clock, times):
     """Ages (T, 8) of the readings, since the first sample."""
-    turns = clock[:, 1] * (times[:, None] - times[0]) + clock[:, 2]
+    since = times[:, None] - times[0]
+    turns = clock[:, 1] * since + clock[:, 2] + clock[:, 4] / 2 * (since - since[-1] / 2) ** 2
     return clock[:, 3] + clock[:, 0] * (turns % 1.0 - 0.5)
 
 
@@ -47,10 +48,10 @@ def test_half_the_age_leaves_a_quarter_of_the_error(name):
     rng, errors = np.random.default_rng(1), []
     clock = np.column_stack([
         rng.uniform(1e-3, 2e-3, 8), rng.uniform(0.3, 9, 8), rng.uniform(0, 1, 8),
-        rng.uniform(0, 1e-3, 8),
+        rng.uniform(0, 1e-3, 8), rng.uniform(-8, 8, 8),
     ])  # fmt: skip
     for size in (1.0, 0.5):
-        scaled = clock * np.array([size, 1, 1, size])
+        scaled = clock * np.array([size, 1, 1, size, 1])
         if name == "sensor_clock":
             values, times = scaled, TIMES[:, None] - sawtooth(scaled, TIMES)
         else:

@@ -124,11 +124,13 @@ class Search:
 
     def edges(self, state, width) -> None:
         """Leave out a clocked IMU's samples near the sawtooth's jump: which side is a gamble."""
-        near = np.zeros(self.readings.keep.shape, bool)
+        near = np.zeros((*self.readings.keep.shape[:2], 2), bool)
         values = self.columns.model.split(np.asarray(state.parameters))
         for imu in self.clocks:
             turns = clock_turns(values["sensor_clock"][imu], self.readings.time, self.readings.span)
             near[:, imu] = (np.abs(turns - np.round(turns)) < width)[:, None]
+        # what is left must tell the motion
+        near = np.repeat(noises.few_at_once(near), 3, axis=2)
         self.readings = replace(self.readings, keep=(self.readings.keep | self.jumps) & ~near)
         self.jumps = near & self.allowed
 
@@ -176,7 +178,11 @@ def started(search: Search, candidate: Candidate, values):
     whole[~search.active & ~held] = 0.0
     whole[: len(search.fit.state.positions), columns.of(POSITION)] = search.fit.state.positions
     state = search.fit.state
-    if state.loose is not None and candidate.effect == "sensor_clock" and len(values) >= ENOUGH:
+    if (
+        state.loose is not None
+        and candidate.effect == "sensor_clock"
+        and len(values or ()) >= ENOUGH
+    ):
         values = wind(search.readings, state.motion[:, 3:6], values)
         state = state._replace(loose=state.loose.freed())
     if values is not None:
