@@ -135,12 +135,13 @@ def refine_clock(readings: Readings, clock, score, information) -> np.ndarray:
     powers = np.stack([np.ones_like(time), time, (time - span / 2) ** 2 / 2], axis=1)
     root = np.sqrt(information)[:, None]
     mixed = np.linalg.inv(np.linalg.qr(root * powers)[1])
-    mixed = mixed / np.abs(powers @ mixed).max(axis=0)  # each reaches one turn at most
+    # each reaches one turn at most; the first is one turn throughout, whatever LAPACK's sign
+    mixed = mixed / np.abs(powers @ mixed).max(axis=0) * np.sign(mixed[0, 0])
     along, reach, best = powers @ mixed, 0.06, (-np.inf, np.zeros(3), clock[[0, 2, 3]])
     for _ in range(5):
-        for order, number in ((1, 9), (2, 9)):
+        for order, wide in ((1, 2.5), (2, 1.0)):
             centre = best[1].copy()
-            for part in reach * np.linspace(-1, 1, number):
+            for part in wide * reach * np.linspace(-1, 1, 9):
                 moved = centre.copy()
                 moved[order] += part
                 starts = moved[0] + reach * np.linspace(-1, 1, 17)
