@@ -30,6 +30,7 @@ from imuarray.model.timing import clock_turns
 TRACE = 2e-5  # of the excess there was at first
 EDGE = 0.03  # of a turn: how near to a clock's jump a reading is left out
 JITTER = 0.04  # the same where clocks were wound by the gyroscopes
+ROUGH_SHARE = 5.0  # by which the least share of what is left is larger where motion is rough
 STEADY = 0.02  # relative change of a noise sd below which a fit is not repeated
 
 
@@ -144,10 +145,12 @@ class Search:
     def least(self) -> float:
         """The least chi-square of a cause: a share of what is left, and a trace of what there was.
 
-        The second order of a huge effect leaves something that smaller ones would take up.
+        The second order of a huge effect leaves something that smaller ones would take up, and
+        rough motion leaves more.
         """
         left = max(self.fit.misfit - self.fit.free, 0.0)
-        return max(self.thresholds.share * left, TRACE * self.excess)
+        share = self.thresholds.share * (1.0 if self.smooth else ROUGH_SHARE)
+        return max(share * left, TRACE * self.excess)
 
     def polish(self) -> None:
         """The same fit to the end."""
