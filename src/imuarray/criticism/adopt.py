@@ -16,6 +16,7 @@ PATIENCE = 8  # refusals in a row: what is left is none of the catalogue
 MOST = 12  # causes
 KEPT = 0.05  # of the gain that a test promises must be there on held-out time
 LEAST_Z = 1.5  # standard errors that a gain on held-out time must have
+ROUGH_Z = 2.0  # the same where the motion is rough, and few stretches decide
 SURE = 50.0  # nats; smaller promises may break
 
 
@@ -76,14 +77,14 @@ def attempt(search: Search, score, values) -> bool:
     before = search.readings, search.fit, search.noise, search.given, causes
     merge(search, candidate, score.log_p)
     gain, error = foreseen(search, candidate, values)
-    if keeps(score, gain, error):
+    if keeps(search, score, gain, error):
         search.refit(started(search, candidate, values))
         if candidate.effect == "position_shift":
             move_instant(search, candidate.imus)
         prune(search, candidate.effect)
         gain, error = heldout_gain(search, candidate.effect)
     words = f"{candidate.effect} {candidate.variant} of {label(search, candidate)}"
-    if not keeps(score, gain, error):
+    if not keeps(search, score, gain, error):
         search.readings, search.fit, search.noise, search.given, search.causes = before
         search.refused.add((candidate.effect, candidate.imus, candidate.variant))
         search.say(f"refused {words}: held-out gain {gain:.1f} +- {error:.1f}")
@@ -97,9 +98,10 @@ def attempt(search: Search, score, values) -> bool:
     return True
 
 
-def keeps(score, gain: float, error: float) -> bool:
+def keeps(search: Search, score, gain: float, error: float) -> bool:
     """Whether a gain on held-out time is clear, and a fair part of what the test promised."""
-    return gain > LEAST_Z * error and gain > KEPT * (score.statistic / 2 - SURE)
+    least = LEAST_Z if search.smooth else ROUGH_Z
+    return gain > least * error and gain > KEPT * (score.statistic / 2 - SURE)
 
 
 def foreseen(search: Search, candidate: Candidate, values) -> tuple[float, float]:
