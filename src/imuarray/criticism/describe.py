@@ -6,7 +6,7 @@ import numpy as np
 
 from imuarray.criticism.columns import HELD
 from imuarray.criticism.fit import flat_parameters
-from imuarray.criticism.search import Cause, Search
+from imuarray.criticism.search import Cause, Search, own_turning
 from imuarray.model import EFFECTS
 from imuarray.model.effects import KINDS
 from imuarray.recording.validate import AXES
@@ -69,6 +69,8 @@ def parameters_of(search: Search, cause: Cause, sds) -> dict:
     """{name: {value, sd, unit}} of a cause; ``sds`` (N, m), of what a scan fixed there is none."""
     values, columns = flat_parameters(search.columns, search.fit.state), search.columns
     active, held = search.active, HELD.get(cause.effect, ())
+    if cause.effect == "sensor_clock" and own_turning(search.fit.state):
+        held = (0, *held)  # where the gyroscopes' turning is free it takes the period's place
     found = {}
     for imu in cause.imus:
         for column in columns.of(cause.effect):
