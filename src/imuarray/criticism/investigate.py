@@ -13,7 +13,7 @@ from imuarray.criticism.adopt import adopt
 from imuarray.criticism.columns import catalogue_effects, columns_of
 from imuarray.criticism.fit import Fit, fit
 from imuarray.criticism.gate import Check, all_checks
-from imuarray.criticism.readings import Readings, arrange, part_of
+from imuarray.criticism.readings import Readings, arrange, determined, part_of
 from imuarray.criticism.remainder import judged, outlier_checks, plausibility_checks
 from imuarray.criticism.scans import delay_score, sawtooth
 from imuarray.criticism.scores import candidates, log_tail, mask_of, score_all
@@ -61,6 +61,9 @@ def investigate(
     thresholds = thresholds or read_thresholds()
     raw = arrange(recording)
     structural, readings, mended = find_structural(raw, without)
+    used = determined(readings)
+    if not used.all():
+        raw, readings = raw.select(used), readings.select(used)
     effects = catalogue_effects(without)
     # clocks are scanned for by what a delay would gain, whether or not it is a candidate
     described = effects if "sensor_delay" in effects else (*effects, "sensor_delay")

@@ -9,8 +9,10 @@ import numpy as np
 from imuarray.errors import InputError
 from imuarray.estimation.selection import neighbours
 from imuarray.geometry import Array
+from imuarray.model.structure import design
 from imuarray.recording import Recording, array_of
 
+WEAKEST = 1e-2  # least information of a sample on omega_dot and s, against all readings'
 LEAST = 200  # samples; fewer tell next to nothing of any effect
 STRETCH = 128  # samples
 WINDOW = 0.04  # s, length of the polynomials that give time derivatives
@@ -61,6 +63,38 @@ class Readings:
     def without(self, lost) -> Readings:
         """The same without the readings in ``lost`` (T, N, 6) bool."""
         return replace(self, keep=self.keep & ~lost)
+
+    def select(self, used) -> Readings:
+        """The samples in ``used`` (T,) bool, in new runs."""
+        time = self.time[used]
+        return replace(
+            self, time=time, values=self.values[used], keep=self.keep[used], run=runs(time)
+        )
+
+
+def determined(readings: Readings) -> np.ndarray:
+    """(T,) bool: samples whose readings tell the motion, in runs long enough for its derivatives.
+
+    Each axis has a gyroscope, and the accelerometers tell omega_dot and s. InputError where too
+    few are left.
+    """
+    positions = readings.array.relative
+    rows = design(positions)[:, 6:]
+    kept = readings.keep[:, : len(positions), :3].reshape(len(readings.time), -1)
+    least, whole = (
+        np.linalg.eigvalsh(np.einsum("tr,ri,rj->tij", part.astype(float), rows, rows))[:, 0]
+        for part in (kept, np.ones_like(kept[:1]))
+    )
+    good = (least > WEAKEST * whole) & readings.keep[..., 3:].any(axis=1).all(axis=1)
+    if good.all():
+        return good
+    used = _long_runs(readings.time, good)
+    if used.sum() < LEAST:
+        raise InputError(
+            f"recording: expected at least {LEAST} samples whose readings tell the motion,"
+            f" found {used.sum()} of {used.size}"
+        )
+    return used
 
 
 def part_of(readings: Readings, most: int) -> Readings:
