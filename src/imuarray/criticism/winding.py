@@ -20,8 +20,9 @@ from imuarray.model.timing import clock_turns
 
 ENOUGH = 4  # gyroscopes with a clock
 MOST = 2500  # samples, those of the fastest turning
-ROUNDS = 14
-REACH = 0.1  # turns by which a first guess may be off
+ROUNDS = 18
+REACH = 0.1  # turns, rms, by which a first guess may be off
+DRAWN_IN = 0.85  # factor of the reach from round to round
 UNIT = 1e-3  # s, of the ages until their size is known
 
 
@@ -52,7 +53,7 @@ def wind(readings: Readings, turning, clocks: dict) -> dict:
         weights = 1 / (1 + (np.sum(left**2, axis=2) / (4 * size) ** 2) ** 2)
         maps = remapped(seen, motion, ages, weights)
         if number:
-            guess = turned(seen, maps, motion, guess, REACH / number)
+            guess = turned(seen, maps, motion, guess, REACH * DRAWN_IN**number)
     both = [np.sqrt(np.mean(part**2)) for part in (motion[:, 3:], seen.turning)]
     sign = np.sign(np.sum(motion[:, 3:] * seen.turning))
     guess[:, 0] = sign * UNIT * both[0] / both[1]
@@ -110,11 +111,7 @@ def turned(seen: Gyroscopes, maps, motion, clocks, reach) -> np.ndarray:
     All together first, which moves nothing but the jumps (an age common to all is the motion's);
     then each of its own.
     """
-    middle = (seen.time[0] + seen.time[-1]) / 2
-    x = 2 * (seen.time - middle) / (seen.time[-1] - seen.time[0])
-    along = np.stack([np.ones_like(x), x, x**2 - 1 / 3], axis=1)
-    powers = np.stack([np.ones_like(x), seen.time, (seen.time - seen.span / 2) ** 2 / 2], axis=1)
-    exact = np.linalg.lstsq(powers, along, rcond=None)[0]
+    along, exact = polynomials(seen)
     rate, turn = (
         np.einsum("kij,tj->tki", maps[..., :3], motion[:, part]) for part in (slice(3), slice(3, 6))
     )
@@ -136,6 +133,21 @@ def turned(seen: Gyroscopes, maps, motion, clocks, reach) -> np.ndarray:
         place = _searched(lambda s, k=k: cost([k], s, taken), along, reach)
         out[k, [2, 1, 4]] += exact @ (place + together)
     return out
+
+
+def polynomials(seen: Gyroscopes) -> tuple[np.ndarray, np.ndarray]:
+    """(T, 3) of time, orthonormal under the turning's square, and their phase, rate, drift (3, 3).
+
+    So they change where the board turns: a recording may be still for most of its time.
+    """
+    since = seen.time - seen.span / 2
+    powers = np.stack([np.ones_like(since), seen.time, since**2 / 2], axis=1)
+    weight = np.linalg.norm(seen.turning, axis=1, keepdims=True)
+    weight = weight / np.sqrt(np.sum(weight**2))
+    scale = np.abs(powers).max(axis=0)
+    exact = np.linalg.inv(np.linalg.qr(weight * powers / scale)[1]) / scale[:, None]
+    exact *= np.sign(exact[0, 0])
+    return powers @ exact, exact
 
 
 def _searched(cost, along, reach) -> np.ndarray:
