@@ -102,3 +102,32 @@ rule publish_blind_table:
         kind="csv|tex|md",
     shell:
         "cp {input:q} {output:q} 2> {log:q}"
+
+
+# And only `snakemake diagnose`, or asking for one by name, for these.
+rule publish_diagnosis:
+    input:
+        "results/measured/figures/diagnosis_{group}.{kind}",
+    output:
+        "paper_figures/diagnosis_{group}.{kind}",
+    log:
+        "results/logs/publish/diagnosis_{group}.{kind}.log",
+    wildcard_constraints:
+        kind="pdf|png|csv",
+    shell:
+        "cp {input:q} {output:q} 2> {log:q}"
+
+
+rule publish_cause:
+    input:
+        "results/measured/diagnosis/{name}/diagnosis.json",
+    output:
+        "paper_figures/cause_{effect}_{name}.{kind}",
+    log:
+        "results/logs/publish/cause_{effect}_{name}.{kind}.log",
+    wildcard_constraints:
+        effect="[a-z_]+",
+        name="|".join(RECORDINGS) or "none",
+        kind="pdf|png|csv",
+    shell:
+        "cp $(dirname {input:q})/cause_*_{wildcards.effect}.{wildcards.kind} {output:q} 2> {log:q}"
