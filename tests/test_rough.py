@@ -84,6 +84,9 @@ def numbers(document, effect, name):
 def test_clocks_and_lag_are_found_beside_the_gyroscopes_errors(made):
     document, _, aliases = made[0].document, *made[1:]
     first = {cause["effect"] for cause in document["causes"][:4]}
+    # products of filtered rates are not the filtered products: what no effect names is said
+    others = {cause["effect"] for cause in document["causes"][4:]}
+    assert document["unexplained"] or not others
     assert first == {
         "sensor_clock", "gyroscope_delay", "gyroscope_misalignment", "gyroscope_scale",
     }  # fmt: skip
@@ -92,7 +95,7 @@ def test_clocks_and_lag_are_found_beside_the_gyroscopes_errors(made):
     assert numbers(document, "gyroscope_delay", "") == pytest.approx(BEHIND, rel=0.06)
 
 
-def test_the_extended_model_s_positions_are_ten_times_better(made):
+def test_the_extended_model_s_positions_are_seven_times_better(made):
     document, positions, _ = made[0].document, *made[1:]
     error = {
         name: np.sqrt(np.mean((np.array(document[name]["positions_m"]) - positions)[1:] ** 2))

@@ -52,7 +52,7 @@ def test_phases_rates_drifts_and_the_period_are_found(seed):
     off -= np.round(off)
     assert np.abs(off).max() < 0.03
     # strengths as equal as the draw makes them
-    assert clocks[:, 0] == pytest.approx(PERIOD, rel=0.06)
+    assert clocks[:, 0] == pytest.approx(PERIOD, rel=0.03)
 
 
 def test_with_true_ages_only_noise_is_left():
@@ -66,4 +66,5 @@ def test_with_true_ages_only_noise_is_left():
     design = np.stack([np.ones(8), -ages[100]], axis=1)
     expected = np.linalg.lstsq(design, bare[100], rcond=None)[0]
     np.testing.assert_allclose(motion[100].reshape(2, 3), expected, rtol=0.02, atol=0.02)
-    assert left.shape == bare.shape
+    # two of eight readings are used up; the maps' own percent of the rate is left in this test
+    assert np.sqrt(np.mean(left**2)) < 0.01 * 15 * np.sqrt(3)

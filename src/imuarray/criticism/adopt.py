@@ -74,7 +74,7 @@ def attempt(search: Search, score, values) -> bool:
     """Adopt a candidate, refit, and take it back where held-out time does not gain."""
     candidate = score.candidate
     causes = [replace(c, variants=set(c.variants)) for c in search.causes]
-    before = search.readings, search.fit, search.noise, search.given, causes
+    before = search.readings, search.jumps, search.fit, search.noise, search.given, causes
     merge(search, candidate, score.log_p)
     gain, error = foreseen(search, candidate, values)
     if keeps(search, score, gain, error):
@@ -85,7 +85,8 @@ def attempt(search: Search, score, values) -> bool:
         gain, error = heldout_gain(search, candidate.effect)
     words = f"{candidate.effect} {candidate.variant} of {label(search, candidate)}"
     if not keeps(search, score, gain, error):
-        search.readings, search.fit, search.noise, search.given, search.causes = before
+        search.readings, search.jumps, *rest, search.causes = before
+        search.fit, search.noise, search.given = rest
         search.refused.add((candidate.effect, candidate.imus, candidate.variant))
         search.say(f"refused {words}: held-out gain {gain:.1f} +- {error:.1f}")
         return False

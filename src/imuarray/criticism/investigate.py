@@ -17,7 +17,7 @@ from imuarray.criticism.readings import Readings, arrange, determined, part_of
 from imuarray.criticism.remainder import judged, outlier_checks, plausibility_checks
 from imuarray.criticism.scans import delay_score, sawtooth
 from imuarray.criticism.scores import candidates, log_tail, mask_of, score_all
-from imuarray.criticism.search import Search
+from imuarray.criticism.search import Search, own_turning
 from imuarray.criticism.structure import Structural, find_structural
 from imuarray.criticism.thresholds import Thresholds, read_thresholds
 from imuarray.criticism.worth import clear, freed_places, need
@@ -105,7 +105,7 @@ def looked_ahead(whole: Search, part: Readings, excess: float) -> Search:
     adopt(ahead)
     search = Search(whole.readings, whole.columns, whole.effects, whole.thresholds, whole.say)
     search.causes, search.refused, state = ahead.causes, ahead.refused, ahead.fit.state
-    search.begin(state.parameters, state.positions)
+    search.begin(state.parameters, state.positions, own_turning(state))
     search.excess = excess
     search.trace = ahead.trace
     return search

@@ -106,9 +106,11 @@ def _outliers(fast, core) -> np.ndarray:
 def few_at_once(far) -> np.ndarray:
     """Outliers (T, N, 2) bool without the samples where a quarter of a kind stands out at once.
 
-    Those are events of the whole array, and leaving them out would leave no motion.
+    Those are events of the whole array, and leaving them out would leave no motion, which takes
+    three triads.
     """
-    crowd = far.sum(axis=1, keepdims=True) > max(1, far.shape[1] // 4)
+    number = far.shape[1]
+    crowd = far.sum(axis=1, keepdims=True) > min(max(1, number // 4), max(0, number - 3))
     return far & ~crowd
 
 

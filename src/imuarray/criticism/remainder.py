@@ -8,9 +8,12 @@ import numpy as np
 from scipy.stats import norm
 
 from imuarray.criticism import variance
-from imuarray.criticism.fit import at, flat_parameters
+from imuarray.criticism.columns import POSITION
+from imuarray.criticism.fit import flat_parameters
 from imuarray.criticism.gate import Check, normal_checks
+from imuarray.criticism.linearise import linearise
 from imuarray.criticism.search import Search
+from imuarray.criticism.worth import need
 
 LITTLE = 0.03  # of the noise's own misfit: so little left over may be forgiven
 IMPLAUSIBLE = 10.0  # prior sds
@@ -24,11 +27,14 @@ def outlier_checks(search: Search) -> list[Check]:
     """
     away = search.allowed & ~search.readings.keep & ~search.jumps
     whole = replace(search.readings, keep=search.allowed)
-    seen = at(whole, search.columns, search.active, search.fit.state, True)
-    predicted = np.nan_to_num(whole.values) / np.repeat(whole.sd, 3, axis=1) - seen.residual
+    # by the motion that was fitted without them: an outlier would be part of its own prediction
+    column = search.columns.of(POSITION)[:1]
+    seen = linearise(whole, search.columns, search.fit.state, column)
+    missed = seen.residual + np.einsum("tri,ti->tr", seen.basis, seen.taken).reshape(away.shape)
+    predicted = np.nan_to_num(whole.values) / np.repeat(whole.sd, 3, axis=1) - missed
     change = np.diff(predicted, axis=0, prepend=predicted[:1])
     change[np.diff(whole.run, prepend=whole.run[0]) > 0] = 0.0
-    products = np.where(away, seen.residual * change, 0.0).reshape(len(away), -1, 2, 3)
+    products = np.where(away, missed * change, 0.0).reshape(len(away), -1, 2, 3)
     found = []
     for imu, kind in np.argwhere(whole.exists):
         own = products[:, imu, kind].sum(axis=1)
@@ -64,5 +70,8 @@ def judged(search: Search, checks, in_noise) -> tuple[float, bool]:
     large = search.excess > 30 * np.sqrt(2 * search.fit.free)
     small = left < LITTLE * search.fit.free
     forgiven = large and small and explained > search.thresholds.explained
+    # what a large cause leaves over does not excuse a small one that takes up as little
+    weakest = min((need(search, c.effect)[0] for c in search.causes), default=np.inf)
+    forgiven = forgiven and left - 2 * np.sqrt(2 * search.fit.free) < weakest
     forgiven = forgiven and not any(c.name.startswith(UNFORGIVEN) for c in failing)
     return explained, bool(failing) and not forgiven

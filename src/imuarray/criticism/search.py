@@ -24,7 +24,7 @@ from imuarray.criticism.scans import delay_parts, refine_clock
 from imuarray.criticism.scores import Candidate, Evidence, evidence, mask_of
 from imuarray.criticism.start import is_smooth, start
 from imuarray.criticism.thresholds import Thresholds
-from imuarray.criticism.winding import ENOUGH, wind
+from imuarray.criticism.winding import wind, windable
 from imuarray.model.timing import clock_turns
 
 TRACE = 2e-5  # of the excess there was at first
@@ -132,8 +132,9 @@ class Search:
             near[:, imu] = (np.abs(turns - np.round(turns)) < width)[:, None]
         # what is left must tell the motion
         near = np.repeat(noises.few_at_once(near), 3, axis=2)
-        self.readings = replace(self.readings, keep=(self.readings.keep | self.jumps) & ~near)
-        self.jumps = near & self.allowed
+        keep = self.readings.keep | self.jumps
+        self.readings = replace(self.readings, keep=keep & ~near)
+        self.jumps = near & keep
 
     def weigh(self) -> None:
         """The evidence at the present fit."""
@@ -156,8 +157,8 @@ class Search:
         """The same fit to the end."""
         self.refit(turns=2, rough=False)
 
-    def begin(self, parameters=None, positions=None) -> None:
-        """The papers' model, or what another search came to."""
+    def begin(self, parameters=None, positions=None, wound=False) -> None:
+        """The papers' model, or what another search came to, its clocks ``wound`` or not."""
         first = start(self.readings, self.columns)
         if parameters is not None:
             first = first._replace(positions=positions, parameters=parameters)
@@ -165,7 +166,7 @@ class Search:
         self.smooth = is_smooth(self.readings, first.motion)
         if not self.smooth:
             first = loosened(self.readings, first)
-            if len(self.clocks) >= ENOUGH:
+            if wound:
                 first = first._replace(loose=first.loose.freed())
         self.refit(first)
         self.excess = max(self.fit.misfit - self.fit.free, 0.0)
@@ -177,21 +178,29 @@ def started(search: Search, candidate: Candidate, values):
     whole = flat_parameters(columns, search.fit.state)
     held = np.zeros_like(whole, bool)
     for name in SCANNED:
-        held[:, columns.of(name)] = True
+        own = columns.of(name)
+        held[:, own] = search.active[:, own].any(axis=1, keepdims=True)
     whole[~search.active & ~held] = 0.0
     whole[: len(search.fit.state.positions), columns.of(POSITION)] = search.fit.state.positions
     state = search.fit.state
-    if (
-        state.loose is not None
-        and candidate.effect == "sensor_clock"
-        and len(values or ()) >= ENOUGH
-    ):
+    if state.loose is not None and candidate.effect == "sensor_clock" and values is not None:
+        # clocks that are there already are wound again, all as one
+        place = columns.of("sensor_clock")
+        values = {imu: whole[imu, place] for imu in search.clocks} | values
+    if own_clocks(search, candidate, values, state):
         values = wind(search.readings, state.motion[:, 3:6], values)
         state = state._replace(loose=state.loose.freed())
     if values is not None:
         for imu, value in values.items():
             whole[imu, columns.of(candidate.effect)] = value
     return from_flat(columns, state, whole)
+
+
+def own_clocks(search: Search, candidate: Candidate, values, state) -> bool:
+    """Whether a candidate's clocks are to be wound by the gyroscopes alone."""
+    if state.loose is None or candidate.effect != "sensor_clock" or values is None:
+        return False
+    return windable(search.readings, values)
 
 
 def own_turning(state) -> bool:

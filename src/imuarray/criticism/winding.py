@@ -19,6 +19,7 @@ from imuarray.criticism.readings import Readings
 from imuarray.model.timing import clock_turns
 
 ENOUGH = 4  # gyroscopes with a clock
+LEAST = 200  # samples
 MOST = 2500  # samples, those of the fastest turning
 ROUNDS = 18
 REACH = 0.1  # turns, rms, by which a first guess may be off
@@ -50,21 +51,37 @@ def wind(readings: Readings, turning, clocks: dict) -> dict:
         ages = ages_of(guess, seen)
         motion, left = moved(seen, maps, ages, weights)
         size = 1.4826 * np.median(np.abs(left))
-        weights = 1 / (1 + (np.sum(left**2, axis=2) / (4 * size) ** 2) ** 2)
+        weights = robust(left, size)
         maps = remapped(seen, motion, ages, weights)
         if number:
             guess = turned(seen, maps, motion, guess, REACH * DRAWN_IN**number)
+    # over all samples: those that were picked turn fast by the accelerometers, and less by others
+    seen = informative(readings, turning, imus, None)
+    ages = ages_of(guess, seen)
+    motion, left = moved(seen, maps, ages, np.ones(ages.shape))
+    motion = moved(seen, maps, ages, robust(left, size))[0]
     both = [np.sqrt(np.mean(part**2)) for part in (motion[:, 3:], seen.turning)]
     sign = np.sign(np.sum(motion[:, 3:] * seen.turning))
     guess[:, 0] = sign * UNIT * both[0] / both[1]
     return dict(zip(imus, guess, strict=True))
 
 
-def informative(readings: Readings, turning, imus) -> Gyroscopes:
-    """The samples of the fastest turning at which all the gyroscopes were read."""
+def windable(readings: Readings, imus) -> bool:
+    """Whether there are gyroscopes and samples enough."""
+    together = readings.keep[:, sorted(imus), 3:].all(axis=(1, 2))
+    return len(imus) >= ENOUGH and together.sum() >= LEAST
+
+
+def robust(left, size) -> np.ndarray:
+    """Weights (T, K) of misfits (T, K, 3): near one up to a few times their usual size."""
+    return 1 / (1 + (np.sum(left**2, axis=2) / (4 * size) ** 2) ** 2)
+
+
+def informative(readings: Readings, turning, imus, most=MOST) -> Gyroscopes:
+    """The ``most`` samples of the fastest turning at which all the gyroscopes were read."""
     good = np.flatnonzero(readings.keep[:, imus, 3:].all(axis=(1, 2)))
     fast = np.linalg.norm(turning[good], axis=1)
-    good = np.sort(good[np.argsort(fast)[-MOST:]])
+    good = np.sort(good[np.argsort(fast)[-(most or len(good)) :]])
     values = readings.values[good][:, imus, 3:]
     return Gyroscopes(readings.time[good], readings.span, values, turning[good])
 
