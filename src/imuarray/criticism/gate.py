@@ -9,13 +9,17 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import median_filter
 from scipy.stats import chi2, norm
 
 from imuarray.criticism.fit import Fit, pick
 from imuarray.criticism.noise import Noise, standardised, tail_log_p
+from imuarray.criticism.scans import delay_score
 from imuarray.criticism.scores import Evidence, log_tail, robust_inverse
 
 SEEN = 1e-4
+SLOW = 3  # turns in the recording; slower ages are a drift
+AROUND = 101  # frequencies that tell a periodogram's level
 CROWD = 1.3  # axes' tests are not quite independent: variance of their sum against chi-square's
 
 
@@ -32,8 +36,7 @@ def features(fit: Fit, imu: int) -> dict[str, np.ndarray]:
     """Groups of features of an IMU's own motion, each (T, n) with unit mean square."""
     motion, state = fit.state.motion, fit.state
     rate, turn = motion[:, :3], motion[:, 3:6]
-    place = state.positions[min(imu, len(state.positions) - 1)]
-    force = np.cross(rate, np.cross(rate, place)) + np.cross(turn, place) + motion[:, 6:9]
+    force = lever(motion, state.positions[min(imu, len(state.positions) - 1)]) + motion[:, 6:9]
     jerk, force_rate = state.jerk
     time = 2 * fit.readings.time[:, None] / fit.readings.span - 1
     pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
@@ -55,8 +58,25 @@ def features(fit: Fit, imu: int) -> dict[str, np.ndarray]:
         "force in time": time * force,
         "rate in time": time * rate,
     }
-    sizes = {name: np.sqrt(np.mean(value**2, axis=0)) for name, value in groups.items()}
-    return {n: v / np.where(sizes[n] > 0, sizes[n], 1.0) for n, v in groups.items()}
+    return {name: unit(value) for name, value in groups.items()}
+
+
+def unit(values) -> np.ndarray:
+    """Columns (T, n) with unit mean square."""
+    size = np.sqrt(np.mean(values**2, axis=0))
+    return values / np.where(size > 0, size, 1.0)
+
+
+def lever(motion, place) -> np.ndarray:
+    """Acceleration (T, 3) of a place (3,) m against the origin's."""
+    rate, turn = motion[:, :3], motion[:, 3:6]
+    return np.cross(rate, np.cross(rate, place)) + np.cross(turn, place)
+
+
+def bending(motion, force, axis: int) -> np.ndarray:
+    """What an accelerometer's axis sees where forces (T, 3) move it, (T, 9): boards bend."""
+    arms = np.stack([lever(motion, place)[:, axis] for place in np.eye(3)], axis=1)
+    return unit((arms[:, :, None] * force[:, None, :]).reshape(len(motion), 9))
 
 
 def regression_checks(fit: Fit, given: Evidence, noise: Noise) -> list[Check]:
@@ -70,12 +90,15 @@ def regression_checks(fit: Fit, given: Evidence, noise: Noise) -> list[Check]:
     groups: dict[str, list] = {}
     axes = []
     for imu in range(count):
-        table = features(fit, imu)
-        names = np.repeat(list(table), [v.shape[1] for v in table.values()])
-        stacked = np.hstack(list(table.values()))
+        common = features(fit, imu)
         for axis in range(6):
             if not fit.readings.exists[imu, axis // 3]:
                 continue
+            table = dict(common)
+            if axis < 3:
+                table["force times lever"] = bending(fit.state.motion, common["force"], axis)
+            names = np.repeat(list(table), [v.shape[1] for v in table.values()])
+            stacked = np.hstack(list(table.values()))
             seen = -np.einsum("ti,tia->ta", basis[:, imu, axis], through)
             own = np.flatnonzero(pairs[:, 0] == imu)
             seen[:, own] += fit.whitened[:, imu, axis][:, pairs[own, 1]]
@@ -92,7 +115,7 @@ def regression_checks(fit: Fit, given: Evidence, noise: Noise) -> list[Check]:
                 chosen = np.flatnonzero(names == name)
                 groups.setdefault(name, []).append((imu, *_chi(block, score, bare, chosen)))
             axes.append((imu, *_chi(block, score, bare, np.arange(len(names)))))
-    checks = [_pooled(f"residual against {name}", found) for name, found in groups.items()]
+    checks = [_either(f"residual against {name}", found) for name, found in groups.items()]
     return [*checks, _pooled("residual against all", axes), _worst("an axis against all", axes)]
 
 
@@ -111,6 +134,13 @@ def _pooled(name, found) -> Check:
     widened = freedom + (total - freedom) / np.sqrt(CROWD)
     worst = max(found, key=lambda f: f[1] - f[2])
     return Check(name, total / freedom, log_tail(max(widened, 1e-9), freedom), (worst[0],))
+
+
+def _either(name, found) -> Check:
+    """All axes together, or the worst of them."""
+    together, worst = _pooled(name, found), _worst(name, found)
+    best = min(together, worst, key=lambda check: check.log_p)
+    return best._replace(log_p=min(best.log_p + np.log(2), 0.0))
 
 
 def _worst(name, found) -> Check:
@@ -154,6 +184,33 @@ def normal_checks(name, found) -> Check:
     single = norm.logsf(abs(worst[1])) + np.log(2 * len(found))
     pooled = chi2.logsf(sum(z**2 for _, z in found), len(found))
     return Check(name, worst[1], float(min(single, pooled, -np.log(2)) + np.log(2)), (worst[0],))
+
+
+def timing_check(fit: Fit) -> Check:
+    """Do ages come and go at some frequency? The periodogram of each IMU's delay.
+
+    Against white noise, or its own level around a frequency where that is higher.
+    """
+    score, information = delay_score(fit)
+    time = fit.readings.time
+    step = np.median(np.diff(time))
+    place = np.round((time - time[0]) / step).astype(int)
+    both = np.flatnonzero(fit.readings.exists.all(axis=1))
+    found = []
+    for imu in both:
+        own, known = score[:, imu], information[:, imu]
+        grid = np.zeros(place[-1] + 1)
+        np.add.at(grid, place, own - known * own.sum() / known.sum())
+        power = np.abs(np.fft.rfft(grid))[SLOW:] ** 2
+        if len(power) < AROUND:
+            continue
+        level = median_filter(power, AROUND, mode="nearest") / np.log(2)
+        highest = float(np.max(power / np.maximum(level, known.sum())))
+        found.append((int(imu), highest, np.log(len(power) * len(both)) - highest))
+    if not found:
+        return Check("ages in time", 0.0, 0.0, ())
+    imu, highest, log_p = min(found, key=lambda f: f[2])
+    return Check("ages in time", highest, float(min(log_p, 0.0)), (imu,))
 
 
 def company_check(fit: Fit, noise: Noise) -> Check:
@@ -209,7 +266,8 @@ def resolution_check(fit: Fit) -> Check:
 def all_checks(fit: Fit, given: Evidence, noise: Noise) -> list[Check]:
     """Everything that is tested of a residual."""
     return [
-        *regression_checks(fit, given, noise), *size_checks(fit), company_check(fit, noise),
+        *regression_checks(fit, given, noise), *size_checks(fit), timing_check(fit),
+        company_check(fit, noise),
         *noise_checks(noise, fit.readings.exists), resolution_check(fit),
     ]  # fmt: skip
 

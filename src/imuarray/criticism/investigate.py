@@ -14,7 +14,7 @@ from imuarray.criticism.columns import catalogue_effects, columns_of
 from imuarray.criticism.fit import Fit, fit
 from imuarray.criticism.gate import Check, all_checks
 from imuarray.criticism.readings import Readings, arrange, determined, part_of
-from imuarray.criticism.remainder import judged, outlier_checks, plausibility_checks
+from imuarray.criticism.remainder import drift_checks, judged, outlier_checks, plausibility_checks
 from imuarray.criticism.scans import delay_score, sawtooth
 from imuarray.criticism.scores import candidates, log_tail, mask_of, score_all
 from imuarray.criticism.search import Search, own_turning
@@ -82,14 +82,14 @@ def investigate(
     search.polish()
     clear(search)
     say("judging the noise")
-    tails, in_noise = settle(search, without)
+    tailed, in_noise = settle(search, without)
     if "coloured_noise" not in without:
         remember(search)
     say("testing what is left")
     checks = all_checks(search.fit, search.given, search.noise)
-    checks += [*outlier_checks(search), *plausibility_checks(search)]
+    checks += [*outlier_checks(search), *plausibility_checks(search), *drift_checks(search)]
     calm_ = not any(c.log_p < thresholds.check for c in checks if c.name.startswith("residual"))
-    in_noise += named_noise(search, without, tails, calm_)
+    in_noise += named_noise(search, without, tailed, calm_)
     explained, failing = judged(search, checks, in_noise)
     found = Found(search, base, base_checks, structural, in_noise, checks, explained, failing, raw)
     say("looking for what cannot be told apart")
@@ -121,13 +121,17 @@ def calm(search: Search) -> None:
 
 
 def settle(search: Search, without) -> tuple[list, list]:
-    """Heavy tails: judged on all readings once the means are known, then left out of the fit."""
+    """Heavy tails: judged on all readings once the means are known, then left out of the fit.
+
+    Returns the triads [(imu, kind, Mixture)] that have them, or may have, and the cause.
+    """
     whole = replace(search.readings, keep=search.allowed)
     search.readings = whole
     search.refit()
     if "heavy_tails" in without:
         return [], []
-    named, hits = variance.heavy_tails(search.fit, search.thresholds.limit("heavy_tails"))
+    limit = search.thresholds.limit("heavy_tails")
+    named, hits, others = variance.heavy_tails(search.fit, limit)
     if named is None:
         return [], []
     far = np.zeros((*whole.keep.shape[:2], 2), bool)
@@ -139,7 +143,7 @@ def settle(search: Search, without) -> tuple[list, list]:
     adopt(search)
     if len(search.causes) > before:
         clear(search)
-    return hits, [named]
+    return hits + others, [named]
 
 
 def remember(search: Search) -> None:

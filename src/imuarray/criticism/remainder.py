@@ -12,12 +12,14 @@ from imuarray.criticism.columns import POSITION
 from imuarray.criticism.fit import flat_parameters
 from imuarray.criticism.gate import Check, normal_checks
 from imuarray.criticism.linearise import linearise
+from imuarray.criticism.scores import log_tail
 from imuarray.criticism.search import Search
 from imuarray.criticism.worth import need
 
 LITTLE = 0.03  # of the noise's own misfit: so little left over may be forgiven
 IMPLAUSIBLE = 10.0  # prior sds
-UNFORGIVEN = ("outliers", "size of")  # checks that a small remainder does not excuse
+STEADY = -50.0  # log p of a drift that does not change: what it names is not what it is
+UNFORGIVEN = ("outliers", "size of", "change of")  # checks that a small remainder does not excuse
 
 
 def outlier_checks(search: Search) -> list[Check]:
@@ -57,6 +59,18 @@ def plausibility_checks(search: Search) -> list[Check]:
                 Check(f"size of {cause.effect}", largest, float(norm.logsf(largest)), (imu,))
             )
     return found
+
+
+def drift_checks(search: Search) -> list[Check]:
+    """Drifts that need their constants only: an offset in their clothes."""
+    cause = next((c for c in search.causes if c.effect == "bias_drift"), None)
+    if cause is None:
+        return []
+    columns = search.columns
+    changing = [c for c in columns.of("bias_drift") if columns.places[c][2] > 0]
+    statistic, freedom = need(search, "bias_drift", among=changing)
+    steady = log_tail(statistic, max(freedom, 1)) > search.thresholds.limit("bias_drift")
+    return [Check("change of bias_drift", statistic, STEADY if steady else 0.0, cause.imus)]
 
 
 def judged(search: Search, checks, in_noise) -> tuple[float, bool]:

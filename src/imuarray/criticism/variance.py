@@ -14,6 +14,7 @@ from imuarray.criticism.scores import log_tail
 from imuarray.model.effects import KINDS
 
 FEW = 4  # outliers; so few are an accident, not a law
+MAYBE = -3.0  # log p of one triad's tails, where another's are sure
 AGREE = 3.5  # sds within which two estimates are of one thing
 
 
@@ -193,7 +194,10 @@ def _tail_nats(axes, square, share, factor, core, plain) -> np.ndarray:
 
 
 def heavy_tails(fit: Fit, limit: float):
-    """(Named or None, [(imu, kind, Mixture)]): triads that a mixture describes better."""
+    """(Named or None, hits, others): triads [(imu, kind, Mixture)] that a mixture describes better.
+
+    ``others`` are those where it may be so, once it is so somewhere.
+    """
     triads = np.argwhere(fit.readings.exists)
     tried = [(int(i), int(k), mixture(fit, i, k)) for i, k in triads]
     several = [m.share * len(fit.residual) > FEW for *_, m in tried]
@@ -202,8 +206,10 @@ def heavy_tails(fit: Fit, limit: float):
          for (*_, m), s in zip(tried, several, strict=True)]
     ) + np.log(len(triads))  # fmt: skip
     if logs.min() > limit:
-        return None, []
+        return None, [], []
     hits = [item for item, log_p in zip(tried, logs, strict=True) if log_p < limit]
+    maybe = logs - np.log(len(triads)) < MAYBE
+    others = [item for item, weak in zip(tried, maybe & (logs >= limit), strict=True) if weak]
     nats, numbers, count = np.zeros(len(fit.residual)), {}, len(fit.residual)
     for imu, kind, mix in hits:
         unit = triad(fit, imu, kind)
@@ -216,7 +222,7 @@ def heavy_tails(fit: Fit, limit: float):
         far = max(6 * mix.share * count, 1.0)
         numbers[f"factor_{name}"] = (mix.factor, float(mix.factor / np.sqrt(far)), "1")
     imus = tuple(sorted({imu for imu, *_ in hits}))
-    return Named("heavy_tails", imus, float(logs.min()), numbers, *held_out(nats)), hits
+    return Named("heavy_tails", imus, float(logs.min()), numbers, *held_out(nats)), hits, others
 
 
 def pooled_memory(fit: Fit, noise: Noise, memories) -> float:

@@ -10,19 +10,20 @@ from imuarray.criticism.scores import Candidate, log_tail
 from imuarray.criticism.search import Search, started
 
 
-def freed_places(search: Search, effect: str, imus=None) -> np.ndarray:
-    """Places of an adopted effect's free parameters, of some of its IMUs."""
+def freed_places(search: Search, effect: str, imus=None, among=None) -> np.ndarray:
+    """Places of an adopted effect's free parameters, of some of its IMUs or ``among`` columns."""
     mask = search.active.copy()
-    others = np.setdiff1d(np.arange(search.columns.size), search.columns.of(effect))
+    chosen = search.columns.of(effect) if among is None else among
+    others = np.setdiff1d(np.arange(search.columns.size), chosen)
     mask[:, others] = False
     if imus is not None:
         mask[np.setdiff1d(np.arange(len(mask)), imus)] = False
     return search.given.places(mask)
 
 
-def need(search: Search, effect: str, imus=None) -> tuple[float, int]:
+def need(search: Search, effect: str, imus=None, among=None) -> tuple[float, int]:
     """(chi-square, degrees of freedom) of an adopted effect against zero, all else refitted."""
-    freed = freed_places(search, effect, imus)
+    freed = freed_places(search, effect, imus, among)
     active = np.setdiff1d(search.given.places(search.active), freed)
     conditional = search.given.conditional(active, freed)
     return search.given.test(conditional, freed)
