@@ -77,6 +77,14 @@ class Noise:
 
         return one(self.accelerometer), one(self.gyroscope)
 
+    def misfit(self, force, rate, saturated=None) -> float:
+        """Chi-square of residuals (T, A, 3) m/s^2 and (T, G, 3) rad/s, saturated axes left out."""
+        force, rate = force.reshape(len(force), -1), rate.reshape(len(rate), -1)
+        if saturated is not None:
+            rate = np.where(np.reshape(saturated, rate.shape), 0.0, rate)
+        total = np.sum((force @ self.accelerometer_precision) * force)
+        return float(total + np.sum(np.linalg.solve(self.gyroscope, rate.T).T * rate))
+
     def angular_rate_given_gyroscopes(self, angular_rate, saturated=None):
         """The Gaussian p(omega_t | y_g) under a flat prior (paper 2021, eq. 15).
 

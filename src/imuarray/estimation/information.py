@@ -1,0 +1,105 @@
+"""The positions' score and Fisher information with the motion eliminated, in collapsed form.
+
+For the papers' model with isotropic triads. The residual's derivative by r_k is Omega_t =
+Omega(omega)^2 + Omega(omega_dot), the same at each triad; the motion's derivatives are B dw/domega
+and H of (5a), whose B and H are the same at each sample. So the Schur complement over all samples
+needs moments of Omega_t and dw/domega only: 54 x 54 numbers, however many triads there are.
+"""
+
+from __future__ import annotations
+
+import numba as nb
+import numpy as np
+
+from imuarray.estimation.collapsed import Collapsed
+from imuarray.model import structure_tensor
+from imuarray.model.structure import design
+
+CHUNK = 4096  # samples at a time: bounds memory
+
+
+def arms(state) -> np.ndarray:
+    """Omega_t as (3, 3, T): axis of the force, axis of the position, from (w, phi) (12, T)."""
+    tensor = structure_tensor()[1:].transpose(1, 0, 2)
+    return (tensor.reshape(9, 12) @ state).reshape(3, 3, -1)
+
+
+def score(data: Collapsed, positions, state) -> np.ndarray:
+    """Half the cost's fall per metre of each position, (A, 3), at the motion ``state`` (12, T).
+
+    At the most likely motion this is the score of the profile likelihood.
+    """
+    omega = arms(state)
+    force = data.specific_force.reshape(len(positions), -1)
+    common = structure_tensor()[0] @ state
+    stacked = omega.transpose(1, 0, 2).reshape(3, -1)
+    right = force @ stacked.T - stacked @ common.ravel()
+    return data.weights[:, None] * (right - positions @ (stacked @ stacked.T))
+
+
+@nb.njit(cache=True, nogil=True)
+def _rows(rate, omega, C, P, out):
+    """Omega_t (x) dw/domega W_t^-1/2, (3 T, 54), W_t the information of omega_t."""
+    slope, W, Y = np.zeros((6, 3)), np.empty((3, 3)), np.empty((6, 3))
+    for t in range(rate.shape[1]):
+        x, y, z = rate[0, t], rate[1, t], rate[2, t]
+        slope[0, 0], slope[1, 1], slope[2, 2] = 2 * x, 2 * y, 2 * z
+        slope[3, 0], slope[3, 1] = y, x
+        slope[4, 0], slope[4, 2] = z, x
+        slope[5, 1], slope[5, 2] = z, y
+        for i in range(3):
+            for j in range(i + 1):
+                value = P[i, j, t]
+                for a in range(6):
+                    for b in range(6):
+                        value += slope[a, i] * C[a, b] * slope[b, j]
+                W[i, j] = value
+        for j in range(3):
+            for i in range(j, 3):
+                value = W[i, j]
+                for m in range(j):
+                    value -= W[i, m] * W[j, m]
+                W[i, j] = np.sqrt(value) if i == j else value / W[j, j]
+        for a in range(6):
+            for i in range(3):
+                value = slope[a, i]
+                for m in range(i):
+                    value -= W[i, m] * Y[a, m]
+                Y[a, i] = value / W[i, i]
+        for j in range(3):
+            for i in range(3):
+                for c in range(3):
+                    for a in range(6):
+                        out[3 * t + j, 18 * i + 6 * c + a] = omega[c, i, t] * Y[a, j]
+
+
+def information(data: Collapsed, positions, rate, state, reduced) -> np.ndarray:
+    """Fisher information (3 (A - 1), 3 (A - 1)) of r_2 ... r_A, 1 / m^2, the motion unknown.
+
+    ``rate`` (3, T) and ``state`` (12, T) are the motion, ``reduced`` what `Collapsed.reduce`
+    gives at ``positions`` (A, 3). Its inverse is the Cramer-Rao bound of the positions.
+    """
+    C, X, inverse = reduced[0], reduced[2], reduced[-1]
+    omega, count = arms(state), len(positions)
+    stacked = omega.transpose(1, 0, 2).reshape(3, -1)
+    whole = np.kron(np.diag(data.weights), stacked @ stacked.T)
+    # what omega_dot and s take up
+    columns = design(positions).reshape(count, 3, 12)
+    linear = data.weights[:, None, None] * columns[..., 6:]
+    entries = omega.transpose(1, 0, 2).reshape(9, -1)  # position's axis, force's axis
+    moments = (entries @ entries.T).reshape(3, 3, 3, 3)
+    lost = np.einsum("kcp,pq,ldq->kcld", linear, inverse, linear)
+    whole -= np.einsum("kcld,icjd->kilj", lost, moments).reshape(whole.shape)
+    # what omega takes up of the rest
+    left = data.weights[:, None, None] * (columns[..., :6] - columns[..., 6:] @ X)
+    left = left.reshape(count, 18)
+    gram = np.zeros((54, 54))
+    for first in range(0, rate.shape[1], CHUNK):
+        part = slice(first, first + CHUNK)
+        rows = np.empty((3 * rate[:, part].shape[1], 54))
+        _rows(rate[:, part], omega[..., part], C, data.gyroscope_information[..., part], rows)
+        gram += rows.T @ rows
+    blocks = gram.reshape(3, 18, 3, 18)
+    taken = np.einsum("ka,iajb,lb->kilj", left, blocks, left, optimize=True)
+    whole -= taken.reshape(whole.shape)
+    return whole[3:, 3:]

@@ -1,0 +1,136 @@
+"""Joint Gauss-Newton of positions and motion for the papers' model, the motion eliminated."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg
+
+from imuarray.errors import IdentifiabilityError
+from imuarray.estimation import kernels
+from imuarray.estimation.bcd import Calibration
+from imuarray.estimation.collapsed import Collapsed
+from imuarray.estimation.information import information, score
+from imuarray.estimation.motion_ml import motion_from
+
+SLOW = 0.05  # of the step before: an information that contracts less is computed anew
+TRIES = 10  # halvings of a step that raises the cost
+RATE, LIMIT = 1e-10, 50  # of the search for each sample's omega: tolerance, steps
+ROUNDED = 1e-14  # of y' Lambda y: what a cost, a small difference of such, is good to
+SINGULAR = 1e-12  # least pivot of the information, scaled to a unit diagonal
+
+
+def descend(
+    data: Collapsed, start, prior=None, tolerance: float = 1e-6, limit: int = 50,
+) -> Calibration:  # fmt: skip
+    """The most likely positions from ``start`` (A, 3) m, and their covariance.
+
+    ``prior`` is None or (mean (3 (A - 1),) m, precision (3 (A - 1),) squared, 1 / m^2). Each
+    iteration finds every sample's motion and takes a step of Newton's method on the profile
+    likelihood, its curvature the Fisher information with the motion eliminated; that is computed
+    again only where steps shrink slowly. Stops when no coordinate moves by more than
+    ``tolerance`` of its own sd. IdentifiabilityError where the information is singular.
+    """
+    here = _at(data, np.array(start, float), data.mean.copy(), prior)
+    curvature, costs, steps, converged, last = None, [here.cost], [0.0], False, np.inf
+    for _ in range(limit):
+        fresh = curvature is None
+        curvature = _curvature(data, here, prior) if fresh else curvature
+        step, size = _step(curvature, here)
+        if not fresh and max(SLOW * last, tolerance) < size:
+            curvature = _curvature(data, here, prior)
+            step, size = _step(curvature, here)
+        if size < tolerance:
+            converged = True
+            break
+        there, length = _shortened(data, here, step, prior)
+        if there is None:
+            break  # no shorter step lowers the cost: not converged, and said so
+        here, last = there, size
+        costs.append(here.cost)
+        steps.append(float(np.max(np.abs(length * step))))
+    covariance = np.linalg.inv(_information(data, here, prior))
+    return Calibration(
+        here.positions, motion_from(data, here.positions), np.array(costs), np.array(steps),
+        converged, here.positions[None], covariance, np.empty(0),
+    )  # fmt: skip
+
+
+class Point(NamedTuple):
+    """Positions, the most likely motion there, and how good both are."""
+
+    positions: np.ndarray  # (A, 3)
+    rate: np.ndarray  # (3, T)
+    state: np.ndarray  # (w, phi) (12, T)
+    reduced: tuple
+    cost: float  # twice the negative log posterior
+    slope: np.ndarray  # (3 (A - 1),), half the cost's fall
+
+
+class Curvature(NamedTuple):
+    """Fisher information, factored, and the sds it implies."""
+
+    factor: tuple
+    sd: np.ndarray
+
+
+def _at(data: Collapsed, positions, rate, prior) -> Point:
+    """The motion is searched from ``rate`` (3, T)."""
+    reduced = data.reduce(positions)
+    C, b, X, phi, const, logdet, _ = reduced
+    if np.isnan(logdet):
+        raise IdentifiabilityError(
+            "positions: expected triads from which omega_dot and s follow, found H'QH singular"
+        )
+    rate, counts = rate.copy(), np.empty(data.samples, np.int64)
+    cost, state = np.empty(data.samples), np.empty((12, data.samples))
+    kernels.angular_rates(
+        rate, C, b, data.mean, data.gyroscope_information, RATE, LIMIT, cost, counts
+    )
+    kernels.linear_motion(rate, X, phi, state)
+    total = float(cost.sum() + const.sum())
+    slope = score(data, positions, state)[1:].ravel()
+    if prior is not None:
+        away = positions[1:].ravel() - prior[0]
+        pull = prior[1] @ away
+        total, slope = total + float(away @ pull), slope - pull
+    return Point(positions, rate, state, reduced, total, slope)
+
+
+def _information(data: Collapsed, here: Point, prior) -> np.ndarray:
+    known = information(data, here.positions, here.rate, here.state, here.reduced)
+    return known if prior is None else known + prior[1]
+
+
+def _curvature(data: Collapsed, here: Point, prior) -> Curvature:
+    known = _information(data, here, prior)
+    scale = np.sqrt(np.maximum(np.diag(known), 1e-300))
+    factor, failed = scipy.linalg.lapack.dpotrf(known / np.outer(scale, scale), lower=1)
+    if failed or np.min(np.diag(factor)) ** 2 < SINGULAR:
+        raise IdentifiabilityError(
+            "calibration: expected informative motion, found a direction of the positions that the"
+            " data do not determine"
+        )
+    inverse = scipy.linalg.lapack.dpotri(factor, lower=1)[0]
+    factor = scale[:, None] * factor
+    return Curvature((factor, True), np.sqrt(np.diag(inverse)) / scale)
+
+
+def _step(curvature: Curvature, here: Point):
+    """(step, its largest component in sds)."""
+    step = scipy.linalg.cho_solve(curvature.factor, here.slope)
+    return step, float(np.max(np.abs(step) / curvature.sd))
+
+
+def _shortened(data: Collapsed, here: Point, step, prior):
+    """(where the cost is no higher, share of the step), halved where need be; or (None, 0)."""
+    length = 1.0
+    for _ in range(TRIES):
+        moved = here.positions.copy()
+        moved[1:] += length * step.reshape(-1, 3)
+        there = _at(data, moved, here.rate, prior)
+        if there.cost <= here.cost + ROUNDED * data.energy.sum():
+            return there, length
+        length /= 2
+    return None, 0.0
