@@ -17,10 +17,12 @@ from imuarray.errors import IdentifiabilityError, InputError
 def calls(monkeypatch, tmp_path):
     """Stand-ins for the commands, which note what they were called with."""
     seen = []
-    commands = types.ModuleType("imuarray.commands")
-    for name in ("simulate", "calibrate", "sample"):
-        setattr(commands, name, lambda arguments, name=name: seen.append((name, arguments)))
-    monkeypatch.setitem(sys.modules, "imuarray.commands", commands)
+    homes = {"commands": ("simulate", "calibrate"), "commands_sample": ("sample",)}
+    for home, names in homes.items():
+        commands = types.ModuleType(f"imuarray.{home}")
+        for name in names:
+            setattr(commands, name, lambda arguments, name=name: seen.append((name, arguments)))
+        monkeypatch.setitem(sys.modules, f"imuarray.{home}", commands)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "rec.nc").write_text("stands for a recording")
     (tmp_path / "c.yaml").write_text("scale: quick")

@@ -11,7 +11,7 @@ from imuarray.argument_types import count, effects, positive, seed
 from imuarray.errors import InputError
 
 CALIBRATION_METHODS = ("bcd", "gauss-newton")
-SAMPLING_METHODS = ("pmmh",)
+SAMPLING_METHODS = ("pmmh", "nuts")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -264,7 +264,7 @@ def _add_sample(commands) -> None:
     parser = _add_command(
         commands,
         "sample",
-        _later("commands", "sample"),
+        _later("commands_sample", "sample"),
         "Sample the posterior distribution of the accelerometer positions.",
         "rec.nc --method pmmh --steps 5000 --seed 1 --out posterior.nc",
         "posterior to write (NetCDF-4)",
@@ -273,7 +273,8 @@ def _add_sample(commands) -> None:
     _add_model(parser)
     parser.add_argument(
         "--method", choices=SAMPLING_METHODS, default="pmmh",
-        help="pmmh: pseudo-marginal Metropolis-Hastings (default)",
+        help="pmmh: pseudo-marginal Metropolis-Hastings, as paper 2021 (default); nuts: the"
+        " no-U-turn sampler on the exact marginal likelihood, in seconds",
     )  # fmt: skip
     parser.add_argument(
         "--rates", choices=("declared", "spread"), default="declared",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from imuarray.errors import IdentifiabilityError
@@ -92,6 +94,10 @@ def calibrate_gauss_newton(
             mean, sd = position_prior
             position_prior = np.asarray(mean), np.diag(np.broadcast_to(sd, mean.shape) ** -2.0)
         found = descend(data, positions, position_prior, tolerance, limit)
+        # the collapsed cost leaves out how the gyroscopes differ among themselves
+        spread = angular_rate - data.mean.T[:, None]
+        apart = model.noise.misfit(np.zeros((len(spread), 3 * len(positions))), spread, saturated)
+        found = replace(found, cost=found.cost + apart)
     else:
         found = calibrate_blocks(
             model, specific_force, angular_rate, positions, saturated, position_prior,

@@ -1,0 +1,203 @@
+"""The marginal likelihood p(y | theta) without Monte Carlo noise, and with a gradient.
+
+Given omega_t the rest of the motion is integrated analytically, as in (26a); what is left, an
+integral over omega_t in three dimensions, has an exponent that is a quartic polynomial, almost
+quadratic. Gauss-Hermite nodes are laid around its mode at every theta, scaled by its curvature.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from imuarray.estimation.collapsed import Collapsed
+from imuarray.model import structure_tensor
+from imuarray.model.jax64 import jax, jnp
+from imuarray.model.small_linear import (
+    cholesky,
+    log_determinant,
+    solve_lower,
+    solve_upper,
+)
+from imuarray.model.structure import PAIRS
+from imuarray.posterior.likelihood import Likelihood
+
+NODES = 3  # on each axis of omega
+NEWTON = 4  # steps to the mode, from where it is at the reference positions
+
+
+class Data(NamedTuple):
+    """Measurements as the marginal needs them (T samples, D = 3 A)."""
+
+    weighted: jnp.ndarray  # (T, D) Lambda y
+    energy: jnp.ndarray  # (T,) y' Lambda y
+    precision: jnp.ndarray  # (D, D) Lambda
+    mean: jnp.ndarray  # (T, 3) rad/s, of p(omega | y_g)
+    information: jnp.ndarray  # (T, 3, 3), its inverse covariance
+    pull: jnp.ndarray  # (T, 6) the prior's part of H' Lambda y for omega_dot and s
+    ridge: jnp.ndarray  # (6,) its part of H' Lambda H's diagonal, zero where flat
+    start: jnp.ndarray  # (T, 3) rad/s, where the search for each mode begins
+
+
+def grid(nodes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes (n^3, 3) and log weights (n^3,) of the standard normal in three dimensions."""
+    points, weights = np.polynomial.hermite_e.hermegauss(nodes)
+    weights = np.log(weights / np.sqrt(2 * np.pi))
+    three = np.meshgrid(points, points, points, indexing="ij")
+    logs = weights[:, None, None] + weights[:, None] + weights
+    return np.stack([axis.ravel() for axis in three], axis=1), logs.ravel()
+
+
+def _products(rate):
+    """w (..., 6) of omega (..., 3)."""
+    return jnp.stack([rate[..., i] * rate[..., j] for i, j in PAIRS], axis=-1)
+
+
+_TENSOR = np.zeros((6, 3, 3))  # d2 w_a / d omega_i d omega_j
+for _row, (_i, _j) in enumerate(PAIRS):
+    _TENSOR[_row, _i, _j] += 1.0
+    _TENSOR[_row, _j, _i] += 1.0
+
+
+def collapse(positions, data: Data):
+    """(C (6, 6), b (T, 6), constant (T,), log |H' Lambda H|) at positions (A, 3) m.
+
+    Minus twice the exponent of (26a) is constant - 2 b . w + w' C w.
+    """
+    affine = jnp.concatenate([jnp.ones((len(positions), 1)), positions], axis=1)
+    design = jnp.einsum("km,mij->kij", affine, structure_tensor()).reshape(-1, 12)
+    known = design.T @ data.precision @ design
+    factor = cholesky(known[6:, 6:] + jnp.diag(data.ridge))
+    half = solve_lower(factor, known[6:, :6])
+    seen = data.weighted @ design
+    inner = solve_lower(factor, (seen[:, 6:] + data.pull).T)
+    b = seen[:, :6] - inner.T @ half
+    constant = data.energy - jnp.sum(inner**2, axis=0)
+    return known[:6, :6] - half.T @ half, b, constant, log_determinant(factor)
+
+
+def _curvature(rate, C, b, information):
+    """(gradient (3,), second derivatives (3, 3) or their first-order part) of one exponent."""
+    slope = jnp.einsum("aij,j->ai", _TENSOR, rate)
+    misfit = C @ _products(rate) - b
+    first = information + slope.T @ C @ slope
+    full = first + jnp.einsum("a,aij->ij", misfit, _TENSOR)
+    minors = full[0, 0], full[0, 0] * full[1, 1] - full[0, 1] ** 2, jnp.linalg.det(full)
+    sound = (minors[0] > 0) & (minors[1] > 0) & (minors[2] > 1e-3 * jnp.linalg.det(first))
+    return slope.T @ misfit, jnp.where(sound, full, first)
+
+
+def _mode(rate, C, b, mean, information):
+    """(mode (3,), lower factor (3, 3) of the curvature there) of one sample's exponent."""
+
+    def step(rate, _):
+        slope, second = _curvature(rate, C, b, information)
+        gradient = slope + information @ (rate - mean)
+        factor = cholesky(second)
+        return rate - solve_upper(factor, solve_lower(factor, gradient[:, None]))[:, 0], None
+
+    rate, _ = jax.lax.scan(step, rate, None, NEWTON)
+    return rate, cholesky(_curvature(rate, C, b, information)[1])
+
+
+def log_marginal(positions, data: Data, nodes, log_weights):
+    """log p(y_a | theta, y_g) at positions (A, 3) m, up to the constant that (26a) leaves out.
+
+    The nodes are fixed where the derivative is taken: the derivative under the integral.
+    """
+    C, b, constant, logdet = collapse(positions, data)
+    fixed = jax.lax.stop_gradient((C, b))
+    rate, factor = jax.vmap(_mode, (0, None, 0, 0, 0))(
+        data.start, fixed[0], fixed[1], data.mean, data.information
+    )
+    # omega = mode + F^-T z for a curvature F F'
+    spread = jax.vmap(lambda f: solve_upper(f, nodes.T).T)(factor)
+    drawn = rate[:, None] + spread
+    w = _products(drawn)
+    away = drawn - data.mean[:, None]
+    prior = jnp.einsum("tni,tij,tnj->tn", away, data.information, away)
+    form = jnp.einsum("tna,ab,tnb->tn", w, C, w) - 2 * jnp.einsum("tna,ta->tn", w, b)
+    exponent = -0.5 * (prior + form + constant[:, None])
+    inside = jax.scipy.special.logsumexp(
+        exponent + log_weights + 0.5 * jnp.sum(nodes**2, axis=1), axis=1
+    )
+    volume = jnp.sum(jnp.log(jnp.diagonal(factor, axis1=1, axis2=2)))
+    known = 0.5 * jnp.sum(jnp.linalg.slogdet(data.information)[1])
+    return jnp.sum(inside) - volume + known - 0.5 * len(rate) * logdet
+
+
+@partial(jax.jit)
+def _value(positions, data, nodes, log_weights):
+    return log_marginal(positions, data, nodes, log_weights)
+
+
+@dataclass(frozen=True)
+class Marginal:
+    """The papers' marginal likelihood of a recording, exact to its quadrature.
+
+    Build it with `Marginal.of`; ``nodes`` (n^3, 3) and ``log_weights`` (n^3,) as `grid` has them.
+    """
+
+    data: Data
+    nodes: np.ndarray
+    log_weights: np.ndarray
+
+    @classmethod
+    def of(
+        cls, likelihood: Likelihood, positions, nodes: int = NODES, motion_sd=(np.inf,) * 3
+    ) -> Marginal:
+        """Of the same recording as a `Likelihood`; modes are searched from those at ``positions``.
+
+        Parameters
+        ----------
+        nodes : int
+            On each axis of omega: 1 is Laplace's method, 3 integrates the quartic to some 1e-10
+            nats a sample where gyroscopes see the motion well.
+        motion_sd : (float, float, float)
+            Prior sds of omega (rad/s), omega_dot (rad/s^2) and s (m/s^2), as `ArrayModel` has
+            them; infinite as in paper 2021.
+        """
+        collapsed = likelihood.collapsed
+        start = _modes(collapsed, likelihood, positions)
+        weighted = collapsed.weighted.reshape(-1, collapsed.samples).T
+        weight = np.asarray(motion_sd, float) ** -2.0
+        information = np.linalg.inv(likelihood.rate_covariance)
+        both = information + weight[0] * np.eye(3)
+        mean = np.linalg.solve(both, information @ likelihood.rate_mean[..., None])[..., 0]
+        # measurements are less their mean over triads, and so is s
+        offset = collapsed.offset.T
+        pull = np.hstack([np.zeros_like(offset), -weight[2] * offset])
+        energy = collapsed.energy + weight[2] * np.sum(offset**2, axis=1)
+        parts = (
+            weighted, energy, _precision(collapsed), mean, both, pull, np.repeat(weight[1:], 3),
+            start,
+        )  # fmt: skip
+        return cls(Data(*map(jnp.asarray, parts)), *grid(nodes))
+
+    def __call__(self, positions) -> float:
+        """log p(y_a | theta, y_g) at positions (A, 3) m, as `Likelihood.estimate` estimates it."""
+        positions = np.asarray(positions, float)
+        return float(_value(positions - positions[0], self.data, self.nodes, self.log_weights))
+
+    def log_density(self, theta):
+        """The same of theta (3 (A - 1),), to be traced and differentiated by JAX."""
+        positions = jnp.concatenate([jnp.zeros((1, 3)), theta.reshape(-1, 3)])
+        return log_marginal(positions, self.data, self.nodes, self.log_weights)
+
+
+def _precision(collapsed: Collapsed) -> np.ndarray:
+    if collapsed.weights is None:
+        return collapsed.precision
+    return np.diag(np.repeat(collapsed.weights, 3))
+
+
+def _modes(collapsed: Collapsed, likelihood: Likelihood, positions) -> np.ndarray:
+    """Each sample's mode of omega at reference positions, (T, 3) rad/s."""
+    from imuarray.posterior.proposals import proposals
+
+    positions = np.asarray(positions, float)
+    relative = np.ascontiguousarray(positions - positions[0])
+    return proposals(collapsed, likelihood.rate_mean, likelihood.rate_covariance, relative)[0]

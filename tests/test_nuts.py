@@ -1,0 +1,97 @@
+"""The no-U-turn sampler on the exact marginal likelihood, against quadrature and PmMH."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from imuarray.blind.cases import Case, make
+from imuarray.cli import main
+from imuarray.errors import InputError
+from imuarray.model.jax64 import jnp
+from imuarray.posterior import Likelihood
+from imuarray.posterior.diagnostics import ess, rhat
+from imuarray.posterior.marginal import Marginal
+from imuarray.posterior.nuts import Whitened, run_nuts
+from imuarray.recording import write_recording
+from tests import test_pmmh_targets
+
+
+@cache
+def chains():
+    """Four chains on the six unknowns that the PmMH sampler is tested on."""
+    model, force, rate, prior = test_pmmh_targets.problem()
+    likelihood = Likelihood.of(model, force, rate)
+    thetas, weights = test_pmmh_targets.exact(0.5)
+    mean = weights @ thetas
+    covariance = (thetas - mean).T @ (weights[:, None] * (thetas - mean))
+    marginal = Marginal.of(likelihood, np.vstack([np.zeros(3), mean.reshape(-1, 3)]), 7)
+
+    def density(theta):
+        return marginal.log_density(theta) - 0.5 * jnp.sum(((theta - prior.mean) / prior.sd) ** 2)
+
+    starts = prior.mean + 1e-3 * np.random.default_rng(3).standard_normal((4, 6))
+    return run_nuts(density, mean, covariance, starts, 300, 2500, seed=3, quiet=True)
+
+
+def test_quantiles_agree_with_quadrature():
+    """Five quantiles of six unknowns within five standard errors, as for PmMH."""
+    draws = chains().draws
+    assert rhat(draws).max() < 1.01
+    assert ess(draws).min() > 3000
+    assert np.abs(test_pmmh_targets.deviations(draws, 0.5)).max() < 5
+
+
+def test_same_posterior_as_pmmh():
+    """Means and sds of both samplers, in their Monte Carlo errors."""
+    mine, other = chains().draws, test_pmmh_targets.chains(20, "derived", 400_000)
+    for power in (1, 2):
+        centre = mine.mean(axis=(0, 1))
+        first, second = (mine - centre) ** power, (other - centre) ** power
+        error = sum(part.var(axis=(0, 1)) / ess(part) for part in (first, second))
+        apart = first.mean(axis=(0, 1)) - second.mean(axis=(0, 1))
+        assert np.abs(apart / np.sqrt(error)).max() < 4.5
+
+
+def test_whitening_goes_both_ways():
+    rng = np.random.default_rng(1)
+    factor = np.tril(rng.standard_normal((4, 4))) + 4 * np.eye(4)
+    white = Whitened(None, rng.standard_normal(4), factor)
+    theta = rng.standard_normal((2, 3, 4))
+    np.testing.assert_allclose(white.theta(white.white(theta)), theta, rtol=1e-12)
+
+
+def test_same_seed_same_draws():
+    def density(theta):
+        return -0.5 * jnp.sum(theta**2)
+
+    def run(seed):
+        starts = np.ones((2, 3))
+        return run_nuts(density, np.zeros(3), np.eye(3), starts, 20, 30, seed, quiet=True).draws
+
+    np.testing.assert_array_equal(run(1), run(1))
+    assert not np.any(run(1)[:, -1] == run(2)[:, -1])
+    assert not np.any(run(1)[0, -1] == run(1)[1, -1])
+
+
+def test_a_start_without_a_density_is_refused():
+    with pytest.raises(InputError, match="finite"):
+        run_nuts(
+            lambda t: jnp.log(t[0]), np.ones(2), np.eye(2), -np.ones((2, 2)), 10, 10, 1, quiet=True
+        )
+
+
+def test_command(tmp_path):
+    """`imuarray sample --method nuts` writes what `--method pmmh` does."""
+    recording, _ = make(Case("nuts", duration=4.0), 1)
+    write_recording(recording, tmp_path / "rec.nc")
+    out = tmp_path / "posterior.nc"
+    code = main(
+        ["sample", str(tmp_path / "rec.nc"), "--method", "nuts", "--steps", "300", "--seed", "2",
+         "--quiet", "--out", str(out)]
+    )  # fmt: skip
+    assert code == 0
+    with xr.open_datatree(out, engine="h5netcdf") as tree:
+        assert tree.attrs["rhat_max"] < 1.05
+        assert tree["posterior"]["position"].sizes["chain"] == 2
