@@ -1,0 +1,202 @@
+"""The Cramer-Rao bound of the positions: who reaches it, how fast, and what it depends on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from imuarray.estimation.bcd import calibrate_bcd
+from imuarray.estimation.collapsed import Collapsed
+from imuarray.estimation.information import arms, information
+from imuarray.estimation.newton import descend
+from imuarray.geometry import Array
+from imuarray.model import ArrayModel
+from imuarray.model.structure import products
+from imuarray.motion import sphere_motion
+from imuarray.simulation import measure
+from imuarray.studies.batches import batch_stream, batches, root_mean_square, run_batches
+
+NEAR = 1.01  # times the bound: as good as efficient
+RANK = 1e-10  # of the largest eigenvalue of the scaled information
+
+
+def information_at(model: ArrayModel, motion, positions, saturated=None) -> np.ndarray:
+    """Fisher information (3 (A - 1),) squared, 1 / m^2, of r_2 ... r_A at a true motion (T, 3).
+
+    The motion is unknown to who estimates; ``saturated`` (T, G, 3) axes tell nothing.
+    """
+    force, rate = model.predict_many(motion, positions)
+    data = Collapsed.of(model, force, rate, saturated)
+    turning = np.ascontiguousarray(np.asarray(motion.angular_rate).T)
+    state = np.zeros((12, data.samples))
+    state[:6], state[6:9] = products(turning.T).T, np.asarray(motion.angular_acceleration).T
+    return information(data, positions, turning, state, data.reduce(positions))
+
+
+def block_information(model: ArrayModel, motion) -> np.ndarray:
+    """The same were the motion known: what a step of ML-BCD believes."""
+    state = np.zeros((12, len(motion.angular_rate)))
+    state[:6], state[6:9] = (
+        products(motion.angular_rate).T,
+        np.asarray(motion.angular_acceleration).T,
+    )
+    stacked = arms(state).transpose(1, 0, 2).reshape(3, -1)
+    return np.kron(np.diag(model.noise.triad_weights), stacked @ stacked.T)[3:, 3:]
+
+
+def contraction(known, believed) -> float:
+    """By what factor ML-BCD's slowest error shrinks in an iteration, near the optimum.
+
+    The largest squared canonical correlation of positions and motion: one less the smallest
+    eigenvalue of the information with the motion unknown against that with it known.
+    """
+    values = np.linalg.eigvals(np.linalg.solve(believed, known)).real
+    return float(1.0 - values.min())
+
+
+def rms_width(known, prior_sd: float = np.inf) -> float:
+    """rms over coordinates of the bound's sds, m, with a normal prior of the positions or none."""
+    return float(
+        np.sqrt(np.trace(np.linalg.inv(known + np.eye(len(known)) / prior_sd**2)) / len(known))
+    )
+
+
+def _draw(model, rng, samples, motion, options):
+    """(motion, truth, forces, rates, saturated) of a realisation."""
+    array = model.array
+    errors = options["position_sd"] * rng.standard_normal((array.accelerometers, 3))
+    truth = array.relative + errors - errors[0]
+    moves = sphere_motion(rng, (samples,), *motion)
+    return moves, truth, *measure(model, moves, truth, rng, gyroscope_range=options["rail"])
+
+
+def efficiency(
+    model: ArrayModel, seed, sample_counts, motion, options, threads=1, quiet=True
+) -> pd.DataFrame:
+    """RMSE of the most likely positions, with and without a prior, against the bound; a row per N.
+
+    ``motion`` and ``options`` as `imuarray.studies.position_error` has them. The bound is that of
+    each realisation's own motion; ``ratio`` is the RMSE over the bound's rms.
+    """
+    rows = []
+    for samples in sample_counts:
+
+        def job(batch, samples=samples):
+            number, size = batch
+            rng = batch_stream(seed, "bound", samples, number)
+            return [_one(model, rng, samples, motion, options) for _ in range(size)]
+
+        parts = run_batches(job, batches(options["realisations"]), threads, quiet, f"N={samples}")
+        found = np.concatenate(parts)
+        for column, name in enumerate(("maximum likelihood", "with the prior")):
+            rmse, error = root_mean_square(found[:, 2 * column] ** 2)
+            bound = float(np.sqrt(np.mean(found[:, 2 * column + 1] ** 2)))
+            rows.append(
+                {"samples": samples, "estimator": name, "rmse_m": rmse, "rmse_se_m": error,
+                 "bound_m": bound, "ratio": rmse / bound, "ratio_se": error / bound,
+                 "realisations": len(found), "iterations": float(np.median(found[:, 4]))}
+            )  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def _one(model, rng, samples, motion, options):
+    """rms error and bound without a prior, the same with it, and iterations."""
+    moves, truth, force, rate, saturated = _draw(model, rng, samples, motion, options)
+    data = Collapsed.of(model, force, rate, saturated)
+    size = truth[1:].size
+    # errors of r_k - r_1 are correlated: the reference triad's is in all of them
+    spread = options["position_sd"] ** 2 * (np.eye(size) + np.tile(np.eye(3), (size // 3,) * 2))
+    prior = model.array.parameters, np.linalg.inv(spread)
+    known = information_at(model, moves, truth, saturated)
+    out = []
+    for given in (None, prior):
+        found = descend(data, model.array.relative, given)
+        error = np.sqrt(np.mean((found.positions - truth)[1:] ** 2))
+        ridge = 0.0 if given is None else given[1]
+        bound = np.sqrt(np.trace(np.linalg.inv(known + ridge)) / size)
+        out += [error, bound]
+    return [*out, len(found.cost) - 1]
+
+
+def convergence(model: ArrayModel, seed, samples, motions, options, count=5) -> pd.DataFrame:
+    """Iterations of ML-BCD and of Gauss-Newton to 1.01 times the bound, for each motion.
+
+    ``contraction`` is what the information foresees for ML-BCD, ``observed`` what its steps show.
+    """
+    rows = []
+    for number, motion in enumerate(motions):
+        for repeat in range(count):
+            rng = batch_stream(seed, "bound", "convergence", number, repeat)
+            rows.append(_paths(model, rng, samples, motion, options))
+    return pd.DataFrame(rows)
+
+
+def _paths(model, rng, samples, motion, options):
+    moves, truth, force, rate, saturated = _draw(model, rng, samples, motion, options)
+    data = Collapsed.of(model, force, rate, saturated)
+    best = descend(data, model.array.relative)
+    bound = np.sqrt(np.trace(best.covariance) / len(best.covariance))
+    enough = bound * np.sqrt(NEAR**2 - 1)  # distance from the optimum, errors adding in squares
+    marks = np.unique(np.geomspace(1, options["limit"], 400).astype(int))
+    slow = calibrate_bcd(
+        model, force, rate, saturated=saturated, tolerance=0.0, limit=options["limit"], marks=marks
+    )
+    away = np.sqrt(np.mean((slow.snapshots - best.positions)[:, 1:] ** 2, axis=(1, 2)))
+    near = np.flatnonzero(away <= enough)
+    late = np.flatnonzero((away < 0.3 * away[0]) & (away > 1e-3 * bound))
+    observed = np.nan
+    if len(late) > 1:
+        first, last = late[len(late) // 2], late[-1]
+        observed = (away[last] / away[first]) ** (1 / max(marks[last] - marks[first], 1))
+    newton, positions = np.nan, model.array.relative
+    for iteration in range(1, 11):
+        positions = descend(data, positions, limit=1).positions
+        if np.sqrt(np.mean((positions - best.positions)[1:] ** 2)) <= enough:
+            newton = iteration
+            break
+    known = information_at(model, moves, truth, saturated)
+    return {
+        "angular_rate_dps": np.degrees(motion[0]),
+        "angular_acceleration_dps2": np.degrees(motion[1]),
+        "samples": samples,
+        "bound_m": bound,
+        "bcd_iterations": marks[near[0]] if len(near) else np.nan,
+        "newton_iterations": newton,
+        "contraction": contraction(known, block_information(model, moves)),
+        "observed": observed,
+    }
+
+
+def against_size(model: ArrayModel, seed, samples, motion, factors, count=20) -> pd.DataFrame:
+    """The bound for arrays of the same shape, ``factors`` times as large; a row for each."""
+    rows = []
+    for factor in factors:
+        array = model.array
+        scaled = Array(factor * array.positions, array.labels, array.gyroscopes, array.name)
+        larger = ArrayModel(scaled, model.noise)
+        widths = []
+        for repeat in range(count):
+            rng = batch_stream(seed, "bound", "size", repeat)
+            moves = sphere_motion(rng, (samples,), *motion)
+            widths.append(rms_width(information_at(larger, moves, scaled.relative)))
+        extent = float(np.linalg.norm(np.ptp(scaled.relative, axis=0)))
+        bound = float(np.sqrt(np.mean(np.square(widths))))
+        rows.append(
+            {"factor": factor, "extent_m": extent, "bound_m": bound, "relative": bound / extent}
+        )
+    return pd.DataFrame(rows)
+
+
+def ranks(cases) -> pd.DataFrame:
+    """Rank and conditioning of the information; ``cases`` of (name, model, motion)."""
+    rows = []
+    for name, model, motion in cases:
+        known = information_at(model, motion, model.array.relative)
+        scale = np.sqrt(np.maximum(np.diag(known), 1e-300))
+        values = np.linalg.eigvalsh(known / np.outer(scale, scale))
+        seen = values > RANK * values[-1]
+        rows.append(
+            {"case": name, "samples": len(motion.angular_rate), "unknowns": len(known),
+             "rank": int(seen.sum()), "condition": float(values[-1] / values[seen][0])}
+        )  # fmt: skip
+    return pd.DataFrame(rows)
