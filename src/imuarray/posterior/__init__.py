@@ -6,6 +6,7 @@ Names load when first used: a job that only reads tables needs no sampler.
 from importlib import import_module
 
 _HOME = {
+    "AutoregressiveTarget": "target",
     "Chains": "chains",
     "CompiledTarget": "target",
     "GaussianPrior": "target",

@@ -173,3 +173,45 @@ def transitions(theta, log_target, prior, step, draws, power, data, rng, count):
             log_target = proposed
             accepted += 1
     return accepted, log_target
+
+
+@nb.njit(cache=True, nogil=True)
+def autoregressive(theta, log_target, prior, centre, factor, step, draws, power, data, rng, count):
+    """``count`` transitions from ``theta`` in place, proposals reversible for a normal density.
+
+    That density has mean ``centre`` (3 (A - 1),) and covariance factor factor', ``factor`` lower:
+    in its own coordinates a proposal is sqrt(1 - step^2) z + step n. Only what the target departs
+    from it can be refused. Returns (accepted, log_target).
+    """
+    work = workspace(data.energy.size, draws)
+    size = theta.size
+    positions = np.zeros((size // 3 + 1, 3))
+    flat = positions.ravel()[3:]
+    z, new = np.empty(size), np.empty(size)
+    square = 0.0
+    for i in range(size):
+        value = theta[i] - centre[i]
+        for j in range(i):
+            value -= factor[i, j] * z[j]
+        z[i] = value / factor[i, i]
+        square += z[i] ** 2
+    keep, accepted = math.sqrt(1.0 - step**2), 0
+    for _ in range(count):
+        proposed, moved = 0.0, 0.0
+        for i in range(size):
+            new[i] = keep * z[i] + step * rng.standard_normal()
+            moved += new[i] ** 2
+        for i in range(size):
+            value = centre[i]
+            for j in range(i + 1):
+                value += factor[i, j] * new[j]
+            flat[i] = value
+            proposed -= 0.5 * prior[1, i] * (value - prior[0, i]) ** 2
+        proposed += fresh_draws(positions, data, rng, work, power, 0, data.energy.size)
+        ratio = proposed - log_target + 0.5 * (moved - square)
+        if math.log(rng.random()) < ratio:
+            theta[:] = flat
+            z[:] = new
+            log_target, square = proposed, moved
+            accepted += 1
+    return accepted, log_target

@@ -1,0 +1,270 @@
+"""Samplers of the positions' posterior side by side: effective draws per core second.
+
+`python benchmarks/samplers.py [--samples 5 50 500] [--seconds 60] [--out results/samplers.md]`.
+Every sampler runs two chains on the same data of section IV-A of paper 2021, from starts spread
+over the prior where it can bear that; ESS is the smallest over all parameters, bulk, of both
+chains, after the burn-in that the chains themselves show. Core seconds are those of all threads.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from imuarray.commands_model import model_of
+from imuarray.commands_sample import density_of
+from imuarray.config import read_config
+from imuarray.posterior import (
+    AutoregressiveTarget,
+    CompiledTarget,
+    GaussianPrior,
+    Likelihood,
+    run_chains,
+    tuning,
+)
+from imuarray.posterior.diagnostics import ess, find_burn_in, rhat
+from imuarray.provenance import atomic_write
+from imuarray.studies.bayes import simulate_dataset
+
+WIDER = 1.05  # than the mode's curvature, for autoregressive proposals
+PAPER_CORE_SECONDS = 320 * 3600.0  # 8 hours on 40 cores, T = 500
+ENOUGH = 1000
+
+
+@dataclass
+class Row:
+    """One sampler on one data set."""
+
+    method: str
+    samples: int
+    ess: float
+    rhat: float
+    core_seconds: float
+    draws: np.ndarray
+
+    @property
+    def rate(self) -> float:
+        """Effective draws per core second."""
+        return self.ess / self.core_seconds
+
+
+class Problem:
+    """A recording of T samples with all that the samplers start from."""
+
+    def __init__(self, config, samples):
+        self.samples = samples
+        self.recording, _ = simulate_dataset(config, samples)
+        self.model = model_of(self.recording)
+        self.log_density, self.prior, self.mode, self.covariance = density_of(
+            self.recording, self.model
+        )
+        self.likelihood = Likelihood.of(
+            self.model, self.recording.specific_force, self.recording.angular_rate
+        )
+        self.factor = np.linalg.cholesky(self.covariance)
+
+    def starts(self, rng, share=1.0):
+        """Two starts spread over the prior, or over a ``share`` of the posterior."""
+        if share == 1.0:
+            return self.prior.mean + self.prior.sd * rng.standard_normal((2, self.mode.size))
+        return self.mode + share * rng.standard_normal((2, self.mode.size)) @ self.factor.T
+
+    @property
+    def centre(self):
+        """The mode as positions (A, 3)."""
+        return np.vstack([np.zeros(3), self.mode.reshape(-1, 3)])
+
+
+def timed(function):
+    """(result, core seconds of all threads)."""
+    start = time.process_time()
+    result = function()
+    return result, time.process_time() - start
+
+
+def judged(name, problem, chains, seconds) -> Row:
+    """A row from chains, burn-in left out."""
+    burn_in = find_burn_in(chains.draws, chains.log_target).draws
+    left = chains.draws[:, burn_in:]
+    return Row(name, problem.samples, ess(left).min(), rhat(left).max(), seconds, left)
+
+
+def compiled(problem, name, target, starts, step, seconds, thin) -> Row:
+    """PmMH of a target for about so many core seconds."""
+    theta, rng = starts[0].copy(), np.random.default_rng(1)
+    value = target.log_target(theta, rng)
+    target.transitions(theta, value, step, 10, rng)
+    _, cost = timed(lambda: target.transitions(theta, value, step, 200, rng))
+    draws = max(int(seconds / 2 / (cost / 200) / thin), 200)
+    chains, spent = timed(
+        lambda: run_chains(target, starts, step, draws, thin, 1, ("bench", name), quiet=True)
+    )
+    return judged(name, problem, chains, spent)
+
+
+def pmmh_rows(problem, seconds, rng):
+    """The paper's walk, then one improvement after the other."""
+    prior = GaussianPrior.of(problem.prior.mean, problem.prior.sd)
+    counts = [1, 2, 5, 10, 20, 50, 100]
+    variances = tuning.variance_sweep(problem.likelihood, problem.centre, counts, 200, rng)
+    draws = tuning.choose_draws(counts, variances, 0.1)
+    centred = problem.likelihood.centred(problem.centre)
+    walk = CompiledTarget(problem.likelihood, prior, draws)
+    steps = problem.prior.sd[0] * np.geomspace(1e-6, 0.3, 16)
+    rates = tuning.acceptance_sweep(walk, problem.mode, steps, 1000, rng)
+    step = tuning.choose_step(steps, rates)
+    spread, near = problem.starts(rng), problem.starts(rng, 0.5)
+    yield compiled(
+        problem, f"PmMH, isotropic walk (27), N = {draws}", walk, spread, step, seconds, 100
+    )
+    one = CompiledTarget(centred, prior, 1)
+    rates = tuning.acceptance_sweep(one, problem.mode, steps, 1000, rng)
+    step = tuning.choose_step(steps, rates)
+    name = "the same, N = 1 drawn around each mode"
+    yield compiled(problem, name, one, spread, step, seconds, 100)
+    shaped = AutoregressiveTarget(centred, prior, 1, problem.mode, WIDER * problem.factor)
+    lengths = np.geomspace(0.02, 0.999, 12)
+    rates = tuning.acceptance_sweep(shaped, problem.mode, lengths, 1000, rng)
+    step = float(lengths[np.argmax(rates * lengths**2)])
+    name = f"PmMH, autoregressive around the mode, step {step:.2f}"
+    yield compiled(problem, name, shaped, near, step, seconds, 10)
+
+
+def nuts_row(problem, rng) -> Row:
+    """NUTS on the exact marginal likelihood, warm-up and compilation included."""
+    from imuarray.posterior.nuts import run_nuts
+
+    chains, spent = timed(
+        lambda: run_nuts(
+            problem.log_density, problem.mode, problem.covariance, problem.starts(rng), 300, 1000,
+            1, quiet=True,
+        )
+    )  # fmt: skip
+    return judged("NUTS, exact marginal, compilation included", problem, chains, spent)
+
+
+def emcee_row(problem, seconds, rng) -> Row:
+    """A peer: emcee's stretch moves on the exact marginal, 4 walkers a dimension."""
+    import emcee
+
+    from imuarray.model.jax64 import jax
+    from imuarray.posterior.chains import Chains
+
+    size = problem.mode.size
+    density = jax.jit(jax.vmap(problem.log_density))
+    count = 4 * size
+    begin = problem.mode + rng.standard_normal((count, size)) @ problem.factor.T
+    density(begin[: count // 2])
+    sampler = emcee.EnsembleSampler(count, size, lambda p: np.asarray(density(p)), vectorize=True)
+
+    def run():
+        first = time.perf_counter()
+        for _ in sampler.sample(begin, iterations=10**6, skip_initial_state_check=True):
+            if time.perf_counter() - first > seconds / 2:
+                break
+
+    _, spent = timed(run)
+    draws = sampler.get_chain().swapaxes(0, 1)
+    left = draws[:, draws.shape[1] // 4 :]
+    chains = Chains(left, sampler.get_log_prob().T, np.ones(count), 1, 0.0)
+    return Row(
+        "emcee's stretch moves, exact marginal", problem.samples, ess(chains.draws).min(),
+        rhat(chains.draws).max(), spent, chains.draws,
+    )  # fmt: skip
+
+
+def rows_of(problem, seconds, rng):
+    """All samplers, one after the other."""
+    yield from pmmh_rows(problem, seconds, rng)
+    yield nuts_row(problem, rng)
+    yield emcee_row(problem, seconds, rng)
+
+
+def direct_ratio(problem, rng) -> float:
+    """How much slower (26a) is evaluated directly, in 3 A dimensions a sample, N = 20."""
+    from tests.oracles import direct_log_likelihood
+
+    draws, sd = 20, np.sqrt(problem.model.noise.gyroscope[0, 0] / problem.model.array.gyroscopes)
+    mean = problem.likelihood.rate_mean
+    force = problem.recording.specific_force
+
+    def direct():
+        rates = mean[:, None] + sd * rng.standard_normal((problem.samples, draws, 3))
+        direct_log_likelihood(force, problem.centre, problem.model.noise.accelerometer, rates)
+
+    def fast():
+        problem.likelihood.estimate(problem.centre, draws, rng)
+
+    times = []
+    for function in (direct, fast):
+        function()
+        times.append(min(timed(function)[1] for _ in range(3)))
+    return times[0] / max(times[1], 1e-9)
+
+
+def table(rows, ratios) -> str:
+    """Markdown: a line for each sampler and T."""
+    lines = [
+        "| T | sampler | R-hat | ESS per core second | core seconds to ESS 1000 "
+        "| against the paper's walk, evaluated directly | against 320 core hours |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for row in rows:
+        first = next(r for r in rows if r.samples == row.samples)
+        direct = first.rate / ratios[row.samples]
+        hours = PAPER_CORE_SECONDS / (ENOUGH / row.rate) if row.samples == 500 else None
+        said = f"{hours:.3g}" if hours else ""
+        lines.append(
+            f"| {row.samples} | {row.method} | {row.rhat:.3f} | {row.rate:.3g}"
+            f" | {ENOUGH / row.rate:.3g} | {row.rate / direct:.3g} | {said} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def agreement(rows) -> str:
+    """Largest departure of each sampler's means and sds from NUTS', in posterior sds."""
+    lines = []
+    for samples in sorted({row.samples for row in rows}):
+        same = [row for row in rows if row.samples == samples]
+        reference = next((row for row in same if row.method.startswith("NUTS")), same[-1])
+        flat = reference.draws.reshape(-1, reference.draws.shape[-1])
+        mean, sd = flat.mean(axis=0), flat.std(axis=0)
+        for row in same:
+            other = row.draws.reshape(-1, flat.shape[1])
+            apart = np.abs((other.mean(axis=0) - mean) / sd).max()
+            ratio = np.abs(other.std(axis=0) / sd - 1).max()
+            lines.append(f"T = {samples}, {row.method}: means within {apart:.2f} sd, sds within"
+                         f" {100 * ratio:.0f} %")  # fmt: skip
+    return "\n".join(lines) + "\n"
+
+
+def main():
+    """Run all and print; write where --out says."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--samples", type=int, nargs="+", default=[5, 50, 500])
+    parser.add_argument("--seconds", type=float, default=60.0, help="core seconds of a PmMH row")
+    parser.add_argument("--out", type=Path, default=Path("results/samplers.md"))
+    parser.add_argument("--config", type=Path, default=Path("config.yaml"))
+    arguments = parser.parse_args()
+    config, rows, ratios = read_config(arguments.config), [], {}
+    for samples in arguments.samples:
+        rng = np.random.default_rng(samples)
+        problem = Problem(config, samples)
+        ratios[samples] = direct_ratio(problem, rng)
+        for row in rows_of(problem, arguments.seconds, rng):
+            rows.append(row)
+            spent = f"ESS {row.ess:.0f} in {row.core_seconds:.1f} s"
+            print(samples, row.method, spent, flush=True)
+    text = table(rows, ratios) + "\n" + agreement(rows)
+    print(text)
+    arguments.out.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_write(arguments.out) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
