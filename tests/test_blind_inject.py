@@ -14,6 +14,7 @@ from scipy.stats import multivariate_normal
 import imuarray.blind
 from imuarray.blind import CATALOGUE, EFFECTS, GAUGE, OUTSIDE, Case, Scene, inject_measured
 from imuarray.blind import cases as cases_module
+from imuarray.blind.added import ADDED, add, grade_added
 from imuarray.blind.change import draw_noise, finish, noiseless_readings, noisy_readings
 from imuarray.blind.measured import NOT_FROM_READINGS, measured_change
 from imuarray.blind.scene import GYROSCOPE_RAIL, Pair
@@ -609,3 +610,31 @@ def test_nothing_is_shared_with_the_model():
             for name in names:
                 if name.split(".")[0] == "imuarray":
                     assert ".".join(name.split(".")[:2]) in allowed, f"{path}: {name}"
+
+
+def test_an_added_effect_is_graded():
+    """Truth, and found only where it is named on its own sensor."""
+    there = scene(4, duration=4.0)
+    before = as_recording(there, noisy_readings(there, [], np.random.default_rng(3)))
+    for effect in ADDED:
+        changed, truth = add(before, effect, 5)
+        again, same = add(before, effect, 5)
+        np.testing.assert_array_equal(changed.specific_force, again.specific_force)
+        assert truth == same == json.loads(json.dumps(truth))
+        differs = [
+            not np.array_equal(getattr(changed, name)[:, k], getattr(before, name)[:, k])
+            for k in range(8)
+            for name in ("specific_force", "angular_rate")
+        ]
+        own = before.accelerometer_labels.index(truth["sensor"])
+        assert any(differs[2 * own : 2 * own + 2]) and sum(differs) <= 2
+    cause = {"effect": "axis_swap", "sensors": [truth["sensor"]], "indistinguishable_from": [],
+             "heldout_gain_nats": 3.0}  # fmt: skip
+    other = cause | {"effect": "sensor_delay", "sensors": ["all"]}
+    nothing, right = {"causes": []}, {"causes": [cause, other]}
+    found = grade_added(truth, nothing, right)
+    assert found["found"] and found["sensor_right"] and found["others"] == "sensor_delay"
+    assert not grade_added(truth, nothing, {"causes": [other]})["found"]
+    assert grade_added(truth, right, right)["there_before"]
+    wrong = {"causes": [cause | {"sensors": ["all"]}]}
+    assert not grade_added(truth, nothing, wrong)["sensor_right"]

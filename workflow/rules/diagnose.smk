@@ -1,3 +1,5 @@
+from imuarray.blind.added import ADDED
+
 # What the papers' model gets wrong on each measured recording; its own target, `diagnose`.
 DIAGNOSED = resting_on(
     "criticism/diagnosis.py",
@@ -62,3 +64,73 @@ rule diagnosis_agreement:
         runtime=10,
     script:
         "../scripts/diagnosis_agreement.py"
+
+
+rule add_effect:
+    input:
+        recording=lambda wc: "results/measured/{}/{}.nc".format(
+            "corrected" if RECORDINGS[wc.name].get("first_order", True) else "recordings", wc.name
+        ),
+        code=resting_on("blind/added.py", "recording/format.py", "provenance.py"),
+    output:
+        recording="results/measured/added/{name}/{effect}.nc",
+        truth="results/measured/added/{name}/{effect}.json",
+    log:
+        "results/measured/logs/added/{name}_{effect}.log",
+    benchmark:
+        "results/measured/benchmarks/added/{name}_{effect}.tsv"
+    wildcard_constraints:
+        effect="|".join(ADDED),
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        settings=lambda wc: {"seed": config["seed"]},
+    script:
+        "../scripts/add_effect.py"
+
+
+rule diagnose_added:
+    input:
+        recording="results/measured/added/{name}/{effect}.nc",
+        code=DIAGNOSED,
+    output:
+        diagnosis="results/measured/added/{name}/{effect}/diagnosis.json",
+        report="results/measured/added/{name}/{effect}/report.html",
+    log:
+        "results/measured/logs/added/{name}_{effect}_diagnosis.log",
+    benchmark:
+        "results/measured/benchmarks/added/{name}_{effect}_diagnosis.tsv"
+    wildcard_constraints:
+        effect="|".join(ADDED),
+    threads: 1
+    resources:
+        mem_mb=8000,
+        runtime=60,
+    params:
+        settings=lambda wc: {"seed": config["seed"]},
+    script:
+        "../scripts/diagnose_recording.py"
+
+
+rule grade_added:
+    input:
+        before="results/measured/diagnosis/{name}/diagnosis.json",
+        truths=expand("results/measured/added/{{name}}/{effect}.json", effect=ADDED),
+        after=expand("results/measured/added/{{name}}/{effect}/diagnosis.json", effect=ADDED),
+        code=resting_on("blind/added.py", "figures/blind_tables.py", "provenance.py"),
+    output:
+        csv="results/measured/tables/added_{name}.csv",
+        tex="results/measured/tables/added_{name}.tex",
+        md="results/measured/tables/added_{name}.md",
+    log:
+        "results/measured/logs/added/{name}.log",
+    benchmark:
+        "results/measured/benchmarks/added/{name}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    script:
+        "../scripts/grade_added.py"

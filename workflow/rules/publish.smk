@@ -131,3 +131,16 @@ rule publish_cause:
         kind="pdf|png|csv",
     shell:
         "cp $(dirname {input:q})/cause_*_{wildcards.effect}.{wildcards.kind} {output:q} 2> {log:q}"
+
+
+rule publish_added:
+    input:
+        "results/measured/tables/added_{name}.{kind}",
+    output:
+        "paper_figures/added_{name}.{kind}",
+    log:
+        "results/logs/publish/added_{name}.{kind}.log",
+    wildcard_constraints:
+        kind="csv|tex|md",
+    shell:
+        "cp {input:q} {output:q} 2> {log:q}"

@@ -16,7 +16,7 @@ from imuarray.criticism.gate import Check, all_checks
 from imuarray.criticism.readings import Readings, arrange, determined, part_of
 from imuarray.criticism.remainder import drift_checks, judged, outlier_checks, plausibility_checks
 from imuarray.criticism.scans import delay_score, sawtooth
-from imuarray.criticism.scores import candidates, log_tail, mask_of, score_all
+from imuarray.criticism.scores import Candidate, candidates, log_tail, mask_of, score_all
 from imuarray.criticism.search import Search, own_turning
 from imuarray.criticism.structure import Structural, find_structural
 from imuarray.criticism.thresholds import Thresholds, read_thresholds
@@ -31,6 +31,7 @@ NESTED = {  # an effect, and those that contain it or are contained
 LONG = 3500  # samples; longer recordings are looked at in part first
 CLEAR = 2.5  # sds of a triad's memory, where all together are beyond doubt
 TAILED = 0.25  # log ratio by which a mixture's core may miss the noise
+LIKELY = -4.6  # log p of a drift beside an adopted bias
 DELAYED = 0.1  # log ratio of noise that an adopted delay may bring with it
 
 
@@ -131,7 +132,7 @@ def settle(search: Search, without) -> tuple[list, list]:
     if "heavy_tails" in without:
         return [], []
     limit = search.thresholds.limit("heavy_tails")
-    named, hits, others = variance.heavy_tails(search.fit, limit)
+    named, hits, others = variance.heavy_tails(search.fit, search.noise, limit)
     if named is None:
         return [], []
     far = np.zeros((*whole.keep.shape[:2], 2), bool)
@@ -235,8 +236,10 @@ def rivals(search: Search, effect: str) -> list[str]:
         )
         if close or alike:
             found.append(candidate.effect)
-    if effect == "sensor_delay" and "sensor_clock" in search.effects:
+    if effect in ("sensor_delay", "gyroscope_delay") and "sensor_clock" in search.effects:
         found += ["sensor_clock"] if maybe_clock(search, cause, own) else []
+    if effect.endswith("_bias") and "bias_drift" in search.effects:
+        found += ["bias_drift"] if maybe_drift(search, cause) else []
     return found
 
 
@@ -247,6 +250,14 @@ def maybe_clock(search: Search, cause, own) -> bool:
         sawtooth(search.readings.time, score[:, imu], information[:, imu])[0] for imu in cause.imus
     ]
     return bool(np.sum(gains) > own / 6)
+
+
+def maybe_drift(search: Search, cause) -> bool:
+    """Whether a bias may change through the recording: not enough to be adopted, but likely."""
+    kind = cause.effect.removesuffix("_bias")
+    tried = [Candidate("bias_drift", cause.imus, f"{kind} {form}") for form in ("linear", "cubic")]
+    scores = score_all(search.given, search.fit, tried)
+    return any(log_tail(max(s.statistic, 1e-9), s.freedom) < LIKELY for s in scores)
 
 
 def _shared(given, fit_, candidate, left, signal) -> float:

@@ -18,6 +18,7 @@ from imuarray.criticism.worth import need
 
 LITTLE = 0.03  # of the noise's own misfit: so little left over may be forgiven
 IMPLAUSIBLE = 10.0  # prior sds
+CHANGING = 0.05  # of a drift's chi-square that its change must be worth
 STEADY = -50.0  # log p of a drift that does not change: what it names is not what it is
 UNFORGIVEN = ("outliers", "size of", "change of")  # checks that a small remainder does not excuse
 
@@ -70,6 +71,7 @@ def drift_checks(search: Search) -> list[Check]:
     changing = [c for c in columns.of("bias_drift") if columns.places[c][2] > 0]
     statistic, freedom = need(search, "bias_drift", among=changing)
     steady = log_tail(statistic, max(freedom, 1)) > search.thresholds.limit("bias_drift")
+    steady |= statistic < CHANGING * need(search, "bias_drift")[0]
     return [Check("change of bias_drift", statistic, STEADY if steady else 0.0, cause.imus)]
 
 

@@ -193,23 +193,33 @@ def _tail_nats(axes, square, share, factor, core, plain) -> np.ndarray:
     return both - (-axes * np.log(plain) - square / (2 * plain**2))
 
 
-def heavy_tails(fit: Fit, limit: float):
+def heavy_tails(fit: Fit, noise: Noise, limit: float):
     """(Named or None, hits, others): triads [(imu, kind, Mixture)] that a mixture describes better.
 
-    ``others`` are those where it may be so, once it is so somewhere.
+    ``others`` are those where it may be so, once it is so somewhere: each by itself, or all the
+    rest of a kind together.
     """
     triads = np.argwhere(fit.readings.exists)
     tried = [(int(i), int(k), mixture(fit, i, k)) for i, k in triads]
-    several = [m.share * len(fit.residual) > FEW for *_, m in tried]
-    logs = np.array(
-        [log_tail(max(m.gain, 1e-9), 2) if s else 0.0
-         for (*_, m), s in zip(tried, several, strict=True)]
-    ) + np.log(len(triads))  # fmt: skip
+    gains = np.array([_tail_gain(fit, noise, *item) for item in tried])
+    logs = np.array([log_tail(max(gain, 1e-9), 2) for gain in gains]) + np.log(len(triads))
     if logs.min() > limit:
         return None, [], []
     hits = [item for item, log_p in zip(tried, logs, strict=True) if log_p < limit]
     maybe = logs - np.log(len(triads)) < MAYBE
-    others = [item for item, weak in zip(tried, maybe & (logs >= limit), strict=True) if weak]
+    for kind in {k for _, k, _ in hits}:
+        rest = (triads[:, 1] == kind) & (logs >= limit)
+        if rest.any() and log_tail(max(gains[rest].sum(), 1e-9), 2 * rest.sum()) < limit:
+            hits += [item for item, also in zip(tried, rest & maybe, strict=True) if also]
+            maybe |= rest
+    there = {item[:2] for item in hits}
+    others = [m for m, may in zip(tried, maybe, strict=True) if may and m[:2] not in there]
+    imus = tuple(sorted({imu for imu, *_ in hits}))
+    return Named("heavy_tails", imus, float(logs.min()), *_told(fit, hits)), hits, others
+
+
+def _told(fit: Fit, hits):
+    """(numbers, gain, its standard error, blocks) of the triads with heavy tails."""
     nats, numbers, count = np.zeros(len(fit.residual)), {}, len(fit.residual)
     for imu, kind, mix in hits:
         unit = triad(fit, imu, kind)
@@ -221,8 +231,14 @@ def heavy_tails(fit: Fit, limit: float):
         numbers[f"share_{name}"] = (mix.share, error, "1")
         far = max(6 * mix.share * count, 1.0)
         numbers[f"factor_{name}"] = (mix.factor, float(mix.factor / np.sqrt(far)), "1")
-    imus = tuple(sorted({imu for imu, *_ in hits}))
-    return Named("heavy_tails", imus, float(logs.min()), numbers, *held_out(nats)), hits, others
+    return numbers, *held_out(nats)
+
+
+def _tail_gain(fit: Fit, noise: Noise, imu: int, kind: int, mix: Mixture) -> float:
+    """A mixture's gain, less where neighbours are alike; none for a handful of outliers."""
+    rho = noise.correlation[imu, kind]
+    several = mix.share * len(fit.residual) > FEW
+    return mix.gain * (1 - rho**2) / (1 + rho**2) if several else 0.0
 
 
 def pooled_memory(fit: Fit, noise: Noise, memories) -> float:

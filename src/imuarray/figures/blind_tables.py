@@ -40,6 +40,26 @@ GAIN = (
     Column("extended_coverage", "extended (%)", r"extended (\%)", "{:.1f}", 100.0),
 )  # fmt: skip
 
+ADDED = (
+    Column("effect", "added effect", "effect"),
+    Column("amplitude", "size", "size", "{:.3g}"),
+    Column("unit", "unit", "unit"),
+    Column("sensor", "on IMU", "IMU"),
+    Column("found", "found", "found"),
+    Column("sensors", "named on IMU", "named on"),
+    Column("gain_nats", "held-out gain (nats)", "gain", "{:.3g}"),
+    Column("others", "other new names", "others"),
+)
+
+
+def added_notes(name: str) -> list[str]:
+    """The small print under the effects added to a measured recording."""
+    return [
+        f"Recording {name}; each effect alone, of its largest realistic size, added to one IMU's"
+        " readings. Found: named, or among what the named one cannot be told from; other new"
+        " names are causes that the recording as it is does not have.",
+    ]
+
 
 def shown(table: pd.DataFrame) -> pd.DataFrame:
     """The bars with words for yes and no, empty where a bar has no such thing."""
