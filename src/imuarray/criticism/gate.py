@@ -18,6 +18,8 @@ from imuarray.criticism.scans import delay_score
 from imuarray.criticism.scores import Evidence, log_tail, robust_inverse
 
 SEEN = 1e-4
+SAME = 1e-9  # m/s^2 or rad/s: equal readings
+COARSE = 2.0  # noise sds of a step between readings
 SLOW = 3  # turns in the recording; slower ages are a drift
 AROUND = 101  # frequencies that tell a periodogram's level
 CROWD = 1.3  # axes' tests are not quite independent: variance of their sum against chi-square's
@@ -73,10 +75,10 @@ def lever(motion, place) -> np.ndarray:
     return np.cross(rate, np.cross(rate, place)) + np.cross(turn, place)
 
 
-def bending(motion, force, axis: int) -> np.ndarray:
-    """What an accelerometer's axis sees where forces (T, 3) move it, (T, 9): boards bend."""
+def displaced(motion, causes, axis: int) -> np.ndarray:
+    """What an accelerometer's axis sees where ``causes`` (T, n) move it, (T, 3 n)."""
     arms = np.stack([lever(motion, place)[:, axis] for place in np.eye(3)], axis=1)
-    return unit((arms[:, :, None] * force[:, None, :]).reshape(len(motion), 9))
+    return unit((arms[:, :, None] * causes[:, None, :]).reshape(len(motion), -1))
 
 
 def regression_checks(fit: Fit, given: Evidence, noise: Noise) -> list[Check]:
@@ -96,7 +98,10 @@ def regression_checks(fit: Fit, given: Evidence, noise: Noise) -> list[Check]:
                 continue
             table = dict(common)
             if axis < 3:
-                table["force times lever"] = bending(fit.state.motion, common["force"], axis)
+                # boards bend, mounts give way
+                for cause in ("force", "time"):
+                    moved = displaced(fit.state.motion, common[cause], axis)
+                    table[f"lever times {cause}"] = moved
             names = np.repeat(list(table), [v.shape[1] for v in table.values()])
             stacked = np.hstack(list(table.values()))
             seen = -np.einsum("ti,tia->ta", basis[:, imu, axis], through)
@@ -179,11 +184,13 @@ def size_checks(fit: Fit) -> list[Check]:
 
 
 def normal_checks(name, found) -> Check:
-    """Worst and pooled of standard normals that are expected near zero."""
+    """Worst, pooled and mean of standard normals that are expected near zero."""
     worst = max(found, key=lambda f: abs(f[1]))
     single = norm.logsf(abs(worst[1])) + np.log(2 * len(found))
     pooled = chi2.logsf(sum(z**2 for _, z in found), len(found))
-    return Check(name, worst[1], float(min(single, pooled, -np.log(2)) + np.log(2)), (worst[0],))
+    alike = norm.logsf(abs(sum(z for _, z in found)) / np.sqrt(len(found))) + np.log(2)
+    log_p = min(single, pooled, alike) + np.log(3)
+    return Check(name, worst[1], float(min(log_p, 0.0)), (worst[0],))
 
 
 def timing_check(fit: Fit) -> Check:
@@ -252,15 +259,18 @@ def noise_checks(noise: Noise, exists) -> list[Check]:
 
 
 def resolution_check(fit: Fit) -> Check:
-    """Are readings coarser than their noise? The least step between values against the sd."""
+    """Are readings coarser than their noise? The least step between values against the sd.
+
+    Of so many continuous values some two would be far nearer to each other than any step.
+    """
     readings, worst = fit.readings, (0.0, 0)
     for imu, kind in np.argwhere(readings.exists):
-        values = readings.values[:, imu, 3 * kind]
-        distinct = np.unique(np.round(values, 9))
-        if len(distinct) < 0.5 * len(values):
-            step = float(np.median(np.diff(distinct)[np.diff(distinct) > 1e-9]))
-            worst = max(worst, (step / readings.sd[imu, kind], int(imu)))
-    return Check("resolution", worst[0], -50.0 if worst[0] > 2.0 else 0.0, (worst[1],))
+        values = np.sort(readings.values[:, imu, 3 * kind])
+        gaps = np.diff(values)
+        gaps = gaps[gaps > SAME]
+        if len(gaps):
+            worst = max(worst, (float(gaps.min()) / readings.sd[imu, kind], int(imu)))
+    return Check("resolution", worst[0], -50.0 if worst[0] > COARSE else 0.0, (worst[1],))
 
 
 def all_checks(fit: Fit, given: Evidence, noise: Noise) -> list[Check]:

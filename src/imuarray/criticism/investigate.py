@@ -14,7 +14,13 @@ from imuarray.criticism.columns import catalogue_effects, columns_of
 from imuarray.criticism.fit import Fit, fit
 from imuarray.criticism.gate import Check, all_checks
 from imuarray.criticism.readings import Readings, arrange, determined, part_of
-from imuarray.criticism.remainder import drift_checks, judged, outlier_checks, plausibility_checks
+from imuarray.criticism.remainder import (
+    drift_checks,
+    judged,
+    outlier_checks,
+    plausibility_checks,
+    tail_checks,
+)
 from imuarray.criticism.scans import delay_score, sawtooth
 from imuarray.criticism.scores import Candidate, candidates, log_tail, mask_of, score_all
 from imuarray.criticism.search import Search, own_turning
@@ -88,7 +94,8 @@ def investigate(
         remember(search)
     say("testing what is left")
     checks = all_checks(search.fit, search.given, search.noise)
-    checks += [*outlier_checks(search), *plausibility_checks(search), *drift_checks(search)]
+    checks += [*outlier_checks(search), *plausibility_checks(search)]
+    checks += [*drift_checks(search), *tail_checks(search, tailed)]
     calm_ = not any(c.log_p < thresholds.check for c in checks if c.name.startswith("residual"))
     in_noise += named_noise(search, without, tailed, calm_)
     explained, failing = judged(search, checks, in_noise)

@@ -62,6 +62,14 @@ def plausibility_checks(search: Search) -> list[Check]:
     return found
 
 
+def tail_checks(search: Search, tailed) -> list[Check]:
+    """Triads whose residual a mixture describes better, where ``tailed`` does not say so."""
+    there = {(imu, kind) for imu, kind, _ in tailed}
+    named, hits, _ = variance.heavy_tails(search.fit, search.noise, search.thresholds.check)
+    left = sorted({imu for imu, kind, _ in hits if (imu, kind) not in there})
+    return [Check("outliers' mixture", len(left), named.log_p, tuple(left))] if left else []
+
+
 def drift_checks(search: Search) -> list[Check]:
     """Drifts that need their constants only: an offset in their clothes."""
     cause = next((c for c in search.causes if c.effect == "bias_drift"), None)
