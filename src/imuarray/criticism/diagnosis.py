@@ -26,6 +26,8 @@ from imuarray.model.effects import KINDS
 from imuarray.recording import Recording
 from imuarray.streams import stream
 
+LEAST = -1e6  # log p; JSON has no infinity
+
 
 @dataclass
 class Fitted:
@@ -254,7 +256,7 @@ def _entry(item, labels, parameters, nats, rivals, says=None) -> dict:
         "sensors": sensors,
         "parameters": plain,
         "p_value": float(np.exp(item.log_p)),
-        "log10_p_value": float(item.log_p / np.log(10)),
+        "log10_p_value": float(max(item.log_p, LEAST) / np.log(10)),
         "heldout_gain_nats": nats[0],
         "heldout_gain_se": nats[1],
         "indistinguishable_from": list(rivals),

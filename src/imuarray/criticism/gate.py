@@ -220,6 +220,21 @@ def timing_check(fit: Fit) -> Check:
     return Check("ages in time", highest, float(min(log_p, 0.0)), (imu,))
 
 
+def jitter_check(fit: Fit) -> Check:
+    """Do ages wander from sample to sample? The residual along a delay where delays show most."""
+    score, information = delay_score(fit)
+    found = []
+    for imu in np.flatnonzero(fit.readings.exists.all(axis=1)):
+        known = information[:, imu]
+        square = score[:, imu] ** 2 / known
+        excess = (known - known.mean()) * (square - square.mean())
+        spread = np.sqrt(np.sum(excess**2))
+        found.append((int(imu), float(excess.sum() / max(spread, 1e-300))))
+    if not found:
+        return Check("ages that wander", 0.0, 0.0, ())
+    return normal_checks("ages that wander", found)
+
+
 def company_check(fit: Fit, noise: Noise) -> Check:
     """Correlations between axes beyond what the common motion explains."""
     samples = len(fit.residual)
@@ -277,8 +292,8 @@ def all_checks(fit: Fit, given: Evidence, noise: Noise) -> list[Check]:
     """Everything that is tested of a residual."""
     return [
         *regression_checks(fit, given, noise), *size_checks(fit), timing_check(fit),
-        company_check(fit, noise),
-        *noise_checks(noise, fit.readings.exists), resolution_check(fit),
+        jitter_check(fit), company_check(fit, noise), *noise_checks(noise, fit.readings.exists),
+        resolution_check(fit),
     ]  # fmt: skip
 
 
