@@ -150,6 +150,36 @@ def test_an_effect_struck_from_the_catalogue_leaves_something_unexplained():
     assert document["unexplained"] or not document["causes"]
 
 
+@pytest.mark.parametrize(
+    ("effect", "size", "sign"),
+    [
+        ("outside_flexible_board", 30.0, "residual against lever times force"),
+        ("outside_timing_jitter", 80.0, "ages that wander"),
+        ("outside_quantisation", None, "resolution"),
+    ],
+)
+def test_what_is_outside_the_catalogue_shows_as_itself(effect, size, sign):
+    """Names may be given; the check made for such things says that they are not all."""
+    case = Case("test-outside", ((effect, ALL),), size, kind="outside", duration=DURATION)
+    document, _ = found_in(case)
+    assert document["unexplained"] and sign in document["remaining"]
+
+
+@pytest.mark.parametrize(
+    ("effect", "sign"),
+    [
+        ("sensor_clock", "ages in time"),
+        ("position_shift", "residual against lever times time"),
+        ("heavy_tails", "outliers' mixture"),
+        ("gyroscope_bias", "change of bias_drift"),
+    ],
+)
+def test_another_cause_in_its_clothes_is_no_answer(effect, sign):
+    """The effect struck from the catalogue: whatever is named instead, `unexplained` is true."""
+    document, _ = found_in(hidden((effect, (2,)), kind="struck"))
+    assert document["unexplained"] and sign in document["remaining"]
+
+
 def test_most_triads_decide_which_axes_are_right():
     from imuarray.criticism.readings import arrange
 
