@@ -183,13 +183,13 @@ def size_checks(fit: Fit) -> list[Check]:
     return checks
 
 
-def normal_checks(name, found) -> Check:
-    """Worst, pooled and mean of standard normals that are expected near zero."""
+def normal_checks(name, found, alike=False) -> Check:
+    """Worst and pooled of standard normals expected near zero; their mean where all are alike."""
     worst = max(found, key=lambda f: abs(f[1]))
     single = norm.logsf(abs(worst[1])) + np.log(2 * len(found))
     pooled = chi2.logsf(sum(z**2 for _, z in found), len(found))
-    alike = norm.logsf(abs(sum(z for _, z in found)) / np.sqrt(len(found))) + np.log(2)
-    log_p = min(single, pooled, alike) + np.log(3)
+    mean = norm.logsf(abs(sum(z for _, z in found)) / np.sqrt(len(found))) + np.log(2)
+    log_p = min(single, pooled, mean if alike else 0.0) + np.log(2 + alike)
     return Check(name, worst[1], float(min(log_p, 0.0)), (worst[0],))
 
 
@@ -232,7 +232,7 @@ def jitter_check(fit: Fit) -> Check:
         found.append((int(imu), float(excess.sum() / max(spread, 1e-300))))
     if not found:
         return Check("ages that wander", 0.0, 0.0, ())
-    return normal_checks("ages that wander", found)
+    return normal_checks("ages that wander", found, alike=True)
 
 
 def company_check(fit: Fit, noise: Noise) -> Check:
