@@ -32,7 +32,8 @@ class Whitened:
 
     def white(self, theta) -> np.ndarray:
         """z (..., size) of theta (..., size)."""
-        return np.linalg.solve(self.factor, (np.asarray(theta) - self.centre).T).T
+        away = np.asarray(theta) - self.centre
+        return np.linalg.solve(self.factor, away[..., None])[..., 0]
 
     def potential(self, z):
         """Minus the log density of z."""
