@@ -72,13 +72,15 @@ def run_nuts(
         jax.random.key_data(jax.random.key(int(stream(seed, *names, chain).integers(2**31))))
         for chain in range(len(starts))
     ]
-    states = [
-        begin(
-            jnp.asarray(z), num_warmup=warmup, target_accept_prob=ACCEPTANCE, max_tree_depth=DEPTH,
+
+    @jax.jit
+    def first(z, key):
+        return begin(
+            z, num_warmup=warmup, target_accept_prob=ACCEPTANCE, max_tree_depth=DEPTH,
             adapt_mass_matrix=False, step_size=0.5, rng_key=key,
-        )
-        for z, key in zip(white.white(starts), keys, strict=True)
-    ]  # fmt: skip
+        )  # fmt: skip
+
+    states = [first(jnp.asarray(z), key) for z, key in zip(white.white(starts), keys, strict=True)]
 
     @jax.jit
     def run(state):
