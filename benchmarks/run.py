@@ -13,11 +13,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from written import publish  # noqa: E402
+
 from imuarray.config import model_from, read_config  # noqa: E402
 from imuarray.estimation import calibrate_bcd  # noqa: E402
 from imuarray.motion import normal_motion, sphere_motion  # noqa: E402
 from imuarray.posterior import Likelihood  # noqa: E402
-from imuarray.provenance import atomic_write  # noqa: E402
 from imuarray.simulation import measure  # noqa: E402
 from tests.oracles import direct_log_likelihood  # noqa: E402
 
@@ -127,10 +128,7 @@ def main():
     lines = ["| what | measured | ratio to the direct form, or growth |", "|---|---|---|"]
     lines += [f"| {' | '.join(row)} |" for row in rows]
     text = "\n".join(lines) + "\n"
-    print(text)
-    arguments.out.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_write(arguments.out) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    publish(text, arguments.out)
 
 
 if __name__ == "__main__":

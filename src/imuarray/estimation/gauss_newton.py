@@ -67,7 +67,7 @@ def calibrate_gauss_newton(
     """ML (or MAP) positions and effect parameters of any model, with their covariance.
 
     The papers' model with isotropic triads takes the collapsed form of `newton.descend`, any other
-    `calibrate_blocks`: the same optimum, hundreds of times slower.
+    `calibrate_blocks`: the same optimum, far slower.
 
     Parameters
     ----------

@@ -8,7 +8,6 @@ quadratic. Gauss-Hermite nodes are laid around its mode at every theta, scaled b
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +23,7 @@ from imuarray.model.small_linear import (
 )
 from imuarray.model.structure import PAIRS
 from imuarray.posterior.likelihood import Likelihood
+from imuarray.posterior.proposals import proposals
 
 NODES = 3  # on each axis of omega
 NEWTON = 4  # steps to the mode, from where it is at the reference positions
@@ -129,7 +129,7 @@ def log_marginal(positions, data: Data, nodes, log_weights):
     return jnp.sum(inside) - volume + known - 0.5 * len(rate) * logdet
 
 
-@partial(jax.jit)
+@jax.jit
 def _value(positions, data, nodes, log_weights):
     return log_marginal(positions, data, nodes, log_weights)
 
@@ -154,8 +154,8 @@ class Marginal:
         Parameters
         ----------
         nodes : int
-            On each axis of omega: 1 is Laplace's method, 3 integrates the quartic to some 1e-10
-            nats a sample where gyroscopes see the motion well.
+            On each axis of omega: 1 is Laplace's method, 3 integrates the quartic to some 1e-8
+            nats a sample where gyroscopes see the motion well (`tests/test_marginal.py`).
         motion_sd : (float, float, float)
             Prior sds of omega (rad/s), omega_dot (rad/s^2) and s (m/s^2), as `ArrayModel` has
             them; infinite as in paper 2021.
@@ -196,8 +196,6 @@ def _precision(collapsed: Collapsed) -> np.ndarray:
 
 def _modes(collapsed: Collapsed, likelihood: Likelihood, positions) -> np.ndarray:
     """Each sample's mode of omega at reference positions, (T, 3) rad/s."""
-    from imuarray.posterior.proposals import proposals
-
     positions = np.asarray(positions, float)
     relative = np.ascontiguousarray(positions - positions[0])
     return proposals(collapsed, likelihood.rate_mean, likelihood.rate_covariance, relative)[0]

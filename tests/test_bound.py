@@ -1,0 +1,61 @@
+"""The Cramer-Rao bound: reached by maximum likelihood, and what ML-BCD's rate follows from."""
+
+import numpy as np
+import pytest
+
+from imuarray.model import ArrayModel
+from imuarray.motion import normal_motion
+from imuarray.studies import bound
+from tests import oracles
+from tests.cases import small_array
+
+MOTION = (20.0, 300.0, 10.0)  # rad/s, rad/s^2, m/s^2
+OPTIONS = {"position_sd": 1e-3, "rail": np.inf, "realisations": 100, "limit": 4000}
+
+
+def model():
+    return ArrayModel.isotropic(small_array(5, 5), 0.04, 0.02)
+
+
+def test_information_is_that_of_the_direct_jacobian():
+    motion = normal_motion(np.random.default_rng(1), (6,), 10.0, 300.0, 20.0)
+    known = bound.information_at(model(), motion, model().array.relative)
+    jacobian = oracles.joint_jacobian(np.hstack(motion[:3]), model().array.relative, 5, 0.04, 0.02)
+    direct = oracles.position_information(jacobian, 12)
+    np.testing.assert_allclose(known, direct, rtol=1e-6, atol=1e-9 * direct.max())
+
+
+def test_maximum_likelihood_reaches_the_bound():
+    """100 realisations of 30 samples: within five standard errors, with and without a prior."""
+    table = bound.efficiency(model(), 2, [30], MOTION, OPTIONS)
+    assert list(table.estimator) == ["maximum likelihood", "with the prior"]
+    assert np.all(np.abs(table.ratio - 1) < 5 * table.ratio_se)
+    assert np.all(table.ratio_se < 0.05)
+    assert table.bound_m[1] < table.bound_m[0]
+
+
+def test_rate_of_bcd_is_foreseen_and_newton_is_quick():
+    table = bound.convergence(model(), 3, 50, [MOTION], OPTIONS, count=2)
+    np.testing.assert_allclose(table.observed, table.contraction, atol=0.02)
+    assert np.all(table.newton_iterations <= 10)
+    assert np.all(table.bcd_iterations > 2 * table.newton_iterations)
+
+
+def test_larger_arrays_have_the_same_sds_relative_to_noise():
+    table = bound.against_size(model(), 4, 30, MOTION, [1.0, 2.0], count=5)
+    assert table.extent_m[1] == pytest.approx(2 * table.extent_m[0])
+    assert table.relative[1] < table.relative[0]
+
+
+def test_ranks():
+    """One sample tells too little; two tell all; one axis of rotation never does (Lemma 1)."""
+    rng = np.random.default_rng(5)
+    two = normal_motion(rng, (2,), 10.0, 300.0, 20.0)
+    many = normal_motion(rng, (20,), 10.0, 300.0, 20.0)
+    axis = np.array([0.0, 0.0, 1.0])
+    flat = many._replace(
+        angular_rate=many.angular_rate[:, 2:] * axis,
+        angular_acceleration=many.angular_acceleration[:, 2:] * axis,
+    )
+    table = bound.ranks([("two", model(), two), ("many", model(), many), ("axis", model(), flat)])
+    assert list(table["rank"] < table.unknowns) == [False, False, True]
