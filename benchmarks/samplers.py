@@ -34,6 +34,7 @@ from imuarray.studies.bayes import simulate_dataset
 WIDER = 1.05  # than the mode's curvature, for autoregressive proposals
 PAPER_CORE_SECONDS = 320 * 3600.0  # 8 hours on 40 cores, T = 500
 ENOUGH = 1000
+CONVERGED = 1.1  # R-hat
 
 
 @dataclass
@@ -219,6 +220,10 @@ def table(rows, ratios) -> str:
         direct = first.rate / ratios[row.samples]
         hours = PAPER_CORE_SECONDS / (ENOUGH / row.rate) if row.samples == 500 else None
         said = f"{hours:.3g}" if hours else ""
+        if row.rhat > CONVERGED:  # an effective size means nothing there
+            start = f"| {row.samples} | {row.method} | {row.rhat:.3f}"
+            lines.append(f"{start} | not converged | | | |")
+            continue
         lines.append(
             f"| {row.samples} | {row.method} | {row.rhat:.3f} | {row.rate:.3g}"
             f" | {ENOUGH / row.rate:.3g} | {row.rate / direct:.3g} | {said} |"
