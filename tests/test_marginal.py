@@ -71,6 +71,12 @@ def test_nodes_hardly_matter():
         )
 
 
+def test_nodes_are_taken_where_they_are_needed():
+    for gyroscope_sd, points in ((0.02, 1), (1.0, 27)):
+        likelihood, *_, positions = case(gyroscope_sd=gyroscope_sd)
+        assert len(Marginal.of(likelihood, positions).nodes) == points
+
+
 def test_start_of_the_modes_hardly_matters():
     likelihood, *_, positions = case()
     far = positions + 2e-3 * np.random.default_rng(5).standard_normal(positions.shape)
@@ -78,9 +84,11 @@ def test_start_of_the_modes_hardly_matters():
     assert near(positions) == pytest.approx(other(positions), abs=1e-8)
 
 
-def test_gradient():
-    likelihood, *_, positions = case(gyroscope_sd=0.05)
-    marginal = Marginal.of(likelihood, positions)
+@pytest.mark.parametrize("nodes", [1, 3])
+def test_gradient(nodes):
+    """Laplace's too, where its volume moves with theta: gyroscopes that see little."""
+    likelihood, *_, positions = case(gyroscope_sd=0.05 if nodes > 1 else 1.0)
+    marginal = Marginal.of(likelihood, positions, nodes)
     theta = positions[1:].ravel()
     slope, value = jax.jit(jax.grad(marginal.log_density))(theta), jax.jit(marginal.log_density)
     for place in range(theta.size):

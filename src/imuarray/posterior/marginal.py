@@ -26,7 +26,9 @@ from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.proposals import proposals
 
 NODES = 3  # on each axis of omega
-NEWTON = 4  # steps to the mode, from where it is at the reference positions
+ENOUGH = 1e-4  # nats in total between Laplace's method and nodes: then the former is taken
+NEWTON = 6  # steps to the mode at most, from where it is at the reference positions
+NEAR = 1e-4  # sds: a step as short is the last, the next would be its square
 
 
 class Data(NamedTuple):
@@ -40,6 +42,7 @@ class Data(NamedTuple):
     pull: jnp.ndarray  # (T, 6) the prior's part of H' Lambda y for omega_dot and s
     ridge: jnp.ndarray  # (6,) its part of H' Lambda H's diagonal, zero where flat
     start: jnp.ndarray  # (T, 3) rad/s, where the search for each mode begins
+    volume: jnp.ndarray  # half the log determinants of ``information``, summed over samples
 
 
 def grid(nodes: int) -> tuple[np.ndarray, np.ndarray]:
@@ -90,43 +93,80 @@ def _curvature(rate, C, b, information):
     return slope.T @ misfit, jnp.where(sound, full, first)
 
 
-def _mode(rate, C, b, mean, information):
-    """(mode (3,), lower factor (3, 3) of the curvature there) of one sample's exponent."""
+def _step(rate, C, b, mean, information):
+    """(omega (3,) after a step of Newton's method, its squared length in sds) of one sample.
 
-    def step(rate, _):
-        slope, second = _curvature(rate, C, b, information)
-        gradient = slope + information @ (rate - mean)
-        factor = cholesky(second)
-        return rate - solve_upper(factor, solve_lower(factor, gradient[:, None]))[:, 0], None
+    Its derivative takes the curvature as given: at a mode, that is the mode's derivative.
+    """
+    slope, second = _curvature(rate, C, b, information)
+    factor = cholesky(jax.lax.stop_gradient(second))
+    half = solve_lower(factor, (slope + information @ (rate - mean))[:, None])
+    return rate - solve_upper(factor, half)[:, 0], jnp.sum(half**2)
 
-    rate, _ = jax.lax.scan(step, rate, None, NEWTON)
-    return rate, cholesky(_curvature(rate, C, b, information)[1])
+
+def _modes_at(C, b, data):
+    """(modes (T, 3), lower factors (T, 3, 3) of the curvatures there) of the exponents."""
+    steps = jax.vmap(_step, (0, None, 0, 0, 0))
+
+    def further(state):
+        return (state[2] < NEWTON) & (state[1] > NEAR**2)
+
+    def again(state):
+        rate, length = steps(state[0], C, b, data.mean, data.information)
+        return rate, jnp.max(length), state[2] + 1
+
+    rate, _, _ = jax.lax.while_loop(further, again, (data.start, jnp.inf, 0))
+    second = jax.vmap(_curvature, (0, None, 0, 0))(rate, C, b, data.information)[1]
+    return rate, jax.vmap(cholesky)(second)
 
 
 def log_marginal(positions, data: Data, nodes, log_weights):
     """log p(y_a | theta, y_g) at positions (A, 3) m, up to the constant that (26a) leaves out.
 
-    The nodes are fixed where the derivative is taken: the derivative under the integral.
+    One node is Laplace's method.
     """
     C, b, constant, logdet = collapse(positions, data)
-    fixed = jax.lax.stop_gradient((C, b))
-    rate, factor = jax.vmap(_mode, (0, None, 0, 0, 0))(
-        data.start, fixed[0], fixed[1], data.mean, data.information
-    )
-    # omega = mode + F^-T z for a curvature F F'
-    spread = jax.vmap(lambda f: solve_upper(f, nodes.T).T)(factor)
-    drawn = rate[:, None] + spread
-    w = _products(drawn)
-    away = drawn - data.mean[:, None]
+    rate, factor = _modes_at(*jax.lax.stop_gradient((C, b)), data)
+    if len(nodes) == 1:
+        inside, volume = _laplace(rate, C, b, constant, data)
+    else:
+        inside, volume = _quadrature(rate, factor, C, b, constant, data, nodes, log_weights)
+    return inside - volume + data.volume - 0.5 * len(rate) * logdet
+
+
+def _exponent(rate, C, b, constant, data):
+    """That of (26a) at omega (T, N, 3) of each sample, (T, N)."""
+    w = _products(rate)
+    away = rate - data.mean[:, None]
     prior = jnp.einsum("tni,tij,tnj->tn", away, data.information, away)
     form = jnp.einsum("tna,ab,tnb->tn", w, C, w) - 2 * jnp.einsum("tna,ta->tn", w, b)
-    exponent = -0.5 * (prior + form + constant[:, None])
+    return -0.5 * (prior + form + constant[:, None])
+
+
+def _quadrature(rate, factor, C, b, constant, data, nodes, log_weights):
+    """(log integrals, log volume), each summed over samples.
+
+    The nodes are fixed where the derivative is taken: the derivative under the integral.
+    """
+    # omega = mode + F^-T z for a curvature F F'
+    spread = jax.vmap(lambda f: solve_upper(f, nodes.T).T)(factor)
+    exponent = _exponent(rate[:, None] + spread, C, b, constant, data)
     inside = jax.scipy.special.logsumexp(
         exponent + log_weights + 0.5 * jnp.sum(nodes**2, axis=1), axis=1
     )
-    volume = jnp.sum(jnp.log(jnp.diagonal(factor, axis1=1, axis2=2)))
-    known = 0.5 * jnp.sum(jnp.linalg.slogdet(data.information)[1])
-    return jnp.sum(inside) - volume + known - 0.5 * len(rate) * logdet
+    return jnp.sum(inside), jnp.sum(jnp.log(jnp.diagonal(factor, axis1=1, axis2=2)))
+
+
+def _laplace(rate, C, b, constant, data):
+    """The same by the mode alone; the volume's derivative follows the mode as theta moves."""
+
+    def volume(rate, b, mean, information):
+        # one step more is nothing at the mode, but its derivative is the mode's
+        moved = _step(rate, C, b, mean, information)[0]
+        return 0.5 * log_determinant(cholesky(_curvature(moved, C, b, information)[1]))
+
+    volumes = jax.vmap(volume)(rate, b, data.mean, data.information)
+    return jnp.sum(_exponent(rate[:, None], C, b, constant, data)), jnp.sum(volumes)
 
 
 @jax.jit
@@ -147,7 +187,7 @@ class Marginal:
 
     @classmethod
     def of(
-        cls, likelihood: Likelihood, positions, nodes: int = NODES, motion_sd=(np.inf,) * 3
+        cls, likelihood: Likelihood, positions, nodes: int | None = None, motion_sd=(np.inf,) * 3
     ) -> Marginal:
         """Of the same recording as a `Likelihood`; modes are searched from those at ``positions``.
 
@@ -155,7 +195,8 @@ class Marginal:
         ----------
         nodes : int
             On each axis of omega: 1 is Laplace's method, 3 integrates the quartic to some 1e-8
-            nats a sample where gyroscopes see the motion well (`tests/test_marginal.py`).
+            nats a sample where gyroscopes see the motion well (`tests/test_marginal.py`). By
+            default 1 if that differs by less than 1e-4 nats in total from 3 at ``positions``.
         motion_sd : (float, float, float)
             Prior sds of omega (rad/s), omega_dot (rad/s^2) and s (m/s^2), as `ArrayModel` has
             them; infinite as in paper 2021.
@@ -173,9 +214,13 @@ class Marginal:
         energy = collapsed.energy + weight[2] * np.sum(offset**2, axis=1)
         parts = (
             weighted, energy, _precision(collapsed), mean, both, pull, np.repeat(weight[1:], 3),
-            start,
+            start, 0.5 * np.sum(np.linalg.slogdet(both)[1]),
         )  # fmt: skip
-        return cls(Data(*map(jnp.asarray, parts)), *grid(nodes))
+        data = Data(*map(jnp.asarray, parts))
+        if nodes is not None:
+            return cls(data, *grid(nodes))
+        plain, fine = cls(data, *grid(1)), cls(data, *grid(NODES))
+        return plain if abs(plain(positions) - fine(positions)) < ENOUGH else fine
 
     def __call__(self, positions) -> float:
         """log p(y_a | theta, y_g) at positions (A, 3) m, as `Likelihood.estimate` estimates it."""
