@@ -370,7 +370,8 @@ def test_figures_and_tables(tmp_path):
     figure = drawing.confusion_figure(confusion, ["Scale quick"])
     axes = figure.axes[0]
     labels = [label.get_text() for label in axes.get_yticklabels()]
-    assert len(labels) == len(EFFECTS) + 2 and labels[-1] == f"{drawing.STRUCK} (66)"
+    struck = f"{drawing.STRUCK} ({3 * len(CATALOGUE)})"
+    assert len(labels) == len(EFFECTS) + 2 and labels[-1] == struck
     cells = {(round(t.get_position()[0]), round(t.get_position()[1])) for t in axes.texts}
     assert len(cells) >= len(labels)
     paths = {kind: tmp_path / f"confusion.{kind}" for kind in ("pdf", "png", "csv")}

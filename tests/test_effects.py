@@ -163,13 +163,13 @@ def test_gauss_newton_finds_the_optimum_of_bcd():
 def test_a_new_effect_is_ten_lines_and_needs_nothing_else():
     """An effect unknown to the package, defined here, is simulated, estimated and judged."""
 
-    @effect("test_bias", unit="m s-2", prior_sd=0.1, shape=lambda a, g: (a - 1, 3))
+    @effect("test_bias", unit="m s-2", prior_sd=0.1, shape=lambda a, g: (a, 3))
     def bias(value, instant, predicted):
-        return predicted._replace(specific_force=predicted.specific_force.at[1:].add(value))
+        return predicted._replace(specific_force=predicted.specific_force + value)
 
     try:
         model, force, rate, _, parameters, motion = simulated(
-            ("test_bias",), lambda rng: {"test_bias": 0.05 * rng.standard_normal((7, 3))}
+            ("test_bias",), lambda rng: {"test_bias": 0.05 * rng.standard_normal((8, 3))}
         )
         prior = (model.array.parameters, 3e-3)
         found = calibrate_gauss_newton(model, force, rate, position_prior=prior)
@@ -179,7 +179,7 @@ def test_a_new_effect_is_ten_lines_and_needs_nothing_else():
         normals = np.zeros((len(force), 1, 3))
         flat = found.positions[1:].ravel()
         with_bias = likelihood.on(np.concatenate([flat, found.effect_parameters]), normals)
-        assert with_bias > likelihood.on(np.concatenate([flat, np.zeros(21)]), normals)
+        assert with_bias > likelihood.on(np.concatenate([flat, np.zeros(24)]), normals)
     finally:
         del EFFECTS["test_bias"]
 

@@ -75,7 +75,8 @@ def _check_output(arguments: argparse.Namespace) -> None:
         raise InputError(f"--out {out}: expected a folder one may write to, found {out.parent}")
     for source in _inputs(arguments):
         if not source.is_file():
-            raise InputError(f"{source}: expected a file to read, found none")
+            found = "a folder" if source.is_dir() else "none"
+            raise InputError(f"{source}: expected a file to read, found {found}")
         if out.is_file() and out.samefile(source):
             raise InputError(f"--out {out}: expected another file than the input, found the same")
 

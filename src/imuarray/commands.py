@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from imuarray.commands_model import assumed, chosen_model, effect_names, extender, usable
+from imuarray.commands_model import assumed, chosen_model, extender, usable
 from imuarray.errors import InputError
 from imuarray.model.effects import find_effects
+from imuarray.model.names import parameter_names
 from imuarray.provenance import digest, stamp, write_netcdf
 from imuarray.recording import read_recording, write_recording
 
@@ -40,8 +41,9 @@ def calibrate(arguments) -> None:
     find_effects(arguments.effects)  # an unknown one is named before anything else
     if arguments.method == "bcd":
         if model.effects:
+            asked = "--effects" if arguments.effects else "--diagnosis"
             raise InputError(
-                "--effects: expected --method gauss-newton (bcd is for the papers' model), found"
+                f"{asked}: expected --method gauss-newton (bcd is for the papers' model), found"
                 f" bcd with {', '.join(model.effects)}"
             )
         found = calibrate_bcd(model, *data, saturated=saturated, tolerance=1e-9)
@@ -92,9 +94,10 @@ def calibration_dataset(recording, model, found, saturated) -> xr.Dataset:
     }  # fmt: skip
     dataset = xr.Dataset(variables, coords, {"converged": int(found.converged)})
     if model.effects:
+        imus = recording.accelerometer_labels, recording.gyroscope_labels
         dataset["effect_parameter"] = (("parameter",), found.effect_parameters)
         dataset["effect_sd"] = (("parameter",), np.sqrt(np.diag(covariance)[size:]))
-        dataset = dataset.assign_coords(parameter=effect_names(model))
+        dataset = dataset.assign_coords(parameter=parameter_names(model, imus))
     return dataset
 
 

@@ -8,6 +8,7 @@ import time
 from imuarray.criticism.describe import MEANING
 from imuarray.criticism.diagnosis import diagnose as criticise
 from imuarray.errors import InputError
+from imuarray.model import EFFECTS
 from imuarray.recording import read_recording
 from imuarray.report.write import write_report
 
@@ -15,8 +16,8 @@ from imuarray.report.write import write_report
 def diagnose(arguments) -> None:
     """Name what the papers' model gets wrong on a recording; a folder with the evidence."""
     for name in arguments.without:
-        if name not in MEANING:
-            known = ", ".join(sorted(MEANING))
+        if name not in {*MEANING, *EFFECTS}:
+            known = ", ".join(sorted({*MEANING, *EFFECTS}))
             raise InputError(f"--without: expected any of {known}, found {name}")
     recording = read_recording(arguments.recording)
     begun = time.monotonic()

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from imuarray.errors import InputError
 from imuarray.model import ArrayModel
 from imuarray.recording import Recording, array_of
@@ -83,11 +81,3 @@ def chosen_model(recording: Recording, arguments) -> ArrayModel:
     return extended(
         model_of(recording), (recording.accelerometer_labels, recording.gyroscope_labels)
     )
-
-
-def effect_names(model: ArrayModel) -> list[str]:
-    """A name for each flat effect parameter: id[i, j] unit."""
-    names = []
-    for item, shape in zip(model.chain, model.shapes, strict=True):
-        names += [f"{item.id}[{', '.join(map(str, i))}] {item.unit}" for i in np.ndindex(*shape)]
-    return names

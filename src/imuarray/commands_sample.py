@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.commands_model import assumed, chosen_model, effect_names, usable
+from imuarray.commands_model import assumed, chosen_model, usable
 from imuarray.errors import InputError
+from imuarray.model.names import parameter_names
 from imuarray.posterior import (
     Chains,
     CompiledTarget,
@@ -40,6 +41,7 @@ def sample(arguments) -> None:
     recording = usable(read_recording(arguments.recording), arguments.quiet)
     recording = assumed(recording, arguments)
     model = chosen_model(recording, arguments)
+    names = parameter_names(model, (recording.accelerometer_labels, recording.gyroscope_labels))
     if model.effects and arguments.rates == "spread":
         raise InputError("--rates spread: expected no --effects with it, found some")
     made = (_nuts if arguments.method == "nuts" else _pmmh)(recording, model, arguments)
@@ -47,7 +49,7 @@ def sample(arguments) -> None:
     verdict, table, _ = summarise(made.chains, labels, RHAT_THRESHOLD)
     attrs = stamp({"recording": made.key, **made.settings}, arguments.seed)
     attrs |= {name: verdict[name] for name in ("burn_in_draws", "rhat_max", "ess_min")}
-    write_chains(arguments.out, made.chains, labels, made.prior, attrs, effect_names(model))
+    write_chains(arguments.out, made.chains, labels, made.prior, attrs, names)
     if made.checkpoint is not None:
         Path(made.checkpoint).unlink(missing_ok=True)
     if not arguments.quiet:

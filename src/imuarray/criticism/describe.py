@@ -7,15 +7,7 @@ import numpy as np
 from imuarray.criticism.columns import HELD
 from imuarray.criticism.fit import flat_parameters
 from imuarray.criticism.search import Cause, Search, own_turning
-from imuarray.model import EFFECTS
-from imuarray.model.effects import KINDS
-from imuarray.recording.validate import AXES
-
-OFF_DIAGONAL = ("xy", "xz", "yx", "yz", "zx", "zy")
-COMPONENTS = {
-    "sensor_clock": ("period", "frequency", "phase", "offset", "drift"),
-    "position_shift": ("x", "y", "z", "time"),
-}
+from imuarray.model.names import component, unit_of
 
 # What an effect is, in the words of one who holds the board.
 MEANING = {
@@ -42,27 +34,6 @@ MEANING = {
     "stale_samples": "former samples are repeated",
     "position_shift": "a triad moved on the board during the recording",
 }
-
-
-def component(effect: str, place: tuple[int, ...]) -> str:
-    """The name of a parameter within its IMU's: ``place`` are its indices."""
-    if not place:
-        return "delay" if effect.endswith("delay") else "value"
-    if effect == "bias_drift":
-        return f"{KINDS[place[0]]}_{AXES[place[1]]}_degree{place[2]}"
-    if effect in COMPONENTS:
-        return COMPONENTS[effect][place[0]]
-    if len(place) == 2:
-        return AXES[place[0]] + AXES[place[1]]
-    return OFF_DIAGONAL[place[0]] if effect.endswith("misalignment") else AXES[place[0]]
-
-
-def unit_of(effect: str, place: tuple[int, ...]) -> str:
-    """The parameter's unit."""
-    unit = EFFECTS[effect].unit
-    if "|" in unit:
-        return unit.split("|")[place[0]].strip()
-    return unit.split(",")[place[-1]].strip() if "," in unit else unit
 
 
 def parameters_of(search: Search, cause: Cause, sds) -> dict:

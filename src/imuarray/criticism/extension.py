@@ -9,12 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.criticism.describe import component
+from imuarray.criticism.describe import MEANING
 from imuarray.criticism.structure import LEFT_OUT
 from imuarray.errors import InputError
 from imuarray.model import EFFECTS, ArrayModel
 from imuarray.model.array_model import EffectPrior
 from imuarray.model.effects import KINDS
+from imuarray.model.names import component
 from imuarray.model.noise import Noise
 
 PINNED = 1e-6  # of a prior sd: parameters that the diagnosis fixed, or found no need of
@@ -39,18 +40,25 @@ def read_extension(path: Path) -> Extension:
     try:
         document = json.loads(Path(path).read_text(encoding="utf-8"))
         causes, noise = document["causes"], document["noise_sd"]
-        effects = tuple(c["effect"] for c in causes if c["effect"] in EFFECTS)
+        named = [c["effect"] for c in causes]
+        effects = tuple(name for name in named if name in EFFECTS)
         values = {
             c["effect"]: {n: (float(p["value"]), p["sd"]) for n, p in c["parameters"].items()}
             for c in causes if c["effect"] in EFFECTS
         }  # fmt: skip
         sds = [{label: float(item["sd"]) for label, item in noise[kind].items()} for kind in KINDS]
-        before = tuple(c["effect"] for c in causes if c["effect"] in BEFORE)
+        before = tuple(name for name in named if name in BEFORE)
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: expected a diagnosis.json, found no text") from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         what = f"no {error}" if isinstance(error, KeyError) else str(error)[:80]
         raise InputError(f"{path}: expected a diagnosis.json, found {what}") from error
+    for name in named:
+        if name not in EFFECTS and name not in MEANING:
+            raise InputError(
+                f"{path}: expected causes that this installation knows, found {name}; is the"
+                " module that defines it imported?"
+            )
     return Extension(effects, values, *sds, before)
 
 
@@ -75,8 +83,8 @@ def extended_model(extension: Extension, model: ArrayModel, labels) -> ArrayMode
             place += 1
     if unused:
         raise InputError(
-            f"--diagnosis: expected IMUs {', '.join(whole)} as in the recording, found parameters"
-            f" {', '.join(sorted(n for _, n in unused)[:3])}"
+            f"--diagnosis: expected IMUs {', '.join(whole)} and components as in the model, found"
+            f" parameters {', '.join(sorted(n for _, n in unused)[:3])}"
         )
     sd = named.effect_prior_sd
     prior = EffectPrior(np.where(pinned, start, 0.0), np.where(pinned, PINNED * sd, sd), start)

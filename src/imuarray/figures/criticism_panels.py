@@ -8,10 +8,11 @@ import numpy as np
 import pandas as pd
 
 from imuarray.criticism.columns import POSITION
-from imuarray.criticism.describe import component
 from imuarray.criticism.scans import delay_score
 from imuarray.criticism.scores import robust_inverse
 from imuarray.figures.criticism_signals import BINS, Signal, binned, signal_of
+from imuarray.model.effects import KINDS
+from imuarray.model.names import component
 from imuarray.model.timing import clock_turns
 from imuarray.recording.validate import AXES
 
@@ -137,8 +138,14 @@ def parameter_panels(signal: Signal) -> list[pd.DataFrame]:
     return panels
 
 
+ROOTS = ("bias", "scale", "misalignment", "nonlinearity")
+DRAWN = {"size_effect", "gyroscope_g_sensitivity"} | {f"{k}_{r}" for k in KINDS for r in ROOTS}
+
+
 def abscissa(effect: str, name: str) -> tuple[float, str, bool]:
     """(factor, label, whether it is the reading itself) of what a parameter multiplies."""
+    if effect not in DRAWN:  # somebody's own
+        return 1.0, "reading per unit parameter", False
     along_axis = name[-1]
     if effect == "size_effect":
         return 1e-3, f"lever arm {along_axis} (m/s² per mm)", False

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +14,10 @@ from imuarray.model import kinematics
 from imuarray.model.effects import Effect, Instant, Prediction, find_effects
 from imuarray.model.jax64 import jax, jnp
 from imuarray.model.noise import Noise
+from imuarray.model.probe import probe
 from imuarray.motion.state import Motion
+
+probed = cache(probe)  # once each
 
 
 class EffectPrior(NamedTuple):
@@ -61,8 +64,11 @@ class ArrayModel:
 
     @cached_property
     def chain(self) -> tuple[Effect, ...]:
-        """The effects themselves; InputError for an unknown id."""
-        return tuple(sorted(find_effects(self.effects), key=lambda item: not item.sampling))
+        """The effects themselves; InputError for an unknown id, or one that is not as declared."""
+        found = find_effects(self.effects)
+        for item in found:
+            probed(item)
+        return tuple(sorted(found, key=lambda item: not item.sampling))
 
     @cached_property
     def shapes(self) -> tuple[tuple[int, ...], ...]:

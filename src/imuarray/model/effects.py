@@ -2,8 +2,8 @@
 
 An effect names its parameters' shape, unit and prior scale, and turns a predicted
 measurement into another one. Nothing else is needed: simulation, both estimators and
-the likelihood call `ArrayModel.predict`, and derivatives come from autodiff. To add
-one, write a function here with the `effect` decorator.
+the likelihood call `ArrayModel.predict`, and derivatives come from autodiff. The package's
+are in `imuarray.model.catalogue` and `imuarray.model.timing`; `docs/effects.md` adds one.
 """
 
 from __future__ import annotations
@@ -77,10 +77,13 @@ def effect(id, *, unit, prior_sd, shape, derivatives=False, sensors=None, sampli
     """Register the decorated function as the effect ``id`` of the catalogue."""
 
     def register(function):
+        if "," in id or " " in id:
+            raise ValueError(f"effect {id!r}: expected an id without commas and spaces")
         if id in EFFECTS:
             raise ValueError(f"effect {id}: expected a new id, found it registered already")
+        prior = tuple(prior_sd) if isinstance(prior_sd, list) else prior_sd
         whose = sensors or (id.split("_")[0] if id.split("_")[0] in KINDS else "imu")
-        EFFECTS[id] = Effect(id, unit, prior_sd, shape, derivatives, whose, function, sampling)
+        EFFECTS[id] = Effect(id, unit, prior, shape, derivatives, whose, function, sampling)
         return function
 
     return register

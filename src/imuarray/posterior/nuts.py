@@ -107,3 +107,40 @@ def run_nuts(
     z, log_target, accepted, _ = (np.stack(part)[:, cut] for part in zip(*joined, strict=True))
     steps = [float(state.adapt_state.step_size) for state in states]
     return Chains(white.theta(z), log_target, accepted.mean(axis=1), 1, float(np.mean(steps)))
+
+
+def run_many(log_density, data, centres, factors, starts, warmup: int, draws: int, keys,
+             threads: int = 1) -> np.ndarray:  # fmt: skip
+    """One chain on each of many data sets of one shape, (sets, draws, size), compiled once.
+
+    ``log_density(theta, data)``; ``data``, a list of pytrees, ``centres`` and ``starts``
+    (sets, size), lower ``factors`` (sets, size, size) and ``keys``, one integer each, as
+    `run_nuts` has them for one.
+    """
+    from numpyro.infer.hmc import hmc
+
+    @jax.jit
+    def one(data, centre, factor, z, seed):
+        key = jax.random.key_data(jax.random.key(seed))
+        begin, advance = hmc(lambda z: -log_density(centre + factor @ z, data), algo="NUTS")
+        state = begin(
+            z, num_warmup=warmup, target_accept_prob=ACCEPTANCE, max_tree_depth=DEPTH,
+            adapt_mass_matrix=False, step_size=0.5, rng_key=key,
+        )  # fmt: skip
+
+        def step(state, _):
+            state = advance(state)
+            return state, state.z
+
+        _, z = jax.lax.scan(step, state, None, warmup + draws)
+        return z[warmup:] @ factor.T + centre
+
+    whites = [
+        np.linalg.solve(factor, start - centre)
+        for start, centre, factor in zip(starts, centres, factors, strict=True)
+    ]
+    with ThreadPoolExecutor(threads) as pool:
+        made = pool.map(lambda job: np.asarray(one(*job)), zip(
+            data, centres, factors, whites, keys, strict=True
+        ))  # fmt: skip
+        return np.stack(list(made))

@@ -32,12 +32,12 @@ SHARES = ("scale", "share")  # of effects and parameters without a unit, those t
 
 
 def unit_shown(effect: str, name: str, unit: str) -> str:
-    """The key of `SHOWN` for a parameter: what "1" means depends on whose it is."""
+    """The unit that a parameter is shown in: what "1" means depends on whose it is."""
     if unit == "1" and effect.endswith("misalignment"):
         return "rad"
     if unit == "1" and (effect.endswith(SHARES[0]) or name.startswith(SHARES[1])):
         return "%"
-    return unit if unit in SHOWN else "1"
+    return unit
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -74,9 +74,10 @@ def plus_minus(value: float, error: float | None) -> str:
 def quantity(value: float, error: float | None, unit: str, size: float | None = None) -> str:
     """A value in SI with its error as a page shows it, degrees beside radians.
 
-    ``unit``: a key of `SHOWN`; ``size``: what chooses the prefix, the value itself if None.
+    ``unit``: a key of `SHOWN`, others are shown as they are; ``size``: what chooses the prefix,
+    the value itself if None.
     """
-    choices, beside = SHOWN[unit]
+    choices, beside = SHOWN.get(unit, (((1.0, unit),), None))
     size = abs(value) if size is None else size
     large = [choice for choice in choices if choice[0] * size >= 0.0999]
     factor, name = large[0] if large else choices[-1]
@@ -91,7 +92,7 @@ def quantity(value: float, error: float | None, unit: str, size: float | None = 
 
 def span(low: float, high: float, unit: str) -> str:
     """'1.02 to 1.07 mrad/s (0.0586 to 0.0612 deg/s)'; one value where both read alike."""
-    choices, beside = SHOWN[unit]
+    choices, beside = SHOWN.get(unit, (((1.0, unit),), None))
     size = max(abs(low), abs(high))
     large = [choice for choice in choices if choice[0] * size >= 0.0999]
     parts = [large[0] if large else choices[-1], *([beside] if beside else [])]

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.model import ArrayModel
+from imuarray.model.names import parameter_names
 from imuarray.motion import Motion
 from imuarray.recording import Recording
 from imuarray.simulation.measure import clip, measure
@@ -30,7 +31,7 @@ def _recording(model, time, force, rate, nominal, ranges, prior_sd, title) -> Re
     )
 
 
-def _truth(motion: Motion, positions, parameters) -> xr.Dataset:
+def _truth(model: ArrayModel, motion: Motion, positions, parameters) -> xr.Dataset:
     axes = ("time", "axis")
     data = {name: (axes, getattr(motion, name)) for name in Motion._fields}
     data["position"] = (("accelerometer", "axis"), positions)
@@ -39,7 +40,7 @@ def _truth(motion: Motion, positions, parameters) -> xr.Dataset:
         "angular_rate": "rad s-1", "angular_acceleration": "rad s-2", "specific_force": "m s-2",
         "angular_jerk": "rad s-3", "force_rate": "m s-3", "position": "m",
     }  # fmt: skip
-    truth = xr.Dataset(data)
+    truth = xr.Dataset(data, {"parameter": parameter_names(model)} if model.effects else None)
     for name, unit in units.items():
         truth[name].attrs["units"] = unit
     return truth
@@ -61,7 +62,7 @@ def simulate_samples(
     force, _ = clip(force, accelerometer_range)
     ranges = (accelerometer_range, gyroscope_range)
     recording = _recording(model, time, force, rate, nominal, ranges, position_prior_sd, title)
-    return recording, _truth(motion, relative, parameters)
+    return recording, _truth(model, motion, relative, parameters)
 
 
 def simulate_recording(

@@ -1,0 +1,53 @@
+"""What the parameters of effects are called, in every file and on every page."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from imuarray.model.array_model import ArrayModel
+from imuarray.model.effects import EFFECTS, KINDS
+
+AXES = "xyz"
+OFF_DIAGONAL = ("xy", "xz", "yx", "yz", "zx", "zy")
+COMPONENTS = {
+    "sensor_clock": ("period", "frequency", "phase", "offset", "drift"),
+    "position_shift": ("x", "y", "z", "time"),
+}
+
+
+def component(effect: str, place: tuple[int, ...]) -> str:
+    """The name of a parameter within its IMU's: ``place`` are its indices but the IMU's."""
+    if not place:
+        return "delay" if effect.endswith("delay") else "value"
+    if effect == "bias_drift":
+        return f"{KINDS[place[0]]}_{AXES[place[1]]}_degree{place[2]}"
+    if effect in COMPONENTS:
+        return COMPONENTS[effect][place[0]]
+    sizes = EFFECTS[effect].shape(2, 2)[1:] if effect in EFFECTS else (3,) * len(place)
+    if set(sizes) == {3}:
+        return "".join(AXES[index] for index in place)
+    if sizes == (len(OFF_DIAGONAL),):
+        return OFF_DIAGONAL[place[0]]
+    return "value" + "_".join(str(index + 1) for index in place)
+
+
+def unit_of(effect: str, place: tuple[int, ...]) -> str:
+    """The parameter's unit."""
+    unit = EFFECTS[effect].unit
+    if "|" in unit:
+        return unit.split("|")[place[0]].strip()
+    return unit.split(",")[place[-1]].strip() if "," in unit else unit
+
+
+def parameter_names(model: ArrayModel, labels=None) -> list[str]:
+    """'effect component_IMU unit' of each flat effect parameter, (P,).
+
+    ``labels``: of the accelerometers and of the gyroscopes; by default the array's, or numbers.
+    """
+    counts = (str(k + 1) for k in range(model.array.gyroscopes))
+    whole = max(labels or (model.array.labels, tuple(counts)), key=len)
+    return [
+        f"{item.id} {component(item.id, i[1:])}_{whole[i[0]]} {unit_of(item.id, i[1:])}"
+        for item, shape in zip(model.chain, model.shapes, strict=True)
+        for i in np.ndindex(*shape)
+    ]

@@ -1,0 +1,104 @@
+"""Whether an effect is what it declares: found out once, before anything rests on it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from imuarray.errors import InputError
+from imuarray.model.effects import Effect, Instant, Prediction
+from imuarray.model.jax64 import jax, jnp
+from imuarray.motion.state import Motion
+
+ACCELEROMETERS, GYROSCOPES = 4, 3  # of the array that effects are tried on
+
+
+def probe(item: Effect) -> None:
+    """InputError, with the effect's id, where declaration and function do not agree.
+
+    Tried on a small array: shapes; no effect at the value zero; and no use of omega double dot
+    or s dot without ``derivatives=True``, for those would be taken for zero.
+    """
+    sd = np.broadcast_to(_prior_sd(item), _shape(item))
+    with jax.ensure_compile_time_eval():  # models are looked at while others are traced
+        _probe(item, sd, np.random.default_rng(1))
+
+
+def _probe(item: Effect, sd, rng) -> None:
+    plain = Prediction(
+        jnp.asarray(10 * rng.standard_normal((ACCELEROMETERS, 3))),
+        jnp.asarray(5 * rng.standard_normal((GYROSCOPES, 3))),
+    )
+    positions = jnp.asarray(0.01 * rng.standard_normal((ACCELEROMETERS, 3)))
+    fields = [jnp.asarray(scale * rng.standard_normal(3)) for scale in (5, 100, 10, 1e3, 1e2)]
+
+    def predicted(parameters, later):
+        instant = Instant(Motion(*fields[:3], *later), positions, time=0.3, span=1.0)
+        return item.apply(jnp.asarray(parameters), instant, plain)
+
+    later = tuple(fields[3:])
+    nothing = _tried(item, sd.shape, lambda: predicted(np.zeros(sd.shape), later))
+    _require_shapes(item, nothing, plain)
+    for kind, old, new in zip(Prediction._fields, plain, nothing, strict=True):
+        if not np.allclose(old, new, rtol=1e-9, atol=1e-12):
+            raise _wrong(item, f"{kind} left as it is by parameters of zero", "it changed")
+    drawn = sd * rng.standard_normal(sd.shape)
+    _, change = _tried(
+        item, sd.shape, lambda: jax.jvp(lambda x: predicted(drawn, x), (later,), (later,))
+    )
+    if not item.derivatives and any(np.any(np.asarray(part) != 0) for part in change):
+        raise _wrong(item, "derivatives=True, since it uses omega double dot or s dot", "False")
+
+
+def _wrong(item: Effect, expected: str, found) -> InputError:
+    return InputError(f"effect {item.id}: expected {expected}, found {found}")
+
+
+def _shape(item: Effect) -> tuple[int, ...]:
+    try:
+        shape = tuple(int(size) for size in item.shape(ACCELEROMETERS, GYROSCOPES))
+    except Exception as error:
+        raise _wrong(item, "shape=lambda a, g: a tuple", _first(error)) from error
+    if not shape or shape[0] not in (ACCELEROMETERS, GYROSCOPES):
+        expected = (
+            f"a shape whose first axis counts triads, {ACCELEROMETERS} or {GYROSCOPES} for"
+            f" {ACCELEROMETERS} accelerometers and {GYROSCOPES} gyroscopes"
+        )
+        raise _wrong(item, expected, shape)
+    units = item.unit.split("," if "," in item.unit else "|")
+    if len(units) > 1 and (len(shape) < 2 or len(units) not in shape[1:]):
+        raise _wrong(item, f"a unit for each of {shape[1:]}", item.unit)
+    return shape
+
+
+def _prior_sd(item: Effect) -> np.ndarray:
+    shape = _shape(item)
+    try:
+        sd = np.asarray(item.prior_sd, float)
+        np.broadcast_to(sd, shape)
+    except (TypeError, ValueError):
+        raise _wrong(item, f"a prior_sd that broadcasts to {shape}", item.prior_sd) from None
+    if not np.all((sd > 0) & np.isfinite(sd)):
+        raise _wrong(item, "a positive prior_sd", item.prior_sd)
+    return sd
+
+
+def _tried(item: Effect, shape, function):
+    try:
+        return function()
+    except Exception as error:
+        expected = f"a function of (parameters {shape}, instant, predicted) in jax.numpy"
+        raise _wrong(item, expected, _first(error)) from error
+
+
+def _require_shapes(item: Effect, made, plain) -> None:
+    if not isinstance(made, Prediction):
+        raise _wrong(item, "predicted._replace(...) returned", type(made).__name__)
+    for kind, old, new in zip(Prediction._fields, plain, made, strict=True):
+        if np.shape(new) != np.shape(old):
+            raise _wrong(item, f"{kind} of shape {np.shape(old)}", np.shape(new))
+
+
+def _first(error: Exception) -> str:
+    """A one-line account of somebody else's error."""
+    text = str(error).strip().split("\n")[0]
+    return f"{type(error).__name__}: {text[:120]}"
