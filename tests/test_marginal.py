@@ -102,7 +102,8 @@ def test_proper_motion_prior_is_that_of_the_generic_likelihood():
     likelihood, force, rate, model, positions = case(gyroscope_sd=0.05)
     rng = np.random.default_rng(6)
     motion_sd = (8.0, 200.0, 15.0)
-    marginal = Marginal.of(likelihood, positions, 5, motion_sd)
+    likelihood = Likelihood.of(model, force, rate, motion_sd=motion_sd[:2])
+    marginal = Marginal.of(likelihood, positions, 5, motion_sd[2])
     proper = ArrayModel(model.array, model.noise, (), motion_sd=motion_sd)
     start = np.hstack([rate.mean(axis=1), np.zeros((len(rate), 3)), force.mean(axis=1)])
     generic = GenericLikelihood(proper, force, rate, start, steps=8)
@@ -111,6 +112,19 @@ def test_proper_motion_prior_is_that_of_the_generic_likelihood():
     both = [(float(one(t)), float(other(t))) for t in thetas]
     difference = np.subtract(*np.array(both).T)
     np.testing.assert_allclose(difference, difference[0], atol=1e-3)
+
+
+def test_proper_motion_prior_of_the_estimator():
+    """The compiled estimate's mean is the marginal, with the same priors of omega, omega_dot."""
+    _, force, rate, model, positions = case(gyroscope_sd=0.05)
+    likelihood = Likelihood.of(model, force, rate, motion_sd=(8.0, 200.0))
+    rng = np.random.default_rng(8)
+    values = likelihood.centred(positions).realisations(positions, 2000, 20, rng)
+    error = values.std(ddof=1) / np.sqrt(len(values))
+    assert Marginal.of(likelihood, positions, 5)(positions) == pytest.approx(
+        values.mean(), abs=5 * error + 1e-6
+    )
+    assert error < 0.01
 
 
 def test_laplace_of_the_generic_likelihood():

@@ -11,6 +11,8 @@ PACKAGE = Path(imuarray.__file__).parent
 
 BASE = ("config.py", "errors.py", "provenance.py", "streams.py")  # under every stage
 
+APART = ("blind_", "theory_", "validation_")  # sizes of targets that nothing else rests on
+
 # Every stage rests on those before it: the package's folders are the path of the data.
 STAGES = {
     "simulation": ("geometry", "motion", "model", "simulation", "recording", "studies"),
@@ -72,11 +74,12 @@ def attempt(path: str) -> float:
     return time.time() if missing else 0.0
 
 
-def effective(config: dict, scale: str, *sections: str, scaled: bool = True) -> dict:
+def effective(config: dict, scale: str, *sections: str, scaled: bool = True, own: str = "") -> dict:
     """The part of the configuration a rule depends on, with one scale resolved.
 
-    Without the number of threads, which no result depends on, and the blind study's keys, which
-    only its own do; ``scaled=False`` leaves the scale out, for results that all scales share.
+    Without the number of threads, which no result depends on, and the keys that only the blind
+    study or ``own`` targets (a prefix such as "theory_") depend on; ``scaled=False`` leaves the
+    scale out, for results that all scales share.
     """
     names = ("seed", "array", "noise", *sections)
     if not scaled:
@@ -84,7 +87,7 @@ def effective(config: dict, scale: str, *sections: str, scaled: bool = True) -> 
     sizes = {
         key: value
         for key, value in config["scales"][scale].items()
-        if key != "threads" and not key.startswith("blind_")
+        if key != "threads" and (key.startswith(own) if own else not key.startswith(APART))
     }
     return {**{name: config[name] for name in names}, "scale": {"name": scale, **sizes}}
 

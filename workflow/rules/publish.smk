@@ -10,7 +10,7 @@ rule publish_figure:
     log:
         "results/logs/publish/{name}.{kind}.log",
     wildcard_constraints:
-        name=r"\d{4}_fig\d",
+        name=r"\d{4}_fig\d|theory_(efficiency|convergence|size)|validation_ranks",
         kind="pdf|png|csv",
     shell:
         "cp {input:q} {output:q} 2> {log:q}"
@@ -24,7 +24,7 @@ rule publish_table:
     log:
         "results/logs/publish/{name}.{kind}.log",
     wildcard_constraints:
-        name=r"\d{4}_table\d",
+        name=r"\d{4}_table\d|theory_ranks|validation_(coverage|joint)",
         kind="csv|tex|md",
     shell:
         "cp {input:q} {output:q} 2> {log:q}"

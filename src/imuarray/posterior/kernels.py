@@ -25,6 +25,7 @@ class Data(NamedTuple):
     values: np.ndarray
     pairs: np.ndarray
     products: np.ndarray
+    ridge: np.ndarray  # (3,) prior precision of omega_dot (s^4/rad^2), zero where flat
 
 
 class Workspace(NamedTuple):
@@ -66,6 +67,8 @@ def _collapse(positions, data, work):
         kernels.information(positions, data.weights, data.pairs, data.products, work.K)
     else:
         kernels.information_general(positions, data.precision, data.tensor, work.K)
+    for i in range(3):
+        work.K[6 + i, 6 + i] += data.ridge[i]
     logdet = kernels.eliminate(work.K, work.C, work.X, work.inverse)
     work.moments[0] = data.base
     kernels.weighted_moments(positions, data.weighted, work.moments)

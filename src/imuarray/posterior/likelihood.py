@@ -41,11 +41,13 @@ class Likelihood:
         saturated=None,
         determinant: str = "derived",
         rate_distribution=None,
+        motion_sd=(np.inf, np.inf),
     ) -> Likelihood:
         """Arrange measurements (T, A, 3) m/s^2 and (T, G, 3) rad/s for the estimator.
 
         ``rate_distribution``: None for p(omega | y_g) from the declared noise, or a pair
-        (mean (T, 3), covariance (T, 3, 3)), say from (30a)/(30b). InputError where an axis
+        (mean (T, 3), covariance (T, 3, 3)), say from (30a)/(30b). ``motion_sd``: prior sds of
+        omega (rad/s) and omega_dot (rad/s^2), infinite as in the paper. InputError where an axis
         of some sample has no unsaturated gyroscope.
         """
         if determinant not in DETERMINANTS:
@@ -62,10 +64,13 @@ class Likelihood:
                     f" in sample {bad[0]} (and {bad.size - 1} more)"
                 )
             mean, covariance = collapsed.mean, np.linalg.inv(information)
+            if np.isfinite(motion_sd[0]):
+                covariance = np.linalg.inv(information + np.eye(3) / motion_sd[0] ** 2)
+                mean = np.einsum("tij,tjk,kt->it", covariance, information, mean)
         else:
             mean = np.ascontiguousarray(np.asarray(rate_distribution[0], float).T)
             covariance = np.asarray(rate_distribution[1], float)
-        data = _arrange(collapsed, mean, covariance)
+        data = _arrange(collapsed, mean, covariance, np.full(3, float(motion_sd[1]) ** -2.0))
         return cls(data, DETERMINANTS[determinant], collapsed, mean.T, covariance)
 
     def centred(self, positions) -> Likelihood:
@@ -142,7 +147,7 @@ def _lower(covariance) -> np.ndarray:
     return np.array([factor[:, i, j] for i in range(3) for j in range(i + 1)])
 
 
-def _arrange(collapsed: Collapsed, mean, covariance) -> kernels.Data:
+def _arrange(collapsed: Collapsed, mean, covariance, ridge) -> kernels.Data:
     general = collapsed.weights is None
     known = tables()
     return kernels.Data(
@@ -156,4 +161,5 @@ def _arrange(collapsed: Collapsed, mean, covariance) -> kernels.Data:
         np.ascontiguousarray(collapsed.precision) if general else np.empty((0, 0)),
         np.array(structure_tensor()),
         *known,
+        ridge,
     )

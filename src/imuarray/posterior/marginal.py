@@ -187,7 +187,7 @@ class Marginal:
 
     @classmethod
     def of(
-        cls, likelihood: Likelihood, positions, nodes: int | None = None, motion_sd=(np.inf,) * 3
+        cls, likelihood: Likelihood, positions, nodes: int | None = None, force_sd: float = np.inf
     ) -> Marginal:
         """Of the same recording as a `Likelihood`; modes are searched from those at ``positions``.
 
@@ -197,24 +197,22 @@ class Marginal:
             On each axis of omega: 1 is Laplace's method, 3 integrates the quartic to some 1e-8
             nats a sample where gyroscopes see the motion well (`tests/test_marginal.py`). By
             default 1 if that differs by less than 1e-4 nats in total from 3 at ``positions``.
-        motion_sd : (float, float, float)
-            Prior sds of omega (rad/s), omega_dot (rad/s^2) and s (m/s^2), as `ArrayModel` has
-            them; infinite as in paper 2021.
+        force_sd : float
+            Prior sd of s (m/s^2); those of omega and omega_dot are the likelihood's.
         """
         collapsed = likelihood.collapsed
         start = _modes(collapsed, likelihood, positions)
         weighted = collapsed.weighted.reshape(-1, collapsed.samples).T
-        weight = np.asarray(motion_sd, float) ** -2.0
+        weight = float(force_sd) ** -2.0
         information = np.linalg.inv(likelihood.rate_covariance)
-        both = information + weight[0] * np.eye(3)
-        mean = np.linalg.solve(both, information @ likelihood.rate_mean[..., None])[..., 0]
         # measurements are less their mean over triads, and so is s
         offset = collapsed.offset.T
-        pull = np.hstack([np.zeros_like(offset), -weight[2] * offset])
-        energy = collapsed.energy + weight[2] * np.sum(offset**2, axis=1)
+        pull = np.hstack([np.zeros_like(offset), -weight * offset])
+        energy = collapsed.energy + weight * np.sum(offset**2, axis=1)
         parts = (
-            weighted, energy, _precision(collapsed), mean, both, pull, np.repeat(weight[1:], 3),
-            start, 0.5 * np.sum(np.linalg.slogdet(both)[1]),
+            weighted, energy, _precision(collapsed), likelihood.rate_mean, information, pull,
+            np.append(likelihood.data.ridge, np.full(3, weight)), start,
+            0.5 * np.sum(np.linalg.slogdet(information)[1]),
         )  # fmt: skip
         data = Data(*map(jnp.asarray, parts))
         if nodes is not None:

@@ -12,11 +12,12 @@ from imuarray.estimation.newton import descend
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.model.structure import products
-from imuarray.motion import sphere_motion
+from imuarray.motion import normal_motion, sphere_motion
 from imuarray.simulation import measure
 from imuarray.studies.batches import batch_stream, batches, root_mean_square, run_batches
 
 NEAR = 1.01  # times the bound: as good as efficient
+BCD_LIMIT = 20000  # iterations after which ML-BCD is given up
 RANK = 1e-10  # of the largest eigenvalue of the scaled information
 
 
@@ -118,17 +119,21 @@ def _one(model, rng, samples, motion, options):
     return [*out, len(found.cost) - 1]
 
 
-def convergence(model: ArrayModel, seed, samples, motions, options, count=5) -> pd.DataFrame:
+def convergence(
+    model: ArrayModel, seed, samples, motions, options, count=5, threads=1
+) -> pd.DataFrame:
     """Iterations of ML-BCD and of Gauss-Newton to 1.01 times the bound, for each motion.
 
     ``contraction`` is what the information foresees for ML-BCD, ``observed`` what its steps show.
     """
-    rows = []
-    for number, motion in enumerate(motions):
-        for repeat in range(count):
-            rng = batch_stream(seed, "bound", "convergence", number, repeat)
-            rows.append(_paths(model, rng, samples, motion, options))
-    return pd.DataFrame(rows)
+
+    def job(which):
+        number, repeat = which
+        rng = batch_stream(seed, "bound", "convergence", number, repeat)
+        return _paths(model, rng, samples, motions[number], options)
+
+    jobs = [(number, repeat) for number in range(len(motions)) for repeat in range(count)]
+    return pd.DataFrame(run_batches(job, jobs, threads, True, "convergence"))
 
 
 def _paths(model, rng, samples, motion, options):
@@ -200,3 +205,38 @@ def ranks(cases) -> pd.DataFrame:
              "rank": int(seen.sum()), "condition": float(values[-1] / values[seen][0])}
         )  # fmt: skip
     return pd.DataFrame(rows)
+
+
+def rank_cases(model: ArrayModel, seed, sphere, normal) -> list[tuple]:
+    """(name, model, motion) of what may and may not tell the positions.
+
+    ``sphere``: magnitudes as in paper 2017; ``normal``: sds as in paper 2021.
+    """
+    rng = batch_stream(seed, "bound", "ranks")
+    many = normal_motion(rng, (50,), *normal)
+    axis, still = np.array([0.0, 0.6, 0.8]), np.zeros((50, 3))
+    along = {
+        name: getattr(many, name)[:, 2:] * axis for name in ("angular_rate", "angular_acceleration")
+    }
+    cases = [
+        (f"general motion, N = {n}", model, normal_motion(rng, (n,), *normal)) for n in (1, 2, 3, 5)
+    ]
+    cases += [
+        ("the papers' magnitudes", model, sphere_motion(rng, (50,), *sphere)),
+        ("omega_dot = 0", model, many._replace(angular_acceleration=still)),
+        ("omega = 0", model, many._replace(angular_rate=still)),
+        ("turned about one axis", model, many._replace(**along)),
+        ("about one axis, omega_dot free", model,
+         many._replace(angular_rate=along["angular_rate"])),
+    ]  # fmt: skip
+    noise = model.noise.accelerometer[0, 0] ** 0.5, model.noise.gyroscope[0, 0] ** 0.5
+    for count in (3, 4, 8):
+        chosen = np.linspace(0, model.array.accelerometers - 1, count).round().astype(int)
+        labels = tuple(model.array.labels[k] for k in chosen)
+        part = Array(model.array.positions[chosen], labels, count)
+        cases.append((f"{count} triads", ArrayModel.isotropic(part, *noise), many))
+    flat = Array(
+        model.array.positions * [1.0, 1.0, 0.0], model.array.labels, model.array.gyroscopes
+    )
+    cases.append(("all triads in one plane", ArrayModel.isotropic(flat, *noise), many))
+    return cases

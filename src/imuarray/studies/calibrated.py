@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from imuarray.config import model_from
 from imuarray.estimation.newton import descend
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
@@ -52,6 +53,21 @@ class Setting(NamedTuple):
         return GaussianPrior.of(self.model.array.parameters, self.prior_sd)
 
 
+def setting_from(settings: dict, samples: int) -> Setting:
+    """From a configuration: noise, motion and prior of ``paper2021``."""
+    paper, whole = settings["paper2021"], model_from(settings)
+    array = sub_array(whole.array, settings["validation"]["triads"])
+    noise = settings["noise"]
+    model = ArrayModel.isotropic(
+        array, noise["accelerometer_sd"], np.radians(noise["gyroscope_sd_dps"])
+    )
+    motion = (
+        np.radians(paper["angular_rate_sd_dps"]), np.radians(paper["angular_acceleration_sd_dps2"]),
+        paper["specific_force_sd"],
+    )  # fmt: skip
+    return Setting(model, paper["prior_sd"], motion, samples, settings["seed"])
+
+
 class Replicate(NamedTuple):
     """A truth from the prior, what was measured of it, and where its posterior is."""
 
@@ -79,7 +95,7 @@ def replicate(setting: Setting, number: int) -> Replicate:
     truth = prior.mean + prior.sd * rng.standard_normal(prior.mean.size)
     motion = normal_motion(rng, (setting.samples,), *setting.motion_sd)
     force, rate, _ = measure(model, motion, np.vstack([np.zeros(3), truth.reshape(-1, 3)]), rng)
-    likelihood = Likelihood.of(model, force, rate)
+    likelihood = Likelihood.of(model, force, rate, motion_sd=setting.motion_sd[:2])
     precision = np.diag(prior.sd**-2.0)
     best = descend(likelihood.collapsed, model.array.relative, (prior.mean, precision))
     plain = descend(likelihood.collapsed, best.positions)
@@ -137,11 +153,12 @@ def _positions(theta) -> np.ndarray:
 
 
 def _walk(setting: Setting, pilot: Replicate, rng):
-    """The paper's: (target of a replicate, step), N and sigma_q chosen as in section III-C."""
+    """The paper's: (target of a replicate, step), N and sigma_q chosen as in section III-C.
+
+    But N at the mode: here the prior's mean is as far off as the prior says, not a thirtieth of it.
+    """
     counts = [1, 2, 5, 10, 20, 50, 100]
-    variances = tuning.variance_sweep(
-        pilot.likelihood, setting.model.array.relative, counts, 200, rng
-    )
+    variances = tuning.variance_sweep(pilot.likelihood, _positions(pilot.mode), counts, 200, rng)
     draws = tuning.choose_draws(counts, variances)
 
     def target(one):

@@ -1,0 +1,105 @@
+"""Estimation theory: the Cramer-Rao bound, who reaches it, how fast, and the array's size."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from imuarray.figures.style import BLACK, GREY, look, new_figure, styled
+from imuarray.figures.tables import Column
+
+ESTIMATORS = ("maximum likelihood", "with the prior")
+
+RANKS = (
+    Column("case", "motion and geometry", "motion and geometry"),
+    Column("samples", "samples", "$N$"),
+    Column("unknowns", "unknowns", "unknowns"),
+    Column("rank", "rank of the information", "rank"),
+    Column("condition", "condition of what is seen", "condition", "{:.2g}"),
+)
+RANKS_NOTES = (
+    "Fisher information of the positions r_2 ... r_A with the motion unknown, scaled to a unit"
+    " diagonal. A rank below the number of unknowns: the positions cannot be identified.",
+)
+
+
+@styled
+def efficiency_figure(table: pd.DataFrame, footer=()):
+    """RMSE over N beside the bound, and their ratio; ``table``: `studies.bound.efficiency`."""
+    figure = new_figure(footer, height=4.0)
+    top, below = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
+    for index, name in enumerate(ESTIMATORS):
+        rows = table[table.estimator == name]
+        style = look(index, "linestyle")
+        top.errorbar(
+            rows.samples, rows.rmse_m, rows.rmse_se_m, linestyle="none", label=f"RMSE, {name}",
+            markerfacecolor="none", **style,
+        )  # fmt: skip
+        top.plot(
+            rows.samples, rows.bound_m, color=style["color"], linestyle=look(index)["linestyle"],
+            label="bound" if index == 0 else "bound with the prior",
+        )  # fmt: skip
+        below.errorbar(
+            rows.samples * 1.04**index, rows.ratio, rows.ratio_se, linestyle="none",
+            markerfacecolor="none", **style,
+        )  # fmt: skip
+    below.axhline(1.0, color=BLACK, linewidth=0.8)
+    top.set(xscale="log", yscale="log", ylabel="RMSE of the positions (m)")
+    below.set(xlabel="Time samples $N$ (count)", ylabel="RMSE / bound")
+    top.legend(loc="upper right")
+    return figure
+
+
+@styled
+def convergence_figure(table: pd.DataFrame, footer=()):
+    """Iterations to 1.01 times the bound, and ML-BCD's rate as foreseen and as seen.
+
+    ``table``: `studies.bound.convergence`.
+    """
+    figure = new_figure(footer, height=5.0)
+    top, below = figure.subplots(2, 1)
+    groups = table.groupby("angular_acceleration_dps2")
+    for index, (acceleration, rows) in enumerate(groups):
+        means = rows.groupby("angular_rate_dps")[["bcd_iterations", "newton_iterations"]].mean()
+        style = look(index)
+        top.plot(
+            means.index, means.bcd_iterations, markerfacecolor="none",
+            label=rf"$\|\dot\omega\|$ = {acceleration:g} deg/s²", **style,
+        )  # fmt: skip
+        top.plot(means.index, means.newton_iterations, color=GREY, marker=style["marker"],
+                 markerfacecolor="none", linestyle=":")  # fmt: skip
+        below.plot(
+            1 - rows.contraction, 1 - rows.observed, markerfacecolor="none",
+            **{**style, "linestyle": "none"},
+        )  # fmt: skip
+    top.annotate("Gauss-Newton (grey)", (0.02, 0.04), xycoords="axes fraction", size=7, color="0.3")
+    top.set(
+        xscale="log", yscale="log", xlabel=r"Angular rate $\|\omega\|$ (deg/s)",
+        ylabel="iterations to 1.01 × bound",
+    )  # fmt: skip
+    top.legend(loc="best")
+    ends = 1 - np.array([table.contraction.max(), table.contraction.min()])
+    below.plot(ends, ends, color=BLACK, linewidth=0.8)
+    below.set(
+        xscale="log", yscale="log", xlabel="share of the error lost in an iteration, foreseen",
+        ylabel="seen",
+    )  # fmt: skip
+    return figure
+
+
+@styled
+def size_figure(table: pd.DataFrame, footer=()):
+    """The bound over the array's size, absolute and relative to it; `studies.bound.against_size`.
+
+    Both on one axis of lengths would hide that the one falls: two panels.
+    """
+    figure = new_figure(footer, height=4.0)
+    top, below = figure.subplots(2, 1, sharex=True)
+    top.plot(1e3 * table.extent_m, 1e6 * table.bound_m, markerfacecolor="none", **look(0))
+    below.plot(1e3 * table.extent_m, 1e6 * table.relative, markerfacecolor="none", **look(2))
+    top.set(xscale="log", yscale="log", ylabel="bound (µm)")
+    below.set(
+        xscale="log", yscale="log", xlabel="size of the array, corner to corner (mm)",
+        ylabel="bound / size (ppm)",
+    )  # fmt: skip
+    return figure

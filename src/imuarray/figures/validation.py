@@ -1,0 +1,88 @@
+"""Simulation-based calibration: rank histograms, and how often intervals hold the truth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from imuarray.figures.style import BLACK, PAGE, SKY, look, new_figure, styled
+from imuarray.figures.tables import Column
+
+BINS = 20
+
+COVERAGE = (
+    Column("method", "method", "method"),
+    Column("samples", "T", "$T$"),
+    Column("replicates", "replicates", "replicates"),
+    Column("covered_50", "50 % intervals cover (%)", r"50 \%", "{:.1f}", 100.0),
+    Column("se_50", "±", r"$\pm$", "{:.1f}", 100.0),
+    Column("covered_90", "90 % (%)", r"90 \%", "{:.1f}", 100.0),
+    Column("se_90", "± ", r"$\pm$ ", "{:.1f}", 100.0),
+    Column("covered_95", "95 % (%)", r"95 \%", "{:.1f}", 100.0),
+    Column("se_95", "±  ", r"$\pm$  ", "{:.1f}", 100.0),
+    Column("p", "p of uniform ranks", "$p$", "{:.2g}"),
+)
+NOTES = (
+    "Truths drawn from the prior; ±: standard errors over replicates. p: Kolmogorov and Smirnov's,"
+    " the smallest of all parameters times their number.",
+)
+JOINT = (
+    Column("sampler", "sampler", "sampler"),
+    Column("rounds", "rounds", "rounds"),
+    Column("parameters", "unknowns", "unknowns"),
+    Column("ess_min", "smallest effective size", "ESS", "{:.0f}"),
+    Column("mean_z", "largest |z| of means", r"$|z|$, means", "{:.2f}"),
+    Column("square_z", "largest |z| of squares", r"$|z|$, squares", "{:.2f}"),
+    Column("p", "p", "$p$", "{:.2g}"),
+)
+JOINT_NOTES = (
+    "Measurements are drawn given the positions, then the positions moved by the sampler given the"
+    " measurements, over and over: right samplers leave the positions' prior as it is. z: means of"
+    " the coordinates and their squares against the prior's, in Monte Carlo standard errors; p: of"
+    " the largest, times the number of comparisons.",
+)
+
+
+def histogram(levels: pd.DataFrame) -> pd.DataFrame:
+    """Density of the truths' posterior levels, uniform if right: a row for each bin.
+
+    ``se``: from the spread between replicates, whose parameters are not independent, but never
+    less than a single parameter's share of so many replicates could tell if all were one.
+    """
+    frames = []
+    edges = np.linspace(0, 1, BINS + 1)
+    for (method, samples), part in levels.groupby(["method", "samples"], sort=False):
+        place = np.clip((part.level * BINS).astype(int), 0, BINS - 1)
+        shares = BINS * pd.crosstab(part.replicate, place, normalize="index")
+        shares = shares.reindex(columns=range(BINS), fill_value=0.0)
+        frames.append(
+            pd.DataFrame(
+                {"method": method, "samples": samples, "low": edges[:-1], "high": edges[1:],
+                 "density": shares.mean().to_numpy(),
+                 "se": (shares.std(ddof=1) / np.sqrt(len(shares))).to_numpy(),
+                 "replicates": len(shares)}
+            )
+        )  # fmt: skip
+    return pd.concat(frames, ignore_index=True)
+
+
+@styled
+def rank_figure(table: pd.DataFrame, footer=()):
+    """A histogram for each method (row) and T (column); band: 95 % of a right sampler's."""
+    methods, sizes = list(dict.fromkeys(table.method)), sorted(set(table.samples))
+    figure = new_figure(footer, PAGE, 0.3 + 1.35 * len(methods))
+    panels = figure.subplots(len(methods), len(sizes), sharex=True, sharey=True, squeeze=False)
+    for method, line in zip(methods, panels, strict=True):
+        for samples, axes in zip(sizes, line, strict=True):
+            rows = table[(table.method == method) & (table.samples == samples)]
+            width = 1.96 * rows.se.mean()
+            axes.axhspan(1 - width, 1 + width, color=SKY, alpha=0.4, linewidth=0)
+            axes.axhline(1.0, color=BLACK, linewidth=0.6)
+            axes.stairs(rows.density, [*rows.low, 1.0], color=look(2)["color"], linewidth=1.2)
+            axes.set_title(f"{method}, T = {samples}", size=7)
+    for axes in panels[-1]:
+        axes.set_xlabel("share of the posterior below the truth")
+    for axes in panels[:, 0]:
+        axes.set_ylabel("density")
+    panels[0, 0].set(xlim=(0, 1), ylim=(0, None))
+    return figure

@@ -1,0 +1,153 @@
+"""The joint test of Geweke (2004): samplers and simulation by turns must keep the prior.
+
+Measurements are drawn given the positions, then the positions are moved given the measurements.
+Were the sampler, the likelihood or the simulator wrong, or not of one model, the positions would
+drift away from their prior.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from imuarray.geometry import Array
+from imuarray.model import ArrayModel
+from imuarray.motion import normal_motion
+from imuarray.posterior import AutoregressiveTarget, CompiledTarget, GaussianPrior, Likelihood
+from imuarray.posterior.diagnostics import ess
+from imuarray.simulation import measure
+from imuarray.streams import stream
+
+# A problem whose data hardly narrow the prior: rounds then forget one another soon.
+POSITIONS = np.array(
+    [[0.0, 0.0, 0.0], [0.02, 0.0, 0.003], [0.0, 0.02, 0.0], [0.015, 0.018, -0.004]]
+)
+ACCELEROMETER_SD, GYROSCOPE_SD = 2.0, 0.1  # m/s^2, rad/s
+PRIOR_SD = 2e-3  # m
+MOTION_SD = (15.0, 500.0, 20.0)  # rad/s, rad/s^2, m/s^2; the last is flat to the samplers,
+# who see differences between triads only
+SAMPLES, DRAWS = 2, 5
+STEPS = {"walk": (1.0e-3, 10), "autoregressive": (0.6, 5)}  # length, transitions a round
+LEAPS, LEAP = 2, 0.5  # NUTS: transitions a round, step length in prior sds
+
+
+class Data(NamedTuple):
+    """A round's measurements, with the motion that made them."""
+
+    likelihood: Likelihood
+    rate: np.ndarray  # (T, 3) rad/s
+
+
+def problem() -> tuple[ArrayModel, GaussianPrior]:
+    """Four triads, one gyroscope."""
+    array = Array(POSITIONS, ("1", "2", "3", "4"), 1, "four")
+    model = ArrayModel.isotropic(array, ACCELEROMETER_SD, GYROSCOPE_SD)
+    return model, GaussianPrior.of(array.parameters, PRIOR_SD)
+
+
+def simulated(model: ArrayModel, theta, rng) -> Data:
+    """Motion from its prior, measurements given it and theta (P,)."""
+    motion = normal_motion(rng, (SAMPLES,), *MOTION_SD)
+    positions = np.vstack([np.zeros(3), theta.reshape(-1, 3)])
+    force, rate, _ = measure(model, motion, positions, rng)
+    likelihood = Likelihood.of(model, force, rate, motion_sd=MOTION_SD[:2])
+    return Data(likelihood, np.asarray(motion.angular_rate))
+
+
+def begun(target: CompiledTarget, theta, data: Data, rng) -> float:
+    """log target at theta with draws of omega as they are, given that theta made the data.
+
+    One of N draws a sample is the omega that did: fresh ones alone would be of another law than
+    the pseudo-marginal chain's own, and the test would fail for a right sampler.
+    """
+    factor = np.linalg.cholesky(data.likelihood.rate_covariance)
+    normals = rng.standard_normal((SAMPLES, target.draws, 3))
+    rates = data.likelihood.rate_mean[:, None] + np.einsum("tij,tnj->tni", factor, normals)
+    rates[np.arange(SAMPLES), rng.integers(target.draws, size=SAMPLES)] = data.rate
+    positions = np.vstack([np.zeros(3), theta.reshape(-1, 3)])
+    return target.prior.log_density(theta) + data.likelihood.on(positions, rates)
+
+
+def pmmh_rounds(name: str, seed: int, rounds: int) -> Iterator[np.ndarray]:
+    """theta after each round of PmMH: the paper's walk, or autoregressive proposals."""
+    model, prior = problem()
+    rng = stream(seed, "joint", name)
+    step, count = STEPS[name]
+    theta = prior.mean + prior.sd * rng.standard_normal(prior.mean.size)
+    for _ in range(rounds):
+        data = simulated(model, theta, rng)
+        target = CompiledTarget(data.likelihood, prior, DRAWS)
+        if name == "autoregressive":
+            shape = prior.mean, np.diag(prior.sd)
+            target = AutoregressiveTarget(data.likelihood, prior, DRAWS, *shape)
+        target.transitions(theta, begun(target, theta, data, rng), step, count, rng)
+        yield theta.copy()
+
+
+def nuts_rounds(name: str, seed: int, rounds: int) -> Iterator[np.ndarray]:
+    """The same by NUTS with a fixed step on the exact marginal likelihood."""
+    from numpyro.infer.hmc import hmc
+
+    from imuarray.model.jax64 import jax, jnp
+    from imuarray.posterior.marginal import Marginal, log_marginal
+
+    model, prior = problem()
+    rng = stream(seed, "joint", name)
+    theta = prior.mean + prior.sd * rng.standard_normal(prior.mean.size)
+    nodes = weights = None
+
+    @jax.jit
+    def moved(z, data, key):
+        def potential(z):
+            positions = jnp.concatenate(
+                [jnp.zeros((1, 3)), (prior.mean + prior.sd * z).reshape(-1, 3)]
+            )
+            return 0.5 * jnp.sum(z**2) - log_marginal(positions, data, nodes, weights)
+
+        begin, advance = hmc(potential, algo="NUTS")
+        state = begin(
+            z, num_warmup=0, adapt_step_size=False, adapt_mass_matrix=False, step_size=LEAP,
+            max_tree_depth=5, rng_key=jax.random.key_data(jax.random.key(key)),
+        )  # fmt: skip
+        return jax.lax.fori_loop(0, LEAPS, lambda _, state: advance(state), state).z
+
+    for _ in range(rounds):
+        data = simulated(model, theta, rng)
+        positions = np.vstack([np.zeros(3), theta.reshape(-1, 3)])
+        marginal = Marginal.of(data.likelihood, positions, 5)
+        nodes, weights = marginal.nodes, marginal.log_weights
+        z = moved((theta - prior.mean) / prior.sd, marginal.data, int(rng.integers(2**31)))
+        theta = prior.mean + prior.sd * np.asarray(z)
+        yield theta
+
+
+SAMPLERS: dict[str, tuple[str, Callable, int]] = {  # label, rounds of it, how many fewer
+    "walk": ("PmMH, (27)", pmmh_rounds, 1),
+    "autoregressive": ("PmMH, autoregressive", pmmh_rounds, 1),
+    "nuts": ("NUTS", nuts_rounds, 4),
+}
+
+
+def joint_test(seed: int, rounds: int, names=tuple(SAMPLERS)) -> pd.DataFrame:
+    """A row for each sampler: how far means and squares of theta are from the prior's."""
+    _, prior = problem()
+    rows = []
+    for name in names:
+        label, sampler, fewer = SAMPLERS[name]
+        draws = np.array(list(sampler(name, seed, rounds // fewer)))
+        z = (draws - prior.mean) / prior.sd
+        size = {power: ess((z**power)[None]) for power in (1, 2)}
+        means = z.mean(axis=0) * np.sqrt(size[1])
+        squares = (np.mean(z**2, axis=0) - 1) * np.sqrt(size[2] / 2)
+        largest = np.abs(np.concatenate([means, squares])).max()
+        rows.append(
+            {"sampler": label, "rounds": len(draws), "parameters": z.shape[1],
+             "ess_min": min(part.min() for part in size.values()),
+             "mean_z": np.abs(means).max(), "square_z": np.abs(squares).max(),
+             "p": min(1.0, 2 * z.shape[1] * 2 * stats.norm.sf(largest))}
+        )  # fmt: skip
+    return pd.DataFrame(rows)

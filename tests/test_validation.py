@@ -1,0 +1,85 @@
+"""Are the uncertainties right? `snakemake validate`, small, and proof that it can fail."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from imuarray.config import read_config
+from imuarray.figures import validation
+from imuarray.posterior import Likelihood
+from imuarray.studies import calibrated, joint
+from imuarray.studies.calibrated import METHODS, coverage, setting_from, sub_array
+from tests.test_pipeline import ROOT
+
+
+def setting(samples=5, triads=4):
+    config = read_config(ROOT / "config.yaml")
+    config["validation"]["triads"] = triads
+    return setting_from(config, samples)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_levels_of_the_truth_are_uniform(method):
+    """30 truths, 9 coordinates: p below 1e-3 in one of a thousand runs of a right sampler."""
+    levels = calibrated.calibrated(setting(), 30, methods=[method])
+    assert len(levels) == 30 * 9 and levels.level.between(0, 1).all()
+    row = coverage(levels).iloc[0]
+    assert row.p > 1e-3
+    for share in (50, 90, 95):
+        assert abs(row[f"covered_{share}"] - share / 100) < 4.5 * max(row[f"se_{share}"], 0.01)
+
+
+@pytest.mark.parametrize("factor", [0.6, 1.6])
+def test_widths_that_are_wrong_are_seen(monkeypatch, factor):
+    """Were the accelerometers' noise so many times what is assumed."""
+    measure = calibrated.measure
+
+    def measured(model, *arguments):
+        noise = type(model.noise)(factor**2 * model.noise.accelerometer, model.noise.gyroscope)
+        return measure(type(model)(model.array, noise), *arguments)
+
+    monkeypatch.setattr(calibrated, "measure", measured)
+    levels = calibrated.calibrated(setting(), 200, methods=["PmMH, autoregressive"])
+    assert coverage(levels).p[0] < 1e-3
+
+
+@pytest.mark.parametrize(("name", "rounds"), [("walk", 6000), ("autoregressive", 6000),
+                                              ("nuts", 4000)])  # fmt: skip
+def test_sampler_and_simulation_by_turns_keep_the_prior(name, rounds):
+    row = joint.joint_test(1, rounds, [name]).iloc[0]
+    assert row.ess_min > 200
+    assert row.p > 1e-3
+
+
+def test_the_printed_determinant_does_not_keep_the_prior(monkeypatch):
+    """(25) and (26a) as printed, without the square root."""
+    right = Likelihood.of
+
+    def printed(*arguments, **options):
+        return right(*arguments, determinant="printed", **options)
+
+    monkeypatch.setattr(Likelihood, "of", printed)
+    assert joint.joint_test(1, 12000, ["autoregressive"]).p[0] < 1e-3
+
+
+def test_sub_array_is_spread_over_the_board():
+    array = setting(5, 32).model.array
+    part = sub_array(array, 8)
+    assert part.accelerometers == part.gyroscopes == 8
+    assert part.labels[0] == array.labels[0] and part.labels[-1] == array.labels[-1]
+    assert sub_array(array, 32) is array
+
+
+def test_histogram_of_uniform_levels_is_flat():
+    rng = np.random.default_rng(1)
+    rows, columns = np.indices((400, 6))
+    levels = pd.DataFrame(
+        {"method": "x", "samples": 5, "replicate": rows.ravel(), "parameter": columns.ravel(),
+         "level": rng.random(2400)}
+    )  # fmt: skip
+    table = validation.histogram(levels)
+    assert len(table) == validation.BINS
+    assert table.density.mean() == pytest.approx(1.0)
+    assert np.abs((table.density - 1) / table.se).max() < 4.5
+    figure = validation.rank_figure(table, ["Scale quick"])
+    assert [axes.get_title() for axes in figure.axes] == ["x, T = 5"]

@@ -1,0 +1,16 @@
+"""The Cramer-Rao bound against the size of the array -> CSV."""
+
+from job import job
+
+with job(snakemake) as settings:
+    from imuarray.config import model_from
+    from imuarray.provenance import write_csv
+    from imuarray.studies import bound
+    from imuarray.studies.settings2017 import magnitudes
+
+    paper, theory, scale = settings["paper2017"], settings["theory"], settings["scale"]
+    table = bound.against_size(
+        model_from(settings), settings["seed"], theory["convergence_samples"], magnitudes(paper),
+        theory["size_factors"], scale["theory_repeats"],
+    )  # fmt: skip
+    write_csv(table, snakemake.output[0])

@@ -1,0 +1,11 @@
+"""Posterior levels of truths drawn from the prior, for each method -> CSV."""
+
+from job import job
+
+with job(snakemake) as settings:
+    from imuarray.provenance import write_csv
+    from imuarray.studies.calibrated import calibrated, setting_from
+
+    setting = setting_from(settings, int(snakemake.wildcards.samples))
+    count = settings["scale"]["validation_replicates"]
+    write_csv(calibrated(setting, count, snakemake.threads), snakemake.output[0])

@@ -1,0 +1,15 @@
+"""The Cramer-Rao bound against the array's size -> PDF, PNG, CSV."""
+
+from job import job
+
+with job(snakemake) as settings:
+    import pandas as pd
+
+    from imuarray.figures import theory
+    from imuarray.figures.notes import scale_line
+    from imuarray.figures.style import write_figure
+
+    table = pd.read_csv(snakemake.input.rows)
+    footer = [scale_line(settings, f"N = {settings['theory']['convergence_samples']}")]
+    figure = theory.size_figure(table, footer)
+    write_figure(figure, table, **dict(snakemake.output.items()))
