@@ -57,6 +57,7 @@ def calibrate(arguments) -> None:
     write_netcdf(dataset, arguments.out)
     if not arguments.quiet:
         _report(recording, found, dataset)
+        _say_informative(recording, found, dataset)
         _say_misfit(recording, model, found, saturated)
 
 
@@ -109,6 +110,22 @@ def _report(recording, found, dataset) -> None:
     for label, row, sd in zip(recording.accelerometer_labels, found.positions, sds, strict=True):
         values = "  ".join(f"{1e3 * value:8.4f}" for value in row)
         print(f"{label:>5} {values}    {', '.join(f'{1e6 * value:.2g}' for value in sd)}")
+
+
+def _say_informative(recording, found, dataset) -> None:
+    """How well the recording tells the positions, and which combinations of them worst."""
+    from imuarray.estimation.informative import weak_directions
+
+    size = 3 * (len(found.positions) - 1)
+    covariance = dataset["position_covariance"].to_numpy()[1:, :, 1:, :].reshape(size, size)
+    worst = weak_directions(found.positions, covariance, recording.accelerometer_labels)
+    rms = np.sqrt(np.trace(covariance) / size)
+    said = ", ".join(f"{item.words} ({1e6 * item.sd:.2g} um)" for item in worst)
+    print(f"positions to {1e6 * rms:.2g} um rms by the Cramer-Rao bound; told worst: {said}")
+    if worst[0].sd > recording.position_prior_sd:
+        print(f"{worst[0].words}: told worse than the nominal positions' own"
+              f" {1e3 * recording.position_prior_sd:g} mm; turn the array faster, and about all"
+              " axes")  # fmt: skip
 
 
 def _say_misfit(recording, model, found, saturated) -> None:
