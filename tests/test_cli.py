@@ -78,7 +78,7 @@ BAD = {
     "simulate --config no.yaml --out new.nc": "no.yaml: expected a file to read, found none",
     "calibrate --out new.nc": "required: recording",
     "calibrate no.nc --out new.nc": "no.nc: expected a file to read, found none",
-    "calibrate folder --out new.nc": "folder: expected a file to read, found none",
+    "calibrate folder --out new.nc": "folder: expected a file to read, found a folder",
     "calibrate rec.nc --out no/new.nc": "expected an existing folder, found no no",
     "calibrate rec.nc --out rec.nc/new.nc": "expected an existing folder, found no rec.nc",
     "calibrate rec.nc --out folder": "expected a file to write, found a folder",

@@ -40,8 +40,8 @@ def weak_directions(positions, covariance, labels, count: int = 3) -> list[Direc
     """The ``count`` worst known directions, the worst first.
 
     ``positions`` (A, 3) m, ``covariance`` (3 (A - 1),) squared of r_2 ... r_A, m^2; ``labels`` of
-    all A triads. A direction is named after a pattern that makes up half of it, or after the
-    coordinate that has the largest part in it.
+    all A triads. A direction is named after a pattern that makes up half of it, or a coordinate
+    that makes up a quarter.
     """
     values, vectors = np.linalg.eigh(covariance)
     known = patterns(positions)
@@ -51,6 +51,8 @@ def weak_directions(positions, covariance, labels, count: int = 3) -> list[Direc
         best = max(shares, key=shares.get)
         if shares[best] < NAMED:
             place = int(np.argmax(np.abs(vector)))
-            best = f"IMU {labels[1 + place // 3]} along {AXES[place % 3]}, mostly"
+            best = "a mixture of all positions"
+            if vector[place] ** 2 > NAMED / 2:
+                best = f"IMU {labels[1 + place // 3]} along {AXES[place % 3]}, mostly"
         found.append(Direction(float(np.sqrt(max(value, 0.0))), vector.reshape(-1, 3), best))
     return found
