@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import pandas as pd
 
@@ -130,45 +132,66 @@ def convergence(
     def job(which):
         number, repeat = which
         rng = batch_stream(seed, "bound", "convergence", number, repeat)
-        return _paths(model, rng, samples, motions[number], options)
+        return _convergence_row(model, rng, samples, motions[number], options)
 
     jobs = [(number, repeat) for number in range(len(motions)) for repeat in range(count)]
     return pd.DataFrame(run_batches(job, jobs, threads, True, "convergence"))
 
 
-def _paths(model, rng, samples, motion, options):
-    moves, truth, force, rate, saturated = _draw(model, rng, samples, motion, options)
+class Paths(NamedTuple):
+    """How ML-BCD and Gauss-Newton come to the same optimum from the nominal positions."""
+
+    bound: float  # m, rms
+    marks: np.ndarray  # iterations of ML-BCD
+    away: np.ndarray  # m, rms distance from the optimum there
+    bcd: float  # iterations to 1.01 times the bound, NaN if never
+    newton: float
+
+    @property
+    def observed(self) -> float:
+        """The factor by which ML-BCD's last steps shrink its error."""
+        late = np.flatnonzero((self.away < 0.3 * self.away[0]) & (self.away > 1e-3 * self.bound))
+        if len(late) < 2:
+            return np.nan
+        first, last = late[len(late) // 2], late[-1]
+        apart = max(self.marks[last] - self.marks[first], 1)
+        return float((self.away[last] / self.away[first]) ** (1 / apart))
+
+
+def paths(model: ArrayModel, force, rate, saturated, limit: int = BCD_LIMIT) -> Paths:
+    """Both methods on the same measurements (T, A, 3) and (T, G, 3)."""
     data = Collapsed.of(model, force, rate, saturated)
     best = descend(data, model.array.relative)
     bound = np.sqrt(np.trace(best.covariance) / len(best.covariance))
     enough = bound * np.sqrt(NEAR**2 - 1)  # distance from the optimum, errors adding in squares
-    marks = np.unique(np.geomspace(1, options["limit"], 400).astype(int))
+    marks = np.unique(np.geomspace(1, limit, 400).astype(int))
     slow = calibrate_bcd(
-        model, force, rate, saturated=saturated, tolerance=0.0, limit=options["limit"], marks=marks
+        model, force, rate, saturated=saturated, tolerance=0.0, limit=limit, marks=marks
     )
     away = np.sqrt(np.mean((slow.snapshots - best.positions)[:, 1:] ** 2, axis=(1, 2)))
     near = np.flatnonzero(away <= enough)
-    late = np.flatnonzero((away < 0.3 * away[0]) & (away > 1e-3 * bound))
-    observed = np.nan
-    if len(late) > 1:
-        first, last = late[len(late) // 2], late[-1]
-        observed = (away[last] / away[first]) ** (1 / max(marks[last] - marks[first], 1))
     newton, positions = np.nan, model.array.relative
     for iteration in range(1, 11):
         positions = descend(data, positions, limit=1).positions
         if np.sqrt(np.mean((positions - best.positions)[1:] ** 2)) <= enough:
             newton = iteration
             break
+    return Paths(bound, marks, away, marks[near[0]] if len(near) else np.nan, newton)
+
+
+def _convergence_row(model, rng, samples, motion, options):
+    moves, truth, force, rate, saturated = _draw(model, rng, samples, motion, options)
+    made = paths(model, force, rate, saturated, options["limit"])
     known = information_at(model, moves, truth, saturated)
     return {
         "angular_rate_dps": np.degrees(motion[0]),
         "angular_acceleration_dps2": np.degrees(motion[1]),
         "samples": samples,
-        "bound_m": bound,
-        "bcd_iterations": marks[near[0]] if len(near) else np.nan,
-        "newton_iterations": newton,
+        "bound_m": made.bound,
+        "bcd_iterations": made.bcd,
+        "newton_iterations": made.newton,
         "contraction": contraction(known, block_information(model, moves)),
-        "observed": observed,
+        "observed": made.observed,
     }
 
 
