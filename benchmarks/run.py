@@ -129,12 +129,13 @@ def to_the_bound(model, rng, samples=1000):
     def slow():
         calibrate_bcd(model, force, rate, tolerance=0.0, limit=int(made.bcd))
 
-    def fast():
+    def fast(covariance):
         data = Collapsed.of(model, force, rate, saturated)
-        descend(data, model.array.relative, limit=int(made.newton))
+        descend(data, model.array.relative, limit=int(made.newton), covariance=covariance)
 
-    seconds = interleaved([slow, fast], 9)
-    names = f"ML-BCD, {made.bcd:.0f} iterations", f"Gauss-Newton, {made.newton:.0f} iterations"
+    seconds = interleaved([slow, lambda: fast(False), lambda: fast(True)], 15)
+    newton = f"Gauss-Newton, {made.newton:.0f} iterations"
+    names = f"ML-BCD, {made.bcd:.0f} iterations", newton, f"{newton}, with the covariance"
     return [
         (f"to 1.01 x bound, N = {samples}: {name}", f"{1e3 * s:.1f} ms", f"{seconds[0] / s:.1f}")
         for name, s in zip(names, seconds, strict=True)

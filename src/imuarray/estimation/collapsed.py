@@ -65,8 +65,9 @@ class Collapsed:
     @classmethod
     def of(cls, model: ArrayModel, specific_force, angular_rate, saturated=None) -> Collapsed:
         """From measurements (T, A, 3) m/s^2 and (T, G, 3) rad/s, and saturated axes."""
-        offset = specific_force.mean(axis=1)
-        centred = np.ascontiguousarray((specific_force - offset[:, None]).transpose(1, 2, 0))
+        centred = np.array(np.transpose(specific_force, (1, 2, 0)), float, order="C")
+        offset = centred.mean(axis=0)
+        centred -= offset
         precision = model.noise.accelerometer_precision
         weights = model.noise.triad_weights
         if weights is None:
@@ -79,9 +80,9 @@ class Collapsed:
         mean, information = model.noise.angular_rate_given_gyroscopes(angular_rate, saturated)
         return cls(
             centred,
-            np.ascontiguousarray(offset.T),
+            offset,
             weighted,
-            (centred * weighted).sum(axis=(0, 1)),
+            np.einsum("kct,kct->t", centred, weighted),
             moments,
             np.ascontiguousarray(mean.T),
             np.ascontiguousarray(information.transpose(1, 2, 0)),

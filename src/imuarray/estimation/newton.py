@@ -23,8 +23,9 @@ SINGULAR = 1e-12  # least pivot of the information, scaled to a unit diagonal
 
 def descend(
     data: Collapsed, start, prior=None, tolerance: float = 1e-6, limit: int = 50,
+    covariance: bool = True,
 ) -> Calibration:  # fmt: skip
-    """The most likely positions from ``start`` (A, 3) m, and their covariance.
+    """The most likely positions from ``start`` (A, 3) m, and, if asked for, their covariance.
 
     ``prior`` is None or (mean (3 (A - 1),) m, precision (3 (A - 1),) squared, 1 / m^2). Each
     iteration finds every sample's motion and takes a step of Newton's method on the profile
@@ -50,10 +51,10 @@ def descend(
         here, last = there, size
         costs.append(here.cost)
         steps.append(float(np.max(np.abs(length * step))))
-    covariance = np.linalg.inv(_information(data, here, prior))
+    width = np.linalg.inv(_information(data, here, prior)) if covariance else None
     return Calibration(
         here.positions, motion_from(data, here.positions), np.array(costs), np.array(steps),
-        converged, here.positions[None], covariance, np.empty(0),
+        converged, here.positions[None], width, np.empty(0),
     )  # fmt: skip
 
 

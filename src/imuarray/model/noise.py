@@ -10,6 +10,14 @@ import numpy as np
 from imuarray.errors import InputError
 
 
+def _inverse(covariance) -> np.ndarray:
+    """Of a covariance; what is written as diagonal, as most are, needs no factorisation."""
+    diagonal = np.diag(covariance)
+    if np.count_nonzero(covariance) == len(diagonal):
+        return np.diag(1.0 / diagonal)
+    return np.linalg.inv(covariance)
+
+
 def _covariance(blocks, count, what) -> np.ndarray:
     """(3n, 3n) covariance from a scalar sd, (n,) sds, (n, 3, 3) blocks or the full form."""
     given = np.asarray(blocks, float)
@@ -54,7 +62,7 @@ class Noise:
     @cached_property
     def accelerometer_precision(self) -> np.ndarray:
         """Lambda, (3A, 3A)."""
-        return np.linalg.inv(self.accelerometer)
+        return _inverse(self.accelerometer)
 
     @cached_property
     def triad_weights(self) -> np.ndarray | None:
@@ -120,7 +128,7 @@ class Noise:
         An axis nobody keeps gets the plain average and no information.
         """
         stack = np.tile(np.eye(3), (len(keep) // 3, 1))
-        weighted = np.linalg.inv(self.gyroscope[np.ix_(keep, keep)]) @ stack[keep]
+        weighted = _inverse(self.gyroscope[np.ix_(keep, keep)]) @ stack[keep]
         total = stack[keep].T @ weighted
         blind = ~keep.reshape(-1, 3).any(axis=0)
         gain = np.zeros((3, len(keep)))
