@@ -88,8 +88,12 @@ def information(data: Collapsed, positions, rate, state, reduced) -> np.ndarray:
     linear = data.weights[:, None, None] * columns[..., 6:]
     entries = omega.transpose(1, 0, 2).reshape(9, -1)  # position's axis, force's axis
     moments = (entries @ entries.T).reshape(3, 3, 3, 3)
-    lost = np.einsum("kcp,pq,ldq->kcld", linear, inverse, linear)
-    whole -= np.einsum("kcld,icjd->kilj", lost, moments).reshape(whole.shape)
+    linear = linear.reshape(-1, 6)
+    lost = (linear @ inverse @ linear.T).reshape(count, 3, count, 3)
+    # sum over c and d of lost[k, c, l, d] moments[i, c, j, d]
+    pairs = lost.transpose(0, 2, 1, 3).reshape(-1, 9)
+    taken = pairs @ moments.transpose(1, 3, 0, 2).reshape(9, 9)
+    whole -= taken.reshape(count, count, 3, 3).transpose(0, 2, 1, 3).reshape(whole.shape)
     # what omega takes up of the rest
     left = data.weights[:, None, None] * (columns[..., :6] - columns[..., 6:] @ X)
     left = left.reshape(count, 18)
