@@ -30,13 +30,14 @@ def test_maximum_likelihood_reaches_the_bound():
     table = bound.efficiency(model(), 2, [30], MOTION, OPTIONS)
     assert list(table.estimator) == ["maximum likelihood", "with the prior"]
     assert np.all(np.abs(table.ratio - 1) < 5 * table.ratio_se)
-    assert np.all(table.ratio_se < 0.05)
+    assert np.all(table.ratio_se < 0.03) and np.all(table.not_converged == 0)
+    assert np.all(table.iterations_max <= 10)
     assert table.bound_m[1] < table.bound_m[0]
 
 
 def test_rate_of_bcd_is_foreseen_and_newton_is_quick():
     table = bound.convergence(model(), 3, 50, [MOTION], OPTIONS, count=2)
-    np.testing.assert_allclose(table.observed, table.contraction, atol=0.02)
+    np.testing.assert_allclose(np.log(table.observed), np.log(table.contraction), rtol=0.15)
     assert np.all(table.newton_iterations <= 10)
     assert np.all(table.bcd_iterations > 2 * table.newton_iterations)
 
@@ -44,7 +45,7 @@ def test_rate_of_bcd_is_foreseen_and_newton_is_quick():
 def test_larger_arrays_have_the_same_sds_relative_to_noise():
     table = bound.against_size(model(), 4, 30, MOTION, [1.0, 2.0], count=5)
     assert table.extent_m[1] == pytest.approx(2 * table.extent_m[0])
-    assert table.relative[1] < table.relative[0]
+    assert table.bound_m[1] == pytest.approx(table.bound_m[0], rel=0.1)
 
 
 def test_ranks():

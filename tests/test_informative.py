@@ -32,7 +32,7 @@ def test_a_single_triad_is_named():
     assert first.words == "IMU 8 along z, mostly"
 
 
-def test_a_motion_that_hardly_turns_about_x():
+def test_a_motion_about_one_axis_hardly_tells_the_arms_along_it():
     """The lever arms along the axis of rotation are what it tells worst."""
     model = ArrayModel.isotropic(ARRAY, 0.04, 1e-3)
     motion = normal_motion(np.random.default_rng(1), (50,), 10.0, 200.0, 20.0)

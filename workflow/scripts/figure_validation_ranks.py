@@ -13,7 +13,7 @@ with job(snakemake) as settings:
     table = validation.histogram(levels)
     footer = [
         scale_line(settings, f"{table.replicates.max()} truths from the prior per panel"),
-        "Histograms of all positions' coordinates; band: 95 % for a single bin of a right sampler.",
+        "Histograms of all positions' coordinates; band: 95 % for all bins of a panel together.",
     ]
     figure = validation.rank_figure(table, footer)
     write_figure(figure, table, **dict(snakemake.output.items()))

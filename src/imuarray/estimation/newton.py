@@ -14,7 +14,8 @@ from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.information import information, score
 from imuarray.estimation.motion_ml import motion_from
 
-SLOW = 0.05  # of the step before: an information that contracts less is computed anew
+FAR = 1.0  # sds of the step before: the information is computed anew after a longer one
+SLOW = 0.05  # of the step before: and where steps contract less than so
 TRIES = 10  # halvings of a step that raises the cost
 RATE, LIMIT = 1e-10, 50  # of the search for each sample's omega: tolerance, steps
 ROUNDED = 1e-14  # of y' Lambda y: what a cost, a small difference of such, is good to
@@ -28,15 +29,15 @@ def descend(
     """The most likely positions from ``start`` (A, 3) m, and, if asked for, their covariance.
 
     ``prior`` is None or (mean (3 (A - 1),) m, precision (3 (A - 1),) squared, 1 / m^2). Each
-    iteration finds every sample's motion and takes a step of Newton's method on the profile
-    likelihood, its curvature the Fisher information with the motion eliminated; that is computed
+    iteration finds every sample's motion and takes a step of Fisher's scoring on the profile
+    likelihood, with the information with the motion eliminated; near the optimum that is computed
     again only where steps shrink slowly. Stops when no coordinate moves by more than
     ``tolerance`` of its own sd. IdentifiabilityError where the information is singular.
     """
     here = _at(data, np.array(start, float), data.mean.copy(), prior)
     curvature, costs, steps, converged, last = None, [here.cost], [0.0], False, np.inf
     for _ in range(limit):
-        fresh = curvature is None
+        fresh = curvature is None or last > FAR
         curvature = _curvature(data, here, prior) if fresh else curvature
         step, size = _step(curvature, here)
         if not fresh and max(SLOW * last, tolerance) < size:

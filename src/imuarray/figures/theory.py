@@ -37,7 +37,7 @@ def efficiency_figure(table: pd.DataFrame, footer=()):
         )  # fmt: skip
         top.plot(
             rows.samples, rows.bound_m, color=style["color"], linestyle=look(index)["linestyle"],
-            label="bound" if index == 0 else "bound with the prior",
+            label="bound" if index == 0 else "linearised posterior",
         )  # fmt: skip
         below.errorbar(
             rows.samples * 1.04**index, rows.ratio, rows.ratio_se, linestyle="none",
@@ -45,7 +45,7 @@ def efficiency_figure(table: pd.DataFrame, footer=()):
         )  # fmt: skip
     below.axhline(1.0, color=BLACK, linewidth=0.8)
     top.set(xscale="log", yscale="log", ylabel="RMSE of the positions (m)")
-    below.set(xlabel="Time samples $N$ (count)", ylabel="RMSE / bound")
+    below.set(xlabel="Time samples $N$ (count)", ylabel="error / bound")
     top.legend(loc="upper right")
     return figure
 
@@ -60,7 +60,9 @@ def convergence_figure(table: pd.DataFrame, footer=()):
     top, below = figure.subplots(2, 1)
     groups = table.groupby("angular_acceleration_dps2")
     for index, (acceleration, rows) in enumerate(groups):
-        means = rows.groupby("angular_rate_dps")[["bcd_iterations", "newton_iterations"]].mean()
+        # medians: a run that did not come to an end counts as longer than any other
+        means = rows.fillna(np.inf).groupby("angular_rate_dps").median()
+        means = means.replace(np.inf, np.nan)
         style = look(index)
         top.plot(
             means.index, means.bcd_iterations, markerfacecolor="none",

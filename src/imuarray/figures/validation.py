@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+from scipy import stats
 
 from imuarray.figures.style import BLACK, PAGE, SKY, look, new_figure, styled
 from imuarray.figures.tables import Column
@@ -20,11 +21,16 @@ COVERAGE = (
     Column("se_90", "± ", r"$\pm$ ", "{:.1f}", 100.0),
     Column("covered_95", "95 % (%)", r"95 \%", "{:.1f}", 100.0),
     Column("se_95", "±  ", r"$\pm$  ", "{:.1f}", 100.0),
+    Column("shift_z", "z of the mean score", r"$z$, shift", "{:+.1f}"),
+    Column("width_z", "z of the mean squared score", r"$z$, width", "{:+.1f}"),
     Column("p", "p of uniform ranks", "$p$", "{:.2g}"),
 )
 NOTES = (
-    "Truths drawn from the prior; ±: standard errors over replicates. p: Kolmogorov and Smirnov's,"
-    " the smallest of all parameters times their number.",
+    "Truths drawn from the prior, motion from its own, which the samplers know (the paper's limit"
+    " of a flat motion prior is not what can be simulated); ±: standard errors over replicates."
+    " Scores: normal quantiles of the truth's level; a mean square above 1 (z > 0) means widths too"
+    " small."
+    " p: Kolmogorov and Smirnov's, the smallest of all parameters times their number.",
 )
 JOINT = (
     Column("sampler", "sampler", "sampler"),
@@ -46,8 +52,7 @@ JOINT_NOTES = (
 def histogram(levels: pd.DataFrame) -> pd.DataFrame:
     """Density of the truths' posterior levels, uniform if right: a row for each bin.
 
-    ``se``: from the spread between replicates, whose parameters are not independent, but never
-    less than a single parameter's share of so many replicates could tell if all were one.
+    ``se``: from the spread between replicates, whose parameters are not independent.
     """
     frames = []
     edges = np.linspace(0, 1, BINS + 1)
@@ -68,14 +73,14 @@ def histogram(levels: pd.DataFrame) -> pd.DataFrame:
 
 @styled
 def rank_figure(table: pd.DataFrame, footer=()):
-    """A histogram for each method (row) and T (column); band: 95 % of a right sampler's."""
+    """A histogram for each method (row) and T (column); band: all 20 bins of a panel, 95 %."""
     methods, sizes = list(dict.fromkeys(table.method)), sorted(set(table.samples))
     figure = new_figure(footer, PAGE, 0.3 + 1.35 * len(methods))
     panels = figure.subplots(len(methods), len(sizes), sharex=True, sharey=True, squeeze=False)
     for method, line in zip(methods, panels, strict=True):
         for samples, axes in zip(sizes, line, strict=True):
             rows = table[(table.method == method) & (table.samples == samples)]
-            width = 1.96 * rows.se.mean()
+            width = stats.norm.isf(0.025 / BINS) * rows.se.mean()
             axes.axhspan(1 - width, 1 + width, color=SKY, alpha=0.4, linewidth=0)
             axes.axhline(1.0, color=BLACK, linewidth=0.6)
             axes.stairs(rows.density, [*rows.low, 1.0], color=look(2)["color"], linewidth=1.2)

@@ -9,7 +9,7 @@ from imuarray.model.effects import Effect, Instant, Prediction
 from imuarray.model.jax64 import jax, jnp
 from imuarray.motion.state import Motion
 
-ACCELEROMETERS, GYROSCOPES = 4, 3  # of the array that effects are tried on
+ACCELEROMETERS, GYROSCOPES = 7, 5  # of the array that effects are tried on
 
 
 def probe(item: Effect) -> None:
@@ -42,9 +42,11 @@ def _probe(item: Effect, sd, rng) -> None:
         if not np.allclose(old, new, rtol=1e-9, atol=1e-12):
             raise _wrong(item, f"{kind} left as it is by parameters of zero", "it changed")
     drawn = sd * rng.standard_normal(sd.shape)
-    _, change = _tried(
+    values, change = _tried(
         item, sd.shape, lambda: jax.jvp(lambda x: predicted(drawn, x), (later,), (later,))
     )
+    if not all(np.all(np.isfinite(part)) for part in values):
+        raise _wrong(item, "finite readings at parameters within their prior", "NaN or infinite")
     if not item.derivatives and any(np.any(np.asarray(part) != 0) for part in change):
         raise _wrong(item, "derivatives=True, since it uses omega double dot or s dot", "False")
 

@@ -70,6 +70,8 @@ class Likelihood:
         else:
             mean = np.ascontiguousarray(np.asarray(rate_distribution[0], float).T)
             covariance = np.asarray(rate_distribution[1], float)
+            if np.isfinite(motion_sd[0]):
+                raise InputError("motion_sd: expected none of omega beside rate_distribution")
         data = _arrange(collapsed, mean, covariance, np.full(3, float(motion_sd[1]) ** -2.0))
         return cls(data, DETERMINANTS[determinant], collapsed, mean.T, covariance)
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from imuarray.errors import InputError
 from imuarray.estimation.bcd import calibrate_bcd
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.information import arms, information
@@ -20,6 +21,7 @@ from imuarray.studies.batches import batch_stream, batches, root_mean_square, ru
 
 NEAR = 1.01  # times the bound: as good as efficient
 BCD_LIMIT = 20000  # iterations after which ML-BCD is given up
+SCORING_LIMIT = 10  # and Gauss-Newton
 RANK = 1e-10  # of the largest eigenvalue of the scaled information
 
 
@@ -78,8 +80,10 @@ def efficiency(
 ) -> pd.DataFrame:
     """RMSE of the most likely positions, with and without a prior, against the bound; a row per N.
 
-    ``motion`` and ``options`` as `imuarray.studies.position_error` has them. The bound is that of
-    each realisation's own motion; ``ratio`` is the RMSE over the bound's rms.
+    ``motion`` and ``options`` as `imuarray.studies.position_error` has them. ``bound_m`` is the
+    rms of each realisation's own bound (with the prior: of the linearised posterior's sds), and
+    ``ratio`` the root of the mean of e' I e / P over realisations, e the P errors and I the
+    information: 1 for an efficient estimator, in every direction, whatever the motion.
     """
     rows = []
     for samples in sample_counts:
@@ -90,20 +94,22 @@ def efficiency(
             return [_one(model, rng, samples, motion, options) for _ in range(size)]
 
         parts = run_batches(job, batches(options["realisations"]), threads, quiet, f"N={samples}")
-        found = np.concatenate(parts)
-        for column, name in enumerate(("maximum likelihood", "with the prior")):
-            rmse, error = root_mean_square(found[:, 2 * column] ** 2)
-            bound = float(np.sqrt(np.mean(found[:, 2 * column + 1] ** 2)))
+        found = np.concatenate(parts)  # (realisations, estimators, columns)
+        for place, name in enumerate(("maximum likelihood", "with the prior")):
+            square, bound, quadratic, iterations, converged = found[:, place].T
+            rmse, error = root_mean_square(square)
+            ratio, ratio_se = root_mean_square(quadratic)
             rows.append(
                 {"samples": samples, "estimator": name, "rmse_m": rmse, "rmse_se_m": error,
-                 "bound_m": bound, "ratio": rmse / bound, "ratio_se": error / bound,
-                 "realisations": len(found), "iterations": float(np.median(found[:, 4]))}
+                 "bound_m": float(np.sqrt(np.mean(bound))), "ratio": ratio, "ratio_se": ratio_se,
+                 "realisations": len(found), "iterations_max": int(iterations.max()),
+                 "not_converged": int(np.sum(converged == 0))}
             )  # fmt: skip
     return pd.DataFrame(rows)
 
 
 def _one(model, rng, samples, motion, options):
-    """rms error and bound without a prior, the same with it, and iterations."""
+    """Squared error and bound (m^2), e' I e / P, iterations, converged: without, with a prior."""
     moves, truth, force, rate, saturated = _draw(model, rng, samples, motion, options)
     data = Collapsed.of(model, force, rate, saturated)
     size = truth[1:].size
@@ -113,12 +119,14 @@ def _one(model, rng, samples, motion, options):
     known = information_at(model, moves, truth, saturated)
     out = []
     for given in (None, prior):
-        found = descend(data, model.array.relative, given)
-        error = np.sqrt(np.mean((found.positions - truth)[1:] ** 2))
-        ridge = 0.0 if given is None else given[1]
-        bound = np.sqrt(np.trace(np.linalg.inv(known + ridge)) / size)
-        out += [error, bound]
-    return [*out, len(found.cost) - 1]
+        found = descend(data, model.array.relative, given, covariance=False)
+        error = (found.positions - truth)[1:].ravel()
+        whole = known if given is None else known + given[1]
+        out.append([
+            np.mean(error**2), np.trace(np.linalg.inv(whole)) / size, error @ whole @ error / size,
+            len(found.cost) - 1, found.converged,
+        ])  # fmt: skip
+    return np.array(out, float)
 
 
 def convergence(
@@ -126,7 +134,8 @@ def convergence(
 ) -> pd.DataFrame:
     """Iterations of ML-BCD and of Gauss-Newton to 1.01 times the bound, for each motion.
 
-    ``contraction`` is what the information foresees for ML-BCD, ``observed`` what its steps show.
+    ``contraction`` is what the information foresees for ML-BCD, ``observed`` what its steps show;
+    iterations beyond the limits are NaN.
     """
 
     def job(which):
@@ -162,18 +171,20 @@ def paths(model: ArrayModel, force, rate, saturated, limit: int = BCD_LIMIT) -> 
     """Both methods on the same measurements (T, A, 3) and (T, G, 3)."""
     data = Collapsed.of(model, force, rate, saturated)
     best = descend(data, model.array.relative)
+    if not best.converged:
+        raise InputError("convergence study: expected a calibration that converges, found none")
     bound = np.sqrt(np.trace(best.covariance) / len(best.covariance))
     enough = bound * np.sqrt(NEAR**2 - 1)  # distance from the optimum, errors adding in squares
-    marks = np.unique(np.geomspace(1, limit, 400).astype(int))
+    marks = np.unique(np.geomspace(1, limit, 1000).astype(int))
     slow = calibrate_bcd(
         model, force, rate, saturated=saturated, tolerance=0.0, limit=limit, marks=marks
     )
     away = np.sqrt(np.mean((slow.snapshots - best.positions)[:, 1:] ** 2, axis=(1, 2)))
     near = np.flatnonzero(away <= enough)
-    newton, positions = np.nan, model.array.relative
-    for iteration in range(1, 11):
-        positions = descend(data, positions, limit=1).positions
-        if np.sqrt(np.mean((positions - best.positions)[1:] ** 2)) <= enough:
+    newton = np.nan
+    for iteration in range(1, SCORING_LIMIT + 1):
+        tried = descend(data, model.array.relative, limit=iteration, covariance=False)
+        if np.sqrt(np.mean((tried.positions - best.positions)[1:] ** 2)) <= enough:
             newton = iteration
             break
     return Paths(bound, marks, away, marks[near[0]] if len(near) else np.nan, newton)
@@ -220,7 +231,8 @@ def ranks(cases) -> pd.DataFrame:
     rows = []
     for name, model, motion in cases:
         known = information_at(model, motion, model.array.relative)
-        scale = np.sqrt(np.maximum(np.diag(known), 1e-300))
+        # a coordinate of which nothing is known must not be scaled up to something
+        scale = np.sqrt(np.maximum(np.diag(known), RANK * np.diag(known).max()))
         values = np.linalg.eigvalsh(known / np.outer(scale, scale))
         seen = values > RANK * values[-1]
         rows.append(

@@ -30,10 +30,10 @@ from imuarray.simulation import measure
 from imuarray.streams import stream
 from imuarray.studies.batches import run_batches
 
-DRAWS = 100  # kept of each posterior, nearly independent
+DRAWS = 199  # kept of each posterior, nearly independent: 200 ranks divide into 20 bins
 APART = 2.0  # posterior sds by which chains start off the mode
 WARMUP, SPACING = 200, 4  # NUTS: transitions to settle in, transitions between kept draws
-PILOT = 20000  # transitions of PmMH by which its step, length and thinning are chosen
+PILOT, PILOT_ESS = 20000, 200  # transitions of PmMH at a time, until so many are effective
 WIDER = 1.05  # than the mode's curvature, for autoregressive proposals
 LEVELS = (0.5, 0.9, 0.95)
 
@@ -217,11 +217,16 @@ def _thinning(target, start, step, rng) -> int:
     """Transitions after which a chain has nearly forgotten, for the slowest parameter."""
     theta = start.copy()
     value = target.log_target(theta, rng)
-    kept = np.empty((PILOT // 10, theta.size))
-    for row in kept:
-        _, value = target.transitions(theta, value, step, 10, rng)
-        row[:] = theta
-    return max(1, int(np.ceil(2 * PILOT / ess(kept[None]).min())))
+    blocks, effective = [], 0.0
+    while effective < PILOT_ESS and len(blocks) < 500:
+        kept = np.empty((PILOT // 20, theta.size))
+        for row in kept:
+            _, value = target.transitions(theta, value, step, 20, rng)
+            row[:] = theta
+        blocks.append(kept)
+        if len(blocks) in (1, 2, 5, 10, 20, 50, 100, 200, 500):
+            effective = ess(np.concatenate(blocks)[None]).min()
+    return max(1, int(np.ceil(2 * PILOT * len(blocks) / effective)))
 
 
 METHODS = {
@@ -254,8 +259,9 @@ def coverage(levels: pd.DataFrame) -> pd.DataFrame:
     """How often central intervals hold the truth, and whether levels are uniform.
 
     A row for each method and T: ``covered_50`` and so on with standard errors over replicates
-    (parameters of one replicate are not independent), and ``p``, the smallest Kolmogorov-Smirnov
-    p-value of a parameter times the number of parameters.
+    (parameters of one replicate are not independent); ``shift_z`` and ``width_z``, the mean
+    normal score and the mean squared one less 1, over all parameters of a replicate, in standard
+    errors; and ``p``, the smallest Kolmogorov-Smirnov p-value of a parameter times their number.
     """
     rows = []
     for (method, samples), part in levels.groupby(["method", "samples"], sort=False):
@@ -265,6 +271,16 @@ def coverage(levels: pd.DataFrame) -> pd.DataFrame:
             inside = (np.abs(grid - 0.5) < share / 2).mean(axis=1)
             row[f"covered_{100 * share:.0f}"] = inside.mean()
             row[f"se_{100 * share:.0f}"] = inside.std(ddof=1) / np.sqrt(len(grid))
+        scores = stats.norm.ppf(grid)
+        for name, each in (("shift", scores), ("width", scores**2 - 1)):
+            # parameters of a replicate are not independent: replicates are
+            row[f"{name}_z"] = _mean_z(each)
         smallest = min(stats.kstest(column, "uniform").pvalue for column in grid.T)
         rows.append({**row, "p": min(1.0, smallest * grid.shape[1])})
     return pd.DataFrame(rows)
+
+
+def _mean_z(scores) -> float:
+    """Mean of (R, P) over its standard error from the means of the replicates."""
+    means = scores.mean(axis=1)
+    return float(means.mean() / (means.std(ddof=1) / np.sqrt(len(means))))
