@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,6 +31,7 @@ NUTS_STEPS, NUTS_WARMUP = 1000, 300
 APART = 2.0  # posterior sds by which the starts differ where effects are free
 STORED = 2000
 RHAT_THRESHOLD = 1.05
+GAP = 1e-3  # nats in total
 VARIANCE = 0.1  # wanted of log p-hat, section III-C of paper 2021
 
 
@@ -145,6 +147,9 @@ def density_of(recording, model, rates: str = "declared"):
         estimator = _likelihood(recording, model, rates == "spread")
         mode, covariance = _mode(recording, model, rates == "spread")
         likelihood = Marginal.of(estimator, np.vstack([np.zeros(3), mode.reshape(-1, 3)]))
+        if likelihood.gap > GAP:
+            print(f"gyroscopes that see little of the motion: the likelihood is good to"
+                  f" {likelihood.gap:.1g} nats only", file=sys.stderr)  # fmt: skip
 
     def log_density(p):
         # traced: no call out of it

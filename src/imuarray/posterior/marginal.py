@@ -7,11 +7,12 @@ quadratic. Gauss-Hermite nodes are laid around its mode at every theta, scaled b
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
+from imuarray.errors import InputError
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.model import structure_tensor
 from imuarray.model.jax64 import jax, jnp
@@ -22,11 +23,11 @@ from imuarray.model.small_linear import (
     solve_upper,
 )
 from imuarray.model.structure import PAIRS
-from imuarray.posterior.likelihood import Likelihood
+from imuarray.posterior.likelihood import DETERMINANTS, Likelihood
 from imuarray.posterior.proposals import proposals
 
-NODES = 3  # on each axis of omega
-ENOUGH = 1e-4  # nats in total between Laplace's method and nodes: then the former is taken
+LADDER = (1, 3, 5, 7, 9, 11)  # nodes on each axis of omega
+ENOUGH = 1e-4  # nats in total between one rung and the next: then the former is taken
 NEWTON = 6  # steps to the mode at most, from where it is at the reference positions
 NEAR = 1e-4  # sds: a step as short is the last, the next would be its square
 
@@ -184,6 +185,7 @@ class Marginal:
     data: Data
     nodes: np.ndarray
     log_weights: np.ndarray
+    gap: float = np.nan  # nats in total to the next finer quadrature, where that was looked at
 
     @classmethod
     def of(
@@ -194,12 +196,14 @@ class Marginal:
         Parameters
         ----------
         nodes : int
-            On each axis of omega: 1 is Laplace's method, 3 integrates the quartic to some 1e-8
-            nats a sample where gyroscopes see the motion well (`tests/test_marginal.py`). By
-            default 1 if that differs by less than 1e-4 nats in total from 3 at ``positions``.
+            On each axis of omega; 1 is Laplace's method. By default the fewest of `LADDER` that
+            differ by less than 1e-4 nats in total from the next at ``positions``, or the most:
+            ``gap`` tells. Two poor gyroscopes already need more than three (tests).
         force_sd : float
             Prior sd of s (m/s^2); those of omega and omega_dot are the likelihood's.
         """
+        if likelihood.power != DETERMINANTS["derived"]:
+            raise InputError("marginal: expected the derived determinant, found the printed one")
         collapsed = likelihood.collapsed
         start = _modes(collapsed, likelihood, positions)
         weighted = collapsed.weighted.reshape(-1, collapsed.samples).T
@@ -217,8 +221,15 @@ class Marginal:
         data = Data(*map(jnp.asarray, parts))
         if nodes is not None:
             return cls(data, *grid(nodes))
-        plain, fine = cls(data, *grid(1)), cls(data, *grid(NODES))
-        return plain if abs(plain(positions) - fine(positions)) < ENOUGH else fine
+        rung = cls(data, *grid(LADDER[0]))
+        value = rung(positions)
+        for count in LADDER[1:]:
+            finer = cls(data, *grid(count))
+            gap, value = abs(value - finer(positions)), finer(positions)
+            if gap < ENOUGH:
+                return replace(rung, gap=gap)
+            rung = finer
+        return replace(rung, gap=gap)
 
     def __call__(self, positions) -> float:
         """log p(y_a | theta, y_g) at positions (A, 3) m, as `Likelihood.estimate` estimates it."""

@@ -128,7 +128,9 @@ def levels_nuts(setting: Setting, made, threads: int = 1) -> np.ndarray:
     from imuarray.posterior.nuts import run_many
 
     prior = setting.prior
-    marginals = [Marginal.of(m.likelihood, _positions(m.mode), nodes=3) for m in made]
+    first = Marginal.of(made[0].likelihood, _positions(made[0].mode))
+    count = round(len(first.nodes) ** (1 / 3))
+    marginals = [Marginal.of(m.likelihood, _positions(m.mode), count) for m in made]
     nodes, weights = marginals[0].nodes, marginals[0].log_weights
 
     def log_density(theta, data):
