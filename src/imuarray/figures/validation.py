@@ -39,13 +39,15 @@ JOINT = (
     Column("ess_min", "smallest effective size", "ESS", "{:.0f}"),
     Column("mean_z", "largest |z| of means", r"$|z|$, means", "{:.2f}"),
     Column("square_z", "largest |z| of squares", r"$|z|$, squares", "{:.2f}"),
+    Column("misfit_z", "|z| of the misfit", r"$|z|$, misfit", "{:.2f}"),
     Column("p", "p", "$p$", "{:.2g}"),
 )
 JOINT_NOTES = (
     "Measurements are drawn given the positions, then the positions moved by the sampler given the"
-    " measurements, over and over: right samplers leave the positions' prior as it is. z: means of"
-    " the coordinates and their squares against the prior's, in Monte Carlo standard errors; p: of"
-    " the largest, times the number of comparisons.",
+    " measurements, over and over: right samplers leave the positions' prior as it is, and the"
+    " misfit between both as in independent draws. z: means of the coordinates and their squares"
+    " against the prior's, of the misfit against the independent ones', in Monte Carlo standard"
+    " errors; p: of the largest, times the number of comparisons.",
 )
 
 

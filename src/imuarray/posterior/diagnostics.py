@@ -29,6 +29,11 @@ def ess(draws) -> np.ndarray:
     return _arviz("ess", draws, method="bulk")
 
 
+def ess_of_mean(draws) -> np.ndarray:
+    """The same for the plain mean: how many independent draws would estimate it as well."""
+    return _arviz("ess", draws, method="mean")
+
+
 def agreement(draws) -> np.ndarray:
     """|difference of the two halves of the chains' means| in its Monte Carlo sd, (size,).
 

@@ -98,11 +98,21 @@ def _assemble(total, const, logdet, determinant_power):
     return total - 0.5 * const.sum() - determinant_power * const.size * logdet
 
 
+@nb.njit(cache=True, nogil=True, inline="always")
+def _tilted(k, t, x, y, z):
+    """log p(omega | y_g) less the log of the density it is drawn from."""
+    return (
+        k[0, t] + k[1, t] * x + k[2, t] * y + k[3, t] * z
+        + k[4, t] * x * x + k[5, t] * y * y + k[6, t] * z * z
+        + k[7, t] * x * y + k[8, t] * x * z + k[9, t] * y * z
+    )  # fmt: skip
+
+
 @nb.njit(cache=True, nogil=True)
 def fixed_draws(positions, data, rates, work, power):
     """log p-hat (26a) on given draws ``rates`` (T, N, 3) rad/s."""
     logdet = _collapse(positions, data, work)
-    total = 0.0
+    total, tilted = 0.0, data.tilt.shape[1] > 0
     for t in range(rates.shape[0]):
         b = work.b[:, t]
         for n in range(rates.shape[1]):
@@ -110,6 +120,8 @@ def fixed_draws(positions, data, rates, work, power):
             work.exponent[n] = -0.5 * kernels.quadratic(
                 x, y, z, work.C, b[0], b[1], b[2], b[3], b[4], b[5]
             )
+            if tilted:
+                work.exponent[n] += _tilted(data.tilt, t, x, y, z)
         total += _log_mean_exp(work.exponent)
     return _assemble(total, work.const, logdet, power)
 
@@ -136,11 +148,7 @@ def fresh_draws(positions, data, rng, work, power, first, last):
             z = mz + zx * u + zy * v + zz * w
             work.exponent[n] = -0.5 * kernels.quadratic(x, y, z, C, b0, b1, b2, b3, b4, b5)
             if tilted:
-                work.exponent[n] += (
-                    k[0, t] + k[1, t] * x + k[2, t] * y + k[3, t] * z
-                    + k[4, t] * x * x + k[5, t] * y * y + k[6, t] * z * z
-                    + k[7, t] * x * y + k[8, t] * x * z + k[9, t] * y * z
-                )  # fmt: skip
+                work.exponent[n] += _tilted(k, t, x, y, z)
         total += _log_mean_exp(work.exponent)
     return _assemble(total, work.const[first:last], logdet, power)
 

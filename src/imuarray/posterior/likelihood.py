@@ -11,7 +11,7 @@ from imuarray.errors import InputError
 from imuarray.estimation.collapsed import Collapsed, tables
 from imuarray.model import ArrayModel, structure_tensor
 from imuarray.posterior import kernels
-from imuarray.posterior.proposals import proposals, tilts
+from imuarray.posterior.proposals import WIDENING, proposals, tilts
 
 # (19) and (23) imply |H' Lambda H|^(-1/2) for each sample; (25) and (26a) print the
 # determinant without the root. "derived" is right; "printed" exists to show the difference.
@@ -75,15 +75,17 @@ class Likelihood:
         data = _arrange(collapsed, mean, covariance, np.full(3, float(motion_sd[1]) ** -2.0))
         return cls(data, DETERMINANTS[determinant], collapsed, mean.T, covariance)
 
-    def centred(self, positions) -> Likelihood:
+    def centred(self, positions, widening: float = WIDENING) -> Likelihood:
         """The same likelihood, estimated with draws from where its integrand is.
 
         omega_t is drawn around the integrand's mode at ``positions`` (A, 3) m, weighted by
         p(omega_t | y_g) over that density: unbiased at every theta, and of far smaller
         variance than (26a) where p(omega_t | y_g) is wide or lies off, as in measured data.
+        Drawn so many times as wide as the integrand's curvature says, which alone gives log p-hat
+        a variance of some 6 (widening - 1)^2 / N a sample.
         """
         mean, covariance = proposals(
-            self.collapsed, self.rate_mean, self.rate_covariance, _contiguous(positions)
+            self.collapsed, self.rate_mean, self.rate_covariance, _contiguous(positions), widening
         )
         tilt = tilts(self.rate_mean, self.rate_covariance, mean, covariance)
         data = self.data._replace(
@@ -97,7 +99,10 @@ class Likelihood:
         return self.data.energy.size
 
     def on(self, positions, rates) -> float:
-        """log p-hat at ``positions`` (A, 3) m on given draws ``rates`` (T, N, 3) rad/s."""
+        """log p-hat at ``positions`` (A, 3) m on given draws ``rates`` (T, N, 3) rad/s.
+
+        They are taken to be from where `estimate` would draw them.
+        """
         work = kernels.workspace(self.samples, rates.shape[1])
         return kernels.fixed_draws(_contiguous(positions), self.data, rates, work, self.power)
 

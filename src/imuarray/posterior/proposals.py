@@ -16,7 +16,7 @@ WIDENING = 1.05
 PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
-def proposals(collapsed: Collapsed, mean, covariance, positions):
+def proposals(collapsed: Collapsed, mean, covariance, positions, widening: float = WIDENING):
     """Mean (T, 3) rad/s and covariance (T, 3, 3) of a normal density like the integrand.
 
     The integrand is p(omega_t | y_g) = N(``mean``, ``covariance``) times the exponential of
@@ -37,7 +37,7 @@ def proposals(collapsed: Collapsed, mean, covariance, positions):
     # far from a good fit the second derivative may not be positive: then the first order serves
     sound = np.linalg.eigvalsh(full)[:, 0] > 0.1 * np.linalg.eigvalsh(curvature)[:, 0]
     curvature[sound] = full[sound]
-    return rate, WIDENING**2 * np.linalg.inv(curvature)
+    return rate, widening**2 * np.linalg.inv(curvature)
 
 
 def tilts(mean, covariance, proposal_mean, proposal_covariance) -> np.ndarray:

@@ -18,7 +18,7 @@ from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.motion import normal_motion
 from imuarray.posterior import AutoregressiveTarget, CompiledTarget, GaussianPrior, Likelihood
-from imuarray.posterior.diagnostics import ess
+from imuarray.posterior.diagnostics import ess_of_mean
 from imuarray.simulation import measure
 from imuarray.streams import stream
 
@@ -33,6 +33,7 @@ MOTION_SD = (15.0, 500.0, 20.0)  # rad/s, rad/s^2, m/s^2; the last is flat to th
 SAMPLES, DRAWS = 2, 5
 STEPS = {"walk": (1.0e-3, 10), "autoregressive": (0.6, 5)}  # length, transitions a round
 LEAPS, LEAP = 2, 0.5  # NUTS: transitions a round, step length in prior sds
+NODES = 5
 
 
 class Data(NamedTuple):
@@ -64,32 +65,56 @@ def begun(target: CompiledTarget, theta, data: Data, rng) -> float:
     One of N draws a sample is the omega that did: fresh ones alone would be of another law than
     the pseudo-marginal chain's own, and the test would fail for a right sampler.
     """
-    factor = np.linalg.cholesky(data.likelihood.rate_covariance)
-    normals = rng.standard_normal((SAMPLES, target.draws, 3))
-    rates = data.likelihood.rate_mean[:, None] + np.einsum("tij,tnj->tni", factor, normals)
+    drawn = target.likelihood.data
+    xx, yx, yy, zx, zy, zz = drawn.factor
+    u, v, w = rng.standard_normal((3, target.draws, SAMPLES))
+    rates = drawn.mean.T[:, None] + np.stack([xx * u, yx * u + yy * v, zx * u + zy * v + zz * w]).T
+    rates = np.ascontiguousarray(rates)
     rates[np.arange(SAMPLES), rng.integers(target.draws, size=SAMPLES)] = data.rate
     positions = np.vstack([np.zeros(3), theta.reshape(-1, 3)])
-    return target.prior.log_density(theta) + data.likelihood.on(positions, rates)
+    return target.prior.log_density(theta) + target.likelihood.on(positions, rates)
+
+
+def _walk(likelihood: Likelihood, model: ArrayModel, prior: GaussianPrior) -> CompiledTarget:
+    """The paper's."""
+    return CompiledTarget(likelihood, prior, DRAWS)
+
+
+def _autoregressive(likelihood, model, prior) -> CompiledTarget:
+    """Omega drawn around each integrand's mode, at positions that do not hang on theta."""
+    centred = likelihood.centred(model.array.relative)
+    return AutoregressiveTarget(centred, prior, DRAWS, prior.mean, np.diag(prior.sd))
+
+
+TARGETS = {"walk": _walk, "autoregressive": _autoregressive}
 
 
 def pmmh_rounds(name: str, seed: int, rounds: int) -> Iterator[np.ndarray]:
-    """theta after each round of PmMH: the paper's walk, or autoregressive proposals."""
+    """(theta, misfit of the measurements at it) after each round of PmMH."""
     model, prior = problem()
     rng = stream(seed, "joint", name)
     step, count = STEPS[name]
     theta = prior.mean + prior.sd * rng.standard_normal(prior.mean.size)
     for _ in range(rounds):
         data = simulated(model, theta, rng)
-        target = CompiledTarget(data.likelihood, prior, DRAWS)
-        if name == "autoregressive":
-            shape = prior.mean, np.diag(prior.sd)
-            target = AutoregressiveTarget(data.likelihood, prior, DRAWS, *shape)
+        target = TARGETS[name](data.likelihood, model, prior)
         target.transitions(theta, begun(target, theta, data, rng), step, count, rng)
-        yield theta.copy()
+        yield np.append(theta, misfit(data, theta))
+
+
+def misfit(data: Data, theta) -> float:
+    """How badly theta fits a round's measurements: of what a sampler that ignores them is wrong.
+
+    The squared distance of the triads' differences from what theta and the gyroscopes' omega
+    predict at best, in sds of the accelerometers.
+    """
+    positions = np.vstack([np.zeros(3), theta.reshape(-1, 3)])
+    rates = np.ascontiguousarray(data.likelihood.rate_mean[:, None])
+    return -2 * data.likelihood.on(positions, rates) / SAMPLES
 
 
 def nuts_rounds(name: str, seed: int, rounds: int) -> Iterator[np.ndarray]:
-    """The same by NUTS with a fixed step on the exact marginal likelihood."""
+    """The same by NUTS, its step fixed, on the exact marginal likelihood."""
     from numpyro.infer.hmc import hmc
 
     from imuarray.model.jax64 import jax, jnp
@@ -118,36 +143,52 @@ def nuts_rounds(name: str, seed: int, rounds: int) -> Iterator[np.ndarray]:
     for _ in range(rounds):
         data = simulated(model, theta, rng)
         positions = np.vstack([np.zeros(3), theta.reshape(-1, 3)])
-        marginal = Marginal.of(data.likelihood, positions, 5)
+        marginal = Marginal.of(data.likelihood, positions, NODES)
         nodes, weights = marginal.nodes, marginal.log_weights
         z = moved((theta - prior.mean) / prior.sd, marginal.data, int(rng.integers(2**31)))
         theta = prior.mean + prior.sd * np.asarray(z)
-        yield theta
+        yield np.append(theta, misfit(data, theta))
 
 
-SAMPLERS: dict[str, tuple[str, Callable, int]] = {  # label, rounds of it, how many fewer
-    "walk": ("PmMH, (27)", pmmh_rounds, 1),
-    "autoregressive": ("PmMH, autoregressive", pmmh_rounds, 1),
-    "nuts": ("NUTS", nuts_rounds, 4),
+SAMPLERS: dict[str, tuple[str, Callable]] = {
+    "walk": ("PmMH, (27)", pmmh_rounds),
+    "autoregressive": ("PmMH, autoregressive, centred", pmmh_rounds),
+    "nuts": ("NUTS", nuts_rounds),
 }
 
 
+def independent(seed: int, rounds: int) -> np.ndarray:
+    """Misfits of truths and measurements drawn together, (rounds,): what those should be like."""
+    model, prior = problem()
+    rng = stream(seed, "joint", "independent")
+    found = np.empty(rounds)
+    for number in range(rounds):
+        theta = prior.mean + prior.sd * rng.standard_normal(prior.mean.size)
+        found[number] = misfit(simulated(model, theta, rng), theta)
+    return found
+
+
 def joint_test(seed: int, rounds: int, names=tuple(SAMPLERS)) -> pd.DataFrame:
-    """A row for each sampler: how far means and squares of theta are from the prior's."""
+    """A row for each sampler: how far means and squares of theta are from the prior's, and the
+    misfit of the measurements from that of independent draws of both."""
     _, prior = problem()
+    right = independent(seed, rounds)
     rows = []
     for name in names:
-        label, sampler, fewer = SAMPLERS[name]
-        draws = np.array(list(sampler(name, seed, rounds // fewer)))
-        z = (draws - prior.mean) / prior.sd
-        size = {power: ess((z**power)[None]) for power in (1, 2)}
-        means = z.mean(axis=0) * np.sqrt(size[1])
-        squares = (np.mean(z**2, axis=0) - 1) * np.sqrt(size[2] / 2)
-        largest = np.abs(np.concatenate([means, squares])).max()
+        label, sampler = SAMPLERS[name]
+        draws = np.array(list(sampler(name, seed, rounds)))
+        z = (draws[:, :-1] - prior.mean) / prior.sd
+        values = np.hstack([z, z**2, draws[:, -1:]])
+        size = ess_of_mean(values[None])
+        expected = np.concatenate([np.zeros(z.shape[1]), np.ones(z.shape[1]), [right.mean()]])
+        error = values.var(axis=0) / size
+        error[-1] += right.var() / len(right)
+        scores = np.abs(values.mean(axis=0) - expected) / np.sqrt(error)
+        count = z.shape[1]
         rows.append(
-            {"sampler": label, "rounds": len(draws), "parameters": z.shape[1],
-             "ess_min": min(part.min() for part in size.values()),
-             "mean_z": np.abs(means).max(), "square_z": np.abs(squares).max(),
-             "p": min(1.0, 2 * z.shape[1] * 2 * stats.norm.sf(largest))}
+            {"sampler": label, "rounds": len(draws), "parameters": count, "ess_min": size.min(),
+             "mean_z": scores[:count].max(), "square_z": scores[count:-1].max(),
+             "misfit_z": scores[-1],
+             "p": min(1.0, len(scores) * 2 * stats.norm.sf(scores.max()))}
         )  # fmt: skip
     return pd.DataFrame(rows)
