@@ -14,6 +14,7 @@ import pandas as pd
 from scipy import stats
 
 from imuarray.config import model_from
+from imuarray.errors import InputError
 from imuarray.estimation.newton import descend
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
@@ -34,6 +35,7 @@ DRAWS = 199  # kept of each posterior, nearly independent: 200 ranks divide into
 APART = 2.0  # posterior sds by which chains start off the mode
 WARMUP, SPACING = 200, 4  # NUTS: transitions to settle in, transitions between kept draws
 PILOT, PILOT_ESS = 20000, 200  # transitions of PmMH at a time, until so many are effective
+STARTS, GOOD = 50, 2.0  # of the search for a mode; mean square of residuals that ends it
 WIDER = 1.05  # than the mode's curvature, for autoregressive proposals
 LEVELS = (0.5, 0.9, 0.95)
 
@@ -96,13 +98,34 @@ def replicate(setting: Setting, number: int) -> Replicate:
     motion = normal_motion(rng, (setting.samples,), *setting.motion_sd)
     force, rate, _ = measure(model, motion, np.vstack([np.zeros(3), truth.reshape(-1, 3)]), rng)
     likelihood = Likelihood.of(model, force, rate, motion_sd=setting.motion_sd[:2])
-    precision = np.diag(prior.sd**-2.0)
-    best = descend(likelihood.collapsed, model.array.relative, (prior.mean, precision))
+    best = _most_likely(setting, likelihood, rng)
     plain = descend(likelihood.collapsed, best.positions)
+    if not (best.converged and plain.converged):
+        raise InputError(f"replicate {number}: expected a calibration that converges, found none")
     return Replicate(
         truth, likelihood, best.positions[1:].ravel(), best.covariance,
         plain.positions[1:].ravel(), np.sqrt(np.diag(plain.covariance)),
     )  # fmt: skip
+
+
+def _most_likely(setting: Setting, likelihood: Likelihood, rng):
+    """The mode, searched from the nominal positions and, where that ends badly, from others.
+
+    Few triads, few samples and a wide prior have local optima: from the nominal positions alone
+    the search ends in one in some 3 % of data sets of 4 triads and 5 samples with positions off
+    by 3 mm. Their residuals, far beyond the noise, give them away.
+    """
+    prior, data = setting.prior, likelihood.collapsed
+    enough = GOOD * 3 * setting.model.array.accelerometers * setting.samples
+    best, start = None, prior.mean
+    for _ in range(STARTS):
+        found = descend(data, _positions(start), (prior.mean, np.diag(prior.sd**-2.0)))
+        if best is None or found.cost[-1] < best.cost[-1]:
+            best = found
+        if best.cost[-1] < enough:
+            break
+        start = prior.mean + prior.sd * rng.standard_normal(prior.mean.size)
+    return best
 
 
 def levels_ml(setting: Setting, made, threads: int = 1) -> np.ndarray:
