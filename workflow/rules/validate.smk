@@ -1,5 +1,10 @@
 # Only `snakemake validate` asks for these: are the uncertainties right?
 VALIDATED = resting_on("studies/calibrated.py", "studies/joint.py", "config.py", "provenance.py")
+LEVELS = [
+    f"results/{{scale}}/validation/levels_{name}_T{samples}.csv"
+    for name, chosen in config["validation"]["settings"].items()
+    for samples in chosen["samples"]
+]
 VALIDATION_DRAWING = resting_on(
     "figures/validation.py", "figures/notes.py", "figures/imuarray.mplstyle"
 )
@@ -9,11 +14,11 @@ rule calibrated_levels:
     input:
         code=VALIDATED,
     output:
-        "results/{scale}/validation/levels_T{samples}.csv",
+        "results/{scale}/validation/levels_{setting}_T{samples}.csv",
     log:
-        "results/{scale}/logs/validation/levels_T{samples}.log",
+        "results/{scale}/logs/validation/levels_{setting}_T{samples}.log",
     benchmark:
-        "results/{scale}/benchmarks/validation/levels_T{samples}.tsv"
+        "results/{scale}/benchmarks/validation/levels_{setting}_T{samples}.tsv"
     threads: lambda wc: config["scales"][wc.scale]["threads"]
     resources:
         mem_mb=3000,
@@ -49,10 +54,7 @@ rule joint_test:
 
 rule figure_validation_ranks:
     input:
-        levels=expand(
-            "results/{{scale}}/validation/levels_T{samples}.csv",
-            samples=config["validation"]["samples"],
-        ),
+        levels=LEVELS,
         code=VALIDATION_DRAWING,
     output:
         pdf="results/{scale}/figures/validation_ranks.pdf",
@@ -80,10 +82,7 @@ rule figure_validation_ranks:
 
 rule table_validation_coverage:
     input:
-        levels=expand(
-            "results/{{scale}}/validation/levels_T{samples}.csv",
-            samples=config["validation"]["samples"],
-        ),
+        levels=LEVELS,
         code=[*VALIDATED, *VALIDATION_DRAWING],
     output:
         csv="results/{scale}/tables/validation_coverage.csv",

@@ -12,6 +12,7 @@ from imuarray.figures.tables import Column
 BINS = 20
 
 COVERAGE = (
+    Column("setting", "setting", "setting"),
     Column("method", "method", "method"),
     Column("samples", "T", "$T$"),
     Column("replicates", "replicates", "replicates"),
@@ -23,14 +24,16 @@ COVERAGE = (
     Column("se_95", "±  ", r"$\pm$  ", "{:.1f}", 100.0),
     Column("shift_z", "z of the mean score", r"$z$, shift", "{:+.1f}"),
     Column("width_z", "z of the mean squared score", r"$z$, width", "{:+.1f}"),
+    Column("size_z", "z, the array's size", r"$z$, size", "{:+.1f}"),
+    Column("misfit_z", "z, misfit of the data", r"$z$, misfit", "{:+.1f}"),
     Column("p", "p of uniform ranks", "$p$", "{:.2g}"),
 )
 NOTES = (
-    "Truths drawn from the prior, motion from its own, which the samplers know (the paper's limit"
-    " of a flat motion prior is not what can be simulated); ±: standard errors over replicates."
+    "Truths drawn from the prior, motion from its own, which the samplers know; but for the paper's"
+    " limit of a flat motion prior in the last rows. ±: standard errors over replicates."
     " Scores: normal quantiles of the truth's level; a mean square above 1 (z > 0) means widths too"
     " small."
-    " p: Kolmogorov and Smirnov's, the smallest of all parameters times their number.",
+    " p: Kolmogorov and Smirnov's, the smallest of all quantities times their number.",
 )
 JOINT = (
     Column("sampler", "sampler", "sampler"),
@@ -58,13 +61,17 @@ def histogram(levels: pd.DataFrame) -> pd.DataFrame:
     """
     frames = []
     edges = np.linspace(0, 1, BINS + 1)
-    for (method, samples), part in levels.groupby(["method", "samples"], sort=False):
+    own = levels[~levels.quantity.isin(("size", "misfit"))].dropna()
+    for (setting, method, samples), part in own.groupby(
+        ["setting", "method", "samples"], sort=False
+    ):
         place = np.clip((part.level * BINS).astype(int), 0, BINS - 1)
         shares = BINS * pd.crosstab(part.replicate, place, normalize="index")
         shares = shares.reindex(columns=range(BINS), fill_value=0.0)
         frames.append(
             pd.DataFrame(
-                {"method": method, "samples": samples, "low": edges[:-1], "high": edges[1:],
+                {"setting": setting, "method": method, "samples": samples,
+                 "low": edges[:-1], "high": edges[1:],
                  "density": shares.mean().to_numpy(),
                  "se": (shares.std(ddof=1) / np.sqrt(len(shares))).to_numpy(),
                  "replicates": len(shares)}
@@ -76,17 +83,20 @@ def histogram(levels: pd.DataFrame) -> pd.DataFrame:
 @styled
 def rank_figure(table: pd.DataFrame, footer=()):
     """A histogram for each method (row) and T (column); band: all 20 bins of a panel, 95 %."""
-    methods, sizes = list(dict.fromkeys(table.method)), sorted(set(table.samples))
+    methods = list(dict.fromkeys(table.method))
+    settings = list(dict.fromkeys(zip(table.setting, table.samples, strict=True)))
     figure = new_figure(footer, PAGE, 0.3 + 1.35 * len(methods))
-    panels = figure.subplots(len(methods), len(sizes), sharex=True, sharey=True, squeeze=False)
+    panels = figure.subplots(len(methods), len(settings), sharex=True, sharey=True, squeeze=False)
     for method, line in zip(methods, panels, strict=True):
-        for samples, axes in zip(sizes, line, strict=True):
-            rows = table[(table.method == method) & (table.samples == samples)]
+        for (setting, samples), axes in zip(settings, line, strict=True):
+            rows = table[
+                (table.method == method) & (table.setting == setting) & (table.samples == samples)
+            ]
             width = stats.norm.isf(0.025 / BINS) * rows.se.mean()
             axes.axhspan(1 - width, 1 + width, color=SKY, alpha=0.4, linewidth=0)
             axes.axhline(1.0, color=BLACK, linewidth=0.6)
             axes.stairs(rows.density, [*rows.low, 1.0], color=look(2)["color"], linewidth=1.2)
-            axes.set_title(f"{method}, T = {samples}", size=7)
+            axes.set_title(f"{method}: {setting}, T = {samples}", size=7)
     for axes in panels[-1]:
         axes.set_xlabel("share of the posterior below the truth")
     for axes in panels[:, 0]:

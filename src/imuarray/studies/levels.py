@@ -1,0 +1,198 @@
+"""The quantiles of truths in their posteriors, by each method: uniform if all is right."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from scipy import stats
+
+from imuarray.posterior import AutoregressiveTarget, CompiledTarget, Likelihood, tuning
+from imuarray.posterior.diagnostics import ess
+from imuarray.streams import stream
+from imuarray.studies.batches import run_batches
+from imuarray.studies.truths import SPARE, Replicate, Setting, positions_of, replicate
+
+DRAWS = 199  # kept of each posterior, nearly independent
+APART = 2.0  # posterior sds by which chains start off the mode
+WARMUP, SPACING = 200, 4  # NUTS: transitions to settle in, transitions between kept draws
+PILOT, PILOT_ESS = 20000, 200  # transitions of PmMH at a time, until so many are effective
+BLOCKS = (1, 2, 5, 10, 20, 50, 100, 200, 500)  # of them, after which that is looked at
+TINY = 1e-12
+WIDER = 1.05  # than the mode's curvature, for autoregressive proposals
+WIDENING = 1.005  # of the draws of omega beyond the integrand's curvature
+
+
+def names_of(setting: Setting) -> list[str]:
+    """The quantities whose levels are looked at: coordinates, then what hangs on all of them."""
+    labels = setting.model.array.labels[1:]
+    return [f"{label}_{axis}" for label in labels for axis in "xyz"] + ["size", "misfit"]
+
+
+def _size(setting: Setting, thetas) -> np.ndarray:
+    """The array's size along its nominal shape, (...)."""
+    nominal = setting.prior.mean
+    return np.asarray(thetas) @ nominal / np.linalg.norm(nominal)
+
+
+def _misfit(one: Replicate, thetas) -> np.ndarray:
+    """How badly positions (L, P) fit the data at the gyroscopes' omega, (L,).
+
+    A sampler that does not look at the data, or not at all of them, is wrong here.
+    """
+    rates = np.ascontiguousarray(one.likelihood.rate_mean[:, None])
+    return np.array([-one.likelihood.on(positions_of(theta), rates) for theta in thetas])
+
+
+def of_draws(setting: Setting, made, draws, name: str) -> np.ndarray:
+    """Levels (R, P + 2) of the truths among draws (R, L, P), uniform between two draws."""
+    out = []
+    for one, thetas in zip(made, draws, strict=True):
+        both = np.vstack([one.truth, thetas])
+        values = np.column_stack([both, _size(setting, both), _misfit(one, both)])
+        rank = np.sum(values[1:] < values[0], axis=0)
+        rng = stream(setting.seed, "calibrated", name, setting.name, setting.samples, one.number)
+        out.append((rank + rng.random(rank.size)) / (len(thetas) + 1))
+    return np.array(out)
+
+
+def ml(setting: Setting, made, threads: int = 1) -> np.ndarray:
+    """Under a normal density around the ML estimate; NaN of the misfit, and where there is none."""
+    size = setting.prior.mean / np.linalg.norm(setting.prior.mean)
+    out = []
+    for one in made:
+        away, sd = one.truth - one.ml, np.sqrt(np.diag(one.ml_covariance))
+        along = size @ away / np.sqrt(size @ one.ml_covariance @ size)
+        # 0 and 1 themselves have no normal score
+        found = [*np.clip(stats.norm.cdf([*away / sd, along]), TINY, 1 - TINY), np.nan]
+        out.append(found if one.ml_converged else [np.nan] * len(found))
+    return np.array(out)
+
+
+def _start(setting: Setting, one: Replicate, name: str) -> np.ndarray:
+    where = setting.name, setting.samples, one.number
+    rng = stream(setting.seed, "calibrated", name, "start", *where)
+    return rng.multivariate_normal(one.mode, APART**2 * one.covariance)
+
+
+def nuts(setting: Setting, made, threads: int = 1, flat: bool = False) -> np.ndarray:
+    """By NUTS on the exact marginal likelihood, or on that of a ``flat`` motion prior."""
+    from imuarray.model.jax64 import jnp
+    from imuarray.posterior.marginal import Marginal, log_marginal
+    from imuarray.posterior.nuts import run_many
+
+    prior, name = setting.prior, "nuts flat" if flat else "nuts"
+
+    def marginal(one, count=None):
+        likelihood = one.flat if flat else one.likelihood
+        return Marginal.of(likelihood, positions_of(one.mode), count)
+
+    first = marginal(made[0])
+    nodes, weights = first.nodes, first.log_weights
+    count = round(len(nodes) ** (1 / 3))
+    marginals = [marginal(one, count) for one in made]
+
+    def log_density(theta, data):
+        positions = jnp.concatenate([jnp.zeros((1, 3)), theta.reshape(-1, 3)])
+        off = (theta - prior.mean) / prior.sd
+        return log_marginal(positions, data, nodes, weights) - 0.5 * jnp.sum(off**2)
+
+    rng = stream(setting.seed, "calibrated", name, setting.name, setting.samples)
+    draws = run_many(
+        log_density, [m.data for m in marginals], [m.mode for m in made],
+        [np.linalg.cholesky(m.covariance) for m in made],
+        [_start(setting, one, name) for one in made], WARMUP, DRAWS * SPACING,
+        rng.integers(2**31, size=len(made)), threads,
+    )  # fmt: skip
+    return of_draws(setting, made, draws[:, SPACING - 1 :: SPACING], name)
+
+
+def _variances(likelihood: Likelihood, one: Replicate, rng):
+    counts = [1, 2, 5, 10, 20, 50, 100]
+    at_mode = positions_of(one.mode)
+    return counts, tuning.variance_sweep(likelihood, at_mode, counts, 200, rng)
+
+
+def _walk(setting: Setting, pilot: Replicate, rng):
+    """The paper's: (target of a replicate, step), N and sigma_q chosen as in section III-C.
+
+    But N at the mode: here the prior's mean is as far off as the prior says, not a thirtieth of it.
+    """
+    draws = tuning.choose_draws(*_variances(pilot.likelihood, pilot, rng))
+
+    def target(one):
+        return CompiledTarget(one.likelihood, setting.prior, draws)
+
+    steps = np.sqrt(np.diag(pilot.covariance)).mean() * np.geomspace(1e-3, 3.0, 12)
+    rates = tuning.acceptance_sweep(target(pilot), pilot.mode, steps, 1000, rng)
+    return target, tuning.choose_step(steps, rates)
+
+
+def _shaped(setting: Setting, pilot: Replicate, rng):
+    """The same likelihood drawn around each mode, proposals of the posterior's shape."""
+
+    def centred(one):
+        return one.likelihood.centred(positions_of(one.mode), WIDENING)
+
+    draws = tuning.choose_draws(*_variances(centred(pilot), pilot, rng))
+
+    def target(one):
+        factor = WIDER * np.linalg.cholesky(one.covariance)
+        return AutoregressiveTarget(centred(one), setting.prior, draws, one.mode, factor)
+
+    lengths = np.geomspace(0.05, 0.99, 10)
+    rates = tuning.acceptance_sweep(target(pilot), pilot.mode, lengths, 1000, rng)
+    return target, float(lengths[np.argmax(rates * lengths**2)])
+
+
+def _pmmh(kernel: Callable, name: str):
+    """Levels by PmMH; step and thinning from a pilot data set of its own."""
+
+    def levels(setting: Setting, made, threads: int = 1) -> np.ndarray:
+        rng = stream(setting.seed, "calibrated", name, "pilot", setting.name, setting.samples)
+        pilot = replicate(setting, SPARE)
+        make, step = kernel(setting, pilot, rng)
+        thin = _thinning(make(pilot), pilot.mode, step, rng)
+
+        def chain(one):
+            where = setting.name, setting.samples, one.number
+            own = stream(setting.seed, "calibrated", name, "chain", *where)
+            target, theta = make(one), _start(setting, one, name)
+            value = target.log_target(theta, own)
+            _, value = target.transitions(theta, value, step, DRAWS * thin // 4, own)
+            out = np.empty((DRAWS, theta.size))
+            for row in out:
+                _, value = target.transitions(theta, value, step, thin, own)
+                row[:] = theta
+            return out
+
+        draws = run_batches(chain, made, threads, True, name)
+        return of_draws(setting, made, draws, name)
+
+    return levels
+
+
+def _thinning(target, start, step, rng) -> int:
+    """Transitions after which a chain has nearly forgotten, for the slowest parameter."""
+    theta = start.copy()
+    value = target.log_target(theta, rng)
+    blocks, effective = [], 0.0
+    while effective < PILOT_ESS and len(blocks) < BLOCKS[-1]:
+        kept = np.empty((PILOT // 20, theta.size))
+        for row in kept:
+            _, value = target.transitions(theta, value, step, 20, rng)
+            row[:] = theta
+        blocks.append(kept)
+        if len(blocks) in BLOCKS:
+            effective = ess(np.concatenate(blocks)[None]).min()
+    return max(1, int(np.ceil(2 * PILOT * len(blocks) / effective)))
+
+
+METHODS: dict[str, Callable] = {
+    "ML": ml,
+    "PmMH": _pmmh(_walk, "walk"),
+    "PmMH, autoregressive": _pmmh(_shaped, "autoregressive"),
+    "NUTS": nuts,
+    "NUTS, flat motion prior": partial(nuts, flat=True),
+}
