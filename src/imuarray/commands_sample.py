@@ -56,6 +56,9 @@ def sample(arguments) -> None:
         Path(made.checkpoint).unlink(missing_ok=True)
     if not arguments.quiet:
         _report(verdict, table)
+        if made.chains.divergent:
+            print(f"{made.chains.divergent} transitions diverged: a part of the posterior may be"
+                  " missed")  # fmt: skip
 
 
 class Made(NamedTuple):
@@ -127,7 +130,8 @@ def _nuts(recording, model, arguments) -> Made:
         log_density, mode, covariance, starts, NUTS_WARMUP, steps, arguments.seed,
         quiet=arguments.quiet,
     )  # fmt: skip
-    return Made(found, prior, _key(recording, model, prior, arguments, steps, "nuts"), {})
+    return Made(found, prior, _key(recording, model, prior, arguments, steps, "nuts"),
+                {"divergent": found.divergent})  # fmt: skip
 
 
 def density_of(recording, model, rates: str = "declared"):

@@ -6,10 +6,12 @@ with job(snakemake) as settings:
     from itertools import product
 
     import numpy as np
+    import pandas as pd
 
     from imuarray.config import model_from
     from imuarray.provenance import write_csv
     from imuarray.studies import bound
+    from imuarray.studies.settings2017 import magnitudes
 
     paper, theory, scale = settings["paper2017"], settings["theory"], settings["scale"]
     motions = [
@@ -20,8 +22,10 @@ with job(snakemake) as settings:
         "position_sd": paper["position_sd"], "rail": np.radians(paper["gyroscope_range_dps"]),
         "limit": bound.BCD_LIMIT,
     }  # fmt: skip
-    table = bound.convergence(
-        model_from(settings), settings["seed"], theory["convergence_samples"], motions, options,
-        scale["theory_repeats"], snakemake.threads,
-    )  # fmt: skip
-    write_csv(table, snakemake.output[0])
+    model = model_from(settings)
+    rest = options, scale["theory_repeats"], snakemake.threads
+    where = settings["seed"], theory["convergence_samples"]
+    tables = [bound.convergence(model, *where, motions, *rest)]
+    for other in bound.geometries(model).values():
+        tables.append(bound.convergence(other, *where, [magnitudes(paper)], *rest))
+    write_csv(pd.concat(tables), snakemake.output[0])

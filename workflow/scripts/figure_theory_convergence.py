@@ -11,5 +11,5 @@ with job(snakemake) as settings:
 
     table = pd.read_csv(snakemake.input.rows)
     footer = [scale_line(settings, f"N = {table.samples.max()}")]
-    figure = theory.convergence_figure(table, footer)
+    figure = theory.convergence_figure(table, settings["paper2017"]["position_sd"], footer)
     write_figure(figure, table, **dict(snakemake.output.items()))

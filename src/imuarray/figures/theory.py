@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from imuarray.figures.style import BLACK, GREY, look, new_figure, styled
+from imuarray.figures.style import BLACK, GREY, MARKERS, look, new_figure, styled
 from imuarray.figures.tables import Column
 
 ESTIMATORS = ("maximum likelihood", "with the prior")
@@ -51,41 +51,49 @@ def efficiency_figure(table: pd.DataFrame, footer=()):
 
 
 @styled
-def convergence_figure(table: pd.DataFrame, footer=()):
-    """Iterations to 1.01 times the bound, and ML-BCD's rate as foreseen and as seen.
+def convergence_figure(table: pd.DataFrame, nominal_sd: float, footer=()):
+    """Iterations to 1.01 times the bound over the motion, and ML-BCD's rate, foreseen and seen.
 
-    ``table``: `studies.bound.convergence`.
+    ``table``: `studies.bound.convergence` of the array, then of others. Motions that tell hardly
+    more than the nominal positions, off by ``nominal_sd`` (m), do are left out above.
     """
-    figure = new_figure(footer, height=5.0)
+    figure = new_figure(footer, height=5.4)
     top, below = figure.subplots(2, 1)
-    groups = table.groupby("angular_acceleration_dps2")
-    for index, (acceleration, rows) in enumerate(groups):
+    own = table[table.array == table.array.iloc[0]]
+    for index, (acceleration, rows) in enumerate(own.groupby("angular_acceleration_dps2")):
         # medians: a run that did not come to an end counts as longer than any other
-        means = rows.fillna(np.inf).groupby("angular_rate_dps").median()
-        means = means.replace(np.inf, np.nan)
+        told = rows[rows.groupby("angular_rate_dps").bound_m.transform("median") < nominal_sd / 3]
+        counts = told[["angular_rate_dps", "bcd_iterations", "newton_iterations"]].fillna(np.inf)
+        medians = counts.groupby("angular_rate_dps").median().replace(np.inf, np.nan)
         style = look(index)
         top.plot(
-            means.index, means.bcd_iterations, markerfacecolor="none",
+            medians.index, medians.bcd_iterations, markerfacecolor="none",
             label=rf"$\|\dot\omega\|$ = {acceleration:g} deg/s²", **style,
         )  # fmt: skip
-        top.plot(means.index, means.newton_iterations, color=GREY, marker=style["marker"],
+        top.plot(medians.index, medians.newton_iterations, color=GREY, marker=style["marker"],
                  markerfacecolor="none", linestyle=":")  # fmt: skip
         below.plot(
             1 - rows.contraction, 1 - rows.observed, markerfacecolor="none",
             **{**style, "linestyle": "none"},
+        )  # fmt: skip
+    for index, (name, rows) in enumerate(table[table.array != own.array.iloc[0]].groupby("array")):
+        below.plot(
+            1 - rows.contraction, 1 - rows.observed, color=BLACK, linestyle="none",
+            marker=MARKERS[-1 - index], markerfacecolor="none", label=name,
         )  # fmt: skip
     top.annotate("Gauss-Newton (grey)", (0.02, 0.04), xycoords="axes fraction", size=7, color="0.3")
     top.set(
         xscale="log", yscale="log", xlabel=r"Angular rate $\|\omega\|$ (deg/s)",
         ylabel="iterations to 1.01 × bound",
     )  # fmt: skip
-    top.legend(loc="best")
+    top.legend(loc="lower center", bbox_to_anchor=(0.5, 0.12), ncols=2, columnspacing=1.0)
     ends = 1 - np.array([table.contraction.max(), table.contraction.min()])
     below.plot(ends, ends, color=BLACK, linewidth=0.8)
     below.set(
         xscale="log", yscale="log", xlabel="share of the error lost in an iteration, foreseen",
         ylabel="seen",
     )  # fmt: skip
+    below.legend(loc="upper left", title="other arrays", title_fontsize=7)
     return figure
 
 

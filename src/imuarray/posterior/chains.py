@@ -12,7 +12,8 @@ class Chains:
     """Paired chains: ``draws`` (chains, draws, size), ``log_target`` (chains, draws).
 
     ``thin`` transitions lie between stored draws; ``acceptance`` (chains,) is the share
-    of accepted proposals over the whole run.
+    of accepted proposals over the whole run. ``divergent`` counts transitions whose integration
+    broke down (NUTS): where there are any the draws may miss a part of the posterior.
     """
 
     draws: np.ndarray
@@ -20,6 +21,7 @@ class Chains:
     acceptance: np.ndarray
     thin: int
     step: float
+    divergent: int = 0
 
     @property
     def steps(self) -> int:

@@ -86,7 +86,7 @@ def run_nuts(
     def run(state):
         def one(state, _):
             state = advance(state)
-            return state, (state.z, -state.potential_energy, state.accept_prob, state.num_steps)
+            return state, (state.z, -state.potential_energy, state.accept_prob, state.diverging)
 
         return jax.lax.scan(one, state, None, block)
 
@@ -104,9 +104,10 @@ def run_nuts(
             bar.update(block)
     joined = [[np.concatenate(part) for part in zip(*blocks, strict=True)] for blocks in kept]
     cut = slice(warmup, warmup + draws)
-    z, log_target, accepted, _ = (np.stack(part)[:, cut] for part in zip(*joined, strict=True))
-    steps = [float(state.adapt_state.step_size) for state in states]
-    return Chains(white.theta(z), log_target, accepted.mean(axis=1), 1, float(np.mean(steps)))
+    z, log_target, accepted, lost = (np.stack(part)[:, cut] for part in zip(*joined, strict=True))
+    step = float(np.mean([state.adapt_state.step_size for state in states]))
+    draws = white.theta(z)
+    return Chains(draws, log_target, accepted.mean(axis=1), 1, step, int(lost.sum()))
 
 
 def run_many(log_density, data, centres, factors, starts, warmup: int, draws: int, keys,

@@ -134,8 +134,8 @@ def convergence(
 ) -> pd.DataFrame:
     """Iterations of ML-BCD and of Gauss-Newton to 1.01 times the bound, for each motion.
 
-    ``contraction`` is what the information foresees for ML-BCD, ``observed`` what its steps show;
-    iterations beyond the limits are NaN.
+    A row for each of ``count`` realisations. ``contraction`` is what the information foresees for
+    ML-BCD, ``observed`` what its steps show; iterations beyond the limits are NaN.
     """
 
     def job(which):
@@ -159,7 +159,9 @@ class Paths(NamedTuple):
     @property
     def observed(self) -> float:
         """The factor by which ML-BCD's last steps shrink its error."""
-        late = np.flatnonzero((self.away < 0.3 * self.away[0]) & (self.away > 1e-3 * self.bound))
+        # not so far that rounding is what is left
+        floor = max(1e-3 * self.bound, 10 * self.away.min())
+        late = np.flatnonzero((self.away < 0.3 * self.away[0]) & (self.away > floor))
         if len(late) < 2:
             return np.nan
         first, last = late[len(late) // 2], late[-1]
@@ -195,6 +197,7 @@ def _convergence_row(model, rng, samples, motion, options):
     made = paths(model, force, rate, saturated, options["limit"])
     known = information_at(model, moves, truth, saturated)
     return {
+        "array": model.array.name,
         "angular_rate_dps": np.degrees(motion[0]),
         "angular_acceleration_dps2": np.degrees(motion[1]),
         "samples": samples,
@@ -242,6 +245,21 @@ def ranks(cases) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def geometries(model: ArrayModel) -> dict[str, ArrayModel]:
+    """Other arrays with the noise of ``model``: fewer triads, all in one plane, half the size."""
+    array, arrays = model.array, {}
+    for count in (3, 4, 8):
+        if count < array.accelerometers:
+            chosen = np.linspace(0, array.accelerometers - 1, count).round().astype(int)
+            labels = tuple(array.labels[k] for k in chosen)
+            name = f"{count} triads"
+            arrays[name] = Array(array.positions[chosen], labels, count, name)
+    for name, factor in (("all triads in one plane", [1.0, 1.0, 0.0]), ("half the size", 0.5)):
+        arrays[name] = Array(array.positions * factor, array.labels, array.gyroscopes, name)
+    noise = model.noise.accelerometer[0, 0] ** 0.5, model.noise.gyroscope[0, 0] ** 0.5
+    return {name: ArrayModel.isotropic(other, *noise) for name, other in arrays.items()}
+
+
 def rank_cases(model: ArrayModel, seed, sphere, normal) -> list[tuple]:
     """(name, model, motion) of what may and may not tell the positions.
 
@@ -264,14 +282,5 @@ def rank_cases(model: ArrayModel, seed, sphere, normal) -> list[tuple]:
         ("about one axis, omega_dot free", model,
          many._replace(angular_rate=along["angular_rate"])),
     ]  # fmt: skip
-    noise = model.noise.accelerometer[0, 0] ** 0.5, model.noise.gyroscope[0, 0] ** 0.5
-    for count in (3, 4, 8):
-        chosen = np.linspace(0, model.array.accelerometers - 1, count).round().astype(int)
-        labels = tuple(model.array.labels[k] for k in chosen)
-        part = Array(model.array.positions[chosen], labels, count)
-        cases.append((f"{count} triads", ArrayModel.isotropic(part, *noise), many))
-    flat = Array(
-        model.array.positions * [1.0, 1.0, 0.0], model.array.labels, model.array.gyroscopes
-    )
-    cases.append(("all triads in one plane", ArrayModel.isotropic(flat, *noise), many))
+    cases += [(name, other, many) for name, other in geometries(model).items()]
     return cases
