@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from imuarray.errors import InputError
 from imuarray.estimation.bcd import calibrate_bcd
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.information import arms, information
@@ -148,7 +147,10 @@ def convergence(
 
 
 class Paths(NamedTuple):
-    """How ML-BCD and Gauss-Newton come to the same optimum from the nominal positions."""
+    """How ML-BCD and Gauss-Newton come to the same optimum from the nominal positions.
+
+    Without marks and iterations where there is no optimum that is found.
+    """
 
     bound: float  # m, rms
     marks: np.ndarray  # iterations of ML-BCD
@@ -159,6 +161,8 @@ class Paths(NamedTuple):
     @property
     def observed(self) -> float:
         """The factor by which ML-BCD's last steps shrink its error."""
+        if not self.away.size:
+            return np.nan
         # not so far that rounding is what is left
         floor = max(1e-3 * self.bound, 10 * self.away.min())
         late = np.flatnonzero((self.away < 0.3 * self.away[0]) & (self.away > floor))
@@ -173,9 +177,9 @@ def paths(model: ArrayModel, force, rate, saturated, limit: int = BCD_LIMIT) -> 
     """Both methods on the same measurements (T, A, 3) and (T, G, 3)."""
     data = Collapsed.of(model, force, rate, saturated)
     best = descend(data, model.array.relative)
-    if not best.converged:
-        raise InputError("convergence study: expected a calibration that converges, found none")
     bound = np.sqrt(np.trace(best.covariance) / len(best.covariance))
+    if not best.converged:  # data that tell too little: there is no way to go
+        return Paths(bound, np.empty(0, int), np.empty(0), np.nan, np.nan)
     enough = bound * np.sqrt(NEAR**2 - 1)  # distance from the optimum, errors adding in squares
     marks = np.unique(np.geomspace(1, limit, 1000).astype(int))
     slow = calibrate_bcd(

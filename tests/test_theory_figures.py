@@ -1,0 +1,48 @@
+"""Figures of estimation theory, from the studies themselves at toy size."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from imuarray.figures import theory
+from imuarray.studies import bound
+from tests.test_bound import MOTION, OPTIONS, model
+
+
+def test_efficiency():
+    table = bound.efficiency(model(), 2, [10, 30], MOTION, {**OPTIONS, "realisations": 10})
+    figure = theory.efficiency_figure(table, ["Scale quick"])
+    top, below = figure.axes
+    assert len(top.get_legend().get_texts()) == 4
+    assert below.get_ylabel() == "error / bound"
+
+
+def test_convergence_shows_other_arrays_and_leaves_out_what_tells_nothing():
+    slow = (0.5, 1.0, 10.0)  # tells less than the nominal positions
+    tables = [bound.convergence(model(), 3, 30, [MOTION, slow], {**OPTIONS, "limit": 300}, count=1)]
+    others = bound.geometries(model())
+    assert set(others) == {"3 triads", "4 triads", "all triads in one plane", "half the size"}
+    other = others["4 triads"]
+    tables.append(bound.convergence(other, 3, 30, [MOTION], {**OPTIONS, "limit": 300}, count=1))
+    table = pd.concat(tables)
+    assert list(table.array) == [model().array.name] * 2 + ["4 triads"]
+    assert table.bound_m.iloc[1] > OPTIONS["position_sd"] / 3
+    top, below = theory.convergence_figure(table, OPTIONS["position_sd"]).axes
+    drawn = [x for line in top.lines for x in line.get_xdata()]
+    assert set(np.round(drawn)) == {round(np.degrees(MOTION[0]))}
+    assert [text.get_text() for text in below.get_legend().get_texts()] == ["4 triads"]
+
+
+def test_size():
+    table = bound.against_size(model(), 4, 30, MOTION, [1.0, 2.0], count=2)
+    top, below = theory.size_figure(table).axes
+    assert top.lines[0].get_ydata() == pytest.approx(1e6 * table.bound_m.to_numpy())
+    assert "ppm" in below.get_ylabel()
+
+
+def test_rate_is_seen_before_rounding_takes_over():
+    """Steps that stall at the optimum's own rounding say nothing of the rate."""
+    marks = np.arange(1, 200)
+    away = 1e-3 * 0.9**marks + 2e-8
+    made = bound.Paths(1e-6, marks, away, 50, 2)
+    assert made.observed == pytest.approx(0.9, abs=0.01)
