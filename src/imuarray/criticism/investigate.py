@@ -13,6 +13,7 @@ from imuarray.criticism.adopt import adopt
 from imuarray.criticism.columns import catalogue_effects, columns_of
 from imuarray.criticism.fit import Fit, fit
 from imuarray.criticism.gate import Check, all_checks
+from imuarray.criticism.lone import leave_out_clips, lone_checks, together
 from imuarray.criticism.readings import Readings, arrange, determined, part_of
 from imuarray.criticism.remainder import (
     drift_checks,
@@ -88,6 +89,8 @@ def investigate(
     say("fitting to the end")
     search.polish()
     clear(search)
+    if "saturation" not in without:
+        structural = together(structural, leave_out_clips(search))
     say("judging the noise")
     tailed, in_noise = settle(search, without)
     if "coloured_noise" not in without:
@@ -96,6 +99,7 @@ def investigate(
     checks = all_checks(search.fit, search.given, search.noise)
     checks += [*outlier_checks(search), *plausibility_checks(search)]
     checks += [*drift_checks(search), *tail_checks(search, tailed)]
+    checks += lone_checks(search, tailed)
     calm_ = not any(c.log_p < thresholds.check for c in checks if c.name.startswith("residual"))
     in_noise += named_noise(search, without, tailed, calm_)
     explained, failing = judged(search, checks, in_noise)
