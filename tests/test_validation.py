@@ -19,10 +19,7 @@ def setting(name="paper", samples=5, triads=4):
     return setting_from(config, name, samples)
 
 
-RIGHT = [name for name in METHODS if "flat" not in name]
-
-
-@pytest.mark.parametrize("method", RIGHT)
+@pytest.mark.parametrize("method", METHODS)
 def test_levels_of_the_truth_are_uniform(method):
     """30 truths, 9 coordinates: p below 1e-3 in one of a thousand runs of a right sampler."""
     levels = calibrated.calibrated(setting(), 30, methods=[method])
@@ -49,11 +46,13 @@ def test_widths_that_are_wrong_are_seen(monkeypatch, factor):
     assert np.sign(np.log(factor)) * coverage(levels).width_z[0] > 5
 
 
-def test_the_flat_motion_prior_shrinks_the_array():
-    """The paper's limit of it, in noise that leaves the size to it: docs/findings.md."""
-    names = ["NUTS", "NUTS, flat motion prior"]
-    right, flat = coverage(calibrated.calibrated(setting("hard"), 150, methods=names)).size_z
-    assert abs(right) < 4 and flat > 6
+def test_levels_are_uniform_where_data_tell_little():
+    """The hard setting: posteriors a third to two thirds as wide as the prior."""
+    levels = calibrated.calibrated(setting("hard"), 40, methods=["NUTS"])
+    row = coverage(levels).iloc[0]
+    assert row.p > 1e-3
+    scores = row[["shift_z", "width_z", "size_z", "misfit_z"]].astype(float)
+    assert np.all(np.abs(scores) < 4)
 
 
 @pytest.mark.parametrize(("name", "rounds"), [("walk", 4000), ("autoregressive", 4000),

@@ -29,8 +29,9 @@ COVERAGE = (
     Column("p", "p of uniform ranks", "$p$", "{:.2g}"),
 )
 NOTES = (
-    "Truths drawn from the prior, motion from its own, which the samplers know; but for the paper's"
-    " limit of a flat motion prior in the last rows. ±: standard errors over replicates."
+    "Truths drawn from the prior, motion from its own, which the samplers know (the paper's limit"
+    " of a flat motion prior cannot be simulated; docs/findings.md says what it does to the array's"
+    " size). ±: standard errors over replicates."
     " Scores: normal quantiles of the truth's level; a mean square above 1 (z > 0) means widths too"
     " small."
     " p: Kolmogorov and Smirnov's, the smallest of all quantities times their number.",

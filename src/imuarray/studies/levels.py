@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 from scipy import stats
@@ -76,17 +75,16 @@ def _start(setting: Setting, one: Replicate, name: str) -> np.ndarray:
     return rng.multivariate_normal(one.mode, APART**2 * one.covariance)
 
 
-def nuts(setting: Setting, made, threads: int = 1, flat: bool = False) -> np.ndarray:
-    """By NUTS on the exact marginal likelihood, or on that of a ``flat`` motion prior."""
+def nuts(setting: Setting, made, threads: int = 1) -> np.ndarray:
+    """By NUTS on the exact marginal likelihood."""
     from imuarray.model.jax64 import jnp
     from imuarray.posterior.marginal import Marginal, log_marginal
     from imuarray.posterior.nuts import run_many
 
-    prior, name = setting.prior, "nuts flat" if flat else "nuts"
+    prior, name = setting.prior, "nuts"
 
     def marginal(one, count=None):
-        likelihood = one.flat if flat else one.likelihood
-        return Marginal.of(likelihood, positions_of(one.mode), count)
+        return Marginal.of(one.likelihood, positions_of(one.mode), count)
 
     first = marginal(made[0])
     nodes, weights = first.nodes, first.log_weights
@@ -194,5 +192,4 @@ METHODS: dict[str, Callable] = {
     "PmMH": _pmmh(_walk, "walk"),
     "PmMH, autoregressive": _pmmh(_shaped, "autoregressive"),
     "NUTS": nuts,
-    "NUTS, flat motion prior": partial(nuts, flat=True),
 }

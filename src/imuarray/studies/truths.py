@@ -62,7 +62,6 @@ class Replicate(NamedTuple):
     number: int
     truth: np.ndarray  # (P,) m
     likelihood: Likelihood  # with the motion's own prior
-    flat: Likelihood  # with the paper's limit of a flat one
     mode: np.ndarray  # (P,)
     covariance: np.ndarray  # (P, P)
     ml: np.ndarray  # (P,) the most likely positions without a prior
@@ -95,7 +94,7 @@ def replicate(setting: Setting, number: int) -> Replicate:
     best = _most_likely(setting, likelihood, rng)
     plain = descend(likelihood.collapsed, best.positions)
     return Replicate(
-        number, truth, likelihood, Likelihood.of(model, force, rate), best.positions[1:].ravel(),
+        number, truth, likelihood, best.positions[1:].ravel(),
         best.covariance, plain.positions[1:].ravel(), plain.covariance, plain.converged,
     )  # fmt: skip
 
