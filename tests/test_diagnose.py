@@ -265,7 +265,7 @@ def test_the_extended_model_is_one_option_away(diagnosed):
 
     document = json.loads((diagnosed / "out" / "diagnosis.json").read_text())
     with xr.open_dataset(out) as found:
-        place = [str(name).startswith("gyroscope_scale[2") for name in found.parameter.values]
+        place = [str(name).endswith("_3 1") for name in found.parameter.values]
         values, sds = found.effect_parameter.values[place], found.effect_sd.values[place]
         others = found.effect_parameter.values[~np.array(place)]
         positions = found.position.values
