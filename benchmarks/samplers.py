@@ -21,6 +21,7 @@ from written import publish
 from imuarray.commands_model import model_of
 from imuarray.commands_sample import density_of
 from imuarray.config import read_config
+from imuarray.geometry import positions_of
 from imuarray.posterior import (
     AutoregressiveTarget,
     CompiledTarget,
@@ -82,7 +83,7 @@ class Problem:
     @property
     def centre(self):
         """The mode as positions (A, 3)."""
-        return np.vstack([np.zeros(3), self.mode.reshape(-1, 3)])
+        return positions_of(self.mode)
 
 
 def timed(function):
@@ -117,13 +118,8 @@ def pmmh_rows(problem, seconds, rng):
     """The paper's walk, then one improvement after the other."""
     prior = GaussianPrior.of(problem.prior.mean, problem.prior.sd)
 
-    def draws_of(likelihood):
-        counts = [1, 2, 5, 10, 20, 50, 100]
-        variances = tuning.variance_sweep(likelihood, problem.centre, counts, 200, rng)
-        return tuning.choose_draws(counts, variances, 0.1)
-
     def walk(likelihood):
-        draws = draws_of(likelihood)
+        draws = tuning.enough_draws(likelihood, problem.centre, rng)
         target = CompiledTarget(likelihood, prior, draws)
         steps = problem.prior.sd[0] * np.geomspace(1e-6, 0.3, 16)
         rates = tuning.acceptance_sweep(target, problem.mode, steps, 1000, rng)
@@ -131,7 +127,7 @@ def pmmh_rows(problem, seconds, rng):
 
     def shaped():
         centred = problem.likelihood.centred(problem.centre, WIDENING)
-        draws = draws_of(centred)
+        draws = tuning.enough_draws(centred, problem.centre, rng)
         factor = WIDER * problem.factor
         target = AutoregressiveTarget(centred, prior, draws, problem.mode, factor)
         lengths = np.geomspace(0.02, 0.999, 12)

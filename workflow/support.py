@@ -13,6 +13,9 @@ BASE = ("config.py", "errors.py", "provenance.py", "streams.py")  # under every 
 
 APART = ("blind_", "theory_", "validation_")  # sizes of targets that nothing else rests on
 
+# Files that nothing of the papers rests on: the criticism's drawings, theory and validation.
+ASIDE = ("blind", "criticism", "theory", "validation", "bound.", "calibrated", "joint", "levels",
+         "truths")  # fmt: skip
 # Every stage rests on those before it: the package's folders are the path of the data.
 STAGES = {
     "simulation": ("geometry", "motion", "model", "simulation", "recording", "studies"),
@@ -35,8 +38,7 @@ def library(stage: str) -> list[str]:
             if name == stage:
                 break
     files = [path for folder in folders for path in (PACKAGE / folder).glob("*.py")]
-    # drawings of the criticism: nothing of the papers rests on them
-    files = [path for path in files if not path.name.startswith(("blind", "criticism"))]
+    files = [path for path in files if not path.name.startswith(ASIDE)]
     return sorted(str(path) for path in [*files, *(PACKAGE / name for name in BASE)])
 
 

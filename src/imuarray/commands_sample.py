@@ -10,6 +10,7 @@ import numpy as np
 
 from imuarray.commands_model import assumed, chosen_model, usable
 from imuarray.errors import InputError
+from imuarray.geometry import positions_of
 from imuarray.model.names import parameter_names
 from imuarray.posterior import (
     Chains,
@@ -150,7 +151,7 @@ def density_of(recording, model, rates: str = "declared"):
     else:
         estimator = _likelihood(recording, model, rates == "spread")
         mode, covariance = _mode(recording, model, rates == "spread")
-        likelihood = Marginal.of(estimator, np.vstack([np.zeros(3), mode.reshape(-1, 3)]))
+        likelihood = Marginal.of(estimator, positions_of(mode))
         if likelihood.gap > GAP:
             print(f"gyroscopes that see little of the motion: the likelihood is good to"
                   f" {likelihood.gap:.1g} nats only", file=sys.stderr)  # fmt: skip
@@ -189,14 +190,14 @@ def _tuned(recording, model, arguments):
     spread = arguments.rates == "spread"
     likelihood = _likelihood(recording, model, spread)
     prior = prior_of(recording, model)
-    counts, rng = [1, 2, 5, 10, 20, 50, 100], _stream(arguments.seed, "tuning")
+    counts, rng = tuning.COUNTS, _stream(arguments.seed, "tuning")
     variances = tuning.variance_sweep(likelihood, model.array.relative, counts, 200, rng)
     mode, _ = _mode(recording, model, spread)
     if variances.min() > 2 * VARIANCE:
         if not arguments.quiet:
             print(f"variance of log p-hat {variances[-1]:.3g} at N = {counts[-1]}: omega is drawn"
                   " around the integrand's mode instead")  # fmt: skip
-        centre = np.vstack([np.zeros(3), mode.reshape(-1, 3)])
+        centre = positions_of(mode)
         likelihood = likelihood.centred(centre)
         variances = tuning.variance_sweep(likelihood, centre, counts, 200, rng)
     draws = tuning.choose_draws(counts, variances, VARIANCE)

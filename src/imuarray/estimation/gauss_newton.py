@@ -12,7 +12,7 @@ from imuarray.estimation.blocks import Blocks, normal_equations, pack_motion, pr
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.motion_ml import MotionEstimate, motion_from
 from imuarray.estimation.newton import descend
-from imuarray.geometry.array import require_planar_extent
+from imuarray.geometry.array import positions_of, require_planar_extent
 from imuarray.model import ArrayModel
 from imuarray.motion import Motion
 
@@ -122,7 +122,7 @@ def calibrate_blocks(
     p = np.concatenate([positions[1:].ravel(), model.effect_start])
     x, p, costs, steps, converged, covariance = _iterate(given, x, p, tolerance, limit)
     size = 3 * (model.array.accelerometers - 1)
-    found = np.vstack([np.zeros(3), p[:size].reshape(-1, 3)])
+    found = positions_of(p[:size])
     motion = Motion.of(x[:, :3], x[:, 3:6], x[:, 6:9])
     flags = np.full(len(x), converged)
     estimate = MotionEstimate(motion, np.full(len(x), np.nan), np.full(len(x), len(costs)), flags)

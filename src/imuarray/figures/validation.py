@@ -8,6 +8,7 @@ from scipy import stats
 
 from imuarray.figures.style import BLACK, PAGE, SKY, look, new_figure, styled
 from imuarray.figures.tables import Column
+from imuarray.studies.calibrated import WHOLE
 
 BINS = 20
 
@@ -62,7 +63,7 @@ def histogram(levels: pd.DataFrame) -> pd.DataFrame:
     """
     frames = []
     edges = np.linspace(0, 1, BINS + 1)
-    own = levels[~levels.quantity.isin(("size", "misfit"))].dropna()
+    own = levels[~levels.quantity.isin(WHOLE)].dropna()
     for (setting, method, samples), part in own.groupby(
         ["setting", "method", "samples"], sort=False
     ):

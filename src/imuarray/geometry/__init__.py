@@ -1,6 +1,12 @@
 """Where the triads sit on the board."""
 
-from imuarray.geometry.array import Array, array_from_config, array_from_csv
+from imuarray.geometry.array import (
+    Array,
+    array_from_config,
+    array_from_csv,
+    positions_of,
+    sub_array,
+)
 from imuarray.geometry.mimu4444 import UNDERSIDE_ROTATION, mimu4444, mimu4444_corners
 
 __all__ = [
@@ -10,4 +16,6 @@ __all__ = [
     "array_from_csv",
     "mimu4444",
     "mimu4444_corners",
+    "positions_of",
+    "sub_array",
 ]

@@ -47,6 +47,20 @@ class Array:
         return self.relative[1:].ravel()
 
 
+def sub_array(array: Array, triads: int) -> Array:
+    """``triads`` of an array's IMUs, spread evenly over its list."""
+    if triads >= array.accelerometers:
+        return array
+    chosen = np.linspace(0, array.accelerometers - 1, triads).round().astype(int)
+    labels = tuple(array.labels[k] for k in chosen)
+    return Array(array.positions[chosen], labels, triads, array.name, array.package)
+
+
+def positions_of(theta) -> np.ndarray:
+    """(A, 3) m relative to the reference triad, of theta (3 (A - 1),), r_2 ... r_A."""
+    return np.vstack([np.zeros(3), np.reshape(theta, (-1, 3))])
+
+
 def require_planar_extent(positions: np.ndarray, where: str = "array") -> None:
     """Raise IdentifiabilityError for fewer than three or collinear triads (2017, section II)."""
     if len(positions) < 3:

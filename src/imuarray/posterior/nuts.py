@@ -14,8 +14,11 @@ from imuarray.model.jax64 import jax, jnp
 from imuarray.posterior.chains import Chains
 from imuarray.streams import stream
 
-ACCEPTANCE = 0.8  # wanted of the step length
-DEPTH = 8  # doublings of a trajectory
+# Of a density that is nearly standard normal: the acceptance wanted of the step length, the
+# doublings of a trajectory, and the first step.
+WHITE = {
+    "target_accept_prob": 0.8, "max_tree_depth": 8, "adapt_mass_matrix": False, "step_size": 0.5,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -75,10 +78,7 @@ def run_nuts(
 
     @jax.jit
     def first(z, key):
-        return begin(
-            z, num_warmup=warmup, target_accept_prob=ACCEPTANCE, max_tree_depth=DEPTH,
-            adapt_mass_matrix=False, step_size=0.5, rng_key=key,
-        )  # fmt: skip
+        return begin(z, num_warmup=warmup, rng_key=key, **WHITE)
 
     states = [first(jnp.asarray(z), key) for z, key in zip(white.white(starts), keys, strict=True)]
 
@@ -124,10 +124,7 @@ def run_many(log_density, data, centres, factors, starts, warmup: int, draws: in
     def one(data, centre, factor, z, seed):
         key = jax.random.key_data(jax.random.key(seed))
         begin, advance = hmc(lambda z: -log_density(centre + factor @ z, data), algo="NUTS")
-        state = begin(
-            z, num_warmup=warmup, target_accept_prob=ACCEPTANCE, max_tree_depth=DEPTH,
-            adapt_mass_matrix=False, step_size=0.5, rng_key=key,
-        )  # fmt: skip
+        state = begin(z, num_warmup=warmup, rng_key=key, **WHITE)
 
         def step(state, _):
             state = advance(state)

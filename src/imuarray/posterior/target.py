@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from imuarray.geometry import positions_of
 from imuarray.posterior import kernels
 from imuarray.posterior.likelihood import Likelihood
 
@@ -58,7 +59,7 @@ class CompiledTarget:
 
     def log_target(self, theta, rng) -> float:
         """log prior + log p-hat with fresh draws."""
-        positions = np.vstack([np.zeros(3), np.reshape(theta, (-1, 3))])
+        positions = positions_of(theta)
         return self.prior.log_density(theta) + self.likelihood.estimate(positions, self.draws, rng)
 
     def transitions(self, theta, log_target, step, count, rng) -> tuple[int, float]:

@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from imuarray.posterior.target import Target
 
 
+COUNTS = (1, 2, 5, 10, 20, 50, 100)  # numbers N of draws that are tried
+
+
 def _each(function, jobs, threads: int) -> np.ndarray:
     """``function`` of every job on ``threads`` threads; the kernels release the interpreter."""
     with ThreadPoolExecutor(threads) as pool:
@@ -43,6 +46,12 @@ def choose_draws(draws, variances, target: float = 0.1) -> int:
     regime = variances < 1.0 if np.any(variances < 1.0) else variances > 0
     scale = np.exp(np.mean(np.log(draws[regime] * variances[regime])))
     return max(1, int(np.ceil(scale / target)))
+
+
+def enough_draws(likelihood: Likelihood, positions, rng, target: float = 0.1) -> int:
+    """N for a variance of log p-hat of at most ``target`` at ``positions`` (A, 3) m."""
+    variances = variance_sweep(likelihood, positions, COUNTS, 200, rng)
+    return choose_draws(COUNTS, variances, target)
 
 
 def acceptance(target: Target, start, step: float, count: int, rng) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from imuarray.estimation.bcd import calibrate_bcd
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.information import arms, information
 from imuarray.estimation.newton import descend
-from imuarray.geometry import Array
+from imuarray.geometry import Array, sub_array
 from imuarray.model import ArrayModel
 from imuarray.model.structure import products
 from imuarray.motion import normal_motion, sphere_motion
@@ -254,10 +255,8 @@ def geometries(model: ArrayModel) -> dict[str, ArrayModel]:
     array, arrays = model.array, {}
     for count in (3, 4, 8):
         if count < array.accelerometers:
-            chosen = np.linspace(0, array.accelerometers - 1, count).round().astype(int)
-            labels = tuple(array.labels[k] for k in chosen)
             name = f"{count} triads"
-            arrays[name] = Array(array.positions[chosen], labels, count, name)
+            arrays[name] = replace(sub_array(array, count), name=name)
     for name, factor in (("all triads in one plane", [1.0, 1.0, 0.0]), ("half the size", 0.5)):
         arrays[name] = Array(array.positions * factor, array.labels, array.gyroscopes, name)
     noise = model.noise.accelerometer[0, 0] ** 0.5, model.noise.gyroscope[0, 0] ** 0.5

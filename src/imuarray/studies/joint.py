@@ -14,13 +14,14 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from imuarray.geometry import Array
+from imuarray.geometry import Array, positions_of
 from imuarray.model import ArrayModel
 from imuarray.motion import normal_motion
 from imuarray.posterior import AutoregressiveTarget, CompiledTarget, GaussianPrior, Likelihood
 from imuarray.posterior.diagnostics import ess_of_mean
 from imuarray.simulation import measure
 from imuarray.streams import stream
+from imuarray.studies.truths import misfit
 
 # A problem whose data hardly narrow the prior: rounds then forget one another soon.
 POSITIONS = np.array(
@@ -53,7 +54,7 @@ def problem() -> tuple[ArrayModel, GaussianPrior]:
 def simulated(model: ArrayModel, theta, rng) -> Data:
     """Motion from its prior, measurements given it and theta (P,)."""
     motion = normal_motion(rng, (SAMPLES,), *MOTION_SD)
-    positions = np.vstack([np.zeros(3), theta.reshape(-1, 3)])
+    positions = positions_of(theta)
     force, rate, _ = measure(model, motion, positions, rng)
     likelihood = Likelihood.of(model, force, rate, motion_sd=MOTION_SD[:2])
     return Data(likelihood, np.asarray(motion.angular_rate))
@@ -71,7 +72,7 @@ def begun(target: CompiledTarget, theta, data: Data, rng) -> float:
     rates = drawn.mean.T[:, None] + np.stack([xx * u, yx * u + yy * v, zx * u + zy * v + zz * w]).T
     rates = np.ascontiguousarray(rates)
     rates[np.arange(SAMPLES), rng.integers(target.draws, size=SAMPLES)] = data.rate
-    positions = np.vstack([np.zeros(3), theta.reshape(-1, 3)])
+    positions = positions_of(theta)
     return target.prior.log_density(theta) + target.likelihood.on(positions, rates)
 
 
@@ -99,18 +100,7 @@ def pmmh_rounds(name: str, seed: int, rounds: int) -> Iterator[np.ndarray]:
         data = simulated(model, theta, rng)
         target = TARGETS[name](data.likelihood, model, prior)
         target.transitions(theta, begun(target, theta, data, rng), step, count, rng)
-        yield np.append(theta, misfit(data, theta))
-
-
-def misfit(data: Data, theta) -> float:
-    """How badly theta fits a round's measurements: of what a sampler that ignores them is wrong.
-
-    The squared distance of the triads' differences from what theta and the gyroscopes' omega
-    predict at best, in sds of the accelerometers.
-    """
-    positions = np.vstack([np.zeros(3), theta.reshape(-1, 3)])
-    rates = np.ascontiguousarray(data.likelihood.rate_mean[:, None])
-    return -2 * data.likelihood.on(positions, rates) / SAMPLES
+        yield np.append(theta, misfit(data.likelihood, theta))
 
 
 def nuts_rounds(name: str, seed: int, rounds: int) -> Iterator[np.ndarray]:
@@ -142,12 +132,12 @@ def nuts_rounds(name: str, seed: int, rounds: int) -> Iterator[np.ndarray]:
 
     for _ in range(rounds):
         data = simulated(model, theta, rng)
-        positions = np.vstack([np.zeros(3), theta.reshape(-1, 3)])
+        positions = positions_of(theta)
         marginal = Marginal.of(data.likelihood, positions, NODES)
         nodes, weights = marginal.nodes, marginal.log_weights
         z = moved((theta - prior.mean) / prior.sd, marginal.data, int(rng.integers(2**31)))
         theta = prior.mean + prior.sd * np.asarray(z)
-        yield np.append(theta, misfit(data, theta))
+        yield np.append(theta, misfit(data.likelihood, theta))
 
 
 SAMPLERS: dict[str, tuple[str, Callable]] = {
@@ -164,7 +154,7 @@ def independent(seed: int, rounds: int) -> np.ndarray:
     found = np.empty(rounds)
     for number in range(rounds):
         theta = prior.mean + prior.sd * rng.standard_normal(prior.mean.size)
-        found[number] = misfit(simulated(model, theta, rng), theta)
+        found[number] = misfit(simulated(model, theta, rng).likelihood, theta)
     return found
 
 

@@ -7,11 +7,12 @@ from collections.abc import Callable
 import numpy as np
 from scipy import stats
 
-from imuarray.posterior import AutoregressiveTarget, CompiledTarget, Likelihood, tuning
+from imuarray.geometry import positions_of
+from imuarray.posterior import AutoregressiveTarget, CompiledTarget, tuning
 from imuarray.posterior.diagnostics import ess
 from imuarray.streams import stream
 from imuarray.studies.batches import run_batches
-from imuarray.studies.truths import SPARE, Replicate, Setting, positions_of, replicate
+from imuarray.studies.truths import SPARE, Replicate, Setting, misfit, replicate
 
 DRAWS = 199  # kept of each posterior, nearly independent
 APART = 2.0  # posterior sds by which chains start off the mode
@@ -35,21 +36,13 @@ def _size(setting: Setting, thetas) -> np.ndarray:
     return np.asarray(thetas) @ nominal / np.linalg.norm(nominal)
 
 
-def _misfit(one: Replicate, thetas) -> np.ndarray:
-    """How badly positions (L, P) fit the data at the gyroscopes' omega, (L,).
-
-    A sampler that does not look at the data, or not at all of them, is wrong here.
-    """
-    rates = np.ascontiguousarray(one.likelihood.rate_mean[:, None])
-    return np.array([-one.likelihood.on(positions_of(theta), rates) for theta in thetas])
-
-
 def of_draws(setting: Setting, made, draws, name: str) -> np.ndarray:
     """Levels (R, P + 2) of the truths among draws (R, L, P), uniform between two draws."""
     out = []
     for one, thetas in zip(made, draws, strict=True):
         both = np.vstack([one.truth, thetas])
-        values = np.column_stack([both, _size(setting, both), _misfit(one, both)])
+        misfits = [misfit(one.likelihood, theta) for theta in both]
+        values = np.column_stack([both, _size(setting, both), misfits])
         rank = np.sum(values[1:] < values[0], axis=0)
         rng = stream(setting.seed, "calibrated", name, setting.name, setting.samples, one.number)
         out.append((rank + rng.random(rank.size)) / (len(thetas) + 1))
@@ -106,18 +99,12 @@ def nuts(setting: Setting, made, threads: int = 1) -> np.ndarray:
     return of_draws(setting, made, draws[:, SPACING - 1 :: SPACING], name)
 
 
-def _variances(likelihood: Likelihood, one: Replicate, rng):
-    counts = [1, 2, 5, 10, 20, 50, 100]
-    at_mode = positions_of(one.mode)
-    return counts, tuning.variance_sweep(likelihood, at_mode, counts, 200, rng)
-
-
 def _walk(setting: Setting, pilot: Replicate, rng):
     """The paper's: (target of a replicate, step), N and sigma_q chosen as in section III-C.
 
     But N at the mode: here the prior's mean is as far off as the prior says, not a thirtieth of it.
     """
-    draws = tuning.choose_draws(*_variances(pilot.likelihood, pilot, rng))
+    draws = tuning.enough_draws(pilot.likelihood, positions_of(pilot.mode), rng)
 
     def target(one):
         return CompiledTarget(one.likelihood, setting.prior, draws)
@@ -133,7 +120,7 @@ def _shaped(setting: Setting, pilot: Replicate, rng):
     def centred(one):
         return one.likelihood.centred(positions_of(one.mode), WIDENING)
 
-    draws = tuning.choose_draws(*_variances(centred(pilot), pilot, rng))
+    draws = tuning.enough_draws(centred(pilot), positions_of(pilot.mode), rng)
 
     def target(one):
         factor = WIDER * np.linalg.cholesky(one.covariance)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from imuarray.geometry import positions_of
 from imuarray.model.structure import design
 from imuarray.motion import Motion
 from imuarray.posterior import Likelihood
@@ -51,7 +52,7 @@ def coordinates(recording, truth, model, accelerometer_sd, gyroscopes, name) -> 
 
 def log_gram_gradient(theta, precision) -> np.ndarray:
     """Derivative of log |H' Lambda H| in theta (3 (A - 1),)."""
-    positions = np.vstack([np.zeros(3), theta.reshape(-1, 3)])
+    positions = positions_of(theta)
     H = design(positions)[:, 6:]
     back = precision @ H @ np.linalg.inv(H.T @ precision @ H)  # (3A, 6)
     slopes = design(np.eye(3))[:, 6:].reshape(3, 3, 6) - design(np.zeros((1, 3)))[:, 6:]
@@ -103,7 +104,7 @@ def determinant_by_sampling(recording, truth, model, rng, count=4000, draws=64) 
     seeds = rng.integers(0, 2**63, count)
     for row, likelihood in enumerate(likelihoods):
         for i, theta in enumerate(thetas):
-            places = np.vstack([np.zeros(3), theta.reshape(-1, 3)])
+            places = positions_of(theta)
             # the same draws for both, so that only the determinant differs
             logs[row, i] = likelihood.estimate(places, draws, np.random.default_rng(seeds[i]))
     logs += 0.5 * np.sum(normals**2, axis=1)

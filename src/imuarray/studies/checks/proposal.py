@@ -6,6 +6,8 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.stats import norm
 
+from imuarray.geometry import positions_of
+
 
 def theory() -> dict:
     """Best acceptance of a random walk with exact and with noisy log density.
@@ -68,7 +70,7 @@ def acceptance_against_variance(targets, theta, step, count, rng) -> list[dict]:
     rows, blocks = [], 20
     for label, target in targets.items():
         state = np.array(theta)
-        positions = np.vstack([np.zeros(3), state.reshape(-1, 3)])
+        positions = positions_of(state)
         logs = target.likelihood.realisations(positions, target.draws, 200, rng)
         value = target.log_target(state, rng)
         _, value = target.transitions(state, value, step, count // 2, rng)
