@@ -81,13 +81,14 @@ def convergence_figure(table: pd.DataFrame, nominal_sd: float, footer=()):
             1 - rows.contraction, 1 - rows.observed, color=BLACK, linestyle="none",
             marker=MARKERS[-1 - index], markerfacecolor="none", label=name,
         )  # fmt: skip
-    top.annotate("Gauss-Newton (grey)", (0.02, 0.04), xycoords="axes fraction", size=7, color="0.3")
+    top.plot([], [], color=GREY, linestyle=":", label="Gauss-Newton, each")
     top.set(
         xscale="log", yscale="log", xlabel=r"Angular rate $\|\omega\|$ (deg/s)",
         ylabel="iterations to 1.01 × bound",
     )  # fmt: skip
     top.legend(loc="lower center", bbox_to_anchor=(0.5, 0.12), ncols=2, columnspacing=1.0)
-    ends = 1 - np.array([table.contraction.max(), table.contraction.min()])
+    drawn = 1 - table.contraction[table.observed.notna()]
+    ends = np.array([drawn.min() / 2, min(drawn.max() * 2, 1.0)])
     below.plot(ends, ends, color=BLACK, linewidth=0.8)
     below.set(
         xscale="log", yscale="log", xlabel="share of the error lost in an iteration, foreseen",
@@ -107,7 +108,13 @@ def size_figure(table: pd.DataFrame, footer=()):
     top, below = figure.subplots(2, 1, sharex=True)
     top.plot(1e3 * table.extent_m, 1e6 * table.bound_m, markerfacecolor="none", **look(0))
     below.plot(1e3 * table.extent_m, 1e6 * table.relative, markerfacecolor="none", **look(2))
-    top.set(xscale="log", yscale="log", ylabel="bound (µm)")
+    # both panels over as many decades, so that what does not change looks so
+    decades = np.log10(table.relative.max() / table.relative.min()) * 0.6
+    middle = 1e6 * np.median(table.bound_m)
+    top.set(
+        xscale="log", yscale="log", ylabel="bound (µm)",
+        ylim=(middle * 10**-decades, middle * 10**decades),
+    )  # fmt: skip
     below.set(
         xscale="log", yscale="log", xlabel="size of the array, corner to corner (mm)",
         ylabel="bound / size (ppm)",
