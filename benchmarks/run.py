@@ -14,6 +14,7 @@ from pathlib import Path
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np  # noqa: E402
+from scipy.optimize import least_squares  # noqa: E402
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
@@ -23,11 +24,15 @@ from imuarray.config import model_from, read_config  # noqa: E402
 from imuarray.estimation import calibrate_bcd  # noqa: E402
 from imuarray.estimation.collapsed import Collapsed  # noqa: E402
 from imuarray.estimation.newton import descend  # noqa: E402
+from imuarray.geometry import positions_of, sub_array  # noqa: E402
+from imuarray.model import ArrayModel  # noqa: E402
+from imuarray.model.jax64 import jax  # noqa: E402
 from imuarray.motion import normal_motion, sphere_motion  # noqa: E402
 from imuarray.posterior import Likelihood  # noqa: E402
+from imuarray.posterior.marginal import Marginal  # noqa: E402
 from imuarray.simulation import measure  # noqa: E402
 from imuarray.studies.bound import paths  # noqa: E402
-from tests.oracles import direct_log_likelihood  # noqa: E402
+from tests.oracles import direct_log_likelihood, joint_jacobian, skew  # noqa: E402
 
 
 def interleaved(functions, repeats):
@@ -94,12 +99,53 @@ def growth(model, rng):
     parts = {n: Likelihood.of(model, *(y[:n] for y in whole)) for n in lengths}
     by_length = [lambda n=n: parts[n].estimate(positions, 50, generator) for n in lengths]
     by_count = [lambda n=n: parts[500].estimate(positions, n, generator) for n in counts]
-    rows = []
-    for name, sizes, jobs in (("T", lengths, by_length), ("N", counts, by_count)):
-        seconds = interleaved(jobs, 15)
-        listed = ", ".join(f"{n}: {1e3 * s:.2f} ms" for n, s in zip(sizes, seconds, strict=True))
-        rows.append((f"likelihood, growth in {name}", listed, linearity(sizes, seconds)))
-    return rows
+    rows = [
+        exponents("likelihood, growth in T", lengths, by_length),
+        exponents("likelihood, growth in N", counts, by_count),
+    ]
+    return rows + triads(model, rng) + gradients(model, rng)
+
+
+def smaller(model, count):
+    """The same board and noise with ``count`` triads."""
+    noise = model.noise
+    sds = np.sqrt(noise.accelerometer[0, 0]), np.sqrt(noise.gyroscope[0, 0])
+    return ArrayModel.isotropic(sub_array(model.array, count), *sds)
+
+
+def exponents(name, sizes, jobs, repeats=15):
+    """A row: times over sizes."""
+    seconds = interleaved(jobs, repeats)
+    listed = ", ".join(f"{n}: {1e3 * s:.2f} ms" for n, s in zip(sizes, seconds, strict=True))
+    return name, listed, linearity(np.array(sizes), seconds)
+
+
+def triads(model, rng):
+    """Rows: growth in the number of triads, T = 500, N = 50."""
+    sizes, generator, jobs = [4, 8, 16, 32], np.random.Generator(np.random.PCG64DXSM(1)), []
+    for count in sizes:
+        part = smaller(model, count)
+        likelihood = Likelihood.of(part, *dataset(part, 500, rng))
+        jobs.append(lambda m=part, x=likelihood: x.estimate(m.array.relative, 50, generator))
+    return [exponents("likelihood, growth in A", sizes, jobs)]
+
+
+def gradients(model, rng):
+    """Rows: the exact marginal with its gradient, growth in T and A."""
+
+    def job(part, length):
+        likelihood = Likelihood.of(part, *dataset(part, length, rng))
+        marginal = Marginal.of(likelihood, part.array.relative)
+        function, theta = jax.jit(jax.value_and_grad(marginal.log_density)), part.array.parameters
+        return lambda: jax.block_until_ready(function(theta))
+
+    lengths, counts = [250, 500, 1000, 2000], [4, 8, 16, 32]
+    by_length = [job(model, n) for n in lengths]
+    by_count = [job(smaller(model, n), 500) for n in counts]
+    return [
+        exponents("exact marginal and gradient, growth in T", lengths, by_length),
+        exponents("exact marginal and gradient, growth in A", counts, by_count),
+    ]
 
 
 def descent(model, rng):
@@ -146,6 +192,45 @@ def to_the_bound(model, rng, samples=1000):
     ]
 
 
+def against_scipy(model, rng, samples=30):
+    """Rows: all positions and motions at once by SciPy, exact Jacobian, against Gauss-Newton."""
+    motion = sphere_motion(rng, (samples,), np.radians(2000), np.radians(2000), 10.0)
+    truth = model.array.relative + 1e-4 * rng.standard_normal(model.array.positions.shape)
+    force, rate, _ = measure(model, motion, truth - truth[0], rng)
+    sds = np.sqrt(model.noise.accelerometer[0, 0]), np.sqrt(model.noise.gyroscope[0, 0])
+    first, mean = model.array.parameters, np.zeros((samples, 9))
+    mean[:, :3], mean[:, 6:] = rate.mean(axis=1), force.mean(axis=1)
+
+    def parts(x):
+        return positions_of(x[: first.size]), x[first.size :].reshape(samples, 9)
+
+    def residual(x):
+        positions, motions = parts(x)
+        turn = skew(motions[:, :3]) @ skew(motions[:, :3]) + skew(motions[:, 3:6])
+        predicted = np.einsum("tij,kj->tki", turn, positions) + motions[:, None, 6:]
+        apart = (predicted - force) / sds[0], (motions[:, None, :3] - rate) / sds[1]
+        return np.concatenate(apart, axis=1).ravel()
+
+    def slope(x):
+        positions, motions = parts(x)
+        return joint_jacobian(motions, positions, model.array.gyroscopes, *sds)
+
+    def peer():
+        start = np.concatenate([first, mean.ravel()])
+        return least_squares(residual, start, slope, x_scale="jac", xtol=1e-12, ftol=1e-12)
+
+    def own():
+        return descend(Collapsed.of(model, force, rate), model.array.relative)
+
+    slow, fast = interleaved([peer, own], 3)
+    apart = np.abs(positions_of(peer().x[: first.size]) - own().positions).max()
+    return [
+        (f"scipy.optimize.least_squares, N = {samples}, exact Jacobian", f"{slow:.2f} s", "1"),
+        ("joint Gauss-Newton, with the covariance", f"{1e3 * fast:.1f} ms", f"{slow / fast:.0f}"),
+        ("largest difference of a position", f"{1e9 * apart:.2g} nm", ""),
+    ]
+
+
 def main():
     """Run all and print a table; write it where --out says."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -155,7 +240,7 @@ def main():
     config = read_config(arguments.config)
     model, rng = model_from(config), np.random.default_rng(config["seed"])
     rows = against_direct(model, rng) + growth(model, rng) + descent(model, rng)
-    rows += to_the_bound(model, rng)
+    rows += to_the_bound(model, rng) + against_scipy(model, rng)
     lines = ["| what | measured | ratio to the direct form, or growth |", "|---|---|---|"]
     lines += [f"| {' | '.join(row)} |" for row in rows]
     text = "\n".join(lines) + "\n"

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
+from threadpoolctl import ThreadpoolController
 
 from imuarray.errors import IdentifiabilityError
 from imuarray.estimation import kernels
@@ -34,6 +36,17 @@ def descend(
     again only where steps shrink slowly. Stops when no coordinate moves by more than
     ``tolerance`` of its own sd. IdentifiabilityError where the information is singular.
     """
+    with _blas().limit(limits=1, user_api="blas"):
+        return _descended(data, start, prior, tolerance, limit, covariance)
+
+
+@cache
+def _blas() -> ThreadpoolController:
+    """Its products are small: more threads than one only wait for each other, 5 times as long."""
+    return ThreadpoolController()
+
+
+def _descended(data, start, prior, tolerance, limit, covariance) -> Calibration:
     here = _at(data, np.array(start, float), data.mean.copy(), prior)
     curvature, costs, steps, converged, last = None, [here.cost], [0.0], False, np.inf
     for _ in range(limit):
