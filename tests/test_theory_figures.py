@@ -10,9 +10,15 @@ from tests.test_bound import MOTION, OPTIONS, model
 
 
 def test_efficiency():
-    table = bound.efficiency(model(), 2, [10, 30], MOTION, {**OPTIONS, "realisations": 10})
-    figure = theory.efficiency_figure(table, ["Scale quick"])
-    top, below = figure.axes
+    few = {**OPTIONS, "realisations": 10}
+    tables = [
+        bound.efficiency(model(), 2, [10, 30], MOTION, few),
+        bound.efficiency(model(), 2, [10], MOTION, few, noise=10.0),
+    ]
+    assert tables[1].bound_m[0] == pytest.approx(10 * tables[0].bound_m[0], rel=0.2)
+    figure = theory.efficiency_figure(pd.concat(tables), ["Scale quick"])
+    top, below, louder = figure.axes
+    assert [len(line.get_xdata()) for line in louder.lines[:1]] == [2]
     assert len(top.get_legend().get_texts()) == 4
     assert below.get_ylabel() == "error / bound"
 

@@ -4,6 +4,7 @@ from job import job
 
 with job(snakemake) as settings:
     import numpy as np
+    import pandas as pd
 
     from imuarray.config import model_from
     from imuarray.provenance import write_csv
@@ -15,8 +16,13 @@ with job(snakemake) as settings:
         "position_sd": paper["position_sd"], "rail": np.radians(paper["gyroscope_range_dps"]),
         "realisations": scale["theory_realisations"],
     }  # fmt: skip
-    table = bound.efficiency(
-        model_from(settings), settings["seed"], theory["samples"], magnitudes(paper), options,
-        snakemake.threads, quiet=False,
-    )  # fmt: skip
-    write_csv(table, snakemake.output[0])
+    cases = [(theory["samples"], 1.0)]
+    cases += [([theory["noise_samples"]], factor) for factor in theory["noise_factors"]]
+    tables = [
+        bound.efficiency(
+            model_from(settings), settings["seed"], samples, magnitudes(paper), options,
+            snakemake.threads, quiet=False, noise=factor,
+        )
+        for samples, factor in cases
+    ]  # fmt: skip
+    write_csv(pd.concat(tables), snakemake.output[0])

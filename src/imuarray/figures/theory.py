@@ -25,11 +25,15 @@ RANKS_NOTES = (
 
 @styled
 def efficiency_figure(table: pd.DataFrame, footer=()):
-    """RMSE over N beside the bound, and their ratio; ``table``: `studies.bound.efficiency`."""
-    figure = new_figure(footer, height=4.0)
-    top, below = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
+    """RMSE over N beside the bound, their ratio, and that over the noise.
+
+    ``table``: `studies.bound.efficiency` for the model's noise, then for others at one N.
+    """
+    figure = new_figure(footer, height=5.4)
+    top, below, louder = figure.subplots(3, 1, height_ratios=[2, 1, 1])
+    others = table[table.noise != 1.0]
     for index, name in enumerate(ESTIMATORS):
-        rows = table[table.estimator == name]
+        rows = table[(table.estimator == name) & (table.noise == 1.0)]
         style = look(index, "linestyle")
         top.errorbar(
             rows.samples, rows.rmse_m, rows.rmse_se_m, linestyle="none", label=f"RMSE, {name}",
@@ -43,9 +47,18 @@ def efficiency_figure(table: pd.DataFrame, footer=()):
             rows.samples * 1.04**index, rows.ratio, rows.ratio_se, linestyle="none",
             markerfacecolor="none", **style,
         )  # fmt: skip
-    below.axhline(1.0, color=BLACK, linewidth=0.8)
+        rows = table[(table.estimator == name) & table.samples.isin(others.samples)]
+        louder.errorbar(
+            rows.noise * 1.04**index, rows.ratio, rows.ratio_se, markerfacecolor="none",
+            **look(index),
+        )  # fmt: skip
+    for panel in (below, louder):
+        panel.axhline(1.0, color=BLACK, linewidth=0.8)
+        panel.set(ylabel="error / bound")
     top.set(xscale="log", yscale="log", ylabel="RMSE of the positions (m)")
-    below.set(xlabel="Time samples $N$ (count)", ylabel="error / bound")
+    below.set(xscale="log", xlabel="Time samples $N$ (count)")
+    counts = ", ".join(map(str, others.samples.unique()))
+    louder.set(xscale="log", yscale="log", xlabel=f"Noise, times the sensors' own ($N$ = {counts})")
     top.legend(loc="upper right")
     return figure
 

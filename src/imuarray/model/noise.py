@@ -71,6 +71,10 @@ class Noise:
         scalar = np.diag(np.repeat(variances[:, 0], 3))
         return 1.0 / variances[:, 0] if np.array_equal(scalar, self.accelerometer) else None
 
+    def times(self, factor) -> Noise:
+        """The same with all sds ``factor`` times as large."""
+        return Noise(factor**2 * self.accelerometer, factor**2 * self.gyroscope)
+
     def draw(self, rng, shape) -> tuple[np.ndarray, np.ndarray]:
         """Noise for ``shape`` samples: (*shape, A, 3) m/s^2 and (*shape, G, 3) rad/s."""
 

@@ -76,21 +76,22 @@ def _draw(model, rng, samples, motion, options):
 
 
 def efficiency(
-    model: ArrayModel, seed, sample_counts, motion, options, threads=1, quiet=True
+    model: ArrayModel, seed, sample_counts, motion, options, threads=1, quiet=True, noise=1.0
 ) -> pd.DataFrame:
     """RMSE of the most likely positions, with and without a prior, against the bound; a row per N.
 
-    ``motion`` and ``options`` as `imuarray.studies.position_error` has them. ``bound_m`` is the
-    rms of each realisation's own bound (with the prior: of the linearised posterior's sds), and
-    ``ratio`` the root of the mean of e' I e / P over realisations, e the P errors and I the
-    information: 1 for an efficient estimator, in every direction, whatever the motion.
+    Noise is ``noise`` times the model's, and estimators know it. ``motion`` and ``options`` as
+    `imuarray.studies.position_error` has them. ``bound_m`` is the rms of each realisation's own
+    bound (with the prior: of the linearised posterior's sds), and ``ratio`` the root of the mean
+    of e' I e / P over realisations, e the P errors and I the information: 1 for an efficient
+    estimator, in every direction, whatever the motion.
     """
-    rows = []
+    rows, model = [], replace(model, noise=model.noise.times(noise))
     for samples in sample_counts:
 
         def job(batch, samples=samples):
             number, size = batch
-            rng = batch_stream(seed, "bound", samples, number)
+            rng = batch_stream(seed, "bound", samples, str(noise), number)
             return [_one(model, rng, samples, motion, options) for _ in range(size)]
 
         parts = run_batches(job, batches(options["realisations"]), threads, quiet, f"N={samples}")
@@ -100,8 +101,9 @@ def efficiency(
             rmse, error = root_mean_square(square)
             ratio, ratio_se = root_mean_square(quadratic)
             rows.append(
-                {"samples": samples, "estimator": name, "rmse_m": rmse, "rmse_se_m": error,
-                 "bound_m": float(np.sqrt(np.mean(bound))), "ratio": ratio, "ratio_se": ratio_se,
+                {"samples": samples, "noise": noise, "estimator": name, "rmse_m": rmse,
+                 "rmse_se_m": error, "bound_m": float(np.sqrt(np.mean(bound))), "ratio": ratio,
+                 "ratio_se": ratio_se,
                  "realisations": len(found), "iterations_max": int(iterations.max()),
                  "not_converged": int(np.sum(converged == 0))}
             )  # fmt: skip
