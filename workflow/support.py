@@ -67,6 +67,14 @@ def imported(path: Path) -> list[Path]:
     return [file for file in files if file.is_file() and PACKAGE in file.parents]
 
 
+def crew(threads: int, cores: int | None) -> int:
+    """Threads of a heavy job where ``cores`` are shared; None: a cluster, all that it asks for.
+
+    At most half: a job on all of them lets the others wait through its serial parts.
+    """
+    return threads if cores is None else max(1, min(threads, cores // 2))
+
+
 def attempt(path: str) -> float:
     """A parameter that changes with every run while recordings are missing, so they are retried."""
     try:

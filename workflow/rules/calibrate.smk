@@ -7,7 +7,7 @@ rule position_error_samples:
         "results/{scale}/logs/calibration/position_error_samples.log",
     benchmark:
         "results/{scale}/benchmarks/calibration/position_error_samples.tsv"
-    threads: lambda wc: config["scales"][wc.scale]["threads"]
+    threads: lambda wc: heavy(wc.scale)
     resources:
         mem_mb=2000,
         runtime=90,
@@ -26,7 +26,7 @@ rule position_error_motion:
         "results/{scale}/logs/calibration/position_error_motion.log",
     benchmark:
         "results/{scale}/benchmarks/calibration/position_error_motion.tsv"
-    threads: lambda wc: config["scales"][wc.scale]["threads"]
+    threads: lambda wc: heavy(wc.scale)
     resources:
         mem_mb=2000,
         runtime=90,
@@ -45,7 +45,7 @@ rule position_error_force:
         "results/{scale}/logs/calibration/position_error_force.log",
     benchmark:
         "results/{scale}/benchmarks/calibration/position_error_force.tsv"
-    threads: lambda wc: config["scales"][wc.scale]["threads"]
+    threads: lambda wc: heavy(wc.scale)
     resources:
         mem_mb=2000,
         runtime=90,
@@ -64,7 +64,7 @@ rule rate_error:
         "results/{scale}/logs/calibration/rate_error.log",
     benchmark:
         "results/{scale}/benchmarks/calibration/rate_error.tsv"
-    threads: lambda wc: config["scales"][wc.scale]["threads"]
+    threads: lambda wc: heavy(wc.scale)
     resources:
         mem_mb=2000,
         runtime=90,

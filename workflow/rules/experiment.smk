@@ -8,7 +8,7 @@ rule sample_experiment:
         "results/{scale}/logs/chains/{kind}.log",
     benchmark:
         "results/{scale}/benchmarks/chains/{kind}.tsv"
-    threads: lambda wc: config["scales"][wc.scale]["threads"]
+    threads: lambda wc: heavy(wc.scale)
     resources:
         mem_mb=4000,
         runtime=60,

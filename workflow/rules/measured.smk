@@ -168,7 +168,7 @@ rule sample_measured:
         "results/{scale}/benchmarks/chains/{kind}.tsv"
     wildcard_constraints:
         kind=MEASURED_KINDS,
-    threads: lambda wc: config["scales"][wc.scale]["threads"]
+    threads: lambda wc: heavy(wc.scale)
     resources:
         mem_mb=4000,
         runtime=60,

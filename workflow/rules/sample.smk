@@ -9,7 +9,8 @@ rule sample_posterior:
         "results/{scale}/logs/chains/T{samples}.log",
     benchmark:
         "results/{scale}/benchmarks/chains/T{samples}.tsv"
-    threads: lambda wc: config["scales"][wc.scale]["threads"]
+    priority: 10  # the longest path
+    threads: lambda wc: heavy(wc.scale)
     resources:
         mem_mb=4000,
         runtime=90,

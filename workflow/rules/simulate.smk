@@ -7,6 +7,7 @@ rule simulate_samples:
         "results/{scale}/logs/recordings/samples.log",
     benchmark:
         "results/{scale}/benchmarks/recordings/samples.tsv"
+    priority: 10
     threads: 1
     resources:
         mem_mb=2000,

@@ -8,7 +8,8 @@ rule sweep_variance:
         "results/{scale}/logs/tuning/variance.log",
     benchmark:
         "results/{scale}/benchmarks/tuning/variance.tsv"
-    threads: lambda wc: config["scales"][wc.scale]["threads"]
+    priority: 10
+    threads: lambda wc: heavy(wc.scale)
     resources:
         mem_mb=2000,
         runtime=30,
@@ -29,7 +30,8 @@ rule sweep_acceptance:
         "results/{scale}/logs/tuning/acceptance.log",
     benchmark:
         "results/{scale}/benchmarks/tuning/acceptance.tsv"
-    threads: lambda wc: config["scales"][wc.scale]["threads"]
+    priority: 10
+    threads: lambda wc: heavy(wc.scale)
     resources:
         mem_mb=2000,
         runtime=30,
@@ -49,6 +51,7 @@ rule tune:
         "results/{scale}/logs/tuning/tune.log",
     benchmark:
         "results/{scale}/benchmarks/tuning/tune.tsv"
+    priority: 10
     threads: 1
     resources:
         mem_mb=2000,

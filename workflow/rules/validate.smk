@@ -19,7 +19,7 @@ rule calibrated_levels:
         "results/{scale}/logs/validation/levels_{setting}_T{samples}.log",
     benchmark:
         "results/{scale}/benchmarks/validation/levels_{setting}_T{samples}.tsv"
-    threads: lambda wc: config["scales"][wc.scale]["threads"]
+    threads: lambda wc: heavy(wc.scale)
     resources:
         mem_mb=3000,
         runtime=240,

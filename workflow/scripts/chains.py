@@ -8,7 +8,7 @@ from imuarray.provenance import code_digest, digest, stamp
 from imuarray.studies.bayes import starts_for
 
 
-def sample_paired(settings, recording, target, step, transitions, names, path, attrs):
+def sample_paired(settings, recording, target, step, transitions, names, path, attrs, threads):
     """Two chains of ``transitions`` steps; the checkpoint is keyed by config, data and code."""
     draws = settings["scale"]["draws"]
     key = digest(
@@ -19,7 +19,7 @@ def sample_paired(settings, recording, target, step, transitions, names, path, a
     starts = starts_for(settings, recording, names)
     chains = run_chains(
         target, starts, step, draws, transitions // draws, settings["seed"], names,
-        checkpoint=checkpoint, key=key,
+        checkpoint=checkpoint, key=key, threads=threads,
     )  # fmt: skip
     labels = recording.accelerometer_labels[1:]
     write_chains(path, chains, labels, target.prior, {**stamp(settings, settings["seed"]), **attrs})

@@ -19,4 +19,6 @@ with job(snakemake) as settings:
         target, step, record = tuned_experiment(settings, recording, names, snakemake.threads)
         attrs = {"samples": samples, "draws_per_sample": target.draws, **record}
         steps = lengths[f"T{samples}"]
-        sample_paired(settings, recording, target, step, steps, names, path, attrs)
+        sample_paired(
+            settings, recording, target, step, steps, names, path, attrs, snakemake.threads
+        )

@@ -19,4 +19,7 @@ with job(snakemake) as settings:
         given = {**settings, "array": board}
         target, step, record = tuned_experiment(given, recording, names, snakemake.threads)
         attrs = {"samples": samples, "draws_per_sample": target.draws, **record}
-        sample_paired(given, recording, target, step, lengths[f"T{samples}"], names, path, attrs)
+        sample_paired(
+            given, recording, target, step, lengths[f"T{samples}"], names, path, attrs,
+            snakemake.threads,
+        )  # fmt: skip

@@ -18,4 +18,5 @@ with job(snakemake) as settings:
         settings, recording, target, tuning["step_length_m"],
         settings["scale"]["transitions"][f"T{samples}"], ("pmmh", samples),
         snakemake.output[0], {"samples": samples, "draws_per_sample": tuning["draws"]},
+        snakemake.threads,
     )  # fmt: skip

@@ -27,11 +27,13 @@ class PseudoMarginalMove(emcee.moves.Move):
     threads, and a chain resumed at i continues bit for bit.
     """
 
-    def __init__(self, target: Target, step: float, thin: int, seed: int, names, iteration=0):
+    def __init__(
+        self, target: Target, step: float, thin: int, seed: int, names, iteration=0, threads=2
+    ):
         self.target, self.step, self.thin = target, step, thin
         self.seed, self.names, self.iteration = seed, tuple(names), iteration
         self.accepted: np.ndarray | None = None
-        self.pool = ThreadPoolExecutor(max_workers=8)
+        self.pool = ThreadPoolExecutor(max_workers=threads)
 
     def propose(self, model, state):
         """Advance every chain; returns the new state and which chains moved at all."""
@@ -66,6 +68,7 @@ def run_chains(
     key: str = "",
     block: int = 500,
     quiet: bool = False,
+    threads: int = 2,
 ) -> Chains:
     """Run one chain from each of ``starts`` (chains, size) for draws * thin transitions.
 
@@ -83,7 +86,7 @@ def run_chains(
     starts = np.atleast_2d(np.asarray(starts, float))
     done = _load(checkpoint, key, starts.shape, thin, draws) if checkpoint else None
     past, state, accepted = _begin(target, starts, seed, names) if done is None else done
-    move = PseudoMarginalMove(target, step, thin, seed, names, iteration=past[0].shape[1])
+    move = PseudoMarginalMove(target, step, thin, seed, names, past[0].shape[1], threads)
     move.accepted = accepted
     sampler = emcee.EnsembleSampler(*starts.shape, _never, moves=move, vectorize=True)
     seldom = 0.2 if sys.stderr.isatty() else 15.0  # seconds; a log file needs few lines
