@@ -12,7 +12,7 @@ SNAKEMAKE := $(BIN)/snakemake --cores $(CORES) $(SNAKEMAKE_ARGS)
 # Snakemake's jobs start `python` and `imuarray` by name.
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: help run quick paper test bench lint lock clean
+.PHONY: help run quick paper test test-slurm bench lint lock clean
 .DEFAULT_GOAL := help
 
 help:
@@ -20,6 +20,7 @@ help:
 	@echo "make quick   the same pipeline, smallest useful sizes"
 	@echo "make paper   the papers' own sizes (long)"
 	@echo "make test    the tests"
+	@echo "make test-slurm   the quick run through a Slurm of one node, brought up here (root, a container)"
 	@echo "make bench   the benchmarks"
 	@echo "make lint    ruff, snakefmt and snakemake --lint"
 	@echo "make lock    resolve pyproject.toml into requirements.lock anew (needs uv)"
@@ -46,6 +47,11 @@ paper: $(READY)
 
 test: $(READY)
 	$(BIN)/python -m pytest -q
+
+# The executor is not in the lock: who has a cluster installs it as docs/cluster.md says.
+test-slurm: $(READY)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .[slurm]
+	tests/slurm/run.sh $$(mktemp -d)
 
 bench: $(READY)
 	$(BIN)/python benchmarks/run.py

@@ -24,7 +24,7 @@ def setting(name="paper", samples=5, triads=4):
 @pytest.mark.parametrize("method", METHODS)
 def test_levels_of_the_truth_are_uniform(method):
     """30 truths, 9 coordinates: p below 1e-3 in one of a thousand runs of a right sampler."""
-    levels = calibrated.calibrated(setting(), 30, methods=[method])
+    levels = calibrated.calibrated(setting(), range(30), methods=[method])
     assert len(levels) == 30 * 11
     row = coverage(levels).iloc[0]
     assert row.p > 1e-3
@@ -44,13 +44,13 @@ def test_widths_that_are_wrong_are_seen(monkeypatch, factor):
         return measure(type(model)(model.array, noise), *arguments)
 
     monkeypatch.setattr(truths, "measure", measured)
-    levels = calibrated.calibrated(setting(), 100, methods=["PmMH, autoregressive"])
+    levels = calibrated.calibrated(setting(), range(100), methods=["PmMH, autoregressive"])
     assert np.sign(np.log(factor)) * coverage(levels).width_z[0] > 5
 
 
 def test_levels_are_uniform_where_data_tell_little():
     """The hard setting: posteriors a third to two thirds as wide as the prior."""
-    levels = calibrated.calibrated(setting("hard"), 40, methods=["NUTS"])
+    levels = calibrated.calibrated(setting("hard"), range(40), methods=["NUTS"])
     row = coverage(levels).iloc[0]
     assert row.p > 1e-3
     scores = row[["shift_z", "width_z", "size_z", "misfit_z"]].astype(float)

@@ -12,6 +12,7 @@ PACKAGE = Path(imuarray.__file__).parent
 BASE = ("config.py", "errors.py", "provenance.py", "streams.py")  # under every stage
 
 APART = ("blind_", "theory_", "validation_")  # sizes of targets that nothing else rests on
+CREWS = ("threads", "parts")  # how work is shared: no result depends on it
 
 # Files that nothing of the papers rests on: the criticism's drawings, theory and validation.
 ASIDE = ("blind", "criticism", "theory", "validation", "bound.", "calibrated", "joint", "levels",
@@ -67,12 +68,20 @@ def imported(path: Path) -> list[Path]:
     return [file for file in files if file.is_file() and PACKAGE in file.parents]
 
 
-def crew(threads: int, cores: int | None) -> int:
-    """Threads of a heavy job where ``cores`` are shared; None: a cluster, all that it asks for.
+class Crew:
+    """How work is shared: among ``cores`` of this machine, or a cluster's (None)."""
 
-    At most half: a job on all of them lets the others wait through its serial parts.
-    """
-    return threads if cores is None else max(1, min(threads, cores // 2))
+    def __init__(self, config: dict, cores: int | None):
+        self.scales, self.cores = config["scales"], cores
+
+    def threads(self, scale: str) -> int:
+        """Of a heavy job: at most half of the cores, or others wait through its serial parts."""
+        wanted = self.scales[scale]["threads"]
+        return wanted if self.cores is None else max(1, min(wanted, self.cores // 2))
+
+    def parts(self, scale: str, study: str = "samples") -> int:
+        """Jobs that the realisations of a study are dealt to; those but "samples" are small."""
+        return self.scales[scale]["parts"] if study == "samples" else 1
 
 
 def attempt(path: str) -> float:
@@ -87,9 +96,9 @@ def attempt(path: str) -> float:
 def effective(config: dict, scale: str, *sections: str, scaled: bool = True, own: str = "") -> dict:
     """The part of the configuration a rule depends on, with one scale resolved.
 
-    Without the number of threads, which no result depends on, and the keys that only the blind
-    study or ``own`` targets (a prefix such as "theory_") depend on; ``scaled=False`` leaves the
-    scale out, for results that all scales share.
+    Without the numbers of threads and parts, which no result depends on, and the keys that only
+    the blind study or ``own`` targets (a prefix such as "theory_") depend on; ``scaled=False``
+    leaves the scale out, for results that all scales share.
     """
     names = ("seed", "array", "noise", *sections)
     if not scaled:
@@ -97,7 +106,7 @@ def effective(config: dict, scale: str, *sections: str, scaled: bool = True, own
     sizes = {
         key: value
         for key, value in config["scales"][scale].items()
-        if key != "threads" and (key.startswith(own) if own else not key.startswith(APART))
+        if key not in CREWS and (key.startswith(own) if own else not key.startswith(APART))
     }
     return {**{name: config[name] for name in names}, "scale": {"name": scale, **sizes}}
 

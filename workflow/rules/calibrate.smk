@@ -1,58 +1,45 @@
-rule position_error_samples:
+rule position_error_part:
     input:
         code=library("estimation"),
     output:
-        "results/{scale}/calibration/position_error_samples.csv",
+        "results/{scale}/calibration/parts/{study}_{part}.npz",
     log:
-        "results/{scale}/logs/calibration/position_error_samples.log",
+        "results/{scale}/logs/calibration/parts/{study}_{part}.log",
     benchmark:
-        "results/{scale}/benchmarks/calibration/position_error_samples.tsv"
-    threads: lambda wc: heavy(wc.scale)
+        "results/{scale}/benchmarks/calibration/parts/{study}_{part}.tsv"
+    priority: 8
+    threads: lambda wc: CREW.threads(wc.scale)
     resources:
         mem_mb=2000,
         runtime=90,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017"),
+        parts=lambda wc: CREW.parts(wc.scale, wc.study),
     script:
-        "../scripts/position_error_samples.py"
+        "../scripts/position_error_part.py"
 
 
-rule position_error_motion:
+rule position_error:
     input:
+        parts=lambda wc: expand(
+            "results/{{scale}}/calibration/parts/{{study}}_{part}.npz",
+            part=range(CREW.parts(wc.scale, wc.study)),
+        ),
         code=library("estimation"),
     output:
-        "results/{scale}/calibration/position_error_motion.csv",
+        "results/{scale}/calibration/position_error_{study}.csv",
     log:
-        "results/{scale}/logs/calibration/position_error_motion.log",
+        "results/{scale}/logs/calibration/position_error_{study}.log",
     benchmark:
-        "results/{scale}/benchmarks/calibration/position_error_motion.tsv"
-    threads: lambda wc: heavy(wc.scale)
+        "results/{scale}/benchmarks/calibration/position_error_{study}.tsv"
+    threads: 1
     resources:
         mem_mb=2000,
-        runtime=90,
+        runtime=10,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017"),
     script:
-        "../scripts/position_error_motion.py"
-
-
-rule position_error_force:
-    input:
-        code=library("estimation"),
-    output:
-        "results/{scale}/calibration/position_error_force.csv",
-    log:
-        "results/{scale}/logs/calibration/position_error_force.log",
-    benchmark:
-        "results/{scale}/benchmarks/calibration/position_error_force.tsv"
-    threads: lambda wc: heavy(wc.scale)
-    resources:
-        mem_mb=2000,
-        runtime=90,
-    params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017"),
-    script:
-        "../scripts/position_error_force.py"
+        "../scripts/position_error.py"
 
 
 rule rate_error:
@@ -64,7 +51,7 @@ rule rate_error:
         "results/{scale}/logs/calibration/rate_error.log",
     benchmark:
         "results/{scale}/benchmarks/calibration/rate_error.tsv"
-    threads: lambda wc: heavy(wc.scale)
+    threads: lambda wc: CREW.threads(wc.scale)
     resources:
         mem_mb=2000,
         runtime=90,

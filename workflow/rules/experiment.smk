@@ -8,7 +8,8 @@ rule sample_experiment:
         "results/{scale}/logs/chains/{kind}.log",
     benchmark:
         "results/{scale}/benchmarks/chains/{kind}.tsv"
-    threads: lambda wc: heavy(wc.scale)
+    priority: 8
+    threads: lambda wc: CREW.threads(wc.scale)
     resources:
         mem_mb=4000,
         runtime=60,

@@ -11,6 +11,7 @@ checkpoint fetch_recordings:
         "results/measured/logs/fetch_recordings.log",
     benchmark:
         "results/measured/benchmarks/fetch_recordings.tsv"
+    priority: 9  # the second longest path
     threads: 1
     resources:
         mem_mb=500,
@@ -32,6 +33,7 @@ rule convert_recording:
         "results/measured/logs/recordings/{name}.log",
     benchmark:
         "results/measured/benchmarks/recordings/{name}.tsv"
+    priority: 9
     threads: 1
     resources:
         mem_mb=2000,
@@ -56,6 +58,7 @@ rule first_order:
         "results/measured/logs/corrected/{name}.log",
     benchmark:
         "results/measured/benchmarks/corrected/{name}.tsv"
+    priority: 9
     threads: 1
     resources:
         mem_mb=2000,
@@ -82,6 +85,7 @@ rule subset_recording:
         "results/measured/logs/subsets/{name}.log",
     benchmark:
         "results/measured/benchmarks/subsets/{name}.tsv"
+    priority: 9
     threads: 1
     resources:
         mem_mb=2000,
@@ -168,7 +172,8 @@ rule sample_measured:
         "results/{scale}/benchmarks/chains/{kind}.tsv"
     wildcard_constraints:
         kind=MEASURED_KINDS,
-    threads: lambda wc: heavy(wc.scale)
+    priority: 9
+    threads: lambda wc: CREW.threads(wc.scale)
     resources:
         mem_mb=4000,
         runtime=60,

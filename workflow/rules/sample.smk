@@ -10,7 +10,7 @@ rule sample_posterior:
     benchmark:
         "results/{scale}/benchmarks/chains/T{samples}.tsv"
     priority: 10  # the longest path
-    threads: lambda wc: heavy(wc.scale)
+    threads: lambda wc: CREW.threads(wc.scale)
     resources:
         mem_mb=4000,
         runtime=90,

@@ -12,7 +12,7 @@ rule bound_efficiency:
         "results/{scale}/logs/theory/efficiency.log",
     benchmark:
         "results/{scale}/benchmarks/theory/efficiency.tsv"
-    threads: lambda wc: heavy(wc.scale)
+    threads: lambda wc: CREW.threads(wc.scale)
     resources:
         mem_mb=3000,
         runtime=60,
@@ -31,7 +31,7 @@ rule bound_convergence:
         "results/{scale}/logs/theory/convergence.log",
     benchmark:
         "results/{scale}/benchmarks/theory/convergence.tsv"
-    threads: lambda wc: heavy(wc.scale)
+    threads: lambda wc: CREW.threads(wc.scale)
     resources:
         mem_mb=3000,
         runtime=60,

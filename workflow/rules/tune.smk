@@ -9,7 +9,7 @@ rule sweep_variance:
     benchmark:
         "results/{scale}/benchmarks/tuning/variance.tsv"
     priority: 10
-    threads: lambda wc: heavy(wc.scale)
+    threads: lambda wc: CREW.threads(wc.scale)
     resources:
         mem_mb=2000,
         runtime=30,
@@ -31,7 +31,7 @@ rule sweep_acceptance:
     benchmark:
         "results/{scale}/benchmarks/tuning/acceptance.tsv"
     priority: 10
-    threads: lambda wc: heavy(wc.scale)
+    threads: lambda wc: CREW.threads(wc.scale)
     resources:
         mem_mb=2000,
         runtime=30,

@@ -1,7 +1,7 @@
 # Only `snakemake validate` asks for these: are the uncertainties right?
 VALIDATED = resting_on("studies/calibrated.py", "studies/joint.py", "config.py", "provenance.py")
 LEVELS = [
-    f"results/{{scale}}/validation/levels_{name}_T{samples}.csv"
+    f"results/{{scale}}/validation/levels_{name}_T{samples}_{{part}}.csv"
     for name, chosen in config["validation"]["settings"].items()
     for samples in chosen["samples"]
 ]
@@ -14,12 +14,12 @@ rule calibrated_levels:
     input:
         code=VALIDATED,
     output:
-        "results/{scale}/validation/levels_{setting}_T{samples}.csv",
+        "results/{scale}/validation/levels_{setting}_T{samples}_{part}.csv",
     log:
-        "results/{scale}/logs/validation/levels_{setting}_T{samples}.log",
+        "results/{scale}/logs/validation/levels_{setting}_T{samples}_{part}.log",
     benchmark:
-        "results/{scale}/benchmarks/validation/levels_{setting}_T{samples}.tsv"
-    threads: lambda wc: heavy(wc.scale)
+        "results/{scale}/benchmarks/validation/levels_{setting}_T{samples}_{part}.tsv"
+    threads: lambda wc: CREW.threads(wc.scale)
     resources:
         mem_mb=3000,
         runtime=240,
@@ -27,6 +27,7 @@ rule calibrated_levels:
         settings=lambda wc: effective(
             config, wc.scale, "paper2021", "validation", own="validation_"
         ),
+        parts=lambda wc: CREW.parts(wc.scale),
     script:
         "../scripts/calibrated_levels.py"
 
@@ -54,7 +55,7 @@ rule joint_test:
 
 rule figure_validation_ranks:
     input:
-        levels=LEVELS,
+        levels=lambda wc: expand(LEVELS, scale=wc.scale, part=range(CREW.parts(wc.scale))),
         code=VALIDATION_DRAWING,
     output:
         pdf="results/{scale}/figures/validation_ranks.pdf",
@@ -82,7 +83,7 @@ rule figure_validation_ranks:
 
 rule table_validation_coverage:
     input:
-        levels=LEVELS,
+        levels=lambda wc: expand(LEVELS, scale=wc.scale, part=range(CREW.parts(wc.scale))),
         code=[*VALIDATED, *VALIDATION_DRAWING],
     output:
         csv="results/{scale}/tables/validation_coverage.csv",

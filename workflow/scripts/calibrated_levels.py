@@ -1,13 +1,15 @@
-"""Posterior levels of truths drawn from the prior, for each method -> CSV."""
+"""Posterior levels of a share of the truths drawn from the prior, for each method -> CSV."""
 
 from job import job
 
 with job(snakemake) as settings:
     from imuarray.provenance import write_csv
+    from imuarray.studies.batches import share
     from imuarray.studies.calibrated import calibrated
     from imuarray.studies.truths import setting_from
 
     chosen = snakemake.wildcards
     setting = setting_from(settings, chosen.setting, int(chosen.samples))
-    count = settings["scale"]["validation_replicates"]
-    write_csv(calibrated(setting, count, snakemake.threads), snakemake.output[0])
+    whole = range(settings["scale"]["validation_replicates"])
+    mine = share(whole, int(chosen.part), snakemake.params.parts)
+    write_csv(calibrated(setting, mine, snakemake.threads), snakemake.output[0])

@@ -25,6 +25,13 @@ def batches(realisations: int):
     return [(i, BATCH) for i in range(full)] + ([(full, rest)] if rest else [])
 
 
+def share(jobs, part: int, parts: int) -> list:
+    """The jobs of one of ``parts`` neighbouring shares, as even as may be."""
+    jobs = list(jobs)
+    ends = [len(jobs) * number // parts for number in (part, part + 1)]
+    return jobs[slice(*ends)]
+
+
 def batch_stream(seed: int, *names):
     """The random stream of one batch."""
     return stream(seed, *names)

@@ -19,20 +19,23 @@ WHOLE = ("size", "misfit")  # quantities that hang on all coordinates
 
 
 def calibrated(
-    setting: Setting, replicates: int, threads: int = 1, methods=tuple(METHODS)
+    setting: Setting, replicates, threads: int = 1, methods=tuple(METHODS)
 ) -> pd.DataFrame:
-    """A row for each method, replicate and quantity; ``level`` is uniform if all is right."""
+    """A row for each method, replicate and quantity; ``level`` is uniform if all is right.
+
+    ``replicates``: their numbers; what one gives does not depend on the others.
+    """
     made = run_batches(
-        lambda number: replicate(setting, number), range(replicates), threads, True, "replicates"
+        lambda number: replicate(setting, number), replicates, threads, True, "replicates"
     )
-    names, frames = np.array(names_of(setting)), []
+    names, numbers, frames = np.array(names_of(setting)), np.array(replicates), []
     for method in methods:
         levels = METHODS[method](setting, made, threads)
         rows, columns = np.indices(levels.shape)
         frames.append(
             pd.DataFrame(
                 {"setting": setting.name, "method": method, "samples": setting.samples,
-                 "replicate": rows.ravel(), "quantity": names[columns.ravel()],
+                 "replicate": numbers[rows.ravel()], "quantity": names[columns.ravel()],
                  "level": levels.ravel()}
             )
         )  # fmt: skip

@@ -79,7 +79,7 @@ def nuts(setting: Setting, made, threads: int = 1) -> np.ndarray:
     def marginal(one, count=None):
         return Marginal.of(one.likelihood, positions_of(one.mode), count)
 
-    first = marginal(made[0])
+    first = marginal(replicate(setting, SPARE))
     nodes, weights = first.nodes, first.log_weights
     count = round(len(nodes) ** (1 / 3))
     marginals = [marginal(one, count) for one in made]
@@ -89,12 +89,12 @@ def nuts(setting: Setting, made, threads: int = 1) -> np.ndarray:
         off = (theta - prior.mean) / prior.sd
         return log_marginal(positions, data, nodes, weights) - 0.5 * jnp.sum(off**2)
 
-    rng = stream(setting.seed, "calibrated", name, setting.name, setting.samples)
+    where = setting.seed, "calibrated", name, setting.name, setting.samples
     draws = run_many(
         log_density, [m.data for m in marginals], [m.mode for m in made],
         [np.linalg.cholesky(m.covariance) for m in made],
         [_start(setting, one, name) for one in made], WARMUP, DRAWS * SPACING,
-        rng.integers(2**31, size=len(made)), threads,
+        [int(stream(*where, one.number).integers(2**31)) for one in made], threads,
     )  # fmt: skip
     return of_draws(setting, made, draws[:, SPACING - 1 :: SPACING], name)
 

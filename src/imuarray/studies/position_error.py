@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import pandas as pd
 
@@ -10,7 +12,13 @@ from imuarray.estimation.collapsed import Collapsed, tables
 from imuarray.model import ArrayModel
 from imuarray.motion import sphere_motion
 from imuarray.simulation import measure
-from imuarray.studies.batches import batch_stream, batches, root_mean_square, run_batches
+from imuarray.studies.batches import (
+    batch_stream,
+    batches,
+    root_mean_square,
+    run_batches,
+    share,
+)
 
 
 def calibrate_batch(model, rng, count, samples, motion, position_sd, rail, limit, tolerance, marks):
@@ -41,42 +49,63 @@ def calibrate_batch(model, rng, count, samples, motion, position_sd, rail, limit
     return squares, iterations, status
 
 
-def _point(model, seed, names, options, samples, motion, threads, quiet):
-    """All realisations of one setting, in batches: squares, iterations, status."""
+class Case(NamedTuple):
+    """A setting whose RMSE is wanted: a point of figure 4 or 5."""
 
-    def job(batch):
-        number, size = batch
-        rng = batch_stream(seed, *names, number)
-        return calibrate_batch(
-            model, rng, size, samples, motion, options["position_sd"], options["rail"],
-            max(options["marks"]), options["tolerance"], options["marks"],
-        )  # fmt: skip
-
-    parts = run_batches(
-        job, batches(options["realisations"]), threads, quiet, "/".join(map(str, names))
-    )
-    return [np.concatenate(part) for part in zip(*parts, strict=True)]
+    names: tuple  # of its random stream
+    samples: int
+    motion: tuple[float, float, float]  # |omega| rad/s, |omega_dot| rad/s^2, |s| m/s^2
 
 
-def rmse_against_samples(
-    model: ArrayModel, seed, sample_counts, motion, options, threads=1, quiet=True
-) -> pd.DataFrame:
-    """Figure 4: RMSE over N and iterations; one row for each pair.
+class Errors(NamedTuple):
+    """Realisations (R) of some cases (C), with errors after M numbers of iterations."""
 
-    ``motion``: magnitudes |omega| rad/s, |omega_dot| rad/s^2, |s| m/s^2. ``options``:
-    realisations, marks (iterations), position_sd (m), rail (rad/s), tolerance (m).
+    squares: np.ndarray  # (C, R, M) mean squared position errors, m^2, NaN: not identifiable
+    iterations: np.ndarray  # (C, R)
+    status: np.ndarray  # (C, R), the kernel's: 1 converged, 0 limit, negative not identifiable
+
+
+def realise(
+    model: ArrayModel, seed, cases, options, threads=1, quiet=True, part=0, parts=1
+) -> Errors:
+    """One of ``parts`` shares of all cases' realisations; a realisation does not depend on them.
+
+    ``options``: realisations, marks (iterations), position_sd (m), rail (rad/s), tolerance (m).
     """
+
+    def of(case):
+        def job(batch):
+            number, size = batch
+            rng = batch_stream(seed, *case.names, number)
+            return calibrate_batch(
+                model, rng, size, case.samples, case.motion, options["position_sd"],
+                options["rail"], max(options["marks"]), options["tolerance"], options["marks"],
+            )  # fmt: skip
+
+        mine = share(batches(options["realisations"]), part, parts)
+        label = "/".join(map(str, case.names))
+        made = run_batches(job, mine, threads, quiet, label)
+        empty = [(np.empty((0, len(options["marks"]))), np.empty(0, int), np.empty(0, int))]
+        return [np.concatenate(one) for one in zip(*(made or empty), strict=True)]
+
+    return Errors(*map(np.stack, zip(*map(of, cases), strict=True)))
+
+
+def joined(shares) -> Errors:
+    """All shares of `realise` in their order."""
+    return Errors(*(np.concatenate(one, axis=1) for one in zip(*shares, strict=True)))
+
+
+def against_samples(cases, errors: Errors, marks) -> pd.DataFrame:
+    """Figure 4: RMSE over N and iterations; one row for each pair."""
     rows = []
-    for samples in sample_counts:
-        squares, iterations, status = _point(
-            model, seed, ("position", "samples", samples), options, samples, motion, threads, quiet
-        )
+    for case, squares, iterations, status in zip(cases, *errors, strict=True):
         good = status >= 0
-        for column, mark in enumerate(options["marks"]):
+        for column, mark in enumerate(marks):
             rmse, error = root_mean_square(squares[good, column])
             rows.append(
                 {
-                    "samples": samples,
+                    "samples": case.samples,
                     "iterations": mark,
                     "rmse_m": rmse,
                     "rmse_se_m": error,
@@ -89,26 +118,19 @@ def rmse_against_samples(
     return pd.DataFrame(rows)
 
 
-def rmse_against_motion(
-    model: ArrayModel, seed, study, samples, motions, options, threads=1, quiet=True
-) -> pd.DataFrame:
-    """Figure 5: RMSE for each (|omega|, |omega_dot|, |s|) in ``motions`` (SI units).
-
-    ``study`` names the random streams, so that two studies never share them."""
+def against_motion(cases, errors: Errors, marks) -> pd.DataFrame:
+    """Figure 5: RMSE for each case's |omega|, |omega_dot| and |s|."""
     rows = []
-    for number, motion in enumerate(motions):
-        squares, _, status = _point(
-            model, seed, ("position", study, number), options, samples, motion, threads, quiet
-        )
+    for case, squares, _, status in zip(cases, *errors, strict=True):
         good = status >= 0
         rmse, error = root_mean_square(squares[good, -1])
         rows.append(
             {
-                "angular_rate_dps": np.degrees(motion[0]),
-                "angular_acceleration_dps2": np.degrees(motion[1]),
-                "specific_force_mps2": motion[2],
-                "samples": samples,
-                "iterations": options["marks"][-1],
+                "angular_rate_dps": np.degrees(case.motion[0]),
+                "angular_acceleration_dps2": np.degrees(case.motion[1]),
+                "specific_force_mps2": case.motion[2],
+                "samples": case.samples,
+                "iterations": marks[-1],
                 "rmse_m": rmse,
                 "rmse_se_m": error,
                 "realisations": int(good.sum()),

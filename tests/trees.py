@@ -1,0 +1,50 @@
+"""Are two runs' results the same? For the tests, the cluster and the run that is killed."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pandas as pd
+import xarray as xr
+
+TIMED = ("logs", "benchmarks")  # folders of times
+CLOCKED = "timing"  # and the files that a claim about times comes from
+
+
+def differences(one: Path, other: Path) -> list[str]:
+    """What is in one tree only, or not the same in both; times of day and durations left out."""
+    first, second = _files(one), _files(other)
+    found = [f"{name}: only in {one}" for name in first if name not in second]
+    found += [f"{name}: only in {other}" for name in second if name not in first]
+    both = [name for name in first if name in second]
+    return found + [f"{name}: differs" for name in both if not _same(one / name, other / name)]
+
+
+def _files(root: Path) -> list[str]:
+    paths = [path.relative_to(root) for path in root.rglob("*") if path.is_file()]
+    return sorted(str(p) for p in paths if not set(p.parts) & set(TIMED) and CLOCKED not in p.stem)
+
+
+def _same(one: Path, other: Path) -> bool:
+    if one.read_bytes() == other.read_bytes():
+        return True
+    if one.suffix == ".nc":  # HDF5 lays the same values out differently
+        with xr.open_datatree(one) as a, xr.open_datatree(other) as b:
+            return a.load().identical(b.load())
+    if one.name == "claims.csv":
+        tables = [pd.read_csv(path, dtype=str) for path in (one, other)]
+        first, second = (table[table.rests_on != "clock"] for table in tables)
+        return first.equals(second)
+    return one.name == "claims.md"  # the same table
+
+
+def main() -> None:
+    """`python -m tests.trees ONE OTHER`: print the differences; 1 if there are some."""
+    found = differences(*map(Path, sys.argv[1:3]))
+    print("\n".join(found) or "the same")
+    sys.exit(bool(found))
+
+
+if __name__ == "__main__":
+    main()

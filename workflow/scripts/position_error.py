@@ -1,0 +1,18 @@
+"""RMSE of ML-BCD positions (2017, figures 4 and 5) from the shares of its realisations -> CSV."""
+
+from job import job
+
+with job(snakemake) as settings:
+    import numpy as np
+
+    from imuarray.provenance import write_csv
+    from imuarray.studies.position_error import Errors, joined
+    from imuarray.studies.settings2017 import TABLES, study
+
+    name = snakemake.wildcards.study
+    cases, options = study(settings, name)
+    shares = []
+    for path in snakemake.input.parts:
+        with np.load(path) as stored:
+            shares.append(Errors(**stored))
+    write_csv(TABLES[name](cases, joined(shares), options["marks"]), snakemake.output[0])

@@ -1,0 +1,19 @@
+"""A share of the realisations of ML-BCD's position errors (2017, figures 4 and 5) -> NPZ."""
+
+from job import job
+
+with job(snakemake) as settings:
+    import numpy as np
+
+    from imuarray.config import model_from
+    from imuarray.provenance import atomic_write
+    from imuarray.studies.position_error import realise
+    from imuarray.studies.settings2017 import study
+
+    cases, options = study(settings, snakemake.wildcards.study)
+    errors = realise(
+        model_from(settings), settings["seed"], cases, options, snakemake.threads, quiet=False,
+        part=int(snakemake.wildcards.part), parts=snakemake.params.parts,
+    )  # fmt: skip
+    with atomic_write(snakemake.output[0]) as path, open(path, "wb") as handle:
+        np.savez(handle, **errors._asdict())
