@@ -11,11 +11,12 @@ from pathlib import Path
 from imuarray.errors import InputError
 from imuarray.parser import make_parser
 
-OK, BAD_INPUT, INTERRUPTED = 0, 2, 130
+OK, BAD_INPUT, INTERRUPTED, CLOSED = 0, 2, 130, 141
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit status: 0, 2 for bad input, 130 when interrupted.
+    """Run one command; returns the exit status: 0, 2 for bad input, 130 when interrupted,
+    141 when nobody reads its output any more.
 
     `argv` are the arguments without the program's name, by default the process's own.
     """
@@ -26,6 +27,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             arguments.run(arguments)
     except InputError as error:
         return _fail(str(error))
+    except BrokenPipeError:
+        # `| head` has read enough; the rest, and what is flushed at the end, goes nowhere
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return CLOSED
     except OSError as error:
         return _fail(_describe(error))
     except KeyboardInterrupt:

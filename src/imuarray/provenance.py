@@ -139,6 +139,16 @@ def write_csv(frame: pd.DataFrame, path: str | Path) -> None:
 
 
 def write_netcdf(data: xr.Dataset | xr.DataTree, path: str | Path) -> None:
-    """Write a dataset or a tree of them as NetCDF-4."""
+    """Write a dataset or a tree of them as NetCDF-4, its numbers with checksums."""
     with atomic_write(path) as temporary:
-        data.to_netcdf(temporary, engine="h5netcdf")
+        if hasattr(data, "subtree"):
+            encoding = {node.path: checksums(node.to_dataset()) for node in data.subtree}
+        else:
+            encoding = checksums(data)
+        data.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
+
+
+def checksums(dataset: xr.Dataset) -> dict[str, dict[str, bool]]:
+    """The encoding under which a number that was damaged on a disk is an error when it is read."""
+    numbers = [n for n, v in dataset.variables.items() if v.dtype.kind in "fiub" and v.ndim]
+    return {str(name): {"fletcher32": True} for name in numbers}

@@ -13,7 +13,7 @@ import xarray as xr
 
 from imuarray.errors import InputError
 from imuarray.geometry import Array
-from imuarray.provenance import atomic_write
+from imuarray.provenance import atomic_write, checksums
 from imuarray.recording import validate
 from imuarray.recording.validate import AXES, DIMENSIONS, FLAGS, NUMBERS, TEXTS, TRUTH, UNITS
 
@@ -187,9 +187,11 @@ def write_recording(
     dataset.attrs = {**(attrs or {}), **dataset.attrs}
     from_dataset(dataset, str(path))
     with atomic_write(path) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf")
+        dataset.to_netcdf(temporary, engine="h5netcdf", encoding=checksums(dataset))
         if truth is not None:
-            truth.to_netcdf(temporary, mode="a", group=TRUTH, engine="h5netcdf")
+            truth.to_netcdf(
+                temporary, mode="a", group=TRUTH, engine="h5netcdf", encoding=checksums(truth)
+            )
 
 
 def _existing(path: str | Path) -> Path:

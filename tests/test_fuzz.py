@@ -1,0 +1,155 @@
+"""Readers of tables, recordings and configurations against a thousand damaged files each.
+
+An InputError of one line, or what was written: no other exception, no hang, no wrong number.
+MIMU files: `test_mimu_fuzz.py`.
+"""
+
+import csv
+import io
+import time
+
+import numpy as np
+import pytest
+import yaml
+
+from imuarray.config import read_config
+from imuarray.errors import InputError
+from imuarray.recording import read_recording, write_recording
+from tests.test_convert_csv import HEADER, layout, table
+from tests.test_convert_csv import read as read_csv
+from tests.test_pipeline import ROOT
+from tests.test_recording import make
+
+FILES = 1000
+SLOW = 5.0  # s: nothing here should take a tenth of that
+WORDS = [
+    "nan", "inf", "-inf", "1e400", "-1e-400", "", " ", "NA", "None", "true", "0x10", "1_0", "1,5",
+    "٣", "\x00", '"', "'", "#", ";", "\t", "\n", "\r", "\ufeff", "9" * 400, "1e5000", "- 1",
+    "*a", "&a [*a]", "!!python/object/apply:os.system ['true']", "!!binary x", "{", "[", "%", "|",
+    "2001-01-01", "12:30:45", ".nan", "-.inf", "~", "<<: *x", "? x", "\U0001f600",
+]  # fmt: skip
+
+
+def damaged(rng, content: bytes) -> bytes:
+    """Bytes changed, cut, repeated, exchanged, or a word put in place of another."""
+    data = bytearray(content)
+    for _ in range(int(rng.choice([1, 1, 1, 2, 5, 20]))):
+        first, second = sorted(int(x) for x in rng.integers(0, len(data) + 1, 2))
+        end = min(len(data), first + int(rng.integers(1, 40)))
+        kind = rng.integers(7)
+        if kind == 0 and first < len(data):
+            data[first] ^= int(rng.integers(1, 256))
+        elif kind == 1:
+            del data[first:end]
+        elif kind == 2:
+            data[second:second] = data[first:end]
+        elif kind == 3:
+            data[first:first] = rng.bytes(int(rng.integers(1, 9)))
+        elif kind == 4 and rng.integers(5) == 0:
+            del data[first:]
+        else:
+            word = str(rng.choice(WORDS)).encode()
+            data[first : first + int(rng.integers(0, 6))] = word
+        if not data:
+            return b""
+    return bytes(data)
+
+
+def outcome(function):
+    """What it gives, or None where it refuses in one line; anything else is a failure."""
+    start = time.monotonic()
+    try:
+        return function()
+    except InputError as error:
+        assert str(error) and "\n" not in str(error)
+        return None
+    finally:
+        assert time.monotonic() - start < SLOW
+
+
+def plain_numbers(text: str) -> np.ndarray:
+    """The table as the csv module and float() read it: an oracle with no line of the reader's."""
+    rows = [row for row in csv.reader(io.StringIO(text, newline="")) if row]
+    place = {name: rows[0].index(name) for name in HEADER}
+    return np.array([[float(row[place[name]]) for name in HEADER] for row in rows[1:]])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_tables(tmp_path, seed):
+    rng, read = np.random.default_rng([1, seed]), 0
+    content = "\n".join(",".join(row) for row in table(6)).encode() + b"\n"
+    for _ in range(FILES // 4):
+        mutated = damaged(rng, content)
+        try:
+            text = mutated.decode()
+        except UnicodeDecodeError:
+            text = mutated.decode("latin-1")
+        found = outcome(lambda text=text: read_csv(tmp_path, text))
+        if found is None:
+            continue
+        read += 1
+        numbers = plain_numbers((tmp_path / "log.csv").read_text())
+        np.testing.assert_allclose(found.time, numbers[:, 0] / 1e3, rtol=1e-12, atol=1e-12)
+        ours = [
+            found.specific_force / 9.80665, np.degrees(found.angular_rate),
+        ]  # fmt: skip
+        theirs = numbers[:, 1:].reshape(len(numbers), 3, 2, 3)
+        np.testing.assert_allclose(ours[0], theirs[:, :, 0], rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(ours[1], theirs[:, :, 1], rtol=1e-9, atol=1e-12)
+    assert 0 < read < FILES // 4
+
+
+def test_layouts_of_tables(tmp_path):
+    rng, read = np.random.default_rng(2), 0
+    content = yaml.safe_dump(layout()).encode()
+    whole = read_csv(tmp_path, table(6))
+    for _ in range(FILES):
+        text = damaged(rng, content).decode("utf-8", "replace")
+        found = outcome(lambda text=text: read_csv(tmp_path, table(6), text))
+        if found is not None:
+            read += 1
+            assert found.specific_force.shape[0] == 6 and np.all(np.isfinite(found.angular_rate))
+            assert found.specific_force.shape[1:] <= whole.specific_force.shape[1:]
+    assert read < FILES // 2
+
+
+def test_configurations(tmp_path):
+    rng, read = np.random.default_rng(3), 0
+    content, path = (ROOT / "config.yaml").read_bytes(), tmp_path / "config.yaml"
+    for _ in range(FILES):
+        path.write_bytes(damaged(rng, content))
+        found = outcome(lambda: read_config(path))
+        read += found is not None
+        assert found is None or found["scale"] in found["scales"]
+    assert 0 < read < FILES
+
+
+def test_a_configuration_runs_no_code(tmp_path):
+    mark, path = tmp_path / "mark", tmp_path / "config.yaml"
+    path.write_text(f"seed: !!python/object/apply:os.system ['touch {mark}']\n")
+    with pytest.raises(InputError):
+        read_config(path)
+    assert not mark.exists()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_recordings(tmp_path, seed):
+    """Every value that is read is the one that was written: blocks of numbers have checksums."""
+    rng, path, read = np.random.default_rng([4, seed]), tmp_path / "rec.nc", 0
+    recording = make()
+    write_recording(recording, path)
+    content = path.read_bytes()
+    for _ in range(FILES // 4):
+        data = bytearray(content)
+        for place in rng.integers(0, len(data), int(rng.choice([1, 2, 8, 64]))):
+            data[place] ^= int(rng.integers(1, 256))
+        if rng.integers(8) == 0:
+            data = data[: int(rng.integers(0, len(data)))]
+        path.write_bytes(data)
+        found = outcome(lambda: read_recording(path))
+        if found is None:
+            continue
+        read += 1
+        for name in ("time", "specific_force", "angular_rate"):
+            np.testing.assert_array_equal(getattr(found, name), getattr(recording, name))
+    assert 0 < read < FILES // 4
