@@ -89,7 +89,16 @@ def _check_output(arguments: argparse.Namespace) -> None:
 def _inputs(arguments: argparse.Namespace) -> list[Path]:
     """The files a command reads."""
     found = []
-    for name in ("config", "data", "positions", "columns", "diagnosis", "recording", "recordings"):
+    for name in (
+        "config",
+        "data",
+        "positions",
+        "columns",
+        "diagnosis",
+        "calibration",
+        "recording",
+        "recordings",
+    ):
         value = getattr(arguments, name, None)
         found += value if isinstance(value, list) else [value] if value is not None else []
     return found

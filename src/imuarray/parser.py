@@ -42,6 +42,7 @@ def make_parser() -> argparse.ArgumentParser:
     _add_first_order(commands)
     _add_select(commands)
     _add_calibrate(commands)
+    _add_apply(commands)
     _add_sample(commands)
     _add_residuals(commands)
     _add_repeat(commands)
@@ -257,6 +258,24 @@ def _add_calibrate(commands) -> None:
     parser.add_argument(
         "--method", choices=CALIBRATION_METHODS, default="bcd",
         help="bcd: block coordinate descent (default); gauss-newton: any effects, fewer iterations",
+    )  # fmt: skip
+
+
+def _add_apply(commands) -> None:
+    parser = _add_command(
+        commands,
+        "apply",
+        _later("commands_apply", "apply"),
+        "The calibrated array as one sensor: angular rate, angular acceleration and specific force"
+        " at each sample, with covariances.",
+        "cal.nc rec.nc --out motion.nc",
+        "motion to write (NetCDF-4)",
+    )
+    parser.add_argument("calibration", type=Path, help="what `imuarray calibrate` has written")
+    _add_recording(parser)
+    parser.add_argument(
+        "--accelerometer-noise", type=positive, default=None, metavar="SD",
+        help="assumed sd, m/s^2 (default: as the recording declares)",
     )  # fmt: skip
 
 

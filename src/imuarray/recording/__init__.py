@@ -4,9 +4,18 @@ from imuarray.recording.format import (
     Recording,
     array_of,
     has_truth,
+    load_dataset,
     read_recording,
     read_truth,
     write_recording,
 )
 
-__all__ = ["Recording", "array_of", "has_truth", "read_recording", "read_truth", "write_recording"]
+__all__ = [
+    "Recording",
+    "array_of",
+    "has_truth",
+    "load_dataset",
+    "read_recording",
+    "read_truth",
+    "write_recording",
+]

@@ -194,6 +194,11 @@ def write_recording(
             )
 
 
+def load_dataset(path: str | Path, group: str | None = None) -> xr.Dataset:
+    """One group of a NetCDF-4 file in memory; InputError where it cannot be read."""
+    return _load(_existing(path), group)
+
+
 def _existing(path: str | Path) -> Path:
     path = Path(path)
     if not path.is_file():

@@ -1,0 +1,81 @@
+"""`imuarray apply`: from a calibration and a recording to the motion, end to end."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from imuarray.cli import main
+from imuarray.motion import normal_motion
+from imuarray.recording import read_recording, write_recording
+from imuarray.simulation import measure
+from tests.test_bound import model
+from tests.test_recording import make
+
+RAIL = 25.0  # rad/s
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """(calibration, recording, its truth): 5 triads, 200 samples, gyroscopes at rails."""
+    folder, rng, own = tmp_path_factory.mktemp("apply"), np.random.default_rng(1), model()
+    motion = normal_motion(rng, (200,), 15.0, 300.0, 10.0)
+    force, rate, _ = measure(own, motion, own.array.relative, rng, gyroscope_range=RAIL)
+    labels = tuple("12345")
+    recording = make(
+        time=0.01 * np.arange(200), specific_force=force, angular_rate=rate,
+        accelerometer_position=own.array.positions, accelerometer_labels=labels,
+        gyroscope_labels=labels, accelerometer_noise_sd=0.04, gyroscope_noise_sd=0.02,
+        accelerometer_range=1e3, gyroscope_range=RAIL, stationary=np.zeros(200, bool),
+    )  # fmt: skip
+    write_recording(recording, folder / "rec.nc")
+    given = [str(folder / "rec.nc"), "--out", str(folder / "cal.nc"), "--quiet"]
+    assert main(["calibrate", *given, "--method", "gauss-newton"]) == 0
+    return folder / "cal.nc", folder / "rec.nc", motion
+
+
+def test_motion_with_covariances(files, tmp_path, capsys):
+    calibration, recording, motion = files
+    out = tmp_path / "motion.nc"
+    assert main(["apply", str(calibration), str(recording), "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "with a gyroscope at its" in said and "at the rail" in said
+    with xr.open_dataset(out) as found:
+        error = found.angular_rate.to_numpy() - motion.angular_rate
+        z = error / found.angular_rate_sd.to_numpy()
+        assert np.sqrt(np.mean(z**2)) == pytest.approx(1.0, abs=0.15)
+        assert found.motion_covariance.shape == (200, 9, 9)
+        assert np.all(found.specific_force_sd > found.specific_force_sd_from_positions)
+        railed = np.any(np.abs(motion.angular_rate) > RAIL, axis=1)
+        assert 5 < railed.sum() and np.all(found.converged)
+        # the accelerometers know what the gyroscopes have lost
+        assert np.max(np.abs(error[railed])) < 1.0
+
+
+def test_samples_with_an_accelerometer_at_its_rail_are_left_out(files, tmp_path):
+    calibration, recording, _ = files
+    whole = read_recording(recording)
+    force = whole.specific_force.copy()
+    force[7, 2, 1] = 900.0
+    write_recording(
+        replace(whole, specific_force=np.clip(force, -900, 900), accelerometer_range=900.0),
+        tmp_path / "rec.nc",
+    )
+    out = tmp_path / "motion.nc"
+    assert main(["apply", str(calibration), str(tmp_path / "rec.nc"), "--out", str(out)]) == 0
+    with xr.open_dataset(out) as found:
+        lost = np.isnan(found.angular_rate.to_numpy()).all(axis=1)
+        assert np.flatnonzero(lost).tolist() == [7] and not found.converged[7]
+
+
+def test_what_does_not_fit_is_refused(files, tmp_path, capsys):
+    calibration, recording, _ = files
+    out = tmp_path / "motion.nc"
+    assert main(["apply", str(recording), str(recording), "--out", str(out)]) == 2
+    assert "expected a calibration" in capsys.readouterr().err
+    other = replace(read_recording(recording), accelerometer_labels=tuple("abcde"))
+    write_recording(other, tmp_path / "other.nc")
+    assert main(["apply", str(calibration), str(tmp_path / "other.nc"), "--out", str(out)]) == 2
+    assert "expected positions of a, b, c, d, e" in capsys.readouterr().err
+    assert not out.exists()

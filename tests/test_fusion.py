@@ -1,0 +1,69 @@
+"""The array as one sensor: motion with covariances that hold."""
+
+import numpy as np
+import pytest
+
+from imuarray.errors import IdentifiabilityError
+from imuarray.estimation.fusion import fuse
+from imuarray.motion import normal_motion
+from imuarray.simulation import measure
+from tests import oracles
+from tests.test_bound import model
+
+SDS = 20.0, 300.0, 10.0  # rad/s, rad/s^2, m/s^2
+
+
+def errors(rail=np.inf, wrong=0.0, samples=400, seed=1):
+    """(errors (T, 9), what was fused): positions off by ``wrong`` m, as their covariance says."""
+    rng, own = np.random.default_rng(seed), model()
+    motion = normal_motion(rng, (samples,), *SDS)
+    force, rate, saturated = measure(own, motion, own.array.relative, rng, gyroscope_range=rail)
+    positions = own.array.relative.copy()
+    positions[1:] += wrong * rng.standard_normal((4, 3))
+    spread = wrong**2 * np.eye(12) if wrong else None
+    found = fuse(own, force, rate, positions, spread, saturated)
+    truth = np.hstack([np.asarray(field) for field in motion[:3]])
+    estimate = np.hstack([np.asarray(field) for field in found.estimate.motion[:3]])
+    return estimate - truth, found
+
+
+@pytest.mark.parametrize("rail", [np.inf, 20.0])
+def test_errors_are_as_large_as_their_covariance_says(rail):
+    """e' P^-1 e is chi-square with nine degrees of freedom: mean 9, five standard errors."""
+    error, found = errors(rail)
+    assert np.all(found.estimate.converged) and not np.any(found.from_positions)
+    square = np.einsum(
+        "ti,ti->t", error, np.linalg.solve(found.covariance, error[..., None])[..., 0]
+    )
+    assert abs(square.mean() - 9) < 5 * np.sqrt(18 / len(square))
+
+
+def test_covariance_is_that_of_the_direct_jacobian():
+    rng, own = np.random.default_rng(2), model()
+    motion = normal_motion(rng, (5,), *SDS)
+    force, rate = own.predict_many(motion, own.array.relative)
+    found = fuse(own, force, rate)
+    jacobian = oracles.joint_jacobian(
+        np.hstack(motion[:3]), own.array.relative, 5, 0.04, 0.02
+    )[:, 12:]  # fmt: skip
+    whole = np.linalg.inv(jacobian.T @ jacobian).reshape(5, 9, 5, 9)
+    direct = np.stack([whole[t, :, t] for t in range(5)])
+    np.testing.assert_allclose(found.covariance, direct, rtol=1e-6, atol=1e-12)
+
+
+def test_wrong_positions_are_in_the_covariance():
+    """Positions 1 mm off, drawn anew each time: 100 fusions of 5 samples."""
+    squares = []
+    for seed in range(100):
+        error, found = errors(wrong=1e-3, samples=5, seed=seed)
+        assert np.all(np.trace(found.from_positions, axis1=1, axis2=2) > 0)
+        last = np.linalg.solve(found.covariance[-1], error[-1])
+        squares.append(error[-1] @ last)
+    assert abs(np.mean(squares) - 9) < 5 * np.sqrt(18 / 100)
+
+
+def test_collinear_triads_are_refused():
+    own = model()
+    line = own.array.relative * [1.0, 0.0, 0.0]
+    with pytest.raises(IdentifiabilityError):
+        fuse(own, np.zeros((2, 5, 3)), np.zeros((2, 5, 3)), line)
