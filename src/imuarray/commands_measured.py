@@ -7,7 +7,7 @@ import pandas as pd
 import xarray as xr
 
 from imuarray.errors import InputError
-from imuarray.provenance import atomic_write, digest, stamp, write_csv
+from imuarray.provenance import atomic_write, digest, seal, stamp, write_csv
 from imuarray.recording import Recording, read_recording, write_recording
 from imuarray.recording.validate import FIRST_ORDER
 
@@ -83,6 +83,7 @@ def write_corrected(recording: Recording, found, path) -> None:
         _first_order_dataset(recording, found).to_netcdf(
             temporary, mode="a", group=FIRST_ORDER, engine="h5netcdf"
         )
+        seal(temporary)
 
 
 def _first_order_dataset(recording: Recording, found) -> xr.Dataset:

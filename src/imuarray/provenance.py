@@ -139,16 +139,41 @@ def write_csv(frame: pd.DataFrame, path: str | Path) -> None:
 
 
 def write_netcdf(data: xr.Dataset | xr.DataTree, path: str | Path) -> None:
-    """Write a dataset or a tree of them as NetCDF-4, its numbers with checksums."""
+    """Write a dataset or a tree of them as NetCDF-4, sealed."""
     with atomic_write(path) as temporary:
-        if hasattr(data, "subtree"):
-            encoding = {node.path: checksums(node.to_dataset()) for node in data.subtree}
-        else:
-            encoding = checksums(data)
-        data.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
+        data.to_netcdf(temporary, engine="h5netcdf")
+        seal(temporary)
 
 
-def checksums(dataset: xr.Dataset) -> dict[str, dict[str, bool]]:
-    """The encoding under which a number that was damaged on a disk is an error when it is read."""
-    numbers = [n for n, v in dataset.variables.items() if v.dtype.kind in "fiub" and v.ndim]
-    return {str(name): {"fletcher32": True} for name in numbers}
+SEAL = b"imuarray sha-256"  # before the digest, at a file's end, where HDF5 does not look
+
+
+def seal(path: str | Path) -> None:
+    """Append the digest of all that is before it; whatever opens the file to change it drops it."""
+    with open(path, "rb") as handle:
+        found = hashlib.file_digest(handle, "sha256").digest()
+    with open(path, "ab") as handle:
+        handle.write(SEAL + found)
+
+
+def is_damaged(path: str | Path) -> bool:
+    """Whether a sealed file is not as it was written; one without a seal cannot be told.
+
+    To be asked before HDF5 reads the file: wrong bytes make it read wrong numbers, or loop.
+    """
+    length = len(SEAL) + hashlib.sha256().digest_size
+    with open(path, "rb") as handle:
+        size = handle.seek(0, os.SEEK_END)
+        if size < length:
+            return False
+        handle.seek(size - length)
+        tail = handle.read()
+        if not tail.startswith(SEAL):
+            return False
+        state, left = hashlib.sha256(), size - length
+        handle.seek(0)
+        while left:
+            piece = handle.read(min(left, 1 << 20))
+            state.update(piece)
+            left -= len(piece)
+    return tail[len(SEAL) :] != state.digest()

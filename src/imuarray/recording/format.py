@@ -13,7 +13,7 @@ import xarray as xr
 
 from imuarray.errors import InputError
 from imuarray.geometry import Array
-from imuarray.provenance import atomic_write, checksums
+from imuarray.provenance import atomic_write, is_damaged, seal
 from imuarray.recording import validate
 from imuarray.recording.validate import AXES, DIMENSIONS, FLAGS, NUMBERS, TEXTS, TRUTH, UNITS
 
@@ -187,11 +187,10 @@ def write_recording(
     dataset.attrs = {**(attrs or {}), **dataset.attrs}
     from_dataset(dataset, str(path))
     with atomic_write(path) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf", encoding=checksums(dataset))
+        dataset.to_netcdf(temporary, engine="h5netcdf")
         if truth is not None:
-            truth.to_netcdf(
-                temporary, mode="a", group=TRUTH, engine="h5netcdf", encoding=checksums(truth)
-            )
+            truth.to_netcdf(temporary, mode="a", group=TRUTH, engine="h5netcdf")
+        seal(temporary)
 
 
 def load_dataset(path: str | Path, group: str | None = None) -> xr.Dataset:
@@ -218,6 +217,8 @@ def _hdf5(path: Path) -> h5py.File:
 def _load(path: Path, group: str | None) -> xr.Dataset:
     """Read one group into memory, after looking at what sizes it declares."""
     try:
+        if is_damaged(path):
+            raise InputError(f"{path}: expected a file as it was written, found it damaged")
         with _hdf5(path) as file:
             validate.check_sizes(file, str(path))
         # "s" is a number of seconds here, not a date or a time span
