@@ -166,7 +166,7 @@ def nuts_row(problem, rng) -> Row:
 
 
 def emcee_row(problem, seconds, rng) -> Row:
-    """A peer: emcee's stretch moves on the exact marginal, two ensembles of 4 walkers a dimension."""
+    """A peer: emcee's stretch moves on the exact marginal, 4 walkers a dimension, two ensembles."""
     from imuarray.model.jax64 import jax
 
     size = problem.mode.size

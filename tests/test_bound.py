@@ -10,7 +10,7 @@ from tests import oracles
 from tests.cases import small_array
 
 MOTION = (20.0, 300.0, 10.0)  # rad/s, rad/s^2, m/s^2
-OPTIONS = {"position_sd": 1e-3, "rail": np.inf, "realisations": 100, "limit": 4000}
+OPTIONS = {"position_sd": 1e-3, "rail": np.inf, "realisations": 400, "limit": 4000}
 
 
 def model():
@@ -26,11 +26,11 @@ def test_information_is_that_of_the_direct_jacobian():
 
 
 def test_maximum_likelihood_reaches_the_bound():
-    """100 realisations of 30 samples: within five standard errors, with and without a prior."""
+    """400 realisations of 30 samples: within 3 %, with and without a prior."""
     table = bound.efficiency(model(), 2, [30], MOTION, OPTIONS)
     assert list(table.estimator) == ["maximum likelihood", "with the prior"]
-    assert np.all(np.abs(table.ratio - 1) < 5 * table.ratio_se)
-    assert np.all(table.ratio_se < 0.03) and np.all(table.not_converged == 0)
+    assert np.all(np.abs(table.ratio - 1) < 0.03)
+    assert np.all(table.ratio_se < 0.01) and np.all(table.not_converged == 0)
     assert np.all(table.iterations_max <= 10)
     assert table.bound_m[1] < table.bound_m[0]
 
@@ -51,6 +51,7 @@ def test_larger_arrays_have_the_same_sds_relative_to_noise():
 def test_ranks():
     """One sample tells too little; two tell all; one axis of rotation never does (Lemma 1)."""
     rng = np.random.default_rng(5)
+    one = normal_motion(rng, (1,), 10.0, 300.0, 20.0)
     two = normal_motion(rng, (2,), 10.0, 300.0, 20.0)
     many = normal_motion(rng, (20,), 10.0, 300.0, 20.0)
     axis = np.array([0.0, 0.0, 1.0])
@@ -58,5 +59,6 @@ def test_ranks():
         angular_rate=many.angular_rate[:, 2:] * axis,
         angular_acceleration=many.angular_acceleration[:, 2:] * axis,
     )
-    table = bound.ranks([("two", model(), two), ("many", model(), many), ("axis", model(), flat)])
-    assert list(table["rank"] < table.unknowns) == [False, False, True]
+    cases = {"one": one, "two": two, "many": many, "axis": flat}
+    table = bound.ranks([(name, model(), motion) for name, motion in cases.items()])
+    assert list(table["rank"] < table.unknowns) == [True, False, False, True]

@@ -3,13 +3,21 @@
 from job import job
 
 with job(snakemake) as settings:
+    import pandas as pd
+
     from imuarray.provenance import write_csv
     from imuarray.studies.batches import share
-    from imuarray.studies.calibrated import calibrated
+    from imuarray.studies.calibrated import ML_MORE, calibrated
+    from imuarray.studies.levels import METHODS
     from imuarray.studies.truths import setting_from
 
     chosen = snakemake.wildcards
     setting = setting_from(settings, chosen.setting, int(chosen.samples))
-    whole = range(settings["scale"]["validation_replicates"])
-    mine = share(whole, int(chosen.part), snakemake.params.parts)
-    write_csv(calibrated(setting, mine, snakemake.threads), snakemake.output[0])
+    count = settings["scale"]["validation_replicates"]
+    place = int(chosen.part), snakemake.params.parts
+    samplers = [method for method in METHODS if method != "ML"]
+    tables = [
+        calibrated(setting, share(range(ML_MORE * count), *place), snakemake.threads, ["ML"]),
+        calibrated(setting, share(range(count), *place), snakemake.threads, samplers),
+    ]
+    write_csv(pd.concat(tables), snakemake.output[0])

@@ -12,7 +12,7 @@ with job(snakemake) as settings:
     levels = pd.concat([pd.read_csv(path) for path in snakemake.input.levels])
     table = validation.histogram(levels)
     footer = [
-        scale_line(settings, f"{table.replicates.max()} truths from the prior per panel"),
+        scale_line(settings, "n: truths from the prior, those without intervals left out"),
         "Histograms of all positions' coordinates; band: 95 % for all bins of a panel together.",
     ]
     figure = validation.rank_figure(table, footer)

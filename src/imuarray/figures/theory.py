@@ -68,7 +68,8 @@ def convergence_figure(table: pd.DataFrame, nominal_sd: float, footer=()):
     """Iterations to 1.01 times the bound over the motion, and ML-BCD's rate, foreseen and seen.
 
     ``table``: `studies.bound.convergence` of the array, then of others. Motions that tell hardly
-    more than the nominal positions, off by ``nominal_sd`` (m), do are left out above.
+    more than the nominal positions, off by ``nominal_sd`` (m), do are left out above; filled
+    triangles at the top are medians beyond the limit of iterations.
     """
     figure = new_figure(footer, height=5.4)
     top, below = figure.subplots(2, 1)
@@ -77,8 +78,14 @@ def convergence_figure(table: pd.DataFrame, nominal_sd: float, footer=()):
         # medians: a run that did not come to an end counts as longer than any other
         told = rows[rows.groupby("angular_rate_dps").bound_m.transform("median") < nominal_sd / 3]
         counts = told[["angular_rate_dps", "bcd_iterations", "newton_iterations"]].fillna(np.inf)
-        medians = counts.groupby("angular_rate_dps").median().replace(np.inf, np.nan)
+        medians = counts.groupby("angular_rate_dps").median()
+        never = medians.index[np.isinf(medians.bcd_iterations)]
+        medians = medians.replace(np.inf, np.nan)
         style = look(index)
+        top.plot(
+            never, np.full(len(never), 1.3 * rows.limit.max()), linestyle="none", marker="^",
+            color=style["color"], markersize=7 - index,
+        )  # fmt: skip
         top.plot(
             medians.index, medians.bcd_iterations, markerfacecolor="none",
             label=rf"$\|\dot\omega\|$ = {acceleration:g} deg/s²", **style,

@@ -28,6 +28,9 @@ COVERAGE = (
     Column("size_z", "z, the array's size", r"$z$, size", "{:+.1f}"),
     Column("misfit_z", "z, misfit of the data", r"$z$, misfit", "{:+.1f}"),
     Column("p", "p of uniform ranks", "$p$", "{:.2g}"),
+    Column("none", "truths without intervals", "none"),
+    Column("stuck", "chains stuck", "stuck"),
+    Column("apart", "farthest from NUTS", "from NUTS", "{:.2f}"),
 )
 NOTES = (
     "Truths drawn from the prior, motion from its own, which the samplers know (the paper's limit"
@@ -35,7 +38,9 @@ NOTES = (
     " size). ±: standard errors over replicates."
     " Scores: normal quantiles of the truth's level; a mean square above 1 (z > 0) means widths too"
     " small."
-    " p: Kolmogorov and Smirnov's, the smallest of all quantities times their number.",
+    " p: Kolmogorov and Smirnov's, the smallest of all quantities times their number."
+    " Stuck: fewer than 50 of 199 kept draws are worth an independent one. Farthest from NUTS: the"
+    " largest rms difference between both methods' levels of one truth; 0.05 is chance.",
 )
 JOINT = (
     Column("sampler", "sampler", "sampler"),
@@ -98,7 +103,8 @@ def rank_figure(table: pd.DataFrame, footer=()):
             axes.axhspan(1 - width, 1 + width, color=SKY, alpha=0.4, linewidth=0)
             axes.axhline(1.0, color=BLACK, linewidth=0.6)
             axes.stairs(rows.density, [*rows.low, 1.0], color=look(2)["color"], linewidth=1.2)
-            axes.set_title(f"{method}: {setting}, T = {samples}", size=7)
+            count = rows.replicates.max()
+            axes.set_title(f"{method}: {setting}, T = {samples}, n = {count}", size=7)
     for axes in panels[-1]:
         axes.set_xlabel("share of the posterior below the truth")
     for axes in panels[:, 0]:

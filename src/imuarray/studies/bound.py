@@ -21,6 +21,7 @@ from imuarray.studies.batches import batch_stream, batches, root_mean_square, ru
 
 NEAR = 1.01  # times the bound: as good as efficient
 BCD_LIMIT = 20000  # iterations after which ML-BCD is given up
+PATIENCE = 400  # iterations of Gauss-Newton where noise is large
 SCORING_LIMIT = 10  # and Gauss-Newton
 RANK = 1e-10  # of the largest eigenvalue of the scaled information
 
@@ -121,7 +122,7 @@ def _one(model, rng, samples, motion, options):
     known = information_at(model, moves, truth, saturated)
     out = []
     for given in (None, prior):
-        found = descend(data, model.array.relative, given, covariance=False)
+        found = descend(data, model.array.relative, given, limit=PATIENCE, covariance=False)
         error = (found.positions - truth)[1:].ravel()
         whole = known if given is None else known + given[1]
         out.append([
@@ -212,6 +213,7 @@ def _convergence_row(model, rng, samples, motion, options):
         "bcd_iterations": made.bcd,
         "newton_iterations": made.newton,
         "contraction": contraction(known, block_information(model, moves)),
+        "limit": options["limit"],
         "observed": made.observed,
     }
 

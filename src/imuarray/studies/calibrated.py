@@ -15,6 +15,9 @@ from imuarray.studies.levels import METHODS, names_of
 from imuarray.studies.truths import Setting, replicate
 
 LEVELS = (0.5, 0.9, 0.95)
+REFERENCE = "NUTS"  # whose levels the others' are compared with, replicate by replicate
+ML_MORE = 25  # times as many truths as for samplers, as they cost so little
+MIXED = 50  # independent draws of a posterior, of 199: fewer are called stuck
 WHOLE = ("size", "misfit")  # quantities that hang on all coordinates
 
 
@@ -30,13 +33,13 @@ def calibrated(
     )
     names, numbers, frames = np.array(names_of(setting)), np.array(replicates), []
     for method in methods:
-        levels = METHODS[method](setting, made, threads)
+        levels, independent = METHODS[method](setting, made, threads)
         rows, columns = np.indices(levels.shape)
         frames.append(
             pd.DataFrame(
                 {"setting": setting.name, "method": method, "samples": setting.samples,
                  "replicate": numbers[rows.ravel()], "quantity": names[columns.ravel()],
-                 "level": levels.ravel()}
+                 "level": levels.ravel(), "independent": independent[rows.ravel()]}
             )
         )  # fmt: skip
     return pd.concat(frames, ignore_index=True)
@@ -49,6 +52,8 @@ def coverage(levels: pd.DataFrame) -> pd.DataFrame:
     errors over replicates (coordinates of one replicate are not independent); ``shift_z`` and
     ``width_z``, the mean normal score and the mean squared one less 1 over all coordinates of a
     replicate, ``size_z`` and ``misfit_z``, the mean scores of those, in standard errors; and
+    ``none``, replicates without intervals; ``stuck``, chains with few independent draws; ``apart``,
+    how far from NUTS' a replicate's levels are at most (rms; 0.05 is their own noise); and
     ``p``, the smallest Kolmogorov-Smirnov p-value of a quantity times their number.
     """
     rows = []
@@ -57,7 +62,11 @@ def coverage(levels: pd.DataFrame) -> pd.DataFrame:
         grid = part.pivot(index="replicate", columns="quantity", values="level")
         grid = grid.dropna(axis="columns", how="all").dropna()
         own = grid.drop(columns=[name for name in WHOLE if name in grid]).to_numpy()
-        row = dict(zip(keys, key, strict=True)) | {"replicates": len(grid)}
+        mixed = part.groupby("replicate").independent.first()
+        row = dict(zip(keys, key, strict=True)) | {
+            "replicates": len(grid), "none": part.replicate.nunique() - len(grid),
+            "stuck": int(np.sum(mixed < MIXED)), "apart": _apart(levels, key),
+        }  # fmt: skip
         for share in LEVELS:
             inside = (np.abs(own - 0.5) < share / 2).mean(axis=1)
             row[f"covered_{100 * share:.0f}"] = inside.mean()
@@ -70,6 +79,17 @@ def coverage(levels: pd.DataFrame) -> pd.DataFrame:
         smallest = min(stats.kstest(grid[name], "uniform").pvalue for name in grid)
         rows.append({**row, "p": min(1.0, smallest * grid.shape[1])})
     return pd.DataFrame(rows)
+
+
+def _apart(levels: pd.DataFrame, key) -> float:
+    """Largest rms difference of a replicate's coordinates' levels from `REFERENCE`'s."""
+    setting, method, samples = key
+    same = levels[(levels.setting == setting) & (levels.samples == samples)]
+    same = same[~same.quantity.isin(WHOLE)]
+    places = ["replicate", "quantity"]
+    own, other = (same[same.method == name].set_index(places).level for name in (method, REFERENCE))
+    square = ((own - other) ** 2).dropna().groupby("replicate").mean()
+    return float(np.sqrt(square.max())) if method != REFERENCE and len(square) else np.nan
 
 
 def _mean_z(scores) -> float:

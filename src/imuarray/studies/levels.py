@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from scipy import stats
@@ -19,9 +20,12 @@ APART = 2.0  # posterior sds by which chains start off the mode
 WARMUP, SPACING = 200, 4  # NUTS: transitions to settle in, transitions between kept draws
 PILOT, PILOT_ESS = 20000, 200  # transitions of PmMH at a time, until so many are effective
 BLOCKS = (1, 2, 5, 10, 20, 50, 100, 200, 500)  # of them, after which that is looked at
+ROUNDS, LEARNT = 6, 100  # of a burn-in, draws in each
+FIRST = 100  # transitions between them at least
 TINY = 1e-12
+Found = tuple[np.ndarray, np.ndarray]  # levels (R, P + 2), how many draws are independent (R,)
 WIDER = 1.05  # than the mode's curvature, for autoregressive proposals
-WIDENING = 1.005  # of the draws of omega beyond the integrand's curvature
+SHORTER = 4.0  # every other stretch of transitions of autoregressive proposals
 
 
 def names_of(setting: Setting) -> list[str]:
@@ -49,7 +53,12 @@ def of_draws(setting: Setting, made, draws, name: str) -> np.ndarray:
     return np.array(out)
 
 
-def ml(setting: Setting, made, threads: int = 1) -> np.ndarray:
+def independent(draws) -> np.ndarray:
+    """How many of the kept draws (R, L, P) are worth an independent one, at worst: (R,)."""
+    return np.array([ess(one[None]).min() for one in draws])
+
+
+def ml(setting: Setting, made, threads: int = 1) -> Found:
     """Under a normal density around the ML estimate; NaN of the misfit, and where there is none."""
     size = setting.prior.mean / np.linalg.norm(setting.prior.mean)
     out = []
@@ -59,7 +68,7 @@ def ml(setting: Setting, made, threads: int = 1) -> np.ndarray:
         # 0 and 1 themselves have no normal score
         found = [*np.clip(stats.norm.cdf([*away / sd, along]), TINY, 1 - TINY), np.nan]
         out.append(found if one.ml_converged else [np.nan] * len(found))
-    return np.array(out)
+    return np.array(out), np.full(len(out), np.nan)
 
 
 def _start(setting: Setting, one: Replicate, name: str) -> np.ndarray:
@@ -68,7 +77,7 @@ def _start(setting: Setting, one: Replicate, name: str) -> np.ndarray:
     return rng.multivariate_normal(one.mode, APART**2 * one.covariance)
 
 
-def nuts(setting: Setting, made, threads: int = 1) -> np.ndarray:
+def nuts(setting: Setting, made, threads: int = 1) -> Found:
     """By NUTS on the exact marginal likelihood."""
     from imuarray.model.jax64 import jnp
     from imuarray.posterior.marginal import Marginal, log_marginal
@@ -96,7 +105,8 @@ def nuts(setting: Setting, made, threads: int = 1) -> np.ndarray:
         [_start(setting, one, name) for one in made], WARMUP, DRAWS * SPACING,
         [int(stream(*where, one.number).integers(2**31)) for one in made], threads,
     )  # fmt: skip
-    return of_draws(setting, made, draws[:, SPACING - 1 :: SPACING], name)
+    kept = draws[:, SPACING - 1 :: SPACING]
+    return of_draws(setting, made, kept, name), independent(kept)
 
 
 def _walk(setting: Setting, pilot: Replicate, rng):
@@ -111,54 +121,89 @@ def _walk(setting: Setting, pilot: Replicate, rng):
 
     steps = np.sqrt(np.diag(pilot.covariance)).mean() * np.geomspace(1e-3, 3.0, 12)
     rates = tuning.acceptance_sweep(target(pilot), pilot.mode, steps, 1000, rng)
-    return target, tuning.choose_step(steps, rates)
+    return target, (tuning.choose_step(steps, rates),)
 
 
 def _shaped(setting: Setting, pilot: Replicate, rng):
-    """The same likelihood drawn around each mode, proposals of the posterior's shape."""
+    """The same likelihood, proposals of the posterior's shape.
 
-    def centred(one):
-        return one.likelihood.centred(positions_of(one.mode), WIDENING)
-
-    draws = tuning.enough_draws(centred(pilot), positions_of(pilot.mode), rng)
+    Omega is drawn as the paper has it: draws around the integrand's mode at one theta are too
+    narrow for others as far off as these posteriors are wide, and chains stick.
+    """
+    draws = tuning.enough_draws(pilot.likelihood, positions_of(pilot.mode), rng)
 
     def target(one):
         factor = WIDER * np.linalg.cholesky(one.covariance)
-        return AutoregressiveTarget(centred(one), setting.prior, draws, one.mode, factor)
+        return AutoregressiveTarget(one.likelihood, setting.prior, draws, one.mode, factor)
 
     lengths = np.geomspace(0.05, 0.99, 10)
     rates = tuning.acceptance_sweep(target(pilot), pilot.mode, lengths, 1000, rng)
-    return target, float(lengths[np.argmax(rates * lengths**2)])
+    best = float(lengths[np.argmax(rates * lengths**2)])
+    # the tails are not the normal density's: where long steps are refused, short ones are not
+    return target, (best, best / SHORTER)
 
 
 def _pmmh(kernel: Callable, name: str):
     """Levels by PmMH; step and thinning from a pilot data set of its own."""
 
-    def levels(setting: Setting, made, threads: int = 1) -> np.ndarray:
+    def levels(setting: Setting, made, threads: int = 1) -> Found:
         rng = stream(setting.seed, "calibrated", name, "pilot", setting.name, setting.samples)
         pilot = replicate(setting, SPARE)
-        make, step = kernel(setting, pilot, rng)
-        thin = _thinning(make(pilot), pilot.mode, step, rng)
+        make, lengths = kernel(setting, pilot, rng)
+        theta = pilot.mode.copy()
+        target, _ = _learnt(make(pilot), theta, lengths, FIRST, rng)
+        thin = _thinning(target, theta, lengths, rng)
 
         def chain(one):
             where = setting.name, setting.samples, one.number
             own = stream(setting.seed, "calibrated", name, "chain", *where)
-            target, theta = make(one), _start(setting, one, name)
-            value = target.log_target(theta, own)
-            _, value = target.transitions(theta, value, step, DRAWS * thin // 4, own)
+            theta = _start(setting, one, name)
+            target, value = _learnt(make(one), theta, lengths, max(FIRST, thin // 4), own)
             out = np.empty((DRAWS, theta.size))
             for row in out:
-                _, value = target.transitions(theta, value, step, thin, own)
+                value = _moved(target, theta, value, lengths, thin, own)
                 row[:] = theta
             return out
 
         draws = run_batches(chain, made, threads, True, name)
-        return of_draws(setting, made, draws, name)
+        return of_draws(setting, made, draws, name), independent(draws)
 
     return levels
 
 
-def _thinning(target, start, step, rng) -> int:
+def _learnt(target, theta, lengths, spacing: int, rng):
+    """(target, log target) after a burn-in that moves ``theta`` in place.
+
+    Autoregressive proposals learn centre and shape in it, and keep them from then on: where data
+    tell little the posterior's mass is some sds from its mode.
+    """
+    value = target.log_target(theta, rng)
+    for _ in range(ROUNDS):
+        kept = np.empty((LEARNT, theta.size))
+        for row in kept:
+            value = _moved(target, theta, value, lengths, spacing, rng)
+            row[:] = theta
+        if isinstance(target, AutoregressiveTarget):
+            target = _reshaped(target, kept[LEARNT // 4 :])
+    return target, value
+
+
+def _reshaped(target: AutoregressiveTarget, kept) -> AutoregressiveTarget:
+    """Around what was seen; the shape's prior weighs as much as a draw for each coordinate."""
+    centre, (count, size) = kept.mean(axis=0), kept.shape
+    seen, before = np.cov(kept.T), target.factor @ target.factor.T / WIDER**2
+    factor = WIDER * np.linalg.cholesky((count * seen + size * before) / (count + size))
+    return replace(target, centre=centre, factor=factor)
+
+
+def _moved(target, theta, value, lengths, count, rng) -> float:
+    """At least ``count`` transitions of ``theta`` in place, steps of each length by turns."""
+    for length in lengths:
+        _, value = target.transitions(theta, value, length, -(-count // len(lengths)), rng)
+    return value
+
+
+def _thinning(target, start, lengths, rng) -> int:
     """Transitions after which a chain has nearly forgotten, for the slowest parameter."""
     theta = start.copy()
     value = target.log_target(theta, rng)
@@ -166,7 +211,7 @@ def _thinning(target, start, step, rng) -> int:
     while effective < PILOT_ESS and len(blocks) < BLOCKS[-1]:
         kept = np.empty((PILOT // 20, theta.size))
         for row in kept:
-            _, value = target.transitions(theta, value, step, 20, rng)
+            value = _moved(target, theta, value, lengths, 20, rng)
             row[:] = theta
         blocks.append(kept)
         if len(blocks) in BLOCKS:
