@@ -58,7 +58,7 @@ def test_levels_are_uniform_where_data_tell_little():
 
 
 def test_samplers_agree_truth_by_truth_where_data_tell_little():
-    """Numbers 69 and 138 stuck before the burn-in learnt where their mass is: 4 sds off the mode."""
+    """Numbers 69 and 138 stuck before the burn-in learnt where the mass is, 4 sds off the mode."""
     numbers = [*range(4), 69, 138]
     methods = ["PmMH, autoregressive", "NUTS"]
     levels = calibrated.calibrated(setting("hard"), numbers, methods=methods)
