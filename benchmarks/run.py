@@ -227,7 +227,7 @@ def against_scipy(model, rng, samples=30):
     apart = np.abs(positions_of(solved.x[: first.size]) - own().positions).max()
     return [
         (
-            f"scipy.optimize.least_squares, N = {samples}, dense, exact Jacobian, {solved.njev} of it",
+            f"scipy.optimize.least_squares, N = {samples}, {solved.njev} dense Jacobians",
             f"{slow:.2f} s",
             "1",
         ),
