@@ -13,6 +13,7 @@ for kind in local slurm; do
     cp "$root/config.yaml" "$where/$kind/config.yaml"
 done
 common="-s $root/Snakefile --configfile config.yaml --quiet rules"
+# a directory that has been used before is gone on with
 (cd "$where/local" && snakemake $common --workflow-profile none --cores 2 quick)
 # without accounting squeue is what tells of jobs; a node of our own needs no patience
 (cd "$where/slurm" && snakemake $common --workflow-profile "$root/profiles/slurm" \
