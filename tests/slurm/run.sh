@@ -15,9 +15,10 @@ done
 common="-s $root/Snakefile --configfile config.yaml --quiet rules"
 # a directory that has been used before is gone on with
 (cd "$where/local" && snakemake $common --workflow-profile none --cores 2 quick)
-# without accounting squeue is what tells of jobs; a node of our own needs no patience
+# without accounting squeue is what tells of jobs; a node of our own needs no patience, and groups
+# of no more jobs side by side than it has cores
 (cd "$where/slurm" && snakemake $common --workflow-profile "$root/profiles/slurm" \
     --jobs 2 --slurm-no-account --slurm-status-command squeue \
     --slurm-init-seconds-before-status-checks 1 --seconds-between-status-checks 1 \
-    --latency-wait 5 quick)
+    --group-components tuning=1 claims=2 bound=2 drawing=2 --latency-wait 5 quick)
 cd "$root" && python -m tests.trees "$where/local/results" "$where/slurm/results"
