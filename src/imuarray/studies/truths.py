@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.config import model_from
+from imuarray.errors import IdentifiabilityError
 from imuarray.estimation.newton import descend
 from imuarray.geometry import positions_of, sub_array
 from imuarray.model import ArrayModel
@@ -88,11 +89,20 @@ def replicate(setting: Setting, number: int) -> Replicate:
     force, rate, _ = measure(model, motion, positions_of(truth), rng)
     likelihood = Likelihood.of(model, force, rate, motion_sd=setting.motion_sd[:2])
     best = _most_likely(setting, likelihood, rng)
-    plain = descend(likelihood.collapsed, best.positions)
     return Replicate(
-        number, truth, likelihood, best.positions[1:].ravel(),
-        best.covariance, plain.positions[1:].ravel(), plain.covariance, plain.converged,
+        number, truth, likelihood, best.positions[1:].ravel(), best.covariance,
+        *_without_prior(likelihood, best.positions),
     )  # fmt: skip
+
+
+def _without_prior(likelihood: Likelihood, start):
+    """(most likely positions (P,), their covariance, converged); NaN where data do not tell."""
+    try:
+        found = descend(likelihood.collapsed, start)
+    except IdentifiabilityError:
+        size = start[1:].size
+        return np.full(size, np.nan), np.full((size, size), np.nan), False
+    return found.positions[1:].ravel(), found.covariance, found.converged
 
 
 def _most_likely(setting: Setting, likelihood: Likelihood, rng):
