@@ -10,9 +10,9 @@ from jinja2 import Environment, StrictUndefined
 HEAD = """# Figures and tables of the two papers
 
 Made by `snakemake` at scale `{scale}`, seed {seed}; do not edit. Every claim of the papers with
-our value and a verdict: [claims.md](claims.md), [claims.csv](claims.csv). Figures of `theory` and `validate` are in
-[docs/uncertainty.md](../docs/uncertainty.md), of `blind` in the [README](../README.md#what-was-found), of diagnoses in
-[docs/measured.md](../docs/measured.md).
+our value and a verdict: [claims.md](claims.md), [claims.csv](claims.csv). Figures of `theory` and
+`validate` are in [docs/uncertainty.md](../docs/uncertainty.md), of `blind` in the
+[README](../README.md#what-was-found), of diagnoses in [docs/measured.md](../docs/measured.md).
 
 The chains behind the figures and tables of 2021:
 
