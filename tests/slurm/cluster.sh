@@ -74,6 +74,7 @@ down() {
     pkill -x slurmd || true
     pkill -x slurmctld || true
     pkill -x munged || true
+    while pgrep -x slurmctld >/dev/null || pgrep -x slurmd >/dev/null; do sleep 0.2; done
     if [ -e "$conf" ] && grep -qF "$mark" "$conf"; then rm -f "$conf"; fi
     rm -rf "$state"
 }
