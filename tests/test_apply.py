@@ -79,3 +79,13 @@ def test_what_does_not_fit_is_refused(files, tmp_path, capsys):
     assert main(["apply", str(calibration), str(tmp_path / "other.nc"), "--out", str(out)]) == 2
     assert "expected positions of a, b, c, d, e" in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_a_calibration_with_effects_says_them_and_is_refused(files, tmp_path, capsys):
+    _, recording, _ = files
+    cal, out = tmp_path / "cal.nc", tmp_path / "motion.nc"
+    command = f"calibrate {recording} --method gauss-newton --effects gyroscope_bias --out {cal}"
+    assert main(command.split()) == 0
+    assert "effect parameter: value (sd)\ngyroscope_bias" in capsys.readouterr().out
+    assert main(["apply", str(cal), str(recording), "--out", str(out)]) == 2
+    assert "without --effects" in capsys.readouterr().err

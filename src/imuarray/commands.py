@@ -57,6 +57,8 @@ def calibrate(arguments) -> None:
     write_netcdf(dataset, arguments.out)
     if not arguments.quiet:
         _report(recording, found, dataset)
+        if model.effects:
+            _say_effects(dataset)
         _say_informative(recording, found, dataset)
         _say_misfit(recording, model, found, saturated)
 
@@ -110,6 +112,15 @@ def _report(recording, found, dataset) -> None:
     for label, row, sd in zip(recording.accelerometer_labels, found.positions, sds, strict=True):
         values = "  ".join(f"{1e3 * value:8.4f}" for value in row)
         print(f"{label:>5} {values}    {', '.join(f'{1e6 * value:.2g}' for value in sd)}")
+
+
+def _say_effects(dataset) -> None:
+    """The effects' parameters, in their own units (docs/effects.md)."""
+    print("effect parameter: value (sd)")
+    names = dataset["parameter"].to_numpy()
+    columns = names, dataset["effect_parameter"].to_numpy(), dataset["effect_sd"].to_numpy()
+    for name, value, sd in zip(*columns, strict=True):
+        print(f"{name}: {value:.4g} ({sd:.2g})")
 
 
 def _say_informative(recording, found, dataset) -> None:
