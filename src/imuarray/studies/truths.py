@@ -95,6 +95,14 @@ def replicate(setting: Setting, number: int) -> Replicate:
     )  # fmt: skip
 
 
+def _descended(data, start, prior: GaussianPrior):
+    """The mode found from ``start`` (P,), or None where the search ran to positions all in line."""
+    try:
+        return descend(data, positions_of(start), (prior.mean, np.diag(prior.sd**-2.0)))
+    except IdentifiabilityError:
+        return None
+
+
 def _without_prior(likelihood: Likelihood, start):
     """(most likely positions (P,), their covariance, converged); NaN where data do not tell."""
     try:
@@ -116,10 +124,10 @@ def _most_likely(setting: Setting, likelihood: Likelihood, rng):
     enough = GOOD * 3 * setting.model.array.accelerometers * setting.samples
     best, start = None, prior.mean
     for _ in range(STARTS):
-        found = descend(data, positions_of(start), (prior.mean, np.diag(prior.sd**-2.0)))
-        if best is None or found.cost[-1] < best.cost[-1]:
+        found = _descended(data, start, prior)
+        if found is not None and (best is None or found.cost[-1] < best.cost[-1]):
             best = found
-        if best.cost[-1] < enough:
+        if best is not None and best.cost[-1] < enough:
             break
         start = prior.mean + prior.sd * rng.standard_normal(prior.mean.size)
     return best
