@@ -29,7 +29,7 @@ COVERAGE = (
     Column("misfit_z", "z, misfit of the data", r"$z$, misfit", "{:+.1f}"),
     Column("p", "p of uniform ranks", "$p$", "{:.2g}"),
     Column("none", "truths without intervals", "none"),
-    Column("stuck", "chains stuck", "stuck"),
+    Column("stuck", "slow chains", "slow"),
     Column("apart", "farthest from NUTS", "from NUTS", "{:.2f}"),
 )
 NOTES = (
@@ -39,7 +39,7 @@ NOTES = (
     " Scores: normal quantiles of the truth's level; a mean square above 1 (z > 0) means widths too"
     " small."
     " p: Kolmogorov and Smirnov's, the smallest of all quantities times their number."
-    " Stuck: fewer than 50 of 199 kept draws are worth an independent one. Farthest from NUTS: the"
+    " Slow: fewer than 50 of 199 kept draws are worth an independent one. Farthest from NUTS: the"
     " largest rms difference between both methods' levels of one truth; 0.05 is chance.",
 )
 JOINT = (
@@ -68,7 +68,7 @@ def histogram(levels: pd.DataFrame) -> pd.DataFrame:
     """
     frames = []
     edges = np.linspace(0, 1, BINS + 1)
-    own = levels[~levels.quantity.isin(WHOLE)].dropna()
+    own = levels[~levels.quantity.isin(WHOLE)].dropna(subset="level")
     for (setting, method, samples), part in own.groupby(
         ["setting", "method", "samples"], sort=False
     ):
