@@ -149,4 +149,4 @@ def test_histogram_of_uniform_levels_is_flat():
     assert table.density.mean() == pytest.approx(1.0)
     assert np.abs((table.density - 1) / table.se).max() < 4.5
     figure = validation.rank_figure(table, ["Scale quick"])
-    assert [axes.get_title() for axes in figure.axes] == ["x: s, T = 5"]
+    assert [axes.get_title() for axes in figure.axes] == ["x: s, T = 5, n = 400"]
