@@ -13,6 +13,7 @@ from pathlib import Path
 # as the pipeline's jobs have it: small products only wait for BLAS' other threads
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+import numba as nb  # noqa: E402
 import numpy as np  # noqa: E402
 from scipy.optimize import least_squares  # noqa: E402
 
@@ -130,6 +131,48 @@ def triads(model, rng):
     return [exponents("likelihood, growth in A", sizes, jobs)]
 
 
+@nb.njit
+def normals(generator, count):
+    """Sum of so many, drawn as the kernel draws them."""
+    total = 0.0
+    for _ in range(count):
+        total += generator.standard_normal()
+    return total
+
+
+@nb.njit
+def exponentials(exponents):
+    """Sum of exp, as in the kernel's log-mean-exp."""
+    total = 0.0
+    for value in exponents:
+        total += np.exp(value)
+    return total
+
+
+def profile(model, rng, samples=500, draws=24):
+    """Rows: what an estimate of the likelihood spends on a draw of omega, one thread."""
+    generator = np.random.Generator(np.random.PCG64DXSM(1))
+    likelihood = Likelihood.of(model, *dataset(model, samples, rng))
+    positions, count = model.array.relative, samples * draws
+    exponents = -5 * rng.random(count)
+    whole, many, numbers, powers = interleaved(
+        [
+            lambda: likelihood.estimate(positions, draws, generator),
+            lambda: likelihood.estimate(positions, 5 * draws, generator),
+            lambda: normals(generator, 3 * count), lambda: exponentials(exponents),
+        ], 31,
+    )  # fmt: skip
+    drawn = (many - whole) / (4 * count)
+    name = f"likelihood, T = {samples}, N = {draws}, one thread"
+    return [
+        (name, f"{1e6 * whole:.0f} us", ""),
+        ("of that a draw of omega more", f"{1e9 * drawn:.1f} ns", ""),
+        ("of that three normal numbers", f"{1e9 * numbers / count:.1f} ns", ""),
+        ("and an exponential", f"{1e9 * powers / count:.1f} ns", ""),
+        ("theta's own part", f"{1e6 * (whole - drawn * count):.0f} us", ""),
+    ]
+
+
 def gradients(model, rng):
     """Rows: the exact marginal with its gradient, growth in T and A."""
 
@@ -244,7 +287,9 @@ def main():
     arguments = parser.parse_args()
     config = read_config(arguments.config)
     model, rng = model_from(config), np.random.default_rng(config["seed"])
-    rows = against_direct(model, rng) + growth(model, rng) + descent(model, rng)
+    rows = (
+        against_direct(model, rng) + profile(model, rng) + growth(model, rng) + descent(model, rng)
+    )
     rows += to_the_bound(model, rng) + against_scipy(model, rng)
     lines = ["| what | measured | ratio to the direct form, or growth |", "|---|---|---|"]
     lines += [f"| {' | '.join(row)} |" for row in rows]

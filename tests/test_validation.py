@@ -64,7 +64,7 @@ def test_samplers_agree_truth_by_truth_where_data_tell_little():
     levels = calibrated.calibrated(setting("hard"), numbers, methods=methods)
     table = coverage(levels).set_index("method")
     assert table.apart[methods[0]] < 0.15 and np.isnan(table.apart["NUTS"])
-    assert np.all(table.stuck == 0)
+    assert np.all(table.slow == 0)
 
 
 @pytest.mark.parametrize(("name", "rounds"), [("walk", 4000), ("autoregressive", 4000),

@@ -58,7 +58,7 @@ def efficiency_figure(table: pd.DataFrame, footer=()):
     top.set(xscale="log", yscale="log", ylabel="RMSE of the positions (m)")
     below.set(xscale="log", xlabel="Time samples $N$ (count)")
     counts = ", ".join(map(str, others.samples.unique()))
-    louder.set(xscale="log", yscale="log", xlabel=f"Noise, times the sensors' own ($N$ = {counts})")
+    louder.set(xscale="log", xlabel=f"Noise, times the sensors' own ($N$ = {counts})")
     top.legend(loc="upper right")
     return figure
 

@@ -29,7 +29,7 @@ COVERAGE = (
     Column("misfit_z", "z, misfit of the data", r"$z$, misfit", "{:+.1f}"),
     Column("p", "p of uniform ranks", "$p$", "{:.2g}"),
     Column("none", "truths without intervals", "none"),
-    Column("stuck", "slow chains", "slow"),
+    Column("slow", "slow chains", "slow"),
     Column("apart", "farthest from NUTS", "from NUTS", "{:.2f}"),
 )
 NOTES = (

@@ -17,7 +17,7 @@ from imuarray.studies.truths import Setting, replicate
 LEVELS = (0.5, 0.9, 0.95)
 REFERENCE = "NUTS"  # whose levels the others' are compared with, replicate by replicate
 ML_MORE = 25  # times as many truths as for samplers, as they cost so little
-MIXED = 50  # independent draws of a posterior, of 199: fewer are called stuck
+MIXED = 50  # independent draws of a posterior, of 199: fewer are a slow chain
 WHOLE = ("size", "misfit")  # quantities that hang on all coordinates
 
 
@@ -52,7 +52,7 @@ def coverage(levels: pd.DataFrame) -> pd.DataFrame:
     errors over replicates (coordinates of one replicate are not independent); ``shift_z`` and
     ``width_z``, the mean normal score and the mean squared one less 1 over all coordinates of a
     replicate, ``size_z`` and ``misfit_z``, the mean scores of those, in standard errors; and
-    ``none``, replicates without intervals; ``stuck``, chains with few independent draws; ``apart``,
+    ``none``, replicates without intervals; ``slow``, chains with few independent draws; ``apart``,
     how far from NUTS' a replicate's levels are at most (rms; 0.05 is their own noise); and
     ``p``, the smallest Kolmogorov-Smirnov p-value of a quantity times their number.
     """
@@ -65,7 +65,7 @@ def coverage(levels: pd.DataFrame) -> pd.DataFrame:
         mixed = part.groupby("replicate").independent.first()
         row = dict(zip(keys, key, strict=True)) | {
             "replicates": len(grid), "none": part.replicate.nunique() - len(grid),
-            "stuck": int(np.sum(mixed < MIXED)), "apart": _apart(levels, key),
+            "slow": int(np.sum(mixed < MIXED)), "apart": _apart(levels, key),
         }  # fmt: skip
         for share in LEVELS:
             inside = (np.abs(own - 0.5) < share / 2).mean(axis=1)

@@ -158,27 +158,34 @@ def independent(seed: int, rounds: int) -> np.ndarray:
     return found
 
 
+def scores_of(name: str, seed: int, rounds: int, right):
+    """Scores of the means of theta, its squares and the misfit, (2 P + 1,), and effective sizes.
+
+    In Monte Carlo standard errors; ``right`` (R,) are misfits as `independent` draws them.
+    """
+    _, prior = problem()
+    draws = np.array(list(SAMPLERS[name][1](name, seed, rounds)))
+    z = (draws[:, :-1] - prior.mean) / prior.sd
+    values = np.hstack([z, z**2, draws[:, -1:]])
+    size = ess_of_mean(values[None])
+    expected = np.concatenate([np.zeros(z.shape[1]), np.ones(z.shape[1]), [right.mean()]])
+    error = values.var(axis=0) / size
+    error[-1] += right.var() / len(right)
+    return (values.mean(axis=0) - expected) / np.sqrt(error), size
+
+
 def joint_test(seed: int, rounds: int, names=tuple(SAMPLERS)) -> pd.DataFrame:
     """A row for each sampler: how far means and squares of theta are from the prior's, and the
     misfit of the measurements from that of independent draws of both."""
-    _, prior = problem()
     right = independent(seed, rounds)
     rows = []
     for name in names:
-        label, sampler = SAMPLERS[name]
-        draws = np.array(list(sampler(name, seed, rounds)))
-        z = (draws[:, :-1] - prior.mean) / prior.sd
-        values = np.hstack([z, z**2, draws[:, -1:]])
-        size = ess_of_mean(values[None])
-        expected = np.concatenate([np.zeros(z.shape[1]), np.ones(z.shape[1]), [right.mean()]])
-        error = values.var(axis=0) / size
-        error[-1] += right.var() / len(right)
-        scores = np.abs(values.mean(axis=0) - expected) / np.sqrt(error)
-        count = z.shape[1]
+        found, size = scores_of(name, seed, rounds, right)
+        scores, count = np.abs(found), len(found) // 2
         rows.append(
-            {"sampler": label, "rounds": len(draws), "parameters": count, "ess_min": size.min(),
-             "mean_z": scores[:count].max(), "square_z": scores[count:-1].max(),
-             "misfit_z": scores[-1],
+            {"sampler": SAMPLERS[name][0], "rounds": rounds, "parameters": count,
+             "ess_min": size.min(), "mean_z": scores[:count].max(),
+             "square_z": scores[count:-1].max(), "misfit_z": scores[-1],
              "p": min(1.0, len(scores) * 2 * stats.norm.sf(scores.max()))}
         )  # fmt: skip
     return pd.DataFrame(rows)
