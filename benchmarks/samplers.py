@@ -21,8 +21,7 @@ import emcee
 import numpy as np
 from written import publish
 
-from imuarray.commands_model import model_of
-from imuarray.commands_sample import density_of
+from imuarray.analysis import density_of, model_of
 from imuarray.config import read_config
 from imuarray.geometry import positions_of
 from imuarray.posterior import (

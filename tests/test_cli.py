@@ -17,12 +17,10 @@ from imuarray.errors import IdentifiabilityError, InputError
 def calls(monkeypatch, tmp_path):
     """Stand-ins for the commands, which note what they were called with."""
     seen = []
-    homes = {"commands": ("simulate", "calibrate"), "commands_sample": ("sample",)}
-    for home, names in homes.items():
-        commands = types.ModuleType(f"imuarray.{home}")
-        for name in names:
-            setattr(commands, name, lambda arguments, name=name: seen.append((name, arguments)))
-        monkeypatch.setitem(sys.modules, f"imuarray.{home}", commands)
+    for name in ("simulate", "calibrate", "sample"):
+        command = types.ModuleType(f"imuarray.commands.{name}")
+        setattr(command, name, lambda arguments, name=name: seen.append((name, arguments)))
+        monkeypatch.setitem(sys.modules, f"imuarray.commands.{name}", command)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "rec.nc").write_text("stands for a recording")
     (tmp_path / "c.yaml").write_text("scale: quick")
@@ -34,9 +32,9 @@ def fail_with(monkeypatch, error):
     def command(arguments):
         raise error
 
-    commands = types.ModuleType("imuarray.commands")
-    commands.calibrate = command
-    monkeypatch.setitem(sys.modules, "imuarray.commands", commands)
+    module = types.ModuleType("imuarray.commands.calibrate")
+    module.calibrate = command
+    monkeypatch.setitem(sys.modules, "imuarray.commands.calibrate", module)
 
 
 def error_line(capsys):
@@ -136,7 +134,7 @@ def test_a_warning_is_one_line():
     """In a process of its own: pytest collects warnings before they are printed."""
     code = (
         "import sys, types, warnings; from imuarray.cli import main\n"
-        "m = sys.modules['imuarray.commands'] = types.ModuleType('m')\n"
+        "m = sys.modules['imuarray.commands.calibrate'] = types.ModuleType('m')\n"
         "m.calibrate = lambda a: warnings.warn('a gap\\nin time', stacklevel=1)\n"
         "sys.exit(main(['calibrate', sys.executable, '--out', 'cal.nc']))"
     )
@@ -177,7 +175,7 @@ def test_a_wrong_recording_end_to_end(tmp_path):
     code = (
         "import sys, types; from imuarray.cli import main\n"
         "from imuarray.recording import read_recording\n"
-        "m = sys.modules['imuarray.commands'] = types.ModuleType('m')\n"
+        "m = sys.modules['imuarray.commands.calibrate'] = types.ModuleType('m')\n"
         "m.calibrate = lambda arguments: read_recording(arguments.recording)\n"
         "sys.exit(main(sys.argv[1:]))"
     )

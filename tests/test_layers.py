@@ -11,9 +11,7 @@ LAYERS = (
     ("errors",), ("streams", "provenance", "geometry"), ("motion",), ("model", "config"),
     ("recording",), ("simulation", "firstorder", "estimation"), ("posterior",),
     ("studies", "measured"), ("blind", "criticism"), ("claims", "figures"), ("report",),
-    ("commands_model",),
-    ("commands", "commands_apply", "commands_criticism", "commands_measured", "commands_sample"),
-    ("argument_types",), ("parser",), ("cli",),
+    ("analysis",), ("plots",), ("commands",), ("cli",),
 )  # fmt: skip
 PLACE = {name: number for number, names in enumerate(LAYERS) for name in names}
 

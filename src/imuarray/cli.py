@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from imuarray.commands.parser import make_parser
 from imuarray.errors import InputError
-from imuarray.parser import make_parser
 
 OK, BAD_INPUT, INTERRUPTED, CLOSED = 0, 2, 130, 141
 

@@ -3,9 +3,9 @@
 from job import job
 
 with job(snakemake):
-    from imuarray.commands_measured import write_corrected
     from imuarray.firstorder import calibrate_first_order, report
     from imuarray.firstorder.correct import STANDARD_GRAVITY
+    from imuarray.firstorder.store import write_corrected
     from imuarray.provenance import write_csv
     from imuarray.recording import read_recording
 

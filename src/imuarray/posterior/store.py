@@ -10,6 +10,11 @@ from imuarray.provenance import write_netcdf
 
 
 def write_chains(path, chains: Chains, labels, prior, attrs: dict, effects=None) -> None:
+    """Write what `chain_tree` makes of the chains."""
+    write_netcdf(chain_tree(chains, labels, prior, attrs, effects), path)
+
+
+def chain_tree(chains: Chains, labels, prior, attrs: dict, effects=None) -> xr.DataTree:
     """Groups posterior, sample_stats and prior; dims chain, draw, accelerometer, axis.
 
     ``labels`` of the A - 1 estimated triads; ``prior`` a `GaussianPrior`; ``attrs`` the
@@ -41,23 +46,28 @@ def write_chains(path, chains: Chains, labels, prior, attrs: dict, effects=None)
         "/sample_stats": stats,
         "/prior": xr.Dataset(fields, coords),
     }
-    write_netcdf(xr.DataTree.from_dict(groups), path)
+    return xr.DataTree.from_dict(groups)
 
 
 def read_chains(path) -> tuple[Chains, xr.DataTree]:
     """The chains and the whole tree of a file that `write_chains` made."""
     with xr.open_datatree(path, engine="h5netcdf") as opened:
         tree = opened.load()
+    return chains_of(tree), tree
+
+
+def chains_of(tree: xr.DataTree) -> Chains:
+    """The chains in a tree that `chain_tree` made."""
     position = tree["posterior"]["position"].to_numpy()
     draws = position.reshape(*position.shape[:2], -1)
     if "effect_parameter" in tree["posterior"]:
         draws = np.concatenate([draws, tree["posterior"]["effect_parameter"].to_numpy()], axis=2)
     stats = tree["sample_stats"]
-    chains = Chains(
+    return Chains(
         draws,
         stats["log_target"].to_numpy(),
         stats["acceptance"].to_numpy(),
         int(tree.attrs["thin"]),
         float(tree.attrs["step_length_m"]),
+        int(tree.attrs.get("divergent", 0)),
     )
-    return chains, tree

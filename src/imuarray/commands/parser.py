@@ -1,38 +1,26 @@
 """The command line's parser: commands, options and their help; nothing heavy loads here."""
 
 import argparse
-from collections.abc import Callable
-from importlib import import_module
 from pathlib import Path
-from typing import NoReturn
 
 import imuarray
-from imuarray.argument_types import count, effects, positive, seed
-from imuarray.errors import InputError
+from imuarray.commands.argument_types import count, effects, positive, seed
+from imuarray.commands.options import (
+    Parser,
+    add_command,
+    add_effects,
+    add_model,
+    add_recording,
+    later,
+)
 
 CALIBRATION_METHODS = ("bcd", "gauss-newton")
 SAMPLING_METHODS = ("pmmh", "nuts")
 
 
-class _Parser(argparse.ArgumentParser):
-    """Reports a wrong command line as one line, like every other wrong input."""
-
-    def error(self, message: str) -> NoReturn:
-        raise InputError(f"{message} (see '{self.prog} --help')")
-
-
-def _later(module: str, name: str) -> Callable[[argparse.Namespace], None]:
-    """The function ``name`` of ``imuarray.<module>``, loaded when it is called."""
-
-    def run(arguments: argparse.Namespace) -> None:
-        getattr(import_module(f"imuarray.{module}"), name)(arguments)
-
-    return run
-
-
 def make_parser() -> argparse.ArgumentParser:
     """What it parses has the command's function as ``run``; a wrong line is an InputError."""
-    parser = _Parser(
+    parser = Parser(
         prog="imuarray", description="Calibrate the geometry of inertial sensor arrays."
     )
     parser.add_argument("--version", action="version", version=f"imuarray {imuarray.__version__}")
@@ -50,46 +38,11 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _add_command(commands, name, run, summary, example, out, full=None) -> argparse.ArgumentParser:
-    """One subcommand, with what all of them have; ``full`` is its name after another one."""
-    parser = commands.add_parser(
-        name, help=summary, description=summary,
-        epilog=f"example: imuarray {full or name} {example}",
-    )  # fmt: skip
-    parser.add_argument("--out", required=True, type=Path, metavar="FILE", help=out)
-    parser.add_argument("--quiet", action="store_true", help="no progress, no summary")
-    parser.set_defaults(run=run)
-    return parser
-
-
-def _add_recording(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("recording", type=Path, help="NetCDF-4 recording to read")
-
-
-def _add_model(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--accelerometer-noise", type=positive, default=None, metavar="SD",
-        help="assumed sd, m/s^2 (default: as the recording declares)",
-    )  # fmt: skip
-    _add_effects(parser)
-
-
-def _add_effects(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--effects", type=effects, default=(), metavar="A,B",
-        help="effects that extend the measurement model, separated by commas (default: none)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--diagnosis", type=Path, default=None, metavar="FILE",
-        help="diagnosis.json whose extended model to use: its effects, their values, its noise",
-    )  # fmt: skip
-
-
 def _add_simulate(commands) -> None:
-    parser = _add_command(
+    parser = add_command(
         commands,
         "simulate",
-        _later("commands", "simulate"),
+        later("simulate", "simulate"),
         "Simulate a recording; its truth is stored in the group 'truth'.",
         "--config config.yaml --out rec.nc",
         "recording to write (NetCDF-4)",
@@ -97,7 +50,7 @@ def _add_simulate(commands) -> None:
     parser.add_argument(
         "--config", required=True, type=Path, metavar="FILE", help="configuration (YAML)"
     )
-    _add_effects(parser)
+    add_effects(parser)
 
 
 def _add_convert(commands) -> None:
@@ -110,10 +63,10 @@ def _add_convert(commands) -> None:
 
 
 def _add_convert_mimu(kinds) -> None:
-    parser = _add_command(
+    parser = add_command(
         kinds,
         "mimu",
-        _later("commands_measured", "convert_mimu"),
+        later("convert", "convert_mimu"),
         "Read the packets of a MIMU board; damage is located and counted.",
         "data.bin --positions IMU_positions.csv --out rec.nc",
         "recording to write (NetCDF-4)",
@@ -138,10 +91,10 @@ def _add_convert_mimu(kinds) -> None:
 
 
 def _add_convert_csv(kinds) -> None:
-    parser = _add_command(
+    parser = add_command(
         kinds,
         "csv",
-        _later("commands_measured", "convert_csv"),
+        later("convert", "convert_csv"),
         "Read a table; a small YAML names its columns and units (docs/convert.md).",
         "log.csv --columns columns.yaml --out rec.nc",
         "recording to write (NetCDF-4)",
@@ -158,15 +111,15 @@ def _add_convert_csv(kinds) -> None:
 
 
 def _add_first_order(commands) -> None:
-    parser = _add_command(
+    parser = add_command(
         commands,
         "first-order",
-        _later("commands_measured", "first_order"),
+        later("measured", "first_order"),
         "Calibrate each triad by itself from the recording's still poses, and correct it.",
         "rec.nc --gravity 9.818 --out corrected.nc",
         "corrected recording to write (NetCDF-4), with the calibration in group 'first_order'",
     )
-    _add_recording(parser)
+    add_recording(parser)
     parser.add_argument(
         "--gravity", type=positive, default=9.80665, metavar="G",
         help="magnitude of gravity where it was recorded, m/s^2 (default: 9.80665)",
@@ -174,15 +127,15 @@ def _add_first_order(commands) -> None:
 
 
 def _add_select(commands) -> None:
-    parser = _add_command(
+    parser = add_command(
         commands,
         "select",
-        _later("commands_measured", "select"),
+        later("measured", "select"),
         "Keep moving, unsaturated, informative samples; says what each criterion removed.",
         "corrected.nc --samples 500 --out subset.nc",
         "recording to write (NetCDF-4)",
     )
-    _add_recording(parser)
+    add_recording(parser)
     parser.add_argument(
         "--samples", type=count, default=None, metavar="T",
         help="how many, spread evenly (default: all informative ones)",
@@ -190,24 +143,24 @@ def _add_select(commands) -> None:
 
 
 def _add_residuals(commands) -> None:
-    parser = _add_command(
+    parser = add_command(
         commands,
         "residuals",
-        _later("commands_measured", "residuals"),
+        later("measured", "residuals"),
         "Residuals of the papers' model beside those of the recording's own simulation.",
         "corrected.nc --figure residuals.png --out residuals.csv",
         "table to write (CSV)",
     )
-    _add_recording(parser)
+    add_recording(parser)
     parser.add_argument("--figure", type=Path, metavar="FILE", help="figure to write (PNG or PDF)")
     parser.add_argument("--seed", type=seed, default=0, metavar="S", help="of the simulation")
 
 
 def _add_repeat(commands) -> None:
-    parser = _add_command(
+    parser = add_command(
         commands,
         "repeat",
-        _later("commands_measured", "repeat"),
+        later("measured", "repeat"),
         "Do several recordings of one board agree within their claimed widths?",
         "one.nc two.nc three.nc --samples 500 --out agreement.csv",
         "table to write (CSV): z-scores of all pairs",
@@ -225,16 +178,16 @@ def _add_repeat(commands) -> None:
 
 
 def _add_diagnose(commands) -> None:
-    parser = _add_command(
+    parser = add_command(
         commands,
         "diagnose",
-        _later("commands_criticism", "diagnose"),
+        later("diagnose", "diagnose"),
         "What does the simulation get wrong, why, and what does the extended model gain?",
         "corrected.nc --out diagnosis/",
         "folder to write: diagnosis.json, report.html, figures",
     )
     parser.set_defaults(folder=True)
-    _add_recording(parser)
+    add_recording(parser)
     parser.add_argument(
         "--without", type=effects, default=(), metavar="A,B",
         help="effects to strike from the catalogue, separated by commas (default: none)",
@@ -245,16 +198,16 @@ def _add_diagnose(commands) -> None:
 
 
 def _add_calibrate(commands) -> None:
-    parser = _add_command(
+    parser = add_command(
         commands,
         "calibrate",
-        _later("commands", "calibrate"),
+        later("calibrate", "calibrate"),
         "Estimate the accelerometer positions and the motion by maximum likelihood.",
         "rec.nc --method bcd --out cal.nc",
         "estimates to write (NetCDF-4)",
     )
-    _add_recording(parser)
-    _add_model(parser)
+    add_recording(parser)
+    add_model(parser)
     parser.add_argument(
         "--method", choices=CALIBRATION_METHODS, default="bcd",
         help="bcd: block coordinate descent (default); gauss-newton: any effects, fewer iterations",
@@ -262,17 +215,17 @@ def _add_calibrate(commands) -> None:
 
 
 def _add_apply(commands) -> None:
-    parser = _add_command(
+    parser = add_command(
         commands,
         "apply",
-        _later("commands_apply", "apply"),
+        later("apply", "apply"),
         "The calibrated array as one sensor: angular rate, angular acceleration and specific force"
         " at each sample, with covariances.",
         "cal.nc rec.nc --out motion.nc",
         "motion to write (NetCDF-4)",
     )
     parser.add_argument("calibration", type=Path, help="what `imuarray calibrate` has written")
-    _add_recording(parser)
+    add_recording(parser)
     parser.add_argument(
         "--accelerometer-noise", type=positive, default=None, metavar="SD",
         help="assumed sd, m/s^2 (default: as the recording declares)",
@@ -280,16 +233,16 @@ def _add_apply(commands) -> None:
 
 
 def _add_sample(commands) -> None:
-    parser = _add_command(
+    parser = add_command(
         commands,
         "sample",
-        _later("commands_sample", "sample"),
+        later("sample", "sample"),
         "Sample the posterior distribution of the accelerometer positions.",
         "rec.nc --method pmmh --steps 5000 --seed 1 --out posterior.nc",
         "posterior to write (NetCDF-4)",
     )
-    _add_recording(parser)
-    _add_model(parser)
+    add_recording(parser)
+    add_model(parser)
     parser.add_argument(
         "--method", choices=SAMPLING_METHODS, default="pmmh",
         help="pmmh: pseudo-marginal Metropolis-Hastings, as paper 2021 (default); nuts: the"

@@ -1,0 +1,132 @@
+"""The posterior density of a recording's positions: prior, likelihood, mode."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from imuarray.analysis.model import Say, silent
+from imuarray.geometry import positions_of
+from imuarray.model import ArrayModel
+from imuarray.posterior import CompiledTarget, GaussianPrior, GenericTarget, Likelihood, tuning
+from imuarray.posterior.generic import GenericLikelihood
+from imuarray.recording import Recording
+from imuarray.studies.bayes import sample_covariance
+
+GAP = 1e-3  # nats in total
+VARIANCE = 0.1  # wanted of log p-hat, section III-C of paper 2021
+
+
+def density_of(recording: Recording, model: ArrayModel, rates: str = "declared", say: Say = silent):
+    """(log density, prior, mode (P,), covariance (P, P)) of a recording's posterior.
+
+    The log density is a function of p (P,) = (r_2 ... r_A, effect parameters), to be traced and
+    differentiated by JAX. ``rates`` as `imuarray sample --rates` has it.
+    """
+    from imuarray.posterior.marginal import Marginal
+
+    prior = prior_of(recording, model)
+    if model.effects:
+        mode, found = map_estimate(recording, model)
+        likelihood = _generic(recording, model, found)
+        covariance = found.covariance
+    else:
+        estimator = _likelihood(recording, model, rates == "spread")
+        mode, covariance = _mode(recording, model, rates == "spread")
+        likelihood = Marginal.of(estimator, positions_of(mode))
+        if likelihood.gap > GAP:
+            say("gyroscopes that see little of the motion: the likelihood is good to"
+                f" {likelihood.gap:.1g} nats only")  # fmt: skip
+
+    def log_density(p):
+        # traced: no call out of it
+        return likelihood.log_density(p) - 0.5 * (((p - prior.mean) / prior.sd) ** 2).sum()
+
+    return log_density, prior, mode, covariance
+
+
+def prior_of(recording: Recording, model: ArrayModel) -> GaussianPrior:
+    """Of the positions r_2 ... r_A, then of the effects' parameters."""
+    mean = np.concatenate([model.array.parameters, model.effect_prior_mean])
+    sd = np.full(mean.size, recording.position_prior_sd)
+    sd[3 * (model.array.accelerometers - 1) :] = model.effect_prior_sd
+    return GaussianPrior.of(mean, sd)
+
+
+def tuned_target(recording: Recording, model: ArrayModel, rates: str, rng, say: Say = silent):
+    """(target, start near the mode, step length, N) for PmMH, tuned as in section III-C."""
+    if model.effects:
+        return _tuned_generic(recording, model, rng)
+    spread = rates == "spread"
+    likelihood = _likelihood(recording, model, spread)
+    prior = prior_of(recording, model)
+    counts = tuning.COUNTS
+    variances = tuning.variance_sweep(likelihood, model.array.relative, counts, 200, rng)
+    mode, _ = _mode(recording, model, spread)
+    if variances.min() > 2 * VARIANCE:
+        say(f"variance of log p-hat {variances[-1]:.3g} at N = {counts[-1]}: omega is drawn"
+            " around the integrand's mode instead")  # fmt: skip
+        centre = positions_of(mode)
+        likelihood = likelihood.centred(centre)
+        variances = tuning.variance_sweep(likelihood, centre, counts, 200, rng)
+    draws = tuning.choose_draws(counts, variances, VARIANCE)
+    target = CompiledTarget(likelihood, prior, draws)
+    steps = recording.position_prior_sd * np.geomspace(1e-6, 0.3, 16)
+    rates_of = tuning.acceptance_sweep(target, mode, steps, 1000, rng)
+    return target, mode, tuning.choose_step(steps, rates_of), draws
+
+
+def _tuned_generic(recording, model, rng):
+    """The same for a model with effects: Laplace-centred importance sampling of omega."""
+    mode, found = map_estimate(recording, model)
+    estimate = _generic(recording, model, found)
+    target = GenericTarget(
+        estimate, prior_of(recording, model), np.linalg.cholesky(found.covariance)
+    )
+    steps = np.geomspace(1e-3, 1.0, 8)
+    rates = tuning.acceptance_sweep(target, mode, steps, 200, rng)
+    return target, mode, tuning.choose_step(steps, rates), estimate.draws
+
+
+def _likelihood(recording, model, spread: bool) -> Likelihood:
+    """(26a) for the papers' model."""
+    return Likelihood.of(
+        model, recording.specific_force, recording.angular_rate, recording.saturated_gyroscopes(),
+        rate_distribution=sample_covariance(recording.angular_rate) if spread else None,
+    )  # fmt: skip
+
+
+def _mode(recording, model, spread: bool):
+    """MAP (r_2 ... r_A) and the covariance there: the chains' starts spread around it."""
+    from imuarray.measured.positions import locate
+
+    if spread:
+        found = locate(recording, recording.accelerometer_noise_sd)
+        return found.mean[1:].ravel(), found.covariance
+    mode, found = map_estimate(recording, model)
+    return mode, found.covariance
+
+
+def map_estimate(recording: Recording, model: ArrayModel):
+    """(p (P,) at the posterior's mode, the estimator's whole result)."""
+    from imuarray.estimation import calibrate_gauss_newton
+
+    found = calibrate_gauss_newton(
+        model, recording.specific_force, recording.angular_rate,
+        saturated=recording.saturated_gyroscopes(),
+        position_prior=(model.array.parameters, recording.position_prior_sd),
+        time=recording.time,
+    )  # fmt: skip
+    extra = np.empty(0) if found.effect_parameters is None else found.effect_parameters
+    return np.concatenate([found.positions[1:].ravel(), extra]), found
+
+
+def _generic(recording, model, found, draws: int = 2) -> GenericLikelihood:
+    """The likelihood of a model with effects, with the recording's own motion prior."""
+    from imuarray.estimation.blocks import pack_motion
+
+    start = pack_motion(model, found.motion.motion)
+    return GenericLikelihood(
+        model.with_motion(found.motion.motion), recording.specific_force,
+        recording.angular_rate, start, draws=draws, saturated=recording.saturated_gyroscopes(),
+        time=recording.time,
+    )  # fmt: skip

@@ -1,0 +1,99 @@
+"""What the analyses work on: the recording's usable samples, and the model asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from os import PathLike
+
+from imuarray.errors import InputError
+from imuarray.model import ArrayModel
+from imuarray.recording import Recording, array_of
+
+Say = Callable[[str], None]
+
+
+def silent(text: str) -> None:
+    """The default ``say``: what a notebook wants to hear of the work's course."""
+
+
+def model_of(recording: Recording, effects: Sequence[str] = ()) -> ArrayModel:
+    """The measurement model a recording declares: its geometry and noise."""
+    return ArrayModel.isotropic(
+        array_of(recording), recording.accelerometer_noise_sd, recording.gyroscope_noise_sd, effects
+    )
+
+
+def assumed(recording: Recording, accelerometer_noise: float | None) -> Recording:
+    """The recording with another accelerometer noise (m/s^2) than it declares, if one is given."""
+    if accelerometer_noise is None:
+        return recording
+    if not 0 < accelerometer_noise < float("inf"):
+        raise InputError(
+            f"accelerometer_noise: expected a positive number, found {accelerometer_noise!r}"
+        )
+    return replace(recording, accelerometer_noise_sd=accelerometer_noise)
+
+
+def usable(recording: Recording, say: Say = silent) -> Recording:
+    """The recording without still poses and samples with an accelerometer at its rail."""
+    lost = recording.saturated_accelerometers().any(axis=(1, 2))
+    if lost.all():
+        raise InputError("recording: expected samples off the rail, found every one at a rail")
+    if lost.any():
+        say(f"left out {lost.sum()} of {lost.size} samples with an accelerometer at its rail")
+    if recording.stationary is not None and recording.stationary.any():
+        # they tell nothing of the positions, and cost as much as the others
+        still = recording.stationary & ~lost
+        say(f"left out {still.sum()} of {lost.size} samples of still poses")
+        lost = lost | still
+        if lost.all():
+            raise InputError("recording: expected moving samples, found still poses only")
+    return recording.select(~lost) if lost.any() else recording
+
+
+def extender(
+    diagnosis: str | PathLike | None, effects: Sequence[str] = (),
+    accelerometer_noise: float | None = None, say: Say = silent,
+):  # fmt: skip
+    """What gives a model the effects and the noise of ``diagnosis`` (diagnosis.json), or None.
+
+    A function of the model and of the labels of accelerometers and gyroscopes, the model's own
+    by default.
+    """
+    if diagnosis is None:
+        return None
+    from imuarray.criticism.extension import extended_model, read_extension
+
+    if effects:
+        raise InputError("--effects: expected none beside --diagnosis, found some")
+    if accelerometer_noise is not None:
+        raise InputError(
+            "--accelerometer-noise: expected none beside --diagnosis, whose noise is used, found"
+            f" {accelerometer_noise:g}"
+        )
+    extension = read_extension(diagnosis)
+    if "axis_swap" in extension.before:
+        raise InputError(
+            f"{diagnosis}: expected right axes, found an axis_swap; mend the recording"
+        )
+    for name in extension.before:
+        say(f"{name}: concerns readings, not the model; they are used as they are")
+
+    def extended(model: ArrayModel, labels=None) -> ArrayModel:
+        return extended_model(extension, model, labels or (model.array.labels,) * 2)
+
+    return extended
+
+
+def chosen_model(
+    recording: Recording, effects: Sequence[str] = (), diagnosis: str | PathLike | None = None,
+    accelerometer_noise: float | None = None, say: Say = silent,
+) -> tuple[Recording, ArrayModel]:  # fmt: skip
+    """The recording with the noise assumed, and its model with the effects or the diagnosis."""
+    extended = extender(diagnosis, effects, accelerometer_noise, say)
+    recording = assumed(recording, accelerometer_noise)
+    if extended is None:
+        return recording, model_of(recording, effects)
+    labels = recording.accelerometer_labels, recording.gyroscope_labels
+    return recording, extended(model_of(recording), labels)

@@ -1,0 +1,84 @@
+"""A recording before it is calibrated: simulated, corrected triad by triad, its best samples."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+
+from imuarray.errors import InputError
+from imuarray.firstorder.correct import STANDARD_GRAVITY
+from imuarray.geometry import Array
+from imuarray.model import ArrayModel
+from imuarray.motion import hand_twisting
+from imuarray.recording import Recording
+from imuarray.streams import stream
+
+
+def simulate(
+    array: Array, duration: float = 10.0, sampling_rate: float = 100.0, seed: int = 0,
+    effects: Sequence[str] = (), accelerometer_noise: float = 0.04,
+    gyroscope_noise: float = float(np.radians(0.06)), position_error: float = 1e-3,
+    angular_rate: float = float(np.radians(500)), specific_force: float = 20.0,
+    bandwidth: float = 5.0, gyroscope_range: float = float(np.radians(2000)),
+) -> tuple[Recording, xr.Dataset]:  # fmt: skip
+    """(recording, truth) of an array twisted by hand.
+
+    Parameters
+    ----------
+    array
+        The board: `mimu4444()`, or an `Array` of your own.
+    duration, sampling_rate
+        In s and Hz.
+    seed
+        Of motion, positions, effects and noise, each with a stream of its own.
+    effects
+        Hidden in the data, parameters drawn from their priors (docs/effects.md).
+    accelerometer_noise, gyroscope_noise
+        Sds of one reading, m/s^2 and rad/s.
+    position_error
+        Sd (m) of the nominal positions that the recording declares about the true ones.
+    angular_rate, specific_force, bandwidth
+        Sds of the motion per axis, rad/s and m/s^2, and its bandwidth in Hz.
+    gyroscope_range
+        The rail, rad/s.
+    """
+    from imuarray.simulation import simulate_recording
+
+    if not (duration > 0 and sampling_rate > 0):
+        raise InputError(
+            f"simulate: expected a positive duration and sampling rate, found {duration:g} s and"
+            f" {sampling_rate:g} Hz"
+        )
+    model = ArrayModel.isotropic(array, accelerometer_noise, gyroscope_noise, effects)
+    motion = hand_twisting(stream(seed, "twisting"), angular_rate / 2, specific_force, bandwidth)
+    sizes = model.effect_prior_sd
+    errors = position_error * stream(seed, "mounting").standard_normal(array.positions.shape)
+    errors[0] = 0.0
+    return simulate_recording(
+        model, motion, array.positions, array.positions + errors, stream(seed, "noise"),
+        sampling_rate, duration, gyroscope_range=gyroscope_range,
+        position_prior_sd=position_error, title="simulated hand twisting",
+        parameters=sizes * stream(seed, "effects").standard_normal(sizes.shape),
+    )  # fmt: skip
+
+
+def first_order(recording: Recording, gravity: float = STANDARD_GRAVITY) -> Recording:
+    """The recording with each triad's offset, scale and misalignment corrected, from still poses.
+
+    ``gravity`` in m/s^2. InputError without enough still poses.
+    """
+    from imuarray.firstorder import calibrate_first_order, correct
+
+    return correct(recording, calibrate_first_order(recording, gravity))
+
+
+def select(recording: Recording, samples: int | None = None) -> Recording:
+    """The moving, unsaturated, informative samples, or ``samples`` of them, spread evenly."""
+    from imuarray.estimation.selection import select_dynamic
+
+    found = select_dynamic(recording)
+    if samples is None:
+        return recording.select(found.informative)
+    return recording.select(found.disjoint([samples])[samples])

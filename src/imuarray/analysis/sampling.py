@@ -1,0 +1,197 @@
+"""Chains of the positions' posterior, as one labelled tree."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from imuarray.analysis.density import density_of, tuned_target
+from imuarray.analysis.model import Say, chosen_model, silent, usable
+from imuarray.errors import InputError
+from imuarray.model import ArrayModel
+from imuarray.model.names import parameter_names
+from imuarray.posterior import Chains, GaussianPrior, run_chains
+from imuarray.provenance import code_digest, digest, stamp
+from imuarray.recording import Recording
+from imuarray.streams import stream
+
+METHODS, RATES = ("pmmh", "nuts"), ("declared", "spread")
+PMMH_STEPS = {True: 200_000, False: 10_000}  # compiled, any effects
+NUTS_STEPS, NUTS_WARMUP = 1000, 300
+APART = 2.0  # posterior sds by which the starts differ where effects are free
+STORED = 2000
+RHAT_THRESHOLD = 1.05
+
+
+class Asked(NamedTuple):
+    """How to sample; ``beside`` is the file beside which a checkpoint is kept, if any."""
+
+    method: str
+    steps: int | None
+    seed: int
+    rates: str
+    progress: bool
+    beside: Path | None
+    say: Say
+
+
+class Made(NamedTuple):
+    """Chains, and what made them."""
+
+    chains: Chains
+    prior: GaussianPrior
+    key: str  # digest of everything that they depend on
+    settings: dict
+    checkpoint: Path | None = None
+
+
+def sample(
+    recording: Recording, method: str = "pmmh", steps: int | None = None, seed: int = 0,
+    rates: str = "declared", effects: Sequence[str] = (),
+    diagnosis: str | PathLike | None = None, accelerometer_noise: float | None = None,
+    progress: bool = False, say: Say = silent, beside: str | PathLike | None = None,
+) -> xr.DataTree:  # fmt: skip
+    """Two chains of the posterior of the accelerometers' positions (paper 2021).
+
+    Parameters
+    ----------
+    recording
+        Moving samples; still poses and samples with an accelerometer at its rail are left out.
+    method
+        ``"pmmh"``: pseudo-marginal Metropolis-Hastings (paper 2021), N and the step length tuned
+        as in section III-C; ``"nuts"``: the no-U-turn sampler on the exact marginal likelihood.
+    steps
+        Transitions of each chain, after the warm-up in NUTS' case.
+    seed
+        Of the random numbers.
+    rates
+        p(omega | y_g) from the ``"declared"`` gyroscope noise, or from the ``"spread"`` among the
+        gyroscopes of each sample (equation (30)).
+    effects, diagnosis, accelerometer_noise
+        As in `imuarray.calibrate`.
+    progress, say
+        Whether to show a bar; called with each remark on the work's course.
+    beside
+        A file beside which PmMH keeps a checkpoint, continued by the same call with the same
+        data, settings and code; the attribute ``checkpoint`` names it. By default none.
+
+    Returns
+    -------
+    xarray.DataTree
+        ``posterior/position`` (chain, draw, accelerometer, axis) m, with effects
+        ``posterior/effect_parameter``; ``sample_stats``, ``prior``. Attributes: the chains'
+        verdict (``converged``, ``rhat_max``, ``ess_min``, burn-in) and the origin.
+
+    Raises
+    ------
+    InputError
+        The recording cannot tell the positions, or the options do not go together.
+    """
+    for name, value, known in (("method", method, METHODS), ("rates", rates, RATES)):
+        if value not in known:
+            raise InputError(f"{name}: expected any of {', '.join(known)}, found {value!r}")
+    recording, model = chosen_model(
+        usable(recording, say), effects, diagnosis, accelerometer_noise, say
+    )
+    if model.effects and rates == "spread":
+        raise InputError("--rates spread: expected no --effects with it, found some")
+    beside = None if beside is None else Path(beside)
+    asked = Asked(method, steps, seed, rates, progress, beside, say)
+    made = (_nuts if method == "nuts" else _pmmh)(recording, model, asked)
+    return _tree(recording, model, made, seed)
+
+
+def summary(posterior: xr.DataTree) -> pd.DataFrame:
+    """One row per coordinate of what `sample` gave: mean, sd and quantiles (m), R-hat, ESS."""
+    from imuarray.posterior.store import chains_of
+    from imuarray.posterior.summary import summarise
+
+    labels = [str(label) for label in posterior["posterior"]["accelerometer"].to_numpy()]
+    return summarise(chains_of(posterior), labels, RHAT_THRESHOLD)[1]
+
+
+def _tree(recording: Recording, model: ArrayModel, made: Made, seed: int) -> xr.DataTree:
+    from imuarray.posterior.store import chain_tree
+    from imuarray.posterior.summary import summarise
+
+    labels = recording.accelerometer_labels[1:]
+    names = parameter_names(model, (recording.accelerometer_labels, recording.gyroscope_labels))
+    verdict, _, _ = summarise(made.chains, labels, RHAT_THRESHOLD)
+    attrs = stamp({"recording": made.key, **made.settings}, seed)
+    kept = "burn_in_draws", "burn_in_steps", "steps", "rhat_max", "ess_min"
+    attrs |= {name: verdict[name] for name in kept}
+    attrs |= {"converged": int(verdict["converged"]), "divergent": made.chains.divergent}
+    if made.checkpoint is not None:
+        attrs["checkpoint"] = str(made.checkpoint)
+    return chain_tree(made.chains, labels, made.prior, attrs, names)
+
+
+def _key(recording, model, prior, asked: Asked, *rest) -> str:
+    return digest(
+        recording.specific_force, recording.angular_rate, recording.accelerometer_position,
+        model.noise.accelerometer, model.noise.gyroscope, prior.mean, prior.sd,
+        *rest, asked.seed, list(model.effects), asked.rates, code_digest(),
+    )  # fmt: skip
+
+
+def _pmmh(recording, model, asked: Asked) -> Made:
+    """PmMH tuned as in section III-C of paper 2021; continues a checkpoint."""
+    asked.say("tuning N and the step length ...")
+    rng = _stream(asked, "tuning")
+    target, mode, step, draws = tuned_target(recording, model, asked.rates, rng, asked.say)
+    steps = asked.steps or PMMH_STEPS[not model.effects]
+    thin = max(1, steps // STORED)
+    key = _key(recording, model, target.prior, asked, draws, step, steps)
+    checkpoint = _checkpoint(asked, key)
+    rng = _stream(asked, "starts")
+    spread = target.prior.sd / 3
+    starts = np.array([mode, mode + 0.0])
+    starts += spread * rng.standard_normal(starts.shape)
+    chains = run_chains(
+        target, starts, step, max(4, steps // thin), thin, asked.seed,
+        checkpoint=checkpoint, key=key, quiet=not asked.progress,
+    )  # fmt: skip
+    return Made(chains, target.prior, key, {"draws_per_sample": draws}, checkpoint)
+
+
+def _checkpoint(asked: Asked, key: str) -> Path | None:
+    """Where this run's state is kept; says what other runs have left there."""
+    out = asked.beside
+    if out is None:
+        return None
+    checkpoint = out.with_name(f".{out.name}.{key[:16]}.npz")
+    for other in out.parent.glob(f".{out.name}.*.npz"):
+        if other != checkpoint:
+            asked.say(f"{other}: a checkpoint of other data, settings or code, not continued")
+    return checkpoint
+
+
+def _nuts(recording, model, asked: Asked) -> Made:
+    """NUTS on the marginal likelihood, whitened at the mode."""
+    from imuarray.posterior.nuts import run_nuts
+
+    asked.say("finding the mode ...")
+    log_density, prior, mode, covariance = density_of(recording, model, asked.rates, asked.say)
+    rng = _stream(asked, "starts")
+    chains = np.zeros((2, mode.size))
+    if model.effects:  # clocks and shifts have modes of their own far away
+        starts = rng.multivariate_normal(mode, APART**2 * covariance, size=len(chains))
+    else:
+        starts = prior.mean + prior.sd * rng.standard_normal(chains.shape)
+    steps = asked.steps or NUTS_STEPS
+    found = run_nuts(
+        log_density, mode, covariance, starts, NUTS_WARMUP, steps, asked.seed,
+        quiet=not asked.progress,
+    )  # fmt: skip
+    return Made(found, prior, _key(recording, model, prior, asked, steps, "nuts"),
+                {"divergent": found.divergent})  # fmt: skip
+
+
+def _stream(asked: Asked, name: str):
+    return stream(asked.seed, "sample", name)

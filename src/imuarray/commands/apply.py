@@ -1,0 +1,71 @@
+"""The work behind `imuarray apply`."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from imuarray.analysis import apply as applied
+from imuarray.analysis.motion import UNITS
+from imuarray.commands.output import Output
+from imuarray.errors import InputError
+from imuarray.provenance import write_netcdf
+from imuarray.recording import load_dataset, read_recording
+
+
+def apply(arguments) -> None:
+    """The calibrated array's motion with covariances; see `imuarray.apply` for the output."""
+    output = Output(arguments)
+    recording = read_recording(arguments.recording)
+    calibration = load_dataset(arguments.calibration)
+    try:
+        dataset = applied(calibration, recording, arguments.accelerometer_noise)
+    except InputError as error:
+        raise InputError(f"{arguments.calibration}: {error}") from None
+    write_netcdf(dataset, arguments.out)
+    gyroscopes = recording.angular_rate.shape[1]
+    average = recording.gyroscope_noise_sd / np.sqrt(gyroscopes)
+    found = document(dataset)
+    output.say("\n".join(report(found, average)))
+    output.done(found | {"gyroscopes_averaged_sd_rad_s": average, "out": str(arguments.out)})
+
+
+def document(dataset: xr.Dataset) -> dict:
+    """The motion's main numbers; sds are rms over samples."""
+    lost = dataset["accelerometer_at_rail"].to_numpy()
+    railed = dataset["gyroscope_at_rail"].to_numpy() & ~lost
+    found = {
+        "samples": lost.size,
+        "left_out": int(lost.sum()),
+        "gyroscope_at_rail": int(railed.sum()),
+        "not_converged": int(np.sum(~dataset["converged"].to_numpy() & ~lost)),
+    }
+    for name, where in (("off_the_rail", ~railed & ~lost), ("at_the_rail", railed)):
+        if where.any():
+            found[name] = {
+                f"{field}_sd": float(
+                    np.sqrt(np.mean(dataset[f"{field}_sd"].to_numpy()[where] ** 2))
+                )
+                for field in UNITS
+            }
+    return found
+
+
+def report(found: dict, average: float) -> list[str]:
+    """The same for a person; ``average`` (rad/s) is the sd of the gyroscopes' mean."""
+    lines = [
+        f"{found['samples']} samples, {found['left_out']} left out with an accelerometer at its"
+        f" rail, {found['gyroscope_at_rail']} with a gyroscope at its",
+        f"angular rate, gyroscopes averaged: sd {np.degrees(average):.3g} deg/s off the rail",
+    ]
+    for name in ("off_the_rail", "at_the_rail"):
+        if name in found:
+            rate, acceleration, force = (found[name][f"{field}_sd"] for field in UNITS)
+            lines.append(
+                f"fused, {name.replace('_', ' ')}: sd {np.degrees(rate):.3g} deg/s,"
+                f" {np.degrees(acceleration):.3g} deg/s^2, {force:.3g} m/s^2"
+                " (angular rate, angular acceleration, force)"
+            )
+    if found["not_converged"]:
+        lines.append(f"NOT converged at {found['not_converged']} samples")
+    return lines

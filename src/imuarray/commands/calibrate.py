@@ -1,0 +1,109 @@
+"""The work behind `imuarray calibrate`."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from imuarray.analysis import calibrate as calibrated
+from imuarray.commands.output import Output
+from imuarray.estimation.informative import weak_directions
+from imuarray.provenance import write_netcdf
+from imuarray.recording import read_recording
+
+MISFIT = 1.5  # residual over declared noise from which the claimed widths are called too small
+
+
+def calibrate(arguments) -> None:
+    """Positions and motion by maximum likelihood; see `imuarray.calibrate` for the output."""
+    output = Output(arguments)
+    dataset = calibrated(
+        read_recording(arguments.recording), arguments.method, arguments.effects,
+        arguments.diagnosis, arguments.accelerometer_noise, output.say,
+    )  # fmt: skip
+    write_netcdf(dataset, arguments.out)
+    output.say(report(dataset))
+    output.done(document(dataset) | {"out": str(arguments.out)})
+
+
+def document(dataset: xr.Dataset) -> dict:
+    """A calibration's main numbers."""
+    labels = [str(label) for label in dataset["accelerometer"].to_numpy()]
+    found = {
+        "converged": bool(dataset.attrs["converged"]),
+        "iterations": dataset.sizes["iteration"],
+        "samples": dataset.sizes["time"],
+        "residual_ratio": dataset.attrs["residual_ratio"],
+        "accelerometers": labels,
+        "position_m": dataset["position"].to_numpy(),
+        "position_sd_m": _sds(dataset),
+        "weakest_directions": [
+            {"direction": item.words, "sd_m": item.sd} for item in _weakest(dataset)
+        ],
+    }
+    if "effect_parameter" in dataset:
+        columns = (dataset[name].to_numpy() for name in ("effect_parameter", "effect_sd"))
+        rows = zip(dataset["parameter"].to_numpy(), *columns, strict=True)
+        found["effects"] = {name: {"value": value, "sd": sd} for name, value, sd in rows}
+    return found
+
+
+def report(dataset: xr.Dataset) -> str:
+    """The same for a person."""
+    state = "converged" if dataset.attrs["converged"] else "NOT converged"
+    lines = [
+        f"{state} after {dataset.sizes['iteration']} iterations, {dataset.sizes['time']} samples",
+        "triad   x mm      y mm      z mm    (sd um)",
+    ]
+    rows = dataset["accelerometer"].to_numpy(), dataset["position"].to_numpy(), _sds(dataset)
+    for label, row, sd in zip(*rows, strict=True):
+        values = "  ".join(f"{1e3 * value:8.4f}" for value in row)
+        lines.append(f"{label:>5} {values}    {', '.join(f'{1e6 * value:.2g}' for value in sd)}")
+    return "\n".join([*lines, *_effects(dataset), *_informative(dataset), *_misfit(dataset)])
+
+
+def _sds(dataset: xr.Dataset) -> np.ndarray:
+    return np.sqrt(np.einsum("kaka->ka", dataset["position_covariance"].to_numpy()))
+
+
+def _effects(dataset: xr.Dataset) -> list[str]:
+    """The effects' parameters, in their own units (docs/effects.md)."""
+    if "effect_parameter" not in dataset:
+        return []
+    columns = (dataset[name].to_numpy() for name in ("parameter", "effect_parameter", "effect_sd"))
+    rows = zip(*columns, strict=True)
+    return ["effect parameter: value (sd)"] + [
+        f"{name}: {value:.4g} ({sd:.2g})" for name, value, sd in rows
+    ]
+
+
+def _weakest(dataset: xr.Dataset):
+    positions = dataset["position"].to_numpy()
+    size = 3 * (len(positions) - 1)
+    covariance = dataset["position_covariance"].to_numpy()[1:, :, 1:, :].reshape(size, size)
+    return weak_directions(positions, covariance, dataset["accelerometer"].to_numpy())
+
+
+def _informative(dataset: xr.Dataset) -> list[str]:
+    """How well the recording tells the positions, and which combinations of them worst."""
+    worst, prior = _weakest(dataset), dataset.attrs["position_prior_sd"]
+    rms = np.sqrt(np.mean(_sds(dataset)[1:] ** 2))
+    said = ", ".join(f"{item.words} ({1e6 * item.sd:.2g} um)" for item in worst)
+    lines = [f"positions to {1e6 * rms:.2g} um rms by the Cramer-Rao bound; told worst: {said}"]
+    if worst[0].sd > prior:
+        lines.append(
+            f"{worst[0].words}: told worse than the nominal positions' own"
+            f" {1e3 * prior:g} mm; turn the array faster, and about all axes"
+        )
+    return lines
+
+
+def _misfit(dataset: xr.Dataset) -> list[str]:
+    """One line where the residual is not what the declared noise explains."""
+    ratio = dataset.attrs["residual_ratio"]
+    if not ratio > MISFIT:
+        return []
+    return [
+        f"residual {ratio:.3g} times the declared noise: the model misses something, and the"
+        " sds above are too small, by that or more"
+    ]

@@ -1,0 +1,46 @@
+"""The work behind `imuarray diagnose`."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+from imuarray.commands.output import Output
+from imuarray.criticism.describe import MEANING
+from imuarray.criticism.diagnosis import diagnose as criticise
+from imuarray.errors import InputError
+from imuarray.model import EFFECTS
+from imuarray.recording import read_recording
+from imuarray.report.write import write_report
+
+
+def diagnose(arguments) -> None:
+    """Name what the papers' model gets wrong on a recording; a folder with the evidence."""
+    for name in arguments.without:
+        if name not in {*MEANING, *EFFECTS}:
+            known = ", ".join(sorted({*MEANING, *EFFECTS}))
+            raise InputError(f"--without: expected any of {known}, found {name}")
+    recording, output = read_recording(arguments.recording), Output(arguments)
+    begun = time.monotonic()
+
+    def progress(text):
+        if output.progress:
+            print(f"{time.monotonic() - begun:6.1f} s  {text}", file=sys.stderr, flush=True)
+
+    found = criticise(recording, arguments.seed, arguments.without, arguments.recording, progress)
+    write_report(found, arguments.out)
+    output.say("\n".join([*report(found.document), f"report: {arguments.out / 'report.html'}"]))
+    output.done(found.document | {"out": str(arguments.out)})
+
+
+def report(document: dict) -> list[str]:
+    """diagnosis.json for a person: the causes, what is left, the gain."""
+    lines = [f"{cause['effect']}: {cause['says']}" for cause in document["causes"]]
+    if not lines:
+        lines = ["no cause named: the recording is what the model simulates, as far as it shows"]
+    if document["unexplained"]:
+        lines.append(f"unexplained: {', '.join(document['remaining'])}")
+    gain = document["gain"]
+    score = gain["heldout_log_score_nats_per_sample"]
+    error = gain["heldout_log_score_nats_per_sample_se"]
+    return [*lines, f"held-out log score: {score:+.3g} +- {error:.2g} nats a sample"]

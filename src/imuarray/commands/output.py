@@ -1,0 +1,42 @@
+"""What a command prints: text for a person, or one JSON object for a program."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+
+class Output:
+    """Text on standard output, unless ``--quiet``; with ``--json`` one object at the end instead.
+
+    Progress goes to standard error, and only ``--quiet`` stops it.
+    """
+
+    def __init__(self, arguments):
+        self.json = bool(getattr(arguments, "json", False))
+        self.progress = not arguments.quiet
+        self.text = self.progress and not self.json
+
+    def say(self, text: str) -> None:
+        """One remark, at once."""
+        if self.text:
+            print(text, flush=True)
+
+    def done(self, document: dict[str, Any]) -> None:
+        """The numbers of the result; SI units, named in the keys."""
+        if self.json:
+            print(json.dumps(finite(document), allow_nan=False))
+
+
+def finite(value: Any) -> Any:
+    """Plain data as JSON knows it: numpy's numbers and arrays as lists, what is not finite null."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, dict):
+        return {str(key): finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

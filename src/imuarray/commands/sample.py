@@ -1,0 +1,60 @@
+"""The work behind `imuarray sample`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import xarray as xr
+
+from imuarray.analysis import sample as sampled
+from imuarray.analysis import summary
+from imuarray.commands.output import Output
+from imuarray.provenance import write_netcdf
+from imuarray.recording import read_recording
+
+VERDICT = "converged", "rhat_max", "ess_min", "burn_in_steps", "steps", "divergent"
+
+
+def sample(arguments) -> None:
+    """Two chains of the positions' posterior, by PmMH or NUTS; see `imuarray.sample`."""
+    output = Output(arguments)
+    posterior = sampled(
+        read_recording(arguments.recording), arguments.method, arguments.steps, arguments.seed,
+        arguments.rates, arguments.effects, arguments.diagnosis, arguments.accelerometer_noise,
+        output.progress, output.say, beside=arguments.out,
+    )  # fmt: skip
+    checkpoint = posterior.attrs.pop("checkpoint", None)
+    write_netcdf(posterior, arguments.out)
+    if checkpoint is not None:  # the chains are safe
+        Path(checkpoint).unlink(missing_ok=True)
+    table = summary(posterior)
+    output.say(report(posterior, table))
+    output.done(document(posterior, table) | {"out": str(arguments.out)})
+
+
+def document(posterior: xr.DataTree, table: pd.DataFrame) -> dict:
+    """The chains' verdict, and mean and sd of each coordinate."""
+    found = {name: posterior.attrs[name] for name in VERDICT}
+    found["converged"] = bool(found["converged"])
+    columns = ["accelerometer", "axis", "mean_m", "sd_m", "rhat", "ess"]
+    return found | {"coordinates": table[columns].to_dict(orient="records")}
+
+
+def report(posterior: xr.DataTree, table: pd.DataFrame) -> str:
+    """The same for a person."""
+    attrs = posterior.attrs
+    lines = ["triad axis   mean mm   sd um"]
+    for row in table.itertuples():
+        numbers = f"{1e3 * row.mean_m:9.4f} {1e6 * row.sd_m:7.2g}"
+        lines.append(f"{row.accelerometer:>5} {row.axis:>4} {numbers}")
+    state = "converged" if attrs["converged"] else "NOT converged: take more --steps"
+    lines.append(
+        f"{state}: R-hat {attrs['rhat_max']:.3f}, smallest ESS {attrs['ess_min']:.0f},"
+        f" burn-in {attrs['burn_in_steps']} of {attrs['steps']} steps"
+    )
+    if attrs["divergent"]:
+        lines.append(
+            f"{attrs['divergent']} transitions diverged: a part of the posterior may be missed"
+        )
+    return "\n".join(lines)

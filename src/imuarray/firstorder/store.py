@@ -1,0 +1,53 @@
+"""A first-order calibration in a file: the corrected recording with the numbers in a group."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from imuarray.firstorder.correct import FirstOrder, correct
+from imuarray.provenance import atomic_write, digest, seal, stamp
+from imuarray.recording import Recording, write_recording
+from imuarray.recording.validate import FIRST_ORDER
+
+
+def write_corrected(recording: Recording, found: FirstOrder, path) -> None:
+    """The corrected recording, with the calibration's numbers in a group of its own."""
+    data = digest(recording.specific_force, recording.angular_rate)
+    attrs = stamp({"recording": data, "gravity": found.gravity}, 0)
+    with atomic_write(path) as temporary:
+        write_recording(correct(recording, found), temporary, attrs=attrs)
+        _first_order_dataset(recording, found).to_netcdf(
+            temporary, mode="a", group=FIRST_ORDER, engine="h5netcdf"
+        )
+        seal(temporary)
+
+
+def _first_order_dataset(recording: Recording, found) -> xr.Dataset:
+    """Matrix, offset and their covariance, poses, residuals, noise."""
+    fit = found.triads
+    accelerometer, gyroscope = ("accelerometer", "axis"), ("gyroscope", "axis")
+    times = recording.time
+    limits = [(times[pose.start], times[pose.stop - 1]) for pose in found.poses]
+    variables = {
+        "matrix": (("accelerometer", "axis", "axis_other"), fit.matrix, {"units": "1"}),
+        "offset": (accelerometer, fit.offset, {"units": "m s-2"}),
+        "covariance": (
+            ("parameter", "parameter_other"), fit.covariance,
+            {"long_name": "of (matrix row by row, offset), triad by triad"},
+        ),
+        "residual": (("pose", "accelerometer", "axis"), fit.residual, {"units": "m s-2"}),
+        "used": (("pose", "accelerometer"), fit.used),
+        "pose_time": (("pose", "edge"), np.array(limits), {"units": "s"}),
+        "accelerometer_noise": (accelerometer, found.accelerometer_noise, {"units": "m s-2"}),
+        "gyroscope_offset": (gyroscope, found.gyroscope_offset, {"units": "rad s-1"}),
+        "gyroscope_offset_sd": (gyroscope, found.gyroscope_offset_sd, {"units": "rad s-1"}),
+        "gyroscope_noise": (gyroscope, found.gyroscope_noise, {"units": "rad s-1"}),
+    }  # fmt: skip
+    coords = {
+        "accelerometer": list(recording.accelerometer_labels),
+        "gyroscope": list(recording.gyroscope_labels), "axis": list("xyz"),
+        "axis_other": list("xyz"),
+    }  # fmt: skip
+    attrs = {"gravity": found.gravity, "residual_ratio": fit.residual_ratio}
+    return xr.Dataset(variables, coords, attrs)

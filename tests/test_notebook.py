@@ -1,0 +1,124 @@
+"""The notebook's names: the same numbers as the commands, labelled; plots that return axes."""
+
+import json
+import subprocess
+import sys
+
+import matplotlib
+import numpy as np
+import pytest
+import xarray as xr
+
+import imuarray
+from imuarray.cli import main
+from imuarray.geometry import sub_array
+
+matplotlib.use("agg")
+
+
+@pytest.fixture(scope="module")
+def simulated():
+    """(recording, truth): four triads of the board, three seconds."""
+    array = sub_array(imuarray.mimu4444(), 4)
+    return imuarray.simulate(array, duration=3.0, sampling_rate=50.0, seed=3)
+
+
+@pytest.fixture(scope="module")
+def calibration(simulated):
+    return imuarray.calibrate(simulated[0], method="gauss-newton")
+
+
+@pytest.fixture(scope="module")
+def chains(simulated):
+    return imuarray.sample(imuarray.select(simulated[0], 20), method="nuts", steps=200)
+
+
+def test_every_name_is_there():
+    for name in imuarray.__all__:
+        assert getattr(imuarray, name) is not None
+    assert set(dir(imuarray)) == set(imuarray.__all__)
+
+
+def test_positions_are_found(simulated, calibration):
+    recording, truth = simulated
+    sds = np.sqrt(np.einsum("kaka->ka", calibration["position_covariance"].to_numpy()))[1:]
+    error = (calibration["position"].to_numpy() - truth["position"].to_numpy())[1:]
+    assert np.sqrt(np.mean((error / sds) ** 2)) < 2.0
+    moved = calibration["nominal_position"].to_numpy() - truth["position"].to_numpy()
+    assert np.abs(moved).max() > 10 * np.abs(error).max()
+    assert calibration.attrs["converged"] == 1
+    assert calibration.attrs["residual_ratio"] == pytest.approx(1.0, abs=0.1)
+
+
+def test_the_command_writes_the_same(simulated, calibration, tmp_path, capsys):
+    rec, cal = tmp_path / "rec.nc", tmp_path / "cal.nc"
+    imuarray.write_recording(simulated[0], rec)
+    command = f"calibrate {rec} --method gauss-newton --json --out {cal}"
+    assert main(command.split()) == 0
+    xr.testing.assert_equal(imuarray.read_calibration(cal), calibration)
+    said = json.loads(capsys.readouterr().out)
+    assert said["converged"] and said["out"] == str(cal)
+    np.testing.assert_array_equal(said["position_m"], calibration["position"])
+
+
+def test_the_posterior_is_about_the_calibration(calibration, chains, simulated):
+    table = imuarray.summary(chains)
+    assert len(table) == 9 and chains.attrs["divergent"] == 0
+    found = imuarray.calibrate(imuarray.select(simulated[0], 20), method="gauss-newton")
+    z = (table.mean_m.to_numpy() - found["position"].to_numpy()[1:].ravel()) / table.sd_m
+    assert np.abs(z).max() < 1.0
+
+
+def test_motion(simulated, calibration):
+    recording, truth = simulated
+    motion = imuarray.apply(calibration, recording)
+    z = (motion["angular_rate"] - truth["angular_rate"].to_numpy()) / motion["angular_rate_sd"]
+    assert float(np.sqrt((z**2).mean())) == pytest.approx(1.0, abs=0.15)
+    axes = imuarray.plots.motion(motion, "specific_force")
+    assert "m/s²" in axes.get_ylabel() and len(axes.lines) == 3
+    with pytest.raises(imuarray.InputError, match="found 'speed'"):
+        imuarray.plots.motion(motion, "speed")
+
+
+def test_plots(simulated, calibration, chains):
+    axes = imuarray.plots.positions(calibration)
+    assert imuarray.plots.positions(calibration, axes) is axes
+    labels = simulated[0].accelerometer_labels
+    assert "(mm)" in imuarray.plots.posterior(chains, labels[1]).get_xlabel()
+    assert len(imuarray.plots.trace(chains, labels[2], "z").lines) == 2
+    assert all(panel.has_data() for panel in imuarray.plots.residuals(simulated[0]))
+    with pytest.raises(imuarray.InputError, match="expected a triad of"):
+        imuarray.plots.posterior(chains, labels[0])
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda r: imuarray.calibrate(r, method="magic"), "found 'magic'"),
+        (lambda r: imuarray.calibrate(r, accelerometer_noise=-1.0), "a positive number, found -1"),
+        (lambda r: imuarray.sample(r, method="gibbs"), "found 'gibbs'"),
+        (lambda r: imuarray.sample(r, rates="guessed"), "found 'guessed'"),
+        (lambda r: imuarray.simulate(imuarray.mimu4444(), duration=0.0), "found 0 s"),
+        (lambda r: imuarray.read_posterior("none.nc"), "found none"),
+    ],
+)  # fmt: skip
+def test_wrong_options_are_named(simulated, call, message):
+    with pytest.raises(imuarray.InputError, match=message):
+        call(simulated[0])
+
+
+def test_files_of_another_kind_are_refused(simulated, tmp_path):
+    path = tmp_path / "rec.nc"
+    imuarray.write_recording(simulated[0], path)
+    with pytest.raises(imuarray.InputError, match="expected a posterior"):
+        imuarray.read_posterior(path)
+    with pytest.raises(imuarray.InputError, match="expected a calibration"):
+        imuarray.read_calibration(path)
+
+
+def test_importing_loads_nothing_heavy():
+    code = (
+        "import sys, imuarray; print([m for m in ('numpy', 'jax', 'xarray') if m in sys.modules])"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout == "[]\n"
