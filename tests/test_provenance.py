@@ -201,3 +201,18 @@ def test_neighbouring_streams_are_uncorrelated():
 def test_bad_seeds_and_names(arguments):
     with pytest.raises(InputError, match="expected"):
         stream(*arguments)
+
+
+def test_a_full_disk_is_an_error_not_the_end_of_the_process(tmp_path):
+    """A limit on the file's size stands for the disk; HDF5 by itself ends with a signal there."""
+    code = (
+        "import resource, sys, numpy, xarray\n"
+        "from imuarray.provenance import write_netcdf\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))\n"
+        "try: write_netcdf(xarray.Dataset({'a': ('x', numpy.arange(1e4))}), sys.argv[1])\n"
+        "except OSError as error: print(error.filename, error.strerror)\n"
+    )
+    out = tmp_path / "out.nc"
+    run = subprocess.run([sys.executable, "-c", code, out], capture_output=True, text=True)
+    assert (run.returncode, run.stdout, run.stderr) == (0, f"{out} File too large\n", "")
+    assert not list(tmp_path.iterdir())

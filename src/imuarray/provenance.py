@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import io
 import json
 import os
 import platform
@@ -111,7 +112,8 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
     """Give a temporary path beside `path`; it becomes `path` if the block ends without an error.
 
     A reader sees the old file or the new one, never a part; a failure leaves nothing behind.
-    Raises FileNotFoundError if the folder does not exist.
+    Raises FileNotFoundError if the folder does not exist; an OSError in the block, such as that
+    of a full disk, names ``path``.
     """
     path = Path(path)
     if not path.parent.is_dir():
@@ -121,6 +123,10 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
     try:
         yield temporary
         os.replace(temporary, path)
+    except OSError as error:
+        if error.errno is None:
+            raise
+        raise OSError(error.errno, os.strerror(error.errno), str(path)) from error
     finally:
         # after a success there is nothing left to delete
         temporary.unlink(missing_ok=True)
@@ -138,26 +144,27 @@ def write_csv(frame: pd.DataFrame, path: str | Path) -> None:
         frame.to_csv(temporary, index=False, lineterminator="\n")
 
 
-def write_netcdf(data: xr.Dataset | xr.DataTree, path: str | Path) -> None:
-    """Write a dataset or a tree of them as NetCDF-4, sealed."""
+def write_netcdf(
+    data: xr.Dataset | xr.DataTree, path: str | Path, groups: Mapping[str, xr.Dataset] | None = None
+) -> None:
+    """Write a dataset or a tree of them as NetCDF-4, sealed, with further ``groups`` by name.
+
+    The file is made in memory: HDF5 on a full disk ends the process.
+    """
+    image = io.BytesIO()
+    data.to_netcdf(image, engine="h5netcdf")
+    for name, dataset in (groups or {}).items():
+        dataset.to_netcdf(image, mode="a", group=name, engine="h5netcdf")
+    content = image.getvalue()
     with atomic_write(path) as temporary:
-        data.to_netcdf(temporary, engine="h5netcdf")
-        seal(temporary)
+        temporary.write_bytes(content + SEAL + hashlib.sha256(content).digest())
 
 
 SEAL = b"imuarray sha-256"  # before the digest, at a file's end, where HDF5 does not look
 
 
-def seal(path: str | Path) -> None:
-    """Append the digest of all that is before it; whatever opens the file to change it drops it."""
-    with open(path, "rb") as handle:
-        found = hashlib.file_digest(handle, "sha256").digest()
-    with open(path, "ab") as handle:
-        handle.write(SEAL + found)
-
-
 def is_damaged(path: str | Path) -> bool:
-    """Whether a sealed file is not as it was written; one without a seal cannot be told.
+    """Whether a sealed file is not as `write_netcdf` wrote it; without a seal none can tell.
 
     To be asked before HDF5 reads the file: wrong bytes make it read wrong numbers, or loop.
     """

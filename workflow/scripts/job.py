@@ -16,12 +16,16 @@ def job(snakemake):
     """Yield the rule's settings; on failure log the traceback and print one line."""
     from imuarray.errors import InputError
 
-    with open(snakemake.log[0], "w", encoding="utf-8", buffering=1) as log:
-        try:
-            with redirect_stdout(log), redirect_stderr(log):
-                yield snakemake.params.get("settings", {})
-        except Exception as error:
-            traceback.print_exc(file=log)
-            status = 2 if isinstance(error, InputError) else 1
-            print(f"{snakemake.rule}: {error} (see {snakemake.log[0]})", file=sys.stderr)
-            sys.exit(status)
+    try:
+        with open(snakemake.log[0], "w", encoding="utf-8", buffering=1) as log:
+            try:
+                with redirect_stdout(log), redirect_stderr(log):
+                    yield snakemake.params.get("settings", {})
+            except Exception:
+                traceback.print_exc(file=log)
+                raise
+    except Exception as error:  # of the log, too: its disk may be full
+        status = 2 if isinstance(error, InputError) else 1
+        said = " ".join(str(error).split())
+        print(f"{snakemake.rule}: {said} (see {snakemake.log[0]})", file=sys.stderr)
+        sys.exit(status)

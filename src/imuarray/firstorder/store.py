@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.firstorder.correct import FirstOrder, correct
-from imuarray.provenance import atomic_write, digest, seal, stamp
+from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording, write_recording
 from imuarray.recording.validate import FIRST_ORDER
 
@@ -15,12 +15,8 @@ def write_corrected(recording: Recording, found: FirstOrder, path) -> None:
     """The corrected recording, with the calibration's numbers in a group of its own."""
     data = digest(recording.specific_force, recording.angular_rate)
     attrs = stamp({"recording": data, "gravity": found.gravity}, 0)
-    with atomic_write(path) as temporary:
-        write_recording(correct(recording, found), temporary, attrs=attrs)
-        _first_order_dataset(recording, found).to_netcdf(
-            temporary, mode="a", group=FIRST_ORDER, engine="h5netcdf"
-        )
-        seal(temporary)
+    groups = {FIRST_ORDER: _first_order_dataset(recording, found)}
+    write_recording(correct(recording, found), path, attrs=attrs, groups=groups)
 
 
 def _first_order_dataset(recording: Recording, found) -> xr.Dataset:

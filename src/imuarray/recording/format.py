@@ -13,7 +13,7 @@ import xarray as xr
 
 from imuarray.errors import InputError
 from imuarray.geometry import Array
-from imuarray.provenance import atomic_write, is_damaged, seal
+from imuarray.provenance import is_damaged, write_netcdf
 from imuarray.recording import validate
 from imuarray.recording.validate import AXES, DIMENSIONS, FLAGS, NUMBERS, TEXTS, TRUTH, UNITS
 
@@ -177,8 +177,9 @@ def write_recording(
     path: str | Path,
     truth: xr.Dataset | None = None,
     attrs: Mapping[str, Any] | None = None,
+    groups: dict[str, xr.Dataset] | None = None,
 ) -> None:
-    """Write a recording, and in group `truth` what it was simulated from.
+    """Write a recording, in group `truth` what it was simulated from, and further `groups`.
 
     `attrs` (such as `provenance.stamp` gives) join the recording's own attributes, which win. The
     file reads back, or it is not written: InputError as in `read_recording`.
@@ -186,11 +187,7 @@ def write_recording(
     dataset = recording.to_dataset()
     dataset.attrs = {**(attrs or {}), **dataset.attrs}
     from_dataset(dataset, str(path))
-    with atomic_write(path) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf")
-        if truth is not None:
-            truth.to_netcdf(temporary, mode="a", group=TRUTH, engine="h5netcdf")
-        seal(temporary)
+    write_netcdf(dataset, path, ({} if truth is None else {TRUTH: truth}) | (groups or {}))
 
 
 def load_dataset(path: str | Path, group: str | None = None) -> xr.Dataset:
