@@ -1,11 +1,13 @@
 """The array as one sensor: motion with covariances that hold."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from imuarray.errors import IdentifiabilityError
-from imuarray.estimation.fusion import fuse
-from imuarray.motion import normal_motion
+from imuarray.estimation.fusion import fuse, fuse_extended
+from imuarray.motion import hand_twisting, normal_motion
 from imuarray.simulation import measure
 from tests import oracles
 from tests.test_bound import model
@@ -31,7 +33,7 @@ def errors(rail=np.inf, wrong=0.0, samples=400, seed=1):
 def test_errors_are_as_large_as_their_covariance_says(rail):
     """e' P^-1 e is chi-square with nine degrees of freedom: mean 9, five standard errors."""
     error, found = errors(rail)
-    assert np.all(found.estimate.converged) and not np.any(found.from_positions)
+    assert np.all(found.estimate.converged) and not np.any(found.from_calibration)
     square = np.einsum(
         "ti,ti->t", error, np.linalg.solve(found.covariance, error[..., None])[..., 0]
     )
@@ -56,7 +58,7 @@ def test_wrong_positions_are_in_the_covariance():
     squares = []
     for seed in range(100):
         error, found = errors(wrong=1e-3, samples=5, seed=seed)
-        assert np.all(np.trace(found.from_positions, axis1=1, axis2=2) > 0)
+        assert np.all(np.trace(found.from_calibration, axis1=1, axis2=2) > 0)
         last = np.linalg.solve(found.covariance[-1], error[-1])
         squares.append(error[-1] @ last)
     assert abs(np.mean(squares) - 9) < 5 * np.sqrt(18 / 100)
@@ -67,3 +69,42 @@ def test_collinear_triads_are_refused():
     line = own.array.relative * [1.0, 0.0, 0.0]
     with pytest.raises(IdentifiabilityError):
         fuse(own, np.zeros((2, 5, 3)), np.zeros((2, 5, 3)), line)
+
+
+def test_without_effects_the_extended_form_is_the_same():
+    """Two ways to one motion: collapsed and by automatic differentiation; rails and positions."""
+    own, rng = model(), np.random.default_rng(4)
+    motion = normal_motion(rng, (30,), 15.0, 300.0, 10.0)
+    force, rate, saturated = measure(own, motion, own.array.relative, rng, gyroscope_range=25.0)
+    p = own.array.parameters
+    spread = np.diag(np.full(p.size, 1e-8))
+    one = fuse(own, force, rate, None, spread, saturated)
+    other = fuse_extended(own, force, rate, p, spread, saturated)
+    assert saturated.any() and other.estimate.converged.all()
+    for a, b in zip(one.estimate.motion[:3], other.estimate.motion[:3], strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-6, atol=1e-7)
+    np.testing.assert_allclose(one.covariance, other.covariance, rtol=1e-4, atol=1e-10)
+    np.testing.assert_allclose(one.from_calibration, other.from_calibration, rtol=1e-4, atol=1e-10)
+
+
+@pytest.mark.parametrize("name", ["gyroscope_scale", "sensor_delay", "gyroscope_bias"])
+def test_errors_under_a_known_effect_are_as_large_as_their_covariance_says(name):
+    """Nine of them, whether the motion has its higher derivatives or not."""
+    own, samples = replace(model(), effects=(name,)), 200
+    rng = np.random.default_rng(6)
+    moved = hand_twisting(rng, 15.0, 10.0).at(np.arange(samples) / 100.0)
+    sizes = [float(np.sqrt(np.mean(np.square(field)))) for field in moved[3:]]
+    own = replace(own, derivative_sd=tuple(sizes))
+    parameters = 0.3 * own.effect_prior_sd * rng.standard_normal(own.effect_size)
+    force, rate, saturated = measure(
+        own, moved, own.array.relative, rng, parameters, gyroscope_range=20.0
+    )
+    whole = np.concatenate([own.array.parameters, parameters])
+    found = fuse_extended(own, force, rate, whole, None, saturated)
+    assert saturated.any() and found.estimate.converged.all()
+    pairs = zip(found.estimate.motion[:3], moved[:3], strict=True)
+    error = np.hstack([np.asarray(one) - other for one, other in pairs])
+    square = np.einsum(
+        "ti,ti->t", error, np.linalg.solve(found.covariance, error[..., None])[..., 0]
+    )
+    assert abs(square.mean() - 9) < 5 * np.sqrt(18 / samples)

@@ -11,6 +11,7 @@ import xarray as xr
 from imuarray.analysis.model import Say, chosen_model, silent, usable
 from imuarray.errors import InputError
 from imuarray.model import ArrayModel
+from imuarray.model.array_model import clock
 from imuarray.model.effects import find_effects
 from imuarray.model.names import parameter_names
 from imuarray.provenance import digest, stamp
@@ -126,11 +127,33 @@ def calibration_dataset(recording: Recording, model: ArrayModel, found, saturate
     }
     dataset = xr.Dataset(variables, coords, attrs)
     if model.effects:
-        imus = recording.accelerometer_labels, recording.gyroscope_labels
-        dataset["effect_parameter"] = (("parameter",), found.effect_parameters)
-        dataset["effect_sd"] = (("parameter",), np.sqrt(np.diag(covariance)[size:]))
-        dataset = dataset.assign_coords(parameter=parameter_names(model, imus))
+        dataset = dataset.merge(
+            _effects(recording, model, found, covariance), combine_attrs="no_conflicts"
+        )
     return dataset
+
+
+def _effects(recording: Recording, model: ArrayModel, found, covariance) -> xr.Dataset:
+    """The effects' parameters, and what `imuarray.apply` needs to use them."""
+    imus = recording.accelerometer_labels, recording.gyroscope_labels
+    size = 3 * (model.array.accelerometers - 1)
+    sds = np.sqrt(np.diag(model.noise.accelerometer)), np.sqrt(np.diag(model.noise.gyroscope))
+    variables = {
+        "effect_parameter": (("parameter",), found.effect_parameters),
+        "effect_sd": (("parameter",), np.sqrt(np.diag(covariance)[size:])),
+        # of r_2 ... r_A, then the effects' parameters
+        "whole_covariance": (("unknown", "unknown_other"), covariance),
+        "accelerometer_sd": (("accelerometer", "axis"), sds[0].reshape(-1, 3), {"units": "m s-2"}),
+        "gyroscope_sd": (("gyroscope", "axis"), sds[1].reshape(-1, 3), {"units": "rad s-1"}),
+    }
+    coords = {"parameter": parameter_names(model, imus), "gyroscope": list(imus[1])}
+    _, span = clock(recording.time)
+    attrs = {
+        "effects": ",".join(model.effects),
+        "time_origin": float(np.min(recording.time)),
+        "span": span,
+    }
+    return xr.Dataset(variables, coords, attrs)
 
 
 def residual_ratio(recording: Recording, model: ArrayModel, found, saturated) -> float:

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
 from imuarray.analysis.model import assumed, model_of
 from imuarray.errors import InputError
+from imuarray.model.noise import Noise
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording
 
 UNITS = {"angular_rate": "rad s-1", "angular_acceleration": "rad s-2", "specific_force": "m s-2"}
-
-
-class Placed(NamedTuple):
-    """Positions (A, 3) m relative to the first triad, covariance of the others' coordinates."""
-
-    positions: np.ndarray
-    covariance: np.ndarray
 
 
 def apply(
@@ -27,55 +21,85 @@ def apply(
 ) -> xr.Dataset:
     """Motion of the reference triad at each sample, with covariances.
 
-    ``calibration``: what `calibrate` gave for a recording of the same triads;
-    ``accelerometer_noise``: assumed sd in m/s^2, by default what the recording declares.
+    ``calibration``: what `calibrate` gave for a recording of the same IMUs, with effects or
+    without; where effects look at the time (drifts, clocks) it must be the same recording, or a
+    part of it. ``accelerometer_noise``: assumed sd in m/s^2, by default what the recording
+    declares, or with effects what the calibration assumed.
 
     Returns ``angular_rate`` (time, axis) rad/s, ``angular_acceleration`` rad/s^2 and
-    ``specific_force`` m/s^2, each with ``_sd`` and the part of it that is due to the positions,
-    ``_sd_from_positions``; ``motion_covariance`` (time, component, component_other);
+    ``specific_force`` m/s^2, each with ``_sd`` and the part of it that is due to the calibration,
+    ``_sd_from_calibration``; ``motion_covariance`` (time, component, component_other);
     ``converged``, and the flags ``gyroscope_at_rail`` and ``accelerometer_at_rail`` (time; the
     motion is NaN where an accelerometer is). InputError says what does not fit together.
     """
-    from imuarray.estimation.fusion import fuse
-
     recording = assumed(recording, accelerometer_noise)
-    placed = placed_triads(calibration, recording)
+    require_fit(calibration, recording)
     saturated = recording.saturated_gyroscopes()
-    found = fuse(
-        model_of(recording), recording.specific_force, recording.angular_rate,
-        placed.positions, placed.covariance, saturated,
-    )  # fmt: skip
+    if "effect_parameter" in calibration:
+        found = _extended(calibration, recording, accelerometer_noise)
+    else:
+        found = _papers(calibration, recording)
     lost = recording.saturated_accelerometers().any(axis=(1, 2))
     dataset = motion_dataset(recording, found, lost)
     dataset["gyroscope_at_rail"] = (("time",), saturated.any(axis=(1, 2)))
     dataset["accelerometer_at_rail"] = (("time",), lost)
-    data = digest(recording.specific_force, recording.angular_rate, *placed)
+    used = [calibration[name].to_numpy() for name in sorted(calibration.data_vars)]
+    data = digest(recording.specific_force, recording.angular_rate, *used)
     dataset.attrs |= stamp({"recording and calibration": data}, 0)
     return dataset
 
 
-def placed_triads(calibration: xr.Dataset, recording: Recording) -> Placed:
-    """The calibration's positions, for a recording of the same triads."""
+def _papers(calibration: xr.Dataset, recording: Recording):
+    """The papers' model: in closed blocks, fast."""
+    from imuarray.estimation.fusion import fuse
+
+    size = 3 * (calibration.sizes["accelerometer"] - 1)
+    covariance = calibration["position_covariance"].to_numpy()[1:, :, 1:, :].reshape(size, size)
+    positions = calibration["position"].to_numpy()
+    return fuse(
+        model_of(recording), recording.specific_force, recording.angular_rate,
+        positions - positions[0], covariance, recording.saturated_gyroscopes(),
+    )  # fmt: skip
+
+
+def _extended(calibration: xr.Dataset, recording: Recording, accelerometer_noise: float | None):
+    """A model with effects, their parameters and noise as calibrated."""
+    from imuarray.estimation.fusion import fuse_extended
+
+    positions = calibration["position"].to_numpy()
+    sds = [calibration[f"{kind}_sd"].to_numpy()[:, 0] for kind in ("accelerometer", "gyroscope")]
+    if accelerometer_noise is not None:
+        sds[0] = np.full(len(positions), accelerometer_noise)
+    model = model_of(recording, calibration.attrs["effects"].split(","))
+    noise = Noise.of(model.array.accelerometers, model.array.gyroscopes, *sds)
+    parameters = np.concatenate(
+        [(positions - positions[0])[1:].ravel(), calibration["effect_parameter"].to_numpy()]
+    )
+    return fuse_extended(
+        replace(model, noise=noise), recording.specific_force, recording.angular_rate, parameters,
+        calibration["whole_covariance"].to_numpy(), recording.saturated_gyroscopes(),
+        recording.time - calibration.attrs["time_origin"], calibration.attrs["span"],
+    )  # fmt: skip
+
+
+def require_fit(calibration: xr.Dataset, recording: Recording) -> None:
+    """InputError unless this is a calibration of the recording's IMUs."""
     for name in ("position", "position_covariance"):
         if name not in calibration:
             raise InputError(f"expected a calibration (imuarray calibrate), found no {name}")
-    if "effect_parameter" in calibration:
-        raise InputError(
-            "expected a calibration without --effects, as the motion is that of the papers'"
-            " model, found one with"
-        )
-    labels = tuple(map(str, calibration["accelerometer"].to_numpy()))
-    if labels != recording.accelerometer_labels:
-        raise InputError(
-            f"expected positions of {', '.join(recording.accelerometer_labels)}, as in the"
-            f" recording, found {', '.join(labels)}"
-        )
-    size = 3 * (len(labels) - 1)
-    covariance = calibration["position_covariance"].to_numpy()[1:, :, 1:, :].reshape(size, size)
-    positions = calibration["position"].to_numpy()
-    if not (np.all(np.isfinite(positions)) and np.all(np.isfinite(covariance))):
+    for kind in ("accelerometer", "gyroscope"):
+        if kind not in calibration.coords:  # gyroscopes matter to effects only
+            continue
+        labels = tuple(map(str, calibration[kind].to_numpy()))
+        expected = getattr(recording, f"{kind}_labels")
+        if labels != expected:
+            raise InputError(
+                f"expected {kind}s {', '.join(expected)}, as in the recording, found"
+                f" {', '.join(labels)}"
+            )
+    fields = [calibration[name].to_numpy() for name in ("position", "position_covariance")]
+    if not all(np.all(np.isfinite(field)) for field in fields):
         raise InputError("expected finite positions and covariances, found others")
-    return Placed(positions - positions[0], covariance)
 
 
 def motion_dataset(recording: Recording, found, lost) -> xr.Dataset:
@@ -92,10 +116,10 @@ def motion_dataset(recording: Recording, found, lost) -> xr.Dataset:
         values = np.where(lost[:, None], np.nan, getattr(found.estimate.motion, name))
         variables[name] = ("time", "axis"), values, {"units": unit}
         variables[f"{name}_sd"] = ("time", "axis"), sds[:, number], {"units": unit}
-    shared = np.einsum("tii->ti", found.from_positions).reshape(-1, 3, 3)
+    shared = np.einsum("tii->ti", found.from_calibration).reshape(-1, 3, 3)
     for number, (name, unit) in enumerate(UNITS.items()):
         part = np.sqrt(np.where(lost[:, None], np.nan, shared[:, number]))
-        variables[f"{name}_sd_from_positions"] = ("time", "axis"), part, {"units": unit}
+        variables[f"{name}_sd_from_calibration"] = ("time", "axis"), part, {"units": unit}
     coords = {"time": ("time", recording.time, {"units": "s"}), "axis": list("xyz"),
               "component": list(COMPONENTS), "component_other": list(COMPONENTS)}  # fmt: skip
     title = f"motion of triad {recording.accelerometer_labels[0]}, in the array's frame"
