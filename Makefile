@@ -22,7 +22,7 @@ help:
 	@echo "make test    the tests"
 	@echo "make test-slurm   the quick run through a Slurm of one node, brought up here (root, a container)"
 	@echo "make bench   the benchmarks"
-	@echo "make lint    ruff, snakefmt and snakemake --lint"
+	@echo "make lint    ruff, mypy, snakefmt and snakemake --lint"
 	@echo "make lock    resolve pyproject.toml into requirements.lock anew (needs uv)"
 	@echo "make clean   remove the environment and the caches, not the results"
 
@@ -46,7 +46,7 @@ paper: $(READY)
 	$(SNAKEMAKE) --config scale=paper
 
 test: $(READY)
-	$(BIN)/python -m pytest -q
+	$(BIN)/python -m pytest -q -n $(CORES) --dist loadfile
 
 # The executor is not in the lock: who has a cluster installs it as docs/cluster.md says.
 test-slurm: $(READY)
@@ -58,6 +58,7 @@ bench: $(READY)
 
 lint: $(READY)
 	$(BIN)/ruff check .
+	$(BIN)/mypy
 	$(BIN)/ruff format --check .
 	$(BIN)/snakefmt --check Snakefile workflow
 	$(BIN)/snakemake --lint

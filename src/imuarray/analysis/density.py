@@ -25,6 +25,7 @@ def density_of(recording: Recording, model: ArrayModel, rates: str = "declared",
     from imuarray.posterior.marginal import Marginal
 
     prior = prior_of(recording, model)
+    likelihood: GenericLikelihood | Marginal
     if model.effects:
         mode, found = map_estimate(recording, model)
         likelihood = _generic(recording, model, found)
@@ -32,10 +33,10 @@ def density_of(recording: Recording, model: ArrayModel, rates: str = "declared",
     else:
         estimator = _likelihood(recording, model, rates == "spread")
         mode, covariance = _mode(recording, model, rates == "spread")
-        likelihood = Marginal.of(estimator, positions_of(mode))
-        if likelihood.gap > GAP:
+        likelihood = marginal = Marginal.of(estimator, positions_of(mode))
+        if marginal.gap > GAP:
             say("gyroscopes that see little of the motion: the likelihood is good to"
-                f" {likelihood.gap:.1g} nats only")  # fmt: skip
+                f" {marginal.gap:.1g} nats only")  # fmt: skip
 
     def log_density(p):
         # traced: no call out of it

@@ -36,17 +36,17 @@ def read_mimu(
     from imuarray.recording import mimu
     from imuarray.recording.mimu_recording import read_positions, to_recording, turned_labels
 
-    places, labels = read_positions(positions)
+    places, labels = read_positions(Path(positions))
     turned = turned_labels(labels, underside)
     return to_recording(
-        mimu.read_mimu(path), places, labels, turned, accelerometer_noise, gyroscope_noise,
+        mimu.read_mimu(Path(path)), places, labels, turned, accelerometer_noise, gyroscope_noise,
         position_prior, source=Path(path).name,
     )  # fmt: skip
 
 
 def read_calibration(path: str | PathLike) -> xr.Dataset:
     """What `imuarray calibrate` has written; InputError for another file."""
-    found = load_dataset(path)
+    found = load_dataset(Path(path))
     if "position_covariance" not in found:
         raise InputError(f"{path}: expected a calibration, found no position_covariance")
     return found

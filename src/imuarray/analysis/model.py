@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from os import PathLike
+from pathlib import Path
 
 from imuarray.errors import InputError
 from imuarray.model import ArrayModel
@@ -72,7 +73,7 @@ def extender(
             "--accelerometer-noise: expected none beside --diagnosis, whose noise is used, found"
             f" {accelerometer_noise:g}"
         )
-    extension = read_extension(diagnosis)
+    extension = read_extension(Path(diagnosis))
     if "axis_swap" in extension.before:
         raise InputError(
             f"{diagnosis}: expected right axes, found an axis_swap; mend the recording"

@@ -43,7 +43,7 @@ def apply(
     dataset = motion_dataset(recording, found, lost)
     dataset["gyroscope_at_rail"] = (("time",), saturated.any(axis=(1, 2)))
     dataset["accelerometer_at_rail"] = (("time",), lost)
-    used = [calibration[name].to_numpy() for name in sorted(calibration.data_vars)]
+    used = [calibration[name].to_numpy() for name in sorted(map(str, calibration.data_vars))]
     data = digest(recording.specific_force, recording.angular_rate, *used)
     dataset.attrs |= stamp({"recording and calibration": data}, 0)
     return dataset
@@ -108,7 +108,7 @@ def motion_dataset(recording: Recording, found, lost) -> xr.Dataset:
 
     covariance = np.where(lost[:, None, None], np.nan, found.covariance)
     sds = np.sqrt(np.einsum("tii->ti", covariance)).reshape(-1, 3, 3)
-    variables = {
+    variables: dict[str, tuple] = {
         "motion_covariance": (("time", "component", "component_other"), covariance),
         "converged": (("time",), found.estimate.converged & ~lost),
     }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 
@@ -34,7 +36,7 @@ def document(dataset: xr.Dataset) -> dict:
     """The motion's main numbers; sds are rms over samples."""
     lost = dataset["accelerometer_at_rail"].to_numpy()
     railed = dataset["gyroscope_at_rail"].to_numpy() & ~lost
-    found = {
+    found: dict[str, Any] = {
         "samples": lost.size,
         "left_out": int(lost.sum()),
         "gyroscope_at_rail": int(railed.sum()),
