@@ -216,3 +216,22 @@ def test_a_full_disk_is_an_error_not_the_end_of_the_process(tmp_path):
     run = subprocess.run([sys.executable, "-c", code, out], capture_output=True, text=True)
     assert (run.returncode, run.stdout, run.stderr) == (0, f"{out} File too large\n", "")
     assert not list(tmp_path.iterdir())
+
+
+def test_what_a_killed_process_left_is_removed(tmp_path):
+    """The next one to write the same file does it; what a living one writes stays."""
+    code = (
+        "import os, signal, sys; from imuarray.provenance import atomic_write\n"
+        "with atomic_write(sys.argv[1]) as temporary:\n"
+        "    temporary.write_text('half')\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    out = tmp_path / "out.csv"
+    subprocess.run([sys.executable, "-c", code, out], check=False)
+    assert len(list(tmp_path.iterdir())) == 1 and not out.exists()
+    with atomic_write(out) as outer:
+        outer.write_text("mine")
+        with atomic_write(out) as inner:
+            inner.write_text("mine, too")
+        assert outer.exists()
+    assert list(tmp_path.iterdir()) == [out] and out.read_text() == "mine"

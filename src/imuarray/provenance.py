@@ -118,8 +118,10 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
     path = Path(path)
     if not path.parent.is_dir():
         raise FileNotFoundError(errno.ENOENT, "the output's folder does not exist", str(path))
+    own = f".{path.stem}.{platform.node()}-"
+    _sweep(path.parent, own)
     # the ending stays last: some writers choose the format by it
-    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}{path.suffix}")
+    temporary = path.with_name(f"{own}{os.getpid()}-{secrets.token_hex(4)}{path.suffix}")
     try:
         yield temporary
         os.replace(temporary, path)
@@ -130,6 +132,28 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
     finally:
         # after a success there is nothing left to delete
         temporary.unlink(missing_ok=True)
+
+
+def _sweep(folder: Path, own: str) -> None:
+    """Remove the temporary files of this machine's processes that were killed."""
+    for left in folder.iterdir():
+        if not left.name.startswith(own):
+            continue
+        process = left.name.removeprefix(own).partition("-")[0]
+        if process.isdigit() and not _runs(int(process)):
+            left.unlink(missing_ok=True)
+
+
+def _runs(process: int) -> bool:
+    if os.name != "posix":  # signal 0 is another thing there
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:  # another user's
+        return True
+    return True
 
 
 def write_json(value: Any, path: str | Path) -> None:
