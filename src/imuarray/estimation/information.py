@@ -38,8 +38,8 @@ def score(data: Collapsed, positions, state) -> np.ndarray:
 
 
 @nb.njit(cache=True, nogil=True)
-def _rows(rate, omega, C, P, out):
-    """Omega_t (x) dw/domega W_t^-1/2, (3 T, 54), W_t the information of omega_t."""
+def _taken(rate, C, P, out):
+    """dw/domega W_t^-1 (dw/domega)', W_t the information of omega_t: entries `LOWER`, (21, T)."""
     slope, W, Y = np.zeros((6, 3)), np.empty((3, 3)), np.empty((6, 3))
     for t in range(rate.shape[1]):
         x, y, z = rate[0, t], rate[1, t], rate[2, t]
@@ -66,11 +66,36 @@ def _rows(rate, omega, C, P, out):
                 for m in range(i):
                     value -= W[i, m] * Y[a, m]
                 Y[a, i] = value / W[i, i]
-        for j in range(3):
-            for i in range(3):
-                for c in range(3):
-                    for a in range(6):
-                        out[3 * t + j, 18 * i + 6 * c + a] = omega[c, i, t] * Y[a, j]
+        place = 0
+        for a in range(6):
+            for b in range(a + 1):
+                out[place, t] = Y[a, 0] * Y[b, 0] + Y[a, 1] * Y[b, 1] + Y[a, 2] * Y[b, 2]
+                place += 1
+
+
+def _lower(size: int):
+    """(rows, columns) of a symmetric matrix's lower triangle, and where each entry is in it."""
+    rows, columns = np.tril_indices(size)
+    place = np.empty((size, size), int)
+    place[rows, columns] = place[columns, rows] = np.arange(rows.size)
+    return rows, columns, place
+
+
+ARMS, LOWER = _lower(9), _lower(6)  # of Omega_t's entries, and of w's
+
+
+def _gram(data: Collapsed, rate, entries, C) -> np.ndarray:
+    """sum_t Omega_t (x) Omega_t (x) what omega_t takes up, (9, 9, 6, 6).
+
+    Both factors are symmetric: 45 x 21 sums instead of 54 x 54.
+    """
+    found = np.zeros((ARMS[0].size, LOWER[0].size))
+    for first in range(0, rate.shape[1], CHUNK):
+        part = slice(first, first + CHUNK)
+        taken = np.empty((LOWER[0].size, rate[:, part].shape[1]))
+        _taken(rate[:, part], C, data.gyroscope_information[..., part], taken)
+        found += (entries[ARMS[0], part] * entries[ARMS[1], part]) @ taken.T
+    return found[ARMS[2]][:, :, LOWER[2]]
 
 
 def information(data: Collapsed, positions, rate, state, reduced) -> np.ndarray:
@@ -97,13 +122,9 @@ def information(data: Collapsed, positions, rate, state, reduced) -> np.ndarray:
     # what omega takes up of the rest
     left = data.weights[:, None, None] * (columns[..., :6] - columns[..., 6:] @ X)
     left = left.reshape(count, 18)
-    gram = np.zeros((54, 54))
-    for first in range(0, rate.shape[1], CHUNK):
-        part = slice(first, first + CHUNK)
-        rows = np.empty((3 * rate[:, part].shape[1], 54))
-        _rows(rate[:, part], omega[..., part], C, data.gyroscope_information[..., part], rows)
-        gram += rows.T @ rows
-    blocks = gram.reshape(3, 18, 3, 18)
-    taken = np.einsum("ka,iajb,lb->kilj", left, blocks, left, optimize=True)
+    # (position's axis, force's, position's, force's, w, w) -> (i, (c, a), j, (d, b))
+    gram = _gram(data, rate, entries, C).reshape(3, 3, 3, 3, 6, 6)
+    blocks = gram.transpose(0, 1, 4, 2, 3, 5).reshape(3, 18, 3, 18)
+    taken = np.tensordot(np.tensordot(left, blocks, (1, 1)), left, (3, 1)).transpose(0, 1, 3, 2)
     whole -= taken.reshape(whole.shape)
     return whole[3:, 3:]

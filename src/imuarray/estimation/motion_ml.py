@@ -73,5 +73,10 @@ def motion_from(data: Collapsed, positions, tolerance=1e-10, limit=50) -> Motion
     )
     state = np.empty((12, data.samples))
     kernels.linear_motion(rate, X, phi, state)
+    return motion_estimate(data, rate, state, cost + const, iterations)
+
+
+def motion_estimate(data: Collapsed, rate, state, cost, iterations) -> MotionEstimate:
+    """From what the kernels found: omega (3, T), (w, phi) (12, T), cost and steps (T,)."""
     motion = Motion.of(rate.T, state[6:9].T, (state[9:12] + data.offset).T)
-    return MotionEstimate(motion, cost + const, np.abs(iterations), iterations > 0)
+    return MotionEstimate(motion, cost, np.abs(iterations), iterations > 0)

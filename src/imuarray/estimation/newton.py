@@ -14,7 +14,7 @@ from imuarray.estimation import kernels
 from imuarray.estimation.bcd import Calibration
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.information import information, score
-from imuarray.estimation.motion_ml import motion_from
+from imuarray.estimation.motion_ml import motion_estimate
 
 FAR = 1.0  # sds of the step before: the information is computed anew after a longer one
 SLOW = 0.05  # of the step before: and where steps contract less than so
@@ -67,8 +67,8 @@ def _descended(data, start, prior, tolerance, limit, covariance) -> Calibration:
         steps.append(float(np.max(np.abs(length * step))))
     width = np.linalg.inv(_information(data, here, prior)) if covariance else None
     return Calibration(
-        here.positions, motion_from(data, here.positions), np.array(costs), np.array(steps),
-        converged, here.positions[None], width, np.empty(0),
+        here.positions, motion_estimate(data, here.rate, here.state, here.costs, here.counts),
+        np.array(costs), np.array(steps), converged, here.positions[None], width, np.empty(0),
     )  # fmt: skip
 
 
@@ -80,6 +80,8 @@ class Point(NamedTuple):
     state: np.ndarray  # (w, phi) (12, T)
     reduced: tuple
     cost: float  # twice the negative log posterior
+    costs: np.ndarray  # (T,) of it, each sample's
+    counts: np.ndarray  # (T,) steps of the search for omega, negative where it did not end
     slope: np.ndarray  # (3 (A - 1),), half the cost's fall
 
 
@@ -104,13 +106,14 @@ def _at(data: Collapsed, positions, rate, prior) -> Point:
         rate, C, b, data.mean, data.gyroscope_information, RATE, LIMIT, cost, counts
     )
     kernels.linear_motion(rate, X, phi, state)
-    total = float(cost.sum() + const.sum())
+    cost += const
+    total = float(cost.sum())
     slope = score(data, positions, state)[1:].ravel()
     if prior is not None:
         away = positions[1:].ravel() - prior[0]
         pull = prior[1] @ away
         total, slope = total + float(away @ pull), slope - pull
-    return Point(positions, rate, state, reduced, total, slope)
+    return Point(positions, rate, state, reduced, total, cost, counts, slope)
 
 
 def _information(data: Collapsed, here: Point, prior) -> np.ndarray:

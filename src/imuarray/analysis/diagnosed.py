@@ -1,0 +1,80 @@
+"""The extended model of a diagnosis as a calibration: what `imuarray.apply` can use."""
+
+from __future__ import annotations
+
+import json
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from imuarray.analysis.model import model_of
+from imuarray.criticism.extension import extended_model, read_extension
+from imuarray.errors import InputError
+from imuarray.model.array_model import clock
+from imuarray.model.names import parameter_names
+from imuarray.recording import Recording
+
+
+def diagnosed(diagnosis: str | PathLike, recording: Recording) -> xr.Dataset:
+    """Positions and effects of a ``diagnosis.json``, as `calibrate` would give them.
+
+    ``recording`` is the one that was diagnosed, whole: clocks and drifts are its own. The
+    covariance is diagonal, of the sds that the diagnosis states; what it states none for counts
+    as exactly known. InputError for another file, or other IMUs.
+    """
+    extension = read_extension(Path(diagnosis))
+    labels = recording.accelerometer_labels, recording.gyroscope_labels
+    model = extended_model(extension, model_of(recording), labels)
+    positions, sds = _positions(Path(diagnosis), recording)
+    names = parameter_names(model, labels)
+    values = {
+        f"{e} {n}": sd for e, found in extension.values.items() for n, (_, sd) in found.items()
+    }
+    # a name ends with its unit
+    effect_sds = np.array([values.get(name.rpartition(" ")[0]) or 0.0 for name in names])
+    whole = np.diag(np.concatenate([sds[1:].ravel(), effect_sds]) ** 2)
+    count = len(labels[0])
+    covariance = np.diag(sds.ravel() ** 2).reshape(count, 3, count, 3)
+    noise = [
+        np.sqrt(np.diag(part)).reshape(-1, 3)
+        for part in (model.noise.accelerometer, model.noise.gyroscope)
+    ]
+    place = ("accelerometer", "axis")
+    variables = {
+        "position": (place, positions, {"units": "m", "relative_to": labels[0][0]}),
+        "nominal_position": (place, recording.relative_positions(), {"units": "m"}),
+        "position_covariance": (
+            (*place, "accelerometer_other", "axis_other"), covariance, {"units": "m2"},
+        ),
+        "effect_parameter": (("parameter",), model.effect_start),
+        "effect_sd": (("parameter",), effect_sds),
+        "whole_covariance": (("unknown", "unknown_other"), whole),
+        "accelerometer_sd": (place, noise[0], {"units": "m s-2"}),
+        "gyroscope_sd": (("gyroscope", "axis"), noise[1], {"units": "rad s-1"}),
+    }  # fmt: skip
+    coords = {
+        "accelerometer": list(labels[0]), "gyroscope": list(labels[1]), "axis": list("xyz"),
+        "accelerometer_other": list(labels[0]), "axis_other": list("xyz"), "parameter": names,
+    }  # fmt: skip
+    attrs = {
+        "effects": ",".join(model.effects), "time_origin": float(np.min(recording.time)),
+        "span": clock(recording.time)[1],
+    }  # fmt: skip
+    return xr.Dataset(variables, coords, attrs)
+
+
+def _positions(path: Path, recording: Recording) -> tuple[np.ndarray, np.ndarray]:
+    """(positions, sds), each (A, 3) m relative to the first triad, of the extended model."""
+    section = json.loads(path.read_text(encoding="utf-8"))["extended"]
+    fields = [np.array(section[name], float) for name in ("positions_m", "positions_sd_m")]
+    shape = len(recording.accelerometer_labels), 3
+    if fields[0].shape != shape:
+        raise InputError(
+            f"{path}: expected positions of {shape[0]} accelerometers, as in the recording, found"
+            f" {len(fields[0])}"
+        )
+    sds = np.zeros(shape)
+    sds[1:] = fields[1][-(shape[0] - 1) :]  # the reference has none
+    return fields[0] - fields[0][0], sds
