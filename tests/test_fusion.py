@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from imuarray.errors import IdentifiabilityError
-from imuarray.estimation.fusion import fuse, fuse_extended
+from imuarray.estimation.extended import fuse_extended
+from imuarray.estimation.fusion import fuse
 from imuarray.motion import hand_twisting, normal_motion
 from imuarray.simulation import measure
 from tests import oracles

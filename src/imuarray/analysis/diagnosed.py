@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis.model import model_of
-from imuarray.criticism.extension import extended_model, read_extension
+from imuarray.criticism.extension import Extension, extended_model, read_extension
 from imuarray.errors import InputError
 from imuarray.model.array_model import clock
 from imuarray.model.names import parameter_names
@@ -63,6 +63,12 @@ def diagnosed(diagnosis: str | PathLike, recording: Recording) -> xr.Dataset:
         "span": clock(recording.time)[1],
     }  # fmt: skip
     return xr.Dataset(variables, coords, attrs)
+
+
+def _sd(extension: Extension, name: str) -> float:
+    """Of the parameter 'effect component_IMU unit'; 0 where the diagnosis states none."""
+    effect, component = name.split(" ")[:2]
+    return extension.values[effect].get(component, (0.0, None))[1] or 0.0
 
 
 def _positions(path: Path, recording: Recording) -> tuple[np.ndarray, np.ndarray]:

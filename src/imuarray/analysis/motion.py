@@ -64,7 +64,7 @@ def _papers(calibration: xr.Dataset, recording: Recording):
 
 def _extended(calibration: xr.Dataset, recording: Recording, accelerometer_noise: float | None):
     """A model with effects, their parameters and noise as calibrated."""
-    from imuarray.estimation.fusion import fuse_extended
+    from imuarray.estimation.extended import fuse_extended
 
     positions = calibration["position"].to_numpy()
     sds = [calibration[f"{kind}_sd"].to_numpy()[:, 0] for kind in ("accelerometer", "gyroscope")]

@@ -158,3 +158,36 @@ def normal_equations(given: Problem, x, p) -> Blocks:
         cost += float(out[5])
     joined = [np.concatenate(part) for part in (motion, cross, gradient)]
     return Blocks(*joined, shared, shared_gradient, cost)
+
+
+@partial(jax.jit, static_argnums=0)
+def _motion_chunk(model, x, p, force, rate, keep, time, span, whiten_force, whiten_rate):
+    def one(x, force, rate, keep, time, whiten_rate):
+        def flat(x):
+            return residual(
+                model, x, p, force, rate, keep, time, span, whiten_force, whiten_rate
+            )  # fmt: skip
+
+        value, jac = flat(x), jax.jacfwd(flat)(x)
+        return jac.T @ jac, jac.T @ value
+
+    return jax.vmap(one)(x, force, rate, keep, time, whiten_rate)
+
+
+def motion_equations(given: Problem, x, p) -> tuple[np.ndarray, np.ndarray]:
+    """The motion's own part of `normal_equations`, far cheaper: (T, n, n) and (T, n)."""
+    last, found = len(given.whiten_rate) - 1, []
+    for start in range(0, len(x), CHUNK):
+        index = np.minimum(np.arange(start, start + CHUNK), len(x) - 1)
+        found.append(
+            _motion_chunk(
+                given.model, x[index], p, given.specific_force[index], given.angular_rate[index],
+                given.keep[index], given.time[index], given.span, given.whiten_force,
+                given.whiten_rate[np.minimum(index, last)],
+            )
+        )  # fmt: skip
+    A, g = (
+        np.concatenate([np.asarray(part) for part in parts])[: len(x)]
+        for parts in zip(*found, strict=True)
+    )
+    return A, g

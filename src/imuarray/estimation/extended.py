@@ -1,0 +1,69 @@
+"""The array as one sensor under a model with effects: motion with covariances."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from imuarray.estimation.blocks import (
+    motion_equations,
+    normal_equations,
+    pack_motion,
+    problem,
+    unpack_motion,
+)
+from imuarray.estimation.collapsed import Collapsed
+from imuarray.estimation.fusion import Fused
+from imuarray.estimation.motion_ml import MotionEstimate, motion_from
+from imuarray.geometry.array import require_planar_extent
+from imuarray.model import ArrayModel
+from imuarray.motion import Motion
+
+
+def fuse_extended(
+    model: ArrayModel, specific_force, angular_rate, parameters, covariance=None, saturated=None,
+    time=None, span: float | None = None, tolerance: float = 1e-6, limit: int = 50,
+) -> Fused:  # fmt: skip
+    """`fuse` for a model with effects, by Gauss-Newton in each sample's whole motion.
+
+    Parameters
+    ----------
+    parameters : (P,), r_2 ... r_A in m, then the effects' parameters in their units
+    covariance : (P, P) of them, or None: exactly known
+    time, span : (T,) s and s
+        Since the calibration's recording began, and its length, which drifts and clocks look at.
+    tolerance : float
+        Stop when no sample's motion moves by more than this many of its own sds.
+    """
+    parameters = np.asarray(parameters, float)
+    size = 3 * (model.array.accelerometers - 1)
+    positions = np.concatenate([np.zeros((1, 3)), parameters[:size].reshape(-1, 3)])
+    require_planar_extent(positions, "positions")
+    data = Collapsed.of(model, specific_force, angular_rate, saturated)
+    given = problem(model, specific_force, angular_rate, saturated)
+    if time is not None:
+        given = given._replace(time=np.asarray(time, float), span=float(span or np.ptp(time)))
+    x = pack_motion(model, motion_from(data, positions).motion)
+    x, converged, counts = _descend(given, x, parameters, tolerance, limit)
+    blocks = normal_equations(given, x, parameters)
+    whole = np.linalg.inv(blocks.motion)
+    spread = np.zeros((parameters.size,) * 2) if covariance is None else covariance
+    moved = whole @ blocks.cross
+    shared = (moved @ spread @ moved.swapaxes(1, 2))[:, :9, :9]
+    motion = Motion(*map(np.asarray, unpack_motion(x)))
+    found = MotionEstimate(motion, np.full(len(x), np.nan), counts, converged)
+    return Fused(found, whole[:, :9, :9] + shared, shared)
+
+
+def _descend(given, x, parameters, tolerance, limit):
+    """(motion (T, n), converged (T,), steps (T,)), each sample by itself."""
+    converged, counts = np.zeros(len(x), bool), np.zeros(len(x), int)
+    for _ in range(limit):
+        information, gradient = motion_equations(given, x, parameters)
+        step = -np.linalg.solve(information, gradient[..., None])[..., 0]
+        # in units of the step's own sds: its length in the metric of the information
+        converged = np.einsum("ti,tij,tj->t", step, information, step) < tolerance**2
+        if converged.all():
+            break
+        x = x + np.where(converged[:, None], 0.0, step)
+        counts += ~converged
+    return x, converged, counts
