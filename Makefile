@@ -7,12 +7,13 @@ SNAKEMAKE_ARGS ?=
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.installed
+DOCS := .venv-docs
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES) $(SNAKEMAKE_ARGS)
 
 # Snakemake's jobs start `python` and `imuarray` by name.
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: help run quick paper test test-slurm bench lint lock clean
+.PHONY: help run quick paper test test-slurm bench docs lint lock clean
 .DEFAULT_GOAL := help
 
 help:
@@ -22,6 +23,7 @@ help:
 	@echo "make test    the tests"
 	@echo "make test-slurm   the quick run through a Slurm of one node, brought up here (root, a container)"
 	@echo "make bench   the benchmarks"
+	@echo "make docs    the documentation as a site to open without a network: site/index.html"
 	@echo "make lint    ruff, mypy, snakefmt and snakemake --lint"
 	@echo "make lock    resolve pyproject.toml into requirements.lock anew (needs uv)"
 	@echo "make clean   remove the environment and the caches, not the results"
@@ -56,6 +58,17 @@ test-slurm: $(READY)
 bench: $(READY)
 	$(BIN)/python benchmarks/run.py
 
+# The site's tools have an environment of their own: they read the package's source and do not run it.
+$(DOCS)/.installed: pyproject.toml
+	rm -rf $(DOCS)
+	$(PYTHON) -m venv $(DOCS)
+	$(DOCS)/bin/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["docs"], sep="\n")' > $(DOCS)/requirements.txt
+	$(DOCS)/bin/python -m pip install --quiet --disable-pip-version-check -r $(DOCS)/requirements.txt
+	touch $@
+
+docs: $(DOCS)/.installed
+	NO_MKDOCS_2_WARNING=1 $(DOCS)/bin/mkdocs build --strict --quiet
+
 lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/mypy
@@ -68,5 +81,5 @@ lock:
 	    --generate-hashes --no-header --quiet -o requirements.lock
 
 clean:
-	rm -rf $(VENV) build dist src/*.egg-info .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(DOCS) site build dist src/*.egg-info .pytest_cache .ruff_cache .hypothesis
 	find src tests workflow benchmarks -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true

@@ -5,8 +5,8 @@ A page is one program: its blocks run in their order, in one namespace and one f
 - ``python`` is run. ``sh`` is run where each command is an `imuarray` one, so other commands must
   be marked.
 - A block under a line that is a file's name alone, as code, is that file.
-- ``text`` below a block that has run is what it printed, numbers to within a fifth; elsewhere it
-  is a drawing.
+- ``text`` right below a block that has run is what it printed, numbers to within a fifth;
+  elsewhere it is a drawing.
 - ``<!-- not run: reason -->`` on the line before a block leaves it out, ``<!-- source: path -->``
   says that it stands in that file as it is.
 
@@ -41,7 +41,7 @@ QUICK = (("board: mimu4444 ", "board: mimu4444_corners "), ("duration: 100.0", "
 
 @dataclass(frozen=True)
 class Block:
-    """A fenced block; ``kind`` is python, sh, file, text, not run or source."""
+    """A fenced block; ``kind`` is python, sh, file, output, text, not run or source."""
 
     page: Path
     line: int  # of its first line of code
@@ -83,6 +83,8 @@ def _kind(language: str, before: str, where: str) -> tuple[str, str]:
         return mark["kind"], mark["text"]
     if name := FILE.match(before):
         return "file", name[1]
+    if language == "text" and not before:  # nothing between it and the block above
+        return "output", ""
     if language in ("python", "sh", "text"):
         return language, ""
     raise ValueError(
@@ -110,7 +112,7 @@ def run(page: Path) -> None:
             with contextlib.redirect_stdout(output):
                 (_run_python if block.kind == "python" else _run_shell)(block, namespace)
             printed = output.getvalue()
-        elif block.kind == "text" and printed is not None:
+        elif block.kind == "output" and printed is not None:
             compare(block, printed)
         if block.kind not in ("python", "sh"):
             printed = None
