@@ -105,9 +105,10 @@ class Measured:
         return sorted(set(paths))
 
     def diagnoses(self) -> list[str]:
-        """Diagnoses of all recordings, and their agreement where a board has several."""
+        """Diagnoses of all recordings, their agreement where a board has several, their use."""
         folder = "results/measured"
         paths = [f"{folder}/diagnosis/{name}/diagnosis.json" for name in self.available()]
+        paths += [f"{folder}/figures/past_rail_{name}.png" for name in self.available()]
         for group in self.groups():
             paths += [f"{folder}/figures/diagnosis_{group}.{k}" for k in ("pdf", "png", "csv")]
         return paths

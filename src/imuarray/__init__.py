@@ -30,6 +30,7 @@ _HOME = {
     "calibrate_bcd": "imuarray.estimation",
     "calibrate_gauss_newton": "imuarray.estimation",
     "diagnose": "imuarray.criticism.diagnosis",
+    "diagnosed": "imuarray.analysis",
     "estimate_motion": "imuarray.estimation",
     "first_order": "imuarray.analysis",
     "mimu4444": "imuarray.geometry",
@@ -52,6 +53,7 @@ if TYPE_CHECKING:  # what the names above are, for type checkers and editors
     from imuarray import plots as plots
     from imuarray.analysis import apply as apply
     from imuarray.analysis import calibrate as calibrate
+    from imuarray.analysis import diagnosed as diagnosed
     from imuarray.analysis import first_order as first_order
     from imuarray.analysis import read_calibration as read_calibration
     from imuarray.analysis import read_csv as read_csv

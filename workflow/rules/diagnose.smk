@@ -66,6 +66,33 @@ rule diagnosis_agreement:
         "../scripts/diagnosis_agreement.py"
 
 
+rule past_rail:
+    input:
+        recording=lambda wc: "results/measured/{}/{}.nc".format(
+            "corrected" if RECORDINGS[wc.name].get("first_order", True) else "recordings", wc.name
+        ),
+        diagnosis="results/measured/diagnosis/{name}/diagnosis.json",
+        code=resting_on("analysis/past_rail.py", "figures/past_rail.py", "provenance.py"),
+    output:
+        pdf="results/measured/figures/past_rail_{name}.pdf",
+        png=report(
+            "results/measured/figures/past_rail_{name}.png",
+            caption="../report/past_rail.rst",
+            category="Model criticism",
+        ),
+        csv="results/measured/figures/past_rail_{name}.csv",
+    log:
+        "results/measured/logs/past_rail_{name}.log",
+    benchmark:
+        "results/measured/benchmarks/past_rail_{name}.tsv"
+    threads: 1
+    resources:
+        mem_mb=4000,
+        runtime=20,
+    script:
+        "../scripts/past_rail.py"
+
+
 rule add_effect:
     input:
         recording=lambda wc: "results/measured/{}/{}.nc".format(

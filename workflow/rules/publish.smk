@@ -118,6 +118,20 @@ rule publish_diagnosis:
         "cp {input:q} {output:q} 2> {log:q}"
 
 
+rule publish_past_rail:
+    input:
+        "results/measured/figures/past_rail_{name}.{kind}",
+    output:
+        "paper_figures/past_rail_{name}.{kind}",
+    log:
+        "results/logs/publish/past_rail_{name}.{kind}.log",
+    wildcard_constraints:
+        name="|".join(RECORDINGS) or "none",
+        kind="pdf|png|csv",
+    shell:
+        "cp {input:q} {output:q} 2> {log:q}"
+
+
 rule publish_cause:
     input:
         "results/measured/diagnosis/{name}/diagnosis.json",

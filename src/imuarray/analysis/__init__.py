@@ -10,6 +10,7 @@ _HOME = {
     "apply": "motion",
     "calibrate": "calibration",
     "density_of": "density",
+    "diagnosed": "extension",
     "first_order": "prepare",
     "model_of": "model",
     "prior_of": "density",
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from imuarray.analysis.calibration import calibrate as calibrate
     from imuarray.analysis.density import density_of as density_of
     from imuarray.analysis.density import prior_of as prior_of
+    from imuarray.analysis.extension import diagnosed as diagnosed
     from imuarray.analysis.files import read_calibration as read_calibration
     from imuarray.analysis.files import read_csv as read_csv
     from imuarray.analysis.files import read_mimu as read_mimu

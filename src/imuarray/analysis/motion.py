@@ -36,7 +36,7 @@ def apply(
     require_fit(calibration, recording)
     saturated = recording.saturated_gyroscopes()
     if "effect_parameter" in calibration:
-        found = _extended(calibration, recording, accelerometer_noise)
+        _, found = extended_motion(calibration, recording, saturated, accelerometer_noise)
     else:
         found = _papers(calibration, recording)
     lost = recording.saturated_accelerometers().any(axis=(1, 2))
@@ -62,8 +62,14 @@ def _papers(calibration: xr.Dataset, recording: Recording):
     )  # fmt: skip
 
 
-def _extended(calibration: xr.Dataset, recording: Recording, accelerometer_noise: float | None):
-    """A model with effects, their parameters and noise as calibrated."""
+def extended_motion(
+    calibration: xr.Dataset, recording: Recording, saturated,
+    accelerometer_noise: float | None = None,
+):  # fmt: skip
+    """(model, `Fused`) under a calibration with effects, their parameters and noise as calibrated.
+
+    ``saturated`` (T, G, 3) bool: gyroscope axes to be left out.
+    """
     from imuarray.estimation.extended import fuse_extended
 
     positions = calibration["position"].to_numpy()
@@ -72,12 +78,13 @@ def _extended(calibration: xr.Dataset, recording: Recording, accelerometer_noise
         sds[0] = np.full(len(positions), accelerometer_noise)
     model = model_of(recording, calibration.attrs["effects"].split(","))
     noise = Noise.of(model.array.accelerometers, model.array.gyroscopes, *sds)
+    model = replace(model, noise=noise)
     parameters = np.concatenate(
         [(positions - positions[0])[1:].ravel(), calibration["effect_parameter"].to_numpy()]
     )
-    return fuse_extended(
-        replace(model, noise=noise), recording.specific_force, recording.angular_rate, parameters,
-        calibration["whole_covariance"].to_numpy(), recording.saturated_gyroscopes(),
+    return model, fuse_extended(
+        model, recording.specific_force, recording.angular_rate, parameters,
+        calibration["whole_covariance"].to_numpy(), saturated,
         recording.time - calibration.attrs["time_origin"], calibration.attrs["span"],
     )  # fmt: skip
 

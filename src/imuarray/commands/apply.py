@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from imuarray.analysis import apply as applied
+from imuarray.analysis import diagnosed
 from imuarray.analysis.motion import UNITS
 from imuarray.commands.output import Output
 from imuarray.errors import InputError
 from imuarray.provenance import write_netcdf
-from imuarray.recording import load_dataset, read_recording
+from imuarray.recording import Recording, load_dataset, read_recording
 
 
 def apply(arguments) -> None:
     """The calibrated array's motion with covariances; see `imuarray.apply` for the output."""
     output = Output(arguments)
     recording = read_recording(arguments.recording)
-    calibration = load_dataset(arguments.calibration)
     try:
+        calibration = _calibration(arguments.calibration, recording)
         dataset = applied(calibration, recording, arguments.accelerometer_noise)
     except InputError as error:
         raise InputError(f"{arguments.calibration}: {error}") from None
@@ -30,6 +32,13 @@ def apply(arguments) -> None:
     found = document(dataset)
     output.say("\n".join(report(found, average)))
     output.done(found | {"gyroscopes_averaged_sd_rad_s": average, "out": str(arguments.out)})
+
+
+def _calibration(path: Path, recording: Recording) -> xr.Dataset:
+    """What `calibrate` has written, or the extended model of a diagnosis.json."""
+    if path.suffix == ".json":
+        return diagnosed(path, recording)
+    return load_dataset(path)
 
 
 def document(dataset: xr.Dataset) -> dict:

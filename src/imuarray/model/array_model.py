@@ -149,18 +149,22 @@ class ArrayModel:
             predicted = item.apply(values[item.id], instant, predicted)
         return predicted
 
-    def predict_many(self, motion: Motion, positions, parameters=(), time=None) -> Prediction:
+    def predict_many(
+        self, motion: Motion, positions, parameters=(), time=None, span: float | None = None
+    ) -> Prediction:
         """`predict` over leading sample axes, compiled; returns numpy arrays (..., n, 3).
 
         ``positions`` is (A, 3), or (realisations, A, 3) with motion (realisations, T, 3);
-        ``time`` (T,) s matters to drifts, shifts and clocks only, zero if not given.
+        ``time`` (T,) s matters to drifts, shifts and clocks only, zero if not given; with
+        ``span`` (s) it counts from the beginning of a recording of that length.
         """
         fields = Motion(*(jnp.asarray(field) for field in motion))
         positions = jnp.asarray(positions)
         parameters = jnp.asarray(np.asarray(parameters, float))
         samples = fields.angular_rate.shape[-2]
-        time, span = clock(np.zeros(samples) if time is None else time)
-        out = _predict_many(self, fields, positions, parameters, time, span)
+        if span is None:
+            time, span = clock(np.zeros(samples) if time is None else time)
+        out = _predict_many(self, fields, positions, parameters, np.asarray(time, float), span)
         return Prediction(*(np.asarray(part) for part in out))
 
     def with_motion(self, motion: Motion) -> ArrayModel:

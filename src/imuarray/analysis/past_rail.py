@@ -1,0 +1,118 @@
+"""How well an array tells an angular rate that its gyroscopes may not see (2017, figure 3).
+
+On a measured recording nobody knows the rate past the gyroscopes' rail. So a lower rail is made
+up: readings beyond it are hidden from the estimate and kept to judge it by.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from imuarray.analysis.motion import extended_motion
+from imuarray.errors import InputError
+from imuarray.estimation import estimate_motion
+from imuarray.model import ArrayModel
+from imuarray.recording import Recording, array_of
+
+BINS = (250, 350, 500, 700, 1000, 1400, 2000)  # deg/s; the first is the rail that is made up
+PER_BIN = 150  # samples
+ASSUMED = 0.79  # m/s^2, the accelerometers' noise in paper 2021's experiment
+
+
+def past_rail(
+    recording: Recording, diagnosed: xr.Dataset, base, bins=BINS, per_bin: int = PER_BIN
+) -> pd.DataFrame:
+    """Errors of hidden gyroscope readings, as several models foretell them.
+
+    Parameters
+    ----------
+    recording
+        Whole and corrected; samples at a true rail are not used.
+    diagnosed
+        What `diagnosed` gives of the recording's diagnosis.
+    base : (A, 3) m
+        Positions by the papers' model, relative to the first triad.
+    bins
+        Edges in deg/s of the hidden axis' rate; the first is the rail.
+
+    Returns
+    -------
+    DataFrame
+        A row per model (``clipped``, ``nominal``, ``calibrated``, ``extended``) and bin: geometric
+        mid ``rate_dps``, ``readings``, ``rmse_dps``, ``median_dps`` of the absolute error, and for
+        ``extended`` what it claims, ``sd_dps`` and ``within_95``.
+
+    InputError where no sample is beyond the rail.
+    """
+    chosen = _choose(recording, np.radians(bins), per_bin)
+    lowest = np.radians(bins[0])
+    hidden = (np.abs(chosen.angular_rate) >= lowest).any(axis=1, keepdims=True)
+    hidden = np.broadcast_to(hidden, chosen.angular_rate.shape)
+    clipped = replace(chosen, angular_rate=np.clip(chosen.angular_rate, -lowest, lowest))
+    errors, sds = {"clipped": clipped.angular_rate - chosen.angular_rate}, {}
+    for name, positions in (("nominal", recording.relative_positions()), ("calibrated", base)):
+        model = ArrayModel.isotropic(array_of(chosen), ASSUMED, chosen.gyroscope_noise_sd)
+        found = estimate_motion(
+            model, clipped.specific_force, clipped.angular_rate, positions, hidden
+        )
+        errors[name] = found.motion.angular_rate[:, None] - chosen.angular_rate
+    model, found = extended_motion(diagnosed, clipped, hidden)
+    foretold = _readings(model, diagnosed, found, chosen.time)
+    errors["extended"] = foretold - chosen.angular_rate
+    variance = np.einsum("tii->ti", found.covariance)[:, None, :3]
+    noise = np.diag(model.noise.gyroscope).reshape(1, -1, 3)
+    sds["extended"] = np.sqrt(variance + noise)
+    rates = np.abs(chosen.angular_rate.mean(axis=1, keepdims=True))
+    rates = np.broadcast_to(rates, hidden.shape)
+    return _table(errors, sds, hidden, np.degrees(rates), bins)
+
+
+def _choose(recording: Recording, edges, per_bin: int) -> Recording:
+    """Samples off all true rails, spread evenly over time in each bin of their fastest axis."""
+    fastest = np.abs(recording.angular_rate.mean(axis=1)).max(axis=1)
+    lost = recording.saturated_gyroscopes()
+    off = ~lost.any(axis=(1, 2)) & ~recording.saturated_accelerometers().any(axis=(1, 2))
+    chosen = []
+    for low, high in zip(edges[:-1], edges[1:], strict=True):
+        index = np.flatnonzero(off & (fastest >= low) & (fastest < high))
+        chosen.append(index[:: max(1, len(index) // per_bin)][:per_bin])
+    index = np.sort(np.concatenate(chosen))
+    if not len(index):
+        raise InputError(
+            f"recording: expected samples beyond {np.degrees(edges[0]):g} deg/s, found none"
+        )
+    return recording.select(index)
+
+
+def _readings(model: ArrayModel, diagnosed: xr.Dataset, found, time) -> np.ndarray:
+    """What the gyroscopes read at the motion found, (T, G, 3) rad/s."""
+    since = time - diagnosed.attrs["time_origin"]
+    predicted = model.predict_many(
+        found.estimate.motion, diagnosed["position"].to_numpy(),
+        diagnosed["effect_parameter"].to_numpy(), since, span=diagnosed.attrs["span"],
+    )  # fmt: skip
+    return np.asarray(predicted.angular_rate)
+
+
+def _table(errors, sds, hidden, rates, bins) -> pd.DataFrame:
+    rows = []
+    for name, error in errors.items():
+        size = np.degrees(np.abs(error))
+        for low, high in zip(bins[:-1], bins[1:], strict=True):
+            here = hidden & (rates >= low) & (rates < high)
+            if not here.any():
+                continue
+            row = {
+                "model": name, "rate_dps": float(np.sqrt(low * high)), "readings": int(here.sum()),
+                "rmse_dps": np.sqrt(np.mean(size[here] ** 2)), "median_dps": np.median(size[here]),
+            }  # fmt: skip
+            if name in sds:
+                claimed = np.degrees(sds[name])
+                row["sd_dps"] = np.median(claimed[here])
+                row["within_95"] = np.mean(size[here] < 1.96 * claimed[here])
+            rows.append(row)
+    return pd.DataFrame(rows)

@@ -1,0 +1,82 @@
+"""Readings that are hidden from the estimate and kept to judge it by."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import imuarray
+from imuarray.analysis.past_rail import past_rail
+from imuarray.cli import main
+from imuarray.errors import InputError
+from imuarray.figures.past_rail import past_rail_figure
+from imuarray.model.names import parameter_names
+from tests.test_bound import model
+
+
+@pytest.fixture(scope="module")
+def hidden():
+    """(recording with scaled gyroscopes, its truth): 5 triads, 300 samples."""
+    effects = ("gyroscope_scale",)
+    recording, truth = imuarray.simulate(
+        model().array, 3.0, 100.0, seed=2, effects=effects, angular_rate=30.0,
+        gyroscope_noise=0.005, position_error=1e-4,
+    )  # fmt: skip
+    return recording, truth
+
+
+@pytest.fixture
+def diagnosis(hidden, tmp_path):
+    """What a diagnosis that found the truth would say."""
+    recording, truth = hidden
+    own = replace(model(), effects=("gyroscope_scale",))
+    labels = recording.accelerometer_labels, recording.gyroscope_labels
+    names = [name.split(" ")[1] for name in parameter_names(own, labels)]
+    values = truth["effect_parameter"].to_numpy()
+    parameters = {
+        name: {"value": value, "sd": 1e-4, "unit": "1"}
+        for name, value in zip(names, values, strict=True)
+    }
+    noise = {
+        kind: {label: {"sd": sd} for label in labels[0]}
+        for kind, sd in (("accelerometer", 0.04), ("gyroscope", 0.005))
+    }
+    section = {"positions_m": truth["position"].to_numpy().tolist()}
+    section["positions_sd_m"] = np.full((5, 3), 1e-6).tolist()
+    document = {
+        "causes": [{"effect": "gyroscope_scale", "parameters": parameters}],
+        "noise_sd": noise, "extended": section,
+    }  # fmt: skip
+    path = tmp_path / "diagnosis.json"
+    path.write_text(json.dumps(document))
+    return path
+
+
+def test_the_right_model_foretells_what_is_hidden(hidden, diagnosis):
+    recording, truth = hidden
+    found = imuarray.diagnosed(diagnosis, recording)
+    assert np.array_equal(found["effect_parameter"], truth["effect_parameter"])
+    assert np.allclose(found["effect_sd"], 1e-4)
+    table = past_rail(recording, found, truth["position"].to_numpy(), bins=(300, 800, 2000))
+    errors = table.pivot(index="rate_dps", columns="model", values="median_dps")
+    assert np.all(errors.extended < 0.2 * errors.calibrated)
+    assert np.all(errors.calibrated < errors.clipped)
+    extended = table[table.model == "extended"]
+    assert np.all(np.abs(extended.within_95 - 0.95) < 0.05)
+    figure = past_rail_figure(table, 300, ["a footer"])
+    assert all(len(axes.lines) == 6 for axes in figure.axes)
+
+
+def test_a_diagnosis_is_a_calibration_for_the_command(hidden, diagnosis, tmp_path):
+    recording, _ = hidden
+    imuarray.write_recording(recording, tmp_path / "rec.nc")
+    out = tmp_path / "motion.nc"
+    assert main(["apply", str(diagnosis), str(tmp_path / "rec.nc"), "--out", str(out)]) == 0
+
+
+def test_what_is_never_fast_is_refused(hidden, diagnosis):
+    recording, truth = hidden
+    found = imuarray.diagnosed(diagnosis, recording)
+    with pytest.raises(InputError, match="beyond 9000 deg/s, found none"):
+        past_rail(recording, found, truth["position"].to_numpy(), bins=(9000, 9500))
