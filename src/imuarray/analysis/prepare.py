@@ -29,18 +29,26 @@ def simulate(
     ----------
     array
         The board: `mimu4444()`, or an `Array` of your own.
-    duration, sampling_rate
-        In s and Hz.
+    duration
+        In s.
+    sampling_rate
+        In Hz.
     seed
         Of motion, positions, effects and noise, each with a stream of its own.
     effects
         Hidden in the data, parameters drawn from their priors (docs/effects.md).
-    accelerometer_noise, gyroscope_noise
-        Sds of one reading, m/s^2 and rad/s.
+    accelerometer_noise
+        Sd of one reading, m/s^2.
+    gyroscope_noise
+        Sd of one reading, rad/s.
     position_error
         Sd (m) of the nominal positions that the recording declares about the true ones.
-    angular_rate, specific_force, bandwidth
-        Sds of the motion per axis, rad/s and m/s^2, and its bandwidth in Hz.
+    angular_rate
+        Of the motion, twice its sd per axis, rad/s.
+    specific_force
+        Of the motion, sd per axis, m/s^2.
+    bandwidth
+        Of the motion, Hz.
     gyroscope_range
         The rail, rad/s.
     """

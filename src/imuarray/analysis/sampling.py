@@ -73,10 +73,16 @@ def sample(
     rates
         p(omega | y_g) from the ``"declared"`` gyroscope noise, or from the ``"spread"`` among the
         gyroscopes of each sample (equation (30)).
-    effects, diagnosis, accelerometer_noise
+    effects
         As in `imuarray.calibrate`.
-    progress, say
-        Whether to show a bar; called with each remark on the work's course.
+    diagnosis
+        As in `imuarray.calibrate`.
+    accelerometer_noise
+        As in `imuarray.calibrate`.
+    progress
+        Whether to show a bar.
+    say
+        Called with each remark on the work's course.
     beside
         A file beside which PmMH keeps a checkpoint, continued by the same call with the same
         data, settings and code; the attribute ``checkpoint`` names it. By default none.
