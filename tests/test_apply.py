@@ -97,7 +97,7 @@ def test_the_motion_under_effects(files, tmp_path):
     array = model().array
     names = ("gyroscope_misalignment", "size_effect")
     recording, truth = imuarray.simulate(
-        array, 3.0, 100.0, seed=5, effects=names, angular_rate=30.0, gyroscope_range=RAIL,
+        array, 3.0, 100.0, seed=5, effects=names, angular_rate=15.0, gyroscope_range=RAIL,
         accelerometer_noise=0.1, gyroscope_noise=0.02,
     )  # fmt: skip
     z = {}

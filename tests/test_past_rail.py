@@ -20,7 +20,7 @@ def hidden():
     """(recording with scaled gyroscopes, its truth): 5 triads, 300 samples."""
     effects = ("gyroscope_scale",)
     recording, truth = imuarray.simulate(
-        model().array, 3.0, 100.0, seed=2, effects=effects, angular_rate=30.0,
+        model().array, 3.0, 100.0, seed=2, effects=effects, angular_rate=15.0,
         gyroscope_noise=0.005, position_error=1e-4,
     )  # fmt: skip
     return recording, truth

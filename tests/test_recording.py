@@ -146,3 +146,15 @@ def test_a_gap_is_a_warning_of_one_line(tmp_path):
     with pytest.warns(UserWarning, match=r"1 gap\(s\) .* 3.01 s, comes after index 9") as seen:
         read_recording(path)
     assert len(seen) == 1 and "\n" not in str(seen[0].message)
+
+
+def test_samples_that_were_chosen_are_no_gap(tmp_path, recwarn):
+    """The file says that they are a part; a gap in what was recorded is a warning still."""
+    whole = make(**{n: np.repeat(getattr(make(), n), 3, axis=0) for n in ("specific_force",
+        "angular_rate", "stationary")}, time=np.arange(3.0 * len(make().time)))  # fmt: skip
+    part = whole.select([0, 1, 2, 3, 9]).select(slice(1, None))
+    assert part.selected == f"4 of {len(whole.time)} samples"
+    write_recording(part, tmp_path / "rec.nc")
+    assert read_recording(tmp_path / "rec.nc").selected == part.selected and not recwarn.list
+    with pytest.warns(UserWarning, match="gap"):
+        write_recording(dataclasses.replace(part, selected=""), tmp_path / "rec.nc")

@@ -20,7 +20,7 @@ def simulate(
     array: Array, duration: float = 10.0, sampling_rate: float = 100.0, seed: int = 0,
     effects: Sequence[str] = (), accelerometer_noise: float = 0.04,
     gyroscope_noise: float = float(np.radians(0.06)), position_error: float = 1e-3,
-    angular_rate: float = float(np.radians(500)), specific_force: float = 20.0,
+    angular_rate: float = float(np.radians(250)), specific_force: float = 20.0,
     bandwidth: float = 5.0, gyroscope_range: float = float(np.radians(2000)),
 ) -> tuple[Recording, xr.Dataset]:  # fmt: skip
     """(recording, truth) of an array twisted by hand.
@@ -44,7 +44,7 @@ def simulate(
     position_error
         Sd (m) of the nominal positions that the recording declares about the true ones.
     angular_rate
-        Of the motion, twice its sd per axis, rad/s.
+        Of the motion, sd per axis, rad/s.
     specific_force
         Of the motion, sd per axis, m/s^2.
     bandwidth
@@ -60,7 +60,7 @@ def simulate(
             f" {sampling_rate:g} Hz"
         )
     model = ArrayModel.isotropic(array, accelerometer_noise, gyroscope_noise, effects)
-    motion = hand_twisting(stream(seed, "twisting"), angular_rate / 2, specific_force, bandwidth)
+    motion = hand_twisting(stream(seed, "twisting"), angular_rate, specific_force, bandwidth)
     sizes = model.effect_prior_sd
     errors = position_error * stream(seed, "mounting").standard_normal(array.positions.shape)
     errors[0] = 0.0

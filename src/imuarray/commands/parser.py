@@ -21,7 +21,10 @@ SAMPLING_METHODS = ("pmmh", "nuts")
 def make_parser() -> argparse.ArgumentParser:
     """What it parses has the command's function as ``run``; a wrong line is an InputError."""
     parser = Parser(
-        prog="imuarray", description="Calibrate the geometry of inertial sensor arrays."
+        prog="imuarray",
+        description="Calibrate the geometry of inertial sensor arrays.",
+        epilog="example: imuarray calibrate rec.nc --method gauss-newton --out cal.nc;"
+        " every command has its own: imuarray calibrate --help",
     )
     parser.add_argument("--version", action="version", version=f"imuarray {imuarray.__version__}")
     commands = parser.add_subparsers(dest="command", metavar="command", required=True)
@@ -55,9 +58,12 @@ def _add_simulate(commands) -> None:
 
 def _add_convert(commands) -> None:
     summary = "Turn a logger's file into a recording."
-    kinds = commands.add_parser("convert", help=summary, description=summary).add_subparsers(
-        dest="kind", metavar="format", required=True
-    )
+    kinds = commands.add_parser(
+        "convert",
+        help=summary,
+        description=summary,
+        epilog="example: imuarray convert csv log.csv --columns columns.yaml --out rec.nc",
+    ).add_subparsers(dest="kind", metavar="format", required=True)
     _add_convert_mimu(kinds)
     _add_convert_csv(kinds)
 
@@ -224,7 +230,11 @@ def _add_apply(commands) -> None:
         "cal.nc rec.nc --out motion.nc",
         "motion to write (NetCDF-4)",
     )
-    parser.add_argument("calibration", type=Path, help="what `imuarray calibrate` has written")
+    parser.add_argument(
+        "calibration",
+        type=Path,
+        help="what `imuarray calibrate` has written, or the diagnosis.json of `imuarray diagnose`",
+    )
     add_recording(parser)
     parser.add_argument(
         "--accelerometer-noise", type=positive, default=None, metavar="SD",

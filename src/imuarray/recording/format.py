@@ -43,6 +43,8 @@ class Recording:
     specific_force_saturated, angular_rate_saturated : ndarray (T, A or G, 3) bool, or None
         Readings at a rail, where a correction moved them off the range (first-order calibration).
     title, source, license : str, empty if not known
+    selected : str
+        How many samples of how many, where these are not all that were recorded; else empty.
     """
 
     time: np.ndarray
@@ -62,6 +64,7 @@ class Recording:
     title: str = ""
     source: str = ""
     license: str = ""
+    selected: str = ""
 
     def to_dataset(self) -> xr.Dataset:
         """The recording as the file holds it, rates in rad/s; InputError for shapes at odds."""
@@ -105,7 +108,11 @@ class Recording:
         """The samples that `index` picks: a slice, a (T,) mask or an array of time indices."""
         names = ("time", "specific_force", "angular_rate", *FLAGS)
         parts = {name: getattr(self, name) for name in names}
-        return replace(self, **{n: x[index] for n, x in parts.items() if x is not None})
+        left = {n: x[index] for n, x in parts.items() if x is not None}
+        whole = self.selected.partition(" of ")[2] or f"{len(self.time)} samples"
+        said = f"{len(left['time'])} of {whole}"
+        unchanged = len(left["time"]) == len(self.time)
+        return replace(self, **left, selected=self.selected if unchanged else said)
 
 
 def array_of(recording: Recording, gyroscopes: int | None = None) -> Array:

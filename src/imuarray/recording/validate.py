@@ -64,7 +64,7 @@ NUMBERS = {
 MAY_BE_INFINITE = ("accelerometer_range", "gyroscope_range")
 
 # Optional attributes that are text.
-TEXTS = ("title", "source", "license")
+TEXTS = ("title", "source", "license", "selected")
 
 # 1.6 GB as float64. A file of a few bytes can declare far more than any memory holds.
 MAX_VALUES = 200_000_000
@@ -118,7 +118,7 @@ def check_values(recording: Recording, where: str) -> None:
     _check_labels("gyroscope", recording.gyroscope_labels, where)
     for name in UNITS:
         _check_finite(recording, name, where)
-    _check_time(recording.time, where)
+    _check_time(recording.time, where, told=bool(recording.selected))
     require_planar_extent(recording.accelerometer_position, f"{where}: accelerometer_position")
     _check_range(recording, "specific_force", recording.accelerometer_range, where)
     _check_range(recording, "angular_rate", recording.gyroscope_range, where)
@@ -259,8 +259,8 @@ def _place(recording: Recording, name: str, index: tuple[int, ...]) -> str:
     return ", ".join(words)
 
 
-def _check_time(time: np.ndarray, where: str) -> None:
-    """Strictly increasing, or InputError; even, or a warning."""
+def _check_time(time: np.ndarray, where: str, told: bool = False) -> None:
+    """Strictly increasing, or InputError; even, or a warning, unless the file has ``told`` so."""
     steps = np.diff(time)
     if (steps <= 0).any():
         i = int(np.argmax(steps <= 0))
@@ -268,7 +268,7 @@ def _check_time(time: np.ndarray, where: str) -> None:
             f"{where}: time: expected strictly increasing values, found {time[i]} s and then "
             f"{time[i + 1]} s at index {i + 1}"
         )
-    if len(steps) == 0:
+    if len(steps) == 0 or told:
         return
     usual = float(np.median(steps))
     gaps = np.flatnonzero(steps > GAP_FACTOR * usual)
