@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import imuarray
+from imuarray.analysis import density_of, model_of
 from imuarray.blind.cases import Case, make
 from imuarray.cli import main
 from imuarray.errors import InputError
+from imuarray.geometry import positions_of, sub_array
 from imuarray.model.jax64 import jnp
 from imuarray.posterior import Likelihood
 from imuarray.posterior.diagnostics import ess, rhat
@@ -95,3 +98,35 @@ def test_command(tmp_path):
     with xr.open_datatree(out, engine="h5netcdf") as tree:
         assert tree.attrs["rhat_max"] < 1.05
         assert tree["posterior"]["position"].sizes["chain"] == 2
+
+
+def test_a_chain_that_falls_into_the_flat_priors_hole_is_told():
+    """Under the flat motion prior the density grows as d^-T towards triads on one line, d apart.
+
+    These four are nearly on one; from this seed's first start NUTS finds the others' place.
+    """
+    array = sub_array(imuarray.mimu4444(), 4)
+    recording, _ = imuarray.simulate(array, duration=5.0, sampling_rate=50.0, seed=1)
+    said = []
+    found = imuarray.sample(
+        imuarray.select(recording, 20), method="nuts", steps=100, seed=1, say=said.append
+    )
+    assert found.attrs["above_mode_nats"] > 50 and not found.attrs["converged"]
+    assert any("no bound" in text for text in said)
+
+
+def test_the_density_has_no_bound_towards_triads_on_one_line():
+    """T nats for each factor e by which they come nearer, once near (T = 20: d^-20)."""
+    array = sub_array(imuarray.mimu4444(), 4)
+    recording, _ = imuarray.simulate(array, duration=5.0, sampling_rate=50.0, seed=1)
+    recording = imuarray.select(recording, 20)
+    log_density, _, mode, _ = density_of(recording, model_of(recording))
+    positions = positions_of(mode)
+    centred = positions - positions.mean(axis=0)
+    along = np.linalg.svd(centred)[2][0]
+    line = centred @ np.outer(along, along)
+    values = [
+        float(log_density((d * positions + (1 - d) * (line - line[0]))[1:].ravel()))
+        for d in (1e-3, 1e-4)
+    ]
+    assert values[1] - values[0] == pytest.approx(20 * np.log(10), abs=1.0)

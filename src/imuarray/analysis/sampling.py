@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -27,6 +27,7 @@ NUTS_STEPS, NUTS_WARMUP = 1000, 300
 APART = 2.0  # posterior sds by which the starts differ where effects are free
 STORED = 2000
 RHAT_THRESHOLD = 1.05
+AWAY = 50.0  # nats above the mode that no chain of a proper posterior gets
 
 
 class Asked(NamedTuple):
@@ -48,7 +49,14 @@ class Made(NamedTuple):
     prior: GaussianPrior
     key: str  # digest of everything that they depend on
     settings: dict
+    at_mode: float  # log target at the mode
     checkpoint: Path | None = None
+
+    @property
+    def above(self) -> float:
+        """Nats by which a chain is above the mode, where the target has no bound; else 0."""
+        found = float(self.chains.log_target.max()) - self.at_mode
+        return found if found > AWAY else 0.0
 
 
 def sample(
@@ -110,6 +118,10 @@ def sample(
     beside = None if beside is None else Path(beside)
     asked = Asked(method, steps, seed, rates, progress, beside, say)
     made = (_nuts if method == "nuts" else _pmmh)(recording, model, asked)
+    if made.above:
+        say(f"a chain went {made.above:.0f} nats above the mode: the flat motion prior has no bound"
+            " where triads come to lie on one line, which these are not far enough from"
+            " (docs/findings.md)")  # fmt: skip
     return _tree(recording, model, made, seed)
 
 
@@ -129,10 +141,11 @@ def _tree(recording: Recording, model: ArrayModel, made: Made, seed: int) -> xr.
     labels = recording.accelerometer_labels[1:]
     names = parameter_names(model, (recording.accelerometer_labels, recording.gyroscope_labels))
     verdict, _, _ = summarise(made.chains, labels, RHAT_THRESHOLD)
-    attrs = stamp({"recording": made.key, **made.settings}, seed)
+    attrs: dict[str, Any] = {**stamp({"recording": made.key, **made.settings}, seed)}
     kept = "burn_in_draws", "burn_in_steps", "steps", "rhat_max", "ess_min"
     attrs |= {name: verdict[name] for name in kept}
-    attrs |= {"converged": int(verdict["converged"]), "divergent": made.chains.divergent}
+    attrs["converged"] = int(verdict["converged"] and not made.above)
+    attrs |= {"divergent": made.chains.divergent, "above_mode_nats": made.above}
     if made.checkpoint is not None:
         attrs["checkpoint"] = str(made.checkpoint)
     return chain_tree(made.chains, labels, made.prior, attrs, names)
@@ -163,7 +176,9 @@ def _pmmh(recording, model, asked: Asked) -> Made:
         target, starts, step, max(4, steps // thin), thin, asked.seed,
         checkpoint=checkpoint, key=key, quiet=not asked.progress,
     )  # fmt: skip
-    return Made(chains, target.prior, key, {"draws_per_sample": draws}, checkpoint)
+    at_mode = float(target.log_target(mode, rng))
+    settings = {"draws_per_sample": draws}
+    return Made(chains, target.prior, key, settings, at_mode, checkpoint)
 
 
 def _checkpoint(asked: Asked, key: str) -> Path | None:
@@ -195,8 +210,9 @@ def _nuts(recording, model, asked: Asked) -> Made:
         log_density, mode, covariance, starts, NUTS_WARMUP, steps, asked.seed,
         quiet=not asked.progress,
     )  # fmt: skip
-    return Made(found, prior, _key(recording, model, prior, asked, steps, "nuts"),
-                {"divergent": found.divergent})  # fmt: skip
+    key = _key(recording, model, prior, asked, steps, "nuts")
+    settings, at_mode = {"divergent": found.divergent}, float(log_density(mode))
+    return Made(found, prior, key, settings, at_mode)
 
 
 def _stream(asked: Asked, name: str):
