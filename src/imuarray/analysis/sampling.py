@@ -120,7 +120,7 @@ def sample(
     made = (_nuts if method == "nuts" else _pmmh)(recording, model, asked)
     if made.above:
         say(f"a chain went {made.above:.0f} nats above the mode: the flat motion prior has no bound"
-            " where triads come to lie on one line, which these are not far enough from"
+            " where triads come to lie on one line, and these are not far enough from that"
             " (docs/findings.md)")  # fmt: skip
     return _tree(recording, model, made, seed)
 
