@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 import yaml
 
+from imuarray.cli import main
 from imuarray.config import read_config
 from imuarray.errors import InputError
 from imuarray.provenance import is_damaged
-from imuarray.recording import read_recording, write_recording
+from imuarray.recording import apart, read_recording, write_recording
 from tests.test_convert_csv import HEADER, layout, table
 from tests.test_convert_csv import read as read_csv
 from tests.test_pipeline import ROOT
@@ -170,3 +171,31 @@ def test_a_recording_changed_by_hand_has_no_seal(tmp_path):
     with h5py.File(path, "r+") as file:
         file["angular_rate"][0] = 0.0
     assert not np.any(read_recording(path).angular_rate[0])
+
+
+def test_what_hangs_or_ends_hdf5_is_refused(tmp_path, monkeypatch):
+    """In a process of its own: here one that sleeps, or kills itself, stands for HDF5."""
+    path = tmp_path / "rec.nc"
+    make().to_dataset().to_netcdf(path, engine="h5netcdf")
+    apart.require_readable(path)
+    monkeypatch.setattr(apart, "LOOK", "import time; time.sleep(60)")
+    with pytest.raises(InputError, match="not through with after 1 s"):
+        apart.require_readable(path, 1.0)
+    monkeypatch.setattr(apart, "LOOK", "import os; os.kill(os.getpid(), 11)")
+    with pytest.raises(InputError, match="crashes"):
+        apart.require_readable(path)
+    write_recording(make(), path)  # sealed: not looked at
+    apart.require_readable(path)
+
+
+def test_damaged_files_of_other_programs_end_in_a_line(tmp_path):
+    """Without a seal, by the command: no traceback, no hang."""
+    rng, path = np.random.default_rng(5), tmp_path / "rec.nc"
+    make().to_dataset().to_netcdf(path, engine="h5netcdf")
+    content = path.read_bytes()
+    for _ in range(25):
+        data = bytearray(content)
+        for place in rng.integers(0, len(data), 64):
+            data[place] ^= int(rng.integers(1, 256))
+        path.write_bytes(data)
+        assert main(["select", str(path), "--out", str(tmp_path / "out.nc"), "--quiet"]) in (0, 2)

@@ -125,7 +125,7 @@ def test_bad_configuration_is_one_clear_line(tmp_path):
         capture_output=True, text=True, timeout=120,
     )  # fmt: skip
     said = done.stdout + done.stderr
-    assert done.returncode != 0 and "gyroscope_sd" in said and "Traceback" not in said
+    assert done.returncode == 2 and "gyroscope_sd" in said and "Traceback" not in said
     assert not (tmp_path / "results").exists()
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from imuarray.commands.parser import make_parser
 from imuarray.errors import InputError
 
+NETCDF = (".nc", ".nc4", ".h5")
 OK, BAD_INPUT, INTERRUPTED, CLOSED = 0, 2, 130, 141
 
 
@@ -84,6 +85,10 @@ def _check_output(arguments: argparse.Namespace) -> None:
             raise InputError(f"{source}: expected a file to read, found {found}")
         if out.is_file() and out.samefile(source):
             raise InputError(f"--out {out}: expected another file than the input, found the same")
+        if source.suffix in NETCDF:
+            from imuarray.recording.apart import require_readable
+
+            require_readable(source)
 
 
 def _inputs(arguments: argparse.Namespace) -> list[Path]:

@@ -187,24 +187,30 @@ def write_netcdf(
 SEAL = b"imuarray sha-256"  # before the digest, at a file's end, where HDF5 does not look
 
 
+def seal_of(path: str | Path) -> bytes | None:
+    """The digest at the end of a sealed file, or None."""
+    length = len(SEAL) + hashlib.sha256().digest_size
+    with open(path, "rb") as handle:
+        size = handle.seek(0, os.SEEK_END)
+        if size < length:
+            return None
+        handle.seek(size - length)
+        tail = handle.read()
+    return tail[len(SEAL) :] if tail.startswith(SEAL) else None
+
+
 def is_damaged(path: str | Path) -> bool:
     """Whether a sealed file is not as `write_netcdf` wrote it; without a seal none can tell.
 
     To be asked before HDF5 reads the file: wrong bytes make it read wrong numbers, or loop.
     """
-    length = len(SEAL) + hashlib.sha256().digest_size
+    found = seal_of(path)
+    if found is None:
+        return False
+    state, left = hashlib.sha256(), os.path.getsize(path) - len(SEAL) - len(found)
     with open(path, "rb") as handle:
-        size = handle.seek(0, os.SEEK_END)
-        if size < length:
-            return False
-        handle.seek(size - length)
-        tail = handle.read()
-        if not tail.startswith(SEAL):
-            return False
-        state, left = hashlib.sha256(), size - length
-        handle.seek(0)
         while left:
             piece = handle.read(min(left, 1 << 20))
             state.update(piece)
             left -= len(piece)
-    return tail[len(SEAL) :] != state.digest()
+    return found != state.digest()
