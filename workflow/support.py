@@ -3,6 +3,7 @@
 import ast
 import json
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import imuarray
@@ -57,7 +58,7 @@ def resting_on(*names: str) -> list[str]:
 def imported(path: Path) -> list[Path]:
     """Files of the package that a file of it imports, those of the packages on the way too."""
     names = []
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in _run(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom):
             names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
         elif isinstance(node, ast.Import):
@@ -66,6 +67,15 @@ def imported(path: Path) -> list[Path]:
     steps = {PACKAGE.joinpath(*part[:depth]) for part in parts for depth in range(len(part) + 1)}
     files = [place for step in steps for place in (step / "__init__.py", step.with_suffix(".py"))]
     return [file for file in files if file.is_file() and PACKAGE in file.parents]
+
+
+def _run(tree: ast.AST) -> Iterator[ast.AST]:
+    """The nodes of a file but for those that only type checkers see."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            continue
+        yield node
+        yield from _run(node)
 
 
 class Crew:
