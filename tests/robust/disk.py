@@ -16,7 +16,7 @@ from pathlib import Path
 from tests.robust.kill import fresh, started
 from tests.trees import differences
 
-SIZES = 4, 16, 40, 70  # kB that commands get
+SIZES = 4, 40, 400, 4000  # kB that commands get
 ROOM = 200, 1000, 3000  # kB that the pipeline gets, before it gets enough
 COMMANDS = (
     "simulate --config {config} --out {out}",
@@ -63,7 +63,7 @@ def commands(folder: Path, names: dict[str, Path]) -> list[str]:
                 left = sorted(path.name for path in folder.iterdir())
             said = run.stderr.splitlines()
             refused = run.returncode == 2 and len(said) == 1 and not left
-            allowed = run.returncode == 0 and size >= SIZES[1] and not said
+            allowed = run.returncode == 0 and size >= SIZES[2] and not said
             state = f"{command.split()[0]} on {size or 'read-only'}: {run.returncode}"
             print(state, *said, flush=True)
             if not (refused or allowed):

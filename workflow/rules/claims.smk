@@ -169,7 +169,11 @@ rule claims:
         experiment=lambda wc: MEASURED.claims(wc.scale),
         code=library("claims"),
     output:
-        table="results/{scale}/claims/claims.csv",
+        table=report(
+            "results/{scale}/claims/claims.csv",
+            caption="../report/claims.rst",
+            category="Claims",
+        ),
         page="results/{scale}/claims/claims.md",
     log:
         "results/{scale}/logs/claims/claims.log",
