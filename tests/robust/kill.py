@@ -29,7 +29,7 @@ def command(*arguments: str) -> list[str]:
     """snakemake as the README has it, in whatever directory."""
     return [
         sys.executable, "-m", "snakemake", "-s", str(ROOT / "Snakefile"), "--configfile",
-        "config.yaml", "--cores", "2", "--quiet", "all", "--rerun-incomplete",
+        "config.yaml", "--cores", "2", "--quiet", "rules", "--rerun-incomplete",
         "--workflow-profile", "none", *arguments,
     ]  # fmt: skip
 
