@@ -65,7 +65,7 @@ def test_the_right_model_foretells_what_is_hidden(hidden, diagnosis):
     extended = table[table.model == "extended"]
     assert np.all(np.abs(extended.within_95 - 0.95) < 0.05)
     figure = past_rail_figure(table, 300, ["a footer"])
-    assert all(len(axes.lines) == 6 for axes in figure.axes)
+    assert all(len(axes.lines) == 7 for axes in figure.axes)
 
 
 def test_a_diagnosis_is_a_calibration_for_the_command(hidden, diagnosis, tmp_path):

@@ -160,7 +160,8 @@ def residual_ratio(recording: Recording, model: ArrayModel, found, saturated) ->
     """Rms residual over the declared noise, degrees of freedom allowed for; NaN without any."""
     samples, count = recording.specific_force.shape[:2]
     values = 3 * samples * (count + recording.angular_rate.shape[1]) - int(saturated.sum())
-    freedom = values - 9 * samples - 3 * (count - 1)
+    # with effects the positions have a prior, which is in the cost and pays for them
+    freedom = values - 9 * samples - (0 if model.effects else 3 * (count - 1))
     if freedom <= 0:
         return float("nan")
     return float(np.sqrt(_misfit(recording, model, found, saturated) / freedom))

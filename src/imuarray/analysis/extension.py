@@ -21,20 +21,16 @@ def diagnosed(diagnosis: str | PathLike, recording: Recording) -> xr.Dataset:
     """Positions and effects of a ``diagnosis.json``, as `calibrate` would give them.
 
     ``recording`` is the one that was diagnosed, whole: clocks and drifts are its own. The
-    covariance is diagonal, of the sds that the diagnosis states; what it states none for counts
-    as exactly known. InputError for another file, or other IMUs.
+    diagnosis states sds but not how positions and effects go together, without which they tell
+    nothing of the motion's error: ``whole_covariance`` is not there. InputError for another
+    file, or other IMUs.
     """
     extension = read_extension(Path(diagnosis))
     labels = recording.accelerometer_labels, recording.gyroscope_labels
     model = extended_model(extension, model_of(recording), labels)
     positions, sds = _positions(Path(diagnosis), recording)
     names = parameter_names(model, labels)
-    values = {
-        f"{e} {n}": sd for e, found in extension.values.items() for n, (_, sd) in found.items()
-    }
-    # a name ends with its unit
-    effect_sds = np.array([values.get(name.rpartition(" ")[0]) or 0.0 for name in names])
-    whole = np.diag(np.concatenate([sds[1:].ravel(), effect_sds]) ** 2)
+    effect_sds = np.array([_sd(extension, name) for name in names])
     count = len(labels[0])
     covariance = np.diag(sds.ravel() ** 2).reshape(count, 3, count, 3)
     noise = [
@@ -50,7 +46,6 @@ def diagnosed(diagnosis: str | PathLike, recording: Recording) -> xr.Dataset:
         ),
         "effect_parameter": (("parameter",), model.effect_start),
         "effect_sd": (("parameter",), effect_sds),
-        "whole_covariance": (("unknown", "unknown_other"), whole),
         "accelerometer_sd": (place, noise[0], {"units": "m s-2"}),
         "gyroscope_sd": (("gyroscope", "axis"), noise[1], {"units": "rad s-1"}),
     }  # fmt: skip

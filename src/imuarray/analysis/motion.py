@@ -28,7 +28,8 @@ def apply(
 
     Returns ``angular_rate`` (time, axis) rad/s, ``angular_acceleration`` rad/s^2 and
     ``specific_force`` m/s^2, each with ``_sd`` and the part of it that is due to the calibration,
-    ``_sd_from_calibration``; ``motion_covariance`` (time, component, component_other);
+    ``_sd_from_calibration`` (NaN for a diagnosis, which does not tell it: sds are the noise's
+    alone then); ``motion_covariance`` (time, component, component_other);
     ``converged``, and the flags ``gyroscope_at_rail`` and ``accelerometer_at_rail`` (time; the
     motion is NaN where an accelerometer is). InputError says what does not fit together.
     """
@@ -41,6 +42,9 @@ def apply(
         found = _papers(calibration, recording)
     lost = recording.saturated_accelerometers().any(axis=(1, 2))
     dataset = motion_dataset(recording, found, lost)
+    if "effect_parameter" in calibration and "whole_covariance" not in calibration:
+        for name in UNITS:
+            dataset[f"{name}_sd_from_calibration"][:] = np.nan
     dataset["gyroscope_at_rail"] = (("time",), saturated.any(axis=(1, 2)))
     dataset["accelerometer_at_rail"] = (("time",), lost)
     used = [calibration[name].to_numpy() for name in sorted(map(str, calibration.data_vars))]
@@ -82,9 +86,12 @@ def extended_motion(
     parameters = np.concatenate(
         [(positions - positions[0])[1:].ravel(), calibration["effect_parameter"].to_numpy()]
     )
+    covariance = None
+    if "whole_covariance" in calibration:
+        covariance = calibration["whole_covariance"].to_numpy()
     return model, fuse_extended(
         model, recording.specific_force, recording.angular_rate, parameters,
-        calibration["whole_covariance"].to_numpy(), saturated,
+        covariance, saturated,
         recording.time - calibration.attrs["time_origin"], calibration.attrs["span"],
     )  # fmt: skip
 

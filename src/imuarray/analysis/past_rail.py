@@ -42,9 +42,11 @@ def past_rail(
     Returns
     -------
     DataFrame
-        A row per model (``clipped``, ``nominal``, ``calibrated``, ``extended``) and bin: geometric
-        mid ``rate_dps``, ``readings``, ``rmse_dps``, ``median_dps`` of the absolute error, and for
-        ``extended`` what it claims, ``sd_dps`` and ``within_95``.
+        A row per model (``clipped``, ``nominal``, ``calibrated``, the same less the gyroscopes' lag
+        ``delayed``, ``extended``) and bin of the hidden axis' rate: geometric mid ``rate_dps``,
+        ``readings`` (of all gyroscopes, which share an error), ``rmse_dps``, ``median_dps`` of the
+        absolute error, ``above_100`` the share beyond 100 deg/s, and for ``extended`` what noise
+        alone claims: ``sd_dps`` (median), ``rms_sd_dps`` and ``within_95``.
 
     InputError where no sample is beyond the rail.
     """
@@ -60,6 +62,8 @@ def past_rail(
             model, clipped.specific_force, clipped.angular_rate, positions, hidden
         )
         errors[name] = found.motion.angular_rate[:, None] - chosen.angular_rate
+        late = found.motion.angular_acceleration[:, None] * lag_of(diagnosed)
+    errors["delayed"] = errors["calibrated"] - late
     model, found = extended_motion(diagnosed, clipped, hidden)
     foretold = _readings(model, diagnosed, found, chosen.time)
     errors["extended"] = foretold - chosen.angular_rate
@@ -69,6 +73,13 @@ def past_rail(
     rates = np.abs(chosen.angular_rate.mean(axis=1, keepdims=True))
     rates = np.broadcast_to(rates, hidden.shape)
     return _table(errors, sds, hidden, np.degrees(rates), bins)
+
+
+def lag_of(diagnosed: xr.Dataset) -> float:
+    """The gyroscopes' mean lag behind the accelerometers (s) in a diagnosis, 0 without one."""
+    names = [str(name) for name in diagnosed["parameter"].to_numpy()]
+    lags = [name.startswith("gyroscope_delay ") for name in names]
+    return float(diagnosed["effect_parameter"].to_numpy()[lags].mean()) if any(lags) else 0.0
 
 
 def _choose(recording: Recording, edges, per_bin: int) -> Recording:
@@ -108,11 +119,13 @@ def _table(errors, sds, hidden, rates, bins) -> pd.DataFrame:
                 continue
             row = {
                 "model": name, "rate_dps": float(np.sqrt(low * high)), "readings": int(here.sum()),
+                "above_100": np.mean(size[here] > 100.0),
                 "rmse_dps": np.sqrt(np.mean(size[here] ** 2)), "median_dps": np.median(size[here]),
             }  # fmt: skip
             if name in sds:
                 claimed = np.degrees(sds[name])
                 row["sd_dps"] = np.median(claimed[here])
+                row["rms_sd_dps"] = np.sqrt(np.mean(claimed[here] ** 2))
                 row["within_95"] = np.mean(size[here] < 1.96 * claimed[here])
             rows.append(row)
     return pd.DataFrame(rows)

@@ -16,6 +16,7 @@ from imuarray.estimation.fusion import Fused
 from imuarray.estimation.motion_ml import MotionEstimate, motion_from
 from imuarray.geometry.array import require_planar_extent
 from imuarray.model import ArrayModel
+from imuarray.model.array_model import clock
 from imuarray.motion import Motion
 
 
@@ -41,7 +42,9 @@ def fuse_extended(
     data = Collapsed.of(model, specific_force, angular_rate, saturated)
     given = problem(model, specific_force, angular_rate, saturated)
     if time is not None:
-        given = given._replace(time=np.asarray(time, float), span=float(span or np.ptp(time)))
+        given = given._replace(
+            time=np.asarray(time, float), span=float(span) if span else clock(time)[1]
+        )
     x = pack_motion(model, motion_from(data, positions).motion)
     x, converged, counts = _descend(given, x, parameters, tolerance, limit)
     blocks = normal_equations(given, x, parameters)
