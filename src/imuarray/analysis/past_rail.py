@@ -42,8 +42,8 @@ def past_rail(
     Returns
     -------
     DataFrame
-        A row per model (``clipped``, ``nominal``, ``calibrated``, the same less the gyroscopes' lag
-        ``delayed``, ``extended``) and bin of the hidden axis' rate: geometric mid ``rate_dps``,
+        A row per model (``clipped``, ``nominal``, ``calibrated``, ``delayed``: the same with the
+        gyroscopes' lead, ``extended``) and bin of the hidden axis' rate: geometric mid ``rate_dps``,
         ``readings`` (of all gyroscopes, which share an error), ``rmse_dps``, ``median_dps`` of the
         absolute error, ``above_100`` the share beyond 100 deg/s, and for ``extended`` what noise
         alone claims: ``sd_dps`` (median), ``rms_sd_dps`` and ``within_95``.
@@ -62,8 +62,8 @@ def past_rail(
             model, clipped.specific_force, clipped.angular_rate, positions, hidden
         )
         errors[name] = found.motion.angular_rate[:, None] - chosen.angular_rate
-        late = found.motion.angular_acceleration[:, None] * lag_of(diagnosed)
-    errors["delayed"] = errors["calibrated"] - late
+        ahead = found.motion.angular_acceleration[:, None] * lead_of(diagnosed)
+    errors["delayed"] = errors["calibrated"] + ahead
     model, found = extended_motion(diagnosed, clipped, hidden)
     foretold = _readings(model, diagnosed, found, chosen.time)
     errors["extended"] = foretold - chosen.angular_rate
@@ -75,8 +75,8 @@ def past_rail(
     return _table(errors, sds, hidden, np.degrees(rates), bins)
 
 
-def lag_of(diagnosed: xr.Dataset) -> float:
-    """The gyroscopes' mean lag behind the accelerometers (s) in a diagnosis, 0 without one."""
+def lead_of(diagnosed: xr.Dataset) -> float:
+    """By how much (s) the gyroscopes are ahead of the accelerometers, 0 where nobody found it."""
     names = [str(name) for name in diagnosed["parameter"].to_numpy()]
     lags = [name.startswith("gyroscope_delay ") for name in names]
     return float(diagnosed["effect_parameter"].to_numpy()[lags].mean()) if any(lags) else 0.0

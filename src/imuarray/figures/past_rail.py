@@ -10,7 +10,7 @@ SERIES = {
     "clipped": "gyroscopes at the rail",
     "nominal": "papers' model, nominal positions",
     "calibrated": "papers' model, calibrated positions",
-    "delayed": "the same and the gyroscopes' lag",
+    "delayed": "the same and one delay",
     "extended": "extended model",
 }
 
@@ -31,7 +31,7 @@ def past_rail_figure(table: pd.DataFrame, rail_dps: float, footer=()):
             axes.plot(rows.rate_dps, rows[column], label=label, **look(number), markersize=4)
         rows = table[table.model == "extended"]
         axes.plot(rows.rate_dps, factor * rows[claimed], color="0.4", linestyle=(0, (1, 1.5)),
-                  linewidth=1, label="the same, as noise alone claims")  # fmt: skip
+                  linewidth=1, label="extended model, as noise alone claims")  # fmt: skip
         axes.axvline(rail_dps, color="0.6", linewidth=0.8)
         axes.set(xscale="log", yscale="log", xlabel="angular rate of the hidden axis (deg/s)")
         axes.set_xticks([250, 500, 1000, 2000], ["250", "500", "1000", "2000"])
