@@ -43,7 +43,7 @@ def past_rail(
     -------
     DataFrame
         A row per model (``clipped``, ``nominal``, ``calibrated``, ``delayed``: the same with the
-        gyroscopes' lead, ``extended``) and bin of the hidden axis' rate: geometric mid ``rate_dps``,
+        gyroscopes' lead, ``extended``) and bin of the hidden axis' rate: mid ``rate_dps``,
         ``readings`` (of all gyroscopes, which share an error), ``rmse_dps``, ``median_dps`` of the
         absolute error, ``above_100`` the share beyond 100 deg/s, and for ``extended`` what noise
         alone claims: ``sd_dps`` (median), ``rms_sd_dps`` and ``within_95``.
