@@ -72,13 +72,15 @@ def residuals(arguments) -> None:
     recording, output = read_recording(arguments.recording), Output(arguments)
     moving = recording.select(select_dynamic(recording).usable)
     table, shape = compare(moving, np.random.default_rng(arguments.seed))
-    write_csv(table, arguments.out)
-    if arguments.figure is not None:
+    if arguments.figure is None:
+        write_csv(table, arguments.out)
+    else:
         from imuarray.figures.measured import residual_figure
 
         figure = residual_figure(table, shape, [f"{arguments.recording.name}"])
         with atomic_write(arguments.figure) as temporary:
             figure.savefig(temporary, format=arguments.figure.suffix.lstrip(".") or "png")
+            write_csv(table, arguments.out)  # both or none
     sizes: dict[str, dict[str, float]] = {}
     for (source, quantity), part in table[table["by"] == "axis"].groupby(["source", "quantity"]):
         size = float(np.sqrt(np.mean(part.rms**2)))
