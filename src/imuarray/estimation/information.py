@@ -12,6 +12,7 @@ import numba as nb
 import numpy as np
 
 from imuarray.estimation.collapsed import Collapsed
+from imuarray.estimation.kernels import rate_information
 from imuarray.model import structure_tensor
 from imuarray.model.structure import design
 
@@ -40,32 +41,24 @@ def score(data: Collapsed, positions, state) -> np.ndarray:
 @nb.njit(cache=True, nogil=True)
 def _taken(rate, C, P, out):
     """dw/domega W_t^-1 (dw/domega)', W_t the information of omega_t: entries `LOWER`, (21, T)."""
-    slope, W, Y = np.zeros((6, 3)), np.empty((3, 3)), np.empty((6, 3))
+    Y = np.empty((6, 3))
     for t in range(rate.shape[1]):
         x, y, z = rate[0, t], rate[1, t], rate[2, t]
-        slope[0, 0], slope[1, 1], slope[2, 2] = 2 * x, 2 * y, 2 * z
-        slope[3, 0], slope[3, 1] = y, x
-        slope[4, 0], slope[4, 2] = z, x
-        slope[5, 1], slope[5, 2] = z, y
-        for i in range(3):
-            for j in range(i + 1):
-                value = P[i, j, t]
-                for a in range(6):
-                    for b in range(6):
-                        value += slope[a, i] * C[a, b] * slope[b, j]
-                W[i, j] = value
-        for j in range(3):
-            for i in range(j, 3):
-                value = W[i, j]
-                for m in range(j):
-                    value -= W[i, m] * W[j, m]
-                W[i, j] = np.sqrt(value) if i == j else value / W[j, j]
+        xx, xy, xz, yy, yz, zz = rate_information(x, y, z, C, P[:, :, t])
+        # W's Cholesky factor, then Y = slope factor'^-1
+        fxx = np.sqrt(xx)
+        fyx, fzx = xy / fxx, xz / fxx
+        fyy = np.sqrt(yy - fyx * fyx)
+        fzy = (yz - fzx * fyx) / fyy
+        fzz = np.sqrt(zz - fzx * fzx - fzy * fzy)
+        slopes = (
+            (2.0 * x, 0.0, 0.0), (0.0, 2.0 * y, 0.0), (0.0, 0.0, 2.0 * z),
+            (y, x, 0.0), (z, 0.0, x), (0.0, z, y),
+        )  # fmt: skip
         for a in range(6):
-            for i in range(3):
-                value = slope[a, i]
-                for m in range(i):
-                    value -= W[i, m] * Y[a, m]
-                Y[a, i] = value / W[i, i]
+            Y[a, 0] = slopes[a][0] / fxx
+            Y[a, 1] = (slopes[a][1] - fyx * Y[a, 0]) / fyy
+            Y[a, 2] = (slopes[a][2] - fzx * Y[a, 0] - fzy * Y[a, 1]) / fzz
         place = 0
         for a in range(6):
             for b in range(a + 1):

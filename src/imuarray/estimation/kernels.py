@@ -163,30 +163,49 @@ def _gyroscope_cost(x, y, z, m, P):
     )
 
 
+@nb.njit(cache=True, nogil=True, inline="always")
+def _pulled(a, x, y, z, C):
+    """Row a of C dw/domega."""
+    return (
+        2.0 * x * C[a, 0] + y * C[a, 3] + z * C[a, 4],
+        2.0 * y * C[a, 1] + x * C[a, 3] + z * C[a, 5],
+        2.0 * z * C[a, 2] + x * C[a, 4] + y * C[a, 5],
+    )
+
+
+@nb.njit(cache=True, nogil=True, inline="always")
+def rate_information(x, y, z, C, P):
+    """(dw/domega)' C dw/domega + P: entries xx, xy, xz, yy, yz, zz."""
+    j0, j1, j2 = _pulled(0, x, y, z, C), _pulled(1, x, y, z, C), _pulled(2, x, y, z, C)
+    j3, j4, j5 = _pulled(3, x, y, z, C), _pulled(4, x, y, z, C), _pulled(5, x, y, z, C)
+    return (
+        2.0 * x * j0[0] + y * j3[0] + z * j4[0] + P[0, 0],
+        2.0 * x * j0[1] + y * j3[1] + z * j4[1] + P[0, 1],
+        2.0 * x * j0[2] + y * j3[2] + z * j4[2] + P[0, 2],
+        2.0 * y * j1[1] + x * j3[1] + z * j5[1] + P[1, 1],
+        2.0 * y * j1[2] + x * j3[2] + z * j5[2] + P[1, 2],
+        2.0 * z * j2[2] + x * j4[2] + y * j5[2] + P[2, 2],
+    )
+
+
+@nb.njit(cache=True, nogil=True, inline="always")
+def _excess(a, x, y, z, C, b):
+    """Component a of C w - b."""
+    value = C[a, 0] * x * x + C[a, 1] * y * y + C[a, 2] * z * z
+    return value + C[a, 3] * x * y + C[a, 4] * x * z + C[a, 5] * y * z - b[a]
+
+
 @nb.njit(cache=True, nogil=True)
 def _rate_step(x, y, z, C, b, m, P, damping):
     """One damped Gauss-Newton step in omega for the collapsed cost; returns the step."""
-    w0, w1, w2, w3, w4, w5 = x * x, y * y, z * z, x * y, x * z, y * z
-    gradient = np.empty(6)
-    jac = np.empty((6, 3))
-    for a in range(6):
-        c = C[a]
-        gradient[a] = c[0] * w0 + c[1] * w1 + c[2] * w2 + c[3] * w3 + c[4] * w4 + c[5] * w5 - b[a]
-        jac[a, 0] = 2.0 * x * c[0] + y * c[3] + z * c[4]
-        jac[a, 1] = 2.0 * y * c[1] + x * c[3] + z * c[5]
-        jac[a, 2] = 2.0 * z * c[2] + x * c[4] + y * c[5]
+    g0, g1, g2 = _excess(0, x, y, z, C, b), _excess(1, x, y, z, C, b), _excess(2, x, y, z, C, b)
+    g3, g4, g5 = _excess(3, x, y, z, C, b), _excess(4, x, y, z, C, b), _excess(5, x, y, z, C, b)
     dx, dy, dz = x - m[0], y - m[1], z - m[2]
-    g = gradient
-    gx = 2.0 * x * g[0] + y * g[3] + z * g[4] + P[0, 0] * dx + P[0, 1] * dy + P[0, 2] * dz
-    gy = 2.0 * y * g[1] + x * g[3] + z * g[5] + P[0, 1] * dx + P[1, 1] * dy + P[1, 2] * dz
-    gz = 2.0 * z * g[2] + x * g[4] + y * g[5] + P[0, 2] * dx + P[1, 2] * dy + P[2, 2] * dz
-    j = jac
-    hxx = 2.0 * x * j[0, 0] + y * j[3, 0] + z * j[4, 0] + P[0, 0] + damping
-    hxy = 2.0 * x * j[0, 1] + y * j[3, 1] + z * j[4, 1] + P[0, 1]
-    hxz = 2.0 * x * j[0, 2] + y * j[3, 2] + z * j[4, 2] + P[0, 2]
-    hyy = 2.0 * y * j[1, 1] + x * j[3, 1] + z * j[5, 1] + P[1, 1] + damping
-    hyz = 2.0 * y * j[1, 2] + x * j[3, 2] + z * j[5, 2] + P[1, 2]
-    hzz = 2.0 * z * j[2, 2] + x * j[4, 2] + y * j[5, 2] + P[2, 2] + damping
+    gx = 2.0 * x * g0 + y * g3 + z * g4 + P[0, 0] * dx + P[0, 1] * dy + P[0, 2] * dz
+    gy = 2.0 * y * g1 + x * g3 + z * g5 + P[0, 1] * dx + P[1, 1] * dy + P[1, 2] * dz
+    gz = 2.0 * z * g2 + x * g4 + y * g5 + P[0, 2] * dx + P[1, 2] * dy + P[2, 2] * dz
+    hxx, hxy, hxz, hyy, hyz, hzz = rate_information(x, y, z, C, P)
+    hxx, hyy, hzz = hxx + damping, hyy + damping, hzz + damping
     cxx, cxy, cxz = hyy * hzz - hyz * hyz, hxz * hyz - hxy * hzz, hxy * hyz - hxz * hyy
     cyy, cyz, czz = hxx * hzz - hxz * hxz, hxy * hxz - hxx * hyz, hxx * hyy - hxy * hxy
     det = hxx * cxx + hxy * cxy + hxz * cxz

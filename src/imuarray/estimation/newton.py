@@ -88,7 +88,7 @@ class Point(NamedTuple):
 class Curvature(NamedTuple):
     """Fisher information, factored, and the sds it implies."""
 
-    factor: tuple
+    factor: np.ndarray  # lower triangular
     sd: np.ndarray
 
 
@@ -130,14 +130,14 @@ def _curvature(data: Collapsed, here: Point, prior) -> Curvature:
             "calibration: expected informative motion, found a direction of the positions that the"
             " data do not determine"
         )
-    inverse = scipy.linalg.lapack.dpotri(factor, lower=1)[0]
-    factor = scale[:, None] * factor
-    return Curvature((factor, True), np.sqrt(np.diag(inverse)) / scale)
+    half = scipy.linalg.lapack.dtrtri(factor, lower=1)[0]
+    sd = np.sqrt(np.einsum("ij,ij->j", half, half)) / scale
+    return Curvature(scale[:, None] * factor, sd)
 
 
 def _step(curvature: Curvature, here: Point):
     """(step, its largest component in sds)."""
-    step = scipy.linalg.cho_solve(curvature.factor, here.slope)
+    step = scipy.linalg.lapack.dpotrs(curvature.factor, here.slope, lower=1)[0]
     return step, float(np.max(np.abs(step) / curvature.sd))
 
 
