@@ -36,6 +36,7 @@ _HOME = {
     "mimu4444": "imuarray.geometry",
     "read_calibration": "imuarray.analysis",
     "read_csv": "imuarray.analysis",
+    "read_effects": "imuarray.model",
     "read_mimu": "imuarray.analysis",
     "read_posterior": "imuarray.analysis",
     "read_recording": "imuarray.recording",
@@ -71,6 +72,7 @@ if TYPE_CHECKING:  # what the names above are, for type checkers and editors
     from imuarray.geometry import Array as Array
     from imuarray.geometry import mimu4444 as mimu4444
     from imuarray.model import ArrayModel as ArrayModel
+    from imuarray.model import read_effects as read_effects
     from imuarray.recording import Recording as Recording
     from imuarray.recording import read_recording as read_recording
     from imuarray.recording import write_recording as write_recording

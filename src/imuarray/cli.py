@@ -25,6 +25,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         with _warnings_in_one_line():
             arguments = make_parser().parse_args(argv)
             _check_output(arguments)
+            if getattr(arguments, "effect_file", None) is not None:
+                from imuarray.model import read_effects
+
+                read_effects(arguments.effect_file)
             arguments.run(arguments)
     except InputError as error:
         return _fail(str(error))
@@ -100,6 +104,7 @@ def _inputs(arguments: argparse.Namespace) -> list[Path]:
         "positions",
         "columns",
         "diagnosis",
+        "effect_file",
         "calibration",
         "recording",
         "recordings",

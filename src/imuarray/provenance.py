@@ -29,10 +29,23 @@ if TYPE_CHECKING:
 _LIBRARIES = ("numpy", "scipy", "jax", "numba", "emcee", "arviz")
 
 
+_ADDED: dict[str, str] = {}  # text of code that is not the package's, by name
+
+
+def add_code(name: str, text: str) -> None:
+    """Let `versions` and `code_digest` know code from outside the package, under ``name``."""
+    _ADDED[name] = text
+
+
 def versions() -> dict[str, str]:
-    """Versions of imuarray, of Python and of the libraries that the numbers depend on."""
+    """Versions of imuarray, of Python and of the libraries that the numbers depend on.
+
+    Code from outside has its SHA-256.
+    """
     found = {"imuarray": imuarray.__version__, "python": platform.python_version()}
-    return found | {name: metadata.version(name) for name in _LIBRARIES}
+    found |= {name: metadata.version(name) for name in _LIBRARIES}
+    added = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in _ADDED.items()}
+    return found | {name: f"sha256 {value}" for name, value in added.items()}
 
 
 def digest(*objects: Any) -> str:
@@ -73,11 +86,15 @@ def _feed(state: Any, value: Any) -> None:
 
 
 def code_digest() -> str:
-    """SHA-256, in hexadecimal, of the names and the text of the package's Python files."""
+    """SHA-256, in hexadecimal, of the names and the text of the package's Python files.
+
+    And of what `add_code` was told, if anything.
+    """
     root = Path(__file__).parent
     sources = sorted((path.relative_to(root).as_posix(), path) for path in root.rglob("*.py"))
     # a checkout may have changed the line ends
-    return digest([[name, path.read_text(encoding="utf-8")] for name, path in sources])
+    texts = [[name, path.read_text(encoding="utf-8")] for name, path in sources]
+    return digest(texts + [[name, text] for name, text in sorted(_ADDED.items())])
 
 
 def stamp(config: Mapping[str, Any], seed: int) -> dict[str, str | int]:

@@ -8,6 +8,7 @@ from os import PathLike
 import numpy as np
 import xarray as xr
 
+from imuarray.analysis import methods
 from imuarray.analysis.model import Say, chosen_model, silent, usable
 from imuarray.errors import InputError
 from imuarray.model import ArrayModel
@@ -16,8 +17,6 @@ from imuarray.model.effects import find_effects
 from imuarray.model.names import parameter_names
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording
-
-METHODS = ("bcd", "gauss-newton")
 
 
 def calibrate(
@@ -61,8 +60,9 @@ def calibrate(
     """
     from imuarray.estimation import calibrate_bcd, calibrate_gauss_newton
 
-    if method not in METHODS:
-        raise InputError(f"method: expected any of {', '.join(METHODS)}, found {method!r}")
+    if method not in methods.CALIBRATION:
+        known = ", ".join(methods.CALIBRATION)
+        raise InputError(f"method: expected any of {known}, found {method!r}")
     recording, model = chosen_model(
         usable(recording, say), effects, diagnosis, accelerometer_noise, say
     )

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from imuarray.analysis import methods
 from imuarray.analysis.density import density_of, tuned_target
 from imuarray.analysis.model import Say, chosen_model, silent, usable
 from imuarray.errors import InputError
@@ -21,7 +22,6 @@ from imuarray.provenance import code_digest, digest, stamp
 from imuarray.recording import Recording
 from imuarray.streams import stream
 
-METHODS, RATES = ("pmmh", "nuts"), ("declared", "spread")
 PMMH_STEPS = {True: 200_000, False: 10_000}  # compiled, any effects
 NUTS_STEPS, NUTS_WARMUP = 1000, 300
 APART = 2.0  # posterior sds by which the starts differ where effects are free
@@ -100,7 +100,10 @@ def sample(
     InputError
         The recording cannot tell the positions, or the options do not go together.
     """
-    for name, value, known in (("method", method, METHODS), ("rates", rates, RATES)):
+    for name, value, known in (
+        ("method", method, methods.SAMPLING),
+        ("rates", rates, methods.RATES),
+    ):
         if value not in known:
             raise InputError(f"{name}: expected any of {', '.join(known)}, found {value!r}")
     recording, model = chosen_model(

@@ -53,7 +53,15 @@ def add_model(parser: argparse.ArgumentParser) -> None:
     add_effects(parser)
 
 
+def add_effect_file(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--effect-file", type=Path, default=None, metavar="FILE",
+        help="Python file with effects of your own, which is run: they join the catalogue",
+    )  # fmt: skip
+
+
 def add_effects(parser: argparse.ArgumentParser) -> None:
+    add_effect_file(parser)
     parser.add_argument(
         "--effects", type=effects, default=(), metavar="A,B",
         help="effects that extend the measurement model, separated by commas (default: none)",

@@ -4,18 +4,17 @@ import argparse
 from pathlib import Path
 
 import imuarray
+from imuarray.analysis import methods
 from imuarray.commands.argument_types import count, effects, positive, seed
 from imuarray.commands.options import (
     Parser,
     add_command,
+    add_effect_file,
     add_effects,
     add_model,
     add_recording,
     later,
 )
-
-CALIBRATION_METHODS = ("bcd", "gauss-newton")
-SAMPLING_METHODS = ("pmmh", "nuts")
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -194,6 +193,7 @@ def _add_diagnose(commands) -> None:
     )
     parser.set_defaults(folder=True)
     add_recording(parser)
+    add_effect_file(parser)
     parser.add_argument(
         "--without", type=effects, default=(), metavar="A,B",
         help="effects to strike from the catalogue, separated by commas (default: none)",
@@ -215,7 +215,7 @@ def _add_calibrate(commands) -> None:
     add_recording(parser)
     add_model(parser)
     parser.add_argument(
-        "--method", choices=CALIBRATION_METHODS, default="bcd",
+        "--method", choices=methods.CALIBRATION, default="bcd",
         help="bcd: block coordinate descent (default); gauss-newton: any effects, fewer iterations",
     )  # fmt: skip
 
@@ -236,6 +236,7 @@ def _add_apply(commands) -> None:
         help="what `imuarray calibrate` has written, or the diagnosis.json of `imuarray diagnose`",
     )
     add_recording(parser)
+    add_effect_file(parser)
     parser.add_argument(
         "--accelerometer-noise", type=positive, default=None, metavar="SD",
         help="assumed sd, m/s^2 (default: as the recording declares)",
@@ -254,12 +255,12 @@ def _add_sample(commands) -> None:
     add_recording(parser)
     add_model(parser)
     parser.add_argument(
-        "--method", choices=SAMPLING_METHODS, default="pmmh",
+        "--method", choices=methods.SAMPLING, default="pmmh",
         help="pmmh: pseudo-marginal Metropolis-Hastings, as paper 2021 (default); nuts: the"
         " no-U-turn sampler on the exact marginal likelihood, in seconds",
     )  # fmt: skip
     parser.add_argument(
-        "--rates", choices=("declared", "spread"), default="declared",
+        "--rates", choices=methods.RATES, default="declared",
         help="p(omega | y_g) from the declared gyroscope noise (default), or from the spread among"
         " the gyroscopes of each sample, as paper 2021 does with measured data (30)",
     )  # fmt: skip

@@ -4,6 +4,7 @@ from imuarray.model import catalogue, timing  # register the effects
 from imuarray.model.array_model import ArrayModel, Prediction
 from imuarray.model.effects import EFFECTS, Effect, effect
 from imuarray.model.noise import Noise
+from imuarray.model.own import read_effects
 from imuarray.model.structure import structure_tensor
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "Prediction",
     "catalogue",
     "effect",
+    "read_effects",
     "structure_tensor",
     "timing",
 ]

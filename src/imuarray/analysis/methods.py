@@ -1,0 +1,5 @@
+"""Ways to calibrate and to sample; nothing heavy loads here, so that the command line can look."""
+
+CALIBRATION = ("bcd", "gauss-newton")
+SAMPLING = ("pmmh", "nuts")
+RATES = ("declared", "spread")  # what p(omega | y_g) is made from

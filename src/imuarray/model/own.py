@@ -1,0 +1,56 @@
+"""Effects of a user's own, read from a Python file."""
+
+from __future__ import annotations
+
+import traceback
+from pathlib import Path
+
+from imuarray.errors import InputError
+from imuarray.model.effects import EFFECTS
+from imuarray.provenance import add_code, digest
+
+_READ: dict[str, tuple[str, ...]] = {}  # by the digest of a file's text
+
+
+def read_effects(path: str | Path) -> tuple[str, ...]:
+    """Run a Python file that registers effects (docs/effects.md); returns their ids.
+
+    The file is code and does what it says: read your own only. Results carry its name and SHA-256
+    beside the versions, and chains made with another text of it are not continued. The same text
+    is run once. InputError with the line where it fails, or where it registers nothing; the
+    catalogue is then as before.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: expected a Python file in UTF-8, found {error}") from None
+    known = digest(text)
+    if known in _READ:
+        return _READ[known]
+    before = dict(EFFECTS)
+    try:
+        exec(compile(text, str(path), "exec"), {"__name__": path.stem, "__file__": str(path)})  # noqa: S102
+        new = tuple(name for name in EFFECTS if name not in before)
+        if not new:
+            raise InputError(
+                f"{path}: expected effects (@effect(...) of docs/effects.md), found none"
+            )
+    except BaseException as error:
+        EFFECTS.clear()
+        EFFECTS.update(before)
+        if isinstance(error, InputError | KeyboardInterrupt):
+            raise
+        raise InputError(f"{path}{_line(error, path)}: {type(error).__name__}: {error}") from None
+    add_code(path.name, text)
+    _READ[known] = new
+    return new
+
+
+def _line(error: BaseException, path: Path) -> str:
+    """', line 3': the last of the file's lines that the error went through."""
+    if isinstance(error, SyntaxError):
+        return f", line {error.lineno}"
+    frames = traceback.extract_tb(error.__traceback__)
+    lines = [frame.lineno for frame in frames if frame.filename == str(path)]
+    return f", line {lines[-1]}" if lines else ""

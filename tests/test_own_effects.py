@@ -1,0 +1,98 @@
+"""Effects of a user's own file, through the commands."""
+
+import json
+
+import pytest
+import xarray as xr
+
+import imuarray
+from imuarray import provenance
+from imuarray.cli import main
+from imuarray.model import EFFECTS, own
+from tests.test_bound import model
+
+CUBIC = '''
+from imuarray.model.effects import effect
+
+
+@effect("accelerometer_cubic", unit="s4 m-2", prior_sd={sd}, shape=lambda a, g: (a, 3))
+def accelerometer_cubic(curvature, instant, predicted):
+    """u_i + c_i u_i^3."""
+    force = predicted.specific_force
+    return predicted._replace(specific_force=force + curvature * force**3)
+'''
+
+
+@pytest.fixture(autouse=True)
+def catalogue():
+    """As it was, afterwards: a new process begins without the file."""
+    before = dict(EFFECTS), dict(own._READ), dict(provenance._ADDED)
+    yield
+    for now, then in zip((EFFECTS, own._READ, provenance._ADDED), before, strict=True):
+        now.clear()
+        now.update(then)
+
+
+@pytest.fixture
+def mine(tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text(CUBIC.format(sd="2e-6"))
+    return path
+
+
+def test_commands_know_the_effect(mine, tmp_path, capsys):
+    recording, _ = imuarray.simulate(model().array, 1.0, 50.0, seed=1)
+    imuarray.write_recording(recording, tmp_path / "rec.nc")
+    asked = ["calibrate", str(tmp_path / "rec.nc"), "--method", "gauss-newton", "--effects"]
+    asked += ["accelerometer_cubic", "--out", str(tmp_path / "cal.nc"), "--json"]
+    assert main(asked) == 2
+    assert "found accelerometer_cubic" in capsys.readouterr().err
+    assert main([*asked, "--effect-file", str(mine)]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert len(found["effects"]) == 15
+    with xr.open_dataset(tmp_path / "cal.nc", engine="h5netcdf") as dataset:
+        assert json.loads(dataset.attrs["versions"])["mine.py"].startswith("sha256 ")
+    motion = ["apply", str(tmp_path / "cal.nc"), str(tmp_path / "rec.nc"), "--effect-file"]
+    assert main([*motion, str(mine), "--out", str(tmp_path / "motion.nc"), "--quiet"]) == 0
+
+
+def test_another_text_makes_other_chains(mine):
+    """A checkpoint's key holds `code_digest`."""
+    without = provenance.code_digest()
+    assert imuarray.read_effects(mine) == ("accelerometer_cubic",)
+    assert imuarray.read_effects(mine) == ("accelerometer_cubic",)  # once only
+    one = provenance.code_digest()
+    EFFECTS.pop("accelerometer_cubic")
+    mine.write_text(CUBIC.format(sd="3e-6"))
+    imuarray.read_effects(mine)
+    assert len({without, one, provenance.code_digest()}) == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("x = (", "line 1: SyntaxError"),
+        ("\nimport no_such_module\n", "line 2: ModuleNotFoundError"),
+        ("x = 1\n", "found none"),
+        (CUBIC.format(sd="1.0") + "\nraise SystemExit(0)\n", "SystemExit"),
+        (CUBIC.format(sd="1.0").replace("accelerometer_cubic", "gyroscope_scale"), "already"),
+        (b"\xff\xfe\x00", "UTF-8"),
+        (None, "expected a file to read"),
+        # found when it is used first
+        (CUBIC.format(sd="1.0").replace("curvature * force**3", "1.0"), "left as it is"),
+    ],
+)
+def test_a_wrong_file_is_one_line(text, told, tmp_path, capsys):
+    path, known = tmp_path / "mine.py", dict(EFFECTS)
+    if text is not None:
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    recording, _ = imuarray.simulate(model().array, 1.0, 50.0, seed=1)
+    imuarray.write_recording(recording, tmp_path / "rec.nc")
+    asked = ["calibrate", str(tmp_path / "rec.nc"), "--method", "gauss-newton", "--effects"]
+    asked += ["accelerometer_cubic", "--effect-file", str(path), "--out", str(tmp_path / "cal.nc")]
+    assert main(asked) == 2
+    error = capsys.readouterr().err
+    assert told in error and len(error.splitlines()) == 1
+    assert not (tmp_path / "cal.nc").exists()
+    if told != "left as it is":
+        assert known == EFFECTS
