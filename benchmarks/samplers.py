@@ -19,6 +19,7 @@ from pathlib import Path
 
 import emcee
 import numpy as np
+from samplers_figure import statistics
 from written import publish
 
 from imuarray.analysis import density_of, model_of
@@ -33,6 +34,7 @@ from imuarray.posterior import (
     tuning,
 )
 from imuarray.posterior.diagnostics import ess, find_burn_in, rhat
+from imuarray.provenance import write_csv
 from imuarray.studies.bayes import simulate_dataset
 
 WIDER = 1.05  # than the mode's curvature, for autoregressive proposals
@@ -271,7 +273,7 @@ def agreement(rows) -> str:
 
 
 def main():
-    """Run all and print; write where --out says."""
+    """Run all and print; write where --out says, and beside it the table of the figure."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--samples", type=int, nargs="+", default=[5, 50, 500])
     parser.add_argument("--seconds", type=float, default=60.0, help="core seconds of a PmMH row")
@@ -289,6 +291,7 @@ def main():
             print(samples, row.method, spent, flush=True)
     text = table(rows, ratios) + "\n" + agreement(rows)
     publish(text, arguments.out)
+    write_csv(statistics(rows), arguments.out.with_suffix(".csv"))
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ import xarray as xr
 
 from imuarray.analysis.motion import extended_motion
 from imuarray.errors import InputError
-from imuarray.estimation import estimate_motion
+from imuarray.estimation.fusion import fuse
 from imuarray.model import ArrayModel
 from imuarray.recording import Recording, array_of
 
@@ -58,9 +58,9 @@ def past_rail(
     errors, sds = {"clipped": clipped.angular_rate - chosen.angular_rate}, {}
     for name, positions in (("nominal", recording.relative_positions()), ("calibrated", base)):
         model = ArrayModel.isotropic(array_of(chosen), ASSUMED, chosen.gyroscope_noise_sd)
-        found = estimate_motion(
-            model, clipped.specific_force, clipped.angular_rate, positions, hidden
-        )
+        found = fuse(
+            model, clipped.specific_force, clipped.angular_rate, positions, None, hidden
+        ).estimate
         errors[name] = found.motion.angular_rate[:, None] - chosen.angular_rate
         ahead = found.motion.angular_acceleration[:, None] * lead_of(diagnosed)
     errors["delayed"] = errors["calibrated"] + ahead

@@ -169,13 +169,13 @@ def _motion_chunk(model, x, p, force, rate, keep, time, span, whiten_force, whit
             )  # fmt: skip
 
         value, jac = flat(x), jax.jacfwd(flat)(x)
-        return jac.T @ jac, jac.T @ value
+        return jac.T @ jac, jac.T @ value, value @ value
 
     return jax.vmap(one)(x, force, rate, keep, time, whiten_rate)
 
 
-def motion_equations(given: Problem, x, p) -> tuple[np.ndarray, np.ndarray]:
-    """The motion's own part of `normal_equations`, far cheaper: (T, n, n) and (T, n)."""
+def motion_equations(given: Problem, x, p) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The motion's own part of `normal_equations`, far cheaper: (T, n, n), (T, n), cost (T,)."""
     last, found = len(given.whiten_rate) - 1, []
     for start in range(0, len(x), CHUNK):
         index = np.minimum(np.arange(start, start + CHUNK), len(x) - 1)
@@ -186,8 +186,8 @@ def motion_equations(given: Problem, x, p) -> tuple[np.ndarray, np.ndarray]:
                 given.whiten_rate[np.minimum(index, last)],
             )
         )  # fmt: skip
-    A, g = (
+    A, g, cost = (
         np.concatenate([np.asarray(part) for part in parts])[: len(x)]
         for parts in zip(*found, strict=True)
     )
-    return A, g
+    return A, g, cost

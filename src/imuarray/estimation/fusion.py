@@ -9,6 +9,7 @@ import numpy as np
 
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.motion_ml import MotionEstimate, motion_from
+from imuarray.estimation.rails import better, contradiction, turned
 from imuarray.geometry.array import require_planar_extent
 from imuarray.model import ArrayModel
 from imuarray.model.jax64 import jax, jnp
@@ -47,7 +48,7 @@ def fuse(
     positions = model.array.relative if positions is None else np.asarray(positions, float)
     require_planar_extent(positions, "positions")
     data = Collapsed.of(model, specific_force, angular_rate, saturated)
-    found = motion_from(data, positions)
+    found = _searched(model, data, positions, angular_rate, saturated)
     size = 3 * (model.array.accelerometers - 1)
     spread = np.zeros((size, size)) if position_covariance is None else position_covariance
     state = np.hstack([np.asarray(field) for field in found.motion[:3]])
@@ -62,6 +63,26 @@ def fuse(
         moved = noise[part] @ cross
         shared[part] = moved @ spread @ moved.swapaxes(1, 2)
     return Fused(found, noise + shared, shared)
+
+
+def _searched(model: ArrayModel, data: Collapsed, positions, angular_rate, saturated):
+    """The motion of the lower cost from two starts where gyroscopes are lost.
+
+    Specific force tells products of rates only, so there are several minima then, and
+    contradicting a reading at its rail counts.
+    """
+    first = motion_from(data, positions)
+    if saturated is None or not np.any(saturated):
+        return first
+    rate = turned(np.asarray(first.motion.angular_rate), angular_rate, saturated)
+    both = first, motion_from(data, positions, start=rate)
+    sd = np.sqrt(np.diag(model.noise.gyroscope)).reshape(-1, 3)
+    judged = []
+    for found in both:
+        foretold = np.asarray(found.motion.angular_rate)[:, None]
+        short = contradiction(foretold, angular_rate, saturated, sd)
+        judged.append((found.cost + short, found.converged))
+    return first.replaced(better(*judged), both[1])
 
 
 @partial(jax.jit, static_argnums=0)

@@ -27,6 +27,16 @@ class MotionEstimate:
     iterations: np.ndarray
     converged: np.ndarray
 
+    def replaced(self, take, other: MotionEstimate) -> MotionEstimate:
+        """With the samples ``take`` (T,) bool of another one."""
+        pairs = zip(self.motion, other.motion, strict=True)
+        return MotionEstimate(
+            Motion(*(np.where(take[:, None], new, old) for old, new in pairs)),
+            np.where(take, other.cost, self.cost),
+            np.where(take, other.iterations, self.iterations),
+            np.where(take, other.converged, self.converged),
+        )
+
 
 def estimate_motion(
     model: ArrayModel,
@@ -59,14 +69,16 @@ def estimate_motion(
     return motion_from(data, positions, tolerance, limit)
 
 
-def motion_from(data: Collapsed, positions, tolerance=1e-10, limit=50) -> MotionEstimate:
-    """`estimate_motion` for data already arranged."""
+def motion_from(
+    data: Collapsed, positions, tolerance=1e-10, limit=50, start=None
+) -> MotionEstimate:
+    """`estimate_motion` for data already arranged, from ``start`` (T, 3) rad/s if given."""
     C, b, X, phi, const, logdet, _ = data.reduce(positions)
     if np.isnan(logdet):
         raise IdentifiabilityError(
             "positions: expected triads from which omega_dot and s follow, found H'QH singular"
         )
-    rate = data.mean.copy()
+    rate = data.mean.copy() if start is None else np.array(start.T, order="C")
     cost, iterations = np.empty(data.samples), np.empty(data.samples, np.int64)
     kernels.angular_rates(
         rate, C, b, data.mean, data.gyroscope_information, tolerance, limit, cost, iterations
@@ -78,5 +90,17 @@ def motion_from(data: Collapsed, positions, tolerance=1e-10, limit=50) -> Motion
 
 def motion_estimate(data: Collapsed, rate, state, cost, iterations) -> MotionEstimate:
     """From what the kernels found: omega (3, T), (w, phi) (12, T), cost and steps (T,)."""
-    motion = Motion.of(rate.T, state[6:9].T, (state[9:12] + data.offset).T)
+    motion = _motion_of(data, rate.T, state)
     return MotionEstimate(motion, cost, np.abs(iterations), iterations > 0)
+
+
+def motion_at(data: Collapsed, positions, rate) -> Motion:
+    """The most likely rest of the motion where omega is ``rate`` (T, 3) rad/s."""
+    _, _, X, phi, *_ = data.reduce(positions)
+    state = np.empty((12, data.samples))
+    kernels.linear_motion(np.array(np.asarray(rate).T, order="C"), X, phi, state)
+    return _motion_of(data, rate, state)
+
+
+def _motion_of(data: Collapsed, rate, state) -> Motion:
+    return Motion.of(rate, state[6:9].T, (state[9:12] + data.offset).T)
