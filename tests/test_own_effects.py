@@ -62,10 +62,16 @@ def test_another_text_makes_other_chains(mine):
     assert imuarray.read_effects(mine) == ("accelerometer_cubic",)
     assert imuarray.read_effects(mine) == ("accelerometer_cubic",)  # once only
     one = provenance.code_digest()
-    EFFECTS.pop("accelerometer_cubic")
     mine.write_text(CUBIC.format(sd="3e-6"))
-    imuarray.read_effects(mine)
-    assert len({without, one, provenance.code_digest()}) == 3
+    assert imuarray.read_effects(mine) == ("accelerometer_cubic",)
+    assert EFFECTS["accelerometer_cubic"].prior_sd == 3e-6
+    two = provenance.code_digest()
+    other = mine.parent / "other" / mine.name
+    other.parent.mkdir()
+    other.write_text(CUBIC.replace("accelerometer_cubic", "gyroscope_own").format(sd="1"))
+    assert imuarray.read_effects(other) == ("gyroscope_own",)
+    assert len({without, one, two, provenance.code_digest()}) == 4
+    assert provenance.versions()["mine.py"].count("sha256") == 2
 
 
 @pytest.mark.parametrize(

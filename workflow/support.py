@@ -1,6 +1,7 @@
 """What the rules share: effective settings and the library files a rule rests on."""
 
 import ast
+import hashlib
 import json
 import time
 from collections.abc import Iterator
@@ -60,13 +61,25 @@ def imported(path: Path) -> list[Path]:
     names = []
     for node in _run(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom):
-            names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+            names += [node.module, *(homes(node.module, alias.name) for alias in node.names)]
         elif isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
     parts = [name.split(".")[1:] for name in names if name.split(".")[0] == "imuarray"]
     steps = {PACKAGE.joinpath(*part[:depth]) for part in parts for depth in range(len(part) + 1)}
     files = [place for step in steps for place in (step / "__init__.py", step.with_suffix(".py"))]
     return [file for file in files if file.is_file() and PACKAGE in file.parents]
+
+
+def homes(module: str, name: str) -> str:
+    """The module of what another one gives, also where a package loads it when it is used."""
+    place = PACKAGE.joinpath(*module.split(".")[1:]) / "__init__.py"
+    if module.split(".")[0] == "imuarray" and place.is_file():
+        for node in ast.parse(place.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_HOME":
+                home = ast.literal_eval(node.value).get(name)
+                if home is not None:
+                    return home if home.startswith("imuarray.") else f"{module}.{home}"
+    return f"{module}.{name}"
 
 
 def _run(tree: ast.AST) -> Iterator[ast.AST]:
@@ -94,6 +107,17 @@ class Crew:
         return self.scales[scale]["parts"] if study == "samples" else 1
 
 
+def contents(*paths: str) -> list[str]:
+    """SHA-256 of files outside the pipeline: a parameter that changes when one does."""
+    files = [Path(path) for path in paths]
+    return [hashlib.sha256(f.read_bytes()).hexdigest() if f.is_file() else "" for f in files]
+
+
+def own_files(entry: dict) -> list[str]:
+    """The files that a recording's entry in the configuration names."""
+    return [entry[key] for key in ("file", "columns", "positions") if key in entry]
+
+
 def attempt(path: str) -> float:
     """A parameter that changes with every run while recordings are missing, so they are retried."""
     try:
@@ -111,14 +135,17 @@ def effective(config: dict, scale: str, *sections: str, scaled: bool = True, own
     leaves the scale out, for results that all scales share.
     """
     names = ("seed", "array", "noise", *sections)
+    found = {name: config[name] for name in names}
+    if "file" in config["array"]:  # results rest on what is in it
+        found["array_contents"] = contents(config["array"]["file"])
     if not scaled:
-        return {name: config[name] for name in names}
+        return found
     sizes = {
         key: value
         for key, value in config["scales"][scale].items()
         if key not in CREWS and (key.startswith(own) if own else not key.startswith(APART))
     }
-    return {**{name: config[name] for name in names}, "scale": {"name": scale, **sizes}}
+    return {**found, "scale": {"name": scale, **sizes}}
 
 
 def blind_settings(config: dict, scale: str) -> dict:

@@ -12,6 +12,7 @@ from imuarray.commands.parser import make_parser
 from imuarray.errors import InputError
 
 NETCDF = (".nc", ".nc4", ".h5")
+FIGURES = (".png", ".pdf")
 OK, BAD_INPUT, INTERRUPTED, CLOSED = 0, 2, 130, 141
 
 
@@ -74,15 +75,14 @@ def _warnings_in_one_line() -> Iterator[None]:
 def _check_output(arguments: argparse.Namespace) -> None:
     """Refuse an output that cannot be written now, not after an hour of sampling."""
     out: Path = arguments.out
-    if getattr(arguments, "folder", False):
-        if out.exists() and not out.is_dir():
-            raise InputError(f"--out {out}: expected a folder, found a file")
-    elif out.is_dir():
-        raise InputError(f"--out {out}: expected a file to write, found a folder")
-    if not out.parent.is_dir():
-        raise InputError(f"--out {out}: expected an existing folder, found no {out.parent}")
-    if not os.access(out.parent, os.W_OK | os.X_OK):
-        raise InputError(f"--out {out}: expected a folder one may write to, found {out.parent}")
+    _require_writable("--out", out, getattr(arguments, "folder", False))
+    figure: Path | None = getattr(arguments, "figure", None)
+    if figure is not None:
+        _require_writable("--figure", figure)
+        if figure.suffix.lower() not in FIGURES:
+            raise InputError(f"--figure {figure}: expected {' or '.join(FIGURES)}, found another")
+        if figure.resolve() == out.resolve():
+            raise InputError(f"--figure {figure}: expected another file than --out, found the same")
     for source in _inputs(arguments):
         if not source.is_file():
             found = "a folder" if source.is_dir() else "none"
@@ -93,6 +93,20 @@ def _check_output(arguments: argparse.Namespace) -> None:
             from imuarray.recording.apart import require_readable
 
             require_readable(source)
+
+
+def _require_writable(option: str, path: Path, folder: bool = False) -> None:
+    """InputError unless a file, or a folder, can be written there."""
+    if folder:
+        if path.exists() and not path.is_dir():
+            raise InputError(f"{option} {path}: expected a folder, found a file")
+    elif path.is_dir():
+        raise InputError(f"{option} {path}: expected a file to write, found a folder")
+    parent = path.parent
+    if not parent.is_dir():
+        raise InputError(f"{option} {path}: expected an existing folder, found no {parent}")
+    if not os.access(parent, os.W_OK | os.X_OK):
+        raise InputError(f"{option} {path}: expected a folder one may write to, found {parent}")
 
 
 def _inputs(arguments: argparse.Namespace) -> list[Path]:

@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 _LIBRARIES = ("numpy", "scipy", "jax", "numba", "emcee", "arviz")
 
 
-_ADDED: dict[str, str] = {}  # text of code that is not the package's, by name
+_ADDED: dict[str, tuple[str, str]] = {}  # name and text of code that is not the package's, by place
 
 
-def add_code(name: str, text: str) -> None:
-    """Let `versions` and `code_digest` know code from outside the package, under ``name``."""
-    _ADDED[name] = text
+def add_code(name: str, place: str, text: str) -> None:
+    """Let `versions` and `code_digest` know code from outside the package, at a ``place``."""
+    _ADDED[place] = name, text
 
 
 def versions() -> dict[str, str]:
@@ -44,8 +44,10 @@ def versions() -> dict[str, str]:
     """
     found = {"imuarray": imuarray.__version__, "python": platform.python_version()}
     found |= {name: metadata.version(name) for name in _LIBRARIES}
-    added = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in _ADDED.items()}
-    return found | {name: f"sha256 {value}" for name, value in added.items()}
+    for name, text in _ADDED.values():
+        value = f"sha256 {hashlib.sha256(text.encode()).hexdigest()}"
+        found[name] = f"{found[name]}, {value}" if name in found else value
+    return found
 
 
 def digest(*objects: Any) -> str:
@@ -94,7 +96,7 @@ def code_digest() -> str:
     sources = sorted((path.relative_to(root).as_posix(), path) for path in root.rglob("*.py"))
     # a checkout may have changed the line ends
     texts = [[name, path.read_text(encoding="utf-8")] for name, path in sources]
-    return digest(texts + [[name, text] for name, text in sorted(_ADDED.items())])
+    return digest(texts + sorted([name, text] for name, text in _ADDED.values()))
 
 
 def stamp(config: Mapping[str, Any], seed: int) -> dict[str, str | int]:

@@ -5,6 +5,7 @@ DIAGNOSED = resting_on(
     "criticism/diagnosis.py",
     "report/write.py",
     "criticism/thresholds.json",
+    "figures/imuarray.mplstyle",
     "provenance.py",
 )
 
@@ -42,7 +43,10 @@ rule diagnosis_agreement:
             "results/measured/diagnosis/{name}/diagnosis.json", name=MEASURED.groups()[wc.group]
         ),
         code=resting_on(
-            "criticism/repeatability.py", "figures/criticism_repeatability.py", "provenance.py"
+            "criticism/repeatability.py",
+            "figures/criticism_repeatability.py",
+            "figures/imuarray.mplstyle",
+            "provenance.py",
         ),
     output:
         positions="results/measured/tables/diagnosis_positions_{group}.csv",
@@ -72,7 +76,13 @@ rule past_rail:
             "corrected" if RECORDINGS[wc.name].get("first_order", True) else "recordings", wc.name
         ),
         diagnosis="results/measured/diagnosis/{name}/diagnosis.json",
-        code=resting_on("analysis/past_rail.py", "figures/past_rail.py", "provenance.py"),
+        code=resting_on(
+            "analysis/past_rail.py",
+            "analysis/extension.py",
+            "figures/past_rail.py",
+            "figures/imuarray.mplstyle",
+            "provenance.py",
+        ),
     output:
         pdf="results/measured/figures/past_rail_{name}.pdf",
         png=report(

@@ -40,6 +40,7 @@ rule convert_recording:
         runtime=10,
     params:
         entry=lambda wc: RECORDINGS[wc.name],
+        own=lambda wc: contents(*own_files(RECORDINGS[wc.name])),
     script:
         "../scripts/convert_recording.py"
 

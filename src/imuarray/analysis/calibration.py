@@ -147,12 +147,8 @@ def _effects(recording: Recording, model: ArrayModel, found, covariance) -> xr.D
         "gyroscope_sd": (("gyroscope", "axis"), sds[1].reshape(-1, 3), {"units": "rad s-1"}),
     }
     coords = {"parameter": parameter_names(model, imus), "gyroscope": list(imus[1])}
-    _, span = clock(recording.time)
-    attrs = {
-        "effects": ",".join(model.effects),
-        "time_origin": float(np.min(recording.time)),
-        "span": span,
-    }
+    origin, span = model.clock or (float(np.min(recording.time)), clock(recording.time)[1])
+    attrs = {"effects": ",".join(model.effects), "time_origin": origin, "span": span}
     return xr.Dataset(variables, coords, attrs)
 
 

@@ -12,7 +12,6 @@ import xarray as xr
 from imuarray.analysis.model import model_of
 from imuarray.criticism.extension import Extension, extended_model, read_extension
 from imuarray.errors import InputError
-from imuarray.model.array_model import clock
 from imuarray.model.names import parameter_names
 from imuarray.recording import Recording
 
@@ -20,7 +19,7 @@ from imuarray.recording import Recording
 def diagnosed(diagnosis: str | PathLike, recording: Recording) -> xr.Dataset:
     """Positions and effects of a ``diagnosis.json``, as `calibrate` would give them.
 
-    ``recording`` is the one that was diagnosed, whole: clocks and drifts are its own. The
+    ``recording`` is the one that was diagnosed, or a part of it: clocks and drifts are its own. The
     diagnosis states sds but not how positions and effects go together, without which they tell
     nothing of the motion's error: ``whole_covariance`` is not there. InputError for another
     file, or other IMUs.
@@ -54,8 +53,8 @@ def diagnosed(diagnosis: str | PathLike, recording: Recording) -> xr.Dataset:
         "accelerometer_other": list(labels[0]), "axis_other": list("xyz"), "parameter": names,
     }  # fmt: skip
     attrs = {
-        "effects": ",".join(model.effects), "time_origin": float(np.min(recording.time)),
-        "span": clock(recording.time)[1],
+        "effects": ",".join(model.effects), "time_origin": extension.clock[0],
+        "span": extension.clock[1],
     }  # fmt: skip
     return xr.Dataset(variables, coords, attrs)
 
@@ -68,10 +67,15 @@ def _sd(extension: Extension, name: str) -> float:
 
 def _positions(path: Path, recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     """(positions, sds), each (A, 3) m relative to the first triad, of the extended model."""
-    section = json.loads(path.read_text(encoding="utf-8"))["extended"]
-    fields = [np.array(section[name], float) for name in ("positions_m", "positions_sd_m")]
     shape = len(recording.accelerometer_labels), 3
-    if fields[0].shape != shape:
+    try:
+        section = json.loads(path.read_text(encoding="utf-8"))["extended"]
+        fields = [np.array(section[name], float) for name in ("positions_m", "positions_sd_m")]
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"{path}: expected the extended model's positions and sds (m), found {error!r}"
+        ) from None
+    if fields[0].shape != shape or fields[1].shape[0] < shape[0] - 1:
         raise InputError(
             f"{path}: expected positions of {shape[0]} accelerometers, as in the recording, found"
             f" {len(fields[0])}"

@@ -9,6 +9,7 @@ import xarray as xr
 
 from imuarray.analysis.model import assumed, model_of
 from imuarray.errors import InputError
+from imuarray.model.names import parameter_names
 from imuarray.model.noise import Noise
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording
@@ -81,6 +82,13 @@ def extended_motion(
     if accelerometer_noise is not None:
         sds[0] = np.full(len(positions), accelerometer_noise)
     model = model_of(recording, calibration.attrs["effects"].split(","))
+    expected = parameter_names(model, (recording.accelerometer_labels, recording.gyroscope_labels))
+    found = [str(name) for name in calibration["parameter"].to_numpy()]
+    if found != expected:
+        raise InputError(
+            f"expected {len(expected)} parameters of {', '.join(model.effects)}, found"
+            f" {len(found)}, or others: the effects are not those of the calibration"
+        )
     noise = Noise.of(model.array.accelerometers, model.array.gyroscopes, *sds)
     model = replace(model, noise=noise)
     parameters = np.concatenate(

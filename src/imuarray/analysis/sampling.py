@@ -109,8 +109,10 @@ def sample(
     recording, model = chosen_model(
         usable(recording, say), effects, diagnosis, accelerometer_noise, say
     )
-    if model.effects and rates == "spread":
-        raise InputError("--rates spread: expected no --effects with it, found some")
+    if rates == "spread":
+        if model.effects:
+            raise InputError("--rates spread: expected no --effects with it, found some")
+        recording = _off_rails(recording, say)
     beside = None if beside is None else Path(beside)
     asked = Asked(method, steps, seed, rates, progress, beside, say)
     made = (_nuts if method == "nuts" else _pmmh)(recording, model, asked)
@@ -119,6 +121,18 @@ def sample(
         say("a chain went to where the triads lie on one line: the flat motion prior has no bound"
             " there, and these triads are not far enough from it (docs/findings.md)")  # fmt: skip
     return tree
+
+
+def _off_rails(recording: Recording, say: Say) -> Recording:
+    """Without samples whose gyroscopes' spread a rail has cut."""
+    lost = recording.saturated_gyroscopes().any(axis=(1, 2))
+    if lost.all():
+        raise InputError(
+            "--rates spread: expected samples with all gyroscopes off their rail, found none"
+        )
+    if lost.any():
+        say(f"left out {lost.sum()} of {lost.size} samples with a gyroscope at its rail")
+    return recording.select(~lost) if lost.any() else recording
 
 
 def summary(posterior: xr.DataTree) -> pd.DataFrame:
@@ -168,7 +182,9 @@ def flattest(draws, recording: Recording) -> float:
 
 def _key(recording, model, prior, asked: Asked, *rest) -> str:
     return digest(
-        recording.specific_force, recording.angular_rate, recording.accelerometer_position,
+        recording.time, recording.specific_force, recording.angular_rate,
+        recording.saturated_gyroscopes(), recording.accelerometer_position, model.effect_start,
+        model.effect_prior_mean, model.effect_prior_sd, list(model.clock or ()),
         model.noise.accelerometer, model.noise.gyroscope, prior.mean, prior.sd,
         *rest, asked.seed, list(model.effects), asked.rates, code_digest(),
     )  # fmt: skip

@@ -21,8 +21,8 @@ def apply(arguments) -> None:
     """The calibrated array's motion with covariances; see `imuarray.apply` for the output."""
     output = Output(arguments)
     recording = read_recording(arguments.recording)
+    calibration = _calibration(arguments.calibration, recording)
     try:
-        calibration = _calibration(arguments.calibration, recording)
         dataset = applied(calibration, recording, arguments.accelerometer_noise)
     except InputError as error:
         raise InputError(f"{arguments.calibration}: {error}") from None

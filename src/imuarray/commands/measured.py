@@ -79,7 +79,7 @@ def residuals(arguments) -> None:
 
         figure = residual_figure(table, shape, [f"{arguments.recording.name}"])
         with atomic_write(arguments.figure) as temporary:
-            figure.savefig(temporary, format=arguments.figure.suffix.lstrip(".") or "png")
+            figure.savefig(temporary, format=arguments.figure.suffix[1:].lower())
             write_csv(table, arguments.out)  # both or none
     sizes: dict[str, dict[str, float]] = {}
     for (source, quantity), part in table[table["by"] == "axis"].groupby(["source", "quantity"]):

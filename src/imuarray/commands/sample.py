@@ -13,7 +13,7 @@ from imuarray.commands.output import Output
 from imuarray.provenance import write_netcdf
 from imuarray.recording import read_recording
 
-VERDICT = "converged", "rhat_max", "ess_min", "burn_in_steps", "steps", "divergent"
+VERDICT = "converged", "rhat_max", "ess_min", "burn_in_steps", "steps", "divergent", "on_a_line"
 
 
 def sample(arguments) -> None:
@@ -36,7 +36,7 @@ def sample(arguments) -> None:
 def document(posterior: xr.DataTree, table: pd.DataFrame) -> dict:
     """The chains' verdict, and mean and sd of each coordinate."""
     found = {name: posterior.attrs[name] for name in VERDICT}
-    found["converged"] = bool(found["converged"])
+    found |= {name: bool(found[name]) for name in ("converged", "on_a_line")}
     columns = ["accelerometer", "axis", "mean_m", "sd_m", "rhat", "ess"]
     return found | {"coordinates": table[columns].to_dict(orient="records")}
 
@@ -49,6 +49,8 @@ def report(posterior: xr.DataTree, table: pd.DataFrame) -> str:
         numbers = f"{1e3 * row.mean_m:9.4f} {1e6 * row.sd_m:7.2g}"
         lines.append(f"{row.accelerometer:>5} {row.axis:>4} {numbers}")
     state = "converged" if attrs["converged"] else "NOT converged: take more --steps"
+    if attrs["on_a_line"]:
+        state = "NOT converged: a chain is where the triads lie on one line (docs/findings.md)"
     lines.append(
         f"{state}: R-hat {attrs['rhat_max']:.3f}, smallest ESS {attrs['ess_min']:.0f},"
         f" burn-in {attrs['burn_in_steps']} of {attrs['steps']} steps"

@@ -22,7 +22,7 @@ MEANING = {
     "gyroscope_g_sensitivity": "the gyroscopes respond to specific force",
     "gyroscope_nonlinearity": "the gyroscopes' response is curved",
     "sensor_delay": "whole IMUs are read at instants of their own",
-    "gyroscope_delay": "gyroscopes lag behind the accelerometers",
+    "gyroscope_delay": "gyroscopes tell another instant than accelerometers, later for delays > 0",
     "sensor_clock": "the IMUs sample on clocks of their own, so that a reading's age is a sawtooth",
     "saturation": "readings pile up at a rail below the declared range",
     "accelerometer_noise": "the accelerometers' noise is not the declared one",

@@ -95,6 +95,7 @@ def diagnose(
         "seed": int(seed),
         "version": imuarray.__version__,
         "samples": len(search.readings.time),
+        "clock": {"origin_s": float(recording.time[0]), "span_s": search.readings.span},
         "base": base.section(),
         "discrepancies": [d.as_dict() for d in base.discrepancies],
         "causes": causes_of(found, extended),
@@ -110,9 +111,13 @@ def diagnose(
 
 
 def nats_beside(found: Found) -> np.ndarray:
-    """Nats of each held-out block that the extended fit's own score does not have, (blocks,)."""
-    # a fit's score takes noise for white and normal
-    beside = [i.blocks for i in found.in_noise if i.effect in ("coloured_noise", "heavy_tails")]
+    """Nats of each held-out block that the extended fit's own score does not have, (blocks,).
+
+    Outliers are in no model's score, so what a mixture gains on them is not in the gain either;
+    it stands with its cause.
+    """
+    # a fit's score takes noise for white
+    beside = [i.blocks for i in found.in_noise if i.effect == "coloured_noise"]
     # nor has any model's score the readings left out; exchanged axes are in the rivals' scores,
     # which take the readings as they are
     left_out = [item for item in found.structural if item.effect in LEFT_OUT]

@@ -33,6 +33,7 @@ class Extension(NamedTuple):
     accelerometer_sd: dict[str, float]
     gyroscope_sd: dict[str, float]
     before: tuple[str, ...]
+    clock: tuple[float, float]  # where the diagnosed recording's time begins (s), and its span (s)
 
 
 def read_extension(path: Path) -> Extension:
@@ -48,6 +49,7 @@ def read_extension(path: Path) -> Extension:
         }  # fmt: skip
         sds = [{label: float(item["sd"]) for label, item in noise[kind].items()} for kind in KINDS]
         before = tuple(name for name in named if name in BEFORE)
+        times = float(document["clock"]["origin_s"]), float(document["clock"]["span_s"])
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: expected a diagnosis.json, found no text") from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:
@@ -59,7 +61,7 @@ def read_extension(path: Path) -> Extension:
                 f"{path}: expected causes that this installation knows, found {name}; is the"
                 " module that defines it imported?"
             )
-    return Extension(effects, values, *sds, before)
+    return Extension(effects, values, *sds, before, times)
 
 
 def extended_model(extension: Extension, model: ArrayModel, labels) -> ArrayModel:
@@ -91,7 +93,8 @@ def extended_model(extension: Extension, model: ArrayModel, labels) -> ArrayMode
     declared = extension.accelerometer_sd, extension.gyroscope_sd
     sds = [_by_label(part, names) for part, names in zip(declared, labels, strict=True)]
     counts = model.array.accelerometers, model.array.gyroscopes
-    return replace(named, noise=Noise.of(*counts, *sds), effect_prior=prior)
+    noise = Noise.of(*counts, *sds)
+    return replace(named, noise=noise, effect_prior=prior, clock=extension.clock)
 
 
 def _by_label(sds: dict, labels) -> np.ndarray:

@@ -13,10 +13,10 @@ import numpy as np
 
 from imuarray.errors import InputError
 from imuarray.model import ArrayModel
-from imuarray.model.array_model import clock
 from imuarray.model.jax64 import jax, jnp
 from imuarray.motion.state import Motion
 
+ONE_SIDED = -1.0  # `Problem.keep` of a reading that counts only where the rate falls short of it
 CHUNK = 64  # samples per compiled call: bounds memory and keeps one compiled shape
 
 
@@ -26,12 +26,12 @@ class Problem(NamedTuple):
     model: ArrayModel
     specific_force: np.ndarray  # (T, A, 3)
     angular_rate: np.ndarray  # (T, G, 3)
-    keep: np.ndarray  # (T, 3G) 1.0 where the gyroscope axis is used, else 0.0
+    keep: np.ndarray  # (T, 3G) 1.0 where the gyroscope axis is used, 0.0 where not, or ONE_SIDED
     whiten_force: np.ndarray  # (3A, 3A), upper Cholesky factor of the precision
     whiten_rate: np.ndarray  # (1 or T, 3G, 3G)
     prior_mean: np.ndarray  # (P,)
     prior_sd: np.ndarray  # (P,), infinite where flat
-    time: np.ndarray  # (T,) s since the first sample
+    time: np.ndarray  # (T,) s since the recording began
     span: float  # s
 
 
@@ -65,8 +65,7 @@ def problem(
     """
     keep = np.ones((len(angular_rate), 3 * model.array.gyroscopes))
     if saturated is not None and np.any(saturated):
-        covariance = model.noise.gyroscope
-        if not np.array_equal(np.diag(np.diag(covariance)), covariance):
+        if not model.noise.uncorrelated_gyroscopes:
             raise InputError("saturated gyroscopes: expected uncorrelated gyroscope noise")
         keep -= np.asarray(saturated, float).reshape(keep.shape)
     size = 3 * (model.array.accelerometers - 1)
@@ -79,7 +78,7 @@ def problem(
         np.linalg.cholesky(np.linalg.inv(covariance)).transpose(0, 2, 1),
         np.concatenate([mean, model.effect_prior_mean]),
         np.concatenate([spread, model.effect_prior_sd]),
-        *clock(np.zeros(len(angular_rate)) if time is None else time),
+        *model.since(len(angular_rate), time),
     )  # fmt: skip
 
 
@@ -100,9 +99,11 @@ def residual(model, x, p, force, rate, keep, time, span, whiten_force, whiten_ra
     shared = 3 * (model.array.accelerometers - 1)
     positions = jnp.concatenate([jnp.zeros((1, 3)), p[:shared].reshape(-1, 3)])
     predicted = model.predict(unpack_motion(x), positions, p[shared:], time=time, span=span)
+    turn = whiten_rate @ (rate - predicted.angular_rate).ravel()
+    short = jnp.maximum(jnp.sign(rate.ravel()) * turn, 0.0)
     parts = [
         whiten_force @ (force - predicted.specific_force).ravel(),
-        keep * (whiten_rate @ (rate - predicted.angular_rate).ravel()),
+        jnp.where(keep == ONE_SIDED, short, keep * turn),
     ]
     for place, sd in enumerate(model.motion_sd):
         if np.isfinite(sd):

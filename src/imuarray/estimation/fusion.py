@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from imuarray.estimation.blocks import motion_equations, pack_motion, problem
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.motion_ml import MotionEstimate, motion_from
-from imuarray.estimation.rails import better, contradiction, turned
+from imuarray.estimation.samplewise import rows, search, turned
 from imuarray.geometry.array import require_planar_extent
 from imuarray.model import ArrayModel
 from imuarray.model.jax64 import jax, jnp
@@ -17,6 +18,7 @@ from imuarray.motion import Motion
 
 COMPONENTS = tuple(f"{name}_{axis}" for name in ("omega", "omega_dot", "s") for axis in "xyz")
 CHUNK = 256  # samples at a time: bounds memory
+TOLERANCE, LIMIT = 1e-6, 50  # sds, steps
 
 
 class Fused(NamedTuple):
@@ -41,14 +43,16 @@ def fuse(
     position_covariance : (3 (A - 1), 3 (A - 1)) m^2 of r_2 ... r_A, or None: exactly known
         Its errors are the same at all samples, so they do not average out over time.
     saturated : (T, G, 3) bool or None
-        Gyroscope axes at the rail, left out.
+        Gyroscope axes at the rail. Their readings tell the side and the least size of the rate
+        (`imuarray.estimation.samplewise`; not where gyroscopes' noise is correlated), and nothing
+        to the covariances.
 
     IdentifiabilityError for fewer than three or collinear triads.
     """
     positions = model.array.relative if positions is None else np.asarray(positions, float)
     require_planar_extent(positions, "positions")
     data = Collapsed.of(model, specific_force, angular_rate, saturated)
-    found = _searched(model, data, positions, angular_rate, saturated)
+    found = _searched(model, data, positions, specific_force, angular_rate, saturated)
     size = 3 * (model.array.accelerometers - 1)
     spread = np.zeros((size, size)) if position_covariance is None else position_covariance
     state = np.hstack([np.asarray(field) for field in found.motion[:3]])
@@ -65,24 +69,33 @@ def fuse(
     return Fused(found, noise + shared, shared)
 
 
-def _searched(model: ArrayModel, data: Collapsed, positions, angular_rate, saturated):
-    """The motion of the lower cost from two starts where gyroscopes are lost.
-
-    Specific force tells products of rates only, so there are several minima then, and
-    contradicting a reading at its rail counts.
-    """
+def _searched(
+    model: ArrayModel, data: Collapsed, positions, specific_force, angular_rate, saturated
+) -> MotionEstimate:
+    """Most likely motion; where it falls short of readings at a rail, these are used as well."""
     first = motion_from(data, positions)
     if saturated is None or not np.any(saturated):
         return first
-    rate = turned(np.asarray(first.motion.angular_rate), angular_rate, saturated)
-    both = first, motion_from(data, positions, start=rate)
-    sd = np.sqrt(np.diag(model.noise.gyroscope)).reshape(-1, 3)
-    judged = []
-    for found in both:
-        foretold = np.asarray(found.motion.angular_rate)[:, None]
-        short = contradiction(foretold, angular_rate, saturated, sd)
-        judged.append((found.cost + short, found.converged))
-    return first.replaced(better(*judged), both[1])
+    rate = np.asarray(first.motion.angular_rate)
+    index = np.flatnonzero(np.any(turned(rate, angular_rate, saturated) != rate, axis=1))
+    if not index.size or not model.noise.uncorrelated_gyroscopes:
+        return first
+    given = rows(problem(model, specific_force, angular_rate, saturated), index)
+    part = Collapsed.of(model, specific_force[index], angular_rate[index], saturated[index])
+    parameters, where = positions[1:].ravel() - np.tile(positions[0], len(positions) - 1), index
+    x, converged, counts, cost = search(
+        given, part, positions - positions[0], first.motion.select(index), saturated[index],
+        parameters, TOLERANCE, LIMIT,
+    )  # fmt: skip
+    start = pack_motion(model, first.motion.select(index))
+    before = motion_equations(given, start, parameters)[2]
+    fields = [np.array(field) for field in first.motion]
+    for field, new in zip(fields[:3], np.split(x, 3, axis=1), strict=True):
+        field[where] = new
+    costs, steps, flags = (np.array(f) for f in (first.cost, first.iterations, first.converged))
+    costs[where] += cost - before  # the collapsed cost leaves out a constant
+    steps[where], flags[where] = counts, converged
+    return MotionEstimate(Motion(*fields), costs, steps, flags)
 
 
 @partial(jax.jit, static_argnums=0)

@@ -91,8 +91,8 @@ def calibrate_gauss_newton(
     require_rotation(data, positions)
     if not model.effects and data.weights is not None and rate_covariance is None:
         if position_prior is not None:
-            mean, sd = position_prior
-            position_prior = np.asarray(mean), np.diag(np.broadcast_to(sd, mean.shape) ** -2.0)
+            mean, sd = np.asarray(position_prior[0], float), position_prior[1]
+            position_prior = mean, np.diag(np.broadcast_to(sd, mean.shape) ** -2.0)
         found = descend(data, positions, position_prior, tolerance, limit)
         # the collapsed cost leaves out how the gyroscopes differ among themselves
         spread = angular_rate - data.mean.T[:, None]

@@ -19,23 +19,14 @@ class MotionEstimate:
     """Motion per sample with its convergence.
 
     ``motion`` fields (T, 3); ``cost`` (T,) twice the negative log likelihood up to a
-    constant; ``iterations`` (T,) Gauss-Newton steps; ``converged`` (T,) bool.
+    constant (NaN from `calibrate_gauss_newton` with effects, which sums it over samples);
+    ``iterations`` (T,) Gauss-Newton steps; ``converged`` (T,) bool.
     """
 
     motion: Motion
     cost: np.ndarray
     iterations: np.ndarray
     converged: np.ndarray
-
-    def replaced(self, take, other: MotionEstimate) -> MotionEstimate:
-        """With the samples ``take`` (T,) bool of another one."""
-        pairs = zip(self.motion, other.motion, strict=True)
-        return MotionEstimate(
-            Motion(*(np.where(take[:, None], new, old) for old, new in pairs)),
-            np.where(take, other.cost, self.cost),
-            np.where(take, other.iterations, self.iterations),
-            np.where(take, other.converged, self.converged),
-        )
 
 
 def estimate_motion(

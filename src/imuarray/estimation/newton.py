@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
+from threading import Lock
 from typing import NamedTuple
 
 import numpy as np
@@ -36,14 +39,34 @@ def descend(
     again only where steps shrink slowly. Stops when no coordinate moves by more than
     ``tolerance`` of its own sd. IdentifiabilityError where the information is singular.
     """
-    with _blas().limit(limits=1, user_api="blas"):
+    with _one_thread():
         return _descended(data, start, prior, tolerance, limit, covariance)
 
 
 @cache
 def _blas() -> ThreadpoolController:
-    """Its products are small: more threads than one only wait for each other, 5 times as long."""
     return ThreadpoolController()
+
+
+_LOCK, _HELD = Lock(), []  # a limit for each descent that runs; the first one's is put back
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """BLAS' products are small here: more threads only wait for each other, 5 times as long.
+
+    The limit is the whole process': it stays until the last of several descents at a time ends.
+    """
+    with _LOCK:
+        limit = _HELD[0] if _HELD else _blas().limit(limits=1, user_api="blas")
+        _HELD.append(limit)
+    try:
+        yield
+    finally:
+        with _LOCK:
+            _HELD.pop()
+            if not _HELD:
+                limit.restore_original_limits()
 
 
 def _descended(data, start, prior, tolerance, limit, covariance) -> Calibration:

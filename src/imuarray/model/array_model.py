@@ -47,6 +47,9 @@ class ArrayModel:
         With effects that have a gauge the flat prior is no posterior at all: see `with_motion`.
     effect_prior : EffectPrior or None
         Instead of the effects' own: zero mean, their prior sds, begun at zero.
+    clock : (float, float) or None
+        Where time begins (s) and its span (s), which drifts, shifts and clocks look at; by
+        default those of the times given, which a part of a recording does not share with it.
     """
 
     array: Array
@@ -55,6 +58,7 @@ class ArrayModel:
     derivative_sd: tuple[float, float] = (2e4, 600.0)
     motion_sd: tuple[float, float, float] = (np.inf, np.inf, np.inf)
     effect_prior: EffectPrior | None = None
+    clock: tuple[float, float] | None = None
 
     @classmethod
     def isotropic(cls, array, accelerometer_sd, gyroscope_sd, effects=()) -> ArrayModel:
@@ -163,9 +167,17 @@ class ArrayModel:
         parameters = jnp.asarray(np.asarray(parameters, float))
         samples = fields.angular_rate.shape[-2]
         if span is None:
-            time, span = clock(np.zeros(samples) if time is None else time)
+            time, span = self.since(samples, time)
         out = _predict_many(self, fields, positions, parameters, np.asarray(time, float), span)
         return Prediction(*(np.asarray(part) for part in out))
+
+    def since(self, samples: int, time=None) -> tuple[np.ndarray, float]:
+        """Seconds since the beginning (T,) and the span (s); zeros where no ``time`` is given."""
+        if time is None:
+            return np.zeros(samples), 1.0 if self.clock is None else self.clock[1]
+        if self.clock is None:
+            return clock(time)
+        return np.asarray(time, float) - self.clock[0], self.clock[1]
 
     def with_motion(self, motion: Motion) -> ArrayModel:
         """The same model with the motion prior of a recording: zero mean, its own size.

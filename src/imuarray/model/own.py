@@ -9,7 +9,7 @@ from imuarray.errors import InputError
 from imuarray.model.effects import EFFECTS
 from imuarray.provenance import add_code, digest
 
-_READ: dict[str, tuple[str, ...]] = {}  # by the digest of a file's text
+_READ: dict[str, tuple[str, tuple[str, ...]]] = {}  # by path: digest of the text, and its ids
 
 
 def read_effects(path: str | Path) -> tuple[str, ...]:
@@ -17,21 +17,25 @@ def read_effects(path: str | Path) -> tuple[str, ...]:
 
     The file is code and does what it says: read your own only. Results carry its name and SHA-256
     beside the versions, and chains made with another text of it are not continued. The same text
-    is run once. InputError with the line where it fails, or where it registers nothing; the
-    catalogue is then as before.
+    is run once; a changed file replaces its effects. InputError with the line where it fails, or
+    where it registers nothing; the catalogue is then as before.
     """
     path = Path(path)
     try:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: expected a Python file in UTF-8, found {error}") from None
-    known = digest(text)
-    if known in _READ:
-        return _READ[known]
-    before = dict(EFFECTS)
+    place, known, before = str(path.resolve()), digest(text), dict(EFFECTS)
+    former = _READ.get(place, ("", ()))
+    if former[0] == known:
+        return former[1]
+    for name in former[1]:
+        EFFECTS.pop(name, None)
+    kept = dict(EFFECTS)
     try:
-        exec(compile(text, str(path), "exec"), {"__name__": path.stem, "__file__": str(path)})  # noqa: S102
-        new = tuple(name for name in EFFECTS if name not in before)
+        code = compile(text, str(path), "exec", dont_inherit=True)
+        exec(code, {"__name__": path.stem, "__file__": str(path)})  # noqa: S102
+        new = tuple(name for name in EFFECTS if name not in kept)
         if not new:
             raise InputError(
                 f"{path}: expected effects (@effect(...) of docs/effects.md), found none"
@@ -42,8 +46,8 @@ def read_effects(path: str | Path) -> tuple[str, ...]:
         if isinstance(error, InputError | KeyboardInterrupt):
             raise
         raise InputError(f"{path}{_line(error, path)}: {type(error).__name__}: {error}") from None
-    add_code(path.name, text)
-    _READ[known] = new
+    add_code(path.name, place, text)
+    _READ[place] = known, new
     return new
 
 

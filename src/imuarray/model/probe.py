@@ -66,8 +66,11 @@ def _shape(item: Effect) -> tuple[int, ...]:
             f" {ACCELEROMETERS} accelerometers and {GYROSCOPES} gyroscopes"
         )
         raise _wrong(item, expected, shape)
-    units = item.unit.split("," if "," in item.unit else "|")
-    if len(units) > 1 and (len(shape) < 2 or len(units) not in shape[1:]):
+    # as `names.unit_of` takes them: commas count along the last axis, bars along the second
+    units, axis = item.unit.split("|"), 1
+    if "|" not in item.unit:
+        units, axis = item.unit.split(","), -1
+    if len(units) > 1 and (len(shape) < 2 or len(units) != shape[axis]):
         raise _wrong(item, f"a unit for each of {shape[1:]}", item.unit)
     return shape
 

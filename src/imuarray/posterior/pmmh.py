@@ -102,6 +102,7 @@ def run_chains(
             past[1] = np.concatenate([past[1], sampler.get_log_prob().T], axis=1)
             if checkpoint:
                 _save(checkpoint, key, thin, past, move.accepted)
+    move.pool.shutdown()
     return Chains(past[0], past[1], move.accepted / (thin * draws), thin, step)
 
 

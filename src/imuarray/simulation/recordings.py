@@ -69,6 +69,12 @@ def simulate_recording(
     model: ArrayModel, motion, positions, nominal, rng, sampling_rate: float, duration: float,
     **options,
 ):  # fmt: skip
-    """A recording of a `SmoothMotion` at ``sampling_rate`` Hz for ``duration`` seconds."""
+    """A recording of a `SmoothMotion` at ``sampling_rate`` Hz for ``duration`` seconds.
+
+    Its time begins at zero, or where the model's clock does.
+    """
     time = np.arange(int(round(sampling_rate * duration))) / sampling_rate
-    return simulate_samples(model, motion.at(time), positions, nominal, rng, time=time, **options)
+    begin = 0.0 if model.clock is None else model.clock[0]
+    return simulate_samples(
+        model, motion.at(time), positions, nominal, rng, time=begin + time, **options
+    )
