@@ -46,7 +46,7 @@ def diagnosis(hidden, tmp_path):
     section["positions_sd_m"] = np.full((5, 3), 1e-6).tolist()
     document = {
         "causes": [{"effect": "gyroscope_scale", "parameters": parameters}],
-        "noise_sd": noise, "extended": section,
+        "noise_sd": noise, "extended": section, "clock": {"origin_s": 0.0, "span_s": 2.99},
     }  # fmt: skip
     path = tmp_path / "diagnosis.json"
     path.write_text(json.dumps(document))
