@@ -3,7 +3,7 @@
 For the papers' model with isotropic triads. The residual's derivative by r_k is Omega_t =
 Omega(omega)^2 + Omega(omega_dot), the same at each triad; the motion's derivatives are B dw/domega
 and H of (5a), whose B and H are the same at each sample. So the Schur complement over all samples
-needs moments of Omega_t and dw/domega only: 54 x 54 numbers, however many triads there are.
+needs moments of Omega_t and dw/domega only: 45 x 21 numbers, however many triads there are.
 """
 
 from __future__ import annotations
