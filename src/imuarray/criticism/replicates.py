@@ -13,7 +13,6 @@ import numpy as np
 from imuarray.criticism.describe import first_up
 from imuarray.criticism.fit import Fit, normal
 from imuarray.criticism.noise import standardised
-from imuarray.criticism.readings import Readings
 from imuarray.model.effects import KINDS
 
 REPLICATES = 99
@@ -156,16 +155,6 @@ def _company(part):
     blocks = np.abs(matrix).reshape(count, 3, count, 3).max(axis=(1, 3))
     np.fill_diagonal(blocks, 0.0)
     return blocks.max(axis=1)
-
-
-def spread_of_gyroscopes(readings: Readings, values=None) -> float:
-    """rms departure of the gyroscopes from their own mean, rad/s; NaN for a single one."""
-    there = readings.exists[:, 1]
-    if there.sum() < 2:
-        return float("nan")
-    values = readings.values if values is None else values
-    rate = np.where(readings.keep, values, np.nan)[:, there, 3:]
-    return float(np.sqrt(np.nanmean((rate - np.nanmean(rate, axis=1, keepdims=True)) ** 2)))
 
 
 def discrepancies(fit: Fit, ridge, rng, replicates=REPLICATES) -> list[Discrepancy]:

@@ -19,6 +19,8 @@ class Thresholds:
     check : log p of a check of what is left
     share : of the base model's excess that a cause must explain
     explained : share of the excess from which failing checks are forgiven
+    rival : by how much (log p) another effect may be worse and still be listed beside a cause
+    alike : share of an adopted effect's signal from which another one is of its class
     """
 
     effect: float

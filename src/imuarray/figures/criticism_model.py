@@ -6,11 +6,12 @@ import numpy as np
 import pandas as pd
 from matplotlib.colors import LinearSegmentedColormap
 
+from imuarray.criticism.thresholds import read_thresholds
 from imuarray.figures.blind import words
 from imuarray.figures.criticism import MODELS, NAMES, imu_ticks, legend_above
 from imuarray.figures.style import BLACK, BLUE, PAGE, VERMILLION, new_figure, styled
 
-ALIKE = 0.64  # squared correlation from which two effects are one class
+ALIKE = read_thresholds().alike  # squared correlation from which two effects are one class
 DARK = 0.75  # from which numbers are white
 
 

@@ -209,7 +209,7 @@ def gained(diagnosis: Diagnosis) -> Answer:
         f"Each of the {samples} samples, predicted from the other stretches of time, is"
         f" {over_base} nats more likely than under the papers' model, and {over_inflated} nats more"
         f" than under its honest rival, the papers' model with noise inflated to its residual"
-        f" ({total} nats in all)."
+        f" ({total} nats in all). Readings that were left out as outliers are in no score."
     )
     items = [residual_in_words(diagnosis), positions_in_words(diagnosis)]
     items += readings_in_words(document["causes"])
