@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from imuarray.errors import IdentifiabilityError
 from imuarray.estimation import calibrate_gauss_newton
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.gauss_newton import calibrate_blocks
-from imuarray.estimation.newton import descend
+from imuarray.estimation.newton import _one_thread, descend
 from imuarray.estimation.online import Online
 from imuarray.model import ArrayModel, Noise
 from tests import oracles
@@ -133,3 +134,19 @@ def test_online_widths_shrink(stream):
         widths.append(np.sqrt(np.diag(online.covariance)).max())
     assert np.all(np.diff(widths) < 0)
     assert widths[-1] / widths[3] == pytest.approx(np.sqrt(4 / 20), rel=0.15)
+
+
+def test_descents_that_overlap_leave_the_threads_of_blas_as_they_were():
+    def blas():
+        found = [item for item in threadpool_info() if item["user_api"] == "blas"]
+        return {item["num_threads"] for item in found}
+
+    with threadpool_limits(2, user_api="blas"):
+        one, other = _one_thread(), _one_thread()
+        one.__enter__()
+        other.__enter__()
+        assert blas() == {1}
+        one.__exit__(None, None, None)
+        assert blas() == {1}  # the other one still runs
+        other.__exit__(None, None, None)
+        assert blas() == {2}

@@ -29,6 +29,11 @@ WRONG = {
     "no prior": (scaled, {"prior_sd": 0.0}, "positive prior_sd, found 0.0"),
     "prior of four": (scaled, {"prior_sd": (1.0,) * 4}, "prior_sd that broadcasts"),
     "two units": (scaled, {"unit": "m, rad"}, r"a unit for each of \(3,\)"),
+    "units of another axis": (
+        lambda v, i, p: p._replace(angular_rate=p[1] + v[:, 0]),
+        {"unit": "m, s", "shape": lambda a, g: (g, 2, 3)},
+        r"a unit for each of \(2, 3\)",
+    ),
     "nothing back": (lambda v, i, p: None, {}, "predicted._replace.*found NoneType"),
     "an array back": (lambda v, i, p: p.angular_rate, {}, "predicted._replace"),
     "another shape": (lambda v, i, p: p._replace(angular_rate=v[0]), {}, r"\(5, 3\), found \(3,\)"),
