@@ -5,7 +5,12 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from imuarray.criticism.repeatability import MODELS, parameters_agreement, positions_agreement
+from imuarray.criticism.repeatability import (
+    MODELS,
+    parameters_agreement,
+    positions_agreement,
+    recordings_table,
+)
 from imuarray.figures.criticism_repeatability import repeatability_figure
 
 
@@ -61,3 +66,24 @@ def test_the_figure_has_every_coordinate(documents):
     assert sum(len(line.get_ydata()) for line in left.lines if len(line.get_ydata()) > 2) == (
         3 * 3 * 30
     )
+
+
+def test_a_row_says_what_a_recording_s_causes_leave(documents):
+    for number, given in enumerate(documents.values()):
+        held = {"value": 1.0, "sd": None, "unit": "1"}
+        given["causes"].append({"effect": "sensor_clock", "parameters": {"phase_1": held}})
+        for model, size in (("base", 1.0), ("extended", 0.1)):
+            residual = {"specific_force": size, "angular_rate": size * (number + 1)}
+            given[model] = given[model] | {"residual_sd": residual}
+        gain = {"over_inflated_noise_nats_per_sample": 5.0 + number}
+        gain["over_inflated_noise_nats_per_sample_se"] = 0.5
+        given |= {"samples": 100, "gain": gain, "unexplained": number == 0}
+    table = recordings_table(documents)
+    assert table.recording.tolist() == list(documents)
+    assert table.gain.tolist() == [5.0, 6.0, 7.0] and table.rate_after.iloc[2] == pytest.approx(0.3)
+    assert set(table.causes) == {"gyroscope_scale sensor_clock"}
+    assert set(table.parameters_with_sd) == {2} and table.unexplained.tolist() == [
+        True,
+        False,
+        False,
+    ]

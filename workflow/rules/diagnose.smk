@@ -51,6 +51,7 @@ rule diagnosis_agreement:
     output:
         positions="results/measured/tables/diagnosis_positions_{group}.csv",
         parameters="results/measured/tables/diagnosis_parameters_{group}.csv",
+        recordings="results/measured/tables/diagnosis_recordings_{group}.csv",
         pdf="results/measured/figures/diagnosis_{group}.pdf",
         png=report(
             "results/measured/figures/diagnosis_{group}.png",

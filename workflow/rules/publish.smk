@@ -113,7 +113,21 @@ rule publish_diagnosis:
     log:
         "results/logs/publish/diagnosis_{group}.{kind}.log",
     wildcard_constraints:
+        group="(?!(positions|parameters|recordings)_).*",
         kind="pdf|png|csv",
+    shell:
+        "cp {input:q} {output:q} 2> {log:q}"
+
+
+rule publish_diagnosis_table:
+    input:
+        "results/measured/tables/diagnosis_{table}_{group}.csv",
+    output:
+        "paper_figures/diagnosis_{table}_{group}.csv",
+    log:
+        "results/logs/publish/diagnosis_{table}_{group}.log",
+    wildcard_constraints:
+        table="positions|parameters|recordings",
     shell:
         "cp {input:q} {output:q} 2> {log:q}"
 

@@ -6,7 +6,11 @@ with job(snakemake):
     import json
     from pathlib import Path
 
-    from imuarray.criticism.repeatability import parameters_agreement, positions_agreement
+    from imuarray.criticism.repeatability import (
+        parameters_agreement,
+        positions_agreement,
+        recordings_table,
+    )
     from imuarray.figures.criticism_repeatability import repeatability_figure
     from imuarray.figures.style import write_figure
     from imuarray.provenance import write_csv
@@ -19,6 +23,7 @@ with job(snakemake):
     made = snakemake.output
     write_csv(positions, made.positions)
     write_csv(parameters, made.parameters)
+    write_csv(recordings_table(documents), made.recordings)
     footer = [
         f"{len(documents)} recordings of board {snakemake.wildcards.group}; differences of all"
         " pairs in all coordinates. Pairs share recordings."

@@ -69,3 +69,30 @@ def parameters_agreement(documents: dict[str, dict]) -> pd.DataFrame:
         rows.append(row)
     order = ["effect", "recordings", "parameters", "size", "spread", "correlation"]
     return pd.DataFrame(rows).reindex(columns=order)
+
+
+def recordings_table(documents: dict[str, dict]) -> pd.DataFrame:
+    """One row a recording: what the papers' model leaves, what the causes leave, and the gain.
+
+    ``force`` and ``rate`` columns are residuals in m/s^2 and rad/s (rms, less what the motion
+    takes up); gains are nats a sample on held-out time over the papers' model with inflated noise.
+    """
+    rows = []
+    for name, document in documents.items():
+        before, after = (document[model]["residual_sd"] for model in ("base", "extended"))
+        gain = document["gain"]
+        named = [cause["effect"] for cause in document["causes"]]
+        free = sum(
+            item["sd"] is not None
+            for cause in document["causes"] for item in cause["parameters"].values()
+        )  # fmt: skip
+        rows.append({
+            "recording": name, "samples": document["samples"],
+            "force_before": before["specific_force"], "force_after": after["specific_force"],
+            "rate_before": before["angular_rate"], "rate_after": after["angular_rate"],
+            "gain": gain["over_inflated_noise_nats_per_sample"],
+            "gain_se": gain["over_inflated_noise_nats_per_sample_se"],
+            "unexplained": document["unexplained"], "causes": " ".join(named),
+            "parameters_with_sd": free,
+        })  # fmt: skip
+    return pd.DataFrame(rows)
