@@ -24,6 +24,7 @@ _HOME = {
     "Array": "imuarray.geometry",
     "ArrayModel": "imuarray.model",
     "InputError": "imuarray.errors",
+    "Online": "imuarray.estimation.online",
     "Recording": "imuarray.recording",
     "apply": "imuarray.analysis",
     "calibrate": "imuarray.analysis",
@@ -69,6 +70,7 @@ if TYPE_CHECKING:  # what the names above are, for type checkers and editors
     from imuarray.estimation import calibrate_bcd as calibrate_bcd
     from imuarray.estimation import calibrate_gauss_newton as calibrate_gauss_newton
     from imuarray.estimation import estimate_motion as estimate_motion
+    from imuarray.estimation.online import Online as Online
     from imuarray.geometry import Array as Array
     from imuarray.geometry import mimu4444 as mimu4444
     from imuarray.model import ArrayModel as ArrayModel

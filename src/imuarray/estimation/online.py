@@ -53,7 +53,8 @@ class Online:
     def add(self, specific_force, angular_rate, saturated=None) -> int:
         """Samples (n, A, 3) m/s^2, (n, G, 3) rad/s and saturated axes (n, G, 3) or None.
 
-        Returns how many blocks were learned from; what is left waits for more.
+        Returns how many blocks were learned from; what is left waits for more. Where a block
+        raises IdentifiabilityError nothing of it is learned and it waits, with what comes next.
         """
         if saturated is None:
             saturated = np.zeros(np.shape(angular_rate), bool)
