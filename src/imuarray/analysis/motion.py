@@ -24,8 +24,9 @@ def apply(
 
     ``calibration``: what `calibrate` gave for a recording of the same IMUs, with effects or
     without; where effects look at the time (drifts, clocks) it must be the same recording, or a
-    part of it. ``accelerometer_noise``: assumed sd in m/s^2, by default what the recording
-    declares, or with effects what the calibration assumed.
+    part of it. A gyroscope at its rail says on which side the rate is and what it is at least, no
+    more. ``accelerometer_noise``: assumed sd in m/s^2, by default what the recording declares, or
+    with effects what the calibration assumed.
 
     Returns ``angular_rate`` (time, axis) rad/s, ``angular_acceleration`` rad/s^2 and
     ``specific_force`` m/s^2, each with ``_sd`` and the part of it that is due to the calibration,
