@@ -19,7 +19,7 @@ from pathlib import Path
 
 import emcee
 import numpy as np
-from samplers_figure import statistics
+from samplers_figure import CONVERGED, statistics
 from written import publish
 
 from imuarray.analysis import density_of, model_of
@@ -42,7 +42,6 @@ WIDENING = 1.005  # of the draws of omega beyond the integrand's curvature
 PAPER_CORE_SECONDS = 320 * 3600.0  # 8 hours on 40 cores, T = 500
 ENOUGH = 1000
 KEPT = 10_000  # draws of a chain
-CONVERGED = 1.05  # R-hat, as paper 2021 has it
 
 
 @dataclass

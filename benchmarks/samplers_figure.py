@@ -14,6 +14,7 @@ import pandas as pd
 from imuarray.figures.style import BLACK, PAGE, look, new_figure, styled
 from imuarray.provenance import atomic_write
 
+CONVERGED = 1.05  # R-hat, as paper 2021 has it
 SHORT = {  # how a method's name begins: what the figure calls it
     "PmMH, isotropic walk (27)": "PmMH, paper's walk",
     "the same, omega": "its omega centred",
@@ -41,16 +42,26 @@ def statistics(rows) -> pd.DataFrame:
 def draw(table: pd.DataFrame):
     """Effective draws per core second over T; means and sds against NUTS' at the largest T."""
     figure = new_figure(
-        ["benchmarks/samplers.py: data of paper 2021, IV-A; smallest bulk ESS of 93 parameters;"
-         " the bars' ends hold the 93 coordinates"], width=PAGE, height=2.6,
-    )  # fmt: skip
+        [
+            "benchmarks/samplers.py: data of paper 2021, IV-A; smallest bulk ESS of 93 parameters."
+            " Bars hold the 93 coordinates, markers are their medians. Hollow: R-hat above 1.05."
+        ],
+        width=PAGE,
+        height=2.8,
+    )
     speed, means, sds = figure.subplots(1, 3, width_ratios=[1.5, 1, 1])
     largest = table[table.samples == table.samples.max()]
     reference = largest[largest.sampler == "NUTS"]
     names = list(dict.fromkeys(table.sampler))
     for place, name in enumerate(names):
         rates = table[table.sampler == name].groupby("samples").first()
-        speed.plot(rates.index, rates.ess / rates.core_seconds, label=name, **look(place))
+        heights = rates.ess / rates.core_seconds
+        speed.plot(rates.index, heights, label=name, **look(place))
+        doubtful = rates.rhat > CONVERGED
+        speed.plot(
+            rates.index[doubtful], heights[doubtful], linestyle="none", markerfacecolor="white",
+            zorder=3, **look(place, "linestyle"),
+        )  # fmt: skip
         own = largest[largest.sampler == name]
         apart = (own.mean_m.to_numpy() - reference.mean_m.to_numpy()) / reference.sd_m.to_numpy()
         ratio = own.sd_m.to_numpy() / reference.sd_m.to_numpy()
@@ -59,14 +70,15 @@ def draw(table: pd.DataFrame):
             axes.vlines(place, values.min(), values.max(), color=color)
             axes.plot(place, np.median(values), look(place)["marker"], color=color)
     speed.set(xscale="log", yscale="log", xlabel="Time samples $T$ (count)",
-              ylabel="Effective draws per core second")  # fmt: skip
-    means.set(ylabel=f"Mean less NUTS' (posterior sds), $T$ = {table.samples.max()}")
-    sds.set(ylabel="sd over NUTS'")
+              ylabel="ESS per core second (1/s)")  # fmt: skip
+    largest_t = f"$T$ = {table.samples.max()}"
+    means.set(ylabel="mean less NUTS' (posterior sds)", xlabel=largest_t)
+    sds.set(ylabel="sd over NUTS'", xlabel=largest_t)
     means.axhline(0.0, color=BLACK, linewidth=0.6)
     sds.axhline(1.0, color=BLACK, linewidth=0.6)
     for axes in (means, sds):
-        axes.set_xticks(range(len(names)), names, rotation=60, ha="right", rotation_mode="anchor")
-    speed.legend(loc="lower left")
+        axes.set_xticks([])
+    figure.legend(*speed.get_legend_handles_labels(), loc="outside upper center", ncols=5)
     return figure
 
 
