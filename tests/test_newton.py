@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from imuarray.errors import IdentifiabilityError
+from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.estimation import calibrate_gauss_newton
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.gauss_newton import calibrate_blocks
@@ -150,3 +150,14 @@ def test_descents_that_overlap_leave_the_threads_of_blas_as_they_were():
         assert blas() == {1}  # the other one still runs
         other.__exit__(None, None, None)
         assert blas() == {2}
+
+
+def test_online_keeps_nothing_of_wrong_samples():
+    model, _, force, rate = problem()
+    online = Online(model, 3e-3, len(force))
+    bad = force.copy()
+    bad[0, 0, 0] = np.nan
+    for wrong in ((force[:, :2], rate), (force, rate[1:]), (force[0], rate[0]), (bad, rate)):
+        with pytest.raises(InputError, match="online: expected"):
+            online.add(*wrong)
+    assert online.add(force, rate) == 1 and online.samples == len(force)

@@ -52,8 +52,26 @@ def test_commands_know_the_effect(mine, tmp_path, capsys):
     assert len(found["effects"]) == 15
     with xr.open_dataset(tmp_path / "cal.nc", engine="h5netcdf") as dataset:
         assert json.loads(dataset.attrs["versions"])["mine.py"].startswith("sha256 ")
-    motion = ["apply", str(tmp_path / "cal.nc"), str(tmp_path / "rec.nc"), "--effect-file"]
-    assert main([*motion, str(mine), "--out", str(tmp_path / "motion.nc"), "--quiet"]) == 0
+    motion = ["apply", str(tmp_path / "cal.nc"), str(tmp_path / "rec.nc"), "--quiet", "--out"]
+    motion += [str(tmp_path / "motion.nc")]
+    assert main([*motion, "--effect-file", str(mine)]) == 0
+    # a calibration does not do with another text, nor without
+    mine.write_text(CUBIC.format(sd="2e-6").replace("force**3", "force**2"))
+    assert main([*motion, "--effect-file", str(mine)]) == 2
+    assert "expected mine.py as it was" in capsys.readouterr().err
+    EFFECTS.pop("accelerometer_cubic")
+    assert main(motion) == 2
+    assert "found no accelerometer_cubic: name the file" in capsys.readouterr().err
+
+
+def test_a_file_whose_effects_nobody_asks_for_is_said(mine, tmp_path, capsys):
+    recording, _ = imuarray.simulate(model().array, 1.0, 50.0, seed=1)
+    imuarray.write_recording(recording, tmp_path / "rec.nc")
+    asked = ["calibrate", str(tmp_path / "rec.nc"), "--effect-file", str(mine)]
+    assert main([*asked, "--out", str(tmp_path / "cal.nc")]) == 2
+    assert "expected --effects" in capsys.readouterr().err
+    with pytest.raises(imuarray.InputError, match="expected a Python file"):
+        imuarray.read_effects(tmp_path / "nothing.py")
 
 
 def test_another_text_makes_other_chains(mine):

@@ -44,7 +44,8 @@ WRONG = {
         {},
         "finite",
     ),
-    "numpy": (lambda v, i, p: p._replace(angular_rate=np.sin(v) + p[1]), {}, None),
+    "numpy": (lambda v, i, p: p._replace(angular_rate=np.sin(v) + p[1]), {}, "in jax.numpy"),
+    "an if on values": (lambda v, i, p: p if v.sum() > 0 else scaled(v, i, p), {}, "in jax.numpy"),
     "silent derivative": (late, {"shape": lambda a, g: (a, 3)}, "derivatives=True"),
     "declared derivative": (late, {"shape": lambda a, g: (a, 3), "derivatives": True}, None),
 }

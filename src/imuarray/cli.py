@@ -26,10 +26,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         with _warnings_in_one_line():
             arguments = make_parser().parse_args(argv)
             _check_output(arguments)
-            if getattr(arguments, "effect_file", None) is not None:
-                from imuarray.model import read_effects
-
-                read_effects(arguments.effect_file)
+            _read_effects(arguments)
             arguments.run(arguments)
     except InputError as error:
         return _fail(str(error))
@@ -80,7 +77,8 @@ def _check_output(arguments: argparse.Namespace) -> None:
     if figure is not None:
         _require_writable("--figure", figure)
         if figure.suffix.lower() not in FIGURES:
-            raise InputError(f"--figure {figure}: expected {' or '.join(FIGURES)}, found another")
+            found = figure.suffix or "no ending"
+            raise InputError(f"--figure {figure}: expected {' or '.join(FIGURES)}, found {found}")
         if figure.resolve() == out.resolve():
             raise InputError(f"--figure {figure}: expected another file than --out, found the same")
     for source in _inputs(arguments):
@@ -107,6 +105,21 @@ def _require_writable(option: str, path: Path, folder: bool = False) -> None:
         raise InputError(f"{option} {path}: expected an existing folder, found no {parent}")
     if not os.access(parent, os.W_OK | os.X_OK):
         raise InputError(f"{option} {path}: expected a folder one may write to, found {parent}")
+
+
+def _read_effects(arguments: argparse.Namespace) -> None:
+    """The user's own effects into the catalogue."""
+    files = getattr(arguments, "effect_file", None)
+    if not files:
+        return
+    from imuarray.model import read_effects
+
+    new = [name for path in files for name in read_effects(path)]
+    if hasattr(arguments, "effects") and not (arguments.effects or arguments.diagnosis):
+        raise InputError(
+            f"--effect-file: expected --effects that names what to use of {', '.join(new)}, found"
+            " none"
+        )
 
 
 def _inputs(arguments: argparse.Namespace) -> list[Path]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -9,9 +10,10 @@ import xarray as xr
 
 from imuarray.analysis.model import assumed, model_of
 from imuarray.errors import InputError
+from imuarray.model.effects import EFFECTS
 from imuarray.model.names import parameter_names
 from imuarray.model.noise import Noise
-from imuarray.provenance import digest, stamp
+from imuarray.provenance import digest, stamp, versions
 from imuarray.recording import Recording
 
 UNITS = {"angular_rate": "rad s-1", "angular_acceleration": "rad s-2", "specific_force": "m s-2"}
@@ -78,6 +80,7 @@ def extended_motion(
     """
     from imuarray.estimation.extended import fuse_extended
 
+    _require_effects(calibration)
     positions = calibration["position"].to_numpy()
     sds = [calibration[f"{kind}_sd"].to_numpy()[:, 0] for kind in ("accelerometer", "gyroscope")]
     if accelerometer_noise is not None:
@@ -103,6 +106,20 @@ def extended_motion(
         covariance, saturated,
         recording.time - calibration.attrs["time_origin"], calibration.attrs["span"],
     )  # fmt: skip
+
+
+def _require_effects(calibration: xr.Dataset) -> None:
+    """InputError unless the calibration's effects are here, a user's own with the same text."""
+    missing = [name for name in calibration.attrs["effects"].split(",") if name not in EFFECTS]
+    if missing:
+        raise InputError(
+            f"expected the effects of the calibration, found no {', '.join(missing)}: name the file"
+            " that defines them (--effect-file, imuarray.read_effects)"
+        )
+    then, now = json.loads(calibration.attrs.get("versions", "{}")), versions()
+    for name, text in then.items():
+        if str(text).startswith("sha256") and text not in now.values():
+            raise InputError(f"expected {name} as it was at the calibration, found another text")
 
 
 def require_fit(calibration: xr.Dataset, recording: Recording) -> None:

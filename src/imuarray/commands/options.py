@@ -55,8 +55,9 @@ def add_model(parser: argparse.ArgumentParser) -> None:
 
 def add_effect_file(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--effect-file", type=Path, default=None, metavar="FILE",
-        help="Python file with effects of your own, which is run: they join the catalogue",
+        "--effect-file", type=Path, action="append", metavar="FILE",
+        help="Python file with effects of your own, which is run: they join the catalogue; may be"
+        " given again",
     )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from imuarray.errors import InputError
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.newton import descend
 from imuarray.model import ArrayModel
@@ -53,12 +54,23 @@ class Online:
     def add(self, specific_force, angular_rate, saturated=None) -> int:
         """Samples (n, A, 3) m/s^2, (n, G, 3) rad/s and saturated axes (n, G, 3) or None.
 
+        A reading at a gyroscope's rail that ``saturated`` does not tell of spoils the positions
+        (`Recording.saturated_gyroscopes` finds them). InputError for other shapes and for NaN.
         Returns how many blocks were learned from; what is left waits for more. Where a block
         raises IdentifiabilityError nothing of it is learned and it waits, with what comes next.
         """
-        if saturated is None:
-            saturated = np.zeros(np.shape(angular_rate), bool)
-        self._waiting.append((specific_force, angular_rate, saturated))
+        force, rate = np.asarray(specific_force, float), np.asarray(angular_rate, float)
+        lost = np.zeros(rate.shape, bool) if saturated is None else np.asarray(saturated, bool)
+        counts = self.model.array.accelerometers, self.model.array.gyroscopes
+        expected = [(len(force), count, 3) for count in (*counts, counts[1])]
+        if [part.shape for part in (force, rate, lost)] != expected:
+            raise InputError(
+                f"online: expected samples of shapes {expected}, found"
+                f" {[part.shape for part in (force, rate, lost)]}"
+            )
+        if not (np.all(np.isfinite(force)) and np.all(np.isfinite(rate))):
+            raise InputError("online: expected finite samples, found NaN or infinite ones")
+        self._waiting.append((force, rate, lost))
         learned = 0
         while sum(len(part[0]) for part in self._waiting) >= self.block:
             joined = [np.concatenate(part) for part in zip(*self._waiting, strict=True)]

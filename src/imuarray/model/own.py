@@ -25,6 +25,8 @@ def read_effects(path: str | Path) -> tuple[str, ...]:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: expected a Python file in UTF-8, found {error}") from None
+    except OSError as error:
+        raise InputError(f"{path}: expected a Python file, found {error.strerror}") from None
     place, known, before = str(path.resolve()), digest(text), dict(EFFECTS)
     former = _READ.get(place, ("", ()))
     if former[0] == known:

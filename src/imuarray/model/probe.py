@@ -42,6 +42,8 @@ def _probe(item: Effect, sd, rng) -> None:
         if not np.allclose(old, new, rtol=1e-9, atol=1e-12):
             raise _wrong(item, f"{kind} left as it is by parameters of zero", "it changed")
     drawn = sd * rng.standard_normal(sd.shape)
+    # as it is used: compiled, where numpy's functions and a Python `if` on values fail
+    _tried(item, sd.shape, lambda: jax.eval_shape(lambda x: predicted(x, later), drawn))
     values, change = _tried(
         item, sd.shape, lambda: jax.jvp(lambda x: predicted(drawn, x), (later,), (later,))
     )
