@@ -11,6 +11,7 @@ from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.estimation import kernels
 from imuarray.estimation.collapsed import Collapsed, tables
 from imuarray.estimation.motion_ml import MotionEstimate, motion_from
+from imuarray.estimation.rates import most_likely, workspace
 from imuarray.geometry.array import require_planar_extent
 from imuarray.model import ArrayModel
 
@@ -42,20 +43,10 @@ def _position_block(force, state, rows, values, A, positions):
 
     Returns -1 where sum_n A_n' A_n is singular (a common axis of rotation).
     """
-    accelerometers, _, samples = force.shape
-    A[:] = 0.0
-    for e in range(len(values)):
-        i, c, a = rows[e]
-        for t in range(samples):
-            A[i, c, t] += values[e] * state[a, t]
+    accelerometers = len(force)
+    kernels.arms(state, rows, values, A)
     N = np.zeros((3, 3))
-    for i in range(3):
-        for j in range(3):
-            total = 0.0
-            for c in range(3):
-                for t in range(samples):
-                    total += A[i + 1, c, t] * A[j + 1, c, t]
-            N[i, j] = total
+    kernels.arm_products(A, A[1:], N)
     inverse = np.empty((3, 3))
     for i in range(3):
         for j in range(3):
@@ -66,15 +57,12 @@ def _position_block(force, state, rows, values, A, positions):
     if not determinant > 1e-12 * (N[0, 0] + N[1, 1] + N[2, 2]) ** 3:
         return -1.0
     inverse /= determinant
+    right = np.zeros((accelerometers + 1, 3))
+    kernels.arm_products(A, force, right)
+    kernels.arm_products(A, A[:1], right[accelerometers:])  # what s and omega make at the origin
     largest = 0.0
-    rhs = np.empty(3)
     for k in range(1, accelerometers):
-        for i in range(3):
-            total = 0.0
-            for c in range(3):
-                for t in range(samples):
-                    total += A[i + 1, c, t] * (force[k, c, t] - A[0, c, t])
-            rhs[i] = total
+        rhs = right[k] - right[accelerometers]
         for i in range(3):
             new = inverse[i, 0] * rhs[0] + inverse[i, 1] * rhs[1] + inverse[i, 2] * rhs[2]
             largest = max(largest, abs(new - positions[k, i]))
@@ -84,7 +72,7 @@ def _position_block(force, state, rows, values, A, positions):
 
 @nb.njit(cache=True, nogil=True)
 def descend(
-    force, energy, moments, mean, P, weights, rows, values, pairs, products, positions,
+    force, energy, base, mean, P, weights, rows, values, pairs, products, positions,
     tolerance, cost_tolerance, limit, marks, snapshots, cost_trace, step_trace,
 ):  # fmt: skip
     """Algorithm 1 on one realisation; ``positions`` is start and result.
@@ -92,31 +80,20 @@ def descend(
     Returns (iterations, status): status 1 converged, 0 stopped at the limit, -1 sum A'A
     singular, -2 H' Lambda H singular.
     """
-    samples = energy.size
-    weighted = np.empty_like(force)
-    for k in range(len(force)):
-        weighted[k] = weights[k] * force[k]
-    K, C, X = np.empty((12, 12)), np.empty((6, 6)), np.empty((6, 6))
-    inverse = np.empty((6, 6))
-    full, b, phi = np.empty((12, samples)), np.empty((6, samples)), np.empty((6, samples))
-    const, cost = np.empty(samples), np.empty(samples)
-    A, state = np.empty((4, 3, samples)), np.empty((12, samples))
-    counts = np.empty(samples, np.int64)
+    A, work = np.empty((4, 3, energy.size)), workspace(base)
     rate = mean.copy()
     mark = 0
     for iteration in range(limit):
-        kernels.information(positions, weights, pairs, products, K)
-        if np.isnan(kernels.eliminate(K, C, X, inverse)):
+        logdet = most_likely(
+            positions, force, energy, mean, P, weights, rows, values, pairs, products,
+            rate, 1e-7, 50, work,
+        )  # fmt: skip
+        if np.isnan(logdet):
             return iteration, -2
-        kernels.weighted_moments(positions, weighted, moments)
-        kernels.project(moments, rows, values, full)
-        kernels.reduce_linear(full, X, inverse, b, phi, const, energy)
-        kernels.angular_rates(rate, C, b, mean, P, 1e-7, 50, cost, counts)
-        kernels.linear_motion(rate, X, phi, state)
-        step = _position_block(force, state, rows, values, A, positions)
+        step = _position_block(force, work.state, rows, values, A, positions)
         if step < 0.0:
             return iteration, -1
-        cost_trace[iteration] = cost.sum() + const.sum()
+        cost_trace[iteration] = work.cost.sum() + work.const.sum()
         step_trace[iteration] = step
         while mark < len(marks) and marks[mark] == iteration + 1:
             snapshots[mark] = positions
@@ -193,7 +170,7 @@ def calibrate_bcd(
     marks = np.asarray(sorted(marks), np.int64)
     snapshots = np.empty((len(marks), *positions.shape))
     done, status = descend(
-        data.specific_force, data.energy, data.moments.copy(), data.mean,
+        data.specific_force, data.energy, data.base, data.mean,
         data.gyroscope_information, data.weights, *tables(),
         positions, tolerance, cost_tolerance, limit, marks, snapshots, cost, step,
     )  # fmt: skip

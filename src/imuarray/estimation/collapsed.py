@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +31,11 @@ def tables() -> Tables:
     return Tables(rows, tensor[tuple(rows.T)].copy(), pairs, gram[tuple(pairs.T)].copy())
 
 
+def _weighted(precision, force) -> np.ndarray:
+    """Lambda y (A, 3, T) for any precision (3A, 3A)."""
+    return (precision @ force.reshape(len(precision), -1)).reshape(force.shape)
+
+
 @dataclass(frozen=True)
 class Collapsed:
     """What every estimator of the papers' model needs of the data, computed once.
@@ -40,18 +45,16 @@ class Collapsed:
     specific_force : (A, 3, T) m/s^2, each sample's mean over triads taken out (s_t
         absorbs it exactly, and less is lost to rounding)
     offset : (3, T) that mean
-    weighted : (A, 3, T) Lambda y
     energy : (T,) y' Lambda y
-    moments : (4, 3, T), row 0 filled with sum_k (Lambda y)_k
+    base : (3, T) sum_k (Lambda y)_k
     mean, gyroscope_information : (3, T), (3, 3, T), p(omega_t | y_g)
     weights : (A,) 1 / sigma_k^2, or None for a general covariance
     """
 
     specific_force: np.ndarray
     offset: np.ndarray
-    weighted: np.ndarray
     energy: np.ndarray
-    moments: np.ndarray
+    base: np.ndarray
     mean: np.ndarray
     gyroscope_information: np.ndarray
     weights: np.ndarray | None
@@ -65,30 +68,36 @@ class Collapsed:
     @classmethod
     def of(cls, model: ArrayModel, specific_force, angular_rate, saturated=None) -> Collapsed:
         """From measurements (T, A, 3) m/s^2 and (T, G, 3) rad/s, and saturated axes."""
-        centred = np.array(np.transpose(specific_force, (1, 2, 0)), float, order="C")
-        offset = centred.mean(axis=0)
-        centred -= offset
+        force = np.ascontiguousarray(specific_force, float)
+        samples, accelerometers, _ = force.shape
         precision = model.noise.accelerometer_precision
         weights = model.noise.triad_weights
+        centred, offset = np.empty((accelerometers, 3, samples)), np.empty((3, samples))
+        energy, base = np.empty(samples), np.empty((3, samples))
+        plain = np.ones(accelerometers) if weights is None else weights
+        kernels.arrange(force, plain, centred, offset, energy, base)
         if weights is None:
-            flat = centred.reshape(-1, centred.shape[-1])
-            weighted = (precision @ flat).reshape(centred.shape)
-        else:
-            weighted = weights[:, None, None] * centred
-        moments = np.zeros((4, 3, centred.shape[-1]))
-        moments[0] = weighted.sum(axis=0)
+            weighted = _weighted(precision, centred)
+            base = weighted.sum(axis=0)
+            energy = np.einsum("kct,kct->t", centred, weighted)
         mean, information = model.noise.angular_rate_given_gyroscopes(angular_rate, saturated)
         return cls(
             centred,
             offset,
-            weighted,
-            np.einsum("kct,kct->t", centred, weighted),
-            moments,
+            energy,
+            base,
             np.ascontiguousarray(mean.T),
             np.ascontiguousarray(information.transpose(1, 2, 0)),
             weights,
             precision,
         )
+
+    @cached_property
+    def weighted(self) -> np.ndarray:
+        """Lambda y, (A, 3, T)."""
+        if self.weights is None:
+            return _weighted(self.precision, self.specific_force)
+        return self.weights[:, None, None] * self.specific_force
 
     def reduce(self, positions):
         """Eliminate phi at ``positions`` (A, 3).
@@ -101,11 +110,14 @@ class Collapsed:
         positions = np.ascontiguousarray(positions, float)
         if self.weights is None:
             kernels.information_general(positions, self.precision, structure_tensor(), K)
+            arms, force = positions, self.weighted
         else:
             kernels.information(positions, self.weights, known.pairs, known.products, K)
+            arms, force = self.weights[:, None] * positions, self.specific_force
         logdet = kernels.eliminate(K, C, X, inverse)
-        moments = self.moments.copy()
-        kernels.weighted_moments(positions, self.weighted, moments)
+        moments = np.empty((4, 3, self.samples))
+        moments[0] = self.base
+        kernels.weighted_moments(arms, force, moments)
         full = np.empty((12, self.samples))
         kernels.project(moments, known.rows, known.values, full)
         b, phi, const = (

@@ -1,9 +1,9 @@
 """The positions' score and Fisher information with the motion eliminated, in collapsed form.
 
-For the papers' model with isotropic triads. The residual's derivative by r_k is Omega_t =
-Omega(omega)^2 + Omega(omega_dot), the same at each triad; the motion's derivatives are B dw/domega
-and H of (5a), whose B and H are the same at each sample. So the Schur complement over all samples
-needs moments of Omega_t and dw/domega only: 45 x 21 numbers, however many triads there are.
+For the papers' model with isotropic triads. A residual's derivative by r_k is Omega_t =
+Omega(omega)^2 + Omega(omega_dot), the same at each triad; its derivatives by the motion are affine
+in (1, r_k). So the information is Lambda (x) sum_t Omega_t Omega_t' less a matrix of rank 12, that
+of what the motion takes up: sums over samples of 12 x 12, however many triads there are.
 """
 
 from __future__ import annotations
@@ -11,18 +11,20 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from imuarray.estimation.collapsed import Collapsed
-from imuarray.estimation.kernels import rate_information
+from imuarray.estimation import kernels
+from imuarray.estimation.collapsed import Collapsed, tables
+from imuarray.estimation.kernels import FAST
+from imuarray.estimation.rates import lower, precision_at, rate_information
 from imuarray.model import structure_tensor
-from imuarray.model.structure import design
 
-CHUNK = 4096  # samples at a time: bounds memory
+TILE = 128  # samples at a time
 
 
 def arms(state) -> np.ndarray:
-    """Omega_t as (3, 3, T): axis of the force, axis of the position, from (w, phi) (12, T)."""
-    tensor = structure_tensor()[1:].transpose(1, 0, 2)
-    return (tensor.reshape(9, 12) @ state).reshape(3, 3, -1)
+    """`kernels.arms` of (w, phi) (12, T): (4, axis, T)."""
+    out = np.empty((4, 3, state.shape[1]))
+    kernels.arms(state, tables().rows, tables().values, out)
+    return out
 
 
 def score(data: Collapsed, positions, state) -> np.ndarray:
@@ -30,94 +32,126 @@ def score(data: Collapsed, positions, state) -> np.ndarray:
 
     At the most likely motion this is the score of the profile likelihood.
     """
-    omega = arms(state)
-    force = data.specific_force.reshape(len(positions), -1)
-    common = structure_tensor()[0] @ state
-    stacked = omega.transpose(1, 0, 2).reshape(3, -1)
-    right = force @ stacked.T - stacked @ common.ravel()
-    return data.weights[:, None] * (right - positions @ (stacked @ stacked.T))
+    known = tables()
+    positions = np.ascontiguousarray(positions, float)
+    return _score(
+        positions, data.specific_force, data.weights, state, known.rows, known.values
+    )  # fmt: skip
 
 
 @nb.njit(cache=True, nogil=True)
-def _taken(rate, C, P, out):
-    """dw/domega W_t^-1 (dw/domega)', W_t the information of omega_t: entries `LOWER`, (21, T)."""
-    Y = np.empty((6, 3))
-    for t in range(rate.shape[1]):
-        x, y, z = rate[0, t], rate[1, t], rate[2, t]
-        xx, xy, xz, yy, yz, zz = rate_information(x, y, z, C, P[:, :, t])
-        # W's Cholesky factor, then Y = slope factor'^-1
-        fxx = np.sqrt(xx)
-        fyx, fzx = xy / fxx, xz / fxx
-        fyy = np.sqrt(yy - fyx * fyx)
-        fzy = (yz - fzx * fyx) / fyy
-        fzz = np.sqrt(zz - fzx * fzx - fzy * fzy)
-        slopes = (
-            (2.0 * x, 0.0, 0.0), (0.0, 2.0 * y, 0.0), (0.0, 0.0, 2.0 * z),
-            (y, x, 0.0), (z, 0.0, x), (0.0, z, y),
-        )  # fmt: skip
-        for a in range(6):
-            Y[a, 0] = slopes[a][0] / fxx
-            Y[a, 1] = (slopes[a][1] - fyx * Y[a, 0]) / fyy
-            Y[a, 2] = (slopes[a][2] - fzx * Y[a, 0] - fzy * Y[a, 1]) / fzz
-        place = 0
-        for a in range(6):
-            for b in range(a + 1):
-                out[place, t] = Y[a, 0] * Y[b, 0] + Y[a, 1] * Y[b, 1] + Y[a, 2] * Y[b, 2]
-                place += 1
+def _score(positions, force, weights, state, rows, values):
+    made = np.empty((4, 3, state.shape[1]))
+    kernels.arms(state, rows, values, made)
+    right, square = np.zeros(positions.shape), np.zeros((4, 3))
+    kernels.arm_products(made, force, right)
+    kernels.arm_products(made, made, square)
+    for k in range(len(positions)):
+        for i in range(3):
+            right[k, i] -= square[0, i]
+            for j in range(3):
+                right[k, i] -= positions[k, j] * square[1 + j, i]
+            right[k, i] *= weights[k]
+    return right
 
 
-def _lower(size: int):
-    """(rows, columns) of a symmetric matrix's lower triangle, and where each entry is in it."""
-    rows, columns = np.tril_indices(size)
-    place = np.empty((size, size), int)
-    place[rows, columns] = place[columns, rows] = np.arange(rows.size)
-    return rows, columns, place
+@nb.njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
+def _whitened(rate, C, P, first, size, Z):
+    """Z = dw/domega F'^-1 (6, 3, TILE) of ``size`` samples, F F' the information of omega_t.
 
-
-ARMS, LOWER = _lower(9), _lower(6)  # of Omega_t's entries, and of w's
-
-
-def _gram(data: Collapsed, rate, entries, C) -> np.ndarray:
-    """sum_t Omega_t (x) Omega_t (x) what omega_t takes up, (9, 9, 6, 6).
-
-    Both factors are symmetric: 45 x 21 sums instead of 54 x 54.
+    A tile's own memory tells the compiler that nothing overlaps: vectors, no branch in the loop.
     """
-    found = np.zeros((ARMS[0].size, LOWER[0].size))
-    for first in range(0, rate.shape[1], CHUNK):
-        part = slice(first, first + CHUNK)
-        taken = np.empty((LOWER[0].size, rate[:, part].shape[1]))
-        _taken(rate[:, part], C, data.gyroscope_information[..., part], taken)
-        found += (entries[ARMS[0], part] * entries[ARMS[1], part]) @ taken.T
-    return found[ARMS[2]][:, :, LOWER[2]]
+    c = lower(C)
+    for i in range(size):
+        t = first + i
+        x, y, z = rate[0, t], rate[1, t], rate[2, t]
+        xx, xy, xz, yy, yz, zz = rate_information(x, y, z, c, precision_at(P, t))
+        ix = 1.0 / np.sqrt(xx)
+        fyx, fzx = xy * ix, xz * ix
+        iy = 1.0 / np.sqrt(yy - fyx * fyx)
+        fzy = (yz - fzx * fyx) * iy
+        iz = 1.0 / np.sqrt(zz - fzx * fzx - fzy * fzy)
+        # rows: of w_x^2, w_y^2, w_z^2, w_x w_y, w_x w_z, w_y w_z
+        a0, b1, c2 = 2.0 * x * ix, 2.0 * y * iy, 2.0 * z * iz
+        a1 = -fyx * a0 * iy
+        d0, e0, f1 = y * ix, z * ix, z * iy
+        d1, e1 = (x - fyx * d0) * iy, -fyx * e0 * iy
+        Z[0, 0, i], Z[0, 1, i], Z[0, 2, i] = a0, a1, (-fzx * a0 - fzy * a1) * iz
+        Z[1, 1, i], Z[1, 2, i] = b1, -fzy * b1 * iz
+        Z[2, 2, i] = c2
+        Z[3, 0, i], Z[3, 1, i], Z[3, 2, i] = d0, d1, (-fzx * d0 - fzy * d1) * iz
+        Z[4, 0, i], Z[4, 1, i], Z[4, 2, i] = e0, e1, (x - fzx * e0 - fzy * e1) * iz
+        Z[5, 1, i], Z[5, 2, i] = f1, (y - fzy * f1) * iz
+
+
+@nb.njit(cache=True, nogil=True, fastmath=FAST)
+def _rate_gram(rate, C, P, entries, left):
+    """sum_t U_t U_t' (12, 12), U_t = (Omega_t left_m dw/domega F'^-1) for m = 0 .. 3, (12, 3).
+
+    ``entries`` (3, 3, T) are Omega_t by the position's and the force's axis; ``left`` (4, 3, 6).
+    """
+    Z, V, U = np.zeros((6, 3, TILE)), np.empty((3, 3, TILE)), np.zeros((12, 3, TILE))
+    found = np.zeros((12, 12))
+    for first in range(0, rate.shape[1], TILE):
+        size = min(TILE, rate.shape[1] - first)
+        if size < TILE:
+            U[:] = 0.0
+        _whitened(rate, C, P, first, size, Z)
+        for m in range(4):
+            for c in range(3):
+                q0, q1, q2, q3, q4, q5 = left[m, c]
+                for r in range(3):
+                    for i in range(TILE):
+                        total = q0 * Z[0, r, i] + q1 * Z[1, r, i] + q2 * Z[2, r, i]
+                        V[c, r, i] = total + q3 * Z[3, r, i] + q4 * Z[4, r, i] + q5 * Z[5, r, i]
+            for j in range(3):
+                for r in range(3):
+                    for i in range(size):
+                        total = entries[j, 0, first + i] * V[0, r, i]
+                        total += entries[j, 1, first + i] * V[1, r, i]
+                        U[3 * m + j, r, i] = total + entries[j, 2, first + i] * V[2, r, i]
+        flat = U.reshape(12, 3 * TILE)
+        found += flat @ flat.T
+    return found
+
+
+@nb.njit(cache=True, nogil=True, fastmath=FAST)
+def _assemble(positions, weights, square, taken, out):
+    """diag(weights) (x) square less U taken U', row k of U weights[k] (1, r_k) (x) I; k > 1."""
+    row = np.empty((3, 12))
+    for k in range(1, len(positions)):
+        (x, y, z), weight = positions[k], weights[k]
+        row[:] = taken[:3] + x * taken[3:6] + y * taken[6:9] + z * taken[9:]
+        for m in range(1, k + 1):
+            (x, y, z), both = positions[m], weight * weights[m]
+            for i in range(3):
+                for j in range(3):
+                    value = row[i, j] + x * row[i, 3 + j] + y * row[i, 6 + j] + z * row[i, 9 + j]
+                    a, b = 3 * k - 3 + i, 3 * m - 3 + j
+                    out[a, b] = out[b, a] = -both * value
+        for i in range(3):
+            for j in range(3):
+                out[3 * k - 3 + i, 3 * k - 3 + j] += weight * square[i, j]
 
 
 def information(data: Collapsed, positions, rate, state, reduced) -> np.ndarray:
     """Fisher information (3 (A - 1), 3 (A - 1)) of r_2 ... r_A, 1 / m^2, the motion unknown.
 
-    ``rate`` (3, T) and ``state`` (12, T) are the motion, ``reduced`` what `Collapsed.reduce`
-    gives at ``positions`` (A, 3). Its inverse is the Cramer-Rao bound of the positions.
+    ``rate`` (3, T) and ``state`` (12, T) are the motion, ``reduced`` C, X and (H' Lambda H)^-1
+    of the kernels at ``positions`` (A, 3). Its inverse is the Cramer-Rao bound of the positions.
     """
-    C, X, inverse = reduced[0], reduced[2], reduced[-1]
-    omega, count = arms(state), len(positions)
-    stacked = omega.transpose(1, 0, 2).reshape(3, -1)
-    whole = np.kron(np.diag(data.weights), stacked @ stacked.T)
-    # what omega_dot and s take up
-    columns = design(positions).reshape(count, 3, 12)
-    linear = data.weights[:, None, None] * columns[..., 6:]
-    entries = omega.transpose(1, 0, 2).reshape(9, -1)  # position's axis, force's axis
-    moments = (entries @ entries.T).reshape(3, 3, 3, 3)
-    linear = linear.reshape(-1, 6)
-    lost = (linear @ inverse @ linear.T).reshape(count, 3, count, 3)
-    # sum over c and d of lost[k, c, l, d] moments[i, c, j, d]
-    pairs = lost.transpose(0, 2, 1, 3).reshape(-1, 9)
-    taken = pairs @ moments.transpose(1, 3, 0, 2).reshape(9, 9)
-    whole -= taken.reshape(count, count, 3, 3).transpose(0, 2, 1, 3).reshape(whole.shape)
-    # what omega takes up of the rest
-    left = data.weights[:, None, None] * (columns[..., :6] - columns[..., 6:] @ X)
-    left = left.reshape(count, 18)
-    # (position's axis, force's, position's, force's, w, w) -> (i, (c, a), j, (d, b))
-    gram = _gram(data, rate, entries, C).reshape(3, 3, 3, 3, 6, 6)
-    blocks = gram.transpose(0, 1, 4, 2, 3, 5).reshape(3, 18, 3, 18)
-    taken = np.tensordot(np.tensordot(left, blocks, (1, 1)), left, (3, 1)).transpose(0, 1, 3, 2)
-    whole -= taken.reshape(whole.shape)
-    return whole[3:, 3:]
+    C, X, inverse = reduced
+    tensor = structure_tensor()
+    entries = arms(state)[1:]
+    flat = entries.reshape(9, -1)
+    moments = (flat @ flat.T).reshape(3, 3, 3, 3)
+    # what omega_dot and s take up, then omega of the rest
+    linear = tensor[..., 6:].reshape(12, 6)
+    seen = (linear @ inverse @ linear.T).reshape(4, 3, 4, 3)
+    taken = np.einsum("mcnd,icjd->minj", seen, moments).reshape(12, 12)
+    left = tensor[..., :6] - tensor[..., 6:] @ X
+    taken += _rate_gram(rate, C, data.gyroscope_information, entries, left)
+    positions = np.ascontiguousarray(positions, float)
+    whole = np.empty((3 * len(positions) - 3, 3 * len(positions) - 3))
+    _assemble(positions, data.weights, np.einsum("icjc->ij", moments), taken, whole)
+    return whole

@@ -13,11 +13,52 @@ FAST = {"reassoc", "contract", "nsz"}
 
 
 @nb.njit(cache=True, nogil=True, fastmath=FAST)
+def arrange(force, weights, centred, offset, energy, total):
+    """force (T, A, 3) with time last and each sample's mean over triads taken out.
+
+    Fills centred (A, 3, T), offset (3, T) that mean, energy (T,) = sum_k lambda_k |y_k|^2 and
+    total (3, T) = sum_k lambda_k y_k.
+    """
+    samples, accelerometers, _ = force.shape
+    for t in range(samples):
+        x = y = z = 0.0
+        for k in range(accelerometers):
+            x += force[t, k, 0]
+            y += force[t, k, 1]
+            z += force[t, k, 2]
+        x, y, z = x / accelerometers, y / accelerometers, z / accelerometers
+        square = total_x = total_y = total_z = 0.0
+        for k in range(accelerometers):
+            a, b, c = force[t, k, 0] - x, force[t, k, 1] - y, force[t, k, 2] - z
+            centred[k, 0, t], centred[k, 1, t], centred[k, 2, t] = a, b, c
+            total_x += weights[k] * a
+            total_y += weights[k] * b
+            total_z += weights[k] * c
+            square += weights[k] * (a * a + b * b + c * c)
+        offset[0, t], offset[1, t], offset[2, t] = x, y, z
+        total[0, t], total[1, t], total[2, t] = total_x, total_y, total_z
+        energy[t] = square
+
+
+@nb.njit(cache=True, nogil=True, fastmath=FAST)
 def weighted_moments(positions, z, moments):
-    """moments[i] = sum_k r_ki z_k for i = 1..3; (4, 3, T) from z (A, 3, T). Row 0 is kept."""
+    """moments[i] = sum_k r_ki z_k for i = 1..3; (4, 3, T) from z (A, 3, T). Row 0 is kept.
+
+    Four triads at a time: each sum is then loaded and stored a quarter as often.
+    """
     accelerometers, _, samples = z.shape
     moments[1:] = 0.0
-    for k in range(accelerometers):
+    fours = accelerometers - accelerometers % 4
+    for k in range(0, fours, 4):
+        (x0, y0, h0), (x1, y1, h1) = positions[k], positions[k + 1]
+        (x2, y2, h2), (x3, y3, h3) = positions[k + 2], positions[k + 3]
+        for c in range(3):
+            for t in range(samples):
+                z0, z1, z2, z3 = z[k, c, t], z[k + 1, c, t], z[k + 2, c, t], z[k + 3, c, t]
+                moments[1, c, t] += x0 * z0 + x1 * z1 + x2 * z2 + x3 * z3
+                moments[2, c, t] += y0 * z0 + y1 * z1 + y2 * z2 + y3 * z3
+                moments[3, c, t] += h0 * z0 + h1 * z1 + h2 * z2 + h3 * z3
+    for k in range(fours, accelerometers):
         x, y, h = positions[k]
         for c in range(3):
             for t in range(samples):
@@ -152,112 +193,6 @@ def quadratic(x, y, z, C, b0, b1, b2, b3, b4, b5):
     return q
 
 
-@nb.njit(cache=True, nogil=True, inline="always")
-def _gyroscope_cost(x, y, z, m, P):
-    dx, dy, dz = x - m[0], y - m[1], z - m[2]
-    return (
-        P[0, 0] * dx * dx
-        + P[1, 1] * dy * dy
-        + P[2, 2] * dz * dz
-        + 2.0 * (P[0, 1] * dx * dy + P[0, 2] * dx * dz + P[1, 2] * dy * dz)
-    )
-
-
-@nb.njit(cache=True, nogil=True, inline="always")
-def _pulled(a, x, y, z, C):
-    """Row a of C dw/domega."""
-    return (
-        2.0 * x * C[a, 0] + y * C[a, 3] + z * C[a, 4],
-        2.0 * y * C[a, 1] + x * C[a, 3] + z * C[a, 5],
-        2.0 * z * C[a, 2] + x * C[a, 4] + y * C[a, 5],
-    )
-
-
-@nb.njit(cache=True, nogil=True, inline="always")
-def rate_information(x, y, z, C, P):
-    """(dw/domega)' C dw/domega + P: entries xx, xy, xz, yy, yz, zz."""
-    j0, j1, j2 = _pulled(0, x, y, z, C), _pulled(1, x, y, z, C), _pulled(2, x, y, z, C)
-    j3, j4, j5 = _pulled(3, x, y, z, C), _pulled(4, x, y, z, C), _pulled(5, x, y, z, C)
-    return (
-        2.0 * x * j0[0] + y * j3[0] + z * j4[0] + P[0, 0],
-        2.0 * x * j0[1] + y * j3[1] + z * j4[1] + P[0, 1],
-        2.0 * x * j0[2] + y * j3[2] + z * j4[2] + P[0, 2],
-        2.0 * y * j1[1] + x * j3[1] + z * j5[1] + P[1, 1],
-        2.0 * y * j1[2] + x * j3[2] + z * j5[2] + P[1, 2],
-        2.0 * z * j2[2] + x * j4[2] + y * j5[2] + P[2, 2],
-    )
-
-
-@nb.njit(cache=True, nogil=True, inline="always")
-def _excess(a, x, y, z, C, b):
-    """Component a of C w - b."""
-    value = C[a, 0] * x * x + C[a, 1] * y * y + C[a, 2] * z * z
-    return value + C[a, 3] * x * y + C[a, 4] * x * z + C[a, 5] * y * z - b[a]
-
-
-@nb.njit(cache=True, nogil=True)
-def _rate_step(x, y, z, C, b, m, P, damping):
-    """One damped Gauss-Newton step in omega for the collapsed cost; returns the step."""
-    g0, g1, g2 = _excess(0, x, y, z, C, b), _excess(1, x, y, z, C, b), _excess(2, x, y, z, C, b)
-    g3, g4, g5 = _excess(3, x, y, z, C, b), _excess(4, x, y, z, C, b), _excess(5, x, y, z, C, b)
-    dx, dy, dz = x - m[0], y - m[1], z - m[2]
-    gx = 2.0 * x * g0 + y * g3 + z * g4 + P[0, 0] * dx + P[0, 1] * dy + P[0, 2] * dz
-    gy = 2.0 * y * g1 + x * g3 + z * g5 + P[0, 1] * dx + P[1, 1] * dy + P[1, 2] * dz
-    gz = 2.0 * z * g2 + x * g4 + y * g5 + P[0, 2] * dx + P[1, 2] * dy + P[2, 2] * dz
-    hxx, hxy, hxz, hyy, hyz, hzz = rate_information(x, y, z, C, P)
-    hxx, hyy, hzz = hxx + damping, hyy + damping, hzz + damping
-    cxx, cxy, cxz = hyy * hzz - hyz * hyz, hxz * hyz - hxy * hzz, hxy * hyz - hxz * hyy
-    cyy, cyz, czz = hxx * hzz - hxz * hxz, hxy * hxz - hxx * hyz, hxx * hyy - hxy * hxy
-    det = hxx * cxx + hxy * cxy + hxz * cxz
-    if not det > 0.0:
-        return 0.0, 0.0, 0.0, False
-    sx = -(cxx * gx + cxy * gy + cxz * gz) / det
-    sy = -(cxy * gx + cyy * gy + cyz * gz) / det
-    sz = -(cxz * gx + cyz * gy + czz * gz) / det
-    return sx, sy, sz, True
-
-
-@nb.njit(cache=True, nogil=True)
-def angular_rates(rate, C, b, mean, P, tolerance, limit, cost, iterations):
-    """Concentrated ML of omega_t for every sample by damped Gauss-Newton.
-
-    ``rate`` (3, T) is the start and the result; ``cost`` (T,) gets the collapsed cost
-    without its constant; ``iterations`` (T,) the steps taken, negative where the step
-    never fell below ``tolerance`` (relative).
-    """
-    bt, m, p = np.empty(6), np.empty(3), np.empty((3, 3))
-    for t in range(rate.shape[1]):
-        for a in range(6):
-            bt[a] = b[a, t]
-        for a in range(3):
-            m[a] = mean[a, t]
-            for c in range(3):
-                p[a, c] = P[a, c, t]
-        x, y, z = rate[0, t], rate[1, t], rate[2, t]
-        now = quadratic(x, y, z, C, bt[0], bt[1], bt[2], bt[3], bt[4], bt[5])
-        now += _gyroscope_cost(x, y, z, m, p)
-        damping, done = 0.0, -limit
-        for step in range(1, limit + 1):
-            dx, dy, dz, regular = _rate_step(x, y, z, C, bt, m, p, damping)
-            if regular:
-                nx, ny, nz = x + dx, y + dy, z + dz
-                new = quadratic(nx, ny, nz, C, bt[0], bt[1], bt[2], bt[3], bt[4], bt[5])
-                new += _gyroscope_cost(nx, ny, nz, m, p)
-                small = abs(dx) + abs(dy) + abs(dz) <= tolerance * (
-                    1.0 + abs(nx) + abs(ny) + abs(nz)
-                )
-                if small or new <= now:
-                    x, y, z, now = nx, ny, nz, new
-                    damping *= 0.1
-                    if small:
-                        done = step
-                        break
-                    continue
-            damping = max(10.0 * damping, 1e-3 * (C[0, 0] * (x * x + y * y + z * z) + 1e-12))
-        rate[0, t], rate[1, t], rate[2, t] = x, y, z
-        cost[t], iterations[t] = now, done
-
-
 @nb.njit(cache=True, nogil=True, fastmath=FAST)
 def linear_motion(rate, X, phi, state):
     """state (12, T) = (w, phi_hat) with phi_hat = Kpp^-1 H' Lambda y - X w."""
@@ -271,3 +206,52 @@ def linear_motion(rate, X, phi, state):
             scale = X[a, m]
             for t in range(rate.shape[1]):
                 state[6 + a, t] -= scale * state[m, t]
+
+
+@nb.njit(cache=True, nogil=True, fastmath=FAST)
+def arms(state, rows, values, out):
+    """The predicted force is out[0] + sum_i r_i out[i + 1]: (4, axis, T) from (w, phi) (12, T).
+
+    The last three are Omega_t by the position's axis.
+    """
+    out[:] = 0.0
+    for e in range(len(values)):
+        i, c, a = rows[e]
+        for t in range(state.shape[1]):
+            out[i, c, t] += values[e] * state[a, t]
+
+
+@nb.njit(cache=True, nogil=True, fastmath=FAST)
+def arm_products(arms, force, out):
+    """out[k, i] += sum over c and t of arms[i + 1, c, t] force[k, c, t], for i = 0 .. 2.
+
+    (A, 3) from arms (4, 3, T) and force (A, 3, T), four triads at a time.
+    """
+    accelerometers, _, samples = force.shape
+    fours = accelerometers - accelerometers % 4
+    for k in range(0, fours, 4):
+        for c in range(3):
+            x0 = x1 = x2 = x3 = y0 = y1 = y2 = y3 = h0 = h1 = h2 = h3 = 0.0
+            for t in range(samples):
+                x, y, h = arms[1, c, t], arms[2, c, t], arms[3, c, t]
+                f0, f1 = force[k, c, t], force[k + 1, c, t]
+                f2, f3 = force[k + 2, c, t], force[k + 3, c, t]
+                x0, y0, h0 = x0 + x * f0, y0 + y * f0, h0 + h * f0
+                x1, y1, h1 = x1 + x * f1, y1 + y * f1, h1 + h * f1
+                x2, y2, h2 = x2 + x * f2, y2 + y * f2, h2 + h * f2
+                x3, y3, h3 = x3 + x * f3, y3 + y * f3, h3 + h * f3
+            for m, (p, q, r) in enumerate(((x0, y0, h0), (x1, y1, h1), (x2, y2, h2), (x3, y3, h3))):
+                out[k + m, 0] += p
+                out[k + m, 1] += q
+                out[k + m, 2] += r
+    for k in range(fours, accelerometers):
+        for c in range(3):
+            x0 = y0 = h0 = 0.0
+            for t in range(samples):
+                f0 = force[k, c, t]
+                x0 += arms[1, c, t] * f0
+                y0 += arms[2, c, t] * f0
+                h0 += arms[3, c, t] * f0
+            out[k, 0] += x0
+            out[k, 1] += y0
+            out[k, 2] += h0

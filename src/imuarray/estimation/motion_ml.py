@@ -9,6 +9,7 @@ import numpy as np
 from imuarray.errors import IdentifiabilityError
 from imuarray.estimation import kernels
 from imuarray.estimation.collapsed import Collapsed
+from imuarray.estimation.rates import angular_rates
 from imuarray.geometry.array import require_planar_extent
 from imuarray.model import ArrayModel
 from imuarray.motion import Motion
@@ -71,7 +72,7 @@ def motion_from(
         )
     rate = data.mean.copy() if start is None else np.array(start.T, order="C")
     cost, iterations = np.empty(data.samples), np.empty(data.samples, np.int64)
-    kernels.angular_rates(
+    angular_rates(
         rate, C, b, data.mean, data.gyroscope_information, tolerance, limit, cost, iterations
     )
     state = np.empty((12, data.samples))

@@ -13,18 +13,18 @@ import scipy.linalg
 from threadpoolctl import ThreadpoolController
 
 from imuarray.errors import IdentifiabilityError
-from imuarray.estimation import kernels
 from imuarray.estimation.bcd import Calibration
-from imuarray.estimation.collapsed import Collapsed
+from imuarray.estimation.collapsed import Collapsed, tables
 from imuarray.estimation.information import information, score
 from imuarray.estimation.motion_ml import motion_estimate
+from imuarray.estimation.rates import most_likely, workspace
 
-FAR = 1.0  # sds of the step before: the information is computed anew after a longer one
+FAR = 5.0  # length of the step before: the information is computed anew after a longer one
 SLOW = 0.05  # of the step before: and where steps contract less than so
 TRIES = 10  # halvings of a step that raises the cost
 RATE, LIMIT = 1e-10, 50  # of the search for each sample's omega: tolerance, steps
 ROUNDED = 1e-14  # of y' Lambda y: what a cost, a small difference of such, is good to
-SINGULAR = 1e-12  # least pivot of the information, scaled to a unit diagonal
+SINGULAR = 1e-12  # least pivot of the information, of its diagonal
 
 
 def descend(
@@ -44,11 +44,11 @@ def descend(
 
 
 @cache
-def _blas() -> ThreadpoolController:
-    return ThreadpoolController()
+def _blas() -> list:
+    return ThreadpoolController().select(user_api="blas").lib_controllers
 
 
-_LOCK, _HELD = Lock(), []  # a limit for each descent that runs; the first one's is put back
+_LOCK, _HELD = Lock(), []  # threads before, for each descent that runs; the last one restores them
 
 
 @contextmanager
@@ -58,15 +58,21 @@ def _one_thread() -> Iterator[None]:
     The limit is the whole process': it stays until the last of several descents at a time ends.
     """
     with _LOCK:
-        limit = _HELD[0] if _HELD else _blas().limit(limits=1, user_api="blas")
-        _HELD.append(limit)
+        before = _HELD[0] if _HELD else [library.num_threads for library in _blas()]
+        _HELD.append(before)
+        _set_threads([1] * len(before))
     try:
         yield
     finally:
         with _LOCK:
             _HELD.pop()
             if not _HELD:
-                limit.restore_original_limits()
+                _set_threads(before)
+
+
+def _set_threads(counts) -> None:
+    for library, count in zip(_blas(), counts, strict=True):
+        library.set_num_threads(count)
 
 
 def _descended(data, start, prior, tolerance, limit, covariance) -> Calibration:
@@ -101,42 +107,33 @@ class Point(NamedTuple):
     positions: np.ndarray  # (A, 3)
     rate: np.ndarray  # (3, T)
     state: np.ndarray  # (w, phi) (12, T)
-    reduced: tuple
+    reduced: tuple  # C, X and (H' Lambda H)^-1 of the kernels
     cost: float  # twice the negative log posterior
     costs: np.ndarray  # (T,) of it, each sample's
     counts: np.ndarray  # (T,) steps of the search for omega, negative where it did not end
     slope: np.ndarray  # (3 (A - 1),), half the cost's fall
 
 
-class Curvature(NamedTuple):
-    """Fisher information, factored, and the sds it implies."""
-
-    factor: np.ndarray  # lower triangular
-    sd: np.ndarray
-
-
 def _at(data: Collapsed, positions, rate, prior) -> Point:
     """The motion is searched from ``rate`` (3, T)."""
-    reduced = data.reduce(positions)
-    C, b, X, phi, const, logdet, _ = reduced
+    rate, work = rate.copy(), workspace(data.base)
+    logdet = most_likely(
+        positions, data.specific_force, data.energy, data.mean, data.gyroscope_information,
+        data.weights, *tables(), rate, RATE, LIMIT, work,
+    )  # fmt: skip
     if np.isnan(logdet):
         raise IdentifiabilityError(
             "positions: expected triads from which omega_dot and s follow, found H'QH singular"
         )
-    rate, counts = rate.copy(), np.empty(data.samples, np.int64)
-    cost, state = np.empty(data.samples), np.empty((12, data.samples))
-    kernels.angular_rates(
-        rate, C, b, data.mean, data.gyroscope_information, RATE, LIMIT, cost, counts
-    )
-    kernels.linear_motion(rate, X, phi, state)
-    cost += const
+    cost = work.cost + work.const
     total = float(cost.sum())
-    slope = score(data, positions, state)[1:].ravel()
+    slope = score(data, positions, work.state)[1:].ravel()
     if prior is not None:
         away = positions[1:].ravel() - prior[0]
         pull = prior[1] @ away
         total, slope = total + float(away @ pull), slope - pull
-    return Point(positions, rate, state, reduced, total, cost, counts, slope)
+    reduced = work.C, work.X, work.inverse
+    return Point(positions, rate, work.state, reduced, total, cost, work.counts, slope)
 
 
 def _information(data: Collapsed, here: Point, prior) -> np.ndarray:
@@ -144,24 +141,24 @@ def _information(data: Collapsed, here: Point, prior) -> np.ndarray:
     return known if prior is None else known + prior[1]
 
 
-def _curvature(data: Collapsed, here: Point, prior) -> Curvature:
+def _curvature(data: Collapsed, here: Point, prior) -> np.ndarray:
+    """The Fisher information's lower Cholesky factor."""
     known = _information(data, here, prior)
-    scale = np.sqrt(np.maximum(np.diag(known), 1e-300))
-    factor, failed = scipy.linalg.lapack.dpotrf(known / np.outer(scale, scale), lower=1)
-    if failed or np.min(np.diag(factor)) ** 2 < SINGULAR:
+    whole = known.diagonal().copy()
+    # the transpose of what is symmetric: LAPACK's order, factored in place
+    factor, failed = scipy.linalg.lapack.dpotrf(known.T, lower=1, overwrite_a=1)
+    if failed or np.min(factor.diagonal() ** 2 / whole) < SINGULAR:
         raise IdentifiabilityError(
             "calibration: expected informative motion, found a direction of the positions that the"
             " data do not determine"
         )
-    half = scipy.linalg.lapack.dtrtri(factor, lower=1)[0]
-    sd = np.sqrt(np.einsum("ij,ij->j", half, half)) / scale
-    return Curvature(scale[:, None] * factor, sd)
+    return factor
 
 
-def _step(curvature: Curvature, here: Point):
-    """(step, its largest component in sds)."""
-    step = scipy.linalg.lapack.dpotrs(curvature.factor, here.slope, lower=1)[0]
-    return step, float(np.max(np.abs(step) / curvature.sd))
+def _step(curvature, here: Point):
+    """(step, its length in the information's metric: no coordinate moves by more sds)."""
+    step = scipy.linalg.lapack.dpotrs(curvature, here.slope, lower=1)[0]
+    return step, float(np.sqrt(step @ here.slope))
 
 
 def _shortened(data: Collapsed, here: Point, step, prior):

@@ -117,8 +117,8 @@ class Noise:
         axis the information is singular and the mean holds the plain average there.
         """
         samples, count, _ = angular_rate.shape
-        used, total = self._fuse(np.ones(3 * count, bool))
-        mean = angular_rate.reshape(samples, -1) @ used.T
+        used, total = self._all_fused
+        mean = angular_rate.reshape(samples, -1) @ np.ascontiguousarray(used.T)
         information = np.broadcast_to(total, (samples, 3, 3)).copy()
         if saturated is None or not np.any(saturated):
             return mean, information
@@ -130,6 +130,10 @@ class Noise:
             gain, information[rows] = self._fuse(~pattern)
             mean[rows] = angular_rate[rows].reshape(len(rows), -1) @ gain.T
         return mean, information
+
+    @cached_property
+    def _all_fused(self):
+        return self._fuse(np.ones(len(self.gyroscope), bool))
 
     def _fuse(self, keep):
         """Gain (3, 3G) and information (3, 3) of the gyroscope axes in ``keep`` (3G,).

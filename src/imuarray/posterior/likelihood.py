@@ -160,7 +160,7 @@ def _arrange(collapsed: Collapsed, mean, covariance, ridge) -> kernels.Data:
     return kernels.Data(
         collapsed.weighted,
         collapsed.energy,
-        np.ascontiguousarray(collapsed.moments[0]),
+        collapsed.base,
         np.ascontiguousarray(mean),
         _lower(covariance),
         np.empty((10, 0)),

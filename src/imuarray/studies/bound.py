@@ -36,7 +36,8 @@ def information_at(model: ArrayModel, motion, positions, saturated=None) -> np.n
     turning = np.ascontiguousarray(np.asarray(motion.angular_rate).T)
     state = np.zeros((12, data.samples))
     state[:6], state[6:9] = products(turning.T).T, np.asarray(motion.angular_acceleration).T
-    return information(data, positions, turning, state, data.reduce(positions))
+    C, _, X, *_, inverse = data.reduce(positions)
+    return information(data, positions, turning, state, (C, X, inverse))
 
 
 def block_information(model: ArrayModel, motion) -> np.ndarray:
@@ -46,7 +47,7 @@ def block_information(model: ArrayModel, motion) -> np.ndarray:
         products(motion.angular_rate).T,
         np.asarray(motion.angular_acceleration).T,
     )
-    stacked = arms(state).transpose(1, 0, 2).reshape(3, -1)
+    stacked = arms(state)[1:].reshape(3, -1)
     return np.kron(np.diag(model.noise.triad_weights), stacked @ stacked.T)[3:, 3:]
 
 

@@ -40,7 +40,7 @@ def calibrate_batch(model, rng, count, samples, motion, position_sd, rail, limit
         positions = array.relative.copy()
         snapshots = np.empty((len(marks), *positions.shape))
         iterations[i], status[i] = descend(
-            data.specific_force, data.energy, data.moments, data.mean,
+            data.specific_force, data.energy, data.base, data.mean,
             data.gyroscope_information, data.weights, *tables(), positions,
             tolerance, 0.0, limit, marks, snapshots, np.empty(limit), np.empty(limit),
         )  # fmt: skip
