@@ -1,5 +1,7 @@
 """The likelihood, collapsed to six dimensions, against its direct form in 3A dimensions."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,7 +13,7 @@ from imuarray.errors import InputError
 from imuarray.estimation import Collapsed
 from imuarray.geometry import mimu4444
 from imuarray.model import ArrayModel
-from imuarray.posterior import Likelihood, kernels
+from imuarray.posterior import Likelihood, draws, kernels
 from tests import oracles
 from tests.cases import noises, simulate, small_array
 
@@ -141,6 +143,35 @@ def test_log_mean_exp(exponent):
         direct = logsumexp(exponent) - np.log(exponent.size)
     found = kernels._log_mean_exp(exponent)
     assert found == pytest.approx(direct, rel=1e-12, abs=1e-12)
+    tile = draws.tile(exponent.size)
+    tile.exponent[:, :3] = exponent[:, None]  # three samples alike, the last of them shifted
+    tile.exponent[:, 2] += 7.0
+    assert draws.log_means(3, tile) == pytest.approx(3 * direct + 7.0, rel=1e-12, abs=1e-11)
+
+
+def test_own_exponential():
+    """To two units in the last place of what the C library gives, over the range in use."""
+    values = np.concatenate([-np.logspace(-300, np.log10(699.9), 4000), [0.0]])
+    found = [math.ldexp(p, int(k)) for p, k in map(draws._exp_parts.py_func, values)]
+    np.testing.assert_allclose(found, np.exp(values), rtol=5e-16)
+
+
+@pytest.mark.parametrize("samples", [1, 31, 32, 77])
+@pytest.mark.parametrize("count", [1, 2, 25])
+def test_fresh_draws_are_those_of_their_numbers(samples, count):
+    """A tile at a time, with the density that is drawn from or another: the same as one by one."""
+    rng = np.random.default_rng(samples)
+    model = ArrayModel(small_array(4, 2), noises(rng, 4, 2)["isotropic"])
+    _, force, rate = simulate(rng, model, samples)
+    plain = Likelihood.of(model, force, rate)
+    mean, factor = plain.data.mean.T, np.zeros((samples, 3, 3))
+    for likelihood in (plain, plain.centred(model.array.relative)):
+        mean = likelihood.data.mean.T
+        factor[:, *np.tril_indices(3)] = likelihood.data.factor.T
+        numbers = np.random.default_rng(5).standard_normal((samples, count, 3))
+        rates = mean[:, None] + np.einsum("tij,tnj->tni", factor, numbers)
+        found = likelihood.estimate(model.array.relative, count, np.random.default_rng(5))
+        assert found == pytest.approx(likelihood.on(model.array.relative, rates), rel=1e-11)
 
 
 def quadrature_case(seed=2, form="isotropic"):

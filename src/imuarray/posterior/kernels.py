@@ -7,6 +7,7 @@ import numba as nb
 import numpy as np
 
 from imuarray.estimation import kernels
+from imuarray.posterior import draws
 
 
 class Data(NamedTuple):
@@ -40,12 +41,12 @@ class Workspace(NamedTuple):
     C: np.ndarray
     X: np.ndarray
     inverse: np.ndarray
-    exponent: np.ndarray
+    tile: draws.Tile
 
 
 @nb.njit(cache=True, nogil=True)
-def workspace(samples, draws):
-    """Allocate a `Workspace` for T samples and N draws."""
+def workspace(samples, count):
+    """Allocate a `Workspace` for T samples and N = ``count`` draws."""
     return Workspace(
         np.zeros((4, 3, samples)),
         np.empty((12, samples)),
@@ -56,7 +57,7 @@ def workspace(samples, draws):
         np.empty((6, 6)),
         np.empty((6, 6)),
         np.empty((6, 6)),
-        np.empty(draws),
+        draws.tile(count),
     )
 
 
@@ -98,31 +99,22 @@ def _assemble(total, const, logdet, determinant_power):
     return total - 0.5 * const.sum() - determinant_power * const.size * logdet
 
 
-@nb.njit(cache=True, nogil=True, inline="always")
-def _tilted(k, t, x, y, z):
-    """log p(omega | y_g) less the log of the density it is drawn from."""
-    return (
-        k[0, t] + k[1, t] * x + k[2, t] * y + k[3, t] * z
-        + k[4, t] * x * x + k[5, t] * y * y + k[6, t] * z * z
-        + k[7, t] * x * y + k[8, t] * x * z + k[9, t] * y * z
-    )  # fmt: skip
-
-
 @nb.njit(cache=True, nogil=True)
 def fixed_draws(positions, data, rates, work, power):
     """log p-hat (26a) on given draws ``rates`` (T, N, 3) rad/s."""
     logdet = _collapse(positions, data, work)
     total, tilted = 0.0, data.tilt.shape[1] > 0
+    exponent = np.empty(rates.shape[1])
     for t in range(rates.shape[0]):
         b = work.b[:, t]
         for n in range(rates.shape[1]):
             x, y, z = rates[t, n]
-            work.exponent[n] = -0.5 * kernels.quadratic(
+            exponent[n] = -0.5 * kernels.quadratic(
                 x, y, z, work.C, b[0], b[1], b[2], b[3], b[4], b[5]
             )
             if tilted:
-                work.exponent[n] += _tilted(data.tilt, t, x, y, z)
-        total += _log_mean_exp(work.exponent)
+                exponent[n] += draws.tilted(data.tilt, t, x, y, z)
+        total += _log_mean_exp(exponent)
     return _assemble(total, work.const, logdet, power)
 
 
@@ -130,33 +122,22 @@ def fixed_draws(positions, data, rates, work, power):
 def fresh_draws(positions, data, rng, work, power, first, last):
     """log p-hat (26a) of samples first..last-1 with omega drawn anew from p(omega | y_g)."""
     logdet = _collapse(positions, data, work)
-    total, C = 0.0, work.C
-    m, f, k = data.mean, data.factor, data.tilt
-    tilted = k.shape[1] > 0
-    for t in range(first, last):
-        b0, b1, b2 = work.b[0, t], work.b[1, t], work.b[2, t]
-        b3, b4, b5 = work.b[3, t], work.b[4, t], work.b[5, t]
-        mx, my, mz = m[0, t], m[1, t], m[2, t]
-        xx, yx, yy = f[0, t], f[1, t], f[2, t]
-        zx, zy, zz = f[3, t], f[4, t], f[5, t]
-        for n in range(work.exponent.size):
-            u = rng.standard_normal()
-            v = rng.standard_normal()
-            w = rng.standard_normal()
-            x = mx + xx * u
-            y = my + yx * u + yy * v
-            z = mz + zx * u + zy * v + zz * w
-            work.exponent[n] = -0.5 * kernels.quadratic(x, y, z, C, b0, b1, b2, b3, b4, b5)
-            if tilted:
-                work.exponent[n] += _tilted(k, t, x, y, z)
-        total += _log_mean_exp(work.exponent)
+    total, tile = 0.0, work.tile
+    for start in range(first, last, draws.TILE):
+        size = min(draws.TILE, last - start)
+        mean, factor = data.mean, data.factor
+        draws.normals(rng, size, tile.numbers)
+        draws.exponents(start, size, mean, factor, work.C, work.b, tile.numbers, tile.exponent)
+        if data.tilt.shape[1] > 0:
+            draws.tilt(start, size, data.tilt, mean, factor, tile.numbers, tile.exponent)
+        total += draws.log_means(size, tile)
     return _assemble(total, work.const[first:last], logdet, power)
 
 
 @nb.njit(cache=True, nogil=True)
-def repeated(positions, data, rng, draws, power, out):
+def repeated(positions, data, rng, count, power, out):
     """Independent realisations of log p-hat at one theta, filling ``out``."""
-    work = workspace(data.energy.size, draws)
+    work = workspace(data.energy.size, count)
     for i in range(out.size):
         out[i] = fresh_draws(positions, data, rng, work, power, 0, data.energy.size)
 
