@@ -41,7 +41,7 @@ def test_motion_with_covariances(files, tmp_path, capsys):
     out = tmp_path / "motion.nc"
     assert main(["apply", str(calibration), str(recording), "--out", str(out)]) == 0
     said = capsys.readouterr().out
-    assert "with a gyroscope at its" in said and "at the rail" in said
+    assert "with a gyroscope at its rail" in said and "at the rail" in said
     with xr.open_dataset(out) as found:
         error = found.angular_rate.to_numpy() - motion.angular_rate
         z = error / found.angular_rate_sd.to_numpy()

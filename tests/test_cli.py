@@ -83,7 +83,7 @@ BAD = {
     "calibrate rec.nc --out rec.nc": "expected another file than the input",
     "calibrate rec.nc --out new.nc --method magic": "invalid choice: 'magic'",
     "calibrate rec.nc --out new.nc --effects a,b,a": "expected each effect once, found 'a,b,a'",
-    "calibrate rec.nc --out new.nc --steps 3": "unrecognized arguments: --steps",
+    "calibrate rec.nc --out new.nc --steps 3": "--steps 3 (see 'imuarray calibrate --help')",
     "sample rec.nc --out new.nc --steps 0": "an integer of at least 1, found '0'",
     "sample rec.nc --out new.nc --steps many": "an integer of at least 1, found 'many'",
     "sample rec.nc --out new.nc --seed -1": "an integer of at least 0, found '-1'",

@@ -110,6 +110,17 @@ def test_refuses_one_axis_whatever_the_noise(seed):
         calibrate_bcd(model, force, rate)
 
 
+def test_gyroscopes_at_their_rails_give_no_scale():
+    """All of them throughout: said so; in most samples: the rest give it."""
+    model, truth, _, force, rate = problem("general", 1e-3)
+    lost = np.ones(rate.shape, bool)
+    with pytest.raises(IdentifiabilityError, match="off their rails, found all"):
+        calibrate_bcd(model, force, rate, saturated=lost)
+    lost[::3] = False
+    found = calibrate_bcd(model, force, rate, saturated=lost, limit=200_000)
+    assert np.max(np.abs(found.positions - truth)) < 1e-3
+
+
 def test_one_sample_is_not_enough():
     model, _, motion, force, rate = problem("general")
     assert condition(motion.select(slice(0, 1)), small_array()) < 1e-12

@@ -1,5 +1,7 @@
 """What goes wrong because of the input, as opposed to because of a defect."""
 
+from numbers import Integral
+
 
 class InputError(ValueError):
     """The user's input cannot be used.
@@ -15,3 +17,10 @@ class InputError(ValueError):
 
 class IdentifiabilityError(InputError):
     """The input is well formed, but does not determine the quantities asked for."""
+
+
+def require_integer(name: str, value: object, least: int = 1) -> None:
+    """InputError unless ``value`` is an integer of at least ``least``; a bool is none."""
+    integral = isinstance(value, Integral) and not isinstance(value, bool)
+    if not integral or value < least:
+        raise InputError(f"{name}: expected an integer of at least {least}, found {value!r}")

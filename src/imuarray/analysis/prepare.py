@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from imuarray.errors import InputError
+from imuarray.errors import InputError, require_integer
 from imuarray.firstorder.correct import STANDARD_GRAVITY
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
@@ -83,7 +83,12 @@ def first_order(recording: Recording, gravity: float = STANDARD_GRAVITY) -> Reco
 
 
 def select(recording: Recording, samples: int | None = None) -> Recording:
-    """The moving, unsaturated, informative samples, or ``samples`` of them, spread evenly."""
+    """The moving, unsaturated, informative samples, or ``samples`` of them, spread evenly.
+
+    InputError where there are fewer, or ``samples`` is not a positive integer.
+    """
+    if samples is not None:
+        require_integer("samples", samples)
     from imuarray.estimation.selection import select_dynamic
 
     found = select_dynamic(recording)

@@ -14,7 +14,7 @@ import xarray as xr
 from imuarray.analysis import methods
 from imuarray.analysis.density import density_of, tuned_target
 from imuarray.analysis.model import Say, chosen_model, silent, usable
-from imuarray.errors import InputError
+from imuarray.errors import InputError, require_integer
 from imuarray.model import ArrayModel
 from imuarray.model.names import parameter_names
 from imuarray.posterior import Chains, GaussianPrior, run_chains
@@ -106,6 +106,9 @@ def sample(
     ):
         if value not in known:
             raise InputError(f"{name}: expected any of {', '.join(known)}, found {value!r}")
+    if steps is not None:
+        require_integer("steps", steps)
+    require_integer("seed", seed, 0)
     recording, model = chosen_model(
         usable(recording, say), effects, diagnosis, accelerometer_noise, say
     )

@@ -65,10 +65,13 @@ def document(dataset: xr.Dataset) -> dict:
 def report(found: dict, average: float) -> list[str]:
     """The same for a person; ``average`` (rad/s) is the sd of the gyroscopes' mean."""
     lines = [
-        f"{found['samples']} samples, {found['left_out']} left out with an accelerometer at its"
-        f" rail, {found['gyroscope_at_rail']} with a gyroscope at its",
-        f"angular rate, gyroscopes averaged: sd {np.degrees(average):.3g} deg/s off the rail",
+        f"{found['samples']} samples: {found['left_out']} left out, an accelerometer at its rail;"
+        f" {found['gyroscope_at_rail']} with a gyroscope at its rail"
     ]
+    if "off_the_rail" in found:
+        lines.append(
+            f"gyroscopes averaged, off the rail: sd {np.degrees(average):.3g} deg/s (angular rate)"
+        )
     for name in ("off_the_rail", "at_the_rail"):
         if name in found:
             rate, acceleration, force = (found[name][f"{field}_sd"] for field in UNITS)

@@ -16,6 +16,13 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         raise InputError(f"{message} (see '{self.prog} --help')")
 
+    def parse_known_args(self, args=None, namespace=None):
+        """A subcommand refuses what it does not know itself, so its own help is named."""
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return found, unknown
+
 
 def later(module: str, name: str) -> Callable[[argparse.Namespace], None]:
     """The function ``name`` of ``imuarray.commands.<module>``, loaded when it is called."""

@@ -192,7 +192,12 @@ def require_rotation(data: Collapsed, positions) -> None:
     axis = np.linalg.svd(data.mean.T, full_matrices=False)
     spread = axis[1] / np.sqrt(data.samples)
     informed = data.gyroscope_information[[0, 1, 2], [0, 1, 2]]
-    noise = np.sqrt(1.0 / max(np.median(informed), 1e-300))
+    if not np.any(informed > 0.0):
+        raise IdentifiabilityError(
+            "gyroscopes: expected readings off their rails, found all of them at a rail throughout:"
+            " the array's scale is then undetermined"
+        )
+    noise = np.sqrt(1.0 / np.median(informed[informed > 0.0]))
     if spread[0] <= 5 * noise:
         raise IdentifiabilityError(
             "motion: expected rotation, found no angular rate above the gyroscopes' noise: the"

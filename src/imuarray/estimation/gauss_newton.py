@@ -12,9 +12,12 @@ from imuarray.estimation.blocks import Blocks, normal_equations, pack_motion, pr
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.motion_ml import MotionEstimate, motion_from
 from imuarray.estimation.newton import descend
+from imuarray.estimation.samplewise import descend as samplewise
 from imuarray.geometry.array import positions_of, require_planar_extent
 from imuarray.model import ArrayModel
 from imuarray.motion import Motion
+
+SETTLED, SEARCH = 1e-7, 30  # of a sample's motion: tolerance in its own sds, steps
 
 
 def eliminate_motion(blocks: Blocks):
@@ -133,11 +136,16 @@ def calibrate_blocks(
 
 
 def _iterate(given, x, p, tolerance, limit):
-    """Damped by halving: a step that raises the cost is halved, at most ten times."""
+    """Gauss-Newton on the profile: at each trial the motion is searched sample by sample.
+
+    A step that raises the cost is halved, at most ten times. Steps of motion and parameters
+    together would have to be halved for the worst sample's sake, again and again.
+    """
     size = 3 * (given.model.array.accelerometers - 1)
-    blocks = normal_equations(given, x, p)
-    costs, steps, converged = [blocks.cost], [0.0], False
+    x, cost = _settled(given, x, p)
+    costs, steps, converged = [cost], [0.0], False
     for _ in range(limit):
+        blocks = normal_equations(given, x, p)
         information, gradient, motion_step = eliminate_motion(blocks)
         step, covariance = _checked_solve(information, gradient)
         if np.max(np.abs(step) / np.sqrt(np.diag(covariance))) < tolerance:
@@ -146,17 +154,23 @@ def _iterate(given, x, p, tolerance, limit):
         length = 1.0
         for _ in range(10):
             trial_p = p + length * step
-            trial_x = x + length * motion_step(step)
-            trial = normal_equations(given, trial_x, trial_p)
-            if trial.cost <= blocks.cost * (1 + 1e-12):
+            trial_x, cost = _settled(given, x + length * motion_step(step), trial_p)
+            if cost <= costs[-1] * (1 + 1e-12):
                 break
             length /= 2
         else:
             break  # no shorter step lowers the cost: not converged, and said so
-        x, p, blocks = trial_x, trial_p, trial
-        costs.append(blocks.cost)
+        x, p = trial_x, trial_p
+        costs.append(cost)
         steps.append(float(np.max(np.abs(length * step[:size]))))
     return x, p, costs, steps, converged, covariance
+
+
+def _settled(given, x, p):
+    """(the most likely motion (T, n) from x on at p, the whole cost there, priors included)."""
+    x, *_, cost = samplewise(given, x, p, SETTLED, SEARCH)
+    offset = p - given.prior_mean
+    return x, float(cost.sum() + np.sum((offset / given.prior_sd) ** 2))
 
 
 def parameter_covariance(
