@@ -220,7 +220,7 @@ def to_the_bound(model, rng, samples=1000, motions=5):
     found = np.array([one_to_the_bound(model, rng, samples) for _ in range(motions)])
     rows = []
     names = "ML-BCD", "Gauss-Newton", "Gauss-Newton, with the covariance"
-    shared = found[:, 3, 1]
+    shared = found[:, 3, 1].copy()
     found[:, 3] = found[:, 1]
     found[:, 3, 1] -= shared
     names += ("Gauss-Newton, the data arranged",)
