@@ -6,11 +6,13 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.estimation import calibrate_gauss_newton
+from imuarray.estimation.blocks import normal_equations
+from imuarray.estimation.blocks import problem as problem_of
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.gauss_newton import calibrate_blocks
 from imuarray.estimation.newton import _one_thread, descend
 from imuarray.estimation.online import Online
-from imuarray.model import ArrayModel, Noise
+from imuarray.model import EFFECTS, ArrayModel, Noise
 from tests import oracles
 from tests.cases import measure, noises, simulate, small_array
 from tests.test_bcd import problem, solution
@@ -80,6 +82,30 @@ def test_one_axis_of_rotation_is_refused():
     )
     with pytest.raises(IdentifiabilityError):
         calibrate_gauss_newton(model, *measure(rng, model, along))
+
+
+def test_one_direction_serves_all_triads():
+    """The Jacobian, a triad's own parameters at a time, against one direction a parameter."""
+    rng = np.random.default_rng(12)
+    effects = tuple(EFFECTS)
+    model = ArrayModel.isotropic(small_array(5, 4), 0.04, 0.02, effects)
+    _, force, rate = simulate(rng, ArrayModel(model.array, model.noise), 70)
+    given = problem_of(model, force, rate, time=np.linspace(0.0, 3.0, 70))
+    assert given.apart
+    x = rng.standard_normal((70, model.motion_size)) * np.repeat([5, 100, 10, 1e3, 1e2], 3)
+    p = np.concatenate([model.array.parameters, 0.5 * model.effect_prior_sd])
+    p[-model.effect_size :] *= rng.standard_normal(model.effect_size)
+    fast, slow = normal_equations(given, x, p), normal_equations(given._replace(apart=False), x, p)
+    for one, other in zip(fast, slow, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * np.abs(other).max())
+
+
+def test_shared_noise_is_no_triads_own():
+    rng = np.random.default_rng(13)
+    noise = noises(rng, 4, 4)["crosstalk"]
+    model = ArrayModel(small_array(4, 4), noise, ("gyroscope_scale",))
+    _, force, rate = simulate(rng, ArrayModel(model.array, noise), 5)
+    assert not problem_of(model, force, rate).apart
 
 
 @pytest.fixture(scope="module")

@@ -46,6 +46,16 @@ WRONG = {
     ),
     "numpy": (lambda v, i, p: p._replace(angular_rate=np.sin(v) + p[1]), {}, "in jax.numpy"),
     "an if on values": (lambda v, i, p: p if v.sum() > 0 else scaled(v, i, p), {}, "in jax.numpy"),
+    "a neighbour's parameters": (
+        lambda v, i, p: p._replace(angular_rate=p[1] + jnp.roll(v, 1, axis=0)),
+        {},
+        "that triad alone, found parameters of triad 5 in the angular_rate of triad 1",
+    ),
+    "all triads' readings": (
+        lambda v, i, p: p._replace(angular_rate=p[1] + v * p[1].mean(axis=0)),
+        {},
+        "that triad alone, found readings of triad 2 in the angular_rate of triad 1",
+    ),
     "silent derivative": (late, {"shape": lambda a, g: (a, 3)}, "derivatives=True"),
     "declared derivative": (late, {"shape": lambda a, g: (a, 3), "derivatives": True}, None),
 }

@@ -18,7 +18,8 @@ from imuarray.model.effects import KINDS
 from imuarray.model.names import component
 from imuarray.model.noise import Noise
 
-PINNED = 1e-6  # of a prior sd: parameters that the diagnosis fixed, or found no need of
+PINNED = 1e-9  # of a prior sd: parameters that the diagnosis fixed, or found no need of; so little
+# that misfit does not move a clock's sawtooth past a sample
 BEFORE = ("axis_swap", *LEFT_OUT)  # mended in the data, not in the model
 
 

@@ -6,7 +6,7 @@ p = (r_2 ... r_A, effect parameters). Residuals are in units of their sd.
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +33,7 @@ class Problem(NamedTuple):
     prior_sd: np.ndarray  # (P,), infinite where flat
     time: np.ndarray  # (T,) s since the recording began
     span: float  # s
+    apart: bool  # no noise is shared between triads
 
 
 class Blocks(NamedTuple):
@@ -72,14 +73,21 @@ def problem(
     mean, sd = (np.zeros(size), np.inf) if position_prior is None else position_prior
     spread = np.broadcast_to(sd, size)
     covariance = model.noise.gyroscope[None] if rate_covariance is None else rate_covariance
+    times = model.since(len(angular_rate), time)
     return Problem(
         model, np.asarray(specific_force), np.asarray(angular_rate), keep,
         np.linalg.cholesky(model.noise.accelerometer_precision).T,
         np.linalg.cholesky(np.linalg.inv(covariance)).transpose(0, 2, 1),
         np.concatenate([mean, model.effect_prior_mean]),
         np.concatenate([spread, model.effect_prior_sd]),
-        *model.since(len(angular_rate), time),
+        *times, _apart(model.noise.accelerometer) and all(map(_apart, covariance)),
     )  # fmt: skip
+
+
+def _apart(covariance) -> bool:
+    """Whether a covariance (3n, 3n) is block diagonal by triad."""
+    triad = np.arange(len(covariance)) // 3
+    return not np.any(np.asarray(covariance)[triad[:, None] != triad])
 
 
 def unpack_motion(x) -> Motion:
@@ -114,23 +122,61 @@ def residual(model, x, p, force, rate, keep, time, span, whiten_force, whiten_ra
     return jnp.concatenate(parts)
 
 
-@partial(jax.jit, static_argnums=0)
-def _chunk(model, x, p, force, rate, keep, time, span, use, whiten_force, whiten_rate):
-    def one(x, force, rate, keep, time, use, whiten_rate):
+@cache
+def _columns(model) -> tuple[np.ndarray, np.ndarray]:
+    """Of each shared parameter (P,): its triad, and its place among the triad's own."""
+    triads, places, first = [np.repeat(np.arange(1, model.array.accelerometers), 3)], [], 3
+    places.append(np.tile(np.arange(3), model.array.accelerometers - 1))
+    for shape in model.shapes:
+        own = int(np.prod(shape[1:]))
+        triads.append(np.repeat(np.arange(shape[0]), own))
+        places.append(first + np.tile(np.arange(own), shape[0]))
+        first += own
+    return np.concatenate(triads), np.concatenate(places)
+
+
+def _jacobian(model, flat, both, motion):
+    """Of the residuals by the motion's unknowns and the shared parameters, (R, n + P).
+
+    A triad's parameters change its own readings alone (`probe` sees to it, `apart` asks for
+    noise alike): one direction serves the parameters of the same name in all triads.
+    """
+    triads, places = _columns(model)
+    directions = np.zeros((motion + 1 + max(places), both.size))
+    directions[np.arange(motion), np.arange(motion)] = 1.0
+    directions[motion + places, motion + np.arange(len(places))] = 1.0
+    along = jax.vmap(lambda d: jax.jvp(flat, (both,), (d,))[1], out_axes=-1)(directions)
+    counts = model.array.accelerometers, model.array.gyroscopes
+    readings = np.concatenate([np.repeat(np.arange(count), 3) for count in counts])
+    rows = np.full(along.shape[0], -1)
+    rows[: len(readings)] = readings
+    own = jnp.where(rows[:, None] == triads, along[:, motion + places], 0.0)
+    return jnp.concatenate([along[:, :motion], own], axis=1)
+
+
+@partial(jax.jit, static_argnums=(0, 1))
+def _chunk(model, apart, x, p, force, rate, keep, time, span, use, whiten_force, whiten_rate):
+    motion = x.shape[1]
+
+    def one(x, force, rate, keep, time, whiten_rate):
         def flat(both):
             return residual(
-                model, both[: x.size], both[x.size :], force, rate, keep, time, span,
+                model, both[:motion], both[motion:], force, rate, keep, time, span,
                 whiten_force, whiten_rate,
             )  # fmt: skip
 
         both = jnp.concatenate([x, p])
-        value, jac = flat(both), jax.jacfwd(flat)(both)
-        left, right = jac[:, : x.size], jac[:, x.size :]
-        blocks = left.T @ left, left.T @ right, left.T @ value
-        return (*blocks, use * (right.T @ right), use * (right.T @ value), use * (value @ value))
+        jac = _jacobian(model, flat, both, motion) if apart else jax.jacfwd(flat)(both)
+        return flat(both), jac[:, :motion], jac[:, motion:]
 
-    A, B, g, shared, gradient, cost = jax.vmap(one)(x, force, rate, keep, time, use, whiten_rate)
-    return A, B, g, shared.sum(0), gradient.sum(0), cost.sum()
+    value, left, right = jax.vmap(one)(x, force, rate, keep, time, whiten_rate)
+    turned = left.swapaxes(1, 2)
+    used = (use[:, None, None] * right).reshape(-1, p.size).T
+    flat = value.reshape(-1)
+    return (
+        turned @ left, turned @ right, (turned @ value[..., None])[..., 0],
+        used @ right.reshape(-1, p.size), used @ flat, jnp.sum(use[:, None] * value**2),
+    )  # fmt: skip
 
 
 def normal_equations(given: Problem, x, p) -> Blocks:
@@ -146,9 +192,9 @@ def normal_equations(given: Problem, x, p) -> Blocks:
         use = (index < samples).astype(float)
         index = np.minimum(index, samples - 1)
         out = _chunk(
-            given.model, x[index], p, given.specific_force[index], given.angular_rate[index],
-            given.keep[index], given.time[index], given.span, use, given.whiten_force,
-            given.whiten_rate[np.minimum(index, last)],
+            given.model, given.apart, x[index], p, given.specific_force[index],
+            given.angular_rate[index], given.keep[index], given.time[index], given.span, use,
+            given.whiten_force, given.whiten_rate[np.minimum(index, last)],
         )  # fmt: skip
         used = int(use.sum())
         motion.append(np.asarray(out[0])[:used])

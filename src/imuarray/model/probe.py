@@ -15,8 +15,9 @@ ACCELEROMETERS, GYROSCOPES = 7, 5  # of the array that effects are tried on
 def probe(item: Effect) -> None:
     """InputError, with the effect's id, where declaration and function do not agree.
 
-    Tried on a small array: shapes; no effect at the value zero; and no use of omega double dot
-    or s dot without ``derivatives=True``, for those would be taken for zero.
+    Tried on a small array: shapes; no effect at the value zero; no use of omega double dot
+    or s dot without ``derivatives=True``, for those would be taken for zero; and parameters, or
+    readings that go in, of one triad change that triad's readings alone.
     """
     sd = np.broadcast_to(_prior_sd(item), _shape(item))
     with jax.ensure_compile_time_eval():  # models are looked at while others are traced
@@ -31,7 +32,7 @@ def _probe(item: Effect, sd, rng) -> None:
     positions = jnp.asarray(0.01 * rng.standard_normal((ACCELEROMETERS, 3)))
     fields = [jnp.asarray(scale * rng.standard_normal(3)) for scale in (5, 100, 10, 1e3, 1e2)]
 
-    def predicted(parameters, later):
+    def predicted(parameters, later, plain=plain):
         instant = Instant(Motion(*fields[:3], *later), positions, time=0.3, span=1.0)
         return item.apply(jnp.asarray(parameters), instant, plain)
 
@@ -49,6 +50,7 @@ def _probe(item: Effect, sd, rng) -> None:
     )
     if not all(np.all(np.isfinite(part)) for part in values):
         raise _wrong(item, "finite readings at parameters within their prior", "NaN or infinite")
+    _require_own(item, drawn, plain, lambda x, y: predicted(x, later, y))
     if not item.derivatives and any(np.any(np.asarray(part) != 0) for part in change):
         raise _wrong(item, "derivatives=True, since it uses omega double dot or s dot", "False")
 
@@ -103,6 +105,22 @@ def _require_shapes(item: Effect, made, plain) -> None:
     for kind, old, new in zip(Prediction._fields, plain, made, strict=True):
         if np.shape(new) != np.shape(old):
             raise _wrong(item, f"{kind} of shape {np.shape(old)}", np.shape(new))
+
+
+def _require_own(item: Effect, drawn, plain, predicted) -> None:
+    """InputError where a triad's parameters or readings change another triad's readings."""
+    slopes = jax.jacfwd(predicted, argnums=(0, 1))(jnp.asarray(drawn), plain)
+    parts = []
+    for kind, (by_rows, by_readings) in zip(Prediction._fields, slopes, strict=True):
+        parts += [(kind, "parameters", by_rows)] + [(kind, "readings", s) for s in by_readings]
+    for kind, what, slope in parts:
+        # (triad, axis, triad whose row or reading it is, ...)
+        for triad, row in np.argwhere(np.any(np.asarray(slope) != 0, (1, *range(3, slope.ndim)))):
+            if triad != row:
+                raise _wrong(
+                    item, "a triad's parameters and readings to change that triad alone",
+                    f"{what} of triad {row + 1} in the {kind} of triad {triad + 1}",
+                )  # fmt: skip
 
 
 def _first(error: Exception) -> str:
