@@ -27,13 +27,13 @@ def eliminate_motion(blocks: Blocks):
     """
     right = np.concatenate([blocks.cross, blocks.motion_gradient[..., None]], axis=2)
     solved = np.linalg.solve(blocks.motion, right)
-    cross = np.einsum("tna,tnb->ab", blocks.cross, solved[..., :-1])
-    gradient = np.einsum("tna,tn->a", blocks.cross, solved[..., -1])
+    size = blocks.cross.shape[-1]
+    taken = blocks.cross.reshape(-1, size).T @ solved.reshape(-1, size + 1)
 
     def motion_step(step):
         return -solved[..., -1] - solved[..., :-1] @ step
 
-    return blocks.shared - cross, blocks.shared_gradient - gradient, motion_step
+    return blocks.shared - taken[:, :-1], blocks.shared_gradient - taken[:, -1], motion_step
 
 
 def _checked_solve(information, gradient):
