@@ -140,26 +140,16 @@ def normals(generator, count):
     return total
 
 
-@nb.njit
-def exponentials(exponents):
-    """Sum of exp, as in the kernel's log-mean-exp."""
-    total = 0.0
-    for value in exponents:
-        total += np.exp(value)
-    return total
-
-
 def profile(model, rng, samples=500, draws=24):
     """Rows: what an estimate of the likelihood spends on a draw of omega, one thread."""
     generator = np.random.Generator(np.random.PCG64DXSM(1))
     likelihood = Likelihood.of(model, *dataset(model, samples, rng))
     positions, count = model.array.relative, samples * draws
-    exponents = -5 * rng.random(count)
-    whole, many, numbers, powers = interleaved(
+    whole, many, numbers = interleaved(
         [
             lambda: likelihood.estimate(positions, draws, generator),
             lambda: likelihood.estimate(positions, 5 * draws, generator),
-            lambda: normals(generator, 3 * count), lambda: exponentials(exponents),
+            lambda: normals(generator, 3 * count),
         ], 31,
     )  # fmt: skip
     drawn = (many - whole) / (4 * count)
@@ -168,7 +158,6 @@ def profile(model, rng, samples=500, draws=24):
         (name, f"{1e6 * whole:.0f} us", ""),
         ("of that a draw of omega more", f"{1e9 * drawn:.1f} ns", ""),
         ("of that three normal numbers", f"{1e9 * numbers / count:.1f} ns", ""),
-        ("and an exponential", f"{1e9 * powers / count:.1f} ns", ""),
         ("theta's own part", f"{1e6 * (whole - drawn * count):.0f} us", ""),
     ]
 

@@ -5,7 +5,8 @@ import pytest
 from scipy.optimize import least_squares
 
 from imuarray.errors import IdentifiabilityError
-from imuarray.estimation import estimate_motion
+from imuarray.estimation import estimate_motion, rates
+from imuarray.estimation.collapsed import Collapsed
 from imuarray.geometry import mimu4444
 from imuarray.model import ArrayModel, Noise
 from tests import oracles
@@ -151,3 +152,42 @@ def test_triads_that_do_not_determine_the_motion():
         estimate_motion(model, force, rate, positions=line)
     with pytest.raises(IdentifiabilityError, match="at least 3"):
         estimate_motion(model, force, rate, positions=line[:2])
+
+
+@pytest.mark.parametrize("limit", [1, 2, 4, 5, 6, 50])
+@pytest.mark.parametrize("accelerometers", [3, 6])
+def test_all_samples_together_are_each_alone(accelerometers, limit):
+    """Steps of all samples at once, some of them hard: what each sample's own search gives."""
+    rng = np.random.default_rng(accelerometers)
+    model = ArrayModel.isotropic(small_array(accelerometers, 2), 1.0, 0.5)
+    _, force, rate = simulate(rng, model, 400)
+    saturated = np.zeros(rate.shape, bool)
+    saturated[::2] = True  # nothing but accelerometers: steps have to be damped
+    data = Collapsed.of(model, force, rate, saturated)
+    C, b, *_ = data.reduce(model.array.relative)
+    given = C, b, data.mean, data.gyroscope_information, 1e-10
+    together, cost, counts = data.mean.copy(), np.empty(400), np.empty(400, np.int64)
+    rates.angular_rates(together, *given, limit, cost, counts)
+    alone, price, steps = data.mean.copy(), np.empty(400), np.empty(400, np.int64)
+    rates._costs(alone, *given[:4], price)
+    for t in range(400):
+        rates._alone(t, alone, *given, 1, limit, price, steps)
+    ended = (counts > 0) & (steps > 0) | (limit <= 6)  # where rounding cannot have grown
+    np.testing.assert_allclose(together[:, ended], alone[:, ended], rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(cost[ended], price[ended], rtol=1e-9, atol=1e-9)
+    # the last steps compare equal costs, which may fall either way by rounding
+    assert np.mean(counts == steps) > (0.75 if limit == 50 else 0.9)
+    assert abs(np.sum(counts < 0) - np.sum(steps < 0)) <= 0.03 * 400
+    if limit == 50:
+        assert np.mean(counts > rates.TOGETHER) > 0.02  # the hard ones
+
+
+def test_what_is_not_finite_is_not_found():
+    _, model, _, force, rate = problem()
+    data = Collapsed.of(model, force, rate)
+    C, b, *_ = data.reduce(model.array.relative)
+    b[:, 3], b[:, 5] = np.nan, np.inf
+    found, cost, counts = data.mean.copy(), np.empty(12), np.empty(12, np.int64)
+    rates.angular_rates(found, C, b, data.mean, data.gyroscope_information, 1e-10, 50, cost, counts)
+    assert counts[3] < 0 and counts[5] < 0
+    assert np.all(np.delete(counts, [3, 5]) > 0)

@@ -1,5 +1,7 @@
 """Joint Gauss-Newton in collapsed form, and its recursive use, against the general estimators."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
@@ -13,6 +15,10 @@ from imuarray.estimation.gauss_newton import calibrate_blocks
 from imuarray.estimation.newton import _one_thread, descend
 from imuarray.estimation.online import Online
 from imuarray.model import EFFECTS, ArrayModel, Noise
+from imuarray.model.array_model import EffectPrior
+from imuarray.motion import normal_motion
+from imuarray.simulation import measure as measured
+from imuarray.studies.bound import information_at
 from tests import oracles
 from tests.cases import measure, noises, simulate, small_array
 from tests.test_bcd import problem, solution
@@ -84,13 +90,30 @@ def test_one_axis_of_rotation_is_refused():
         calibrate_gauss_newton(model, *measure(rng, model, along))
 
 
-def test_one_direction_serves_all_triads():
+def spread_in(covariance, rng, samples):
+    """Covariances (T, 3G, 3G), shared within triads."""
+    triads = len(covariance) // 3
+    turns = np.linalg.qr(rng.standard_normal((samples, triads, 3, 3)))[0]
+    whole = np.zeros((samples, len(covariance), len(covariance)))
+    for k in range(triads):
+        part = slice(3 * k, 3 * k + 3)
+        whole[:, part, part] = turns[:, k] @ np.diag([1e-4, 2e-4, 4e-4]) @ turns[:, k].mT
+    return whole
+
+
+@pytest.mark.parametrize("form", ["isotropic", "triad_covariances", "by sample"])
+@pytest.mark.parametrize("counts", [(5, 4), (4, 4)])
+def test_one_direction_serves_all_triads(form, counts):
     """The Jacobian, a triad's own parameters at a time, against one direction a parameter."""
     rng = np.random.default_rng(12)
     effects = tuple(EFFECTS)
-    model = ArrayModel.isotropic(small_array(5, 4), 0.04, 0.02, effects)
-    _, force, rate = simulate(rng, ArrayModel(model.array, model.noise), 70)
-    given = problem_of(model, force, rate, time=np.linspace(0.0, 3.0, 70))
+    noise = noises(rng, *counts)["isotropic" if form == "by sample" else form]
+    model = ArrayModel(small_array(*counts), noise, effects)
+    _, force, rate = simulate(rng, ArrayModel(model.array, noise), 70)
+    rates = spread_in(noise.gyroscope, rng, 70) if form == "by sample" else None
+    given = problem_of(
+        model, force, rate, time=np.linspace(0.0, 3.0, 70), rate_covariance=rates
+    )  # fmt: skip
     assert given.apart
     x = rng.standard_normal((70, model.motion_size)) * np.repeat([5, 100, 10, 1e3, 1e2], 3)
     p = np.concatenate([model.array.parameters, 0.5 * model.effect_prior_sd])
@@ -98,6 +121,60 @@ def test_one_direction_serves_all_triads():
     fast, slow = normal_equations(given, x, p), normal_equations(given._replace(apart=False), x, p)
     for one, other in zip(fast, slow, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * np.abs(other).max())
+
+
+def test_misfit_is_no_hindrance():
+    """A cause that the model lacks, many sds large: converged, and what is pinned stays."""
+    rng = np.random.default_rng(21)
+    board = small_array(5, 5)
+    true = ArrayModel.isotropic(board, 0.04, 0.002, ("sensor_delay", "gyroscope_scale"))
+    late = 2e-3 * rng.standard_normal(true.shapes[0])
+    motion = normal_motion(rng, (150,), 10.0, 300.0, 15.0)
+    parameters = true.join({"sensor_delay": late, "gyroscope_scale": 0.01})
+    force, rate, _ = measured(true, motion, board.relative, rng, parameters)
+    model = ArrayModel.isotropic(board, 0.04, 0.002, ("gyroscope_scale", "gyroscope_misalignment"))
+    sd = model.effect_prior_sd.copy()
+    sd[7] *= 1e-9
+    start = np.zeros(sd.size)
+    start[7] = 0.003
+    model = replace(model, effect_prior=EffectPrior(start, sd, start))
+    found = calibrate_gauss_newton(
+        model, force, rate, position_prior=(board.parameters, 3e-3), limit=50
+    )  # fmt: skip
+    assert found.converged and len(found.cost) < 40
+    assert np.all(np.diff(found.cost) <= 1e-9 * found.cost[0])
+    assert found.cost[-1] > 10 * force.size
+    assert found.effect_parameters[7] == pytest.approx(0.003, abs=1e-6 * sd[8])
+
+
+def test_more_gyroscopes_share_a_position():
+    """Gyroscope k beyond the last accelerometer is beside another one: no triad's own."""
+    assert not ArrayModel.isotropic(small_array(4, 6), 0.04, 0.02, ("size_effect",)).apart
+    assert ArrayModel.isotropic(small_array(4, 4), 0.04, 0.02, ("size_effect",)).apart
+
+
+@pytest.mark.parametrize("samples", [127, 128, 129, 300])
+def test_information_adds_up_over_samples(samples):
+    """Whole tiles, parts of one and single samples: the same sum."""
+    rng = np.random.default_rng(samples)
+    model = ArrayModel(small_array(5, 5), noises(rng, 5, 5)["per_triad"])
+    motion, force, rate = simulate(rng, model, samples)
+    whole = information_at(model, motion, model.array.relative)
+    singles = sum(
+        information_at(model, motion.select(slice(t, t + 1)), model.array.relative)
+        for t in range(samples)
+    )
+    np.testing.assert_allclose(whole, singles, rtol=1e-9, atol=1e-9 * np.abs(whole).max())
+
+
+def test_nan_information_is_refused():
+    rng = np.random.default_rng(3)
+    model = ArrayModel(small_array(4, 4), noises(rng, 4, 4)["isotropic"])
+    _, force, rate = simulate(rng, model, 20)
+    data = Collapsed.of(model, force, rate)
+    data.gyroscope_information[..., 3] = np.nan
+    with pytest.raises(IdentifiabilityError):
+        descend(data, model.array.relative)
 
 
 def test_shared_noise_is_no_triads_own():
@@ -150,6 +227,19 @@ def test_online_memory_is_bounded(stream):
     for part in range(0, 2000, 70):
         online.add(force[part : part + 70], rate[part : part + 70])
         assert sum(len(waiting[0]) for waiting in online._waiting) < 100
+
+
+def test_online_keeps_nothing_of_the_callers_buffer(stream):
+    model, force, rate = stream
+    one, other = Online(model, 3e-3, 100), Online(model, 3e-3, 100)
+    held = np.empty((50, *force.shape[1:])), np.empty((50, *rate.shape[1:]))
+    for first in range(0, 200, 50):
+        held[0][:], held[1][:] = force[first : first + 50], rate[first : first + 50]
+        one.add(*held)
+        other.add(held[0].copy(), held[1].copy())
+    np.testing.assert_array_equal(one.positions, other.positions)
+    with pytest.raises(InputError, match="expected samples of shapes"):
+        one.add(3.0, 4.0)
 
 
 def test_online_widths_shrink(stream):

@@ -58,7 +58,7 @@ def test_commands_know_the_effect(mine, tmp_path, capsys):
     # a calibration does not do with another text, nor without
     mine.write_text(CUBIC.format(sd="2e-6").replace("force**3", "force**2"))
     assert main([*motion, "--effect-file", str(mine)]) == 2
-    assert "expected mine.py as it was" in capsys.readouterr().err
+    assert "accelerometer_cubic as it was" in capsys.readouterr().err
     EFFECTS.pop("accelerometer_cubic")
     assert main(motion) == 2
     assert "found no accelerometer_cubic: name the file" in capsys.readouterr().err

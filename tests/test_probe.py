@@ -56,6 +56,18 @@ WRONG = {
         {},
         "that triad alone, found readings of triad 2 in the angular_rate of triad 1",
     ),
+    "an infinite slope": (
+        lambda v, i, p: p._replace(angular_rate=p[1] + jnp.sqrt(v * 0.0)),
+        {},
+        "finite derivatives",
+    ),
+    "later a neighbour's": (
+        lambda v, i, p: p._replace(
+            angular_rate=p[1] + jnp.where(i.time > 0.5, jnp.roll(v, 1, axis=0), v)
+        ),
+        {},
+        "that triad alone",
+    ),
     "silent derivative": (late, {"shape": lambda a, g: (a, 3)}, "derivatives=True"),
     "declared derivative": (late, {"shape": lambda a, g: (a, 3), "derivatives": True}, None),
 }
@@ -114,3 +126,18 @@ def test_names_are_one_for_each_parameter():
             del EFFECTS["test_named"]
     every = ArrayModel.isotropic(mimu4444_corners(), 0.04, 1e-3, tuple(EFFECTS))
     assert len(set(parameter_names(every))) == every.effect_size
+
+
+def test_where_the_others_are_may_matter():
+    """Allowed, and known: the derivative is then taken by each parameter by itself."""
+
+    def stretched(value, instant, predicted):
+        away = instant.positions - instant.positions.mean(axis=0)
+        return predicted._replace(specific_force=predicted.specific_force + value * away)
+
+    try:
+        effect("accelerometer_probed", **{**SOUND, "shape": lambda a, g: (a, 3)})(stretched)
+        model = ArrayModel.isotropic(mimu4444_corners(), 0.04, 1e-3, ("accelerometer_probed",))
+        assert not model.apart
+    finally:
+        EFFECTS.pop("accelerometer_probed", None)

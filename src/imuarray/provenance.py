@@ -37,6 +37,11 @@ def add_code(name: str, place: str, text: str) -> None:
     _ADDED[place] = name, text
 
 
+def code_version(place: str) -> str:
+    """What `versions` says of the code that `add_code` was told of at ``place``."""
+    return f"sha256 {hashlib.sha256(_ADDED[place][1].encode()).hexdigest()}"
+
+
 def versions() -> dict[str, str]:
     """Versions of imuarray, of Python and of the libraries that the numbers depend on.
 
@@ -44,8 +49,8 @@ def versions() -> dict[str, str]:
     """
     found = {"imuarray": imuarray.__version__, "python": platform.python_version()}
     found |= {name: metadata.version(name) for name in _LIBRARIES}
-    for name, text in _ADDED.values():
-        value = f"sha256 {hashlib.sha256(text.encode()).hexdigest()}"
+    for place, (name, _) in _ADDED.items():
+        value = code_version(place)
         found[name] = f"{found[name]}, {value}" if name in found else value
     return found
 

@@ -18,9 +18,6 @@ from imuarray.model.names import parameter_names
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording
 
-# of a parameter's own sd, where misfit makes steps shrink slowly; the papers' model is done at once
-ENOUGH = 1e-3
-
 
 def calibrate(
     recording: Recording, method: str = "bcd", effects: Sequence[str] = (),
@@ -84,7 +81,6 @@ def calibrate(
         prior = (model.array.parameters, recording.position_prior_sd) if model.effects else None
         found = calibrate_gauss_newton(
             model, *data, saturated=saturated, position_prior=prior, time=recording.time,
-            tolerance=ENOUGH if model.effects else 1e-6,
         )  # fmt: skip
     dataset = calibration_dataset(recording, model, found, saturated)
     dataset.attrs |= {"method": method, **stamp({"recording": digest(*data)}, 0)}

@@ -13,7 +13,8 @@ from imuarray.errors import InputError
 from imuarray.model.effects import EFFECTS
 from imuarray.model.names import parameter_names
 from imuarray.model.noise import Noise
-from imuarray.provenance import digest, stamp, versions
+from imuarray.model.own import own_version
+from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording
 
 UNITS = {"angular_rate": "rad s-1", "angular_acceleration": "rad s-2", "specific_force": "m s-2"}
@@ -116,10 +117,13 @@ def _require_effects(calibration: xr.Dataset) -> None:
             f"expected the effects of the calibration, found no {', '.join(missing)}: name the file"
             " that defines them (--effect-file, imuarray.read_effects)"
         )
-    then, now = json.loads(calibration.attrs.get("versions", "{}")), versions()
-    for name, text in then.items():
-        if str(text).startswith("sha256") and text not in now.values():
-            raise InputError(f"expected {name} as it was at the calibration, found another text")
+    known = " ".join(map(str, json.loads(calibration.attrs.get("versions", "{}")).values()))
+    for name in calibration.attrs["effects"].split(","):
+        text = own_version(name)
+        if text is not None and text not in known:
+            raise InputError(
+                f"expected the effect {name} as it was at the calibration, found another text"
+            )
 
 
 def require_fit(calibration: xr.Dataset, recording: Recording) -> None:

@@ -33,7 +33,7 @@ class Problem(NamedTuple):
     prior_sd: np.ndarray  # (P,), infinite where flat
     time: np.ndarray  # (T,) s since the recording began
     span: float  # s
-    apart: bool  # no noise is shared between triads
+    apart: bool  # a triad's parameters change its own readings alone, and so does its noise
 
 
 class Blocks(NamedTuple):
@@ -80,7 +80,7 @@ def problem(
         np.linalg.cholesky(np.linalg.inv(covariance)).transpose(0, 2, 1),
         np.concatenate([mean, model.effect_prior_mean]),
         np.concatenate([spread, model.effect_prior_sd]),
-        *times, _apart(model.noise.accelerometer) and all(map(_apart, covariance)),
+        *times, model.apart and _apart(model.noise.accelerometer) and all(map(_apart, covariance)),
     )  # fmt: skip
 
 
@@ -138,8 +138,8 @@ def _columns(model) -> tuple[np.ndarray, np.ndarray]:
 def _jacobian(model, flat, both, motion):
     """Of the residuals by the motion's unknowns and the shared parameters, (R, n + P).
 
-    A triad's parameters change its own readings alone (`probe` sees to it, `apart` asks for
-    noise alike): one direction serves the parameters of the same name in all triads.
+    Where a triad's parameters change its own readings alone (`Problem.apart`) one direction
+    serves the parameters of the same name in all triads.
     """
     triads, places = _columns(model)
     directions = np.zeros((motion + 1 + max(places), both.size))

@@ -17,6 +17,7 @@ from imuarray.geometry.array import positions_of, require_planar_extent
 from imuarray.model import ArrayModel
 from imuarray.motion import Motion
 
+ENOUGH = 1e-3  # of a parameter's own sd, with effects
 SETTLED, SEARCH = 1e-7, 30  # of a sample's motion: tolerance in its own sds, steps
 
 
@@ -64,7 +65,7 @@ def calibrate_gauss_newton(
     position_prior=None,
     rate_covariance=None,
     time=None,
-    tolerance: float = 1e-6,
+    tolerance: float | None = None,
     limit: int = 50,
 ) -> Calibration:
     """ML (or MAP) positions and effect parameters of any model, with their covariance.
@@ -78,14 +79,17 @@ def calibrate_gauss_newton(
     position_prior : None, or (mean (3 (A - 1),), sd) in metres
     rate_covariance : None, or (T, 3G, 3G) (rad/s)^2 instead of the model's gyroscope noise
     time : None, or (T,) s, which drifts, shifts and clocks look at
-    tolerance : float
-        Stop when no shared parameter moves by more than this many of its own sds.
+    tolerance : float or None
+        Stop when no shared parameter moves by more than this many of its own sds; by default
+        1e-6, with effects 1e-3, as misfit makes steps shrink slowly.
 
     Raises
     ------
     IdentifiabilityError
         As `calibrate_bcd`, and where the information of the parameters is singular.
     """
+    if tolerance is None:
+        tolerance = ENOUGH if model.effects else 1e-6
     require_samples(len(specific_force))
     positions = model.array.relative if start is None else np.asarray(start, float)
     positions = positions - positions[0]

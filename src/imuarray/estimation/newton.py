@@ -36,8 +36,8 @@ def descend(
     ``prior`` is None or (mean (3 (A - 1),) m, precision (3 (A - 1),) squared, 1 / m^2). Each
     iteration finds every sample's motion and takes a step of Fisher's scoring on the profile
     likelihood, with the information with the motion eliminated; near the optimum that is computed
-    again only where steps shrink slowly. Stops when no coordinate moves by more than
-    ``tolerance`` of its own sd. IdentifiabilityError where the information is singular.
+    again only where steps shrink slowly. Stops when the step's length in the
+    information's metric is below ``tolerance``: no coordinate then moves by more of its own sd. IdentifiabilityError where the information is singular.
     """
     with _one_thread():
         return _descended(data, start, prior, tolerance, limit, covariance)
@@ -147,7 +147,7 @@ def _curvature(data: Collapsed, here: Point, prior) -> np.ndarray:
     whole = known.diagonal().copy()
     # the transpose of what is symmetric: LAPACK's order, factored in place
     factor, failed = scipy.linalg.lapack.dpotrf(known.T, lower=1, overwrite_a=1)
-    if failed or np.min(factor.diagonal() ** 2 / whole) < SINGULAR:
+    if failed or not np.min(factor.diagonal() ** 2 / whole) >= SINGULAR:  # NaN is none either
         raise IdentifiabilityError(
             "calibration: expected informative motion, found a direction of the positions that the"
             " data do not determine"
@@ -158,7 +158,7 @@ def _curvature(data: Collapsed, here: Point, prior) -> np.ndarray:
 def _step(curvature, here: Point):
     """(step, its length in the information's metric: no coordinate moves by more sds)."""
     step = scipy.linalg.lapack.dpotrs(curvature, here.slope, lower=1)[0]
-    return step, float(np.sqrt(step @ here.slope))
+    return step, float(np.sqrt(max(step @ here.slope, 0.0)))
 
 
 def _shortened(data: Collapsed, here: Point, step, prior):

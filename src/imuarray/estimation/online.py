@@ -59,10 +59,12 @@ class Online:
         Returns how many blocks were learned from; what is left waits for more. Where a block
         raises IdentifiabilityError nothing of it is learned and it waits, with what comes next.
         """
-        force, rate = np.asarray(specific_force, float), np.asarray(angular_rate, float)
-        lost = np.zeros(rate.shape, bool) if saturated is None else np.asarray(saturated, bool)
+        # copies: what waits is not the caller's buffer
+        force, rate = np.array(specific_force, float), np.array(angular_rate, float)
+        lost = np.zeros(rate.shape, bool) if saturated is None else np.array(saturated, bool)
         counts = self.model.array.accelerometers, self.model.array.gyroscopes
-        expected = [(len(force), count, 3) for count in (*counts, counts[1])]
+        samples = len(force) if force.ndim else 0
+        expected = [(samples, count, 3) for count in (*counts, counts[1])]
         if [part.shape for part in (force, rate, lost)] != expected:
             raise InputError(
                 f"online: expected samples of shapes {expected}, found"

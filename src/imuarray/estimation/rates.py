@@ -138,25 +138,28 @@ def _steps(rate, C, b, mean, P, trial, determinant):
 
 @nb.njit(cache=True, nogil=True)
 def _accept(rate, trial, cost, new, determinant, tolerance, step, iterations):
-    """Take the steps that are small or lower the cost; returns how many samples go on.
+    """Take the steps that are small or lower the cost; returns how many samples go on so.
 
-    ``iterations`` is positive where a search has ended, and left alone there.
+    ``iterations`` is 0 where a search goes on so, its number of steps where it has ended, and less
+    that of the first step to be refused where it is to go on by itself.
     """
     left = 0
     for t in range(rate.shape[1]):
-        if iterations[t] > 0:
+        if iterations[t] != 0:
             continue
         moved = abs(trial[0, t] - rate[0, t]) + abs(trial[1, t] - rate[1, t])
         moved += abs(trial[2, t] - rate[2, t])
         size = 1.0 + abs(trial[0, t]) + abs(trial[1, t]) + abs(trial[2, t])
-        small = moved <= tolerance * size
+        small = moved <= tolerance * size and size < np.inf
         if determinant[t] > 0.0 and (small or new[t] <= cost[t]):
             rate[0, t], rate[1, t], rate[2, t] = trial[0, t], trial[1, t], trial[2, t]
             cost[t] = new[t]
             if small:
                 iterations[t] = step
-                continue
-        left += 1
+            else:
+                left += 1
+        else:
+            iterations[t] = -step
     return left
 
 
@@ -173,7 +176,8 @@ def _alone(t, rate, C, b, mean, P, tolerance, first, limit, cost, iterations):
         if determinant > 0.0:
             nx, ny, nz = x + sx, y + sy, z + sz
             new = _cost(nx, ny, nz, C, bt, nx - mx, ny - my, nz - mz, p)
-            small = abs(sx) + abs(sy) + abs(sz) <= tolerance * (1.0 + abs(nx) + abs(ny) + abs(nz))
+            size = 1.0 + abs(nx) + abs(ny) + abs(nz)
+            small = abs(sx) + abs(sy) + abs(sz) <= tolerance * size and size < np.inf
             if small or new <= now:
                 x, y, z, now = nx, ny, nz, new
                 damping *= 0.1
@@ -195,7 +199,7 @@ def angular_rates(rate, C, b, mean, P, tolerance, limit, cost, iterations):
     never fell below ``tolerance`` (relative).
     """
     trial, new, determinant = np.empty_like(rate), np.empty_like(cost), np.empty_like(cost)
-    iterations[:] = -limit
+    iterations[:] = 0
     _costs(rate, C, b, mean, P, cost)
     first, left = 1, cost.size
     while left and first <= min(TOGETHER, limit):
@@ -203,10 +207,10 @@ def angular_rates(rate, C, b, mean, P, tolerance, limit, cost, iterations):
         _costs(trial, C, b, mean, P, new)
         left = _accept(rate, trial, cost, new, determinant, tolerance, first, iterations)
         first += 1
-    if left:
-        for t in range(cost.size):
-            if iterations[t] < 0:
-                _alone(t, rate, C, b, mean, P, tolerance, first, limit, cost, iterations)
+    for t in range(cost.size):
+        if iterations[t] <= 0:
+            start = first if iterations[t] == 0 else -iterations[t]
+            _alone(t, rate, C, b, mean, P, tolerance, start, limit, cost, iterations)
 
 
 class Work(NamedTuple):

@@ -75,6 +75,12 @@ class ArrayModel:
         return tuple(sorted(found, key=lambda item: not item.sampling))
 
     @cached_property
+    def apart(self) -> bool:
+        """Whether a triad's parameters, its position among them, change its own readings alone."""
+        fewer = self.array.gyroscopes <= self.array.accelerometers  # each beside one of its own
+        return fewer and all(probed(item) for item in self.chain)
+
+    @cached_property
     def shapes(self) -> tuple[tuple[int, ...], ...]:
         """Shape of each effect's parameters on this array."""
         counts = self.array.accelerometers, self.array.gyroscopes

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from imuarray.errors import InputError
 from imuarray.model.effects import EFFECTS
-from imuarray.provenance import add_code, digest
+from imuarray.provenance import add_code, code_version, digest
 
 _READ: dict[str, tuple[str, tuple[str, ...]]] = {}  # by path: digest of the text, and its ids
 
@@ -51,6 +51,12 @@ def read_effects(path: str | Path) -> tuple[str, ...]:
     add_code(path.name, place, text)
     _READ[place] = known, new
     return new
+
+
+def own_version(name: str) -> str | None:
+    """SHA-256 of the text of the file that an effect was read from, as results carry it."""
+    places = [place for place, (_, names) in _READ.items() if name in names]
+    return code_version(places[0]) if places else None
 
 
 def _line(error: BaseException, path: Path) -> str:

@@ -12,19 +12,20 @@ from imuarray.motion.state import Motion
 ACCELEROMETERS, GYROSCOPES = 7, 5  # of the array that effects are tried on
 
 
-def probe(item: Effect) -> None:
-    """InputError, with the effect's id, where declaration and function do not agree.
+def probe(item: Effect) -> bool:
+    """Whether a triad's own position is all that matters to it.
 
+    InputError, with the effect's id, where declaration and function do not agree.
     Tried on a small array: shapes; no effect at the value zero; no use of omega double dot
     or s dot without ``derivatives=True``, for those would be taken for zero; and parameters, or
     readings that go in, of one triad change that triad's readings alone.
     """
     sd = np.broadcast_to(_prior_sd(item), _shape(item))
     with jax.ensure_compile_time_eval():  # models are looked at while others are traced
-        _probe(item, sd, np.random.default_rng(1))
+        return _probe(item, sd, np.random.default_rng(1))
 
 
-def _probe(item: Effect, sd, rng) -> None:
+def _probe(item: Effect, sd, rng) -> bool:
     plain = Prediction(
         jnp.asarray(10 * rng.standard_normal((ACCELEROMETERS, 3))),
         jnp.asarray(5 * rng.standard_normal((GYROSCOPES, 3))),
@@ -32,8 +33,8 @@ def _probe(item: Effect, sd, rng) -> None:
     positions = jnp.asarray(0.01 * rng.standard_normal((ACCELEROMETERS, 3)))
     fields = [jnp.asarray(scale * rng.standard_normal(3)) for scale in (5, 100, 10, 1e3, 1e2)]
 
-    def predicted(parameters, later, plain=plain):
-        instant = Instant(Motion(*fields[:3], *later), positions, time=0.3, span=1.0)
+    def predicted(parameters, later, plain=plain, positions=positions, time=0.3):
+        instant = Instant(Motion(*fields[:3], *later), positions, time=time, span=1.0)
         return item.apply(jnp.asarray(parameters), instant, plain)
 
     later = tuple(fields[3:])
@@ -50,9 +51,16 @@ def _probe(item: Effect, sd, rng) -> None:
     )
     if not all(np.all(np.isfinite(part)) for part in values):
         raise _wrong(item, "finite readings at parameters within their prior", "NaN or infinite")
-    _require_own(item, drawn, plain, lambda x, y: predicted(x, later, y))
+
+    def slopes(time):
+        by = jax.jacfwd(lambda x, y, r: predicted(x, later, y, r, time), argnums=(0, 1, 2))
+        return by(jnp.asarray(drawn), plain, positions)
+
+    early, late = (_tried(item, sd.shape, lambda t=t: slopes(t)) for t in (0.3, 0.8))
+    own = [_require_own(item, each) for each in (early, late)]
     if not item.derivatives and any(np.any(np.asarray(part) != 0) for part in change):
         raise _wrong(item, "derivatives=True, since it uses omega double dot or s dot", "False")
+    return all(own)
 
 
 def _wrong(item: Effect, expected: str, found) -> InputError:
@@ -107,20 +115,30 @@ def _require_shapes(item: Effect, made, plain) -> None:
             raise _wrong(item, f"{kind} of shape {np.shape(old)}", np.shape(new))
 
 
-def _require_own(item: Effect, drawn, plain, predicted) -> None:
-    """InputError where a triad's parameters or readings change another triad's readings."""
-    slopes = jax.jacfwd(predicted, argnums=(0, 1))(jnp.asarray(drawn), plain)
-    parts = []
-    for kind, (by_rows, by_readings) in zip(Prediction._fields, slopes, strict=True):
-        parts += [(kind, "parameters", by_rows)] + [(kind, "readings", s) for s in by_readings]
-    for kind, what, slope in parts:
-        # (triad, axis, triad whose row or reading it is, ...)
-        for triad, row in np.argwhere(np.any(np.asarray(slope) != 0, (1, *range(3, slope.ndim)))):
-            if triad != row:
+def _require_own(item: Effect, slopes) -> bool:
+    """InputError where a triad's parameters or readings change another triad's readings.
+
+    Returns whether its position does not: effects of the whole board's shape are allowed.
+    """
+    own = True
+    for kind, (rows, readings, places) in zip(Prediction._fields, slopes, strict=True):
+        for what, slope in (("parameters", rows), *(("readings", part) for part in readings)):
+            for triad, row in _reached(item, slope):
                 raise _wrong(
                     item, "a triad's parameters and readings to change that triad alone",
                     f"{what} of triad {row + 1} in the {kind} of triad {triad + 1}",
                 )  # fmt: skip
+        own = own and not _reached(item, places)
+    return own
+
+
+def _reached(item: Effect, slope) -> list[tuple[int, int]]:
+    """(triad, other) pairs, the other's row in a derivative (triad, axis, other, ...) not zero."""
+    slope = np.asarray(slope)
+    if not np.all(np.isfinite(slope)):
+        raise _wrong(item, "finite derivatives at parameters within their prior", "NaN or infinite")
+    pairs = np.argwhere(np.any(slope != 0, (1, *range(3, slope.ndim))))
+    return [(int(triad), int(other)) for triad, other in pairs if triad != other]
 
 
 def _first(error: Exception) -> str:

@@ -25,7 +25,7 @@ class Tile(NamedTuple):
     numbers: np.ndarray  # (N, 3, TILE), normal
     exponent: np.ndarray  # (N, TILE)
     top: np.ndarray  # (TILE,) the largest exponent
-    total: np.ndarray  # (TILE,) sum of the exponentials of the others less it
+    total: np.ndarray  # (TILE,) sum of the exponentials of all less it
     power: np.ndarray  # (TILE,) of 2
     bits: np.ndarray  # (TILE,) the same memory as integers
 
