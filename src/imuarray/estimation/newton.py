@@ -36,8 +36,9 @@ def descend(
     ``prior`` is None or (mean (3 (A - 1),) m, precision (3 (A - 1),) squared, 1 / m^2). Each
     iteration finds every sample's motion and takes a step of Fisher's scoring on the profile
     likelihood, with the information with the motion eliminated; near the optimum that is computed
-    again only where steps shrink slowly. Stops when the step's length in the
-    information's metric is below ``tolerance``: no coordinate then moves by more of its own sd. IdentifiabilityError where the information is singular.
+    again only where steps shrink slowly. Stops when the step's length in the information's metric
+    is below ``tolerance``: no coordinate then moves by more of its own sd. IdentifiabilityError
+    where the information is singular.
     """
     with _one_thread():
         return _descended(data, start, prior, tolerance, limit, covariance)
