@@ -37,7 +37,7 @@ class Calibration:
     effect_parameters: np.ndarray | None = None
 
 
-@nb.njit(cache=True, nogil=True, fastmath=kernels.FAST)
+@nb.njit(cache=True, nogil=True)
 def _position_block(force, state, rows, values, A, positions):
     """Line 10-13 of Algorithm 1: least squares for r_2 ... r_K; returns the largest step.
 

@@ -13,7 +13,6 @@ import numpy as np
 
 from imuarray.estimation import kernels
 from imuarray.estimation.collapsed import Collapsed, tables
-from imuarray.estimation.kernels import FAST
 from imuarray.estimation.rates import lower, precision_at, rate_information
 from imuarray.model import structure_tensor
 
@@ -55,7 +54,7 @@ def _score(positions, force, weights, state, rows, values):
     return right
 
 
-@nb.njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
+@nb.njit(cache=True, nogil=True, error_model="numpy")
 def _whitened(rate, C, P, first, size, Z):
     """Z = dw/domega F'^-1 (6, 3, TILE) of ``size`` samples, F F' the information of omega_t.
 
@@ -84,7 +83,7 @@ def _whitened(rate, C, P, first, size, Z):
         Z[5, 1, i], Z[5, 2, i] = f1, (y - fzy * f1) * iz
 
 
-@nb.njit(cache=True, nogil=True, fastmath=FAST)
+@nb.njit(cache=True, nogil=True)
 def _rate_gram(rate, C, P, entries, left):
     """sum_t U_t U_t' (12, 12), U_t = (Omega_t left_m dw/domega F'^-1) for m = 0 .. 3, (12, 3).
 
@@ -115,7 +114,7 @@ def _rate_gram(rate, C, P, entries, left):
     return found
 
 
-@nb.njit(cache=True, nogil=True, fastmath=FAST)
+@nb.njit(cache=True, nogil=True)
 def _assemble(positions, weights, square, taken, out):
     """diag(weights) (x) square less U taken U', row k of U weights[k] (1, r_k) (x) I; k > 1."""
     row = np.empty((3, 12))

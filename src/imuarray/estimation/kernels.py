@@ -9,6 +9,8 @@ const_t - 2 b_t . w + w' C w. Time is the last, contiguous axis everywhere.
 import numba as nb
 import numpy as np
 
+# For sums over samples only: the compiler may then add in vectors. Elsewhere the order as written,
+# or results would depend on whether a kernel was compiled or came from the cache.
 FAST = {"reassoc", "contract", "nsz"}
 
 
@@ -40,7 +42,7 @@ def arrange(force, weights, centred, offset, energy, total):
         energy[t] = square
 
 
-@nb.njit(cache=True, nogil=True, fastmath=FAST)
+@nb.njit(cache=True, nogil=True)
 def weighted_moments(positions, z, moments):
     """moments[i] = sum_k r_ki z_k for i = 1..3; (4, 3, T) from z (A, 3, T). Row 0 is kept.
 
@@ -147,7 +149,7 @@ def eliminate(K, C, X, inverse):
     return logdet
 
 
-@nb.njit(cache=True, nogil=True, fastmath=FAST)
+@nb.njit(cache=True, nogil=True)
 def project(moments, rows, values, full):
     """full = G' Lambda y_t, (12, T), from the moments and the tensor's few entries."""
     full[:] = 0.0
@@ -158,7 +160,7 @@ def project(moments, rows, values, full):
             full[a, t] += value * moments[i, c, t]
 
 
-@nb.njit(cache=True, nogil=True, fastmath=FAST)
+@nb.njit(cache=True, nogil=True)
 def reduce_linear(full, X, inverse, b, phi, const, energy):
     """b = B' S y (6, T), phi = Kpp^-1 H' Lambda y (6, T), const = y' S' y (T,)."""
     samples = full.shape[1]
@@ -193,7 +195,7 @@ def quadratic(x, y, z, C, b0, b1, b2, b3, b4, b5):
     return q
 
 
-@nb.njit(cache=True, nogil=True, fastmath=FAST)
+@nb.njit(cache=True, nogil=True)
 def linear_motion(rate, X, phi, state):
     """state (12, T) = (w, phi_hat) with phi_hat = Kpp^-1 H' Lambda y - X w."""
     for t in range(rate.shape[1]):
@@ -208,7 +210,7 @@ def linear_motion(rate, X, phi, state):
                 state[6 + a, t] -= scale * state[m, t]
 
 
-@nb.njit(cache=True, nogil=True, fastmath=FAST)
+@nb.njit(cache=True, nogil=True)
 def arms(state, rows, values, out):
     """The predicted force is out[0] + sum_i r_i out[i + 1]: (4, axis, T) from (w, phi) (12, T).
 

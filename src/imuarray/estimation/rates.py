@@ -11,7 +11,6 @@ import numba as nb
 import numpy as np
 
 from imuarray.estimation.kernels import (
-    FAST,
     eliminate,
     information,
     linear_motion,
@@ -114,7 +113,7 @@ def _cost(x, y, z, C, b, dx, dy, dz, p):
     return quadratic(x, y, z, C, b[0], b[1], b[2], b[3], b[4], b[5]) + gyroscopes
 
 
-@nb.njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
+@nb.njit(cache=True, nogil=True, error_model="numpy")
 def _costs(rate, C, b, mean, P, cost):
     """cost (T,) of the rates (3, T)."""
     for t in range(rate.shape[1]):
@@ -124,7 +123,7 @@ def _costs(rate, C, b, mean, P, cost):
         cost[t] = _cost(x, y, z, C, bt, dx, dy, dz, precision_at(P, t))
 
 
-@nb.njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
+@nb.njit(cache=True, nogil=True, error_model="numpy")
 def _steps(rate, C, b, mean, P, trial, determinant):
     """An undamped step of every sample: where it leads, trial (3, T); no branch in the loop."""
     c = lower(C)

@@ -10,12 +10,11 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
-from imuarray.estimation.kernels import FAST, quadratic
+from imuarray.estimation.kernels import quadratic
 
 TILE = 32  # samples
 LOG2E, HIGH, LOW = 1.4426950408889634, 6.93147180369123816490e-01, 1.90821492927058770002e-10
 INTEGER = 6755399441055744.0  # 1.5 2^52: added to a small integer, its bits are the last ones
-EXACT = {"contract", "nsz"}  # sums stay in their order, or INTEGER would cancel
 LEAST = -700.0  # nothing below is more than 0 beside exp(0)
 
 
@@ -60,7 +59,7 @@ def _rate(t, mean, factor, u, v, w):
     )
 
 
-@nb.njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
+@nb.njit(cache=True, nogil=True, error_model="numpy")
 def exponents(first, size, mean, factor, C, b, numbers, out):
     """-(w' C w - 2 b . w) / 2 at mean + factor n, n of ``numbers`` (N, 3, TILE)."""
     for n in range(out.shape[0]):
@@ -82,7 +81,7 @@ def tilted(k, t, x, y, z):
     )  # fmt: skip
 
 
-@nb.njit(cache=True, nogil=True, fastmath=FAST)
+@nb.njit(cache=True, nogil=True)
 def tilt(first, size, k, mean, factor, numbers, out):
     """Add `tilted` to `exponents`."""
     for n in range(out.shape[0]):
@@ -112,7 +111,7 @@ def _exp_parts(x):
     return p * r + 1.0, k
 
 
-@nb.njit(cache=True, nogil=True, fastmath=EXACT, error_model="numpy")
+@nb.njit(cache=True, nogil=True, error_model="numpy")
 def _exponentials(size, work):
     """top = the largest exponent of N, total = the sum of exp(exponent - top), by sample."""
     exponent, top, total, power, bits = (
