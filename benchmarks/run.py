@@ -208,11 +208,11 @@ def to_the_bound(model, rng, samples=1000, motions=5):
     """
     found = np.array([one_to_the_bound(model, rng, samples) for _ in range(motions)])
     rows = []
-    names = "ML-BCD", "Gauss-Newton", "Gauss-Newton, with the covariance"
+    kinds = "", ", with the covariance", ", the data arranged"
+    names = "ML-BCD", *(f"Gauss-Newton{kind}" for kind in kinds)
     shared = found[:, 3, 1].copy()
     found[:, 3] = found[:, 1]
     found[:, 3, 1] -= shared
-    names += ("Gauss-Newton, the data arranged",)
     for name, (counts, seconds) in zip(names, found.transpose(1, 2, 0), strict=True):
         first = found[:, 0, 1] - (shared if name == names[-1] else 0.0)
         ratios = first / seconds

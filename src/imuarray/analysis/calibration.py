@@ -80,8 +80,8 @@ def calibrate(
     else:
         prior = (model.array.parameters, recording.position_prior_sd) if model.effects else None
         found = calibrate_gauss_newton(
-            model, *data, saturated=saturated, position_prior=prior, time=recording.time,
-        )  # fmt: skip
+            model, *data, saturated=saturated, position_prior=prior, time=recording.time
+        )
     dataset = calibration_dataset(recording, model, found, saturated)
     dataset.attrs |= {"method": method, **stamp({"recording": digest(*data)}, 0)}
     return dataset
