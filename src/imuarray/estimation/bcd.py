@@ -80,8 +80,7 @@ def descend(
     Returns (iterations, status): status 1 converged, 0 stopped at the limit, -1 sum A'A
     singular, -2 H' Lambda H singular.
     """
-    A, work = np.empty((4, 3, energy.size)), workspace(base)
-    rate = mean.copy()
+    work, rate = workspace(base), mean.copy()
     mark = 0
     for iteration in range(limit):
         logdet = most_likely(
@@ -90,7 +89,7 @@ def descend(
         )  # fmt: skip
         if np.isnan(logdet):
             return iteration, -2
-        step = _position_block(force, work.state, rows, values, A, positions)
+        step = _position_block(force, work.state, rows, values, work.arms, positions)
         if step < 0.0:
             return iteration, -1
         cost_trace[iteration] = work.cost.sum() + work.const.sum()

@@ -8,6 +8,8 @@ of what the motion takes up: sums over samples of 12 x 12, however many triads t
 
 from __future__ import annotations
 
+from functools import cache
+
 import numba as nb
 import numpy as np
 
@@ -26,21 +28,22 @@ def arms(state) -> np.ndarray:
     return out
 
 
-def score(data: Collapsed, positions, state) -> np.ndarray:
+def score(data: Collapsed, positions, state, made=None) -> np.ndarray:
     """Half the cost's fall per metre of each position, (A, 3), at the motion ``state`` (12, T).
 
-    At the most likely motion this is the score of the profile likelihood.
+    At the most likely motion this is the score of the profile likelihood. ``made`` (4, 3, T), if
+    given, becomes `arms` of the state.
     """
     known = tables()
+    made = np.empty((4, 3, state.shape[1])) if made is None else made
     positions = np.ascontiguousarray(positions, float)
     return _score(
-        positions, data.specific_force, data.weights, state, known.rows, known.values
+        positions, data.specific_force, data.weights, state, known.rows, known.values, made
     )  # fmt: skip
 
 
 @nb.njit(cache=True, nogil=True)
-def _score(positions, force, weights, state, rows, values):
-    made = np.empty((4, 3, state.shape[1]))
+def _score(positions, force, weights, state, rows, values, made):
     kernels.arms(state, rows, values, made)
     right, square = np.zeros(positions.shape), np.zeros((4, 3))
     kernels.arm_products(made, force, right)
@@ -133,24 +136,57 @@ def _assemble(positions, weights, square, taken, out):
                 out[3 * k - 3 + i, 3 * k - 3 + j] += weight * square[i, j]
 
 
-def information(data: Collapsed, positions, rate, state, reduced) -> np.ndarray:
+@nb.njit(cache=True, nogil=True)
+def _moments(entries, linear, inverse, square, taken):
+    """Fills square (3, 3) = sum_t Omega_t Omega_t', and taken (12, 12) by omega_dot and s.
+
+    ``entries`` (3, 3, T) are Omega_t, ``linear`` (12, 6) = G_phi, by the arm and axis.
+    """
+    flat = entries.reshape(9, entries.shape[2])
+    products = flat @ flat.T
+    seen = linear @ inverse @ linear.T
+    for i in range(3):
+        for j in range(3):
+            square[i, j] = 0.0
+            for c in range(3):
+                square[i, j] += products[3 * i + c, 3 * j + c]
+            for m in range(4):
+                for n in range(4):
+                    total = 0.0
+                    for c in range(3):
+                        for d in range(3):
+                            total += seen[3 * m + c, 3 * n + d] * products[3 * i + c, 3 * j + d]
+                    taken[3 * m + i, 3 * n + j] = total
+
+
+@nb.njit(cache=True, nogil=True)
+def _information(positions, weights, rate, entries, C, X, inverse, P, square_part, linear):
+    """`information`; ``square_part`` and ``linear`` (12, 6) are the structure tensor's halves."""
+    square, taken = np.empty((3, 3)), np.empty((12, 12))
+    _moments(entries, linear, inverse, square, taken)  # what omega_dot and s take up ...
+    left = (square_part - linear @ X).reshape(4, 3, 6)
+    taken += _rate_gram(rate, C, P, entries, left)  # ... and omega, of the rest
+    size = 3 * len(positions) - 3
+    out = np.empty((size, size))
+    _assemble(positions, weights, square, taken, out)
+    return out
+
+
+@cache
+def _halves():
+    """The structure tensor of w and of phi, (12, 6) each."""
+    tensor = structure_tensor().reshape(12, 12)
+    return np.ascontiguousarray(tensor[:, :6]), np.ascontiguousarray(tensor[:, 6:])
+
+
+def information(data: Collapsed, positions, rate, made, reduced) -> np.ndarray:
     """Fisher information (3 (A - 1), 3 (A - 1)) of r_2 ... r_A, 1 / m^2, the motion unknown.
 
-    ``rate`` (3, T) and ``state`` (12, T) are the motion, ``reduced`` C, X and (H' Lambda H)^-1
-    of the kernels at ``positions`` (A, 3). Its inverse is the Cramer-Rao bound of the positions.
+    ``rate`` (3, T) and ``made`` (4, 3, T), its `arms`, are the motion, ``reduced`` C, X and
+    (H' Lambda H)^-1 of the kernels at ``positions`` (A, 3). Its inverse is the Cramer-Rao bound of
+    the positions.
     """
-    C, X, inverse = reduced
-    tensor = structure_tensor()
-    entries = arms(state)[1:]
-    flat = entries.reshape(9, -1)
-    moments = (flat @ flat.T).reshape(3, 3, 3, 3)
-    # what omega_dot and s take up, then omega of the rest
-    linear = tensor[..., 6:].reshape(12, 6)
-    seen = (linear @ inverse @ linear.T).reshape(4, 3, 4, 3)
-    taken = np.einsum("mcnd,icjd->minj", seen, moments).reshape(12, 12)
-    left = tensor[..., :6] - tensor[..., 6:] @ X
-    taken += _rate_gram(rate, C, data.gyroscope_information, entries, left)
     positions = np.ascontiguousarray(positions, float)
-    whole = np.empty((3 * len(positions) - 3, 3 * len(positions) - 3))
-    _assemble(positions, data.weights, np.einsum("icjc->ij", moments), taken, whole)
-    return whole
+    return _information(
+        positions, data.weights, rate, made[1:], *reduced, data.gyroscope_information, *_halves()
+    )  # fmt: skip

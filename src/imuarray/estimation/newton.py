@@ -17,7 +17,7 @@ from imuarray.estimation.bcd import Calibration
 from imuarray.estimation.collapsed import Collapsed, tables
 from imuarray.estimation.information import information, score
 from imuarray.estimation.motion_ml import motion_estimate
-from imuarray.estimation.rates import most_likely, workspace
+from imuarray.estimation.rates import Work, most_likely, workspace
 
 FAR = 5.0  # length of the step before: the information is computed anew after a longer one
 SLOW = 0.05  # of the step before: and where steps contract less than so
@@ -77,7 +77,9 @@ def _set_threads(counts) -> None:
 
 
 def _descended(data, start, prior, tolerance, limit, covariance) -> Calibration:
-    here = _at(data, np.array(start, float), data.mean.copy(), prior)
+    # two places, here and there: fresh memory at each step would cost as much as the arithmetic
+    first, spare = (workspace(data.base) for _ in range(2))
+    here = _at(data, np.array(start, float), data.mean, prior, first)
     curvature, costs, steps, converged, last = None, [here.cost], [0.0], False, np.inf
     for _ in range(limit):
         fresh = curvature is None or last > FAR
@@ -89,15 +91,16 @@ def _descended(data, start, prior, tolerance, limit, covariance) -> Calibration:
         if size < tolerance:
             converged = True
             break
-        there, length = _shortened(data, here, step, prior)
+        there, length = _shortened(data, here, step, prior, spare)
         if there is None:
             break  # no shorter step lowers the cost: not converged, and said so
-        here, last = there, size
+        here, spare, last = there, here.work, size
         costs.append(here.cost)
         steps.append(float(np.max(np.abs(length * step))))
     width = np.linalg.inv(_information(data, here, prior)) if covariance else None
+    work = here.work
     return Calibration(
-        here.positions, motion_estimate(data, here.rate, here.state, here.costs, here.counts),
+        here.positions, motion_estimate(data, here.rate, work.state, here.costs, work.counts),
         np.array(costs), np.array(steps), converged, here.positions[None], width, np.empty(0),
     )  # fmt: skip
 
@@ -107,17 +110,15 @@ class Point(NamedTuple):
 
     positions: np.ndarray  # (A, 3)
     rate: np.ndarray  # (3, T)
-    state: np.ndarray  # (w, phi) (12, T)
-    reduced: tuple  # C, X and (H' Lambda H)^-1 of the kernels
+    work: Work  # the motion, and what led to it
     cost: float  # twice the negative log posterior
     costs: np.ndarray  # (T,) of it, each sample's
-    counts: np.ndarray  # (T,) steps of the search for omega, negative where it did not end
     slope: np.ndarray  # (3 (A - 1),), half the cost's fall
 
 
-def _at(data: Collapsed, positions, rate, prior) -> Point:
-    """The motion is searched from ``rate`` (3, T)."""
-    rate, work = rate.copy(), workspace(data.base)
+def _at(data: Collapsed, positions, rate, prior, work) -> Point:
+    """The motion is searched from ``rate`` (3, T); fills ``work``."""
+    rate = rate.copy()
     logdet = most_likely(
         positions, data.specific_force, data.energy, data.mean, data.gyroscope_information,
         data.weights, *tables(), rate, RATE, LIMIT, work,
@@ -128,17 +129,18 @@ def _at(data: Collapsed, positions, rate, prior) -> Point:
         )
     cost = work.cost + work.const
     total = float(cost.sum())
-    slope = score(data, positions, work.state)[1:].ravel()
+    slope = score(data, positions, work.state, work.arms)[1:].ravel()
     if prior is not None:
         away = positions[1:].ravel() - prior[0]
         pull = prior[1] @ away
         total, slope = total + float(away @ pull), slope - pull
-    reduced = work.C, work.X, work.inverse
-    return Point(positions, rate, work.state, reduced, total, cost, work.counts, slope)
+    return Point(positions, rate, work, total, cost, slope)
 
 
 def _information(data: Collapsed, here: Point, prior) -> np.ndarray:
-    known = information(data, here.positions, here.rate, here.state, here.reduced)
+    work = here.work
+    reduced = work.C, work.X, work.inverse
+    known = information(data, here.positions, here.rate, work.arms, reduced)
     return known if prior is None else known + prior[1]
 
 
@@ -162,13 +164,16 @@ def _step(curvature, here: Point):
     return step, float(np.sqrt(max(step @ here.slope, 0.0)))
 
 
-def _shortened(data: Collapsed, here: Point, step, prior):
-    """(where the cost is no higher, share of the step), halved where need be; or (None, 0)."""
+def _shortened(data: Collapsed, here: Point, step, prior, work):
+    """(where the cost is no higher, share of the step), halved where need be; or (None, 0).
+
+    Fills ``work``, which is not ``here``'s.
+    """
     length = 1.0
     for _ in range(TRIES):
         moved = here.positions.copy()
         moved[1:] += length * step.reshape(-1, 3)
-        there = _at(data, moved, here.rate, prior)
+        there = _at(data, moved, here.rate, prior, work)
         if there.cost <= here.cost + ROUNDED * data.energy.sum():
             return there, length
         length /= 2

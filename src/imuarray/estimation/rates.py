@@ -227,6 +227,7 @@ class Work(NamedTuple):
     moments: np.ndarray  # (4, 3, T); row 0 is the caller's
     full: np.ndarray  # (12, T)
     K: np.ndarray  # (12, 12)
+    arms: np.ndarray  # (4, 3, T), the caller's: `kernels.arms` of the state
 
 
 @nb.njit(cache=True, nogil=True)
@@ -239,7 +240,7 @@ def workspace(base):
         np.empty((6, 6)), np.empty((6, 6)), np.empty((6, 6)),
         np.empty((6, samples)), np.empty((6, samples)), np.empty(samples), np.empty(samples),
         np.empty(samples, np.int64), np.empty((12, samples)), moments,
-        np.empty((12, samples)), np.empty((12, 12)),
+        np.empty((12, samples)), np.empty((12, 12)), np.empty((4, 3, samples)),
     )  # fmt: skip
 
 
