@@ -1,12 +1,13 @@
 """The no-U-turn sampler on the exact marginal likelihood, against quadrature and PmMH."""
 
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
 import xarray as xr
 
 import imuarray
+import imuarray.estimation
 from imuarray.analysis import density_of, model_of
 from imuarray.blind.cases import Case, make
 from imuarray.cli import main
@@ -113,6 +114,18 @@ def test_a_chain_that_falls_into_the_flat_priors_hole_is_told():
     )
     assert found.attrs["on_a_line"] and not found.attrs["converged"]
     assert any("no bound" in text for text in said)
+
+
+def test_a_mode_that_was_not_reached_is_told(monkeypatch):
+    recording, _ = imuarray.simulate(imuarray.mimu4444(), duration=2.0, sampling_rate=50.0, seed=1)
+    said: list[str] = []
+    density_of(recording, model_of(recording), say=said.append)
+    assert not said
+    stopped = partial(imuarray.estimation.calibrate_gauss_newton, limit=1)
+    monkeypatch.setattr(imuarray.estimation, "calibrate_gauss_newton", stopped)
+    density_of(recording, model_of(recording), say=said.append)
+    (text,) = said
+    assert "did not converge" in text
 
 
 def test_the_density_has_no_bound_towards_triads_on_one_line():

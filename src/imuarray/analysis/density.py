@@ -27,12 +27,12 @@ def density_of(recording: Recording, model: ArrayModel, rates: str = "declared",
     prior = prior_of(recording, model)
     likelihood: GenericLikelihood | Marginal
     if model.effects:
-        mode, found = map_estimate(recording, model)
+        mode, found = map_estimate(recording, model, say)
         likelihood = _generic(recording, model, found)
         covariance = found.covariance
     else:
         estimator = _likelihood(recording, model, rates == "spread")
-        mode, covariance = _mode(recording, model, rates == "spread")
+        mode, covariance = _mode(recording, model, rates == "spread", say)
         likelihood = marginal = Marginal.of(estimator, positions_of(mode))
         if marginal.gap > GAP:
             say("gyroscopes that see little of the motion: the likelihood is good to"
@@ -56,13 +56,13 @@ def prior_of(recording: Recording, model: ArrayModel) -> GaussianPrior:
 def tuned_target(recording: Recording, model: ArrayModel, rates: str, rng, say: Say = silent):
     """(target, start near the mode, step length, N) for PmMH, tuned as in section III-C."""
     if model.effects:
-        return _tuned_generic(recording, model, rng)
+        return _tuned_generic(recording, model, rng, say)
     spread = rates == "spread"
     likelihood = _likelihood(recording, model, spread)
     prior = prior_of(recording, model)
     counts = tuning.COUNTS
     variances = tuning.variance_sweep(likelihood, model.array.relative, counts, 200, rng)
-    mode, _ = _mode(recording, model, spread)
+    mode, _ = _mode(recording, model, spread, say)
     if variances.min() > 2 * VARIANCE:
         say(f"variance of log p-hat {variances[-1]:.3g} at N = {counts[-1]}: omega is drawn"
             " around the integrand's mode instead")  # fmt: skip
@@ -76,9 +76,9 @@ def tuned_target(recording: Recording, model: ArrayModel, rates: str, rng, say: 
     return target, mode, tuning.choose_step(steps, rates_of), draws
 
 
-def _tuned_generic(recording, model, rng):
+def _tuned_generic(recording, model, rng, say):
     """The same for a model with effects: Laplace-centred importance sampling of omega."""
-    mode, found = map_estimate(recording, model)
+    mode, found = map_estimate(recording, model, say)
     estimate = _generic(recording, model, found)
     target = GenericTarget(
         estimate, prior_of(recording, model), np.linalg.cholesky(found.covariance)
@@ -96,19 +96,23 @@ def _likelihood(recording, model, spread: bool) -> Likelihood:
     )  # fmt: skip
 
 
-def _mode(recording, model, spread: bool):
+def _mode(recording, model, spread: bool, say: Say):
     """MAP (r_2 ... r_A) and the covariance there: the chains' starts spread around it."""
     from imuarray.measured.positions import locate
 
     if spread:
         found = locate(recording, recording.accelerometer_noise_sd)
         return found.mean[1:].ravel(), found.covariance
-    mode, found = map_estimate(recording, model)
+    mode, found = map_estimate(recording, model, say)
     return mode, found.covariance
 
 
-def map_estimate(recording: Recording, model: ArrayModel):
-    """(p (P,) at the posterior's mode, the estimator's whole result)."""
+def map_estimate(recording: Recording, model: ArrayModel, say: Say = silent):
+    """(p (P,) at the posterior's mode, the estimator's whole result).
+
+    Says so where the search did not converge: the posterior does not depend on it, how soon the
+    chains get there does.
+    """
     from imuarray.estimation import calibrate_gauss_newton
 
     found = calibrate_gauss_newton(
@@ -117,6 +121,9 @@ def map_estimate(recording: Recording, model: ArrayModel):
         position_prior=(model.array.parameters, recording.position_prior_sd),
         time=recording.time,
     )  # fmt: skip
+    if not found.converged:
+        say("the search for the posterior's mode did not converge; chains start from where it"
+            " ended: trust their R-hat and ESS, not the start")  # fmt: skip
     extra = np.empty(0) if found.effect_parameters is None else found.effect_parameters
     return np.concatenate([found.positions[1:].ravel(), extra]), found
 

@@ -24,13 +24,6 @@ def total_size(scene: Scene, clean: Pair, perturbed: Pair, steps: int = 1) -> fl
     return smallest_remainder(scene, clean, perturbed, steps)
 
 
-def unprojected_size(scene: Scene, clean: Pair, perturbed: Pair) -> float:
-    """The same with motion and positions known."""
-    keep = below_rails(scene, perturbed)
-    parts = zip(perturbed, clean, scene.noise, strict=True)
-    return float(np.sqrt(sum((((y - x)[keep] / sd) ** 2).sum() for y, x, sd in parts)))
-
-
 def size_of(scene: Scene, changes: Change | list[Change], steps: int = 1) -> float:
     """Size in sigma of one effect, or of several together.
 

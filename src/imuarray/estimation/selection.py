@@ -33,17 +33,23 @@ class Selection:
 
         InputError where there are too few informative samples.
         """
-        left, need = self.informative, sum(counts)
-        if len(left) < need:
+        need = sum(counts)
+        if len(self.informative) < need:
             raise InputError(
-                f"recording: expected at least {need} informative samples, found {len(left)}"
+                "recording: expected at least"
+                f" {need} informative samples, found {len(self.informative)}"
             )
-        chosen = {}
-        for count in sorted(counts, reverse=True):
-            picks = np.linspace(0, len(left) - 1, count).round().astype(int)
-            chosen[count] = left[picks]
-            left = np.delete(left, picks)
-        return chosen
+        return disjoint(self.informative, counts)
+
+
+def disjoint(left: np.ndarray, counts) -> dict[int, np.ndarray]:
+    """Of the samples ``left``, disjoint subsets of ``counts`` each, the largest first."""
+    chosen = {}
+    for count in sorted(counts, reverse=True):
+        picks = np.unique(np.linspace(0, len(left) - 1, count).round().astype(int))
+        chosen[count] = left[picks]
+        left = np.delete(left, picks)
+    return chosen
 
 
 def neighbours(mask: np.ndarray) -> np.ndarray:

@@ -34,8 +34,3 @@ def mimu4444_corners() -> Array:
     corners = [(-edge, edge), (-edge, -edge), (edge, edge), (edge, -edge)]
     rows = [[x, y, side * THICKNESS / 2] for x, y in corners for side in (1, -1)]
     return Array(np.array(rows), tuple(str(k) for k in range(1, 9)), 8, "mimu4444_corners")
-
-
-def underside(array: Array) -> np.ndarray:
-    """Which triads are on the underside, (A,) bool: the even-numbered ones."""
-    return np.array([int(label) % 2 == 0 for label in array.labels])

@@ -10,6 +10,7 @@ import numpy as np
 from imuarray.config import model_from
 from imuarray.errors import InputError
 from imuarray.estimation import calibrate_bcd
+from imuarray.estimation.selection import disjoint, neighbours
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting, normal_motion
@@ -87,18 +88,9 @@ def select_disjoint(recording: Recording, counts) -> dict[int, np.ndarray]:
     A sample is used when nothing saturates in it or next to it and it rotates faster than
     the median; the sets are spread evenly over the recording.
     """
-    rail = recording.saturated_gyroscopes().any(axis=(1, 2))
-    near = rail.copy()
-    near[1:] |= rail[:-1]
-    near[:-1] |= rail[1:]
+    near = neighbours(recording.saturated_gyroscopes().any(axis=(1, 2)))
     speed = np.linalg.norm(recording.angular_rate.mean(axis=1), axis=1)
-    usable = np.flatnonzero(~near & (speed >= np.median(speed)))
-    chosen = {}
-    for count in sorted(counts, reverse=True):
-        picks = np.unique(np.linspace(0, len(usable) - 1, count).round().astype(int))
-        chosen[count] = usable[picks]
-        usable = np.delete(usable, picks)
-    return chosen
+    return disjoint(np.flatnonzero(~near & (speed >= np.median(speed))), counts)
 
 
 def sample_covariance(angular_rate):
