@@ -12,8 +12,9 @@ from imuarray.estimation.blocks import normal_equations
 from imuarray.estimation.blocks import problem as problem_of
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.gauss_newton import calibrate_blocks
-from imuarray.estimation.newton import _one_thread, descend
+from imuarray.estimation.newton import descend
 from imuarray.estimation.online import Online
+from imuarray.estimation.threads import one_thread
 from imuarray.model import EFFECTS, ArrayModel, Noise
 from imuarray.model.array_model import EffectPrior
 from imuarray.motion import normal_motion
@@ -258,7 +259,7 @@ def test_descents_that_overlap_leave_the_threads_of_blas_as_they_were():
         return {item["num_threads"] for item in found}
 
     with threadpool_limits(2, user_api="blas"):
-        one, other = _one_thread(), _one_thread()
+        one, other = one_thread(), one_thread()
         one.__enter__()
         other.__enter__()
         assert blas() == {1}

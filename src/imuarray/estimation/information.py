@@ -9,6 +9,7 @@ of what the motion takes up: sums over samples of 12 x 12, however many triads t
 from __future__ import annotations
 
 from functools import cache
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
@@ -28,22 +29,13 @@ def arms(state) -> np.ndarray:
     return out
 
 
-def score(data: Collapsed, positions, state, made=None) -> np.ndarray:
+@nb.njit(cache=True, nogil=True)
+def slope(positions, force, weights, state, rows, values, made):
     """Half the cost's fall per metre of each position, (A, 3), at the motion ``state`` (12, T).
 
-    At the most likely motion this is the score of the profile likelihood. ``made`` (4, 3, T), if
-    given, becomes `arms` of the state.
+    At the most likely motion this is the score of the profile likelihood. Fills ``made``
+    (4, 3, T), the state's `arms`.
     """
-    known = tables()
-    made = np.empty((4, 3, state.shape[1])) if made is None else made
-    positions = np.ascontiguousarray(positions, float)
-    return _score(
-        positions, data.specific_force, data.weights, state, known.rows, known.values, made
-    )  # fmt: skip
-
-
-@nb.njit(cache=True, nogil=True)
-def _score(positions, force, weights, state, rows, values, made):
     kernels.arms(state, rows, values, made)
     right, square = np.zeros(positions.shape), np.zeros((4, 3))
     kernels.arm_products(made, force, right)
@@ -159,24 +151,31 @@ def _moments(entries, linear, inverse, square, taken):
                     taken[3 * m + i, 3 * n + j] = total
 
 
+class Halves(NamedTuple):
+    """The structure tensor, (12, 6) each by the arm and axis."""
+
+    square: np.ndarray  # of w
+    linear: np.ndarray  # of phi
+
+
+@cache
+def halves() -> Halves:
+    """The structure tensor's columns of w and of phi."""
+    tensor = structure_tensor().reshape(12, 12)
+    return Halves(np.ascontiguousarray(tensor[:, :6]), np.ascontiguousarray(tensor[:, 6:]))
+
+
 @nb.njit(cache=True, nogil=True)
-def _information(positions, weights, rate, entries, C, X, inverse, P, square_part, linear):
-    """`information`; ``square_part`` and ``linear`` (12, 6) are the structure tensor's halves."""
+def fisher(positions, weights, rate, entries, C, X, inverse, P, halves):
+    """`information`, compiled; ``entries`` (3, 3, T) are Omega_t, P (3, 3, T) the gyroscopes'."""
     square, taken = np.empty((3, 3)), np.empty((12, 12))
-    _moments(entries, linear, inverse, square, taken)  # what omega_dot and s take up ...
-    left = (square_part - linear @ X).reshape(4, 3, 6)
+    _moments(entries, halves.linear, inverse, square, taken)  # what omega_dot and s take up ...
+    left = (halves.square - halves.linear @ X).reshape(4, 3, 6)
     taken += _rate_gram(rate, C, P, entries, left)  # ... and omega, of the rest
     size = 3 * len(positions) - 3
     out = np.empty((size, size))
     _assemble(positions, weights, square, taken, out)
     return out
-
-
-@cache
-def _halves():
-    """The structure tensor of w and of phi, (12, 6) each."""
-    tensor = structure_tensor().reshape(12, 12)
-    return np.ascontiguousarray(tensor[:, :6]), np.ascontiguousarray(tensor[:, 6:])
 
 
 def information(data: Collapsed, positions, rate, made, reduced) -> np.ndarray:
@@ -187,6 +186,6 @@ def information(data: Collapsed, positions, rate, made, reduced) -> np.ndarray:
     the positions.
     """
     positions = np.ascontiguousarray(positions, float)
-    return _information(
-        positions, data.weights, rate, made[1:], *reduced, data.gyroscope_information, *_halves()
-    )  # fmt: skip
+    return fisher(
+        positions, data.weights, rate, made[1:], *reduced, data.gyroscope_information, halves()
+    )

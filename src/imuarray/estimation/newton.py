@@ -1,23 +1,25 @@
-"""Joint Gauss-Newton of positions and motion for the papers' model, the motion eliminated."""
+"""Joint Gauss-Newton of positions and motion for the papers' model, the motion eliminated.
+
+The whole search is compiled: a step is a tenth of a millisecond's arithmetic, and calls from Python
+would double it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cache
-from threading import Lock
 from typing import NamedTuple
 
+import numba as nb
 import numpy as np
 import scipy.linalg
-from threadpoolctl import ThreadpoolController
 
 from imuarray.errors import IdentifiabilityError
 from imuarray.estimation.bcd import Calibration
-from imuarray.estimation.collapsed import Collapsed, tables
-from imuarray.estimation.information import information, score
+from imuarray.estimation.collapsed import Collapsed, Tables, tables
+from imuarray.estimation.information import Halves, fisher, halves, slope
 from imuarray.estimation.motion_ml import motion_estimate
 from imuarray.estimation.rates import Work, most_likely, workspace
+from imuarray.estimation.threads import one_thread
 
 FAR = 5.0  # length of the step before: the information is computed anew after a longer one
 SLOW = 0.05  # of the step before: and where steps contract less than so
@@ -25,6 +27,13 @@ TRIES = 10  # halvings of a step that raises the cost
 RATE, LIMIT = 1e-10, 50  # of the search for each sample's omega: tolerance, steps
 ROUNDED = 1e-14  # of y' Lambda y: what a cost, a small difference of such, is good to
 SINGULAR = 1e-12  # least pivot of the information, of its diagonal
+BLOCK = 128  # samples whose costs are added first, or a long recording's sum loses digits
+CONVERGED, ENDED, FLAT, WEAK = 1, 0, -1, -2  # how a search ends
+WHY = {
+    FLAT: "positions: expected triads from which omega_dot and s follow, found H'QH singular",
+    WEAK: "calibration: expected informative motion, found a direction of the positions that the"
+    " data do not determine",
+}
 
 
 def descend(
@@ -40,141 +49,214 @@ def descend(
     is below ``tolerance``: no coordinate then moves by more of its own sd. IdentifiabilityError
     where the information is singular.
     """
-    with _one_thread():
-        return _descended(data, start, prior, tolerance, limit, covariance)
-
-
-@cache
-def _blas() -> list:
-    return ThreadpoolController().select(user_api="blas").lib_controllers
-
-
-_LOCK, _HELD = Lock(), []  # threads before, for each descent that runs; the last one restores them
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """BLAS' products are small here: more threads only wait for each other, 5 times as long.
-
-    The limit is the whole process': it stays until the last of several descents at a time ends.
-    """
-    with _LOCK:
-        before = _HELD[0] if _HELD else [library.num_threads for library in _blas()]
-        _HELD.append(before)
-        _set_threads([1] * len(before))
-    try:
-        yield
-    finally:
-        with _LOCK:
-            _HELD.pop()
-            if not _HELD:
-                _set_threads(before)
-
-
-def _set_threads(counts) -> None:
-    for library, count in zip(_blas(), counts, strict=True):
-        library.set_num_threads(count)
-
-
-def _descended(data, start, prior, tolerance, limit, covariance) -> Calibration:
-    # two places, here and there: fresh memory at each step would cost as much as the arithmetic
-    first, spare = (workspace(data.base) for _ in range(2))
-    here = _at(data, np.array(start, float), data.mean, prior, first)
-    curvature, costs, steps, converged, last = None, [here.cost], [0.0], False, np.inf
-    for _ in range(limit):
-        fresh = curvature is None or last > FAR
-        curvature = _curvature(data, here, prior) if fresh else curvature
-        step, size = _step(curvature, here)
-        if not fresh and max(SLOW * last, tolerance) < size:
-            curvature = _curvature(data, here, prior)
-            step, size = _step(curvature, here)
-        if size < tolerance:
-            converged = True
-            break
-        there, length = _shortened(data, here, step, prior, spare)
-        if there is None:
-            break  # no shorter step lowers the cost: not converged, and said so
-        here, spare, last = there, here.work, size
-        costs.append(here.cost)
-        steps.append(float(np.max(np.abs(length * step))))
-    width = np.linalg.inv(_information(data, here, prior)) if covariance else None
+    given = Given(
+        data.specific_force, data.energy, data.base, data.mean, data.gyroscope_information,
+        data.weights, *_prior(prior), tables(), halves(),
+    )  # fmt: skip
+    start = np.array(start, float)
+    with one_thread():
+        here, costs, steps, status = _search(given, start, tolerance, limit)
+        width = _covariance(given, here) if covariance and status not in WHY else None
+        if status in WHY or (covariance and width is None):
+            raise IdentifiabilityError(WHY.get(status, WHY[WEAK]))
     work = here.work
     return Calibration(
         here.positions, motion_estimate(data, here.rate, work.state, here.costs, work.counts),
-        np.array(costs), np.array(steps), converged, here.positions[None], width, np.empty(0),
+        costs, steps, status == CONVERGED, here.positions[None], width, np.empty(0),
     )  # fmt: skip
 
 
-class Point(NamedTuple):
+def _covariance(given, here):
+    """The information's inverse, None where it is singular."""
+    factor = np.empty((here.slope.size,) * 2)
+    if not _curvature(given, here, factor):
+        return None
+    # the transpose is LAPACK's order; it fills one half
+    half = np.tril(scipy.linalg.lapack.dpotri(factor.T, lower=1, overwrite_c=1)[0])
+    return half + np.tril(half, -1).T
+
+
+def _prior(prior):
+    if prior is None:
+        return _none()
+    return tuple(np.ascontiguousarray(part, float) for part in prior)
+
+
+@cache
+def _none():
+    return np.empty(0), np.empty((0, 0))
+
+
+class Given(NamedTuple):
+    """Data, prior and tables of a search; `Collapsed` tells what they are."""
+
+    force: np.ndarray  # (A, 3, T)
+    energy: np.ndarray  # (T,)
+    base: np.ndarray  # (3, T)
+    mean: np.ndarray  # (3, T)
+    rate_information: np.ndarray  # (3, 3, T)
+    weights: np.ndarray  # (A,)
+    prior_mean: np.ndarray  # (3 (A - 1),), or (0,) for none
+    prior_precision: np.ndarray  # its square
+    tables: Tables
+    halves: Halves
+
+
+class Place(NamedTuple):
     """Positions, the most likely motion there, and how good both are."""
 
     positions: np.ndarray  # (A, 3)
     rate: np.ndarray  # (3, T)
-    work: Work  # the motion, and what led to it
-    cost: float  # twice the negative log posterior
-    costs: np.ndarray  # (T,) of it, each sample's
-    slope: np.ndarray  # (3 (A - 1),), half the cost's fall
+    costs: np.ndarray  # (T,) of twice the negative log likelihood
+    slope: np.ndarray  # (3 (A - 1),), half the cost's fall, the prior's included
+    work: Work
 
 
-def _at(data: Collapsed, positions, rate, prior, work) -> Point:
-    """The motion is searched from ``rate`` (3, T); fills ``work``."""
-    rate = rate.copy()
+@nb.njit(cache=True, nogil=True)
+def _place(given, positions):
+    return Place(
+        positions.copy(), given.mean.copy(), np.empty(given.energy.size),
+        np.empty(3 * len(positions) - 3), workspace(given.base),
+    )  # fmt: skip
+
+
+@nb.njit(cache=True, nogil=True)
+def _search(given, start, tolerance, limit):
+    """(where it ends, costs and position steps (n,), how it ended)."""
+    here, there = _place(given, start), _place(given, start)
+    costs, steps = np.zeros(limit + 1), np.zeros(limit + 1)
+    size, enough = here.slope.size, ROUNDED * given.energy.sum()
+    factor, step, last, known = np.empty((size, size)), np.empty(size), np.inf, False
+    costs[0] = _evaluate(given, here)
+    if np.isnan(costs[0]):
+        return here, costs[:1], steps[:1], FLAT
+    for taken in range(limit):
+        fresh = not known or last > FAR
+        if fresh and not _curvature(given, here, factor):
+            return here, costs[: taken + 1], steps[: taken + 1], WEAK
+        known, length = True, _solve(factor, here.slope, step)
+        if not fresh and length > max(SLOW * last, tolerance):
+            if not _curvature(given, here, factor):
+                return here, costs[: taken + 1], steps[: taken + 1], WEAK
+            length = _solve(factor, here.slope, step)
+        if length < tolerance:
+            return here, costs[: taken + 1], steps[: taken + 1], CONVERGED
+        share, cost = _shortened(given, here, there, step, costs[taken] + enough)
+        if np.isnan(cost):
+            return here, costs[: taken + 1], steps[: taken + 1], FLAT
+        if share == 0.0:  # no shorter step lowers the cost: not converged, and said so
+            return here, costs[: taken + 1], steps[: taken + 1], ENDED
+        # places change hands: memory anew at each step would cost as much as the arithmetic
+        here, there, last = there, here, length
+        costs[taken + 1], steps[taken + 1] = cost, share * np.max(np.abs(step))
+    return here, costs, steps, ENDED
+
+
+@nb.njit(cache=True, nogil=True)
+def _evaluate(given, place):
+    """Twice the negative log posterior at the place, NaN where H'QH is singular.
+
+    Fills the rest of it; the motion is searched from its rate.
+    """
+    work, known = place.work, given.tables
     logdet = most_likely(
-        positions, data.specific_force, data.energy, data.mean, data.gyroscope_information,
-        data.weights, *tables(), rate, RATE, LIMIT, work,
+        place.positions, given.force, given.energy, given.mean, given.rate_information,
+        given.weights, known.rows, known.values, known.pairs, known.products, place.rate, RATE,
+        LIMIT, work,
     )  # fmt: skip
     if np.isnan(logdet):
-        raise IdentifiabilityError(
-            "positions: expected triads from which omega_dot and s follow, found H'QH singular"
-        )
-    cost = work.cost + work.const
-    total = float(cost.sum())
-    slope = score(data, positions, work.state, work.arms)[1:].ravel()
-    if prior is not None:
-        away = positions[1:].ravel() - prior[0]
-        pull = prior[1] @ away
-        total, slope = total + float(away @ pull), slope - pull
-    return Point(positions, rate, work, total, cost, slope)
+        return np.nan
+    total = 0.0
+    for first in range(0, place.costs.size, BLOCK):
+        part = 0.0
+        for t in range(first, min(first + BLOCK, place.costs.size)):
+            place.costs[t] = work.cost[t] + work.const[t]
+            part += place.costs[t]
+        total += part
+    by_triad = slope(
+        place.positions, given.force, given.weights, work.state, known.rows, known.values, work.arms
+    )
+    flat = place.positions.reshape(-1)[3:]
+    place.slope[:] = by_triad.reshape(-1)[3:]
+    for i in range(given.prior_mean.size):
+        pull = 0.0
+        for j in range(given.prior_mean.size):
+            pull += given.prior_precision[i, j] * (flat[j] - given.prior_mean[j])
+        total += (flat[i] - given.prior_mean[i]) * pull
+        place.slope[i] -= pull
+    return total
 
 
-def _information(data: Collapsed, here: Point, prior) -> np.ndarray:
-    work = here.work
-    reduced = work.C, work.X, work.inverse
-    known = information(data, here.positions, here.rate, work.arms, reduced)
-    return known if prior is None else known + prior[1]
+@nb.njit(cache=True, nogil=True)
+def _shortened(given, here, there, step, enough):
+    """(share of the step, cost): ``there`` is where the cost is ``enough``, halved where need be.
 
-
-def _curvature(data: Collapsed, here: Point, prior) -> np.ndarray:
-    """The Fisher information's lower Cholesky factor."""
-    known = _information(data, here, prior)
-    whole = known.diagonal().copy()
-    # the transpose of what is symmetric: LAPACK's order, factored in place
-    factor, failed = scipy.linalg.lapack.dpotrf(known.T, lower=1, overwrite_a=1)
-    if failed or not np.min(factor.diagonal() ** 2 / whole) >= SINGULAR:  # NaN is none either
-        raise IdentifiabilityError(
-            "calibration: expected informative motion, found a direction of the positions that the"
-            " data do not determine"
-        )
-    return factor
-
-
-def _step(curvature, here: Point):
-    """(step, its length in the information's metric: no coordinate moves by more sds)."""
-    step = scipy.linalg.lapack.dpotrs(curvature, here.slope, lower=1)[0]
-    return step, float(np.sqrt(max(step @ here.slope, 0.0)))
-
-
-def _shortened(data: Collapsed, here: Point, step, prior, work):
-    """(where the cost is no higher, share of the step), halved where need be; or (None, 0).
-
-    Fills ``work``, which is not ``here``'s.
+    The share is 0 where no try is; the cost NaN where H'QH is singular.
     """
-    length = 1.0
+    share = 1.0
     for _ in range(TRIES):
-        moved = here.positions.copy()
-        moved[1:] += length * step.reshape(-1, 3)
-        there = _at(data, moved, here.rate, prior, work)
-        if there.cost <= here.cost + ROUNDED * data.energy.sum():
-            return there, length
-        length /= 2
-    return None, 0.0
+        there.positions[:] = here.positions
+        flat = there.positions.reshape(-1)
+        for i in range(step.size):
+            flat[3 + i] += share * step[i]
+        there.rate[:] = here.rate
+        cost = _evaluate(given, there)
+        if cost <= enough or np.isnan(cost):
+            return share, cost
+        share /= 2.0
+    return 0.0, cost
+
+
+@nb.njit(cache=True, nogil=True)
+def _information(given, place):
+    """The Fisher information of the positions, the prior's included."""
+    work = place.work
+    known = fisher(
+        place.positions, given.weights, place.rate, work.arms[1:], work.C, work.X, work.inverse,
+        given.rate_information, given.halves,
+    )  # fmt: skip
+    for i in range(given.prior_mean.size):
+        known[i] += given.prior_precision[i]
+    return known
+
+
+@nb.njit(cache=True, nogil=True)
+def _curvature(given, place, factor):
+    """The information's Cholesky factor, above the diagonal; False where it is singular.
+
+    By hand, for LAPACK's is not there in compiled code but as an exception: each row in turn is
+    taken off those below, in vectors.
+    """
+    factor[:] = _information(given, place)
+    size = len(factor)
+    whole, row = np.diag(factor).copy(), np.empty(size)
+    for k in range(size):
+        if not factor[k, k] >= SINGULAR * whole[k]:  # NaN is none either
+            return False
+        scale = 1.0 / np.sqrt(factor[k, k])
+        for i in range(k, size):
+            row[i] = factor[k, i] * scale
+            factor[k, i] = row[i]
+        for j in range(k + 1, size):
+            scale, target, source = row[j], factor[j, j:], row[j:]
+            for i in range(target.size):
+                target[i] -= scale * source[i]
+    return True
+
+
+@nb.njit(cache=True, nogil=True)
+def _solve(factor, slope, step):
+    """Fills ``step``; returns its length in the information's metric: no coordinate moves by
+    more sds."""
+    size = step.size
+    step[:] = slope
+    for k in range(size):
+        step[k] /= factor[k, k]
+        for i in range(k + 1, size):
+            step[i] -= factor[k, i] * step[k]
+    length = np.sqrt(np.sum(step * step))
+    for k in range(size - 1, -1, -1):
+        for i in range(k + 1, size):
+            step[k] -= factor[k, i] * step[i]
+        step[k] /= factor[k, k]
+    return length
