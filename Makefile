@@ -25,7 +25,7 @@ help:
 	@echo "make bench   the benchmarks"
 	@echo "make docs    the documentation as a site to open without a network: site/index.html"
 	@echo "make lint    ruff, mypy, snakefmt and snakemake --lint"
-	@echo "make lock    resolve pyproject.toml into requirements.lock anew (needs uv)"
+	@echo "make lock    resolve pyproject.toml into the two lock files anew (needs uv)"
 	@echo "make clean   remove the environment and the caches, not the results"
 
 # The stamp is newer than the lock: nothing is installed again until the lock or the project changes.
@@ -59,11 +59,10 @@ bench: $(READY)
 	$(BIN)/python benchmarks/run.py
 
 # The site's tools have an environment of their own: they read the package's source and do not run it.
-$(DOCS)/.installed: pyproject.toml
+$(DOCS)/.installed: requirements-docs.lock
 	rm -rf $(DOCS)
 	$(PYTHON) -m venv $(DOCS)
-	$(DOCS)/bin/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["docs"], sep="\n")' > $(DOCS)/requirements.txt
-	$(DOCS)/bin/python -m pip install --quiet --disable-pip-version-check -r $(DOCS)/requirements.txt
+	$(DOCS)/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-docs.lock
 	touch $@
 
 docs: $(DOCS)/.installed
@@ -79,6 +78,8 @@ lint: $(READY)
 lock:
 	uv pip compile pyproject.toml --universal --python-version 3.11 --extra test --extra build \
 	    --generate-hashes --no-header --quiet -o requirements.lock
+	$(PYTHON) -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["docs"], sep="\n")' | \
+	    uv pip compile - --universal --python-version 3.11 --generate-hashes --no-header --quiet -o requirements-docs.lock
 
 clean:
 	rm -rf $(VENV) $(DOCS) site build dist src/*.egg-info .pytest_cache .ruff_cache .hypothesis
