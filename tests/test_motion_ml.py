@@ -164,8 +164,8 @@ def test_all_samples_together_are_each_alone(accelerometers, limit):
     saturated = np.zeros(rate.shape, bool)
     saturated[::2] = True  # nothing but accelerometers: steps have to be damped
     data = Collapsed.of(model, force, rate, saturated)
-    C, b, *_ = data.reduce(model.array.relative)
-    given = C, b, data.mean, data.gyroscope_information, 1e-10
+    reduced, _ = data.reduce(model.array.relative)
+    given = reduced.C, reduced.b, data.mean, data.gyroscope_information, 1e-10
     together, cost, counts = data.mean.copy(), np.empty(400), np.empty(400, np.int64)
     rates.angular_rates(together, *given, limit, cost, counts)
     alone, price, steps = data.mean.copy(), np.empty(400), np.empty(400, np.int64)
@@ -185,7 +185,8 @@ def test_all_samples_together_are_each_alone(accelerometers, limit):
 def test_what_is_not_finite_is_not_found():
     _, model, _, force, rate = problem()
     data = Collapsed.of(model, force, rate)
-    C, b, *_ = data.reduce(model.array.relative)
+    reduced, _ = data.reduce(model.array.relative)
+    C, b = reduced.C, reduced.b
     b[:, 3], b[:, 5] = np.nan, np.inf
     found, cost, counts = data.mean.copy(), np.empty(12), np.empty(12, np.int64)
     rates.angular_rates(found, C, b, data.mean, data.gyroscope_information, 1e-10, 50, cost, counts)

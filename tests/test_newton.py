@@ -7,16 +7,18 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from imuarray.errors import IdentifiabilityError, InputError
-from imuarray.estimation import calibrate_gauss_newton
+from imuarray.estimation import calibrate_gauss_newton, newton
 from imuarray.estimation.blocks import normal_equations
 from imuarray.estimation.blocks import problem as problem_of
-from imuarray.estimation.collapsed import Collapsed
+from imuarray.estimation.collapsed import Collapsed, tables
 from imuarray.estimation.gauss_newton import calibrate_blocks
+from imuarray.estimation.information import arms, halves, information
 from imuarray.estimation.newton import descend
 from imuarray.estimation.online import Online
 from imuarray.estimation.threads import one_thread
 from imuarray.model import EFFECTS, ArrayModel, Noise
 from imuarray.model.array_model import EffectPrior
+from imuarray.model.structure import products
 from imuarray.motion import normal_motion
 from imuarray.simulation import measure as measured
 from imuarray.studies.bound import information_at
@@ -174,8 +176,68 @@ def test_nan_information_is_refused():
     _, force, rate = simulate(rng, model, 20)
     data = Collapsed.of(model, force, rate)
     data.gyroscope_information[..., 3] = np.nan
-    with pytest.raises(IdentifiabilityError):
+    with pytest.raises(IdentifiabilityError, match="informative motion"):
         descend(data, model.array.relative)
+
+
+@pytest.mark.parametrize("still", ["motion", "weight"])
+def test_information_that_is_zero_is_refused(still):
+    rng = np.random.default_rng(3)
+    model = ArrayModel(small_array(4, 4), noises(rng, 4, 4)["isotropic"])
+    _, force, rate = simulate(rng, model, 20)
+    if still == "motion":
+        force, rate = np.zeros_like(force), np.zeros_like(rate)
+    data = Collapsed.of(model, force, rate)
+    if still == "weight":
+        data.weights[2] = 0.0
+    with pytest.raises(IdentifiabilityError, match="informative motion"):
+        descend(data, model.array.relative)
+
+
+def test_a_prior_of_another_size_is_refused():
+    rng = np.random.default_rng(3)
+    model = ArrayModel(small_array(4, 4), noises(rng, 4, 4)["isotropic"])
+    _, force, rate = simulate(rng, model, 20)
+    for size in (3, 12):
+        with pytest.raises(InputError, match=r"position prior: expected a mean \(9,\)"):
+            calibrate_gauss_newton(model, force, rate, position_prior=(np.zeros(size), 1e-3))
+
+
+@pytest.mark.parametrize("limit", [-1, 0, 1, 2])
+def test_covariance_is_of_where_a_search_stopped(limit):
+    rng = np.random.default_rng(3)
+    model = ArrayModel(small_array(5, 4), noises(rng, 5, 4)["isotropic"])
+    _, force, rate = simulate(rng, model, 20)
+    data = Collapsed.of(model, force, rate)
+    start = np.asfortranarray(model.array.relative + 1e-3 * rng.standard_normal((5, 3)))
+    found = descend(data, start, limit=limit, tolerance=0)
+    assert not found.converged and len(found.cost) == max(limit, 0) + 1
+    moved = np.ascontiguousarray(found.motion.motion.angular_rate.T)
+    state = np.zeros((12, 20))
+    state[:6] = products(moved.T).T
+    state[6:9] = found.motion.motion.angular_acceleration.T
+    reduced, _ = data.reduce(found.positions)
+    known = information(data, found.positions, moved, arms(state), reduced)
+    np.testing.assert_allclose(found.covariance, np.linalg.inv(known), rtol=1e-9)
+
+
+def test_covariance_where_no_shorter_step_is_better():
+    """A search that ends after refused steps: the information is of where it stayed."""
+    rng = np.random.default_rng(3)
+    model = ArrayModel(small_array(5, 4), noises(rng, 5, 4)["isotropic"])
+    _, force, rate = simulate(rng, model, 20)
+    data = Collapsed.of(model, force, rate)
+    given = newton.Given(
+        data.specific_force, data.energy, data.base, data.mean, data.gyroscope_information,
+        data.weights, np.empty(0), np.empty((0, 0)), tables(), halves(),
+    )  # fmt: skip
+    here, there = (newton._place(given, model.array.relative) for _ in range(2))
+    cost, _ = newton._evaluate(given, here)
+    before = newton._information(given, here)
+    uphill = -1e-3 * here.slope / np.abs(here.slope).max()
+    share, _, sound = newton._shortened(given, here, there, uphill, cost - 1.0)
+    assert share == 0.0 and sound
+    np.testing.assert_array_equal(newton._information(given, here), before)
 
 
 def test_shared_noise_is_no_triads_own():

@@ -13,6 +13,7 @@ from imuarray.recording import Recording
 from imuarray.studies.bayes import sample_covariance
 
 GAP = 1e-3  # nats in total
+UNSETTLED = "the search for the posterior's mode did not converge; chains start from where it ended"
 VARIANCE = 0.1  # wanted of log p-hat, section III-C of paper 2021
 
 
@@ -102,6 +103,8 @@ def _mode(recording, model, spread: bool, say: Say):
 
     if spread:
         found = locate(recording, recording.accelerometer_noise_sd)
+        if not found.converged:
+            say(UNSETTLED)
         return found.mean[1:].ravel(), found.covariance
     mode, found = map_estimate(recording, model, say)
     return mode, found.covariance
@@ -110,8 +113,8 @@ def _mode(recording, model, spread: bool, say: Say):
 def map_estimate(recording: Recording, model: ArrayModel, say: Say = silent):
     """(p (P,) at the posterior's mode, the estimator's whole result).
 
-    Says so where the search did not converge: the posterior does not depend on it, how soon the
-    chains get there does.
+    Says so where the search did not converge. Chains start from where it ended; with effects the
+    motion's prior takes its size from there, too.
     """
     from imuarray.estimation import calibrate_gauss_newton
 
@@ -122,8 +125,7 @@ def map_estimate(recording: Recording, model: ArrayModel, say: Say = silent):
         time=recording.time,
     )  # fmt: skip
     if not found.converged:
-        say("the search for the posterior's mode did not converge; chains start from where it"
-            " ended: trust their R-hat and ESS, not the start")  # fmt: skip
+        say(UNSETTLED)
     extra = np.empty(0) if found.effect_parameters is None else found.effect_parameters
     return np.concatenate([found.positions[1:].ravel(), extra]), found
 

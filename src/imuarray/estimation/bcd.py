@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba as nb
 import numpy as np
 
+from imuarray.compiled import njit
 from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.estimation import kernels
 from imuarray.estimation.collapsed import Collapsed, tables
@@ -37,7 +37,7 @@ class Calibration:
     effect_parameters: np.ndarray | None = None
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def _position_block(force, state, rows, values, A, positions):
     """Line 10-13 of Algorithm 1: least squares for r_2 ... r_K; returns the largest step.
 
@@ -70,7 +70,7 @@ def _position_block(force, state, rows, values, A, positions):
     return largest
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def descend(
     force, energy, base, mean, P, weights, rows, values, pairs, products, positions,
     tolerance, cost_tolerance, limit, marks, snapshots, cost_trace, step_trace,
@@ -80,11 +80,11 @@ def descend(
     Returns (iterations, status): status 1 converged, 0 stopped at the limit, -1 sum A'A
     singular, -2 H' Lambda H singular.
     """
-    work, rate = workspace(base), mean.copy()
+    work, rate = workspace(energy.size), mean.copy()
     mark = 0
     for iteration in range(limit):
         logdet = most_likely(
-            positions, force, energy, mean, P, weights, rows, values, pairs, products,
+            positions, force, energy, base, mean, P, weights, rows, values, pairs, products,
             rate, 1e-7, 50, work,
         )  # fmt: skip
         if np.isnan(logdet):
@@ -92,7 +92,7 @@ def descend(
         step = _position_block(force, work.state, rows, values, work.arms, positions)
         if step < 0.0:
             return iteration, -1
-        cost_trace[iteration] = work.cost.sum() + work.const.sum()
+        cost_trace[iteration] = work.cost.sum() + work.reduced.const.sum()
         step_trace[iteration] = step
         while mark < len(marks) and marks[mark] == iteration + 1:
             snapshots[mark] = positions
@@ -207,7 +207,7 @@ def require_rotation(data: Collapsed, positions) -> None:
     acceleration = motion_from(data, positions).motion.angular_acceleration
     along = acceleration @ axis[2][0]
     across = np.sqrt(np.mean(np.sum(acceleration**2, axis=1) - along**2))
-    inverse = data.reduce(positions)[-1]
+    inverse = data.reduce(positions)[0].inverse
     feigned = 0.1 * np.hypot(np.sqrt(np.mean(along**2)), np.mean(data.mean**2) * 3)
     if across <= max(feigned, 5 * np.sqrt(2 * np.max(np.diag(inverse)[:3]))):
         explain(-1)

@@ -99,31 +99,15 @@ class Collapsed:
             return _weighted(self.precision, self.specific_force)
         return self.weights[:, None, None] * self.specific_force
 
-    def reduce(self, positions):
-        """Eliminate phi at ``positions`` (A, 3).
-
-        Returns C (6, 6), b (6, T), X (6, 6), phi (6, T), const (T,), log |H' Lambda H| and
-        (H' Lambda H)^-1 (6, 6), named as in `imuarray.estimation.kernels`.
-        """
-        known = tables()
-        K, C, X, inverse = np.empty((12, 12)), *np.empty((3, 6, 6))
+    def reduce(self, positions) -> tuple[kernels.Reduced, float]:
+        """(the recording with phi eliminated at ``positions`` (A, 3), log |H' Lambda H|)."""
+        known, out = tables(), kernels.reduced(self.samples)
         positions = np.ascontiguousarray(positions, float)
         if self.weights is None:
-            kernels.information_general(positions, self.precision, structure_tensor(), K)
+            kernels.information_general(positions, self.precision, structure_tensor(), out.K)
             arms, force = positions, self.weighted
         else:
-            kernels.information(positions, self.weights, known.pairs, known.products, K)
+            kernels.information(positions, self.weights, known.pairs, known.products, out.K)
             arms, force = self.weights[:, None] * positions, self.specific_force
-        logdet = kernels.eliminate(K, C, X, inverse)
-        moments = np.empty((4, 3, self.samples))
-        moments[0] = self.base
-        kernels.weighted_moments(arms, force, moments)
-        full = np.empty((12, self.samples))
-        kernels.project(moments, known.rows, known.values, full)
-        b, phi, const = (
-            np.empty((6, self.samples)),
-            np.empty((6, self.samples)),
-            np.empty(self.samples),
-        )
-        kernels.reduce_linear(full, X, inverse, b, phi, const, self.energy)
-        return C, b, X, phi, const, logdet, inverse
+        logdet = kernels.reduce(arms, force, self.base, self.energy, known.rows, known.values, out)
+        return out, logdet

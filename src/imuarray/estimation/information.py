@@ -11,9 +11,9 @@ from __future__ import annotations
 from functools import cache
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 
+from imuarray.compiled import njit
 from imuarray.estimation import kernels
 from imuarray.estimation.collapsed import Collapsed, tables
 from imuarray.estimation.rates import lower, precision_at, rate_information
@@ -29,7 +29,7 @@ def arms(state) -> np.ndarray:
     return out
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def slope(positions, force, weights, state, rows, values, made):
     """Half the cost's fall per metre of each position, (A, 3), at the motion ``state`` (12, T).
 
@@ -49,7 +49,7 @@ def slope(positions, force, weights, state, rows, values, made):
     return right
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@njit(error_model="numpy")
 def _whitened(rate, C, P, first, size, Z):
     """Z = dw/domega F'^-1 (6, 3, TILE) of ``size`` samples, F F' the information of omega_t.
 
@@ -78,7 +78,7 @@ def _whitened(rate, C, P, first, size, Z):
         Z[5, 1, i], Z[5, 2, i] = f1, (y - fzy * f1) * iz
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def _rate_gram(rate, C, P, entries, left):
     """sum_t U_t U_t' (12, 12), U_t = (Omega_t left_m dw/domega F'^-1) for m = 0 .. 3, (12, 3).
 
@@ -109,7 +109,7 @@ def _rate_gram(rate, C, P, entries, left):
     return found
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def _assemble(positions, weights, square, taken, out):
     """diag(weights) (x) square less U taken U', row k of U weights[k] (1, r_k) (x) I; k > 1."""
     row = np.empty((3, 12))
@@ -128,7 +128,7 @@ def _assemble(positions, weights, square, taken, out):
                 out[3 * k - 3 + i, 3 * k - 3 + j] += weight * square[i, j]
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def _moments(entries, linear, inverse, square, taken):
     """Fills square (3, 3) = sum_t Omega_t Omega_t', and taken (12, 12) by omega_dot and s.
 
@@ -165,27 +165,28 @@ def halves() -> Halves:
     return Halves(np.ascontiguousarray(tensor[:, :6]), np.ascontiguousarray(tensor[:, 6:]))
 
 
-@nb.njit(cache=True, nogil=True)
-def fisher(positions, weights, rate, entries, C, X, inverse, P, halves):
+@njit
+def fisher(positions, weights, rate, entries, found, P, halves):
     """`information`, compiled; ``entries`` (3, 3, T) are Omega_t, P (3, 3, T) the gyroscopes'."""
     square, taken = np.empty((3, 3)), np.empty((12, 12))
-    _moments(entries, halves.linear, inverse, square, taken)  # what omega_dot and s take up ...
-    left = (halves.square - halves.linear @ X).reshape(4, 3, 6)
-    taken += _rate_gram(rate, C, P, entries, left)  # ... and omega, of the rest
+    _moments(
+        entries, halves.linear, found.inverse, square, taken
+    )  # what omega_dot and s take up ...
+    left = (halves.square - halves.linear @ found.X).reshape(4, 3, 6)
+    taken += _rate_gram(rate, found.C, P, entries, left)
     size = 3 * len(positions) - 3
     out = np.empty((size, size))
     _assemble(positions, weights, square, taken, out)
     return out
 
 
-def information(data: Collapsed, positions, rate, made, reduced) -> np.ndarray:
+def information(data: Collapsed, positions, rate, made, found) -> np.ndarray:
     """Fisher information (3 (A - 1), 3 (A - 1)) of r_2 ... r_A, 1 / m^2, the motion unknown.
 
-    ``rate`` (3, T) and ``made`` (4, 3, T), its `arms`, are the motion, ``reduced`` C, X and
-    (H' Lambda H)^-1 of the kernels at ``positions`` (A, 3). Its inverse is the Cramer-Rao bound of
-    the positions.
+    ``rate`` (3, T) and ``made`` (4, 3, T), its `arms`, are the motion, ``found`` the data's
+    `kernels.Reduced` at ``positions`` (A, 3). Its inverse is the Cramer-Rao bound of the positions.
     """
     positions = np.ascontiguousarray(positions, float)
     return fisher(
-        positions, data.weights, rate, made[1:], *reduced, data.gyroscope_information, halves()
+        positions, data.weights, rate, made[1:], found, data.gyroscope_information, halves()
     )

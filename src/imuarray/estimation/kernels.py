@@ -6,15 +6,18 @@ C = B' S B (6, 6) and b_t = B' S y_t (6), so the quadratic form of (26a) is
 const_t - 2 b_t . w + w' C w. Time is the last, contiguous axis everywhere.
 """
 
-import numba as nb
+from typing import NamedTuple
+
 import numpy as np
+
+from imuarray.compiled import njit
 
 # For sums over samples only: the compiler may then add in vectors. Elsewhere the order as written,
 # or results would depend on whether a kernel was compiled or came from the cache.
 FAST = {"reassoc", "contract", "nsz"}
 
 
-@nb.njit(cache=True, nogil=True, fastmath=FAST)
+@njit(fastmath=FAST)
 def arrange(force, weights, centred, offset, energy, total):
     """force (T, A, 3) with time last and each sample's mean over triads taken out.
 
@@ -42,7 +45,7 @@ def arrange(force, weights, centred, offset, energy, total):
         energy[t] = square
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def weighted_moments(positions, z, moments):
     """moments[i] = sum_k r_ki z_k for i = 1..3; (4, 3, T) from z (A, 3, T). Row 0 is kept.
 
@@ -70,7 +73,7 @@ def weighted_moments(positions, z, moments):
                 moments[3, c, t] += h * value
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def information(positions, weights, pairs, values, out):
     """K = sum_k lambda_k G_k' G_k (12, 12) for isotropic triads with weights (A,).
 
@@ -93,7 +96,7 @@ def information(positions, weights, pairs, values, out):
         out[a, b] += second[i, j] * values[p]
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def information_general(positions, precision, tensor, out):
     """K = G' Lambda G for any precision (3A, 3A), cross-talk included."""
     count = len(positions)
@@ -108,7 +111,7 @@ def information_general(positions, precision, tensor, out):
     out[:] = design.T @ (precision @ design)
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def eliminate(K, C, X, inverse):
     """Schur complement of phi: fills C (6, 6), X = Kpp^-1 Kpw, Kpp^-1; returns log |Kpp|.
 
@@ -149,7 +152,7 @@ def eliminate(K, C, X, inverse):
     return logdet
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def project(moments, rows, values, full):
     """full = G' Lambda y_t, (12, T), from the moments and the tensor's few entries."""
     full[:] = 0.0
@@ -160,7 +163,7 @@ def project(moments, rows, values, full):
             full[a, t] += value * moments[i, c, t]
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def reduce_linear(full, X, inverse, b, phi, const, energy):
     """b = B' S y (6, T), phi = Kpp^-1 H' Lambda y (6, T), const = y' S' y (T,)."""
     samples = full.shape[1]
@@ -177,7 +180,48 @@ def reduce_linear(full, X, inverse, b, phi, const, energy):
             const[t] -= phi[a, t] * full[6 + a, t]
 
 
-@nb.njit(cache=True, nogil=True, inline="always")
+class Reduced(NamedTuple):
+    """A recording at some positions with phi eliminated, and the memory to get there."""
+
+    K: np.ndarray  # (12, 12)
+    C: np.ndarray  # (6, 6)
+    X: np.ndarray  # (6, 6)
+    inverse: np.ndarray  # (6, 6) Kpp^-1
+    b: np.ndarray  # (6, T)
+    phi: np.ndarray  # (6, T) the most likely at omega = 0
+    const: np.ndarray  # (T,)
+    moments: np.ndarray  # (4, 3, T)
+    full: np.ndarray  # (12, T)
+
+
+@njit
+def reduced(samples):
+    """Memory of a `Reduced` of T = ``samples``."""
+    return Reduced(
+        np.empty((12, 12)), np.empty((6, 6)), np.empty((6, 6)), np.empty((6, 6)),
+        np.empty((6, samples)), np.empty((6, samples)), np.empty(samples),
+        np.empty((4, 3, samples)), np.empty((12, samples)),
+    )  # fmt: skip
+
+
+@njit
+def reduce(arms, force, base, energy, rows, values, out):
+    """Fill ``out`` from its K on; returns log |H' Lambda H|, NaN (and stops) where singular.
+
+    ``arms`` (A, 3) and ``force`` (A, 3, T) are the positions and Lambda y, or the positions times
+    the triads' weights and y; ``base`` (3, T) = sum_k (Lambda y)_k, ``energy`` (T,) = y' Lambda y.
+    """
+    logdet = eliminate(out.K, out.C, out.X, out.inverse)
+    if np.isnan(logdet):
+        return logdet
+    out.moments[0] = base
+    weighted_moments(arms, force, out.moments)
+    project(out.moments, rows, values, out.full)
+    reduce_linear(out.full, out.X, out.inverse, out.b, out.phi, out.const, energy)
+    return logdet
+
+
+@njit(inline="always")
 def quadratic(x, y, z, C, b0, b1, b2, b3, b4, b5):
     """w' C w - 2 b . w at omega = (x, y, z)."""
     w0, w1, w2, w3, w4, w5 = x * x, y * y, z * z, x * y, x * z, y * z
@@ -195,7 +239,7 @@ def quadratic(x, y, z, C, b0, b1, b2, b3, b4, b5):
     return q
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def linear_motion(rate, X, phi, state):
     """state (12, T) = (w, phi_hat) with phi_hat = Kpp^-1 H' Lambda y - X w."""
     for t in range(rate.shape[1]):
@@ -210,7 +254,7 @@ def linear_motion(rate, X, phi, state):
                 state[6 + a, t] -= scale * state[m, t]
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def arms(state, rows, values, out):
     """The predicted force is out[0] + sum_i r_i out[i + 1]: (4, axis, T) from (w, phi) (12, T).
 
@@ -223,7 +267,7 @@ def arms(state, rows, values, out):
             out[i, c, t] += values[e] * state[a, t]
 
 
-@nb.njit(cache=True, nogil=True, fastmath=FAST)
+@njit(fastmath=FAST)
 def arm_products(arms, force, out):
     """out[k, i] += sum over c and t of arms[i + 1, c, t] force[k, c, t], for i = 0 .. 2.
 

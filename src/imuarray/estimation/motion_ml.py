@@ -65,7 +65,7 @@ def motion_from(
     data: Collapsed, positions, tolerance=1e-10, limit=50, start=None
 ) -> MotionEstimate:
     """`estimate_motion` for data already arranged, from ``start`` (T, 3) rad/s if given."""
-    C, b, X, phi, const, logdet, _ = data.reduce(positions)
+    found, logdet = data.reduce(positions)
     if np.isnan(logdet):
         raise IdentifiabilityError(
             "positions: expected triads from which omega_dot and s follow, found H'QH singular"
@@ -73,11 +73,12 @@ def motion_from(
     rate = data.mean.copy() if start is None else np.array(start.T, order="C")
     cost, iterations = np.empty(data.samples), np.empty(data.samples, np.int64)
     angular_rates(
-        rate, C, b, data.mean, data.gyroscope_information, tolerance, limit, cost, iterations
-    )
+        rate, found.C, found.b, data.mean, data.gyroscope_information, tolerance, limit, cost,
+        iterations,
+    )  # fmt: skip
     state = np.empty((12, data.samples))
-    kernels.linear_motion(rate, X, phi, state)
-    return motion_estimate(data, rate, state, cost + const, iterations)
+    kernels.linear_motion(rate, found.X, found.phi, state)
+    return motion_estimate(data, rate, state, cost + found.const, iterations)
 
 
 def motion_estimate(data: Collapsed, rate, state, cost, iterations) -> MotionEstimate:
@@ -88,9 +89,9 @@ def motion_estimate(data: Collapsed, rate, state, cost, iterations) -> MotionEst
 
 def motion_at(data: Collapsed, positions, rate) -> Motion:
     """The most likely rest of the motion where omega is ``rate`` (T, 3) rad/s."""
-    _, _, X, phi, *_ = data.reduce(positions)
+    found, _ = data.reduce(positions)
     state = np.empty((12, data.samples))
-    kernels.linear_motion(np.array(np.asarray(rate).T, order="C"), X, phi, state)
+    kernels.linear_motion(np.array(np.asarray(rate).T, order="C"), found.X, found.phi, state)
     return _motion_of(data, rate, state)
 
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 from functools import cache
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 import scipy.linalg
 
-from imuarray.errors import IdentifiabilityError
+from imuarray.compiled import njit
+from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.estimation.bcd import Calibration
 from imuarray.estimation.collapsed import Collapsed, Tables, tables
 from imuarray.estimation.information import Halves, fisher, halves, slope
@@ -51,9 +51,10 @@ def descend(
     """
     given = Given(
         data.specific_force, data.energy, data.base, data.mean, data.gyroscope_information,
-        data.weights, *_prior(prior), tables(), halves(),
+        data.weights, *_prior(prior, data), tables(), halves(),
     )  # fmt: skip
-    start = np.array(start, float)
+    # one layout and one type each, or all would be compiled again
+    start, tolerance, limit = np.array(start, float, order="C"), float(tolerance), max(limit, 0)
     with one_thread():
         here, costs, steps, status = _search(given, start, tolerance, limit)
         width = _covariance(given, here) if covariance and status not in WHY else None
@@ -76,10 +77,18 @@ def _covariance(given, here):
     return half + np.tril(half, -1).T
 
 
-def _prior(prior):
+def _prior(prior, data: Collapsed):
+    """(mean, precision), copied; empty for none. The compiled search checks no bounds."""
     if prior is None:
         return _none()
-    return tuple(np.ascontiguousarray(part, float) for part in prior)
+    size = 3 * (len(data.specific_force) - 1)
+    mean, precision = (np.array(part, float, order="C") for part in prior)
+    if mean.shape != (size,) or precision.shape != (size, size):
+        raise InputError(
+            f"position prior: expected a mean ({size},) and a precision ({size}, {size}), found"
+            f" {mean.shape} and {precision.shape}"
+        )
+    return mean, precision
 
 
 @cache
@@ -112,23 +121,23 @@ class Place(NamedTuple):
     work: Work
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def _place(given, positions):
     return Place(
         positions.copy(), given.mean.copy(), np.empty(given.energy.size),
-        np.empty(3 * len(positions) - 3), workspace(given.base),
+        np.empty(3 * len(positions) - 3), workspace(given.energy.size),
     )  # fmt: skip
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def _search(given, start, tolerance, limit):
     """(where it ends, costs and position steps (n,), how it ended)."""
     here, there = _place(given, start), _place(given, start)
     costs, steps = np.zeros(limit + 1), np.zeros(limit + 1)
     size, enough = here.slope.size, ROUNDED * given.energy.sum()
     factor, step, last, known = np.empty((size, size)), np.empty(size), np.inf, False
-    costs[0] = _evaluate(given, here)
-    if np.isnan(costs[0]):
+    costs[0], sound = _evaluate(given, here)
+    if not sound:
         return here, costs[:1], steps[:1], FLAT
     for taken in range(limit):
         fresh = not known or last > FAR
@@ -141,8 +150,8 @@ def _search(given, start, tolerance, limit):
             length = _solve(factor, here.slope, step)
         if length < tolerance:
             return here, costs[: taken + 1], steps[: taken + 1], CONVERGED
-        share, cost = _shortened(given, here, there, step, costs[taken] + enough)
-        if np.isnan(cost):
+        share, cost, sound = _shortened(given, here, there, step, costs[taken] + enough)
+        if not sound:
             return here, costs[: taken + 1], steps[: taken + 1], FLAT
         if share == 0.0:  # no shorter step lowers the cost: not converged, and said so
             return here, costs[: taken + 1], steps[: taken + 1], ENDED
@@ -152,25 +161,25 @@ def _search(given, start, tolerance, limit):
     return here, costs, steps, ENDED
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def _evaluate(given, place):
-    """Twice the negative log posterior at the place, NaN where H'QH is singular.
+    """(twice the negative log posterior at the place, whether H'QH is not singular).
 
     Fills the rest of it; the motion is searched from its rate.
     """
     work, known = place.work, given.tables
     logdet = most_likely(
-        place.positions, given.force, given.energy, given.mean, given.rate_information,
+        place.positions, given.force, given.energy, given.base, given.mean, given.rate_information,
         given.weights, known.rows, known.values, known.pairs, known.products, place.rate, RATE,
         LIMIT, work,
     )  # fmt: skip
     if np.isnan(logdet):
-        return np.nan
+        return np.nan, False
     total = 0.0
     for first in range(0, place.costs.size, BLOCK):
         part = 0.0
         for t in range(first, min(first + BLOCK, place.costs.size)):
-            place.costs[t] = work.cost[t] + work.const[t]
+            place.costs[t] = work.cost[t] + work.reduced.const[t]
             part += place.costs[t]
         total += part
     by_triad = slope(
@@ -184,14 +193,14 @@ def _evaluate(given, place):
             pull += given.prior_precision[i, j] * (flat[j] - given.prior_mean[j])
         total += (flat[i] - given.prior_mean[i]) * pull
         place.slope[i] -= pull
-    return total
+    return total, True
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def _shortened(given, here, there, step, enough):
-    """(share of the step, cost): ``there`` is where the cost is ``enough``, halved where need be.
+    """(share of the step, cost, whether H'QH is not singular) ``there``, where that is ``enough``.
 
-    The share is 0 where no try is; the cost NaN where H'QH is singular.
+    The step is halved where need be; the share is 0 where no try is good enough.
     """
     share = 1.0
     for _ in range(TRIES):
@@ -200,19 +209,19 @@ def _shortened(given, here, there, step, enough):
         for i in range(step.size):
             flat[3 + i] += share * step[i]
         there.rate[:] = here.rate
-        cost = _evaluate(given, there)
-        if cost <= enough or np.isnan(cost):
-            return share, cost
+        cost, sound = _evaluate(given, there)
+        if cost <= enough or not sound:
+            return share, cost, sound
         share /= 2.0
-    return 0.0, cost
+    return 0.0, cost, True
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def _information(given, place):
     """The Fisher information of the positions, the prior's included."""
     work = place.work
     known = fisher(
-        place.positions, given.weights, place.rate, work.arms[1:], work.C, work.X, work.inverse,
+        place.positions, given.weights, place.rate, work.arms[1:], work.reduced,
         given.rate_information, given.halves,
     )  # fmt: skip
     for i in range(given.prior_mean.size):
@@ -220,7 +229,7 @@ def _information(given, place):
     return known
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def _curvature(given, place, factor):
     """The information's Cholesky factor, above the diagonal; False where it is singular.
 
@@ -231,7 +240,7 @@ def _curvature(given, place, factor):
     size = len(factor)
     whole, row = np.diag(factor).copy(), np.empty(size)
     for k in range(size):
-        if not factor[k, k] >= SINGULAR * whole[k]:  # NaN is none either
+        if not factor[k, k] > SINGULAR * whole[k]:  # NaN is not, and zero not more than zero
             return False
         scale = 1.0 / np.sqrt(factor[k, k])
         for i in range(k, size):
@@ -244,7 +253,7 @@ def _curvature(given, place, factor):
     return True
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def _solve(factor, slope, step):
     """Fills ``step``; returns its length in the information's metric: no coordinate moves by
     more sds."""

@@ -7,23 +7,22 @@ which compilers turn into vector instructions; the few samples that want more go
 
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 
+from imuarray.compiled import njit
 from imuarray.estimation.kernels import (
-    eliminate,
+    Reduced,
     information,
     linear_motion,
-    project,
     quadratic,
-    reduce_linear,
-    weighted_moments,
+    reduce,
+    reduced,
 )
 
 TOGETHER = 4  # steps of all samples at once, before what is left goes one by one
 
 
-@nb.njit(cache=True, nogil=True, inline="always")
+@njit(inline="always")
 def lower(C):
     """The lower triangle of C (6, 6), row by row."""
     return (
@@ -36,13 +35,13 @@ def lower(C):
     )  # fmt: skip
 
 
-@nb.njit(cache=True, nogil=True, inline="always")
+@njit(inline="always")
 def precision_at(P, t):
     """Entries xx, xy, xz, yy, yz, zz of sample t's (3, 3) of P (3, 3, T)."""
     return P[0, 0, t], P[0, 1, t], P[0, 2, t], P[1, 1, t], P[1, 2, t], P[2, 2, t]
 
 
-@nb.njit(cache=True, nogil=True, inline="always")
+@njit(inline="always")
 def rate_information(x, y, z, c, p):
     """(dw/domega)' C dw/domega + P: entries xx, xy, xz, yy, yz, zz; ``c`` is `lower` of C."""
     (c00, c10, c11, c20, c21, c22, c30, c31, c32, c33, c40, c41, c42, c43, c44,
@@ -69,7 +68,7 @@ def rate_information(x, y, z, c, p):
     )
 
 
-@nb.njit(cache=True, nogil=True, inline="always")
+@njit(inline="always")
 def _gradient(x, y, z, c, b, dx, dy, dz, p):
     """Half the cost's gradient by omega."""
     (c00, c10, c11, c20, c21, c22, c30, c31, c32, c33, c40, c41, c42, c43, c44,
@@ -88,7 +87,7 @@ def _gradient(x, y, z, c, b, dx, dy, dz, p):
     )
 
 
-@nb.njit(cache=True, nogil=True, inline="always")
+@njit(inline="always")
 def _step(x, y, z, c, b, dx, dy, dz, p, damping):
     """(a damped Gauss-Newton step in omega (3), the determinant of what it solved)."""
     gx, gy, gz = _gradient(x, y, z, c, b, dx, dy, dz, p)
@@ -106,14 +105,14 @@ def _step(x, y, z, c, b, dx, dy, dz, p, damping):
     )
 
 
-@nb.njit(cache=True, nogil=True, inline="always")
+@njit(inline="always")
 def _cost(x, y, z, C, b, dx, dy, dz, p):
     gyroscopes = p[0] * dx * dx + p[3] * dy * dy + p[5] * dz * dz
     gyroscopes += 2.0 * (p[1] * dx * dy + p[2] * dx * dz + p[4] * dy * dz)
     return quadratic(x, y, z, C, b[0], b[1], b[2], b[3], b[4], b[5]) + gyroscopes
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@njit(error_model="numpy")
 def _costs(rate, C, b, mean, P, cost):
     """cost (T,) of the rates (3, T)."""
     for t in range(rate.shape[1]):
@@ -123,7 +122,7 @@ def _costs(rate, C, b, mean, P, cost):
         cost[t] = _cost(x, y, z, C, bt, dx, dy, dz, precision_at(P, t))
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@njit(error_model="numpy")
 def _steps(rate, C, b, mean, P, trial, determinant):
     """An undamped step of every sample: where it leads, trial (3, T); no branch in the loop."""
     c = lower(C)
@@ -135,7 +134,7 @@ def _steps(rate, C, b, mean, P, trial, determinant):
         trial[0, t], trial[1, t], trial[2, t] = x + sx, y + sy, z + sz
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def _accept(rate, trial, cost, new, determinant, tolerance, step, iterations):
     """Take the steps that are small or lower the cost; returns how many samples go on so.
 
@@ -162,7 +161,7 @@ def _accept(rate, trial, cost, new, determinant, tolerance, step, iterations):
     return left
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@njit(error_model="numpy")
 def _alone(t, rate, C, b, mean, P, tolerance, first, limit, cost, iterations):
     """Steps ``first`` ... ``limit`` of sample t, damped where one would raise the cost."""
     x, y, z, now = rate[0, t], rate[1, t], rate[2, t], cost[t]
@@ -189,7 +188,7 @@ def _alone(t, rate, C, b, mean, P, tolerance, first, limit, cost, iterations):
     cost[t], iterations[t] = now, done
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def angular_rates(rate, C, b, mean, P, tolerance, limit, cost, iterations):
     """Concentrated ML of omega_t for every sample by damped Gauss-Newton.
 
@@ -213,56 +212,41 @@ def angular_rates(rate, C, b, mean, P, tolerance, limit, cost, iterations):
 
 
 class Work(NamedTuple):
-    """What `most_likely` fills: the motion at some positions, and what led to it."""
+    """What `most_likely` fills, ``arms`` excepted: the motion at some positions, what led to it."""
 
-    C: np.ndarray  # (6, 6)
-    X: np.ndarray  # (6, 6)
-    inverse: np.ndarray  # (6, 6)
-    b: np.ndarray  # (6, T)
-    phi: np.ndarray  # (6, T)
-    const: np.ndarray  # (T,)
-    cost: np.ndarray  # (T,) of omega, without const
+    reduced: Reduced
+    cost: np.ndarray  # (T,) of omega, without the reduction's const
     counts: np.ndarray  # (T,) steps, negative where the search did not end
     state: np.ndarray  # (w, phi) (12, T)
-    moments: np.ndarray  # (4, 3, T); row 0 is the caller's
-    full: np.ndarray  # (12, T)
-    K: np.ndarray  # (12, 12)
-    arms: np.ndarray  # (4, 3, T), the caller's: `kernels.arms` of the state
+    arms: np.ndarray  # (4, 3, T), filled by who called: `kernels.arms` of the state
 
 
-@nb.njit(cache=True, nogil=True)
-def workspace(base):
-    """`Work` for T samples with sum_k (Lambda y)_k, (3, T)."""
-    samples = base.shape[1]
-    moments = np.empty((4, 3, samples))
-    moments[0] = base
+@njit
+def workspace(samples):
+    """`Work` for T = ``samples``."""
     return Work(
-        np.empty((6, 6)), np.empty((6, 6)), np.empty((6, 6)),
-        np.empty((6, samples)), np.empty((6, samples)), np.empty(samples), np.empty(samples),
-        np.empty(samples, np.int64), np.empty((12, samples)), moments,
-        np.empty((12, samples)), np.empty((12, 12)), np.empty((4, 3, samples)),
+        reduced(samples), np.empty(samples), np.empty(samples, np.int64), np.empty((12, samples)),
+        np.empty((4, 3, samples)),
     )  # fmt: skip
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def most_likely(
-    positions, force, energy, mean, P, weights, rows, values, pairs, products,
+    positions, force, energy, base, mean, P, weights, rows, values, pairs, products,
     rate, tolerance, limit, work,
 ):  # fmt: skip
     """The most likely motion at ``positions`` for isotropic triads; omega from ``rate`` (3, T).
 
     Fills ``rate`` and ``work``; returns log |H' Lambda H|, NaN where that is singular.
     """
-    information(positions, weights, pairs, products, work.K)
-    logdet = eliminate(work.K, work.C, work.X, work.inverse)
-    if np.isnan(logdet):
-        return logdet
+    found = work.reduced
+    information(positions, weights, pairs, products, found.K)
     scaled = np.empty_like(positions)
     for k in range(len(positions)):
         scaled[k] = weights[k] * positions[k]
-    weighted_moments(scaled, force, work.moments)
-    project(work.moments, rows, values, work.full)
-    reduce_linear(work.full, work.X, work.inverse, work.b, work.phi, work.const, energy)
-    angular_rates(rate, work.C, work.b, mean, P, tolerance, limit, work.cost, work.counts)
-    linear_motion(rate, work.X, work.phi, work.state)
+    logdet = reduce(scaled, force, base, energy, rows, values, found)
+    if np.isnan(logdet):
+        return logdet
+    angular_rates(rate, found.C, found.b, mean, P, tolerance, limit, work.cost, work.counts)
+    linear_motion(rate, found.X, found.phi, work.state)
     return logdet

@@ -33,20 +33,21 @@ class Selection:
 
         InputError where there are too few informative samples.
         """
-        need = sum(counts)
-        if len(self.informative) < need:
-            raise InputError(
-                "recording: expected at least"
-                f" {need} informative samples, found {len(self.informative)}"
-            )
         return disjoint(self.informative, counts)
 
 
 def disjoint(left: np.ndarray, counts) -> dict[int, np.ndarray]:
-    """Of the samples ``left``, disjoint subsets of ``counts`` each, the largest first."""
+    """Of the samples ``left``, disjoint subsets of ``counts`` each, the largest first.
+
+    InputError where there are too few.
+    """
+    if len(left) < sum(counts):
+        raise InputError(
+            f"recording: expected at least {sum(counts)} informative samples, found {len(left)}"
+        )
     chosen = {}
     for count in sorted(counts, reverse=True):
-        picks = np.unique(np.linspace(0, len(left) - 1, count).round().astype(int))
+        picks = np.linspace(0, len(left) - 1, count).round().astype(int)
         chosen[count] = left[picks]
         left = np.delete(left, picks)
     return chosen

@@ -7,9 +7,9 @@ instructions; an exponential of our own keeps calls of the C library out of them
 import math
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 
+from imuarray.compiled import njit
 from imuarray.estimation.kernels import quadratic
 
 TILE = 32  # samples
@@ -29,7 +29,7 @@ class Tile(NamedTuple):
     bits: np.ndarray  # (TILE,) the same memory as integers
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def tile(draws):
     """Allocate a `Tile` for N draws."""
     power = np.zeros(TILE)
@@ -39,7 +39,7 @@ def tile(draws):
     )  # fmt: skip
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def normals(rng, size, out):
     """Three normal numbers a draw for ``size`` samples, sample by sample: the stream's order."""
     for i in range(size):
@@ -49,7 +49,7 @@ def normals(rng, size, out):
             out[n, 2, i] = rng.standard_normal()
 
 
-@nb.njit(cache=True, nogil=True, inline="always")
+@njit(inline="always")
 def _rate(t, mean, factor, u, v, w):
     """mean + factor (u, v, w) of sample t."""
     return (
@@ -59,7 +59,7 @@ def _rate(t, mean, factor, u, v, w):
     )
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@njit(error_model="numpy")
 def exponents(first, size, mean, factor, C, b, numbers, out):
     """-(w' C w - 2 b . w) / 2 at mean + factor n, n of ``numbers`` (N, 3, TILE)."""
     for n in range(out.shape[0]):
@@ -71,7 +71,7 @@ def exponents(first, size, mean, factor, C, b, numbers, out):
             )
 
 
-@nb.njit(cache=True, nogil=True, inline="always")
+@njit(inline="always")
 def tilted(k, t, x, y, z):
     """log p(omega | y_g) less the log of the density it is drawn from."""
     return (
@@ -81,7 +81,7 @@ def tilted(k, t, x, y, z):
     )  # fmt: skip
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def tilt(first, size, k, mean, factor, numbers, out):
     """Add `tilted` to `exponents`."""
     for n in range(out.shape[0]):
@@ -91,7 +91,7 @@ def tilt(first, size, k, mean, factor, numbers, out):
             out[n, i] += tilted(k, t, x, y, z)
 
 
-@nb.njit(cache=True, nogil=True, inline="always")
+@njit(inline="always")
 def _exp_parts(x):
     """(p, k) with exp(x) = p 2^k to an ulp or two, for x in [LEAST, 0]; p by Taylor's series."""
     k = np.floor(x * LOG2E + 0.5)
@@ -111,7 +111,7 @@ def _exp_parts(x):
     return p * r + 1.0, k
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@njit(error_model="numpy")
 def _exponentials(size, work):
     """top = the largest exponent of N, total = the sum of exp(exponent - top), by sample."""
     exponent, top, total, power, bits = (
@@ -134,7 +134,7 @@ def _exponentials(size, work):
             total[i] += exponent[n, i] * power[i]
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def log_means(size, work):
     """Sum over a tile's samples of the log of the mean exponential, safe from over- and underflow.
 

@@ -3,9 +3,9 @@
 import math
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 
+from imuarray.compiled import njit
 from imuarray.estimation import kernels
 from imuarray.posterior import draws
 
@@ -32,55 +32,31 @@ class Data(NamedTuple):
 class Workspace(NamedTuple):
     """Scratch memory of one chain."""
 
-    moments: np.ndarray
-    full: np.ndarray
-    b: np.ndarray
-    phi: np.ndarray
-    const: np.ndarray
-    K: np.ndarray
-    C: np.ndarray
-    X: np.ndarray
-    inverse: np.ndarray
+    reduced: kernels.Reduced
     tile: draws.Tile
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def workspace(samples, count):
     """Allocate a `Workspace` for T samples and N = ``count`` draws."""
-    return Workspace(
-        np.zeros((4, 3, samples)),
-        np.empty((12, samples)),
-        np.empty((6, samples)),
-        np.empty((6, samples)),
-        np.empty(samples),
-        np.empty((12, 12)),
-        np.empty((6, 6)),
-        np.empty((6, 6)),
-        np.empty((6, 6)),
-        draws.tile(count),
-    )
+    return Workspace(kernels.reduced(samples), draws.tile(count))
 
 
-@nb.njit(cache=True, nogil=True)
-def _collapse(positions, data, work):
+@njit
+def _collapse(positions, data, out):
     """Everything that depends on theta but not on omega; returns log |H' Lambda H|."""
     if data.weights.size:
-        kernels.information(positions, data.weights, data.pairs, data.products, work.K)
+        kernels.information(positions, data.weights, data.pairs, data.products, out.K)
     else:
-        kernels.information_general(positions, data.precision, data.tensor, work.K)
+        kernels.information_general(positions, data.precision, data.tensor, out.K)
     for i in range(3):
-        work.K[6 + i, 6 + i] += data.ridge[i]
-    logdet = kernels.eliminate(work.K, work.C, work.X, work.inverse)
-    work.moments[0] = data.base
-    kernels.weighted_moments(positions, data.weighted, work.moments)
-    kernels.project(work.moments, data.rows, data.values, work.full)
-    kernels.reduce_linear(
-        work.full, work.X, work.inverse, work.b, work.phi, work.const, data.energy
+        out.K[6 + i, 6 + i] += data.ridge[i]
+    return kernels.reduce(
+        positions, data.weighted, data.base, data.energy, data.rows, data.values, out
     )
-    return logdet
 
 
-@nb.njit(cache=True, nogil=True, inline="always")
+@njit(inline="always")
 def _log_mean_exp(exponent):
     """log of the mean of exp(exponent), safe from over- and underflow (Appendix A)."""
     top = exponent[0]
@@ -94,47 +70,49 @@ def _log_mean_exp(exponent):
     return top + math.log(total / exponent.size)
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def _assemble(total, const, logdet, determinant_power):
     return total - 0.5 * const.sum() - determinant_power * const.size * logdet
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def fixed_draws(positions, data, rates, work, power):
     """log p-hat (26a) on given draws ``rates`` (T, N, 3) rad/s."""
-    logdet = _collapse(positions, data, work)
+    found = work.reduced
+    logdet = _collapse(positions, data, found)
     total, tilted = 0.0, data.tilt.shape[1] > 0
     exponent = np.empty(rates.shape[1])
     for t in range(rates.shape[0]):
-        b = work.b[:, t]
+        b = found.b[:, t]
         for n in range(rates.shape[1]):
             x, y, z = rates[t, n]
             exponent[n] = -0.5 * kernels.quadratic(
-                x, y, z, work.C, b[0], b[1], b[2], b[3], b[4], b[5]
+                x, y, z, found.C, b[0], b[1], b[2], b[3], b[4], b[5]
             )
             if tilted:
                 exponent[n] += draws.tilted(data.tilt, t, x, y, z)
         total += _log_mean_exp(exponent)
-    return _assemble(total, work.const, logdet, power)
+    return _assemble(total, found.const, logdet, power)
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def fresh_draws(positions, data, rng, work, power, first, last):
     """log p-hat (26a) of samples first..last-1 with omega drawn anew from p(omega | y_g)."""
-    logdet = _collapse(positions, data, work)
+    found = work.reduced
+    logdet = _collapse(positions, data, found)
     total, tile = 0.0, work.tile
     for start in range(first, last, draws.TILE):
         size = min(draws.TILE, last - start)
         mean, factor = data.mean, data.factor
         draws.normals(rng, size, tile.numbers)
-        draws.exponents(start, size, mean, factor, work.C, work.b, tile.numbers, tile.exponent)
+        draws.exponents(start, size, mean, factor, found.C, found.b, tile.numbers, tile.exponent)
         if data.tilt.shape[1] > 0:
             draws.tilt(start, size, data.tilt, mean, factor, tile.numbers, tile.exponent)
         total += draws.log_means(size, tile)
-    return _assemble(total, work.const[first:last], logdet, power)
+    return _assemble(total, found.const[first:last], logdet, power)
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def repeated(positions, data, rng, count, power, out):
     """Independent realisations of log p-hat at one theta, filling ``out``."""
     work = workspace(data.energy.size, count)
@@ -142,7 +120,7 @@ def repeated(positions, data, rng, count, power, out):
         out[i] = fresh_draws(positions, data, rng, work, power, 0, data.energy.size)
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def transitions(theta, log_target, prior, step, draws, power, data, rng, count):
     """``count`` transitions of Algorithm 1 (2021) from ``theta`` (3 (A - 1),), in place.
 
@@ -167,7 +145,7 @@ def transitions(theta, log_target, prior, step, draws, power, data, rng, count):
     return accepted, log_target
 
 
-@nb.njit(cache=True, nogil=True)
+@njit
 def autoregressive(theta, log_target, prior, centre, factor, step, draws, power, data, rng, count):
     """``count`` transitions from ``theta`` in place, proposals reversible for a normal density.
 

@@ -29,10 +29,10 @@ def proposals(collapsed: Collapsed, mean, covariance, positions, widening: float
         gyroscope_information=np.ascontiguousarray(precision.transpose(1, 2, 0)),
     )
     rate = motion_from(given, positions).motion.angular_rate
-    C, b, *_ = collapsed.reduce(positions)
+    found, _ = collapsed.reduce(positions)
     slope = _product_slopes(rate)
-    curvature = precision + np.einsum("tai,ab,tbj->tij", slope, C, slope)
-    misfit = _products(rate) @ C - b.T
+    curvature = precision + np.einsum("tai,ab,tbj->tij", slope, found.C, slope)
+    misfit = _products(rate) @ found.C - found.b.T
     full = curvature + _second(misfit)
     # far from a good fit the second derivative may not be positive: then the first order serves
     sound = np.linalg.eigvalsh(full)[:, 0] > 0.1 * np.linalg.eigvalsh(curvature)[:, 0]

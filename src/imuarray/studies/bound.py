@@ -36,8 +36,8 @@ def information_at(model: ArrayModel, motion, positions, saturated=None) -> np.n
     turning = np.ascontiguousarray(np.asarray(motion.angular_rate).T)
     state = np.zeros((12, data.samples))
     state[:6], state[6:9] = products(turning.T).T, np.asarray(motion.angular_acceleration).T
-    C, _, X, *_, inverse = data.reduce(positions)
-    return information(data, positions, turning, arms(state), (C, X, inverse))
+    found, _ = data.reduce(positions)
+    return information(data, positions, turning, arms(state), found)
 
 
 def block_information(model: ArrayModel, motion) -> np.ndarray:

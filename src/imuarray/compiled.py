@@ -1,0 +1,63 @@
+"""`njit`: numba's compiler, with a cache that every kernel's source is part of.
+
+numba's own cache asks only whether the file of the function called has changed. A kernel into which
+one of another file was compiled would keep the old one after an update, and results would not be
+those of the code that they name.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator
+from contextlib import suppress
+from functools import cache, partial
+from pathlib import Path
+
+import numba
+
+PACKAGE = Path(__file__).parent
+
+
+def njit(function=None, **options):
+    """`numba.njit` with ``nogil`` and the cache, as a decorator with or without ``options``."""
+    if function is None:
+        return partial(njit, **options)
+    folder, before = _folder(), numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(folder or "")
+    try:
+        return numba.njit(function, cache=folder is not None, nogil=True, **options)
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+def kernels_digest() -> str:
+    """SHA-256, in hexadecimal, of the package's files that have kernels."""
+    texts = ((path, path.read_bytes()) for path in sorted(PACKAGE.rglob("*.py")))
+    found = hashlib.sha256()
+    for path, text in texts:
+        if b"njit" in text:
+            found.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0" + text + b"\0")
+    return found.hexdigest()
+
+
+@cache
+def _folder() -> Path | None:
+    """Where these kernels are cached; None where nothing can be written."""
+    name = f"kernels-{kernels_digest()[:16]}"
+    for place in _places():
+        with suppress(OSError):
+            (place / name).mkdir(parents=True, exist_ok=True)
+            if os.access(place / name, os.W_OK):
+                return place / name
+    return None
+
+
+def _places() -> Iterator[Path]:
+    """NUMBA_CACHE_DIR if that is set; or beside the package, or with the user's caches."""
+    if numba.config.CACHE_DIR:
+        yield Path(numba.config.CACHE_DIR)
+        return
+    yield PACKAGE / "__pycache__"
+    with suppress(RuntimeError):  # no home
+        yield Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "imuarray"
