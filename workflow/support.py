@@ -11,7 +11,7 @@ import imuarray
 
 PACKAGE = Path(imuarray.__file__).parent
 
-BASE = ("config.py", "errors.py", "provenance.py", "streams.py")  # under every stage
+BASE = ("compiled.py", "config.py", "errors.py", "provenance.py", "streams.py")  # under every stage
 
 APART = ("blind_", "theory_", "validation_")  # sizes of targets that nothing else rests on
 CREWS = ("threads", "parts")  # how work is shared: no result depends on it
