@@ -10,10 +10,17 @@ from hypothesis.extra.numpy import arrays
 from scipy.special import logsumexp
 
 from imuarray.errors import InputError
-from imuarray.estimation import Collapsed
+from imuarray.estimation import (
+    Collapsed,
+    calibrate_bcd,
+    calibrate_gauss_newton,
+    estimate_motion,
+)
 from imuarray.geometry import mimu4444
 from imuarray.model import ArrayModel
+from imuarray.motion import normal_motion
 from imuarray.posterior import Likelihood, draws, kernels
+from imuarray.simulation import measure
 from tests import oracles
 from tests.cases import noises, simulate, small_array
 
@@ -243,3 +250,37 @@ def test_input_errors():
     saturated[3, :, 1] = True
     with pytest.raises(InputError, match="sample 3"):
         Likelihood.of(model, force, rate, saturated)
+
+
+@pytest.mark.parametrize("calibrate", [calibrate_bcd, calibrate_gauss_newton, estimate_motion])
+def test_other_shapes_are_refused(calibrate):
+    """Before compiled code, which checks no bounds, reads or writes beyond an array."""
+    model = ArrayModel.isotropic(small_array(4, 4), 0.04, 1e-3)
+    motion = normal_motion(np.random.default_rng(1), (20,), 17.0, 600.0, 20.0)
+    force, rate, lost = measure(model, motion, model.array.relative, np.random.default_rng(2))
+    twice = np.concatenate([force, force], axis=1)
+    for wrong in ((force[:, :3], rate), (twice, rate), (force, rate[:, :3]), (force, rate[:9])):
+        with pytest.raises(InputError, match=r"(specific_force|angular_rate): expected shape"):
+            calibrate(model, *wrong)
+    with pytest.raises(InputError, match="saturated: expected shape"):
+        calibrate(model, force, rate, saturated=lost[:, :3])
+    name = "positions" if calibrate is estimate_motion else "start"
+    for places in (model.array.relative[:3], np.tile(model.array.relative, (2, 1))):
+        with pytest.raises(InputError, match=f"{name}: expected shape"):
+            calibrate(model, force, rate, **{name: places})
+
+
+def test_a_likelihood_refuses_other_shapes():
+    model = ArrayModel.isotropic(small_array(4, 4), 0.04, 1e-3)
+    rng = np.random.default_rng(1)
+    motion = normal_motion(rng, (20,), 17.0, 600.0, 20.0)
+    force, rate, _ = measure(model, motion, model.array.relative, rng)
+    likelihood = Likelihood.of(model, force, rate)
+    for places in (model.array.relative[:3], np.tile(model.array.relative, (2, 1))):
+        with pytest.raises(InputError, match="positions: expected shape"):
+            likelihood.estimate(places, 5, rng)
+    with pytest.raises(InputError, match="rates: expected shape"):
+        likelihood.on(model.array.relative, np.zeros((19, 5, 3)))
+    wrong = np.zeros((19, 3)), np.tile(np.eye(3), (20, 1, 1))
+    with pytest.raises(InputError, match="mean: expected shape"):
+        Likelihood.of(model, force, rate, rate_distribution=wrong)

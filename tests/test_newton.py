@@ -199,7 +199,7 @@ def test_a_prior_of_another_size_is_refused():
     model = ArrayModel(small_array(4, 4), noises(rng, 4, 4)["isotropic"])
     _, force, rate = simulate(rng, model, 20)
     for size in (3, 12):
-        with pytest.raises(InputError, match=r"position prior: expected a mean \(9,\)"):
+        with pytest.raises(InputError, match=r"prior's mean: expected shape \(9,\)"):
             calibrate_gauss_newton(model, force, rate, position_prior=(np.zeros(size), 1e-3))
 
 

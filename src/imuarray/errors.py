@@ -24,3 +24,9 @@ def require_integer(name: str, value: object, least: int = 1) -> None:
     integral = isinstance(value, Integral) and not isinstance(value, bool)
     if not integral or value < least:
         raise InputError(f"{name}: expected an integer of at least {least}, found {value!r}")
+
+
+def require_shape(name: str, value, shape: tuple[int, ...]) -> None:
+    """InputError unless the array ``value`` has that shape; compiled code checks no bounds."""
+    if value.shape != shape:
+        raise InputError(f"{name}: expected shape {shape}, found {value.shape}")

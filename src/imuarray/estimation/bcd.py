@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from imuarray.compiled import njit
-from imuarray.errors import IdentifiabilityError, InputError
+from imuarray.errors import IdentifiabilityError, InputError, require_shape
 from imuarray.estimation import kernels
 from imuarray.estimation.collapsed import Collapsed, tables
 from imuarray.estimation.motion_ml import MotionEstimate, motion_from
@@ -159,6 +159,7 @@ def calibrate_bcd(
     """
     require_samples(len(specific_force))
     positions = model.array.relative if start is None else np.array(start, float)
+    require_shape("start", positions, model.array.positions.shape)
     positions = np.ascontiguousarray(positions - positions[0])
     require_planar_extent(positions, "positions")
     data = Collapsed.of(model, specific_force, angular_rate, saturated)

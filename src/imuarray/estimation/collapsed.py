@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from imuarray.errors import require_shape
 from imuarray.estimation import kernels
 from imuarray.model import ArrayModel, structure_tensor
 
@@ -67,9 +68,16 @@ class Collapsed:
 
     @classmethod
     def of(cls, model: ArrayModel, specific_force, angular_rate, saturated=None) -> Collapsed:
-        """From measurements (T, A, 3) m/s^2 and (T, G, 3) rad/s, and saturated axes."""
-        force = np.ascontiguousarray(specific_force, float)
-        samples, accelerometers, _ = force.shape
+        """From measurements (T, A, 3) m/s^2 and (T, G, 3) rad/s, and saturated axes.
+
+        InputError for other shapes.
+        """
+        force, rate = np.ascontiguousarray(specific_force, float), np.asarray(angular_rate, float)
+        samples, accelerometers = len(force), model.array.accelerometers
+        require_shape("specific_force", force, (samples, accelerometers, 3))
+        require_shape("angular_rate", rate, (samples, model.array.gyroscopes, 3))
+        if saturated is not None:
+            require_shape("saturated", np.asarray(saturated), rate.shape)
         precision = model.noise.accelerometer_precision
         weights = model.noise.triad_weights
         centred, offset = np.empty((accelerometers, 3, samples)), np.empty((3, samples))
@@ -80,7 +88,7 @@ class Collapsed:
             weighted = _weighted(precision, centred)
             base = weighted.sum(axis=0)
             energy = np.einsum("kct,kct->t", centred, weighted)
-        mean, information = model.noise.angular_rate_given_gyroscopes(angular_rate, saturated)
+        mean, information = model.noise.angular_rate_given_gyroscopes(rate, saturated)
         return cls(
             centred,
             offset,
@@ -103,6 +111,7 @@ class Collapsed:
         """(the recording with phi eliminated at ``positions`` (A, 3), log |H' Lambda H|)."""
         known, out = tables(), kernels.reduced(self.samples)
         positions = np.ascontiguousarray(positions, float)
+        require_shape("positions", positions, (len(self.specific_force), 3))
         if self.weights is None:
             kernels.information_general(positions, self.precision, structure_tensor(), out.K)
             arms, force = positions, self.weighted

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from imuarray.errors import IdentifiabilityError
+from imuarray.errors import IdentifiabilityError, require_shape
 from imuarray.estimation.bcd import Calibration, require_rotation, require_samples
 from imuarray.estimation.blocks import Blocks, normal_equations, pack_motion, problem
 from imuarray.estimation.collapsed import Collapsed
@@ -92,6 +92,7 @@ def calibrate_gauss_newton(
         tolerance = ENOUGH if model.effects else 1e-6
     require_samples(len(specific_force))
     positions = model.array.relative if start is None else np.asarray(start, float)
+    require_shape("start", positions, model.array.positions.shape)
     positions = positions - positions[0]
     require_planar_extent(positions, "positions")
     data = Collapsed.of(model, specific_force, angular_rate, saturated)

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.linalg
 
 from imuarray.compiled import njit
-from imuarray.errors import IdentifiabilityError, InputError
+from imuarray.errors import IdentifiabilityError, require_shape
 from imuarray.estimation.bcd import Calibration
 from imuarray.estimation.collapsed import Collapsed, Tables, tables
 from imuarray.estimation.information import Halves, fisher, halves, slope
@@ -55,6 +55,7 @@ def descend(
     )  # fmt: skip
     # one layout and one type each, or all would be compiled again
     start, tolerance, limit = np.array(start, float, order="C"), float(tolerance), max(limit, 0)
+    require_shape("start", start, (len(data.specific_force), 3))
     with one_thread():
         here, costs, steps, status = _search(given, start, tolerance, limit)
         width = _covariance(given, here) if covariance and status not in WHY else None
@@ -78,16 +79,13 @@ def _covariance(given, here):
 
 
 def _prior(prior, data: Collapsed):
-    """(mean, precision), copied; empty for none. The compiled search checks no bounds."""
+    """(mean, precision), copied; empty for none."""
     if prior is None:
         return _none()
     size = 3 * (len(data.specific_force) - 1)
     mean, precision = (np.array(part, float, order="C") for part in prior)
-    if mean.shape != (size,) or precision.shape != (size, size):
-        raise InputError(
-            f"position prior: expected a mean ({size},) and a precision ({size}, {size}), found"
-            f" {mean.shape} and {precision.shape}"
-        )
+    require_shape("position prior's mean", mean, (size,))
+    require_shape("position prior's precision", precision, (size, size))
     return mean, precision
 
 
@@ -198,9 +196,9 @@ def _evaluate(given, place):
 
 @njit
 def _shortened(given, here, there, step, enough):
-    """(share of the step, cost, whether H'QH is not singular) ``there``, where that is ``enough``.
+    """(share of the step, cost, whether H'QH is not singular); fills ``there``.
 
-    The step is halved where need be; the share is 0 where no try is good enough.
+    The step is halved until the cost is ``enough`` or less; the share is 0 where it never is.
     """
     share = 1.0
     for _ in range(TRIES):

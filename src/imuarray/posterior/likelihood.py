@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from imuarray.errors import InputError
+from imuarray.errors import InputError, require_shape
 from imuarray.estimation.collapsed import Collapsed, tables
 from imuarray.model import ArrayModel, structure_tensor
 from imuarray.posterior import kernels
@@ -70,6 +70,8 @@ class Likelihood:
         else:
             mean = np.ascontiguousarray(np.asarray(rate_distribution[0], float).T)
             covariance = np.asarray(rate_distribution[1], float)
+            require_shape("rate_distribution's mean", mean.T, (collapsed.samples, 3))
+            require_shape("rate_distribution's covariance", covariance, (collapsed.samples, 3, 3))
             if np.isfinite(motion_sd[0]):
                 raise InputError("motion_sd: expected none of omega beside rate_distribution")
         data = _arrange(collapsed, mean, covariance, np.full(3, float(motion_sd[1]) ** -2.0))
@@ -84,8 +86,9 @@ class Likelihood:
         Drawn so many times as wide as the integrand's curvature says, which alone gives log p-hat
         a variance of some 6 (widening - 1)^2 / N a sample.
         """
+        centre = self._relative(positions)
         mean, covariance = proposals(
-            self.collapsed, self.rate_mean, self.rate_covariance, _contiguous(positions), widening
+            self.collapsed, self.rate_mean, self.rate_covariance, centre, widening
         )
         tilt = tilts(self.rate_mean, self.rate_covariance, mean, covariance)
         data = self.data._replace(
@@ -98,13 +101,19 @@ class Likelihood:
         """Number T of samples."""
         return self.data.energy.size
 
+    def _relative(self, positions) -> np.ndarray:
+        positions = np.asarray(positions, float)
+        require_shape("positions", positions, (len(self.data.weighted), 3))
+        return np.ascontiguousarray(positions - positions[0])
+
     def on(self, positions, rates) -> float:
         """log p-hat at ``positions`` (A, 3) m on given draws ``rates`` (T, N, 3) rad/s.
 
         They are taken to be from where `estimate` would draw them.
         """
+        require_shape("rates", rates, (self.samples, rates.shape[1], 3))
         work = kernels.workspace(self.samples, rates.shape[1])
-        return kernels.fixed_draws(_contiguous(positions), self.data, rates, work, self.power)
+        return kernels.fixed_draws(self._relative(positions), self.data, rates, work, self.power)
 
     def estimate(self, positions, draws: int, rng, threads: int = 1) -> float:
         """log p-hat at ``positions`` (A, 3) m with N = ``draws`` fresh draws a sample.
@@ -112,7 +121,7 @@ class Likelihood:
         With ``threads`` > 1 blocks of samples are shared out, each with a stream of its
         own spawned from ``rng``: the value depends on ``threads``, its law does not.
         """
-        positions = _contiguous(positions)
+        positions = self._relative(positions)
         edges = np.linspace(0, self.samples, threads + 1).astype(int)
 
         def block(job):
@@ -130,7 +139,7 @@ class Likelihood:
     def realisations(self, positions, draws: int, count: int, rng) -> np.ndarray:
         """``count`` independent values of log p-hat at ``positions`` (paper 2021, figure 2)."""
         out = np.empty(count)
-        kernels.repeated(_contiguous(positions), self.data, rng, draws, self.power, out)
+        kernels.repeated(self._relative(positions), self.data, rng, draws, self.power, out)
         return out
 
 
@@ -141,11 +150,6 @@ def _pool(threads: int) -> ThreadPoolExecutor:
     if threads not in _POOLS:
         _POOLS[threads] = ThreadPoolExecutor(threads)
     return _POOLS[threads]
-
-
-def _contiguous(positions) -> np.ndarray:
-    positions = np.asarray(positions, float)
-    return np.ascontiguousarray(positions - positions[0])
 
 
 def _lower(covariance) -> np.ndarray:
