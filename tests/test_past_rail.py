@@ -68,6 +68,26 @@ def test_the_right_model_foretells_what_is_hidden(hidden, diagnosis):
     assert all(len(axes.lines) == 7 for axes in figure.axes)
 
 
+def test_positions_and_delay_of_another_recording(hidden, diagnosis):
+    """Where they are the same ones the errors are, too; a delay shows as the acceleration does."""
+    recording, truth = hidden
+    found, base = imuarray.diagnosed(diagnosis, recording), truth["position"].to_numpy()
+    tables = {
+        lead: past_rail(recording, found, base, bins=(300, 800, 2000), elsewhere=(base, lead))
+        for lead in (0.0, 2e-3)
+    }
+    errors = {
+        lead: table.pivot(index="rate_dps", columns="model", values="rmse_dps")
+        for lead, table in tables.items()
+    }
+    np.testing.assert_array_equal(errors[0.0].transferred, errors[0.0].delayed)
+    np.testing.assert_array_equal(errors[0.0].calibrated, errors[2e-3].calibrated)
+    size = np.degrees(2e-3 * np.sqrt(np.mean(truth["angular_acceleration"].to_numpy() ** 2)))
+    more = np.sqrt(errors[2e-3].transferred ** 2 - errors[0.0].transferred ** 2)
+    assert np.all((more > 0.4 * size) & (more < 2.5 * size))
+    assert all(len(axes.lines) == 8 for axes in past_rail_figure(tables[0.0], 300, []).axes)
+
+
 def test_a_diagnosis_is_a_calibration_for_the_command(hidden, diagnosis, tmp_path):
     recording, _ = hidden
     imuarray.write_recording(recording, tmp_path / "rec.nc")

@@ -71,12 +71,22 @@ rule diagnosis_agreement:
         "../scripts/diagnosis_agreement.py"
 
 
+def others(name: str) -> list[str]:
+    """Recordings of the same board, the next one first."""
+    names = MEASURED.board(RECORDINGS[name].get("group", name)) if name in RECORDINGS else []
+    place = names.index(name) if name in names else 0
+    return [other for other in names[place:] + names[:place] if other != name]
+
+
 rule past_rail:
     input:
         recording=lambda wc: "results/measured/{}/{}.nc".format(
             "corrected" if RECORDINGS[wc.name].get("first_order", True) else "recordings", wc.name
         ),
         diagnosis="results/measured/diagnosis/{name}/diagnosis.json",
+        elsewhere=lambda wc: [
+            f"results/measured/diagnosis/{other}/diagnosis.json" for other in others(wc.name)[:1]
+        ],
         code=resting_on(
             "analysis/past_rail.py",
             "analysis/extension.py",
@@ -100,6 +110,8 @@ rule past_rail:
     resources:
         mem_mb=4000,
         runtime=20,
+    params:
+        others=lambda wc: others(wc.name),
     script:
         "../scripts/past_rail.py"
 

@@ -24,8 +24,9 @@ ASSUMED = 0.79  # m/s^2, the accelerometers' noise in paper 2021's experiment
 
 
 def past_rail(
-    recording: Recording, diagnosed: xr.Dataset, base, bins=BINS, per_bin: int = PER_BIN
-) -> pd.DataFrame:
+    recording: Recording, diagnosed: xr.Dataset, base, bins=BINS, per_bin: int = PER_BIN,
+    elsewhere=None,
+) -> pd.DataFrame:  # fmt: skip
     """Errors of hidden gyroscope readings, as several models foretell them.
 
     Parameters
@@ -38,15 +39,19 @@ def past_rail(
         Positions by the papers' model, relative to the first triad.
     bins
         Edges in deg/s of the hidden axis' rate; the first is the rail.
+    elsewhere : ((A, 3) m, s) or None
+        Positions as ``base`` and the gyroscopes' lead (`lead_of`) from another recording of the
+        board, which has seen nothing of this one.
 
     Returns
     -------
     DataFrame
         A row per model (``clipped``, ``nominal``, ``calibrated``, ``delayed``: the same with the
-        gyroscopes' lead, ``extended``) and bin of the hidden axis' rate: mid ``rate_dps``,
-        ``readings`` (of all gyroscopes, which share an error), ``rmse_dps``, ``median_dps`` of the
-        absolute error, ``above_100`` the share beyond 100 deg/s, and for ``extended`` what noise
-        alone claims: ``sd_dps`` (median), ``rms_sd_dps`` and ``within_95``.
+        gyroscopes' lead, ``transferred``: with both from ``elsewhere``, ``extended``) and bin of
+        the hidden axis' rate: mid ``rate_dps``, ``readings`` (of all gyroscopes, which share an
+        error), ``rmse_dps``, ``median_dps`` of the absolute error, ``above_100`` the share beyond
+        100 deg/s, and for ``extended`` what noise alone claims: ``sd_dps`` (median),
+        ``rms_sd_dps`` and ``within_95``.
 
     InputError where no sample is beyond the rail.
     """
@@ -56,14 +61,15 @@ def past_rail(
     hidden = np.broadcast_to(hidden, chosen.angular_rate.shape)
     clipped = replace(chosen, angular_rate=np.clip(chosen.angular_rate, -lowest, lowest))
     errors, sds = {"clipped": clipped.angular_rate - chosen.angular_rate}, {}
-    for name, positions in (("nominal", recording.relative_positions()), ("calibrated", base)):
-        model = ArrayModel.isotropic(array_of(chosen), ASSUMED, chosen.gyroscope_noise_sd)
-        found = fuse(
-            model, clipped.specific_force, clipped.angular_rate, positions, None, hidden
-        ).estimate
-        errors[name] = found.motion.angular_rate[:, None] - chosen.angular_rate
-        ahead = found.motion.angular_acceleration[:, None] * lead_of(diagnosed)
-    errors["delayed"] = errors["calibrated"] + ahead
+    ways = {
+        "nominal": (recording.relative_positions(), 0.0),
+        "calibrated": (base, 0.0),
+        "delayed": (base, lead_of(diagnosed)),
+    }
+    if elsewhere is not None:
+        ways["transferred"] = elsewhere
+    for name, (positions, lead) in ways.items():
+        errors[name] = _foretold(clipped, hidden, positions, lead) - chosen.angular_rate
     model, found = extended_motion(diagnosed, clipped, hidden)
     foretold = _readings(model, diagnosed, found, chosen.time)
     errors["extended"] = foretold - chosen.angular_rate
@@ -73,6 +79,15 @@ def past_rail(
     rates = np.abs(chosen.angular_rate.mean(axis=1, keepdims=True))
     rates = np.broadcast_to(rates, hidden.shape)
     return _table(errors, sds, hidden, np.degrees(rates), bins)
+
+
+def _foretold(clipped: Recording, hidden, positions, lead: float) -> np.ndarray:
+    """Gyroscopes' readings (T, 1, 3) rad/s by the papers' model, ``lead`` s after the motion."""
+    model = ArrayModel.isotropic(array_of(clipped), ASSUMED, clipped.gyroscope_noise_sd)
+    motion = fuse(
+        model, clipped.specific_force, clipped.angular_rate, positions, None, hidden
+    ).estimate.motion
+    return (motion.angular_rate + lead * motion.angular_acceleration)[:, None]
 
 
 def lead_of(diagnosed: xr.Dataset) -> float:

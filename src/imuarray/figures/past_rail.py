@@ -11,6 +11,7 @@ SERIES = {
     "nominal": "papers' model, nominal positions",
     "calibrated": "papers' model, calibrated positions",
     "delayed": "the same and one delay",
+    "transferred": "both from another recording",
     "extended": "extended model",
 }
 
@@ -28,7 +29,8 @@ def past_rail_figure(table: pd.DataFrame, rail_dps: float, footer=()):
     for axes, (column, title, claimed, factor) in zip(panels, columns, strict=True):
         for number, (name, label) in enumerate(SERIES.items()):
             rows = table[table.model == name]
-            axes.plot(rows.rate_dps, rows[column], label=label, **look(number), markersize=4)
+            if len(rows):
+                axes.plot(rows.rate_dps, rows[column], label=label, **look(number), markersize=4)
         rows = table[table.model == "extended"]
         axes.plot(rows.rate_dps, factor * rows[claimed], color="0.4", linestyle=(0, (1, 1.5)),
                   linewidth=1, label="extended model, as noise alone claims")  # fmt: skip
