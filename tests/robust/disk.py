@@ -85,7 +85,7 @@ def pipeline(where: Path) -> list[str]:
             log.write_text("")
             status = started(here, "quick").wait()
             said = log.read_text(encoding="utf-8")
-            words = "Read-only file system" if options == "ro" else "No space left on device"
+            words = "found one that is read-only" if options == "ro" else "No space left on device"
             named = [line for line in said.splitlines() if words in line]
             print(f"quick, {options}: {status}", *named[:1], flush=True)
             if status == 0 or not named or "Traceback" in said:
