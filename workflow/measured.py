@@ -26,6 +26,12 @@ class Measured:
             if entries[name].get("group", name) == group and entries[name].get("first_order", True)
         ]
 
+    def others(self, name: str) -> list[str]:
+        """The other recordings of the same board, the next one first."""
+        names = self.board(self.config["recordings"][name].get("group", name))
+        place = names.index(name) if name in names else 0
+        return [other for other in names[place:] + names[:place] if other != name]
+
     def groups(self) -> dict[str, list[str]]:
         """Recordings of one board, where there are two or more."""
         groups = {}

@@ -71,13 +71,6 @@ rule diagnosis_agreement:
         "../scripts/diagnosis_agreement.py"
 
 
-def others(name: str) -> list[str]:
-    """Recordings of the same board, the next one first."""
-    names = MEASURED.board(RECORDINGS[name].get("group", name)) if name in RECORDINGS else []
-    place = names.index(name) if name in names else 0
-    return [other for other in names[place:] + names[:place] if other != name]
-
-
 rule past_rail:
     input:
         recording=lambda wc: "results/measured/{}/{}.nc".format(
@@ -85,7 +78,8 @@ rule past_rail:
         ),
         diagnosis="results/measured/diagnosis/{name}/diagnosis.json",
         elsewhere=lambda wc: [
-            f"results/measured/diagnosis/{other}/diagnosis.json" for other in others(wc.name)[:1]
+            f"results/measured/diagnosis/{other}/diagnosis.json"
+            for other in MEASURED.others(wc.name)[:1]
         ],
         code=resting_on(
             "analysis/past_rail.py",
@@ -111,7 +105,7 @@ rule past_rail:
         mem_mb=4000,
         runtime=20,
     params:
-        others=lambda wc: others(wc.name),
+        others=lambda wc: MEASURED.others(wc.name),
     script:
         "../scripts/past_rail.py"
 
