@@ -29,7 +29,8 @@ from imuarray.geometry import positions_of, sub_array  # noqa: E402
 from imuarray.model import ArrayModel  # noqa: E402
 from imuarray.model.jax64 import jax  # noqa: E402
 from imuarray.motion import normal_motion, sphere_motion  # noqa: E402
-from imuarray.posterior import Likelihood  # noqa: E402
+from imuarray.posterior import Likelihood, normals  # noqa: E402
+from imuarray.posterior.draws import TILE  # noqa: E402
 from imuarray.posterior.marginal import Marginal  # noqa: E402
 from imuarray.simulation import measure  # noqa: E402
 from imuarray.studies.bound import paths  # noqa: E402
@@ -132,12 +133,18 @@ def triads(model, rng):
 
 
 @nb.njit
-def normals(generator, count):
-    """Sum of so many, drawn as the kernel draws them."""
-    total = 0.0
-    for _ in range(count):
-        total += generator.standard_normal()
-    return total
+def one_by_one(generator, out, times):
+    """Normal numbers from numpy's generator, a call for each."""
+    for _ in range(times):
+        for i in range(out.size):
+            out[i] = generator.standard_normal()
+
+
+@nb.njit
+def by_lanes(source, out, times):
+    """As the kernels draw them, a tile at a time."""
+    for _ in range(times):
+        normals.fill(source, out.size, out)
 
 
 def profile(model, rng, samples=500, draws=24):
@@ -145,19 +152,23 @@ def profile(model, rng, samples=500, draws=24):
     generator = np.random.Generator(np.random.PCG64DXSM(1))
     likelihood = Likelihood.of(model, *dataset(model, samples, rng))
     positions, count = model.array.relative, samples * draws
-    whole, many, numbers = interleaved(
+    tile = np.empty(normals.room(3 * draws * TILE))
+    source = normals.source(generator, tile.size)
+    whole, many, numbers, numpys = interleaved(
         [
             lambda: likelihood.estimate(positions, draws, generator),
             lambda: likelihood.estimate(positions, 5 * draws, generator),
-            lambda: normals(generator, 3 * count),
+            lambda: by_lanes(source, tile, TILE),
+            lambda: one_by_one(generator, tile, TILE),
         ], 31,
     )  # fmt: skip
     drawn = (many - whole) / (4 * count)
-    name = f"likelihood, T = {samples}, N = {draws}, one thread"
+    name, ratio = f"likelihood, T = {samples}, N = {draws}, one thread", numpys / numbers
     return [
         (name, f"{1e6 * whole:.0f} us", ""),
         ("of that a draw of omega more", f"{1e9 * drawn:.1f} ns", ""),
-        ("of that three normal numbers", f"{1e9 * numbers / count:.1f} ns", ""),
+        ("of that three normal numbers", f"{3e9 * numbers / tile.size / TILE:.1f} ns", f"{ratio:.1f}"),
+        ("three of numpy's generator, one by one", f"{3e9 * numpys / tile.size / TILE:.1f} ns", "1"),
         ("theta's own part", f"{1e6 * (whole - drawn * count):.0f} us", ""),
     ]
 

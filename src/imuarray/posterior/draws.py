@@ -9,76 +9,104 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.compiled import njit
-from imuarray.estimation.kernels import quadratic
+from imuarray.compiled import as_bits, as_number, fma, njit
+from imuarray.posterior import normals
 
 TILE = 32  # samples
 LOG2E, HIGH, LOW = 1.4426950408889634, 6.93147180369123816490e-01, 1.90821492927058770002e-10
 INTEGER = 6755399441055744.0  # 1.5 2^52: added to a small integer, its bits are the last ones
+S52, BIAS = np.uint64(52), np.uint64(1023)
 LEAST = -700.0  # nothing below is more than 0 beside exp(0)
 
 
 class Tile(NamedTuple):
-    """Scratch memory for N draws of a tile's samples."""
+    """Where N draws of a tile's samples come from, and scratch memory."""
 
-    numbers: np.ndarray  # (N, 3, TILE), normal
+    source: normals.Source
+    numbers: np.ndarray  # (room for 3 N TILE,) normal
+    quartic: np.ndarray  # (15,) of `folded`
     exponent: np.ndarray  # (N, TILE)
     top: np.ndarray  # (TILE,) the largest exponent
     total: np.ndarray  # (TILE,) sum of the exponentials of all less it
-    power: np.ndarray  # (TILE,) of 2
-    bits: np.ndarray  # (TILE,) the same memory as integers
 
 
 @njit
-def tile(draws):
-    """Allocate a `Tile` for N draws."""
-    power = np.zeros(TILE)
+def tile(draws, rng):
+    """Allocate a `Tile` for N draws, their numbers seeded by ``rng``."""
+    count = 3 * draws * TILE
     return Tile(
-        np.zeros((draws, 3, TILE)), np.zeros((draws, TILE)), np.zeros(TILE), np.zeros(TILE),
-        power, power.view(np.int64),
+        normals.source(rng, count), np.zeros(normals.room(count)), np.zeros(15),
+        np.zeros((draws, TILE)), np.zeros(TILE), np.zeros(TILE),
     )  # fmt: skip
 
 
 @njit
-def normals(rng, size, out):
-    """Three normal numbers a draw for ``size`` samples, sample by sample: the stream's order."""
-    for i in range(size):
-        for n in range(out.shape[0]):
-            out[n, 0, i] = rng.standard_normal()
-            out[n, 1, i] = rng.standard_normal()
-            out[n, 2, i] = rng.standard_normal()
+def drawn(size, work):
+    """Normal numbers (N, 3, ``size``) for a tile of ``size`` samples, in ``work``'s memory."""
+    draws = work.exponent.shape[0]
+    count = 3 * draws * size
+    normals.fill(work.source, count, work.numbers)
+    return work.numbers[:count].reshape((draws, 3, size))
+
+
+@njit
+def folded(C, out):
+    """The 15 monomials' coefficients of -w' C w / 2 as `_exponent` wants them, into ``out``.
+
+    Three of the 21 products of two of w's come twice: (x y) (x y) is x^2 y^2, and so on.
+    """
+    out[0], out[2], out[5] = -0.5 * C[0, 0], -0.5 * C[1, 1], -0.5 * C[2, 2]
+    out[1], out[3], out[4] = (
+        -(C[1, 0] + 0.5 * C[3, 3]), -(C[2, 0] + 0.5 * C[4, 4]), -(C[2, 1] + 0.5 * C[5, 5])
+    )  # fmt: skip
+    out[6], out[7], out[8] = -C[3, 0], -C[3, 1], -(C[3, 2] + C[5, 4])
+    out[9], out[10], out[11] = -C[4, 0], -(C[4, 1] + C[5, 3]), -C[4, 2]
+    out[12], out[13], out[14] = -(C[5, 0] + C[4, 3]), -C[5, 1], -C[5, 2]
+
+
+@njit(inline="always")
+def _exponent(x, y, z, c, b, t):
+    """-w' C w / 2 + b . w of sample t at omega = (x, y, z), ``c`` of `folded`."""
+    xx, yy, zz = x * x, y * y, z * z
+    found = xx * fma(c[0], xx, b[0, t])
+    found = fma(yy, fma(c[1], xx, fma(c[2], yy, b[1, t])), found)
+    found = fma(zz, fma(c[3], xx, fma(c[4], yy, fma(c[5], zz, b[2, t]))), found)
+    found = fma(x * y, fma(c[6], xx, fma(c[7], yy, fma(c[8], zz, b[3, t]))), found)
+    found = fma(x * z, fma(c[9], xx, fma(c[10], yy, fma(c[11], zz, b[4, t]))), found)
+    return fma(y * z, fma(c[12], xx, fma(c[13], yy, fma(c[14], zz, b[5, t]))), found)
 
 
 @njit(inline="always")
 def _rate(t, mean, factor, u, v, w):
     """mean + factor (u, v, w) of sample t."""
     return (
-        mean[0, t] + factor[0, t] * u,
-        mean[1, t] + factor[1, t] * u + factor[2, t] * v,
-        mean[2, t] + factor[3, t] * u + factor[4, t] * v + factor[5, t] * w,
+        fma(factor[0, t], u, mean[0, t]),
+        fma(factor[2, t], v, fma(factor[1, t], u, mean[1, t])),
+        fma(factor[5, t], w, fma(factor[4, t], v, fma(factor[3, t], u, mean[2, t]))),
     )
 
 
-@njit(error_model="numpy")
-def exponents(first, size, mean, factor, C, b, numbers, out):
-    """-(w' C w - 2 b . w) / 2 at mean + factor n, n of ``numbers`` (N, 3, TILE)."""
+@njit
+def exponents(first, size, mean, factor, quartic, b, numbers, out):
+    """-(w' C w - 2 b . w) / 2 at mean + factor n, n of ``numbers`` (N, 3, size).
+
+    Here and below the sample's index is unsigned: one that might count from the end would be
+    looked up number by number.
+    """
     for n in range(out.shape[0]):
         for i in range(size):
-            t = first + i
+            t = np.uint64(first + i)
             x, y, z = _rate(t, mean, factor, numbers[n, 0, i], numbers[n, 1, i], numbers[n, 2, i])
-            out[n, i] = -0.5 * quadratic(
-                x, y, z, C, b[0, t], b[1, t], b[2, t], b[3, t], b[4, t], b[5, t]
-            )
+            out[n, i] = _exponent(x, y, z, quartic, b, t)
 
 
 @njit(inline="always")
 def tilted(k, t, x, y, z):
     """log p(omega | y_g) less the log of the density it is drawn from."""
-    return (
-        k[0, t] + k[1, t] * x + k[2, t] * y + k[3, t] * z
-        + k[4, t] * x * x + k[5, t] * y * y + k[6, t] * z * z
-        + k[7, t] * x * y + k[8, t] * x * z + k[9, t] * y * z
-    )  # fmt: skip
+    along_x = fma(k[4, t], x, fma(k[7, t], y, fma(k[8, t], z, k[1, t])))
+    along_y = fma(k[5, t], y, fma(k[9, t], z, k[2, t]))
+    along_z = fma(k[6, t], z, k[3, t])
+    return fma(x, along_x, fma(y, along_y, fma(z, along_z, k[0, t])))
 
 
 @njit
@@ -86,37 +114,35 @@ def tilt(first, size, k, mean, factor, numbers, out):
     """Add `tilted` to `exponents`."""
     for n in range(out.shape[0]):
         for i in range(size):
-            t = first + i
+            t = np.uint64(first + i)
             x, y, z = _rate(t, mean, factor, numbers[n, 0, i], numbers[n, 1, i], numbers[n, 2, i])
             out[n, i] += tilted(k, t, x, y, z)
 
 
 @njit(inline="always")
-def _exp_parts(x):
-    """(p, k) with exp(x) = p 2^k to an ulp or two, for x in [LEAST, 0]; p by Taylor's series."""
-    k = np.floor(x * LOG2E + 0.5)
-    r = (x - k * HIGH) - k * LOW
-    p = 1.0 / 479001600.0
-    p = p * r + 1.0 / 39916800.0
-    p = p * r + 1.0 / 3628800.0
-    p = p * r + 1.0 / 362880.0
-    p = p * r + 1.0 / 40320.0
-    p = p * r + 1.0 / 5040.0
-    p = p * r + 1.0 / 720.0
-    p = p * r + 1.0 / 120.0
-    p = p * r + 1.0 / 24.0
-    p = p * r + 1.0 / 6.0
-    p = p * r + 0.5
-    p = p * r + 1.0
-    return p * r + 1.0, k
+def _exp(x):
+    """exp(x) to an ulp or two for x in [LEAST, 0]: a power of 2 times Taylor's series."""
+    shifted = fma(x, LOG2E, INTEGER)
+    k = shifted - INTEGER
+    r = fma(-k, LOW, fma(-k, HIGH, x))
+    p = fma(1.0 / 479001600.0, r, 1.0 / 39916800.0)
+    p = fma(p, r, 1.0 / 3628800.0)
+    p = fma(p, r, 1.0 / 362880.0)
+    p = fma(p, r, 1.0 / 40320.0)
+    p = fma(p, r, 1.0 / 5040.0)
+    p = fma(p, r, 1.0 / 720.0)
+    p = fma(p, r, 1.0 / 120.0)
+    p = fma(p, r, 1.0 / 24.0)
+    p = fma(p, r, 1.0 / 6.0)
+    p = fma(p, r, 0.5)
+    p = fma(p, r, 1.0)
+    return fma(p, r, 1.0) * as_number((as_bits(shifted) + BIAS) << S52)
 
 
-@njit(error_model="numpy")
+@njit
 def _exponentials(size, work):
     """top = the largest exponent of N, total = the sum of exp(exponent - top), by sample."""
-    exponent, top, total, power, bits = (
-        work.exponent, work.top, work.total, work.power, work.bits
-    )  # fmt: skip
+    exponent, top, total = work.exponent, work.top, work.total
     for i in range(size):
         top[i] = exponent[0, i]
         total[i] = 0.0
@@ -125,20 +151,14 @@ def _exponentials(size, work):
             top[i] = max(top[i], exponent[n, i])
     for n in range(exponent.shape[0]):
         for i in range(size):
-            p, k = _exp_parts(max(exponent[n, i] - top[i], LEAST))
-            exponent[n, i] = p
-            power[i] = k + INTEGER
-        for i in range(size):
-            bits[i] = (bits[i] << 52) + (1023 << 52)
-        for i in range(size):
-            total[i] += exponent[n, i] * power[i]
+            total[i] += _exp(max(exponent[n, i] - top[i], LEAST))
 
 
 @njit
 def log_means(size, work):
     """Sum over a tile's samples of the log of the mean exponential, safe from over- and underflow.
 
-    Appendix A of paper 2021. The exponents are used up.
+    Appendix A of paper 2021.
     """
     found, draws = 0.0, work.exponent.shape[0]
     if draws == 1:

@@ -37,9 +37,9 @@ class Workspace(NamedTuple):
 
 
 @njit
-def workspace(samples, count):
-    """Allocate a `Workspace` for T samples and N = ``count`` draws."""
-    return Workspace(kernels.reduced(samples), draws.tile(count))
+def workspace(samples, count, rng):
+    """Allocate a `Workspace` for T samples and N = ``count`` draws, seeded by ``rng``."""
+    return Workspace(kernels.reduced(samples), draws.tile(count, rng))
 
 
 @njit
@@ -76,9 +76,9 @@ def _assemble(total, const, logdet, determinant_power):
 
 
 @njit
-def fixed_draws(positions, data, rates, work, power):
+def fixed_draws(positions, data, rates, power):
     """log p-hat (26a) on given draws ``rates`` (T, N, 3) rad/s."""
-    found = work.reduced
+    found = kernels.reduced(rates.shape[0])
     logdet = _collapse(positions, data, found)
     total, tilted = 0.0, data.tilt.shape[1] > 0
     exponent = np.empty(rates.shape[1])
@@ -96,18 +96,21 @@ def fixed_draws(positions, data, rates, work, power):
 
 
 @njit
-def fresh_draws(positions, data, rng, work, power, first, last):
+def fresh_draws(positions, data, work, power, first, last):
     """log p-hat (26a) of samples first..last-1 with omega drawn anew from p(omega | y_g)."""
     found = work.reduced
     logdet = _collapse(positions, data, found)
     total, tile = 0.0, work.tile
+    draws.folded(found.C, tile.quartic)
     for start in range(first, last, draws.TILE):
         size = min(draws.TILE, last - start)
         mean, factor = data.mean, data.factor
-        draws.normals(rng, size, tile.numbers)
-        draws.exponents(start, size, mean, factor, found.C, found.b, tile.numbers, tile.exponent)
+        numbers = draws.drawn(size, tile)
+        draws.exponents(
+            start, size, mean, factor, tile.quartic, found.b, numbers, tile.exponent
+        )
         if data.tilt.shape[1] > 0:
-            draws.tilt(start, size, data.tilt, mean, factor, tile.numbers, tile.exponent)
+            draws.tilt(start, size, data.tilt, mean, factor, numbers, tile.exponent)
         total += draws.log_means(size, tile)
     return _assemble(total, found.const[first:last], logdet, power)
 
@@ -115,9 +118,9 @@ def fresh_draws(positions, data, rng, work, power, first, last):
 @njit
 def repeated(positions, data, rng, count, power, out):
     """Independent realisations of log p-hat at one theta, filling ``out``."""
-    work = workspace(data.energy.size, count)
     for i in range(out.size):
-        out[i] = fresh_draws(positions, data, rng, work, power, 0, data.energy.size)
+        work = workspace(data.energy.size, count, rng)
+        out[i] = fresh_draws(positions, data, work, power, 0, data.energy.size)
 
 
 @njit
@@ -127,7 +130,7 @@ def transitions(theta, log_target, prior, step, draws, power, data, rng, count):
     ``prior`` (2, 3 (A - 1)) holds means and precisions, ``step`` the walk's sd. The
     accepted noisy estimate is kept, never redrawn. Returns (accepted, log_target).
     """
-    work = workspace(data.energy.size, draws)
+    work = workspace(data.energy.size, draws, rng)
     size = theta.size
     positions = np.zeros((size // 3 + 1, 3))
     flat = positions.ravel()[3:]
@@ -137,7 +140,7 @@ def transitions(theta, log_target, prior, step, draws, power, data, rng, count):
         for i in range(size):
             flat[i] = theta[i] + step * rng.standard_normal()
             proposed -= 0.5 * prior[1, i] * (flat[i] - prior[0, i]) ** 2
-        proposed += fresh_draws(positions, data, rng, work, power, 0, data.energy.size)
+        proposed += fresh_draws(positions, data, work, power, 0, data.energy.size)
         if math.log(rng.random()) < proposed - log_target:
             theta[:] = flat
             log_target = proposed
@@ -153,7 +156,7 @@ def autoregressive(theta, log_target, prior, centre, factor, step, draws, power,
     in its own coordinates a proposal is sqrt(1 - step^2) z + step n. Only what the target departs
     from it can be refused. Returns (accepted, log_target).
     """
-    work = workspace(data.energy.size, draws)
+    work = workspace(data.energy.size, draws, rng)
     size = theta.size
     positions = np.zeros((size // 3 + 1, 3))
     flat = positions.ravel()[3:]
@@ -177,7 +180,7 @@ def autoregressive(theta, log_target, prior, centre, factor, step, draws, power,
                 value += factor[i, j] * new[j]
             flat[i] = value
             proposed -= 0.5 * prior[1, i] * (value - prior[0, i]) ** 2
-        proposed += fresh_draws(positions, data, rng, work, power, 0, data.energy.size)
+        proposed += fresh_draws(positions, data, work, power, 0, data.energy.size)
         ratio = proposed - log_target + 0.5 * (moved - square)
         if math.log(rng.random()) < ratio:
             theta[:] = flat

@@ -112,8 +112,7 @@ class Likelihood:
         They are taken to be from where `estimate` would draw them.
         """
         require_shape("rates", rates, (self.samples, rates.shape[1], 3))
-        work = kernels.workspace(self.samples, rates.shape[1])
-        return kernels.fixed_draws(self._relative(positions), self.data, rates, work, self.power)
+        return kernels.fixed_draws(self._relative(positions), self.data, rates, self.power)
 
     def estimate(self, positions, draws: int, rng, threads: int = 1) -> float:
         """log p-hat at ``positions`` (A, 3) m with N = ``draws`` fresh draws a sample.
@@ -126,10 +125,8 @@ class Likelihood:
 
         def block(job):
             generator, first, last = job
-            work = kernels.workspace(self.samples, draws)
-            return kernels.fresh_draws(
-                positions, self.data, generator, work, self.power, first, last
-            )
+            work = kernels.workspace(self.samples, draws, generator)
+            return kernels.fresh_draws(positions, self.data, work, self.power, first, last)
 
         if threads == 1:
             return block((rng, 0, self.samples))

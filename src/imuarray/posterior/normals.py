@@ -1,0 +1,133 @@
+"""Normal numbers, many at a time: Box and Muller's pairs of lanes of SFC64.
+
+Every loop runs over the lanes and has no branch, no call and no type but one of 64 bits, so
+compilers turn it into vector instructions; numpy's ziggurat, a call for each number, was most of
+what a draw of omega cost. No operation here depends on a C library: other machines give the same
+bits.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from imuarray.compiled import as_bits, as_number, fma, njit
+
+LANES = 32
+BLOCK = 2 * LANES  # numbers that a step of all lanes gives
+ONE = np.uint64(0x3FF0000000000000)  # the bits of 1.0
+BELOW_ONE = 1.0 - 2.0**-53
+ROOT_HALF = np.uint64(0x3FE6A09E667F3BCD)  # the bits of sqrt(1/2)
+INTEGER = 6755399441055744.0  # 1.5 2^52: added to a small integer, its bits are the last ones
+INTEGER_BITS = np.uint64(0x4338000000000000)
+LOG2_HIGH, LOG2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
+S1, S3, S11, S12, S24, S40, S52, S63 = (np.uint64(n) for n in (1, 3, 11, 12, 24, 40, 52, 63))
+BIAS = np.uint64(1023)
+
+
+class Source(NamedTuple):
+    """The lanes, and scratch memory for so many numbers."""
+
+    state: np.ndarray  # (4, LANES) uint64; of the last row the first number counts
+    words: np.ndarray  # (numbers,) uint64
+
+
+@njit
+def room(count):
+    """Size of an array that `fill` can put ``count`` numbers into."""
+    return (count + BLOCK - 1) // BLOCK * BLOCK
+
+
+@njit
+def source(rng, count):
+    """A `Source` whose lanes start at 192 bits each from ``rng`` (numpy.random.Generator)."""
+    state = np.ones((4, LANES), np.uint64)
+    for k in range(3):
+        for i in range(LANES):
+            state[k, i] = np.uint64(rng.random() * 2.0**53) << S11
+            state[k, i] ^= np.uint64(rng.random() * 2.0**53)
+    return Source(state, np.empty(room(count), np.uint64))
+
+
+@njit
+def _words(a, b, c, counter, out):
+    """Words of 64 bits, one of each lane in turn: SFC64, as numpy.random.SFC64 has it.
+
+    ``out`` (rows, LANES).
+    """
+    for k in range(out.shape[0]):
+        for i in range(a.size):
+            word = a[i] + b[i] + counter
+            a[i] = b[i] ^ (b[i] >> S11)
+            b[i] = c[i] + (c[i] << S3)
+            c[i] = ((c[i] << S24) | (c[i] >> S40)) + word
+            out[k, i] = word
+        counter += S1
+    return counter
+
+
+@njit(inline="always")
+def _radius(word):
+    """sqrt(-2 log u), u the word's first 52 bits and a half more, times 2^-52."""
+    u = as_bits(as_number((word >> S12) | ONE) - BELOW_ONE)  # exact; (0, 1)
+    exponent = (u + (ONE - ROOT_HALF)) >> S52
+    m = as_number(u - ((exponent - BIAS) << S52))  # within [sqrt(1/2), sqrt 2)
+    k = as_number(INTEGER_BITS + (exponent - BIAS)) - INTEGER
+    q = (m - 1.0) / (m + 1.0)
+    r = q * q
+    p = fma(2.0 / 19.0, r, 2.0 / 17.0)
+    p = fma(p, r, 2.0 / 15.0)
+    p = fma(p, r, 2.0 / 13.0)
+    p = fma(p, r, 2.0 / 11.0)
+    p = fma(p, r, 2.0 / 9.0)
+    p = fma(p, r, 2.0 / 7.0)
+    p = fma(p, r, 2.0 / 5.0)
+    p = fma(p, r, 2.0 / 3.0)
+    log = fma(k, LOG2_HIGH, fma(2.0, q, fma(k, LOG2_LOW, (p * r) * q)))
+    return math.sqrt(-2.0 * log)
+
+
+@njit(inline="always")
+def _direction(word):
+    """(sin, cos) of an angle within pi / 4 of zero: the word's first 52 bits and a half more."""
+    x = (as_number((word >> S12) | ONE) - 1.5 + 2.0**-53) * (0.5 * math.pi)
+    r = x * x
+    s = fma(-1.0 / 1307674368000.0, r, 1.0 / 6227020800.0)
+    s = fma(s, r, -1.0 / 39916800.0)
+    s = fma(s, r, 1.0 / 362880.0)
+    s = fma(s, r, -1.0 / 5040.0)
+    s = fma(s, r, 1.0 / 120.0)
+    s = fma(s, r, -1.0 / 6.0)
+    c = fma(1.0 / 20922789888000.0, r, -1.0 / 87178291200.0)
+    c = fma(c, r, 1.0 / 479001600.0)
+    c = fma(c, r, -1.0 / 3628800.0)
+    c = fma(c, r, 1.0 / 40320.0)
+    c = fma(c, r, -1.0 / 720.0)
+    c = fma(c, r, 1.0 / 24.0)
+    c = fma(c, r, -0.5)
+    return fma(s * r, x, x), fma(c, r, 1.0)
+
+
+@njit(error_model="numpy")
+def _pairs(words, first, second):
+    """Box and Muller's pairs: a radius and twice an angle, on either half of the circle."""
+    half = first.size
+    for i in range(half):
+        radius = _radius(words[i])
+        s, c = _direction(words[half + i])
+        twice = (radius + radius) * s
+        sign = as_number((words[half + i] << S63) | ONE)
+        first[i] = sign * fma(-twice, s, radius)
+        second[i] = twice * c
+
+
+@njit
+def fill(lanes, count, out):
+    """Normal numbers into ``out`` (size a multiple of BLOCK), at least its first ``count``."""
+    rows = 2 * ((count + BLOCK - 1) // BLOCK)
+    words = lanes.words[: rows * LANES]
+    state = lanes.state
+    a, b, c, counter = state[0], state[1], state[2], state[3]
+    counter[0] = _words(a, b, c, counter[0], words.reshape((rows, LANES)))
+    half = words.size // 2
+    _pairs(words, out[:half], out[half : 2 * half])

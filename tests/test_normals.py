@@ -1,0 +1,97 @@
+"""The vectorised normal numbers against numpy's SFC64, the C library and the normal law."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from imuarray.posterior import normals
+
+
+def filled(count, seed=1):
+    rng = np.random.default_rng(seed)
+    source = normals.source(rng, count)
+    out = np.full(normals.room(count), np.nan)
+    start = source.state.copy()
+    normals.fill(source, count, out)
+    return out, start, source
+
+
+def lane(state, i, count):
+    """Words of lane ``i`` by numpy's own SFC64."""
+    generator = np.random.SFC64()
+    words = state[:, i].copy()
+    words[3] = state[3, 0]
+    generator.state = {**generator.state, "state": {"state": words}}
+    return generator.random_raw(count)
+
+
+@pytest.mark.parametrize("count", [1, 5, normals.BLOCK, normals.BLOCK + 1, 1000])
+def test_words_are_those_of_numpy(count):
+    """Every lane, over several calls: the counter goes on."""
+    _, start, source = filled(count)
+    rows = normals.room(count) // normals.LANES
+    found = [source.words.copy()]
+    normals.fill(source, count, np.empty(normals.room(count)))
+    found.append(source.words)
+    found = np.concatenate(found).reshape(2 * rows, normals.LANES)
+    for i in range(normals.LANES):
+        np.testing.assert_array_equal(found[:, i], lane(start, i, 2 * rows))
+    assert np.unique(found).size == found.size
+
+
+def test_numbers_are_box_and_mullers():
+    """Of those words: a radius from one, an angle and its half of the circle from another."""
+    out, _, source = filled(20000)
+    radius, angle = source.words.reshape(2, -1)
+    u = ((radius >> np.uint64(12)).astype(float) + 0.5) * 2.0**-52
+    v = ((angle >> np.uint64(12)).astype(float) + 0.5) * 2.0**-52
+    length, turn = np.sqrt(-2.0 * np.log(u)), math.pi * (v - 0.5)
+    sign = np.where(angle & np.uint64(1), -1.0, 1.0)
+    np.testing.assert_allclose(out[: length.size], sign * length * np.cos(turn), atol=4e-15)
+    np.testing.assert_allclose(out[length.size :], length * np.sin(turn), atol=4e-15)
+
+
+@pytest.mark.parametrize(
+    ("word", "u"), [(0, 2.0**-53), (2**64 - 1, 1.0 - 2.0**-53), (2**63, 0.5 + 2.0**-53)]
+)
+def test_radius_of_the_extremes(word, u):
+    assert normals._radius(np.uint64(word)) == pytest.approx(math.sqrt(-2 * math.log(u)), rel=1e-14)
+
+
+def test_direction_of_the_extremes():
+    low, high = (normals._direction(np.uint64(word)) for word in (0, 2**64 - 1))
+    assert low == (-high[0], high[1]) == pytest.approx((-math.sqrt(0.5), math.sqrt(0.5)), rel=1e-15)
+
+
+def test_law():
+    """Two million numbers, seed 1: distribution, far tails, and no two alike or correlated.
+
+    False alarms: 1e-4 for the distribution, 6e-7 for each of the 12 others.
+    """
+    out, _, _ = filled(2**21)
+    assert stats.kstest(out, "norm").pvalue > 1e-4
+    for limit in (3.0, 4.0, 4.5):
+        beyond, expected = np.sum(np.abs(out) > limit), 2 * stats.norm.sf(limit) * out.size
+        assert abs(beyond - expected) < 5 * math.sqrt(expected)
+    first, second = out.reshape(2, -1)
+    rows = out.reshape(-1, normals.LANES)
+    pairs = {
+        "of one radius and angle": (first, second),
+        "neighbours": (out[:-1], out[1:]),
+        "of one lane": (rows[:-1], rows[1:]),
+    }
+    for one, other in pairs.values():
+        for power in (1, 2, 3):
+            x, y = one.ravel() ** power, other.ravel() ** power
+            x, y = (x - x.mean()) / x.std(), (y - y.mean()) / y.std()
+            products = x * y
+            assert abs(products.mean()) < 5 * products.std() / math.sqrt(products.size)
+    assert np.unique(out).size > 0.9999 * out.size
+
+
+def test_streams_differ():
+    one, two = filled(1000, 1)[0], filled(1000, 2)[0]
+    assert np.intersect1d(one, two).size == 0
+    np.testing.assert_array_equal(one, filled(1000, 1)[0])
