@@ -162,13 +162,13 @@ def profile(model, rng, samples=500, draws=24):
             lambda: one_by_one(generator, tile, TILE),
         ], 31,
     )  # fmt: skip
-    drawn = (many - whole) / (4 * count)
+    drawn, each = (many - whole) / (4 * count), 3e9 / (tile.size * TILE)
     name, ratio = f"likelihood, T = {samples}, N = {draws}, one thread", numpys / numbers
     return [
         (name, f"{1e6 * whole:.0f} us", ""),
         ("of that a draw of omega more", f"{1e9 * drawn:.1f} ns", ""),
-        ("of that three normal numbers", f"{3e9 * numbers / tile.size / TILE:.1f} ns", f"{ratio:.1f}"),
-        ("three of numpy's generator, one by one", f"{3e9 * numpys / tile.size / TILE:.1f} ns", "1"),
+        ("of that three normal numbers", f"{each * numbers:.1f} ns", f"{ratio:.1f}"),
+        ("three of numpy's generator, one by one", f"{each * numpys:.1f} ns", "1"),
         ("theta's own part", f"{1e6 * (whole - drawn * count):.0f} us", ""),
     ]
 

@@ -1,7 +1,5 @@
 """The likelihood, collapsed to six dimensions, against its direct form in 3A dimensions."""
 
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

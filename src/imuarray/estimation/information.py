@@ -57,7 +57,7 @@ def _whitened(rate, C, P, first, size, Z):
     """
     c = lower(C)
     for i in range(size):
-        t = first + i
+        t = np.uint64(first + i)  # a signed one would be looked up number by number
         x, y, z = rate[0, t], rate[1, t], rate[2, t]
         xx, xy, xz, yy, yz, zz = rate_information(x, y, z, c, precision_at(P, t))
         ix = 1.0 / np.sqrt(xx)
@@ -101,9 +101,10 @@ def _rate_gram(rate, C, P, entries, left):
             for j in range(3):
                 for r in range(3):
                     for i in range(size):
-                        total = entries[j, 0, first + i] * V[0, r, i]
-                        total += entries[j, 1, first + i] * V[1, r, i]
-                        U[3 * m + j, r, i] = total + entries[j, 2, first + i] * V[2, r, i]
+                        t = np.uint64(first + i)  # as above
+                        total = entries[j, 0, t] * V[0, r, i]
+                        total += entries[j, 1, t] * V[1, r, i]
+                        U[3 * m + j, r, i] = total + entries[j, 2, t] * V[2, r, i]
         flat = U.reshape(12, 3 * TILE)
         found += flat @ flat.T
     return found

@@ -106,9 +106,7 @@ def fresh_draws(positions, data, work, power, first, last):
         size = min(draws.TILE, last - start)
         mean, factor = data.mean, data.factor
         numbers = draws.drawn(size, tile)
-        draws.exponents(
-            start, size, mean, factor, tile.quartic, found.b, numbers, tile.exponent
-        )
+        draws.exponents(start, size, mean, factor, tile.quartic, found.b, numbers, tile.exponent)
         if data.tilt.shape[1] > 0:
             draws.tilt(start, size, data.tilt, mean, factor, numbers, tile.exponent)
         total += draws.log_means(size, tile)

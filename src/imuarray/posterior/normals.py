@@ -13,7 +13,7 @@ import numpy as np
 
 from imuarray.compiled import as_bits, as_number, fma, njit
 
-LANES = 32
+LANES = 16
 BLOCK = 2 * LANES  # numbers that a step of all lanes gives
 ONE = np.uint64(0x3FF0000000000000)  # the bits of 1.0
 BELOW_ONE = 1.0 - 2.0**-53
@@ -49,20 +49,21 @@ def source(rng, count):
     return Source(state, np.empty(room(count), np.uint64))
 
 
+@njit(inline="always")
+def _step(a, b, c, counter):
+    """A word and the next state of SFC64, as numpy.random.SFC64 has it."""
+    word = a + b + counter
+    return word, b ^ (b >> S11), c + (c << S3), ((c << S24) | (c >> S40)) + word
+
+
 @njit
 def _words(a, b, c, counter, out):
-    """Words of 64 bits, one of each lane in turn: SFC64, as numpy.random.SFC64 has it.
-
-    ``out`` (rows, LANES).
-    """
-    for k in range(out.shape[0]):
+    """One word of each lane in turn into the rows of ``out`` (an even number, LANES)."""
+    for k in range(0, out.shape[0], 2):
         for i in range(a.size):
-            word = a[i] + b[i] + counter
-            a[i] = b[i] ^ (b[i] >> S11)
-            b[i] = c[i] + (c[i] << S3)
-            c[i] = ((c[i] << S24) | (c[i] >> S40)) + word
-            out[k, i] = word
-        counter += S1
+            out[k, i], x, y, z = _step(a[i], b[i], c[i], counter)
+            out[k + 1, i], a[i], b[i], c[i] = _step(x, y, z, counter + S1)
+        counter += np.uint64(2)
     return counter
 
 
@@ -109,14 +110,17 @@ def _direction(word):
 
 
 @njit(error_model="numpy")
-def _pairs(words, first, second):
-    """Box and Muller's pairs: a radius and twice an angle, on either half of the circle."""
-    half = first.size
-    for i in range(half):
-        radius = _radius(words[i])
-        s, c = _direction(words[half + i])
+def _pairs(radii, angles, first, second):
+    """Box and Muller's, of two words each: a radius and twice an angle, on half a circle or other.
+
+    Indices here count from zero: the compiler must see that none is negative, for those would be
+    looked up number by number.
+    """
+    for i in range(first.size):
+        radius = _radius(radii[i])
+        s, c = _direction(angles[i])
         twice = (radius + radius) * s
-        sign = as_number((words[half + i] << S63) | ONE)
+        sign = as_number((angles[i] << S63) | ONE)
         first[i] = sign * fma(-twice, s, radius)
         second[i] = twice * c
 
@@ -130,4 +134,4 @@ def fill(lanes, count, out):
     a, b, c, counter = state[0], state[1], state[2], state[3]
     counter[0] = _words(a, b, c, counter[0], words.reshape((rows, LANES)))
     half = words.size // 2
-    _pairs(words, out[:half], out[half : 2 * half])
+    _pairs(words[:half], words[half:], out[:half], out[half : 2 * half])
