@@ -113,12 +113,14 @@ def _direction(word):
 def _pairs(radii, angles, first, second):
     """Box and Muller's, of two words each: a radius and twice an angle, on half a circle or other.
 
-    Indices here count from zero: the compiler must see that none is negative, for those would be
-    looked up number by number.
+    Indices count from zero: the compiler must see that none is negative, for those would be looked
+    up number by number. Two short loops keep a processor busier than a long one.
     """
     for i in range(first.size):
-        radius = _radius(radii[i])
+        first[i] = _radius(radii[i])
+    for i in range(first.size):
         s, c = _direction(angles[i])
+        radius = first[i]
         twice = (radius + radius) * s
         sign = as_number((angles[i] << S63) | ONE)
         first[i] = sign * fma(-twice, s, radius)
