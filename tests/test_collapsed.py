@@ -154,11 +154,25 @@ def test_log_mean_exp(exponent):
     assert draws.log_means(3, tile) == pytest.approx(3 * direct + 7.0, rel=1e-12, abs=1e-11)
 
 
+@pytest.mark.parametrize("odd", [[np.nan, 1], [1, np.nan], [np.inf, 1], [-np.inf, -np.inf]])
+def test_odd_exponents_stay_odd(odd):
+    """A draw without a number leaves none, among samples that have one; nothing is made finite."""
+    tile = draws.tile(2, np.random.default_rng(1))
+    tile.exponent[:, :3] = 0.5
+    tile.exponent[:, 1] = odd
+    found = draws.log_means(3, tile)
+    expected = 1.0 + kernels._log_mean_exp(np.array(odd, float))
+    assert not np.isfinite(found)
+    np.testing.assert_equal(found, expected)
+
+
 def test_own_exponential():
     """To two units in the last place of what the C library gives, over the range in use."""
     values = np.concatenate([-np.logspace(-300, np.log10(699.9), 4000), [0.0]])
     found = [draws._exp(value) for value in values]
     np.testing.assert_allclose(found, np.exp(values), rtol=5e-16)
+    assert np.isnan(draws._exp(np.nan))
+    assert draws._exp(draws.LEAST) == pytest.approx(np.exp(draws.LEAST), rel=5e-16)
 
 
 @pytest.mark.parametrize("samples", [1, 31, 32, 77])

@@ -15,6 +15,7 @@ from functools import cache, partial
 from pathlib import Path
 
 import numba
+import numpy as np
 from llvmlite import ir
 from numba.extending import intrinsic
 
@@ -33,29 +34,39 @@ def njit(function=None, **options):
         numba.config.CACHE_DIR = before
 
 
+# Below, as in no other place, pure Python (NUMBA_DISABLE_JIT) cannot follow.
 @intrinsic
 def fma(typing, a, b, c):
-    """a b + c, rounded once: faster, and unlike ``fastmath`` the same bits however compiled."""
+    """a b + c, rounded once: unlike ``fastmath`` the same bits however compiled.
+
+    One instruction of x86 processors since 2013 and of ARM's; elsewhere a call of the C library.
+    """
     number = numba.types.float64
     return number(number, number, number), lambda _, builder, __, values: builder.fma(*values)
 
 
 @intrinsic
 def as_number(typing, bits):
-    """The number of 64 bits that an unsigned integer's bits are."""
-    number = numba.types.float64
-    return number(numba.types.uint64), lambda _, builder, __, values: builder.bitcast(
-        values[0], ir.DoubleType()
-    )
+    """The number of 64 bits that an unsigned integer's bits are; other types do not compile."""
+    if bits != numba.types.uint64:
+        return None
+    found = numba.types.float64(bits)
+    return found, lambda _, builder, __, values: builder.bitcast(values[0], ir.DoubleType())
 
 
 @intrinsic
 def as_bits(typing, number):
-    """The bits of a number, as an unsigned integer."""
-    bits = numba.types.uint64
-    return bits(numba.types.float64), lambda _, builder, __, values: builder.bitcast(
-        values[0], ir.IntType(64)
-    )
+    """The bits of a number, as an unsigned integer; other types do not compile."""
+    if number != numba.types.float64:
+        return None
+    found = numba.types.uint64(number)
+    return found, lambda _, builder, __, values: builder.bitcast(values[0], ir.IntType(64))
+
+
+# Logarithms and exponentials of our own take numbers apart into 2^k m.
+INTEGER = 1.5 * 2.0**52  # added to a small integer, its bits are the last ones
+BIAS, PLACES = np.uint64(1023), np.uint64(52)  # of the power of 2 among a number's bits
+LOG2_HIGH, LOG2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10  # their sum: log 2
 
 
 def kernels_digest() -> str:

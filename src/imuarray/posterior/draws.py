@@ -9,13 +9,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.compiled import as_bits, as_number, fma, njit
+from imuarray.compiled import (
+    BIAS,
+    INTEGER,
+    LOG2_HIGH,
+    LOG2_LOW,
+    PLACES,
+    as_bits,
+    as_number,
+    fma,
+    njit,
+)
 from imuarray.posterior import normals
 
 TILE = 32  # samples
-LOG2E, HIGH, LOW = 1.4426950408889634, 6.93147180369123816490e-01, 1.90821492927058770002e-10
-INTEGER = 6755399441055744.0  # 1.5 2^52: added to a small integer, its bits are the last ones
-S52, BIAS = np.uint64(52), np.uint64(1023)
+LOG2E = 1.4426950408889634
 LEAST = -700.0  # nothing below is more than 0 beside exp(0)
 
 
@@ -124,7 +132,7 @@ def _exp(x):
     """exp(x) to an ulp or two for x in [LEAST, 0]: a power of 2 times Taylor's series."""
     shifted = fma(x, LOG2E, INTEGER)
     k = shifted - INTEGER
-    r = fma(-k, LOW, fma(-k, HIGH, x))
+    r = fma(-k, LOG2_LOW, fma(-k, LOG2_HIGH, x))
     p = fma(1.0 / 479001600.0, r, 1.0 / 39916800.0)
     p = fma(p, r, 1.0 / 3628800.0)
     p = fma(p, r, 1.0 / 362880.0)
@@ -136,7 +144,7 @@ def _exp(x):
     p = fma(p, r, 1.0 / 6.0)
     p = fma(p, r, 0.5)
     p = fma(p, r, 1.0)
-    return fma(p, r, 1.0) * as_number((as_bits(shifted) + BIAS) << S52)
+    return fma(p, r, 1.0) * as_number((as_bits(shifted) + BIAS) << PLACES)
 
 
 @njit
@@ -151,6 +159,7 @@ def _exponentials(size, work):
             top[i] = max(top[i], exponent[n, i])
     for n in range(exponent.shape[0]):
         for i in range(size):
+            # NaN passes max as its first argument, not as its second
             total[i] += _exp(max(exponent[n, i] - top[i], LEAST))
 
 

@@ -1,9 +1,9 @@
-"""Normal numbers, many at a time: Box and Muller's pairs of lanes of SFC64.
+"""Normal numbers, many at a time: Box and Muller's pairs, of lanes of SFC64.
 
-Every loop runs over the lanes and has no branch, no call and no type but one of 64 bits, so
-compilers turn it into vector instructions; numpy's ziggurat, a call for each number, was most of
-what a draw of omega cost. No operation here depends on a C library: other machines give the same
-bits.
+The loops, over lanes and over pairs, have no branch and no type but one of 64 bits, so compilers
+turn them into vector instructions; numpy's ziggurat, a call for each number, was most of what a
+draw of omega cost. Nothing here depends on a C library's logarithms and sines: other machines give
+the same bits (`imuarray.compiled.fma` says where more slowly).
 """
 
 import math
@@ -11,18 +11,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.compiled import as_bits, as_number, fma, njit
+from imuarray.compiled import (
+    BIAS,
+    INTEGER,
+    LOG2_HIGH,
+    LOG2_LOW,
+    PLACES,
+    as_bits,
+    as_number,
+    fma,
+    njit,
+)
 
 LANES = 16
 BLOCK = 2 * LANES  # numbers that a step of all lanes gives
 ONE = np.uint64(0x3FF0000000000000)  # the bits of 1.0
 BELOW_ONE = 1.0 - 2.0**-53
 ROOT_HALF = np.uint64(0x3FE6A09E667F3BCD)  # the bits of sqrt(1/2)
-INTEGER = 6755399441055744.0  # 1.5 2^52: added to a small integer, its bits are the last ones
-INTEGER_BITS = np.uint64(0x4338000000000000)
-LOG2_HIGH, LOG2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
-S1, S3, S11, S12, S24, S40, S52, S63 = (np.uint64(n) for n in (1, 3, 11, 12, 24, 40, 52, 63))
-BIAS = np.uint64(1023)
+INTEGER_BITS = np.uint64(0x4338000000000000)  # of INTEGER
+S1, S3, S11, S12, S24, S40, S63 = (np.uint64(n) for n in (1, 3, 11, 12, 24, 40, 63))
 
 
 class Source(NamedTuple):
@@ -40,7 +47,10 @@ def room(count):
 
 @njit
 def source(rng, count):
-    """A `Source` whose lanes start at 192 bits each from ``rng`` (numpy.random.Generator)."""
+    """A `Source` whose lanes start at 192 bits each from ``rng`` (numpy.random.Generator).
+
+    All of a lane's bits are random, so SFC64 needs none of the rounds that spread a short seed.
+    """
     state = np.ones((4, LANES), np.uint64)
     for k in range(3):
         for i in range(LANES):
@@ -71,8 +81,8 @@ def _words(a, b, c, counter, out):
 def _radius(word):
     """sqrt(-2 log u), u the word's first 52 bits and a half more, times 2^-52."""
     u = as_bits(as_number((word >> S12) | ONE) - BELOW_ONE)  # exact; (0, 1)
-    exponent = (u + (ONE - ROOT_HALF)) >> S52
-    m = as_number(u - ((exponent - BIAS) << S52))  # within [sqrt(1/2), sqrt 2)
+    exponent = (u + (ONE - ROOT_HALF)) >> PLACES
+    m = as_number(u - ((exponent - BIAS) << PLACES))  # within [sqrt(1/2), sqrt 2)
     k = as_number(INTEGER_BITS + (exponent - BIAS)) - INTEGER
     q = (m - 1.0) / (m + 1.0)
     r = q * q
@@ -128,11 +138,15 @@ def _pairs(radii, angles, first, second):
 
 
 @njit
-def fill(lanes, count, out):
-    """Normal numbers into ``out`` (size a multiple of BLOCK), at least its first ``count``."""
+def fill(source, count, out):
+    """Normal numbers into ``out``, at least its first ``count``; its size `room` of that or more.
+
+    ValueError where it is less, or more than the source was made for.
+    """
     rows = 2 * ((count + BLOCK - 1) // BLOCK)
-    words = lanes.words[: rows * LANES]
-    state = lanes.state
+    if out.size < rows * LANES or source.words.size < rows * LANES:
+        raise ValueError("fill: more numbers asked for than there is room for")
+    words, state = source.words[: rows * LANES], source.state
     a, b, c, counter = state[0], state[1], state[2], state[3]
     counter[0] = _words(a, b, c, counter[0], words.reshape((rows, LANES)))
     half = words.size // 2
