@@ -23,7 +23,7 @@ from imuarray.recording import Recording
 from imuarray.streams import stream
 
 PMMH_STEPS = {True: 200_000, False: 10_000}  # compiled, any effects
-NUTS_STEPS, NUTS_WARMUP = 1500, 300  # 1000 left the worst of 93 R-hats above 1.01 now and then
+NUTS_STEPS, NUTS_WARMUP = 1250, 300  # 1000 left the worst of 93 R-hats above 1.01 now and then
 APART = 2.0  # posterior sds by which the starts differ where effects are free
 STORED = 2000
 RHAT_THRESHOLD = 1.05
