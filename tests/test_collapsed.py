@@ -166,15 +166,6 @@ def test_odd_exponents_stay_odd(odd):
     np.testing.assert_equal(found, expected)
 
 
-def test_own_exponential():
-    """To two units in the last place of what the C library gives, over the range in use."""
-    values = np.concatenate([-np.logspace(-300, np.log10(699.9), 4000), [0.0]])
-    found = [draws._exp(value) for value in values]
-    np.testing.assert_allclose(found, np.exp(values), rtol=5e-16)
-    assert np.isnan(draws._exp(np.nan))
-    assert draws._exp(draws.LEAST) == pytest.approx(np.exp(draws.LEAST), rel=5e-16)
-
-
 @pytest.mark.parametrize("samples", [1, 31, 32, 77])
 @pytest.mark.parametrize("count", [1, 2, 25])
 def test_fresh_draws_are_those_of_their_numbers(samples, count):

@@ -15,7 +15,6 @@ from functools import cache, partial
 from pathlib import Path
 
 import numba
-import numpy as np
 from llvmlite import ir
 from numba.extending import intrinsic
 
@@ -61,12 +60,6 @@ def as_bits(typing, number):
         return None
     found = numba.types.uint64(number)
     return found, lambda _, builder, __, values: builder.bitcast(values[0], ir.IntType(64))
-
-
-# Logarithms and exponentials of our own take numbers apart into 2^k m.
-INTEGER = 1.5 * 2.0**52  # added to a small integer, its bits are the last ones
-BIAS, PLACES = np.uint64(1023), np.uint64(52)  # of the power of 2 among a number's bits
-LOG2_HIGH, LOG2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10  # their sum: log 2
 
 
 def kernels_digest() -> str:

@@ -9,21 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.compiled import (
-    BIAS,
-    INTEGER,
-    LOG2_HIGH,
-    LOG2_LOW,
-    PLACES,
-    as_bits,
-    as_number,
-    fma,
-    njit,
-)
+from imuarray.compiled import fma, njit
 from imuarray.posterior import normals
+from imuarray.posterior.elementary import exp
 
 TILE = 32  # samples
-LOG2E = 1.4426950408889634
 LEAST = -700.0  # nothing below is more than 0 beside exp(0)
 
 
@@ -127,26 +117,6 @@ def tilt(first, size, k, mean, factor, numbers, out):
             out[n, i] += tilted(k, t, x, y, z)
 
 
-@njit(inline="always")
-def _exp(x):
-    """exp(x) to an ulp or two for x in [LEAST, 0]: a power of 2 times Taylor's series."""
-    shifted = fma(x, LOG2E, INTEGER)
-    k = shifted - INTEGER
-    r = fma(-k, LOG2_LOW, fma(-k, LOG2_HIGH, x))
-    p = fma(1.0 / 479001600.0, r, 1.0 / 39916800.0)
-    p = fma(p, r, 1.0 / 3628800.0)
-    p = fma(p, r, 1.0 / 362880.0)
-    p = fma(p, r, 1.0 / 40320.0)
-    p = fma(p, r, 1.0 / 5040.0)
-    p = fma(p, r, 1.0 / 720.0)
-    p = fma(p, r, 1.0 / 120.0)
-    p = fma(p, r, 1.0 / 24.0)
-    p = fma(p, r, 1.0 / 6.0)
-    p = fma(p, r, 0.5)
-    p = fma(p, r, 1.0)
-    return fma(p, r, 1.0) * as_number((as_bits(shifted) + BIAS) << PLACES)
-
-
 @njit
 def _exponentials(size, work):
     """top = the largest exponent of N, total = the sum of exp(exponent - top), by sample."""
@@ -160,7 +130,7 @@ def _exponentials(size, work):
     for n in range(exponent.shape[0]):
         for i in range(size):
             # NaN passes max as its first argument, not as its second
-            total[i] += _exp(max(exponent[n, i] - top[i], LEAST))
+            total[i] += exp(max(exponent[n, i] - top[i], LEAST))
 
 
 @njit

@@ -2,8 +2,7 @@
 
 The loops, over lanes and over pairs, have no branch and no type but one of 64 bits, so compilers
 turn them into vector instructions; numpy's ziggurat, a call for each number, was most of what a
-draw of omega cost. Nothing here depends on a C library's logarithms and sines: other machines give
-the same bits (`imuarray.compiled.fma` says where more slowly).
+draw of omega cost. Other machines give the same bits.
 """
 
 import math
@@ -11,24 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.compiled import (
-    BIAS,
-    INTEGER,
-    LOG2_HIGH,
-    LOG2_LOW,
-    PLACES,
-    as_bits,
-    as_number,
-    fma,
-    njit,
-)
+from imuarray.compiled import as_number, fma, njit
+from imuarray.posterior.elementary import ONE, log, sin_cos
 
 LANES = 16
 BLOCK = 2 * LANES  # numbers that a step of all lanes gives
-ONE = np.uint64(0x3FF0000000000000)  # the bits of 1.0
 BELOW_ONE = 1.0 - 2.0**-53
-ROOT_HALF = np.uint64(0x3FE6A09E667F3BCD)  # the bits of sqrt(1/2)
-INTEGER_BITS = np.uint64(0x4338000000000000)  # of INTEGER
 S1, S3, S11, S12, S24, S40, S63 = (np.uint64(n) for n in (1, 3, 11, 12, 24, 40, 63))
 
 
@@ -80,43 +67,14 @@ def _words(a, b, c, counter, out):
 @njit(inline="always")
 def _radius(word):
     """sqrt(-2 log u), u the word's first 52 bits and a half more, times 2^-52."""
-    u = as_bits(as_number((word >> S12) | ONE) - BELOW_ONE)  # exact; (0, 1)
-    exponent = (u + (ONE - ROOT_HALF)) >> PLACES
-    m = as_number(u - ((exponent - BIAS) << PLACES))  # within [sqrt(1/2), sqrt 2)
-    k = as_number(INTEGER_BITS + (exponent - BIAS)) - INTEGER
-    q = (m - 1.0) / (m + 1.0)
-    r = q * q
-    p = fma(2.0 / 19.0, r, 2.0 / 17.0)
-    p = fma(p, r, 2.0 / 15.0)
-    p = fma(p, r, 2.0 / 13.0)
-    p = fma(p, r, 2.0 / 11.0)
-    p = fma(p, r, 2.0 / 9.0)
-    p = fma(p, r, 2.0 / 7.0)
-    p = fma(p, r, 2.0 / 5.0)
-    p = fma(p, r, 2.0 / 3.0)
-    log = fma(k, LOG2_HIGH, fma(2.0, q, fma(k, LOG2_LOW, (p * r) * q)))
-    return math.sqrt(-2.0 * log)
+    u = as_number((word >> S12) | ONE) - BELOW_ONE  # exact; (0, 1)
+    return math.sqrt(-2.0 * log(u))
 
 
 @njit(inline="always")
 def _direction(word):
     """(sin, cos) of an angle within pi / 4 of zero: the word's first 52 bits and a half more."""
-    x = (as_number((word >> S12) | ONE) - 1.5 + 2.0**-53) * (0.5 * math.pi)
-    r = x * x
-    s = fma(-1.0 / 1307674368000.0, r, 1.0 / 6227020800.0)
-    s = fma(s, r, -1.0 / 39916800.0)
-    s = fma(s, r, 1.0 / 362880.0)
-    s = fma(s, r, -1.0 / 5040.0)
-    s = fma(s, r, 1.0 / 120.0)
-    s = fma(s, r, -1.0 / 6.0)
-    c = fma(1.0 / 20922789888000.0, r, -1.0 / 87178291200.0)
-    c = fma(c, r, 1.0 / 479001600.0)
-    c = fma(c, r, -1.0 / 3628800.0)
-    c = fma(c, r, 1.0 / 40320.0)
-    c = fma(c, r, -1.0 / 720.0)
-    c = fma(c, r, 1.0 / 24.0)
-    c = fma(c, r, -0.5)
-    return fma(s * r, x, x), fma(c, r, 1.0)
+    return sin_cos((as_number((word >> S12) | ONE) - 1.5 + 2.0**-53) * (0.5 * math.pi))
 
 
 @njit(error_model="numpy")
