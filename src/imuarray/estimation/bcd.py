@@ -60,11 +60,12 @@ def _position_block(force, state, rows, values, A, positions):
     right = np.zeros((accelerometers + 1, 3))
     kernels.arm_products(A, force, right)
     kernels.arm_products(A, A[:1], right[accelerometers:])  # what s and omega make at the origin
+    x0, y0, z0 = right[accelerometers]
     largest = 0.0
     for k in range(1, accelerometers):
-        rhs = right[k] - right[accelerometers]
+        x, y, z = right[k, 0] - x0, right[k, 1] - y0, right[k, 2] - z0
         for i in range(3):
-            new = inverse[i, 0] * rhs[0] + inverse[i, 1] * rhs[1] + inverse[i, 2] * rhs[2]
+            new = inverse[i, 0] * x + inverse[i, 1] * y + inverse[i, 2] * z
             largest = max(largest, abs(new - positions[k, i]))
             positions[k, i] = new
     return largest

@@ -16,9 +16,9 @@ from imuarray.model import ArrayModel, structure_tensor
 class Tables(NamedTuple):
     """The structure tensor as the kernels want it: its non-zero terms."""
 
-    rows: np.ndarray  # (E, 3): i, c, a of G[i, c, a]
+    rows: np.ndarray  # (E, 3), unsigned: i, c, a of G[i, c, a]
     values: np.ndarray  # (E,)
-    pairs: np.ndarray  # (P, 4): i, j, a, b of sum_c G[i, c, a] G[j, c, b]
+    pairs: np.ndarray  # (P, 4), unsigned: i, j, a, b of sum_c G[i, c, a] G[j, c, b]
     products: np.ndarray  # (P,)
 
 
@@ -26,9 +26,9 @@ class Tables(NamedTuple):
 def tables() -> Tables:
     """Non-zero terms of the structure tensor and of its products."""
     tensor = structure_tensor()
-    rows = np.argwhere(tensor != 0.0)
+    rows = np.argwhere(tensor != 0.0).astype(np.uint64)
     gram = np.einsum("ica,jcb->ijab", tensor, tensor)
-    pairs = np.argwhere(gram != 0.0)
+    pairs = np.argwhere(gram != 0.0).astype(np.uint64)
     return Tables(rows, tensor[tuple(rows.T)].copy(), pairs, gram[tuple(pairs.T)].copy())
 
 

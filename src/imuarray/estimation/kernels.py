@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.compiled import njit
+from imuarray.compiled import fma, njit
 
 # For sums over samples only: the compiler may then add in vectors. Elsewhere the order as written,
 # or results would depend on whether a kernel was compiled or came from the cache.
@@ -45,6 +45,19 @@ def arrange(force, weights, centred, offset, energy, total):
         energy[t] = square
 
 
+@njit(inline="always")
+def _four(a, b, c, d, p, q, r, s, total):
+    """total + a p + b q + c r + d s."""
+    return fma(a, p, fma(b, q, fma(c, r, fma(d, s, total))))
+
+
+@njit(inline="always")
+def _six(x, h0, h1, h2, h3, h4, h5):
+    """The sum of six products."""
+    a, b, c, d, e, f = x
+    return fma(a, h0, fma(b, h1, c * h2)) + fma(d, h3, fma(e, h4, f * h5))
+
+
 @njit
 def weighted_moments(positions, z, moments):
     """moments[i] = sum_k r_ki z_k for i = 1..3; (4, 3, T) from z (A, 3, T). Row 0 is kept.
@@ -60,9 +73,9 @@ def weighted_moments(positions, z, moments):
         for c in range(3):
             for t in range(samples):
                 z0, z1, z2, z3 = z[k, c, t], z[k + 1, c, t], z[k + 2, c, t], z[k + 3, c, t]
-                moments[1, c, t] += x0 * z0 + x1 * z1 + x2 * z2 + x3 * z3
-                moments[2, c, t] += y0 * z0 + y1 * z1 + y2 * z2 + y3 * z3
-                moments[3, c, t] += h0 * z0 + h1 * z1 + h2 * z2 + h3 * z3
+                moments[1, c, t] = _four(x0, x1, x2, x3, z0, z1, z2, z3, moments[1, c, t])
+                moments[2, c, t] = _four(y0, y1, y2, y3, z0, z1, z2, z3, moments[2, c, t])
+                moments[3, c, t] = _four(h0, h1, h2, h3, z0, z1, z2, z3, moments[3, c, t])
     for k in range(fours, accelerometers):
         x, y, h = positions[k]
         for c in range(3):
@@ -74,26 +87,30 @@ def weighted_moments(positions, z, moments):
 
 
 @njit
+def _second_moments(positions, weights):
+    """sum_k lambda_k (1, r_k) (1, r_k)', (4, 4)."""
+    total = x1 = y1 = z1 = xx = xy = xz = yy = yz = zz = 0.0
+    for k in range(len(positions)):
+        x, y, z = positions[k]
+        weight = weights[k]
+        wx, wy, wz = weight * x, weight * y, weight * z
+        total, x1, y1, z1 = total + weight, x1 + wx, y1 + wy, z1 + wz
+        xx, xy, xz = xx + wx * x, xy + wx * y, xz + wx * z
+        yy, yz, zz = yy + wy * y, yz + wy * z, zz + wz * z
+    return np.array(((total, x1, y1, z1), (x1, xx, xy, xz), (y1, xy, yy, yz), (z1, xz, yz, zz)))
+
+
+@njit
 def information(positions, weights, pairs, values, out):
     """K = sum_k lambda_k G_k' G_k (12, 12) for isotropic triads with weights (A,).
 
-    ``pairs`` (P, 4) and ``values`` (P,) are the non-zero terms (i, j, a, b) of G_i' G_j.
+    ``pairs`` (P, 4), unsigned, and ``values`` (P,) are the non-zero terms (i, j, a, b) of
+    G_i' G_j: a signed index might count from the end, and would be looked up number by number.
     """
-    second = np.zeros((4, 4))
-    row = np.empty(4)
-    row[0] = 1.0
-    for k in range(len(positions)):
-        row[1:] = positions[k]
-        for i in range(4):
-            for j in range(i + 1):
-                second[i, j] += weights[k] * row[i] * row[j]
-    for i in range(4):
-        for j in range(i):
-            second[j, i] = second[i, j]
+    second = _second_moments(positions, weights)
     out[:] = 0.0
     for p in range(len(values)):
-        i, j, a, b = pairs[p]
-        out[a, b] += second[i, j] * values[p]
+        out[pairs[p, 2], pairs[p, 3]] += second[pairs[p, 0], pairs[p, 1]] * values[p]
 
 
 @njit
@@ -112,12 +129,8 @@ def information_general(positions, precision, tensor, out):
 
 
 @njit
-def eliminate(K, C, X, inverse):
-    """Schur complement of phi: fills C (6, 6), X = Kpp^-1 Kpw, Kpp^-1; returns log |Kpp|.
-
-    A Cholesky factor by hand: calls into LAPACK would cost more than the 6 x 6 itself.
-    """
-    factor = np.zeros((6, 6))
+def _factored(K, factor, pivots):
+    """Cholesky's factor of Kpp below its diagonal, that one's reciprocals; log |Kpp|, or NaN."""
     logdet = 0.0
     for j in range(6):
         pivot = K[6 + j, 6 + j]
@@ -125,26 +138,40 @@ def eliminate(K, C, X, inverse):
             pivot -= factor[j, m] ** 2
         if not pivot > 1e-14 * K[6 + j, 6 + j]:
             return np.nan
-        factor[j, j] = np.sqrt(pivot)
-        logdet += 2.0 * np.log(factor[j, j])
+        logdet += np.log(pivot)
+        pivots[j] = 1.0 / np.sqrt(pivot)
         for i in range(j + 1, 6):
             value = K[6 + i, 6 + j]
             for m in range(j):
                 value -= factor[i, m] * factor[j, m]
-            factor[i, j] = value / factor[j, j]
-    half = np.empty((6, 12))  # factor^-1 [Kpw, I]
-    for col in range(12):
-        for i in range(6):
+            factor[i, j] = value * pivots[j]
+    return logdet
+
+
+@njit
+def eliminate(K, C, X, inverse):
+    """Schur complement of phi: fills C (6, 6), X = Kpp^-1 Kpw, Kpp^-1; returns log |Kpp|.
+
+    A Cholesky factor by hand: calls into LAPACK would cost more than the 6 x 6 itself.
+    """
+    factor, pivots, half = np.empty((6, 6)), np.empty(6), np.empty((6, 12))
+    logdet = _factored(K, factor, pivots)
+    if np.isnan(logdet):
+        return logdet
+    for i in range(6):  # half = factor^-1 [Kpw, I]
+        for col in range(7 + i):
             value = K[6 + i, col] if col < 6 else (1.0 if i == col - 6 else 0.0)
-            for m in range(i):
+            for m in range(max(0, col - 6), i):
                 value -= factor[i, m] * half[m, col]
-            half[i, col] = value / factor[i, i]
+            half[i, col] = value * pivots[i]
     for a in range(6):
         for b in range(6):
             joint, cross, inv = 0.0, 0.0, 0.0
             for m in range(6):
                 joint += half[m, a] * half[m, b]
+            for m in range(a, 6):
                 cross += half[m, 6 + a] * half[m, b]
+            for m in range(max(a, b), 6):
                 inv += half[m, 6 + a] * half[m, 6 + b]
             C[a, b] = K[a, b] - joint
             X[a, b] = cross
@@ -157,26 +184,24 @@ def project(moments, rows, values, full):
     """full = G' Lambda y_t, (12, T), from the moments and the tensor's few entries."""
     full[:] = 0.0
     for e in range(len(values)):
-        i, c, a = rows[e]
-        value = values[e]
-        for t in range(full.shape[1]):
-            full[a, t] += value * moments[i, c, t]
+        value, source, target = values[e], moments[rows[e, 0], rows[e, 1]], full[rows[e, 2]]
+        for t in range(target.size):
+            target[t] += value * source[t]
 
 
 @njit
 def reduce_linear(full, X, inverse, b, phi, const, energy):
     """b = B' S y (6, T), phi = Kpp^-1 H' Lambda y (6, T), const = y' S' y (T,)."""
-    samples = full.shape[1]
     const[:] = energy
     for a in range(6):
-        b[a] = full[a]
-        phi[a] = 0.0
-        for m in range(6):
-            x, inv = X[m, a], inverse[a, m]
-            for t in range(samples):
-                b[a, t] -= x * full[6 + m, t]
-                phi[a, t] += inv * full[6 + m, t]
-        for t in range(samples):
+        across = X[0, a], X[1, a], X[2, a], X[3, a], X[4, a], X[5, a]
+        along = inverse[a, 0], inverse[a, 1], inverse[a, 2], inverse[a, 3], inverse[a, 4], inverse[a, 5]
+        for t in range(energy.size):
+            h0, h1, h2 = full[6, t], full[7, t], full[8, t]
+            h3, h4, h5 = full[9, t], full[10, t], full[11, t]
+            b[a, t] = full[a, t] - _six(across, h0, h1, h2, h3, h4, h5)
+            phi[a, t] = _six(along, h0, h1, h2, h3, h4, h5)
+        for t in range(energy.size):
             const[t] -= phi[a, t] * full[6 + a, t]
 
 
@@ -247,11 +272,11 @@ def linear_motion(rate, X, phi, state):
         state[0, t], state[1, t], state[2, t] = x * x, y * y, z * z
         state[3, t], state[4, t], state[5, t] = x * y, x * z, y * z
     for a in range(6):
-        state[6 + a] = phi[a]
-        for m in range(6):
-            scale = X[a, m]
-            for t in range(rate.shape[1]):
-                state[6 + a, t] -= scale * state[m, t]
+        across = X[a, 0], X[a, 1], X[a, 2], X[a, 3], X[a, 4], X[a, 5]
+        for t in range(rate.shape[1]):
+            w0, w1, w2 = state[0, t], state[1, t], state[2, t]
+            w3, w4, w5 = state[3, t], state[4, t], state[5, t]
+            state[6 + a, t] = phi[a, t] - _six(across, w0, w1, w2, w3, w4, w5)
 
 
 @njit
@@ -262,9 +287,9 @@ def arms(state, rows, values, out):
     """
     out[:] = 0.0
     for e in range(len(values)):
-        i, c, a = rows[e]
-        for t in range(state.shape[1]):
-            out[i, c, t] += values[e] * state[a, t]
+        value, source, target = values[e], state[rows[e, 2]], out[rows[e, 0], rows[e, 1]]
+        for t in range(target.size):
+            target[t] += value * source[t]
 
 
 @njit(fastmath=FAST)

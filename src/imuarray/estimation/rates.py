@@ -243,7 +243,8 @@ def most_likely(
     information(positions, weights, pairs, products, found.K)
     scaled = np.empty_like(positions)
     for k in range(len(positions)):
-        scaled[k] = weights[k] * positions[k]
+        for i in range(3):
+            scaled[k, i] = weights[k] * positions[k, i]
     logdet = reduce(scaled, force, base, energy, rows, values, found)
     if np.isnan(logdet):
         return logdet
