@@ -52,6 +52,12 @@ def _four(a, b, c, d, p, q, r, s, total):
 
 
 @njit(inline="always")
+def _row(matrix, a):
+    """A row of six as a tuple: unpacking an array would make one of it first."""
+    return matrix[a, 0], matrix[a, 1], matrix[a, 2], matrix[a, 3], matrix[a, 4], matrix[a, 5]
+
+
+@njit(inline="always")
 def _six(x, h0, h1, h2, h3, h4, h5):
     """The sum of six products."""
     a, b, c, d, e, f = x
@@ -194,8 +200,7 @@ def reduce_linear(full, X, inverse, b, phi, const, energy):
     """b = B' S y (6, T), phi = Kpp^-1 H' Lambda y (6, T), const = y' S' y (T,)."""
     const[:] = energy
     for a in range(6):
-        across = X[0, a], X[1, a], X[2, a], X[3, a], X[4, a], X[5, a]
-        along = inverse[a, 0], inverse[a, 1], inverse[a, 2], inverse[a, 3], inverse[a, 4], inverse[a, 5]
+        across, along = _row(X.T, a), _row(inverse, a)
         for t in range(energy.size):
             h0, h1, h2 = full[6, t], full[7, t], full[8, t]
             h3, h4, h5 = full[9, t], full[10, t], full[11, t]
@@ -272,7 +277,7 @@ def linear_motion(rate, X, phi, state):
         state[0, t], state[1, t], state[2, t] = x * x, y * y, z * z
         state[3, t], state[4, t], state[5, t] = x * y, x * z, y * z
     for a in range(6):
-        across = X[a, 0], X[a, 1], X[a, 2], X[a, 3], X[a, 4], X[a, 5]
+        across = _row(X, a)
         for t in range(rate.shape[1]):
             w0, w1, w2 = state[0, t], state[1, t], state[2, t]
             w3, w4, w5 = state[3, t], state[4, t], state[5, t]
