@@ -24,14 +24,16 @@ from written import publish  # noqa: E402
 from imuarray.config import model_from, read_config  # noqa: E402
 from imuarray.estimation import calibrate_bcd  # noqa: E402
 from imuarray.estimation.collapsed import Collapsed  # noqa: E402
+from imuarray.estimation.kernels import reduced  # noqa: E402
 from imuarray.estimation.newton import descend  # noqa: E402
 from imuarray.geometry import positions_of, sub_array  # noqa: E402
 from imuarray.model import ArrayModel  # noqa: E402
 from imuarray.model.jax64 import jax  # noqa: E402
 from imuarray.motion import normal_motion, sphere_motion  # noqa: E402
-from imuarray.posterior import Likelihood, normals  # noqa: E402
+from imuarray.posterior import Likelihood, kernels, normals  # noqa: E402
 from imuarray.posterior.draws import TILE  # noqa: E402
 from imuarray.posterior.marginal import Marginal  # noqa: E402
+from imuarray.posterior.target import CompiledTarget, GaussianPrior  # noqa: E402
 from imuarray.simulation import measure  # noqa: E402
 from imuarray.studies.bound import paths  # noqa: E402
 from tests.oracles import direct_log_likelihood, joint_jacobian, skew  # noqa: E402
@@ -147,25 +149,36 @@ def by_lanes(source, out, times):
         normals.fill(source, out.size, out)
 
 
-def profile(model, rng, samples=500, draws=24):
-    """Rows: what an estimate of the likelihood spends on a draw of omega, one thread."""
+@nb.njit
+def collapsed(positions, data, found, times):
+    """What an estimate does of theta alone."""
+    for _ in range(times):
+        kernels.collapse(positions, data, found)
+
+
+def profile(model, rng, samples=500, draws=24, steps=20):
+    """Rows: what a step of the paper's chain spends on a draw of omega and on theta, one thread."""
     generator = np.random.Generator(np.random.PCG64DXSM(1))
     likelihood = Likelihood.of(model, *dataset(model, samples, rng))
     positions, count = model.array.relative, samples * draws
+    start = positions[1:].ravel()
+    prior = GaussianPrior(start, np.full(start.size, 3e-3))
+
+    def chain(number):
+        target = CompiledTarget(likelihood, prior, number)
+        return lambda: target.transitions(start.copy(), -np.inf, 4e-7, steps, generator)
+
     tile = np.empty(normals.room(3 * draws * TILE))
     source = normals.source(generator, tile.size)
-    whole, many, numbers, numpys = interleaved(
-        [
-            lambda: likelihood.estimate(positions, draws, generator),
-            lambda: likelihood.estimate(positions, 5 * draws, generator),
-            lambda: by_lanes(source, tile, TILE),
-            lambda: one_by_one(generator, tile, TILE),
-        ], 31,
-    )  # fmt: skip
-    drawn, each = (many - whole) / (4 * count), 3e9 / (tile.size * TILE)
-    name, ratio = f"likelihood, T = {samples}, N = {draws}, one thread", numpys / numbers
+    memory = reduced(samples)
+    jobs = chain(draws), chain(5 * draws)
+    jobs += (lambda: collapsed(positions, likelihood.data, memory, steps),)
+    jobs += lambda: by_lanes(source, tile, TILE), lambda: one_by_one(generator, tile, TILE)
+    whole, many, theta, numbers, numpys = interleaved(jobs, 31)
+    drawn, each = (many - whole) / (4 * count * steps), 3e9 / (tile.size * TILE)
+    name, ratio = f"a step of the chain, T = {samples}, N = {draws}", numpys / numbers
     return [
-        (name, f"{1e6 * whole:.0f} us", ""),
+        (name, f"{1e6 * whole / steps:.0f} us", ""),
         ("of that a draw of omega more", f"{1e9 * drawn:.1f} ns", ""),
         ("of that three normal numbers", f"{each * numbers:.1f} ns", ""),
         (
@@ -173,7 +186,7 @@ def profile(model, rng, samples=500, draws=24):
             f"{each * numpys:.1f} ns",
             f"{ratio:.1f} times those",
         ),
-        ("theta's own part", f"{1e6 * (whole - drawn * count):.0f} us", ""),
+        ("theta's own part of the step", f"{1e6 * theta / steps:.0f} us", ""),
     ]
 
 

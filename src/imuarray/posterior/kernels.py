@@ -43,7 +43,7 @@ def workspace(samples, count, rng):
 
 
 @njit
-def _collapse(positions, data, out):
+def collapse(positions, data, out):
     """Everything that depends on theta but not on omega; returns log |H' Lambda H|."""
     if data.weights.size:
         kernels.information(positions, data.weights, data.pairs, data.products, out.K)
@@ -79,7 +79,7 @@ def _assemble(total, const, logdet, determinant_power):
 def fixed_draws(positions, data, rates, power):
     """log p-hat (26a) on given draws ``rates`` (T, N, 3) rad/s."""
     found = kernels.reduced(rates.shape[0])
-    logdet = _collapse(positions, data, found)
+    logdet = collapse(positions, data, found)
     total, tilted = 0.0, data.tilt.shape[1] > 0
     exponent = np.empty(rates.shape[1])
     for t in range(rates.shape[0]):
@@ -99,7 +99,7 @@ def fixed_draws(positions, data, rates, power):
 def fresh_draws(positions, data, work, power, first, last):
     """log p-hat (26a) of samples first..last-1 with omega drawn anew from p(omega | y_g)."""
     found = work.reduced
-    logdet = _collapse(positions, data, found)
+    logdet = collapse(positions, data, found)
     total, tile = 0.0, work.tile
     draws.folded(found.C, tile.quartic)
     for start in range(first, last, draws.TILE):
