@@ -5,6 +5,7 @@ import hashlib
 import json
 import time
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import imuarray
@@ -56,6 +57,7 @@ def resting_on(*names: str) -> list[str]:
     return sorted(map(str, found))
 
 
+@cache
 def imported(path: Path) -> list[Path]:
     """Files of the package that a file of it imports, those of the packages on the way too."""
     names = []
@@ -72,14 +74,19 @@ def imported(path: Path) -> list[Path]:
 
 def homes(module: str, name: str) -> str:
     """The module of what another one gives, also where a package loads it when it is used."""
+    home = _homes(module).get(name, name)
+    return home if home.startswith("imuarray.") else f"{module}.{home}"
+
+
+@cache
+def _homes(module: str) -> dict[str, str]:
+    """The table by which a package loads modules when they are used; empty for others."""
     place = PACKAGE.joinpath(*module.split(".")[1:]) / "__init__.py"
     if module.split(".")[0] == "imuarray" and place.is_file():
         for node in ast.parse(place.read_text(encoding="utf-8")).body:
             if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_HOME":
-                home = ast.literal_eval(node.value).get(name)
-                if home is not None:
-                    return home if home.startswith("imuarray.") else f"{module}.{home}"
-    return f"{module}.{name}"
+                return ast.literal_eval(node.value)
+    return {}
 
 
 def _run(tree: ast.AST) -> Iterator[ast.AST]:

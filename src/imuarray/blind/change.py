@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.signal import lfilter
 
 from imuarray.blind.scene import Field, Pair, Scene
 
@@ -199,6 +198,8 @@ def draw_noise(scene: Scene, changes: Sequence[Change], rng) -> Pair:
 
 def _coloured(noise: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
     """AR(1) noise of the same sd from white noise (T, K, 3), coefficients (K,)."""
+    from scipy.signal import lfilter  # slow to import, and every run of Snakemake imports this
+
     noise = noise.copy()
     for k in np.flatnonzero(coefficients):
         rho = coefficients[k]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import lfilter
 
 from imuarray.blind.change import (
     UNIT_FORCE,
@@ -70,6 +69,8 @@ def outside_cross_talk(scene, rng, sensors, size):
 @effect(UNIT_FORCE, 0.02, 0.3)
 def outside_hysteresis(scene, rng, sensors, size):
     """u + h z, z a first-order lag behind the sign of du/dt; size in m/s^2."""
+    from scipy.signal import lfilter  # slow to import, and every run of Snakemake imports this
+
     depth = entries(rng, sensors, size)
     lag = float(np.exp(rng.uniform(np.log(0.02), np.log(0.1))))
     keep = np.exp(-1 / (lag * scene.sampling_rate))
