@@ -5,8 +5,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-from llvmlite import binding
-
 import imuarray
 
 INNER = "from pack.compiled import njit\n\n@njit\ndef inner(x):\n    return x + {}\n"
@@ -38,26 +36,3 @@ def test_a_change_in_a_kernel_reaches_those_that_call_it(tmp_path):
     assert [said(tmp_path), said(tmp_path)] == ["20 0", "20 1"]
     (package / "inner.py").write_text(INNER.format(2))
     assert said(tmp_path) == "30 0"
-
-
-WIDE = """
-import numba
-{}
-from imuarray import compiled
-from numba.core.registry import cpu_target
-print(cpu_target.target_context.codegen().magic_tuple()[2])
-"""
-
-
-def features(before: str = "") -> list[str]:
-    """What the compiler is told of the processor, in a process of its own."""
-    done = subprocess.run(
-        [sys.executable, "-c", WIDE.format(before)], capture_output=True, text=True, check=True
-    )
-    return done.stdout.strip().split(",")
-
-
-def test_vectors_as_wide_as_the_processor_has_unless_the_user_says_otherwise():
-    host = binding.get_host_cpu_features()
-    assert ("-prefer-256-bit" in features()) == bool(host.get("avx512f"))
-    assert features('numba.config.CPU_FEATURES = "+sse2"') == ["+sse2"]

@@ -3,6 +3,7 @@
 import ast
 import hashlib
 import json
+import threading
 import time
 from collections.abc import Iterator
 from functools import cache
@@ -112,6 +113,26 @@ class Crew:
     def parts(self, scale: str, study: str = "samples") -> int:
         """Jobs that the realisations of a study are dealt to; those but "samples" are small."""
         return self.scales[scale]["parts"] if study == "samples" else 1
+
+
+def one_look_at_a_time(scheduler) -> None:
+    """Keep Snakemake from looking for jobs to start ever more often.
+
+    Because of its limit of starts a second it looks again a second after each look, and every job's
+    end begins another such series: a hundred looks a second at last, half of a core.
+    """
+    pending = threading.Event()
+
+    def look():
+        pending.clear()
+        scheduler._open_jobs.release()
+
+    def later(delay):
+        if not pending.is_set():
+            pending.set()
+            threading.Timer(delay, look).start()
+
+    scheduler._schedule_reevalutation = later
 
 
 def contents(*paths: str) -> list[str]:

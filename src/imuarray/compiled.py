@@ -15,26 +15,10 @@ from functools import cache, partial
 from pathlib import Path
 
 import numba
-from llvmlite import binding, ir
+from llvmlite import ir
 from numba.extending import intrinsic
 
 PACKAGE = Path(__file__).parent
-
-
-def widest() -> None:
-    """Let kernels use vectors of 512 bits where the processor has them.
-
-    LLVM prefers those of 256 on most such processors, the first of which lowered their clock for
-    wider ones; on later ones the chains are a sixth faster. Who has set NUMBA_CPU_FEATURES or
-    NUMBA_CPU_NAME has decided.
-    """
-    if numba.config.CPU_NAME is None and numba.config.CPU_FEATURES is None:
-        features = binding.get_host_cpu_features()
-        if features.get("avx512f"):
-            numba.config.CPU_FEATURES = f"{features.flatten()},-prefer-256-bit"
-
-
-widest()
 
 
 def njit(function=None, **options):

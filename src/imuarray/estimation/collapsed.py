@@ -26,9 +26,9 @@ class Tables(NamedTuple):
 def tables() -> Tables:
     """Non-zero terms of the structure tensor and of its products."""
     tensor = structure_tensor()
-    rows = np.argwhere(tensor != 0.0).astype(np.uint64)
+    rows = np.argwhere(tensor != 0.0).astype(np.uint64, order="C")
     gram = np.einsum("ica,jcb->ijab", tensor, tensor)
-    pairs = np.argwhere(gram != 0.0).astype(np.uint64)
+    pairs = np.argwhere(gram != 0.0).astype(np.uint64, order="C")
     return Tables(rows, tensor[tuple(rows.T)].copy(), pairs, gram[tuple(pairs.T)].copy())
 
 

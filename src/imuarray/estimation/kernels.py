@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.compiled import fma, njit
+from imuarray.compiled import njit
 
 # For sums over samples only: the compiler may then add in vectors. Elsewhere the order as written,
 # or results would depend on whether a kernel was compiled or came from the cache.
@@ -46,12 +46,6 @@ def arrange(force, weights, centred, offset, energy, total):
 
 
 @njit(inline="always")
-def _four(a, b, c, d, p, q, r, s, total):
-    """total + a p + b q + c r + d s."""
-    return fma(a, p, fma(b, q, fma(c, r, fma(d, s, total))))
-
-
-@njit(inline="always")
 def _row(matrix, a):
     """A row of six as a tuple: unpacking an array would make one of it first."""
     return matrix[a, 0], matrix[a, 1], matrix[a, 2], matrix[a, 3], matrix[a, 4], matrix[a, 5]
@@ -61,7 +55,7 @@ def _row(matrix, a):
 def _six(x, h0, h1, h2, h3, h4, h5):
     """The sum of six products."""
     a, b, c, d, e, f = x
-    return fma(a, h0, fma(b, h1, c * h2)) + fma(d, h3, fma(e, h4, f * h5))
+    return (a * h0 + b * h1 + c * h2) + (d * h3 + e * h4 + f * h5)
 
 
 @njit
@@ -79,9 +73,9 @@ def weighted_moments(positions, z, moments):
         for c in range(3):
             for t in range(samples):
                 z0, z1, z2, z3 = z[k, c, t], z[k + 1, c, t], z[k + 2, c, t], z[k + 3, c, t]
-                moments[1, c, t] = _four(x0, x1, x2, x3, z0, z1, z2, z3, moments[1, c, t])
-                moments[2, c, t] = _four(y0, y1, y2, y3, z0, z1, z2, z3, moments[2, c, t])
-                moments[3, c, t] = _four(h0, h1, h2, h3, z0, z1, z2, z3, moments[3, c, t])
+                moments[1, c, t] += x0 * z0 + x1 * z1 + x2 * z2 + x3 * z3
+                moments[2, c, t] += y0 * z0 + y1 * z1 + y2 * z2 + y3 * z3
+                moments[3, c, t] += h0 * z0 + h1 * z1 + h2 * z2 + h3 * z3
     for k in range(fours, accelerometers):
         x, y, h = positions[k]
         for c in range(3):
