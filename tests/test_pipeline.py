@@ -122,7 +122,7 @@ def test_bad_configuration_is_one_clear_line(tmp_path):
     done = subprocess.run(
         [sys.executable, "-m", "snakemake", "-s", str(ROOT / "Snakefile"), "--cores", "1",
          "--directory", str(tmp_path), "--workflow-profile", "none", "-n"],
-        capture_output=True, text=True, timeout=120,
+        capture_output=True, text=True, timeout=600,
     )  # fmt: skip
     said = done.stdout + done.stderr
     assert done.returncode == 2 and "gyroscope_sd" in said and "Traceback" not in said
@@ -134,6 +134,6 @@ def test_lint_is_clean(tmp_path):
     done = subprocess.run(
         [sys.executable, "-m", "snakemake", "-s", str(ROOT / "Snakefile"), "--lint",
          "--directory", str(tmp_path), "--workflow-profile", "none"],
-        capture_output=True, text=True, timeout=120,
+        capture_output=True, text=True, timeout=600,
     )  # fmt: skip
     assert "Congratulations" in done.stdout + done.stderr, done.stdout + done.stderr
