@@ -18,7 +18,7 @@ import numpy as np
 from imuarray.estimation import calibrate_bcd, estimate_motion
 from imuarray.model import ArrayModel, kinematics
 from imuarray.model.jax64 import jax
-from imuarray.model.structure import _coefficients
+from imuarray.model.structure import _force
 from imuarray.posterior import CompiledTarget, GaussianPrior, Likelihood
 from tests.cases import noises, simulate, small_array
 
@@ -36,7 +36,7 @@ target = CompiledTarget(likelihood, GaussianPrior.of(array.parameters, 1e-3), 10
 parameters = np.full(effects.effect_size, 1e-4)
 rates = np.repeat(motion.angular_rate[:, None], 10, axis=1)
 motions = [motion.select(slice(0, n)) for n in (50, 20)]
-coefficients = jax.jit(jax.vmap(_coefficients))
+forces = jax.jit(jax.vmap(_force, (None, None, 0)))
 force_rate = jax.jit(kinematics.force_rate)
 
 def two_hundred(thread):
@@ -54,7 +54,7 @@ print("all came back")
 CALLS = {
     "predict_many": "model.predict_many(motions[thread], r).specific_force",
     "predict_many, effects": "effects.predict_many(motions[thread], r, parameters).specific_force",
-    "structure": "coefficients(r)",
+    "structure": "forces(np.ones(3), np.ones(6), r)",
     "force_rate": "force_rate(motion.select(thread), r)",
     "fixed_draws": "likelihood.on(r, rates)",
     "fixed_draws, general": "correlated.on(r, rates)",

@@ -8,6 +8,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.integrate import solve_ivp
 
 from imuarray.model import ArrayModel, kinematics, structure_tensor
+from imuarray.model.jax64 import jax, jnp
 from imuarray.model.structure import design, products
 from imuarray.motion import Motion, hand_twisting, normal_motion, sphere_motion
 from tests import oracles
@@ -169,6 +170,21 @@ def test_force_at_a_triad_depends_only_on_the_lever_arm(rate, acceleration, shif
     one = kinematics.specific_force(Motion.of(rate, acceleration, np.zeros(3)), r)
     two = kinematics.specific_force(Motion.of(rate, acceleration, shift), r)
     np.testing.assert_allclose(np.asarray(two - one), np.tile(shift, (5, 1)), atol=1e-9)
+
+
+def test_structure_tensor_is_the_models_derivatives():
+    """The coefficients of omega_i omega_j are halves and wholes of the second ones."""
+    positions = small_array().relative
+
+    def force(rate, linear):
+        motion = Motion(rate, linear[:3], linear[3:], jnp.zeros(3), jnp.zeros(3))
+        return kinematics.specific_force(motion, positions).ravel()
+
+    second = np.asarray(jax.jit(jax.hessian(force))(jnp.zeros(3), jnp.zeros(6)))
+    first = np.asarray(jax.jit(jax.jacfwd(force, argnums=1))(jnp.zeros(3), jnp.zeros(6)))
+    squares = second[:, [0, 1, 2], [0, 1, 2]] / 2
+    both = np.hstack([squares, second[:, [0, 0, 1], [1, 2, 2]], first])
+    np.testing.assert_allclose(design(positions), both, rtol=1e-14, atol=1e-15)
 
 
 def test_structure_tensor_cannot_be_written_to():

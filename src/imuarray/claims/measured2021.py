@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import binom
+from scipy.special import bdtr
 
 from imuarray.claims.experiment2021 import MEASURED
 from imuarray.claims.numbers import by_samples, listed, show
@@ -49,7 +49,7 @@ def ellipses(results):
         return untested(results.unconverged(name))
     inside = covered(draws[:, top], nominal[top])
     under = covered(draws[:, ~top], nominal[~top])
-    chance = float(binom.cdf(inside, top.sum(), 1 - 1 / 31))
+    chance = float(bdtr(inside, top.sum(), 1 - 1 / 31))
     remark = f"{under} of {(~top).sum()} on the underside; the board has {top.sum()} such IMUs here"
     if chance >= 0.05:
         return untested(f"too few to tell; {remark}", f"{inside} of {top.sum()}")
@@ -104,7 +104,7 @@ def _agreement(results):
 def underestimated(results):
     table = _agreement(results)
     if table is None:
-        chance = float(binom.cdf(10, 15, 1 - 1 / 31))
+        chance = float(bdtr(10, 15, 1 - 1 / 31))
         return untested(
             "several measured recordings needed",
             f"10 or fewer of 15 has probability {show(chance, 2)} at 97 %",

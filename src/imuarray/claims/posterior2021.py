@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from imuarray.claims.numbers import by_samples, listed, show
 from imuarray.claims.registry import Outcome, claim, judge, untested
@@ -185,7 +185,7 @@ def covered(draws, points, level=1 - 1 / 31):
     inside = 0
     for k in range(draws.shape[1]):
         off = points[k, :2] - draws[:, k, :2].mean(axis=0)
-        inside += off @ np.linalg.solve(np.cov(draws[:, k, :2].T), off) < chi2.ppf(level, 2)
+        inside += off @ np.linalg.solve(np.cov(draws[:, k, :2].T), off) < chdtri(2, 1 - level)
     return int(inside)
 
 

@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 import pandas as pd
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from imuarray.estimation import calibrate_bcd, calibrate_gauss_newton
 from imuarray.estimation.bcd import Calibration
@@ -157,8 +157,8 @@ def agreement(pairs: pd.DataFrame, table: pd.DataFrame) -> dict:
     groups = table.groupby(["accelerometer", "axis"])
     return {
         "recordings": int(table.recording.nunique()),
-        "coverage_50": float(np.mean(size < norm.ppf(0.75))),
-        "coverage_95": float(np.mean(size < norm.ppf(0.975))),
+        "coverage_50": float(np.mean(size < ndtri(0.75))),
+        "coverage_95": float(np.mean(size < ndtri(0.975))),
         "z_rms": float(np.sqrt(np.mean(pairs.z**2))),
         "z_median_abs": float(size.median()),
         "spread_m": float(np.sqrt(groups.mean_m.var(ddof=1).mean())),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from imuarray.geometry import positions_of
 
@@ -17,7 +17,7 @@ def theory() -> dict:
     """
 
     def acceptance(step, variance):
-        return 2 * norm.cdf(-0.5 * np.sqrt(step**2 + 2 * variance))
+        return 2 * ndtr(-0.5 * np.sqrt(step**2 + 2 * variance))
 
     exact = minimize(lambda x: -2 * x[0] - np.log(acceptance(np.exp(x[0]), 0.0)), [0.5],
                      method="Nelder-Mead", options={"xatol": 1e-10, "fatol": 1e-13})  # fmt: skip
