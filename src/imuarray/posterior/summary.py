@@ -18,10 +18,10 @@ def summarise(chains: Chains, labels, threshold: float, truth=None):
     """
     burn_in = diagnostics.find_burn_in(chains.draws, chains.log_target, threshold)
     left = chains.draws[:, burn_in.draws :]
-    table = _coordinates(left, labels, truth)
     # over every sampled parameter, effects included, and the log target
     every = np.concatenate([left, chains.log_target[:, burn_in.draws :, None]], axis=2)
     worst, sizes = diagnostics.rhat(every), diagnostics.ess(every[..., :-1])
+    table = _coordinates(left, labels, truth, worst, sizes)
     verdict = {
         "burn_in_steps": burn_in.draws * chains.thin,
         "burn_in_draws": burn_in.draws,
@@ -40,16 +40,15 @@ def summarise(chains: Chains, labels, threshold: float, truth=None):
     return verdict, table, burn_in.table.assign(burn_in_steps=burn_in.table.burn_in * chains.thin)
 
 
-def _coordinates(left, labels, truth) -> pd.DataFrame:
+def _coordinates(left, labels, truth, rhats, sizes) -> pd.DataFrame:
     names = [(label, axis) for label in labels for axis in "xyz"]
     flat = left[..., : len(names)].reshape(-1, len(names))
     table = pd.DataFrame(names, columns=["accelerometer", "axis"])
     table["mean_m"], table["sd_m"] = flat.mean(axis=0), flat.std(axis=0, ddof=1)
     for level, values in zip(QUANTILES, np.quantile(flat, QUANTILES, axis=0), strict=True):
         table[f"q{level:g}_m"] = values
-    used = left[..., : len(names)]
-    table["rhat"], table["ess"] = diagnostics.rhat(used), diagnostics.ess(used)
-    table["split_z"] = diagnostics.agreement(used)
+    table["rhat"], table["ess"] = rhats[: len(names)], sizes[: len(names)]
+    table["split_z"] = diagnostics.agreement(left[..., : len(names)])
     table["mcse_mean_m"] = table.sd_m / np.sqrt(table.ess)
     if truth is not None:
         table["truth_m"] = np.ravel(truth)
