@@ -83,7 +83,7 @@ def bayes():
         found[f"tuning/acceptance_T{t}"] = moves.assign(acceptance_se=0.01, transitions=1000)
         draws = int(np.ceil(0.03 * t))
         found[f"tuning/T{t}.json"] = {"draws": draws, "variance": 0.003 * t / draws}
-        found[f"benchmarks/chains/T{t}"] = pd.DataFrame({"cpu_time": [60.0 * t]})
+        found[f"benchmarks/chains/T{t}"] = pd.DataFrame({"s": [60.0 * t]})
         candidates = {"burn_in": [0, 5], "rhat_max": [1.2, 1.01]}
         found[f"posterior/burn_in_T{t}"] = pd.DataFrame(candidates)
         for prefix, scale in SDS.items():

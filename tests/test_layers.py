@@ -1,6 +1,8 @@
 """Imports run one way, along the path of the data."""
 
 import ast
+import subprocess
+import sys
 from pathlib import Path
 
 import imuarray
@@ -42,3 +44,11 @@ def test_imports_run_one_way():
 def test_the_injector_shares_no_code_with_the_model():
     found = set().union(*(imported(path) for path in (PACKAGE / "blind").glob("*.py")))
     assert found == {"blind", "geometry", "motion", "recording", "streams"}
+
+
+def test_short_jobs_do_not_wait_for_scipy_stats():
+    """It is slow to import, and scipy.special has the laws that they need."""
+    parts = "estimation.selection", "measured.positions", "measured.residuals", "claims"
+    names = [f"imuarray.{part}" for part in (*parts, "figures.measured", "studies.checks.timing")]
+    code = f"import sys, {', '.join(names)}; sys.exit('scipy.stats' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0

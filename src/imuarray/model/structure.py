@@ -29,8 +29,8 @@ def structure_tensor() -> np.ndarray:
     """G, shape (4, 3, 12): G[0] constant, G[1:] per coordinate of the position in metres.
 
     A quadratic form's coefficients are its values at unit vectors e_i, and those at e_i + e_j
-    less them: small integers here, so nothing is rounded, and a quarter of the time that compiling
-    its second derivative takes each process. Tests differentiate.
+    less them: small integers here, so nothing is rounded, and each process compiles less than
+    for its second derivative. Tests differentiate.
     """
     unit, nothing = np.eye(3), np.zeros((6, 3))
     rates = np.vstack([*(unit[i] if i == j else unit[i] + unit[j] for i, j in PAIRS), nothing])
