@@ -13,6 +13,7 @@ from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.information import arms, information
 from imuarray.estimation.newton import descend
 from imuarray.geometry import Array, sub_array
+from imuarray.linear import scaled_eigh
 from imuarray.model import ArrayModel
 from imuarray.model.structure import products
 from imuarray.motion import normal_motion, sphere_motion
@@ -246,7 +247,7 @@ def ranks(cases) -> pd.DataFrame:
         known = information_at(model, motion, model.array.relative)
         # a coordinate of which nothing is known must not be scaled up to something
         scale = np.sqrt(np.maximum(np.diag(known), RANK * np.diag(known).max()))
-        values = np.linalg.eigvalsh(known / np.outer(scale, scale))
+        values = scaled_eigh(known, scale).values
         seen = values > RANK * values[-1]
         rows.append(
             {"case": name, "samples": len(motion.angular_rate), "unknowns": len(known),

@@ -1,0 +1,49 @@
+"""Symmetric positive systems whose parameters have different units, scaled to a unit diagonal.
+
+Metres beside seconds and radians make eigenvalues meaningless and inverses inexact; divided by
+the square roots of the diagonal's numbers, they are those of a correlation matrix.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+FLOOR = 1e-12  # of the scaled eigenvalues, beneath which rounding is all that they are made of
+
+
+class ScaledEigen(NamedTuple):
+    """matrix = D V diag(values) V' D with D = diag(scale), values ascending."""
+
+    values: np.ndarray  # (n,)
+    vectors: np.ndarray  # (n, n), a column each
+    scale: np.ndarray  # (n,)
+
+
+def scaled_eigh(matrix, scale=None) -> ScaledEigen:
+    """Eigen-decomposition of a symmetric matrix (n, n) over the outer product of ``scale`` (n,).
+
+    By default the scale is the square root of the diagonal, so that the scaled one is of ones.
+    """
+    if scale is None:
+        scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    return ScaledEigen(*np.linalg.eigh(matrix / np.outer(scale, scale)), scale)
+
+
+def scaled_inverse(matrix, cutoff: float = FLOOR) -> np.ndarray:
+    """Inverse (n, n) of a symmetric positive matrix.
+
+    Scaled eigenvalues below ``cutoff`` (no unit, 1 is a parameter by itself) count as that large:
+    directions of which nothing is known get a large variance, but a finite one.
+    """
+    values, vectors, scale = scaled_eigh(matrix)
+    return (vectors / np.maximum(values, cutoff)) @ vectors.T / np.outer(scale, scale)
+
+
+def scaled_square(matrix, vector, cutoff: float, scale=None) -> tuple[float, int]:
+    """(vector' matrix^-1 vector, rank) within the directions above ``cutoff``: a score test's."""
+    values, vectors, scale = scaled_eigh(matrix, scale)
+    seen = values > cutoff
+    along = vectors[:, seen].T @ (vector / scale)
+    return float(np.sum(along**2 / values[seen])), int(seen.sum())

@@ -1,0 +1,42 @@
+"""Symmetric systems scaled to a unit diagonal."""
+
+import numpy as np
+import pytest
+
+from imuarray.linear import scaled_eigh, scaled_inverse, scaled_square
+
+UNITS = np.array([1e-6, 1.0, 1e5, 30.0])
+
+
+def matrix():
+    rng = np.random.default_rng(3)
+    root = rng.standard_normal((4, 9))
+    return np.outer(UNITS, UNITS) * (root @ root.T)
+
+
+def test_decomposition_is_that_of_the_scaled_matrix():
+    values, vectors, scale = scaled_eigh(matrix())
+    np.testing.assert_allclose(scale**2, np.diag(matrix()))
+    found = scale[:, None] * (vectors * values) @ vectors.T * scale
+    np.testing.assert_allclose(found, matrix(), rtol=1e-12)
+    assert values.sum() == pytest.approx(4.0)
+
+
+def test_inverse_whatever_the_units():
+    plain = scaled_inverse(matrix() / np.outer(UNITS, UNITS))
+    np.testing.assert_allclose(scaled_inverse(matrix()), plain / np.outer(UNITS, UNITS), rtol=1e-11)
+    np.testing.assert_allclose(scaled_inverse(matrix()) @ matrix() - np.eye(4), 0, atol=1e-9)
+
+
+def test_a_direction_of_which_nothing_is_known_has_a_finite_variance():
+    known = np.outer(UNITS, UNITS)  # of rank one
+    assert np.all(np.isfinite(scaled_inverse(known)))
+    assert np.linalg.norm(scaled_inverse(known, 1e-4) * known) <= 4e4
+
+
+def test_square_leaves_out_what_lies_below_the_cutoff():
+    vector = matrix() @ np.array([2e6, -1.0, 3e-5, 0.1])
+    expected = vector @ np.linalg.solve(matrix(), vector)
+    assert scaled_square(matrix(), vector, 1e-9) == (pytest.approx(expected), 4)
+    found, rank = scaled_square(np.outer(UNITS, UNITS), UNITS, 1e-9)
+    assert rank == 1 and found == pytest.approx(1.0)
