@@ -4,7 +4,7 @@
 
 One row a recording: what was named, whether `unexplained`, the smallest log p of the effects'
 tests on the papers' model and of the checks at the end. The summary says how often each would pass
-the thresholds in src/imuarray/criticism/thresholds.json, and what the smallest of so many
+the thresholds in src/imuarray/diagnosis/thresholds.json, and what the smallest of so many
 recordings reached: a threshold below that of most tests, by a margin, keeps all of them together
 under 5 % false alarms.
 """
@@ -20,9 +20,9 @@ from scipy.stats import beta
 
 from imuarray.blind import Case
 from imuarray.blind.cases import make
-from imuarray.criticism.adopt import proposals
-from imuarray.criticism.investigate import investigate
-from imuarray.criticism.thresholds import read_thresholds
+from imuarray.diagnosis.adoption import proposals
+from imuarray.diagnosis.procedure import investigate
+from imuarray.diagnosis.thresholds import read_thresholds
 
 
 def one(seed: int) -> dict:

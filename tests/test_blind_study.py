@@ -410,13 +410,13 @@ def test_papers_do_not_rest_on_the_blind_study_nor_diagnoses_on_grades():
     for stage in ("figures", "claims", "measured"):
         assert not any("blind" in Path(path).parts[-2:] or Path(path).name.startswith("blind")
                        for path in support.library(stage))  # fmt: skip
-    found = support.resting_on("criticism/diagnosis.py", "blind/study.py")
+    found = support.resting_on("diagnosis/document.py", "blind/study.py")
     names = {Path(path).relative_to(support.PACKAGE).as_posix() for path in found}
-    assert {"criticism/fit.py", "model/catalogue.py", "blind/errors.py", "errors.py"} <= names
+    assert {"diagnosis/fit.py", "model/catalogue.py", "blind/errors.py", "errors.py"} <= names
     assert {"__init__.py", "recording/__init__.py", "recording/format.py"} <= names
     assert not {"blind/grade.py", "blind/summary.py", "figures/style.py", "cli.py"} & names
     rules = (ROOT / "workflow" / "rules" / "blind.smk").read_text(encoding="utf-8")
-    for name in re.findall(r'"((?:blind|figures|criticism)/[^"]+)"', rules):
+    for name in re.findall(r'"((?:blind|figures|diagnosis)/[^"]+)"', rules):
         assert (support.PACKAGE / name).is_file()
 
 

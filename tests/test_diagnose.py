@@ -8,11 +8,11 @@ import pytest
 from imuarray.blind import Case
 from imuarray.blind.cases import make
 from imuarray.cli import main
-from imuarray.criticism.describe import MEANING
-from imuarray.criticism.diagnosis import diagnose, precision_of, structural_gain
-from imuarray.criticism.extension import extended_model, read_extension
-from imuarray.criticism.heldout import gain, log_scores
-from imuarray.criticism.structure import find_structural
+from imuarray.diagnosis.document import diagnose, precision_of, structural_gain
+from imuarray.diagnosis.extension import extended_model, read_extension
+from imuarray.diagnosis.heldout import gain, log_scores
+from imuarray.diagnosis.reading_effects import find_structural
+from imuarray.diagnosis.words import MEANING
 from imuarray.model import EFFECTS, ArrayModel
 from imuarray.model.effects import effect
 from imuarray.recording import write_recording
@@ -182,7 +182,7 @@ def test_another_cause_in_its_clothes_is_no_answer(effect, sign):
 
 
 def test_most_triads_decide_which_axes_are_right():
-    from imuarray.criticism.readings import arrange
+    from imuarray.diagnosis.readings import arrange
 
     recording, _ = make(Case("test-axes", (("axis_swap", (0, 1, 2)),), None, kind="one",
                              duration=DURATION), SEED)  # fmt: skip

@@ -13,7 +13,7 @@ LAYERS = (
     ("errors", "compiled", "linear"), ("streams", "provenance", "geometry"), ("motion",),
     ("model", "config"),
     ("recording",), ("simulation", "firstorder", "estimation"), ("posterior",),
-    ("studies", "measured"), ("blind", "criticism"), ("claims", "figures"), ("report",),
+    ("studies", "measured"), ("blind", "diagnosis"), ("claims", "figures"), ("report",),
     ("analysis",), ("plots",), ("commands",), ("cli",),
 )  # fmt: skip
 PLACE = {name: number for number, names in enumerate(LAYERS) for name in names}

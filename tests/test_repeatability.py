@@ -5,13 +5,13 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from imuarray.criticism.repeatability import (
+from imuarray.diagnosis.repeatability import (
     MODELS,
     parameters_agreement,
     positions_agreement,
     recordings_table,
 )
-from imuarray.figures.criticism_repeatability import repeatability_figure
+from imuarray.report.repeatability import repeatability_figure
 
 
 def document(rng, scale):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from imuarray.criticism.diagnosis import diagnose
+from imuarray.diagnosis.document import diagnose
 from imuarray.geometry import mimu4444_corners
 from imuarray.recording import Recording
 

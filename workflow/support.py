@@ -18,8 +18,8 @@ BASE = ("compiled.py", "config.py", "errors.py", "provenance.py", "streams.py") 
 APART = ("blind_", "theory_", "validation_")  # sizes of targets that nothing else rests on
 CREWS = ("threads", "parts")  # how work is shared: no result depends on it
 
-# Files that nothing of the papers rests on: the criticism's drawings, theory and validation.
-ASIDE = ("blind", "criticism", "theory", "validation", "bound.", "calibrated", "joint", "levels",
+# Files that nothing of the papers rests on: theory and validation.
+ASIDE = ("blind", "theory", "validation", "bound.", "calibrated", "joint", "levels",
          "truths")  # fmt: skip
 # Every stage rests on those before it: the package's folders are the path of the data.
 STAGES = {

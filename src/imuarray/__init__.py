@@ -11,7 +11,7 @@ In a notebook::
     imuarray.plots.positions(calibration)
 
 The folders follow the path of the data: array geometry -> motion -> measurement model (and
-effects) -> simulation and recordings -> estimation -> posterior -> studies -> criticism -> figures
+effects) -> simulation and recordings -> estimation -> posterior -> studies -> diagnosis -> figures
 and claims. Heavy modules load when they are first used.
 """
 
@@ -30,7 +30,7 @@ _HOME = {
     "calibrate": "imuarray.analysis",
     "calibrate_bcd": "imuarray.estimation",
     "calibrate_gauss_newton": "imuarray.estimation",
-    "diagnose": "imuarray.criticism.diagnosis",
+    "diagnose": "imuarray.diagnosis.document",
     "diagnosed": "imuarray.analysis",
     "estimate_motion": "imuarray.estimation",
     "first_order": "imuarray.analysis",
@@ -65,7 +65,7 @@ if TYPE_CHECKING:  # what the names above are, for type checkers and editors
     from imuarray.analysis import select as select
     from imuarray.analysis import simulate as simulate
     from imuarray.analysis import summary as summary
-    from imuarray.criticism.diagnosis import diagnose as diagnose
+    from imuarray.diagnosis.document import diagnose as diagnose
     from imuarray.errors import InputError as InputError
     from imuarray.estimation import calibrate_bcd as calibrate_bcd
     from imuarray.estimation import calibrate_gauss_newton as calibrate_gauss_newton

@@ -13,7 +13,7 @@ from imuarray.figures.style import GREY, look
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from imuarray.criticism.diagnosis import Diagnosis
+    from imuarray.diagnosis.document import Diagnosis
     from imuarray.recording import Recording
 
 MOTION = {
@@ -138,15 +138,15 @@ def residuals(recording: Recording, seed: int = 0) -> list[Axes]:
 
 def discrepancies(diagnosis: Diagnosis) -> list[Axes]:
     """Each check of the residual against simulations of the fitted model."""
-    from imuarray.figures.criticism import discrepancy_figure
-    from imuarray.figures.criticism_tables import discrepancy_table
+    from imuarray.report.drawings import discrepancy_figure
+    from imuarray.report.numbers import discrepancy_table
 
     return discrepancy_figure(discrepancy_table(diagnosis)).axes
 
 
 def gains(diagnosis: Diagnosis) -> list[Axes]:
     """What each cause gains on held-out time."""
-    from imuarray.figures.criticism import gain_figure
-    from imuarray.figures.criticism_tables import gain_table
+    from imuarray.report.drawings import gain_figure
+    from imuarray.report.numbers import gain_table
 
     return gain_figure(gain_table(diagnosis)).axes

@@ -2,9 +2,9 @@ from imuarray.blind.added import ADDED
 
 # What the papers' model gets wrong on each measured recording; its own target, `diagnose`.
 DIAGNOSED = resting_on(
-    "criticism/diagnosis.py",
+    "diagnosis/document.py",
     "report/write.py",
-    "criticism/thresholds.json",
+    "diagnosis/thresholds.json",
     "figures/imuarray.mplstyle",
     "provenance.py",
 )
@@ -43,8 +43,8 @@ rule diagnosis_agreement:
             "results/measured/diagnosis/{name}/diagnosis.json", name=MEASURED.groups()[wc.group]
         ),
         code=resting_on(
-            "criticism/repeatability.py",
-            "figures/criticism_repeatability.py",
+            "diagnosis/repeatability.py",
+            "report/repeatability.py",
             "figures/imuarray.mplstyle",
             "provenance.py",
         ),

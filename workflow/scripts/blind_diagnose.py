@@ -7,7 +7,7 @@ with job(snakemake) as settings:
 
     from imuarray.blind import matrix
     from imuarray.blind.study import batch_of, diagnosed
-    from imuarray.criticism.diagnosis import diagnose
+    from imuarray.diagnosis.document import diagnose
     from imuarray.provenance import stamp, write_json
 
     cases = batch_of(

@@ -5,7 +5,7 @@ from job import job
 with job(snakemake) as settings:
     from pathlib import Path
 
-    from imuarray.criticism.diagnosis import diagnose
+    from imuarray.diagnosis.document import diagnose
     from imuarray.recording import read_recording
     from imuarray.report.write import write_report
 

@@ -6,14 +6,14 @@ with job(snakemake):
     import json
     from pathlib import Path
 
-    from imuarray.criticism.repeatability import (
+    from imuarray.diagnosis.repeatability import (
         parameters_agreement,
         positions_agreement,
         recordings_table,
     )
-    from imuarray.figures.criticism_repeatability import repeatability_figure
     from imuarray.figures.style import write_figure
     from imuarray.provenance import write_csv
+    from imuarray.report.repeatability import repeatability_figure
 
     documents = {
         Path(path).parent.name: json.loads(Path(path).read_text(encoding="utf-8"))

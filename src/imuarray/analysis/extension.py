@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis.model import model_of
-from imuarray.criticism.extension import Extension, extended_model, read_extension
+from imuarray.diagnosis.extension import Extension, extended_model, read_extension
 from imuarray.errors import InputError
 from imuarray.model.names import parameter_names
 from imuarray.recording import Recording

@@ -64,7 +64,7 @@ def extender(
     """
     if diagnosis is None:
         return None
-    from imuarray.criticism.extension import extended_model, read_extension
+    from imuarray.diagnosis.extension import extended_model, read_extension
 
     if effects:
         raise InputError("--effects: expected none beside --diagnosis, found some")

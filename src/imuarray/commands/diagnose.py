@@ -6,8 +6,8 @@ import sys
 import time
 
 from imuarray.commands.output import Output
-from imuarray.criticism.describe import MEANING
-from imuarray.criticism.diagnosis import diagnose as criticise
+from imuarray.diagnosis.document import diagnose as criticise
+from imuarray.diagnosis.words import MEANING
 from imuarray.errors import InputError
 from imuarray.model import EFFECTS
 from imuarray.recording import read_recording

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from imuarray.criticism.structure import LEFT_OUT
-from imuarray.figures.criticism_tables import imu_labels, in_noise_sds, position_table
+from imuarray.diagnosis.reading_effects import LEFT_OUT
 from imuarray.model.effects import KINDS
 from imuarray.report.cause_words import cause_in_words, equation, whose_short, words
+from imuarray.report.numbers import imu_labels, in_noise_sds, position_table
 from imuarray.report.quantities import (
     NARROW,
     joined,
@@ -22,7 +22,7 @@ from imuarray.report.quantities import (
 )
 
 if TYPE_CHECKING:
-    from imuarray.criticism.diagnosis import Diagnosis
+    from imuarray.diagnosis.document import Diagnosis
 
 HIDDEN = 1.1  # times the assumed noise: a residual that looks like noise
 USUAL = 0.05  # p-value of a check that is as expected

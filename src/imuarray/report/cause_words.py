@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from imuarray.criticism.describe import MEANING, first_up, whose
+from imuarray.diagnosis.words import MEANING, first_up, whose
 from imuarray.model import EFFECTS
 from imuarray.report.quantities import (
     NARROW,

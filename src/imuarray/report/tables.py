@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from imuarray.figures.criticism_tables import (
+from imuarray.model.effects import KINDS
+from imuarray.report.answers import USUAL
+from imuarray.report.cause_words import part_in_words, split_name, whose_short, words
+from imuarray.report.numbers import (
     imu_labels,
     position_table,
     residual_table,
     score_table,
 )
-from imuarray.model.effects import KINDS
-from imuarray.report.answers import USUAL
-from imuarray.report.cause_words import part_in_words, split_name, whose_short, words
 from imuarray.report.quantities import (
     number,
     plus_minus,
@@ -25,7 +25,7 @@ from imuarray.report.quantities import (
 )
 
 if TYPE_CHECKING:
-    from imuarray.criticism.diagnosis import Diagnosis
+    from imuarray.diagnosis.document import Diagnosis
 
 MICRO = 1e6
 

@@ -12,20 +12,20 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 import imuarray
-from imuarray.figures import criticism as drawn
-from imuarray.figures import criticism_tables as numbers
-from imuarray.figures.criticism_causes import cause_figure
-from imuarray.figures.criticism_model import ALIKE, position_figure, separability_figure
-from imuarray.figures.criticism_panels import cause_table
 from imuarray.figures.style import styled
 from imuarray.provenance import atomic_write
+from imuarray.report import drawings as drawn
+from imuarray.report import numbers
 from imuarray.report.answers import answers, verdict
 from imuarray.report.cause_words import whose_short, words
+from imuarray.report.drawings_cause import cause_figure
+from imuarray.report.drawings_model import ALIKE, position_figure, separability_figure
 from imuarray.report.page import render
+from imuarray.report.panels import cause_table
 from imuarray.report.tables import tables
 
 if TYPE_CHECKING:
-    from imuarray.criticism.diagnosis import Diagnosis
+    from imuarray.diagnosis.document import Diagnosis
 
 FIGURES = {
     "discrepancies": (numbers.discrepancy_table, drawn.discrepancy_figure),

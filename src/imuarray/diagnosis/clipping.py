@@ -1,0 +1,116 @@
+"""Lone readings far from what the model predicts: a rail that clips a single one, or nobody knows.
+
+Where a rail clips several readings they pile up at one value, which needs no model
+(`imuarray.diagnosis.reading_effects`); one alone is seen only beside its prediction.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import norm
+
+from imuarray.diagnosis.reading_effects import Structural, unique
+from imuarray.diagnosis.residual_checks import Check
+from imuarray.diagnosis.state import Search
+from imuarray.model.effects import KINDS
+
+ALONE = 1.5  # times farther than any other reading of its triad
+NEXT = 30  # largest readings after it
+UNITS = ("m s-2", "rad s-1")
+
+
+class Peak(NamedTuple):
+    """A triad's largest reading."""
+
+    imu: int
+    kind: int
+    at: np.ndarray  # (T, 3) bool: the reading, with any that are as large
+    size: float  # SI
+    inward: float  # sds by which it falls short of its prediction
+    others: float  # sds by which any other reading of the triad is off at most
+    apart: float  # ``inward`` less what the next largest readings fall short by, in their own sds
+
+
+def peaks(search: Search) -> list[Peak]:
+    """Of every triad."""
+    residual, readings, found = search.fit.residual, search.readings, []
+    for imu, kind in np.argwhere(readings.exists):
+        block = np.s_[:, imu, 3 * kind : 3 * kind + 3]
+        kept, values = readings.keep[block], readings.values[block]
+        size = np.where(kept, np.abs(values), 0.0)
+        at = size >= size.max() * (1 - 1e-9)
+        short = -np.sign(values) * residual[block]
+        rest = kept & ~at
+        # what bends all large readings alike is no rail
+        near = short[rest][np.argsort(size[rest])[-NEXT:]]
+        spread = max(float(np.std(near)), 1.0) * np.sqrt(1 + 1 / NEXT)
+        inward = float(np.max(short[at]))
+        others = float(np.max(np.abs(residual[block])[rest]))
+        apart = (inward - float(np.mean(near))) / spread
+        found.append(Peak(int(imu), int(kind), at, float(size.max()), inward, others, apart))
+    return found
+
+
+def clipped(found: list[Peak], limit: float) -> tuple[list[Peak], float]:
+    """Those that fall short far more than anything else does, or all of a kind together."""
+    logs = {id(p): float(norm.logsf(p.inward) + np.log(len(found))) for p in found}
+    hit = [p for p in found if logs[id(p)] < limit and p.inward > ALONE * p.others]
+    least = min((logs[id(p)] for p in hit), default=0.0)
+    for kind in range(len(KINDS)):
+        own = [p for p in found if p.kind == kind]
+        pooled = sum(p.apart for p in own) / np.sqrt(max(len(own), 1))
+        log_p = float(norm.logsf(pooled) + np.log(len(KINDS)))
+        if log_p < min(limit, least) and np.median([p.apart for p in own]) > 1.0:
+            hit, least = [p for p in hit if p.kind != kind] + own, log_p
+    return hit, least
+
+
+def leave_out_clips(search: Search) -> list[Structural]:
+    """Triads whose largest reading falls short of its prediction, far more than any other does.
+
+    Those readings are left out of ``search`` from here on.
+    """
+    hit, log_p = clipped(peaks(search), search.thresholds.check)
+    if not hit:
+        return []
+    lost = np.zeros(search.readings.keep.shape, bool)
+    for peak in hit:
+        lost[:, peak.imu, 3 * peak.kind : 3 * peak.kind + 3] = peak.at
+    search.readings = search.readings.without(lost)
+    search.refit()
+    search.allowed = search.allowed & ~lost
+    numbers = {}
+    for kind in sorted({peak.kind for peak in hit}):
+        sizes = [peak.size for peak in hit if peak.kind == kind]
+        numbers[f"{KINDS[kind]}_rail"] = float(np.median(sizes)), float(np.std(sizes)), UNITS[kind]
+    where = ", ".join(f"{n} {v[0]:.4g} {v[2]}" for n, v in numbers.items())
+    says = f"the largest reading alone stays below what it should be, as at a rail ({where})"
+    return [Structural("saturation", unique(p.imu for p in hit), log_p, numbers, says)]
+
+
+def together(first: list[Structural], second: list[Structural]) -> list[Structural]:
+    """Both lists, what is in both as one cause."""
+    names = {item.effect: item for item in first}
+    for item in second:
+        old = names.get(item.effect)
+        names[item.effect] = item if old is None else replaced(old, item)
+    return list(names.values())
+
+
+def replaced(old: Structural, new: Structural) -> Structural:
+    """One cause of two findings; the words are the first's."""
+    return old._replace(imus=unique([*old.imus, *new.imus]), log_p=min(old.log_p, new.log_p))
+
+
+def lone_checks(search: Search, tailed) -> list[Check]:
+    """The reading farthest from its prediction, but for triads whose tails are known."""
+    known = {(imu, kind) for imu, kind, _ in tailed}
+    size = np.abs(search.fit.residual)
+    for imu, kind in known:
+        size[:, imu, 3 * kind : 3 * kind + 3] = 0.0
+    place = np.unravel_index(int(np.argmax(size)), size.shape)
+    farthest = float(size[place])
+    log_p = float(norm.logsf(farthest) + np.log(2 * size.size))
+    return [Check("farthest reading", farthest, min(log_p, 0.0), (int(place[1]),))]

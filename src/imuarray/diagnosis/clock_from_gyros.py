@@ -1,0 +1,182 @@
+"""Clocks where the motion is rough: phases, rates and drifts from the gyroscopes alone.
+
+What is too fast for the samples passes the gyroscopes' and the accelerometers' filters differently,
+so that the accelerometers' omega_dot is not what makes an age visible in a gyroscope's reading.
+But all gyroscopes see one omega and one omega_dot, free at each sample:
+
+    y_k = M_k (omega - age_k omega_dot) + b_k,
+
+and three gyroscopes or more that sample at different ages overdetermine both.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from imuarray.diagnosis.readings import Readings
+from imuarray.model.timing import clock_turns
+
+ENOUGH = 4  # gyroscopes with a clock
+LEAST = 200  # samples
+MOST = 2500  # samples, those of the fastest turning
+ROUNDS = 18
+REACH = 0.1  # turns, rms, by which a first guess may be off
+DRAWN_IN = 0.85  # factor of the reach from round to round
+UNIT = 1e-3  # s, of the ages until their size is known
+
+
+class Gyroscopes(NamedTuple):
+    """Readings of the gyroscopes that have clocks, and the turning that accelerometers see."""
+
+    time: np.ndarray  # (T,)
+    span: float
+    values: np.ndarray  # (T, K, 3) rad/s
+    turning: np.ndarray  # (T, 3) rad/s^2
+
+
+def wind(readings: Readings, turning, clocks: dict) -> dict:
+    """{imu: (P, f, phi, c, g)} from first guesses of the same form, `ENOUGH` of them at least.
+
+    ``turning`` (T, 3): omega_dot by the accelerometers. The period that all get makes what the
+    gyroscopes see turn as much as what the accelerometers see.
+    """
+    imus = sorted(clocks)
+    seen = informative(readings, turning, imus)
+    guess = np.array([clocks[imu] for imu in imus])
+    guess[:, 0], guess[:, 3] = UNIT, 0.0
+    maps, weights = np.tile(np.eye(4)[:3], (len(imus), 1, 1)), np.ones(seen.values.shape[:2])
+    for number in range(ROUNDS):
+        ages = ages_of(guess, seen)
+        motion, left = moved(seen, maps, ages, weights)
+        size = 1.4826 * np.median(np.abs(left))
+        weights = robust(left, size)
+        maps = remapped(seen, motion, ages, weights)
+        if number:
+            guess = turned(seen, maps, motion, guess, REACH * DRAWN_IN**number)
+    # over all samples: those that were picked turn fast by the accelerometers, and less by others
+    seen = informative(readings, turning, imus, None)
+    ages = ages_of(guess, seen)
+    motion, left = moved(seen, maps, ages, np.ones(ages.shape))
+    motion = moved(seen, maps, ages, robust(left, size))[0]
+    both = [np.sqrt(np.mean(part**2)) for part in (motion[:, 3:], seen.turning)]
+    sign = np.sign(np.sum(motion[:, 3:] * seen.turning))
+    guess[:, 0] = sign * UNIT * both[0] / both[1]
+    return dict(zip(imus, guess, strict=True))
+
+
+def windable(readings: Readings, imus) -> bool:
+    """Whether there are gyroscopes and samples enough."""
+    together = readings.keep[:, sorted(imus), 3:].all(axis=(1, 2))
+    return len(imus) >= ENOUGH and together.sum() >= LEAST
+
+
+def robust(left, size) -> np.ndarray:
+    """Weights (T, K) of misfits (T, K, 3): near one up to a few times their usual size."""
+    return 1 / (1 + (np.sum(left**2, axis=2) / (4 * size) ** 2) ** 2)
+
+
+def informative(readings: Readings, turning, imus, most=MOST) -> Gyroscopes:
+    """The ``most`` samples of the fastest turning at which all the gyroscopes were read."""
+    good = np.flatnonzero(readings.keep[:, imus, 3:].all(axis=(1, 2)))
+    fast = np.linalg.norm(turning[good], axis=1)
+    good = np.sort(good[np.argsort(fast)[-(most or len(good)) :]])
+    values = readings.values[good][:, imus, 3:]
+    return Gyroscopes(readings.time[good], readings.span, values, turning[good])
+
+
+def ages_of(clocks, seen: Gyroscopes) -> np.ndarray:
+    """(T, K) s, by clocks (K, 5)."""
+    return clocks[:, 0] * (np.mod(clock_turns(clocks.T, seen.time[:, None], seen.span), 1) - 0.5)
+
+
+def moved(seen: Gyroscopes, maps, ages, weights):
+    """omega and omega_dot (T, 6) by weighted least squares, and what is left (T, K, 3)."""
+    matrix = np.broadcast_to(maps[..., :3], (*ages.shape, 3, 3))
+    matrix = np.concatenate([matrix, -ages[..., None, None] * matrix], axis=-1)
+    target = seen.values - maps[..., 3]
+    heavy = weights[..., None, None] * matrix
+    gram = np.einsum("tkia,tkib->tab", heavy, matrix, optimize=True)
+    # ages that agree at a sample tell no turning: the accelerometers' own then
+    ridge = 1e-3 * UNIT**2 * np.eye(3)
+    gram[:, 3:, 3:] += ridge
+    right = np.einsum("tkia,tki->ta", heavy, target)
+    right[:, 3:] += seen.turning @ ridge
+    motion = np.linalg.solve(gram, right[..., None])[..., 0]
+    return motion, target - np.einsum("tkia,ta->tki", matrix, motion)
+
+
+def remapped(seen: Gyroscopes, motion, ages, weights) -> np.ndarray:
+    """(K, 3, 4) each gyroscope's own map and bias, their mean that of perfect ones."""
+    maps = []
+    for k in range(ages.shape[1]):
+        rate = motion[:, :3] - ages[:, k, None] * motion[:, 3:]
+        full = np.hstack([rate, np.ones((len(rate), 1))])
+        heavy = weights[:, k, None] * full
+        maps.append(np.linalg.solve(heavy.T @ full, heavy.T @ seen.values[:, k]).T)
+    maps = np.array(maps)
+    common = maps[..., :3].mean(axis=0)
+    maps[..., :3] = maps[..., :3] @ np.linalg.inv(common)
+    maps[..., 3] -= maps[..., 3].mean(axis=0)
+    return maps
+
+
+def turned(seen: Gyroscopes, maps, motion, clocks, reach) -> np.ndarray:
+    """The clocks with phase, rate and drift where the gyroscopes' own misfit is least.
+
+    All together first, which moves nothing but the jumps (an age common to all is the motion's);
+    then each of its own.
+    """
+    along, exact = polynomials(seen)
+    rate, turn = (
+        np.einsum("kij,tj->tki", maps[..., :3], motion[:, part]) for part in (slice(3), slice(3, 6))
+    )
+    bare = seen.values - maps[..., 3] - rate
+    turns = clock_turns(clocks.T, seen.time[:, None], seen.span)
+    period, most = clocks[:, 0], np.abs(clocks[:, 0]) * np.abs(turn).sum(axis=2)
+
+    def cost(some, shift, taken):
+        age = period[some] * (np.mod(turns[:, some] + shift[:, None], 1) - 0.5 - taken[:, None])
+        # sums of sizes, none beyond what a wrong turn costs: outliers count little
+        off = np.abs(bare[:, some] + age[..., None] * turn[:, some]).sum(axis=2)
+        return np.minimum(off, most[:, some]).sum()
+
+    every, out = np.arange(len(clocks)), clocks.copy()
+    together = _searched(lambda s: cost(every, s, s), along, reach)
+    turns = turns + (along @ together)[:, None]
+    taken = along @ together
+    for k in every:
+        place = _searched(lambda s, k=k: cost([k], s, taken), along, reach)
+        out[k, [2, 1, 4]] += exact @ (place + together)
+    return out
+
+
+def polynomials(seen: Gyroscopes) -> tuple[np.ndarray, np.ndarray]:
+    """(T, 3) of time, orthonormal under the turning's square, and their phase, rate, drift (3, 3).
+
+    So they change where the board turns: a recording may be still for most of its time.
+    """
+    since = seen.time - seen.span / 2
+    powers = np.stack([np.ones_like(since), seen.time, since**2 / 2], axis=1)
+    weight = np.linalg.norm(seen.turning, axis=1, keepdims=True)
+    weight = weight / np.sqrt(np.sum(weight**2))
+    scale = np.abs(powers).max(axis=0)
+    exact = np.linalg.inv(np.linalg.qr(weight * powers / scale)[1]) / scale[:, None]
+    exact *= np.sign(exact[0, 0])
+    return powers @ exact, exact
+
+
+def _searched(cost, along, reach) -> np.ndarray:
+    """Coefficients (3,) of ``along`` with the least cost of their sum, within a reach of zero."""
+    place = np.zeros(3)
+    best = cost(along @ place)
+    for order in (1, 2, 1):
+        centre = place.copy()
+        for shift in reach * np.linspace(-1, 1, 9):
+            for phase in reach * np.linspace(-1, 1, 11):
+                trial = centre + shift * np.eye(3)[order] + phase * np.eye(3)[0]
+                found = cost(along @ trial)
+                if found < best:
+                    best, place = found, trial
+    return place

@@ -1,0 +1,287 @@
+"""The four answers on one recording: what is wrong, why, the extended model, what it gains."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+import imuarray
+from imuarray.diagnosis import words as describe
+from imuarray.diagnosis.elimination import heldout_gain, need
+from imuarray.diagnosis.fit import Fit, at, fit, flat_parameters
+from imuarray.diagnosis.gauges import prior_precision
+from imuarray.diagnosis.heldout import BLOCKS, Scores, gain, log_scores
+from imuarray.diagnosis.noise import coloured_meat, per_triad, standardised
+from imuarray.diagnosis.noise_effects import held_out
+from imuarray.diagnosis.placebo import placebo_gain
+from imuarray.diagnosis.procedure import Found, investigate
+from imuarray.diagnosis.reading_effects import LEFT_OUT
+from imuarray.diagnosis.replicates import Discrepancy, discrepancies
+from imuarray.diagnosis.scores import evidence, robust_inverse
+from imuarray.model.effects import KINDS
+from imuarray.recording import Recording
+from imuarray.streams import stream
+
+LEAST = -1e6  # log p; JSON has no infinity
+
+
+@dataclass
+class Fitted:
+    """A model of the recording: its fit, its score on held-out time, its positions."""
+
+    fit: Fit
+    scores: Scores
+    sds: np.ndarray  # (N, m) of the parameters
+    discrepancies: list[Discrepancy] = field(default_factory=list)
+
+    def section(self) -> dict:
+        """As `diagnosis.json` has it."""
+        positions = self.fit.state.positions
+        place = self.fit.columns.of("position")
+        sds = self.sds[: len(positions), place]
+        return {
+            "heldout_log_score_per_sample": self.scores.per_sample,
+            "residual_sd": residual_sd(self.fit),
+            "positions_m": positions.tolist(),
+            "positions_sd_m": sds.tolist(),
+        }
+
+
+@dataclass
+class Diagnosis:
+    """What `imuarray diagnose` writes, and what its figures are drawn from.
+
+    ``base`` is the papers' model with the declared noise, ``inflated`` the same with the noise
+    that its residual shows (paper 2021's way out), ``extended`` has the causes.
+    """
+
+    document: dict
+    found: Found
+    base: Fitted
+    inflated: Fitted
+    extended: Fitted
+
+    def to_json(self) -> str:
+        """diagnosis.json."""
+        return json.dumps(self.document, indent=1, allow_nan=False)
+
+
+def diagnose(
+    recording: Recording, seed: int = 0, without=(), recording_path: str | Path = "",
+    say: Callable[[str], None] = lambda text: None, replicates: int = 99,
+) -> Diagnosis:  # fmt: skip
+    """Criticise the papers' model on a recording and extend it.
+
+    ``without``: effects struck from the catalogue. InputError for too few moving samples.
+    """
+    found = investigate(recording, without, say)
+    search = found.search
+    say("fitting the papers' model to the same readings")
+    extended = fitted(search.fit, search.noise.correlation)
+    nats = extended.scores.nats + nats_beside(found)
+    extended.scores = extended.scores._replace(nats=nats)
+    base, inflated = rivals_of(found)
+    rng = stream(seed, "diagnose", "replicates")
+    say("replicating the recording")
+    for model in (base, extended):
+        precision = precision_of(model.fit)
+        model.discrepancies = discrepancies(model.fit, precision, rng, replicates)
+    document = {
+        "recording": str(recording_path),
+        "seed": int(seed),
+        "version": imuarray.__version__,
+        "samples": len(search.readings.time),
+        "clock": {"origin_s": float(recording.time[0]), "span_s": search.readings.span},
+        "base": base.section(),
+        "discrepancies": [d.as_dict() for d in base.discrepancies],
+        "causes": causes_of(found, extended),
+        "unexplained": bool(found.unexplained),
+        "remaining": [c.name for c in found.checks if c.log_p < search.thresholds.check],
+        "inflated": inflated.section(),
+        "extended": extended.section(),
+        "discrepancies_after": [d.as_dict() for d in extended.discrepancies],
+        "noise_sd": noise_of(found),
+        "gain": gains(base, inflated, extended),
+    }
+    return Diagnosis(document, found, base, inflated, extended)
+
+
+def nats_beside(found: Found) -> np.ndarray:
+    """Nats of each held-out block that the extended fit's own score does not have, (blocks,).
+
+    Outliers are in no model's score, so what a mixture gains on them is not in the gain either;
+    it stands with its cause.
+    """
+    # a fit's score takes noise for white
+    beside = [i.blocks for i in found.in_noise if i.effect == "coloured_noise"]
+    # nor has any model's score the readings left out; exchanged axes are in the rivals' scores,
+    # which take the readings as they are
+    left_out = [item for item in found.structural if item.effect in LEFT_OUT]
+    beside += [structural_gain(found, item)[2] for item in left_out]
+    return sum((blocks for blocks in beside if np.sum(blocks) > 0), np.zeros(BLOCKS))
+
+
+def precision_of(made: Fit) -> np.ndarray:
+    """Prior precision of a fit's active parameters, gauges pinned."""
+    return prior_precision(made.columns, made.active)
+
+
+def fitted(made: Fit, correlation=None) -> Fitted:
+    """A fit with its held-out score and the sds of its parameters.
+
+    Where noise is coloured (``correlation`` (N, 2)) the sds are those of the sandwich.
+    """
+    given = evidence(made, flat_parameters(made.columns, made.state))
+    # gauges are pinned for the fit; what is known of them is what the priors say
+    places, ridge = given.places(made.active), np.diag(given.ridge[given.places(made.active)])
+    inner = given.information[np.ix_(places, places)]
+    covariance = robust_inverse(inner + ridge)
+    meat = None
+    if correlation is not None:
+        meat = coloured_meat(made, given.information, correlation)
+    if meat is not None:
+        middle = meat[np.ix_(places, places)] + ridge
+        covariance = covariance @ middle @ covariance
+    sds = np.zeros(made.active.shape)
+    sds[made.active] = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return Fitted(made, log_scores(made, precision_of(made)), sds)
+
+
+def rivals_of(found: Found) -> tuple[Fitted, Fitted]:
+    """The papers' model on the extended model's readings: declared noise, and inflated."""
+    search = found.search
+    alone = np.zeros_like(search.active)
+    alone[:, search.columns.of("position")] = True
+    alone &= search.columns.owner
+    start = found.base.state._replace(parameters=np.zeros_like(found.base.state.parameters))
+    bare = replace(search.readings, sd=search.readings.declared)
+    if found.structural:
+        # as read: the rivals know neither of rails nor of repeats nor of exchanged axes
+        bare = replace(bare, values=found.raw.values)
+    declared = fit(bare, search.columns, alone, start, search.smooth, rough=True)
+    size = np.sqrt(np.nanmean(per_triad(standardised(declared)) ** 2, axis=-1))
+    inflated_sd = bare.declared * np.where(bare.exists, np.maximum(size, 1e-3), 1.0)
+    again = fit(
+        bare.with_sd(inflated_sd), search.columns, alone, declared.state, search.smooth, True
+    )
+    return fitted(declared), fitted(again)
+
+
+def residual_sd(made: Fit) -> dict:
+    """rms of the residual in m/s^2 and rad/s, corrected for what the motion takes up."""
+    si = standardised(made) * np.repeat(made.readings.sd, 3, axis=1)
+    return {
+        "specific_force": _rms(si[..., :3]),
+        "angular_rate": _rms(si[..., 3:]),
+    }
+
+
+def _rms(values) -> float:
+    return float(np.sqrt(np.nanmean(values**2)))
+
+
+def noise_of(found: Found) -> dict:
+    """The noise sds of the extended model, by kind and IMU, and their correlation in time."""
+    readings, noise = found.search.readings, found.search.noise
+    return {
+        name: {
+            readings.labels[k]: {
+                "sd": float(readings.sd[k, kind]), "correlation": float(noise.correlation[k, kind]),
+            }
+            for k in np.flatnonzero(readings.exists[:, kind])
+        }
+        for kind, name in enumerate(KINDS)
+    }  # fmt: skip
+
+
+def gains(base: Fitted, inflated: Fitted, extended: Fitted) -> dict:
+    """Held-out nats per sample over both rivals, residual ratios, and the positions' change."""
+    over_base, over_inflated = (
+        gain(base.scores, extended.scores),
+        gain(inflated.scores, extended.scores),
+    )
+    before, after = residual_sd(base.fit), residual_sd(extended.fit)
+    place = base.fit.columns.of("position")
+    owner = base.fit.active[:, place][: len(base.fit.state.positions)]
+    change = (extended.fit.state.positions - base.fit.state.positions)[owner]
+    sds = base.sds[: len(base.fit.state.positions), place][owner]
+    return {
+        "heldout_log_score_nats_per_sample": over_base[0],
+        "heldout_log_score_nats_per_sample_se": over_base[1],
+        "over_inflated_noise_nats_per_sample": over_inflated[0],
+        "over_inflated_noise_nats_per_sample_se": over_inflated[1],
+        "residual_sd_ratio": {name: after[name] / before[name] for name in before},
+        "position_change_sd": float(np.sqrt(np.mean((change / sds) ** 2))),
+        "position_change_m": float(np.sqrt(np.mean(change**2))),
+    }
+
+
+def causes_of(found: Found, extended: Fitted) -> list[dict]:
+    """All causes: of whole readings, of the means in the order of adoption, of the noise."""
+    search, labels = found.search, found.search.readings.labels
+    causes = []
+    for item in found.structural:
+        nats = structural_gain(found, item)[:2]
+        if item.effect == "stale_samples" and nats[0] <= 0:
+            continue  # a coarse converter at rest repeats itself, too, and is right
+        causes.append(_entry(item, labels, item.parameters, nats, [], item.says))
+    for cause in search.causes:
+        parameters = describe.parameters_of(search, cause, extended.sds)
+        nats, names = heldout_gain(search, cause.effect), found.rivals.get(cause.effect, [])
+        entry = _entry(cause, labels, parameters, nats, names)
+        statistic, freedom = need(search, cause.effect)
+        true, placebo = placebo_gain(search, cause)
+        entry |= {
+            "chi_square": statistic, "degrees_of_freedom": freedom,
+            "placebo_gain_nats": placebo, "gain_in_sample_nats": true,
+        }  # fmt: skip
+        causes.append(entry)
+    causes += [
+        _entry(item, labels, item.parameters, (item.gain, item.gain_se), [])
+        for item in found.in_noise
+    ]
+    return causes
+
+
+def _entry(item, labels, parameters, nats, rivals, says=None) -> dict:
+    """One cause of `diagnosis.json`; parameters are dicts or (value, sd, unit)."""
+    plain = {
+        name: value if isinstance(value, dict)
+        else {"value": value[0], "sd": value[1], "unit": value[2]}
+        for name, value in parameters.items()
+    }  # fmt: skip
+    sensors = describe.sensors_of(labels, item.imus)
+    words = describe.sentence(item.effect, sensors, plain, nats[0], rivals)
+    return {
+        "effect": item.effect,
+        "sensors": sensors,
+        "parameters": plain,
+        "p_value": float(np.exp(item.log_p)),
+        "log10_p_value": float(max(item.log_p, LEAST) / np.log(10)),
+        "heldout_gain_nats": nats[0],
+        "heldout_gain_se": nats[1],
+        "indistinguishable_from": list(rivals),
+        "says": f"{words[:-1]}: {says}." if says else words,
+    }
+
+
+def structural_gain(found: Found, item) -> tuple[float, float, np.ndarray]:
+    """Nats by which the readings, as recorded, miss the extended model's prediction.
+
+    Returns their sum, its standard error and each held-out block's share.
+    Nothing was fitted to the readings that were left out, so this is held out as it stands.
+    What the other effects of whole readings did stays mended: theirs is not counted here.
+    """
+    search, raw = found.search, found.raw
+    touched, values = raw.keep & ~search.allowed, search.readings.values
+    if item.effect == "axis_swap":
+        touched, values = raw.keep & (raw.values != values), raw.values
+    mine = np.zeros_like(touched)
+    mine[:, list(item.imus)] = touched[:, list(item.imus)]
+    readings = replace(search.readings, values=values, keep=search.readings.keep | mine)
+    seen = at(readings, search.columns, search.active, search.fit.state, True)
+    return held_out((seen.misfits - search.fit.misfits - mine.sum(axis=(1, 2))) / 2)

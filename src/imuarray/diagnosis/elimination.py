@@ -1,0 +1,115 @@
+"""What adopted effects are worth: tested against zero, on held-out time; the needless go."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from imuarray.diagnosis.fit import flat_parameters, from_flat
+from imuarray.diagnosis.heldout import normal_blocks
+from imuarray.diagnosis.scores import Candidate, log_tail
+from imuarray.diagnosis.state import Search, started
+
+
+def freed_places(search: Search, effect: str, imus=None, among=None) -> np.ndarray:
+    """Places of an adopted effect's free parameters, of some of its IMUs or ``among`` columns."""
+    mask = search.active.copy()
+    chosen = search.columns.of(effect) if among is None else among
+    others = np.setdiff1d(np.arange(search.columns.size), chosen)
+    mask[:, others] = False
+    if imus is not None:
+        mask[np.setdiff1d(np.arange(len(mask)), imus)] = False
+    return search.given.places(mask)
+
+
+def need(search: Search, effect: str, imus=None, among=None) -> tuple[float, int]:
+    """(chi-square, degrees of freedom) of an adopted effect against zero, all else refitted."""
+    freed = freed_places(search, effect, imus, among)
+    active = np.setdiff1d(search.given.places(search.active), freed)
+    conditional = search.given.conditional(active, freed)
+    return search.given.test(conditional, freed)
+
+
+def heldout_gain(search: Search, effect: str) -> tuple[float, float]:
+    """Nats gained on held-out blocks of time by an adopted effect, with standard error.
+
+    Both rivals are trained without the block, the effect's parameters shrunk as their evidence
+    in the training blocks deserves (positive-part James-Stein).
+    """
+    given, mask = search.given, search.active
+    places = given.places(mask)
+    freed = np.isin(places, freed_places(search, effect))
+    ridge, values = given.precision[np.ix_(places, places)], given.values[places]
+    parts = normal_blocks(search.fit, mask)
+    information, score = sum(p[0] for p in parts), sum(p[1] for p in parts)
+    gains = []
+    for block, slope in parts:
+        trained = information - block + ridge, score - slope
+        without = _solve(*trained, values, freed, 0.0)
+        full = _solve(*trained, values, freed, None)
+        found = (full + values)[freed]
+        effective = _schur(trained[0], freed)
+        statistic = found @ effective @ found
+        shrink = max(0.0, 1 - freed.sum() / max(statistic, 1e-300))
+        kept = _solve(*trained, values, freed, shrink * found)
+        gains.append(_predicted(kept, block, slope) - _predicted(without, block, slope))
+    return float(np.sum(gains)), float(np.std(gains, ddof=1) * np.sqrt(len(gains)))
+
+
+def _schur(information, chosen):
+    """Information of the chosen given the rest."""
+    rest = ~chosen
+    inner = np.linalg.solve(information[np.ix_(rest, rest)], information[np.ix_(rest, chosen)])
+    return information[np.ix_(chosen, chosen)] - information[np.ix_(chosen, rest)] @ inner
+
+
+def _solve(information, score, values, freed, target):
+    """Steps of all parameters where the freed ones go to ``target``, or anywhere if None."""
+    if target is None:
+        return np.linalg.solve(information, score)
+    step = np.zeros(len(score))
+    step[freed] = target - values[freed]
+    rest = ~freed
+    right = score[rest] - information[np.ix_(rest, freed)] @ step[freed]
+    step[rest] = np.linalg.solve(information[np.ix_(rest, rest)], right)
+    return step
+
+
+def _predicted(step, block, slope) -> float:
+    """Log likelihood of a block after a step, against before, quadratic."""
+    return float(slope @ step - step @ block @ step / 2)
+
+
+def prune(search: Search, effect: str) -> None:
+    """Of an effect adopted for many IMUs, keep those that need it, where they are the fewer."""
+    cause = next((c for c in search.causes if c.effect == effect), None)
+    if cause is None or len(cause.imus) < 3:
+        return
+    limit = search.thresholds.limit(effect) - np.log(len(cause.imus))
+    keep = []
+    for imu in cause.imus:
+        statistic, freedom = need(search, effect, [imu])
+        if freedom and log_tail(statistic, freedom) < limit:
+            keep.append(imu)
+    rest = [imu for imu in cause.imus if imu not in keep]
+    if not keep or len(keep) > len(cause.imus) / 2:
+        return
+    statistic, freedom = need(search, effect, rest)
+    if freedom and log_tail(statistic, freedom) < search.thresholds.limit(effect):
+        return
+    cause.imus = tuple(keep)
+    state = started(search, Candidate(effect, tuple(keep)), None)
+    whole = flat_parameters(search.columns, state)
+    whole[np.ix_(rest, search.columns.of(effect))] = 0.0
+    search.refit(from_flat(search.columns, state, whole))
+
+
+def clear(search: Search) -> None:
+    """Backward: causes that are not needed beside the others go."""
+    for cause in list(search.causes):
+        statistic, freedom = need(search, cause.effect)
+        limit = search.thresholds.limit(cause.effect)
+        small = statistic < search.least()
+        if not freedom or log_tail(statistic, freedom) > limit or small:
+            search.causes.remove(cause)
+            search.say(f"dropped {cause.effect}: not needed beside the others")
+            search.refit(started(search, Candidate("", ()), None))

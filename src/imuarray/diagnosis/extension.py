@@ -1,0 +1,107 @@
+"""The extended model that a diagnosis came to, for the other commands."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from imuarray.diagnosis.reading_effects import LEFT_OUT
+from imuarray.diagnosis.words import MEANING
+from imuarray.errors import InputError
+from imuarray.model import EFFECTS, ArrayModel
+from imuarray.model.array_model import EffectPrior
+from imuarray.model.effects import KINDS
+from imuarray.model.names import component
+from imuarray.model.noise import Noise
+
+PINNED = 1e-9  # of a prior sd: parameters that the diagnosis fixed, or found no need of; so little
+# that misfit does not move a clock's sawtooth past a sample
+BEFORE = ("axis_swap", *LEFT_OUT)  # mended in the data, not in the model
+
+
+class Extension(NamedTuple):
+    """Effects with their parameters, and the noise sds, of a diagnosis.
+
+    ``values``: {effect: {parameter's name: (value, sd or None)}}; sds by label, m/s^2 and rad/s.
+    """
+
+    effects: tuple[str, ...]
+    values: dict[str, dict[str, tuple[float, float | None]]]
+    accelerometer_sd: dict[str, float]
+    gyroscope_sd: dict[str, float]
+    before: tuple[str, ...]
+    clock: tuple[float, float]  # where the diagnosed recording's time begins (s), and its span (s)
+
+
+def read_extension(path: Path) -> Extension:
+    """From `diagnosis.json`; InputError says what is missing."""
+    try:
+        document = json.loads(Path(path).read_text(encoding="utf-8"))
+        causes, noise = document["causes"], document["noise_sd"]
+        named = [c["effect"] for c in causes]
+        effects = tuple(name for name in named if name in EFFECTS)
+        values = {
+            c["effect"]: {n: (float(p["value"]), p["sd"]) for n, p in c["parameters"].items()}
+            for c in causes if c["effect"] in EFFECTS
+        }  # fmt: skip
+        sds = [{label: float(item["sd"]) for label, item in noise[kind].items()} for kind in KINDS]
+        before = tuple(name for name in named if name in BEFORE)
+        times = float(document["clock"]["origin_s"]), float(document["clock"]["span_s"])
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: expected a diagnosis.json, found no text") from error
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        what = f"no {error}" if isinstance(error, KeyError) else str(error)[:80]
+        raise InputError(f"{path}: expected a diagnosis.json, found {what}") from error
+    for name in named:
+        if name not in EFFECTS and name not in MEANING:
+            raise InputError(
+                f"{path}: expected causes that this installation knows, found {name}; is the"
+                " module that defines it imported?"
+            )
+    return Extension(effects, values, *sds, before, times)
+
+
+def extended_model(extension: Extension, model: ArrayModel, labels) -> ArrayModel:
+    """``model`` with the extension's effects, priors, starting values and noise.
+
+    ``labels``: of the accelerometers and of the gyroscopes. Parameters that the diagnosis fixed,
+    or that belong to IMUs it found no need for, are pinned. InputError where labels differ.
+    """
+    named = replace(model, effects=extension.effects)
+    whole = max(labels, key=len)
+    start, pinned = named.join({}), np.ones(named.effect_size, bool)
+    place = 0
+    unused = {(e, n) for e, found in extension.values.items() for n in found}
+    for item, shape in zip(named.chain, named.shapes, strict=True):
+        for index in np.ndindex(*shape):
+            name = f"{component(item.id, index[1:])}_{whole[index[0]]}"
+            if name in extension.values[item.id]:
+                start[place], sd = extension.values[item.id][name]
+                pinned[place] = sd is None
+                unused.discard((item.id, name))
+            place += 1
+    if unused:
+        raise InputError(
+            f"--diagnosis: expected IMUs {', '.join(whole)} and components as in the model, found"
+            f" parameters {', '.join(sorted(n for _, n in unused)[:3])}"
+        )
+    sd = named.effect_prior_sd
+    prior = EffectPrior(np.where(pinned, start, 0.0), np.where(pinned, PINNED * sd, sd), start)
+    declared = extension.accelerometer_sd, extension.gyroscope_sd
+    sds = [_by_label(part, names) for part, names in zip(declared, labels, strict=True)]
+    counts = model.array.accelerometers, model.array.gyroscopes
+    noise = Noise.of(*counts, *sds)
+    return replace(named, noise=noise, effect_prior=prior, clock=extension.clock)
+
+
+def _by_label(sds: dict, labels) -> np.ndarray:
+    missing = [label for label in labels if label not in sds]
+    if missing:
+        raise InputError(
+            f"--diagnosis: expected the noise of IMU {missing[0]}, found {', '.join(sds)}"
+        )
+    return np.array([sds[label] for label in labels])

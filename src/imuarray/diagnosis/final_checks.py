@@ -1,0 +1,101 @@
+"""What is left after the last cause: is it forgiven, and are the causes what they seem?"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import norm
+
+from imuarray.diagnosis import noise_effects as variance
+from imuarray.diagnosis.elimination import need
+from imuarray.diagnosis.fit import flat_parameters
+from imuarray.diagnosis.linearise import linearise
+from imuarray.diagnosis.parameters import POSITION
+from imuarray.diagnosis.residual_checks import Check, normal_checks
+from imuarray.diagnosis.scores import log_tail
+from imuarray.diagnosis.state import Search
+
+LITTLE = 0.03  # of the noise's own misfit: so little left over may be forgiven
+IMPLAUSIBLE = 10.0  # prior sds
+CHANGING = 0.05  # of a drift's chi-square that its change must be worth
+STEADY = -50.0  # log p of a drift that does not change: what it names is not what it is
+UNFORGIVEN = ("outliers", "size of", "change of")  # checks that a small remainder does not excuse
+
+
+def outlier_checks(search: Search) -> list[Check]:
+    """Readings left out as outliers: is what they miss tied to the reading's own change?
+
+    Tails of the noise are not; a reading that came late, or twice, is.
+    """
+    away = search.allowed & ~search.readings.keep & ~search.jumps
+    whole = replace(search.readings, keep=search.allowed)
+    # by the motion that was fitted without them: an outlier would be part of its own prediction
+    column = search.columns.of(POSITION)[:1]
+    seen = linearise(whole, search.columns, search.fit.state, column)
+    missed = seen.residual + np.einsum("tri,ti->tr", seen.basis, seen.taken).reshape(away.shape)
+    predicted = np.nan_to_num(whole.values) / np.repeat(whole.sd, 3, axis=1) - missed
+    change = np.diff(predicted, axis=0, prepend=predicted[:1])
+    change[np.diff(whole.run, prepend=whole.run[0]) > 0] = 0.0
+    products = np.where(away, missed * change, 0.0).reshape(len(away), -1, 2, 3)
+    found = []
+    for imu, kind in np.argwhere(whole.exists):
+        own = products[:, imu, kind].sum(axis=1)
+        if np.count_nonzero(own) > variance.FEW:
+            found.append((int(imu), float(own.sum() / np.sqrt(np.sum(own**2)))))
+    return [normal_checks("outliers against the reading's change", found)] if found else []
+
+
+def plausibility_checks(search: Search) -> list[Check]:
+    """Causes whose parameters are larger than such sensors have: another cause in their clothes."""
+    columns, found = search.columns, []
+    whole = flat_parameters(columns, search.fit.state) / columns.prior_sd
+    for cause in search.causes:
+        free = search.active[:, columns.of(cause.effect)]
+        sizes = np.where(free, np.abs(whole[:, columns.of(cause.effect)]), 0.0)
+        if sizes.max() > IMPLAUSIBLE:
+            imu = int(np.argmax(sizes.max(axis=1)))
+            largest = float(sizes.max())
+            found.append(
+                Check(f"size of {cause.effect}", largest, float(norm.logsf(largest)), (imu,))
+            )
+    return found
+
+
+def tail_checks(search: Search, tailed) -> list[Check]:
+    """Triads whose residual a mixture describes better, where ``tailed`` does not say so."""
+    there = {(imu, kind) for imu, kind, _ in tailed}
+    named, hits, _ = variance.heavy_tails(search.fit, search.noise, search.thresholds.check)
+    left = sorted({imu for imu, kind, _ in hits if (imu, kind) not in there})
+    return [Check("outliers' mixture", len(left), named.log_p, tuple(left))] if left else []
+
+
+def drift_checks(search: Search) -> list[Check]:
+    """Drifts that need their constants only: an offset in their clothes."""
+    cause = next((c for c in search.causes if c.effect == "bias_drift"), None)
+    if cause is None:
+        return []
+    columns = search.columns
+    changing = [c for c in columns.of("bias_drift") if columns.places[c][2] > 0]
+    statistic, freedom = need(search, "bias_drift", among=changing)
+    steady = log_tail(statistic, max(freedom, 1)) > search.thresholds.limit("bias_drift")
+    steady |= statistic < CHANGING * need(search, "bias_drift")[0]
+    return [Check("change of bias_drift", statistic, STEADY if steady else 0.0, cause.imus)]
+
+
+def judged(search: Search, checks, in_noise) -> tuple[float, bool]:
+    """(share of the base's excess that is explained, whether checks fail beyond forgiveness)."""
+    left = max(search.fit.misfit - search.fit.free, 0.0)
+    explained = 1.0 - left / search.excess if search.excess > 0 else 1.0
+    named = {item.effect for item in in_noise}
+    failing = [c for c in checks if c.log_p < search.thresholds.check]
+    if "coloured_noise" in named:
+        failing = [c for c in failing if c.name != "whiteness"]
+    large = search.excess > 30 * np.sqrt(2 * search.fit.free)
+    small = left < LITTLE * search.fit.free
+    forgiven = large and small and explained > search.thresholds.explained
+    # what a large cause leaves over does not excuse a small one that takes up as little
+    weakest = min((need(search, c.effect)[0] for c in search.causes), default=np.inf)
+    forgiven = forgiven and left - 2 * np.sqrt(2 * search.fit.free) < weakest
+    forgiven = forgiven and not any(c.name.startswith(UNFORGIVEN) for c in failing)
+    return explained, bool(failing) and not forgiven

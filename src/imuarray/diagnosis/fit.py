@@ -1,0 +1,260 @@
+"""Weighted least squares for any subset of the parameters, the motion eliminated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from imuarray.diagnosis.gauges import prior_precision
+from imuarray.diagnosis.linearise import (
+    Eliminated,
+    Loose,
+    State,
+    derivatives,
+    linearise,
+    no_derivatives,
+)
+from imuarray.diagnosis.parameters import POSITION, Columns
+from imuarray.diagnosis.readings import Readings
+
+STEPS = 15
+LITTLE = 0.02  # nats; a step that promises less is not taken
+ROUGH = 1e-4  # of the misfit that a step must gain while causes are looked for
+FINE = 3e-6  # the same at the end
+SETTLED = 0.02  # of a parameter's own sd
+HELD_SD = 1e-8  # s, of a period that is not to move
+SHORTEST = 0.2  # share of a Gauss-Newton step
+WIDE = 10.0  # prior sd of the third derivatives, in sizes of the differences near by
+OWN = 2.0  # prior sd of what turning the gyroscopes see alone, in steps of omega dot
+TIED = 1e-5  # of that, as long as it is not free
+NEAR = 9  # samples that tell the size of the motion's third derivatives
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model fitted to readings, and what score tests need at that point.
+
+    Attributes
+    ----------
+    active : (N, m) bool, the parameters that were fitted
+    residual : (T, N, 6) in the units of the noise sd, the motion's share taken out
+    whitened : (T, N, 6, m) derivative by the shared parameters, in those units
+    basis : (T, 6 N, D) basis of what the motion can explain, orthonormal with its prior's
+    through : (T, N, D, m) the derivative's coordinates in that basis
+    log_volume : (T,) log determinant of the motion's information
+    misfits : (T,) sums of squared residuals, the motion's prior included
+    """
+
+    readings: Readings
+    columns: Columns
+    state: State
+    active: np.ndarray
+    residual: np.ndarray
+    whitened: np.ndarray
+    basis: np.ndarray
+    through: np.ndarray
+    log_volume: np.ndarray
+    misfits: np.ndarray
+    converged: bool
+
+    @property
+    def misfit(self) -> float:
+        """Of all samples."""
+        return float(np.sum(self.misfits))
+
+    @property
+    def leverage(self) -> np.ndarray:
+        """Share of each reading's variance that the motion takes up, (T, N, 6)."""
+        return np.einsum("tij,tij->ti", self.basis, self.basis).reshape(self.residual.shape)
+
+    @property
+    def free(self) -> int:
+        """Degrees of freedom left: readings less motion less fitted parameters."""
+        used = int(self.readings.keep.sum())
+        return used - 9 * len(self.residual) - int(self.active.sum())
+
+
+def pick(through, chosen) -> tuple[np.ndarray, np.ndarray]:
+    """The (imu, column) pairs (n, 2) of ``chosen`` (N, m) bool, and through's columns (T, D, n)."""
+    pairs = np.argwhere(chosen)
+    seen = np.empty((len(through), through.shape[2], len(pairs)))
+    for imu in np.unique(pairs[:, 0]):
+        own = np.flatnonzero(pairs[:, 0] == imu)
+        seen[..., own] = through[:, imu][..., pairs[own, 1]]
+    return pairs, seen
+
+
+def normal(residual, whitened, through, chosen, part=slice(None)):
+    """Information (n, n) and score (n,) of the chosen parameters, motion projected out."""
+    pairs, seen = pick(through[part], chosen)
+    flat = seen.reshape(seen.shape[0] * seen.shape[1], len(pairs))
+    information = -(flat.T @ flat)
+    score = np.empty(len(pairs))
+    for imu in np.unique(pairs[:, 0]):
+        rows = np.flatnonzero(pairs[:, 0] == imu)
+        block = whitened[part, imu][..., pairs[rows, 1]].reshape(-1, len(rows))
+        information[np.ix_(rows, rows)] += block.T @ block
+        # the residual is orthogonal to the motion already
+        score[rows] = block.T @ residual[part, imu].ravel()
+    return information, score
+
+
+def fit(
+    readings: Readings, columns: Columns, active, state: State, smooth=True, rough=False
+) -> Fit:
+    """Gauss-Newton over motion and the active parameters from a state, priors included.
+
+    ``smooth`` says whether the motion's time derivatives may be had from its neighbours, ``rough``
+    that it may stop when a step gains little.
+    """
+    state, converged, _ = search_optimum(readings, columns, active, state, smooth, rough)
+    return at(readings, columns, active, state, converged)
+
+
+def search_optimum(readings, columns, active, state, smooth, rough):
+    """(state, whether it converged, the recording linearised there or a step before)."""
+    prior_mean = prior_means(readings, columns)[active]
+    precision = prior_precision(columns, active)
+    held = held_periods(columns, active) if state.loose is not None and state.loose.free else None
+    if held is not None:
+        precision[held, held] += HELD_SD**-2
+    wanted = np.flatnonzero(active.any(axis=0))
+    converged, last, length, seen = False, np.inf, 1.0, None
+    enough = ROUGH if rough else FINE
+    for number in range(STEPS):
+        state = with_derivatives(readings, state, smooth)
+        seen = linearise(readings, columns, state, wanted, seen)
+        few = padded(active[:, wanted], seen.whitened.shape[-1])
+        misfit = float(np.sum(seen.misfit))
+        information, score = normal(seen.residual, seen.whitened, seen.through, few)
+        offset = flat_parameters(columns, state)[active] - prior_mean
+        if held is not None:
+            offset[held] = 0.0
+        score = score - precision @ offset
+        step, sds = scaled_solve(information + precision, score)
+        moved, astray = np.max(np.abs(step) / sds, initial=0.0), float(np.sum(seen.taken**2))
+        promised = score @ step + astray
+        still = moved < SETTLED and astray < 0.01 * len(seen.taken)
+        if still or promised < max(LITTLE, enough * misfit):
+            # what the last step leaves is of second order in what it promised
+            state = advance(columns, state, active, step, few, seen, 1.0)
+            converged = True
+            break
+        cost = misfit + astray + float(offset @ precision @ offset)
+        if number > 3 and abs(cost - last) < 0.3 * enough * last:
+            break  # it wanders around the optimum, by less than anything told apart here
+        # full steps may leap to and fro across a valley: half of them lead into it
+        length = max(length / 2, SHORTEST) if cost > last else min(1.0, 1.2 * length)
+        last = cost
+        state = advance(columns, state, active, step, few, seen, length)
+    return state, converged, seen
+
+
+def held_periods(columns: Columns, active) -> np.ndarray:
+    """Which of the active parameters are clocks' periods, (n,) bool.
+
+    A period and the fast turning that it multiplies are one where the motion is rough.
+    """
+    mask = np.zeros_like(active)
+    mask[:, columns.of("sensor_clock")[:1]] = True
+    return mask[active]
+
+
+def at(readings: Readings, columns: Columns, active, state: State, converged: bool) -> Fit:
+    """The fit's quantities at a state, with the derivative by every parameter."""
+    seen = linearise(readings, columns, state)
+    return Fit(
+        readings, columns, state, active, seen.residual, seen.whitened, seen.basis, seen.through,
+        seen.log_volume, seen.misfit, converged,
+    )  # fmt: skip
+
+
+def advance(columns, state, active, step, few, seen: Eliminated, length) -> State:
+    """The state after a step of the active parameters, and the motion's own.
+
+    ``length`` is the share of the parameters' step that is taken.
+    """
+    step = length * step
+    blocks = np.zeros(few.shape)
+    blocks[few] = step
+    moved = np.einsum("tkdm,km->td", seen.through, blocks, optimize=True)
+    move = np.einsum("tji,tj->ti", seen.inverse, seen.taken - moved)
+    whole = flat_parameters(columns, state)
+    whole[active] += step
+    return from_flat(columns, state._replace(motion=state.motion + move), whole)
+
+
+def padded(mask, size) -> np.ndarray:
+    """A mask (N, n) with columns of False up to a size."""
+    return np.pad(mask, ((0, 0), (0, size - mask.shape[1])))
+
+
+def scaled_solve(information, right):
+    """(solution, sds) of a positive definite system, scaled to a unit diagonal first."""
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    values = np.maximum(values, 1e-13)
+    solution = (vectors @ ((vectors.T @ (right / scale)) / values)) / scale
+    return solution, np.sqrt(np.sum(vectors**2 / values, axis=1)) / scale
+
+
+def with_derivatives(readings, state, smooth) -> State:
+    """The state with the time derivatives of its own motion, if they are not free."""
+    if not smooth:
+        return state
+    found = derivatives(readings, state.motion, state.positions)
+    return state._replace(derivatives=found)
+
+
+def loosened(readings: Readings, state: State) -> State:
+    """The state with omega double dot and s dot free: neighbours tell them only roughly.
+
+    Their prior has the polynomials' mean, and for sd ten times the size of the differences near by.
+    It is that of the first motion and stays: one that followed the fit would shrink with it.
+    What the gyroscopes' omega dot may have of its own is as large as twice the step from a sample
+    to the next, once it is `freed`.
+    """
+    dt = np.median(np.diff(readings.time))
+    found = derivatives(readings, state.motion, state.positions)
+    mean = np.hstack([*found[:2], np.zeros_like(found[0])])
+    steps = np.diff(state.motion[:, 3:], axis=0, append=state.motion[-1:, 3:]) / dt
+    steps[np.diff(readings.run, append=readings.run[-1]) > 0] = 0.0
+    near = uniform_filter1d(np.mean(steps.reshape(-1, 2, 3) ** 2, axis=-1), NEAR, axis=0)
+    size = np.repeat(np.sqrt(near) + 0.1 * np.sqrt(near.mean(axis=0)), 3, axis=1)
+    own = OWN * dt * size[:, :3]
+    sd = np.hstack([WIDE * size, TIED * own])
+    nothing = no_derivatives(len(mean), len(state.positions))
+    return state._replace(
+        motion=np.hstack([state.motion, mean]), derivatives=nothing, loose=Loose(mean, sd, own)
+    )
+
+
+def flat_parameters(columns: Columns, state: State) -> np.ndarray:
+    """Positions and effect parameters by IMU and column, (N, m); zero where there is none."""
+    count = columns.owner.shape[0]
+    out = np.zeros((count, columns.size))
+    out[: len(state.positions), columns.of(POSITION)] = state.positions
+    values = columns.model.split(state.parameters)
+    for name, value in values.items():
+        rows = np.asarray(value).reshape(len(value), -1)
+        out[: len(rows), columns.of(name)] = rows
+    return out
+
+
+def from_flat(columns: Columns, state: State, whole) -> State:
+    """The inverse of `flat_parameters`, into a state."""
+    model = columns.model
+    shapes = {e.id: s for e, s in zip(model.chain, model.shapes, strict=True)}
+    values = {n: whole[: s[0], columns.of(n)].reshape(s) for n, s in shapes.items()}
+    positions = whole[: len(state.positions), columns.of(POSITION)]
+    return state._replace(positions=positions, parameters=columns.model.join(values))
+
+
+def prior_means(readings: Readings, columns: Columns) -> np.ndarray:
+    """(N, m): nominal positions, no effect."""
+    out = np.zeros(columns.owner.shape)
+    nominal = readings.array.relative
+    out[: len(nominal), columns.of(POSITION)] = nominal
+    return out

@@ -1,0 +1,72 @@
+"""Log scores on blocks of time that a model was not trained on."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from imuarray.diagnosis.fit import Fit, normal
+
+BLOCKS = 10
+
+
+class Scores(NamedTuple):
+    """Held-out log scores of the blocks, nats, and how many samples each has."""
+
+    nats: np.ndarray
+    samples: np.ndarray
+
+    @property
+    def per_sample(self) -> float:
+        """Nats per sample."""
+        return float(self.nats.sum() / self.samples.sum())
+
+
+def edges_of(samples: int, blocks=BLOCKS) -> np.ndarray:
+    """Where the blocks begin and end, (blocks + 1,)."""
+    return np.linspace(0, samples, blocks + 1).astype(int)
+
+
+def normal_blocks(fit: Fit, active) -> list[tuple[np.ndarray, np.ndarray]]:
+    """(information (n, n), score (n,)) of the n ``active`` (N, m) parameters from each block."""
+    edges = edges_of(len(fit.residual))
+    return [
+        normal(fit.residual, fit.whitened, fit.through, active, slice(a, b))
+        for a, b in zip(edges[:-1], edges[1:], strict=True)
+    ]
+
+
+def log_scores(fit: Fit, ridge) -> Scores:
+    """The log density of each block's readings, parameters trained on the other blocks.
+
+    The motion is integrated out sample by sample, with a flat prior where it has none (so only
+    differences between models of the same readings mean anything); noise sds are those of the
+    whole recording. Training without a block is one Gauss-Newton step from the optimum.
+    ``ridge`` (n, n) prior precision of the active parameters.
+    """
+    readings = fit.readings
+    edges = edges_of(len(fit.residual))
+    parts = normal_blocks(fit, fit.active)
+    information, score = sum(p[0] for p in parts), sum(p[1] for p in parts)
+    fixed = np.where(readings.keep, np.repeat(np.log(readings.sd), 3, axis=1), 0.0)
+    constant = fixed.sum(axis=(1, 2)) + fit.log_volume / 2
+    constant += np.log(2 * np.pi) / 2 * (readings.keep.sum(axis=(1, 2)) - 9)
+    if fit.state.loose is not None:
+        constant += np.log(fit.state.loose.sd).sum(axis=1)
+    nats = []
+    for (block, slope), first, last in zip(parts, edges[:-1], edges[1:], strict=True):
+        # at the optimum score and prior balance: without the block, minus its score is left
+        left = information - block + ridge
+        step = np.linalg.solve(left, (score - slope) - score) if len(score) else np.zeros(0)
+        better = slope @ step - step @ block @ step / 2
+        misfit = np.sum(fit.misfits[first:last])
+        nats.append(float(better - misfit / 2 - constant[first:last].sum()))
+    return Scores(np.array(nats), np.diff(edges))
+
+
+def gain(one: Scores, other: Scores) -> tuple[float, float]:
+    """(nats per sample that ``other`` has over ``one``, standard error between blocks)."""
+    difference, samples = other.nats - one.nats, one.samples.sum()
+    error = np.std(difference, ddof=1) * np.sqrt(len(difference))
+    return float(difference.sum() / samples), float(error / samples)

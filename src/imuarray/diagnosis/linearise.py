@@ -1,0 +1,246 @@
+"""The model's prediction and its derivatives over a recording, by automatic differentiation."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import savgol_coeffs
+
+from imuarray.diagnosis.parameters import Columns, tangents
+from imuarray.diagnosis.readings import Readings
+from imuarray.model.effects import Prediction
+from imuarray.model.jax64 import jax, jnp
+from imuarray.motion.state import Motion
+
+KNOWN = 9  # the motion that the papers' model knows: omega, omega_dot, s
+CHUNK = 256  # samples per compiled call: one compiled shape, bounded memory
+
+
+class Loose(NamedTuple):
+    """Normal prior of what rough motion adds to a sample's unknowns: mean and sd, (T, 9) each.
+
+    omega double dot, s dot, and by how much the gyroscopes' omega dot differs: they and the
+    accelerometers have filters, and what is too fast for the samples passes them differently.
+    """
+
+    mean: np.ndarray
+    sd: np.ndarray
+    own: np.ndarray  # (T, 3) sd of what the gyroscopes' omega dot has of its own, once free
+
+    def freed(self) -> Loose:
+        """The gyroscopes' omega dot free."""
+        return self._replace(sd=np.hstack([self.sd[:, :6], self.own]))
+
+    @property
+    def free(self) -> bool:
+        """Whether the gyroscopes' omega dot is free."""
+        return bool(np.any(self.sd[:, 6:] == self.own))
+
+
+class State(NamedTuple):
+    """Where the model is linearised."""
+
+    motion: np.ndarray  # (T, D): omega, omega_dot, s, and what is `Loose`
+    positions: np.ndarray  # (A, 3) m, relative to the reference
+    parameters: np.ndarray  # (P,) of the model with all effects
+    derivatives: tuple  # omega double dot, s dot (T, 3); second, third of (force, rate)
+    loose: Loose | None = None  # where the motion is rough
+
+    @property
+    def jerk(self) -> tuple[np.ndarray, np.ndarray]:
+        """omega double dot and s dot (T, 3), free or from neighbours."""
+        if self.loose is None:
+            return self.derivatives[0], self.derivatives[1]
+        return self.motion[:, 9:12], self.motion[:, 12:15]
+
+
+class Eliminated(NamedTuple):
+    """A linearised recording, whitened, the motion eliminated sample by sample.
+
+    Where the motion has a prior, it counts as so many readings more.
+    """
+
+    residual: np.ndarray  # (T, N, 6), the motion's share taken out
+    whitened: np.ndarray  # (T, N, 6, m), each IMU's readings by its own parameters
+    basis: np.ndarray  # (T, 6 N, D) of what the motion can explain, orthonormal with its prior's
+    through: np.ndarray  # (T, N, D, m), the derivative's coordinates in that basis
+    inverse: np.ndarray  # (T, D, D) of the factor of the motion's information
+    taken: np.ndarray  # (T, D) the residual's coordinates in the basis
+    log_volume: np.ndarray  # (T,) log determinant of the motion's information
+    misfit: np.ndarray  # (T,) squared residuals, the prior's included
+
+
+def _reading(model, count, x, positions, parameters, extra, time, span):
+    """(N, 6) predicted readings of one sample."""
+    jerk, force_rate, second, third = extra
+    turn = None
+    if len(x) > KNOWN:
+        jerk, force_rate, turn = x[9:12], x[12:15], x[3:6] + x[15:18]
+    motion = Motion(x[:3], x[3:6], x[6:9], jerk, force_rate)
+    when = {"time": time, "span": span, "second": second, "third": third, "gyroscope_turn": turn}
+    out = model.predict(motion, positions, parameters, **when)
+    force = jnp.zeros((count, 3)).at[: len(out.specific_force)].set(out.specific_force)
+    rate = jnp.zeros((count, 3)).at[: len(out.angular_rate)].set(out.angular_rate)
+    return jnp.concatenate([force, rate], axis=1)
+
+
+@partial(jax.jit, static_argnums=(0, 1))
+def _chunk(model, count, x, extra, time, span, positions, parameters, directions, data):
+    split = positions.size
+
+    def one(x, extra, time):
+        def flat(x, shared):
+            return _reading(
+                model, count, x, shared[:split].reshape(-1, 3), shared[split:], extra, time, span
+            )
+
+        shared = jnp.concatenate([positions.ravel(), parameters])
+        along = jax.vmap(lambda d: jax.jvp(lambda p: flat(x, p), (shared,), (d,))[1], out_axes=-1)(
+            directions
+        )
+        return flat(x, shared), jax.jacfwd(flat)(x, shared), along
+
+    predicted, motion, shared = jax.vmap(one)(x, extra, time)
+    values, weights = data
+    motion = (weights[..., None] * motion).reshape(len(x), 6 * count, -1)
+    gram = jnp.einsum("tri,trj->tij", motion, motion)
+    return weights * (values - predicted), motion, weights[..., None] * shared, gram
+
+
+@jax.jit
+def _projected(residual, motion, whitened, inverse, bare, sd):
+    samples, count = residual.shape[:2]
+    flat = residual.reshape(samples, -1)
+    basis = jnp.einsum("trj,tij->tri", motion, inverse)
+    expected = inverse[:, :, KNOWN:] / sd[:, None]
+    taken = jnp.einsum("tri,tr->ti", basis, flat) + jnp.einsum("tij,tj->ti", expected, bare)
+    left = flat - jnp.einsum("tri,ti->tr", basis, taken)
+    unexpected = bare - jnp.einsum("tij,ti->tj", expected, taken)
+    through = jnp.einsum("tkid,tkim->tkdm", basis.reshape(samples, count, 6, -1), whitened)
+    misfit = jnp.sum(left**2, axis=1) + jnp.sum(unexpected**2, axis=1)
+    return left.reshape(residual.shape), basis, through, taken, misfit
+
+
+def _eliminated(model, count, x, extra, time, span, shared, data, prior) -> Eliminated:
+    """A chunk; its factorisations are LAPACK's, called from here (see `jax64`)."""
+    positions, parameters, directions = shared
+    residual, motion, whitened, gram = _chunk(
+        model, count, x, extra, time, span, positions, parameters, directions, data
+    )
+    mean, sd = prior
+    gram = np.array(gram)
+    free = np.arange(KNOWN, gram.shape[1])
+    gram[:, free, free] += sd**-2.0
+    factor = np.linalg.cholesky(gram)
+    inverse = np.linalg.inv(factor)
+    bare = (mean - x[:, KNOWN:]) / sd
+    left, basis, through, taken, misfit = _projected(residual, motion, whitened, inverse, bare, sd)
+    volume = 2 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+    return Eliminated(left, whitened, basis, through, inverse, taken, volume, misfit)
+
+
+BUCKETS = (4, 16, 32)  # numbers of columns a compiled derivative is made for
+THREADS = 2
+
+
+def linearise(
+    readings: Readings, columns: Columns, state: State, wanted=None, spare=None
+) -> Eliminated:
+    """Residual and derivatives at a state, the motion eliminated.
+
+    ``wanted`` : indices of the columns to differentiate by, all if None; zeros may follow them.
+    ``spare`` : a former answer whose memory may be used again. LinAlgError where the readings do
+    not determine the motion.
+    """
+    samples, count = readings.values.shape[:2]
+    directions = tangents(columns.model)
+    if wanted is not None:
+        number, whole = len(wanted), len(directions)
+        room = min([size for size in BUCKETS if size >= number], default=whole)
+        directions = np.vstack([directions[wanted], np.zeros((room - number, directions.shape[1]))])
+    nothing = np.zeros((samples, 0))
+    prior = (nothing, nothing) if state.loose is None else state.loose
+    shared, weights = (state.positions, state.parameters, directions), readings.weights
+
+    def one(start):
+        index = np.minimum(np.arange(start, start + CHUNK), samples - 1)
+        extra = jax.tree.map(lambda field: field[index], state.derivatives)
+        return _eliminated(
+            columns.model, count, state.motion[index], extra, readings.time[index], readings.span,
+            shared, (readings.values[index], weights[index]), (prior[0][index], prior[1][index]),
+        )  # fmt: skip
+
+    return _joined(one, samples, spare)
+
+
+def _joined(one, samples, spare) -> Eliminated:
+    """All chunks, one after the other, without the last one's padding."""
+    first = one(0)
+    shapes = [(samples, *part.shape[1:]) for part in first]
+    reused = spare is not None and [part.shape for part in spare] == shapes
+    out = spare if reused else Eliminated(*(np.empty(shape) for shape in shapes))
+
+    def put(start, found=None):
+        for target, part in zip(out, one(start) if found is None else found, strict=True):
+            target[start : start + CHUNK] = np.asarray(part)[: samples - start]
+
+    put(0, first)
+    with ThreadPoolExecutor(THREADS) as pool:
+        list(pool.map(put, range(CHUNK, samples, CHUNK)))
+    return out
+
+
+def derivatives(readings: Readings, motion, positions) -> tuple:
+    """omega double dot, s dot and the readings' second and third derivatives, by polynomials.
+
+    Quartics over a short window of the fitted motion, whose noise is independent of the
+    residual's; the ideal readings are those of the papers' model.
+    """
+    rate, turn, force = motion[:, :3], motion[:, 3:6], motion[:, 6:9]
+    ideal = (
+        np.cross(rate[:, None], np.cross(rate[:, None], positions))
+        + np.cross(turn[:, None], positions)
+        + force[:, None]
+    )
+
+    def along(values, order):
+        return polynomial_derivative(readings.time, readings.run, values, readings.window, order)
+
+    second = Prediction(along(ideal, 2), along(rate, 2)[:, None])
+    third = Prediction(along(ideal, 3), along(rate, 3)[:, None])
+    return along(rate, 2), along(force, 1), second, third
+
+
+def polynomial_derivative(time, run, values, window, order) -> np.ndarray:
+    """The order-th derivative by local quartics, within runs; the ends use the end's polynomial."""
+    step = np.median(np.diff(time))
+    taps = [
+        savgol_coeffs(window, 4, deriv=order, delta=step, pos=pos, use="dot")
+        for pos in range(window)
+    ]
+    out = np.zeros_like(values)
+    half = window // 2
+    edges = np.flatnonzero(np.concatenate([[True], np.diff(run) > 0, [True]]))
+    for first, last in zip(edges[:-1], edges[1:], strict=True):
+        if last - first < window:
+            continue
+        middle = last - window + 1
+        out[first + half : last - half] = sum(
+            tap * values[first + i : middle + i] for i, tap in enumerate(taps[half])
+        )
+        for pos in range(half):
+            out[first + pos] = np.tensordot(taps[pos], values[first : first + window], 1)
+            out[last - half + pos] = np.tensordot(
+                taps[half + 1 + pos], values[last - window : last], 1
+            )
+    return out
+
+
+def no_derivatives(samples, accelerometers) -> tuple:
+    """All zero: a motion of which no derivative is known."""
+    nothing = np.zeros((samples, 3))
+    flat = Prediction(np.zeros((samples, accelerometers, 3)), np.zeros((samples, 1, 3)))
+    return nothing, nothing, flat, flat

@@ -1,0 +1,188 @@
+"""The noise of each triad: scale, colour and outliers, told apart from smooth misfit.
+
+Misfit that the motion causes is smooth in time, noise is not: fourth differences and the upper
+half of the spectrum show the noise whatever the means get wrong.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import norm, poisson
+
+from imuarray.diagnosis.fit import Fit, pick
+from imuarray.diagnosis.readings import Readings
+
+DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / np.sqrt(70.0)
+HALF = len(DIFFERENCE) // 2
+# autocorrelations of differenced white noise at lags 1 ... 4
+ECHO = np.correlate(DIFFERENCE, DIFFERENCE, "full")[len(DIFFERENCE) :]
+# so many differences are worth one independent value in a mean square
+WORTH = float(1 + 2 * np.sum(ECHO**2))
+FAR = 4.0  # sds of a difference; beyond is an outlier's
+FLAT = 0.02  # autocorrelation too small to speak of
+BANDS = (0.2, 0.35)  # of the sampling rate, where the two bands begin
+COLOURED = 4.5  # sds of the spectrum's slope from which noise is not white
+
+
+class Noise(NamedTuple):
+    """What the fast part of the residual says of each triad; arrays are (N, 2)."""
+
+    sd: np.ndarray  # noise sd, m/s^2 and rad/s
+    error: np.ndarray  # relative standard error of it
+    outliers: np.ndarray  # isolated far triad-samples
+    expected: np.ndarray  # of them in Gaussian noise
+    slope: np.ndarray  # log ratio of the top bands' power, in its sds
+    correlation: np.ndarray  # of the AR(1) that has this slope, 0 where it is not significant
+    far: np.ndarray  # (T, N, 2) bool, the outliers
+
+
+def fast_part(values, run) -> np.ndarray:
+    """Fourth differences centred on each sample (T, ...), unit gain for white noise.
+
+    NaN where the five samples are not in one run, or any is NaN.
+    """
+    out = np.full(values.shape, np.nan)
+    inner = len(values) - 2 * HALF
+    out[HALF : HALF + inner] = sum(tap * values[i : i + inner] for i, tap in enumerate(DIFFERENCE))
+    broken = run[2 * HALF :] != run[: -2 * HALF]
+    out[HALF : HALF + inner][broken] = np.nan
+    return out
+
+
+def per_triad(values) -> np.ndarray:
+    """(T, N, 6) as (N, 2, 3 T): a triad's samples and axes together."""
+    moved = values.reshape(len(values), -1, 2, 3)
+    return np.moveaxis(moved, 0, -1).reshape(moved.shape[1], 2, -1)
+
+
+def standardised(fit: Fit) -> np.ndarray:
+    """Residuals of unit variance where noise is as assumed (T, N, 6), NaN where left out."""
+    return to_unit(fit.readings, fit.residual, fit.basis)
+
+
+def to_unit(readings: Readings, residual, basis) -> np.ndarray:
+    """The same from residual (T, N, 6) and the motion's basis (T, 6 N, D)."""
+    leverage = np.einsum("tij,tij->ti", basis, basis).reshape(residual.shape)
+    share = np.sqrt(np.maximum(1.0 - leverage, 1e-6))
+    return np.where(readings.keep, residual / share, np.nan)
+
+
+def judge(fit: Fit) -> Noise:
+    """The noise of each triad from a fit's residual."""
+    return judge_parts(fit.readings, fit.residual, fit.basis)
+
+
+def judge_parts(readings: Readings, residual, basis) -> Noise:
+    """The same from residual and basis."""
+    unit = to_unit(readings, residual, basis)
+    fast = fast_part(unit, readings.run)
+    values = np.where(readings.exists[..., None], per_triad(fast), 1.0)
+    counts = np.maximum(np.sum(np.isfinite(values), axis=-1), 1)
+    core = np.nanmedian(np.abs(values), axis=-1) / norm.ppf(0.75)
+    scale = np.sqrt(np.nanmean(values**2, axis=-1))
+    far = _outliers(fast, core)
+    expected = 2 * norm.sf(FAR) * counts
+    slope, correlation = _colour(np.nan_to_num(unit), readings)
+    passed = 1 + 2 * sum(echo * correlation ** (lag + 1) for lag, echo in enumerate(ECHO))
+    tails = np.nanmean(values**4, axis=-1) / scale**4 - 3.0
+    error = np.sqrt(np.maximum(2 + tails, 1.0) * WORTH / counts) / 2
+    sd = readings.sd * np.where(readings.exists, scale / np.sqrt(passed), 1.0)
+    return Noise(sd, error, far.sum(axis=0), expected, slope, correlation, far)
+
+
+def _outliers(fast, core) -> np.ndarray:
+    """Triad-samples that stand out of their neighbours, (T, N, 2) bool."""
+    size = np.abs(np.nan_to_num(fast)) / np.repeat(core, 3, axis=1)
+    worst = size.reshape(len(size), -1, 2, 3).max(axis=-1)
+    peak = worst > FAR
+    for shift in range(1, HALF + 1):
+        peak[shift:] &= worst[shift:] >= worst[:-shift]
+        peak[:-shift] &= worst[:-shift] >= worst[shift:]
+    return few_at_once(peak)
+
+
+def few_at_once(far) -> np.ndarray:
+    """Outliers (T, N, 2) bool without the samples where a quarter of a kind stands out at once.
+
+    Those are events of the whole array, and leaving them out would leave no motion, which takes
+    three triads.
+    """
+    number = far.shape[1]
+    crowd = far.sum(axis=1, keepdims=True) > min(max(1, number // 4), max(0, number - 3))
+    return far & ~crowd
+
+
+def _colour(unit, readings: Readings):
+    """(slope in sds, AR(1) correlation) from the upper spectrum of each triad, (N, 2)."""
+    power = np.abs(np.fft.rfft(unit, axis=0)) ** 2
+    part, low, high = _bands(len(unit))
+    bands = [power[band].reshape(band.sum(), -1, 2, 3) for band in (low, high)]
+    means = [np.maximum(b.mean(axis=(0, 3)), 1e-12) for b in bands]
+    ratio = np.log(means[1] / means[0])
+    error = _slope_error(low, high)
+    slope = np.where(readings.exists, ratio / error, 0.0)
+    grid = np.linspace(-0.95, 0.98, 194)
+    expected = np.array([_ar_ratio(rho, part[low], part[high]) for rho in grid])
+    correlation = grid[np.argmin(np.abs(expected[:, None, None] - ratio), axis=0)]
+    return slope, np.where(np.abs(slope) > COLOURED, correlation, 0.0)
+
+
+def _bands(samples):
+    """Frequencies in units of the sampling rate, and which are in the two bands."""
+    part = np.fft.rfftfreq(samples)
+    return part, (part >= BANDS[0]) & (part < BANDS[1]), part >= BANDS[1]
+
+
+def _slope_error(low, high) -> float:
+    """sd of the log ratio of two bands' mean power over a triad's three axes."""
+    return float(np.sqrt(1 / (3 * low.sum()) + 1 / (3 * high.sum())))
+
+
+def expected_ratio(rho: float, samples: int) -> float:
+    """The slope, in its sds, that an AR(1) of this correlation has."""
+    part, low, high = _bands(samples)
+    return _ar_ratio(rho, part[low], part[high]) / _slope_error(low, high)
+
+
+def _ar_ratio(rho, low, high) -> float:
+    """Expected log ratio of the two bands' mean power for an AR(1)."""
+    power = [1 / (1 + rho**2 - 2 * rho * np.cos(2 * np.pi * f)) for f in (low, high)]
+    return float(np.log(power[1].mean() / power[0].mean()))
+
+
+def tail_log_p(noise: Noise) -> np.ndarray:
+    """log p of so many outliers in Gaussian noise, (N, 2)."""
+    return poisson.logsf(noise.outliers - 1, noise.expected)
+
+
+def coloured_meat(fit: Fit, information, correlation) -> np.ndarray | None:
+    """Covariance of the score (K, K) where triads have AR(1) noise; None where all is white."""
+    if not np.any(correlation):
+        return None
+    pairs, through = pick(fit.through, fit.columns.owner)
+    samples, count = fit.residual.shape[:2]
+    basis = fit.basis.reshape(samples, count, 6, -1)
+    meat = information.copy()
+    for imu, kind in np.argwhere(correlation != 0):
+        rows = slice(3 * kind, 3 * kind + 3)
+        seen = -(basis[:, imu, rows] @ through)
+        own = np.flatnonzero(pairs[:, 0] == imu)
+        seen[..., own] += fit.whitened[:, imu, rows][..., pairs[own, 1]]
+        spread = _ar_sum(seen, correlation[imu, kind])
+        flat = seen.reshape(-1, len(pairs))
+        meat += flat.T @ spread.reshape(-1, len(pairs))
+    return (meat + meat.T) / 2
+
+
+def _ar_sum(values, rho) -> np.ndarray:
+    """Sum over lags other than zero of rho^|lag| values, along the first axis."""
+    out = np.zeros_like(values)
+    for order in (slice(None), slice(None, None, -1)):
+        carried = np.zeros_like(values[0])
+        series, target = values[order], out[order]
+        for t in range(1, len(values)):
+            carried = rho * (carried + series[t - 1])
+            target[t] += carried
+    return out

@@ -1,0 +1,296 @@
+"""Effects on the noise itself: its scale, its tails, its colour, named at the end of a search."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import norm
+
+from imuarray.diagnosis.fit import Fit
+from imuarray.diagnosis.heldout import edges_of
+from imuarray.diagnosis.noise import FLAT, Noise, expected_ratio, standardised
+from imuarray.diagnosis.scores import log_tail
+from imuarray.model.effects import KINDS
+
+FEW = 4  # outliers; so few are an accident, not a law
+MAYBE = -3.0  # log p of one triad's tails, where another's are sure
+AGREE = 3.5  # sds within which two estimates are of one thing
+
+
+class Named(NamedTuple):
+    """A cause in the noise: whose, log p, numbers, and what it gains on held-out time."""
+
+    effect: str
+    imus: tuple[int, ...]
+    log_p: float
+    parameters: dict  # name -> (value, sd, unit)
+    gain: float  # nats
+    gain_se: float
+    blocks: np.ndarray  # nats of each held-out block
+
+
+class Mixture(NamedTuple):
+    """Two zero-mean normals for a triad's residual: a share is ``factor`` times as large."""
+
+    share: float
+    factor: float
+    core: float  # sd of the rest, in assumed sds
+    outlier: np.ndarray  # (T,) probability of being of the share
+    gain: float  # twice the log likelihood above a single normal's
+
+
+def triad(fit: Fit, imu: int, kind: int) -> np.ndarray:
+    """A triad's standardised residual (T, 3), NaN where left out."""
+    return standardised(fit)[:, imu, 3 * kind : 3 * kind + 3]
+
+
+def held_out(nats) -> tuple[float, float, np.ndarray]:
+    """Sum over samples, the standard error that blocks of time show, and the blocks' sums."""
+    edges = edges_of(len(nats))
+    parts = np.array([nats[a:b].sum() for a, b in zip(edges[:-1], edges[1:], strict=True)])
+    return float(parts.sum()), float(np.std(parts, ddof=1) * np.sqrt(len(parts))), parts
+
+
+def verdict(log_ratio, covariance, limit):
+    """(places far from zero, log p of the worst or of all) for normals (n,) of a covariance."""
+    number = len(log_ratio)
+    single = norm.logsf(np.abs(log_ratio) / np.sqrt(np.diag(covariance))) + np.log(2)
+    pooled = log_tail(float(log_ratio @ np.linalg.solve(covariance, log_ratio)), number)
+    log_p = min(single.min() + np.log(2 * number), pooled + np.log(2), 0.0)
+    return np.flatnonzero(single + np.log(number) < limit), float(log_p)
+
+
+def autocorrelation(fit: Fit, imu: int, kind: int) -> tuple[float, int]:
+    """(lag-one autocorrelation, number of pairs) of a triad's residual."""
+    unit = triad(fit, imu, kind)
+    together = (np.diff(fit.readings.run) == 0)[:, None]
+    pairs = np.where(together, unit[1:] * unit[:-1], np.nan)
+    return float(np.nanmean(pairs) / np.nanmean(unit**2)), int(np.isfinite(pairs).sum())
+
+
+def whole_scales(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+    """(log ratio to the sd in use (n,), covariance (n, n)) of the n triads that exist.
+
+    One step of restricted maximum likelihood: the residual's squares against what the motion
+    leaves of them, and the information of all triads' variances together.
+    """
+    readings = fit.readings
+    samples, count = fit.residual.shape[:2]
+    score, information = np.zeros(2 * count), np.zeros((2 * count, 2 * count))
+    kept = readings.keep.reshape(samples, -1).astype(float)
+    for start in range(0, samples, 256):
+        part = slice(start, start + 256)
+        basis, mask = fit.basis[part], kept[part]
+        left = -np.einsum("tri,tsi->trs", basis, basis)
+        rows = np.arange(left.shape[1])
+        left[:, rows, rows] += mask
+        left *= mask[:, :, None] * mask[:, None, :]
+        squares = np.sum(left**2, axis=0).reshape(2 * count, 3, 2 * count, 3)
+        information += 2 * squares.sum(axis=(1, 3))
+        surplus = fit.residual[part].reshape(-1, 6 * count) ** 2 * mask - left[:, rows, rows]
+        score += surplus.sum(axis=0).reshape(2 * count, 3).sum(axis=1)
+    there = readings.exists.ravel()
+    covariance = np.linalg.inv(information[np.ix_(there, there)])
+    wide = np.array([_width(fit, int(i), int(k)) for i, k in np.argwhere(readings.exists)])
+    return covariance @ score[there], covariance * np.outer(wide, wide)
+
+
+def _width(fit: Fit, imu: int, kind: int) -> float:
+    """By how much a scale's error exceeds that of white normal noise."""
+    unit = triad(fit, imu, kind)
+    tails = np.nanmean(unit**4) / np.nanmean(unit**2) ** 2 - 1.0
+    rho = autocorrelation(fit, imu, kind)[0]
+    return float(np.sqrt(max(tails / 2, 1.0) * (1 + rho**2) / (1 - rho**2)))
+
+
+def scales(fit: Fit, noise: Noise, calm: bool) -> tuple[np.ndarray, np.ndarray]:
+    """(log ratio to the declared sd (n,), covariance (n, n)) of the n triads that exist.
+
+    From the whole residual where that agrees with its fast part, or where nothing ties it to the
+    motion (``calm``) and its spectrum is that of its own memory; else from the fast part, which
+    smooth misfit does not reach.
+    """
+    there = fit.readings.exists
+    whole, covariance = whole_scales(fit)
+    whole = whole + np.log(fit.readings.sd / fit.readings.declared)[there]
+    fast = np.log(noise.sd / fit.readings.declared)[there]
+    spread, rough = np.diag(covariance), noise.error[there] ** 2
+    apart = np.sqrt(np.maximum(rough - spread, spread))
+    agree = (noise.correlation[there] != 0) | (np.abs(whole - fast) < AGREE * apart)
+    if calm:
+        agree |= np.array([alike(fit, noise, int(i), int(k)) for i, k in np.argwhere(there)])
+    own = np.diag(np.where(agree, spread, rough))
+    covariance = np.where(np.outer(agree, agree), covariance, own)
+    return np.where(agree, whole, fast), covariance
+
+
+def alike(fit: Fit, noise: Noise, imu: int, kind: int) -> bool:
+    """Whether a triad's spectrum has the slope that its lag-one correlation implies."""
+    rho = autocorrelation(fit, imu, kind)[0]
+    return bool(abs(noise.slope[imu, kind] - expected_ratio(rho, len(fit.residual))) < AGREE)
+
+
+def noise_scale(
+    fit: Fit, noise: Noise, kind: int, limit, least, skip=(), calm=True
+) -> Named | None:
+    """A triad's (0 accelerometer, 1 gyroscope) noise against the declared one, or None.
+
+    ``least`` (N,) log ratios below which a departure is not believed, ``skip`` IMUs to leave out.
+    """
+    readings = fit.readings
+    pairs = np.argwhere(readings.exists)
+    log_ratio, covariance = scales(fit, noise, calm)
+    chosen = np.flatnonzero(
+        (pairs[:, 1] == kind)
+        & (np.abs(log_ratio) > np.asarray(least)[pairs[:, 0]])
+        & ~np.isin(pairs[:, 0], list(skip))
+    )
+    if not len(chosen):
+        return None
+    hits, log_p = verdict(log_ratio[chosen], covariance[np.ix_(chosen, chosen)], limit)
+    log_p += np.log(readings.exists[:, kind].sum() / len(chosen))
+    if log_p > limit:
+        return None
+    chosen = chosen[hits] if len(hits) else chosen
+    nats, numbers = np.zeros(len(fit.residual)), {}
+    for place in chosen:
+        imu = pairs[place, 0]
+        square = np.nan_to_num(triad(fit, imu, kind)) ** 2
+        bare = readings.declared[imu, kind] / readings.sd[imu, kind]
+        own = np.exp(log_ratio[place]) * bare
+        nats += np.sum(square / bare**2 - square / own**2, axis=1) / 2 - 3 * np.log(own / bare)
+        ratio = float(np.exp(log_ratio[place]))
+        error = ratio * float(np.sqrt(covariance[place, place]))
+        numbers[f"ratio_{readings.labels[imu]}"] = (ratio, error, "1")
+    imus = tuple(int(k) for k in pairs[chosen, 0])
+    return Named(f"{KINDS[kind]}_noise", imus, log_p, numbers, *held_out(nats))
+
+
+def mixture(fit: Fit, imu: int, kind: int, steps=60) -> Mixture:
+    """EM for a triad's standardised residual, its three axes together."""
+    unit = triad(fit, imu, kind)
+    axes, square = np.sum(np.isfinite(unit), axis=1), np.nansum(unit**2, axis=1)
+    plain = np.sqrt(np.sum(square) / max(np.sum(axes), 1))
+    share, factor, core = 0.05, 3.0, float(np.nanmedian(np.abs(unit)) / norm.ppf(0.75))
+    for _ in range(steps):
+        odds = np.log(share / (1 - share)) - axes * np.log(factor)
+        odds = odds + square / (2 * core**2) * (1 - 1 / factor**2)
+        outlier = np.where(axes > 0, 1 / (1 + np.exp(-np.clip(odds, -500, 500))), 0.0)
+        share = float(np.clip(outlier[axes > 0].mean(), 1e-5, 0.5))
+        rest = np.sum((1 - outlier) * axes)
+        core = float(np.sqrt(np.sum((1 - outlier) * square) / max(rest, 1)))
+        wide = np.sum(outlier * square) / max(np.sum(outlier * axes), 1e-9)
+        factor = max(float(np.sqrt(wide)) / core, 1.05)
+    nats = _tail_nats(axes, square, share, factor, core, plain)
+    return Mixture(share, factor, core, outlier, 2 * float(nats.sum()))
+
+
+def _tail_nats(axes, square, share, factor, core, plain) -> np.ndarray:
+    """Log density of the mixture less that of a single normal, by sample."""
+    logs = [-axes * np.log(sd) - square / (2 * sd**2) for sd in (core, core * factor)]
+    both = np.logaddexp(np.log1p(-share) + logs[0], np.log(share) + logs[1])
+    return both - (-axes * np.log(plain) - square / (2 * plain**2))
+
+
+def heavy_tails(fit: Fit, noise: Noise, limit: float):
+    """(Named or None, hits, others): triads [(imu, kind, Mixture)] that a mixture describes better.
+
+    ``others`` are those where it may be so, once it is so somewhere: each by itself, or all the
+    rest of a kind together.
+    """
+    triads = np.argwhere(fit.readings.exists)
+    tried = [(int(i), int(k), mixture(fit, i, k)) for i, k in triads]
+    gains = np.array([_tail_gain(fit, noise, *item) for item in tried])
+    logs = np.array([log_tail(max(gain, 1e-9), 2) for gain in gains]) + np.log(len(triads))
+    if logs.min() > limit:
+        return None, [], []
+    hits = [item for item, log_p in zip(tried, logs, strict=True) if log_p < limit]
+    maybe = logs - np.log(len(triads)) < MAYBE
+    for kind in {k for _, k, _ in hits}:
+        rest = (triads[:, 1] == kind) & (logs >= limit)
+        if rest.any() and log_tail(max(gains[rest].sum(), 1e-9), 2 * rest.sum()) < limit:
+            hits += [item for item, also in zip(tried, rest & maybe, strict=True) if also]
+            maybe |= rest
+    there = {item[:2] for item in hits}
+    others = [m for m, may in zip(tried, maybe, strict=True) if may and m[:2] not in there]
+    imus = tuple(sorted({imu for imu, *_ in hits}))
+    return Named("heavy_tails", imus, float(logs.min()), *_told(fit, hits)), hits, others
+
+
+def _told(fit: Fit, hits):
+    """(numbers, gain, its standard error, blocks) of the triads with heavy tails."""
+    nats, numbers, count = np.zeros(len(fit.residual)), {}, len(fit.residual)
+    for imu, kind, mix in hits:
+        unit = triad(fit, imu, kind)
+        axes, square = np.sum(np.isfinite(unit), axis=1), np.nansum(unit**2, axis=1)
+        plain = np.sqrt(np.sum(square) / max(np.sum(axes), 1))
+        nats += _tail_nats(axes, square, mix.share, mix.factor, mix.core, plain)
+        name = f"{KINDS[kind]}_{fit.readings.labels[imu]}"
+        error = float(np.sqrt(mix.share * (1 - mix.share) / count))
+        numbers[f"share_{name}"] = (mix.share, error, "1")
+        far = max(6 * mix.share * count, 1.0)
+        numbers[f"factor_{name}"] = (mix.factor, float(mix.factor / np.sqrt(far)), "1")
+    return numbers, *held_out(nats)
+
+
+def _tail_gain(fit: Fit, noise: Noise, imu: int, kind: int, mix: Mixture) -> float:
+    """A mixture's gain, less where neighbours are alike; none for a handful of outliers."""
+    rho = noise.correlation[imu, kind]
+    several = mix.share * len(fit.residual) > FEW
+    return mix.gain * (1 - rho**2) / (1 + rho**2) if several else 0.0
+
+
+def pooled_memory(fit: Fit, noise: Noise, memories) -> float:
+    """log p of all triads' lag-one correlations (n, 2: value, pairs), 0 where spectra disagree."""
+    rho, pairs = np.asarray(memories).T
+    statistic = float(np.sum(rho**2 * pairs))
+    slopes = noise.slope[fit.readings.exists]
+    implied = np.array([expected_ratio(value, len(fit.residual)) for value in rho])
+    root = np.sqrt(len(rho))
+    signed = np.sign(rho)
+    apart = abs(np.sum(signed * (slopes - implied))) / root
+    there = -np.sum(signed * slopes) / root
+    return log_tail(statistic, len(rho)) if apart < AGREE < there else 0.0
+
+
+def coloured(fit: Fit, noise: Noise, limit: float, calm: bool) -> Named | None:
+    """Noise correlated in time: neighbours alike, and a spectrum that agrees with it.
+
+    ``calm``: no check finds the residual tied to the motion; else only the spectrum above the
+    motion's frequencies counts.
+    """
+    readings, number = fit.readings, int(fit.readings.exists.sum())
+    hits, nats, numbers, logs = [], np.zeros(len(fit.residual)), {}, []
+    step = float(np.median(np.diff(readings.time)))
+    triads = np.argwhere(readings.exists)
+    memories = [autocorrelation(fit, *pair) for pair in triads]
+    # the common motion passes a little of one triad's memory on to the others
+    loudest = max(abs(rho) for rho, _ in memories)
+    for (imu, kind), (rho, pairs) in zip(triads, memories, strict=True):
+        slope = noise.slope[imu, kind]
+        sharp = norm.logsf(abs(slope)) + np.log(2 * number)
+        plain = norm.logsf(abs(rho) * np.sqrt(pairs)) + np.log(2 * number)
+        log_p = min(sharp, plain if calm and alike(fit, noise, imu, kind) else 0.0)
+        remembered = noise.correlation[imu, kind] != 0
+        if (log_p > limit and not remembered) or (
+            sharp > limit and abs(rho) < max(FLAT, loudest / 5)
+        ):
+            continue
+        hits.append((int(imu), int(kind)))
+        logs.append(float(log_p))
+        name = f"{KINDS[kind]}_{readings.labels[imu]}"
+        error = float(np.sqrt((1 - rho**2) / pairs))
+        numbers[f"correlation_{name}"] = (rho, error, "1")
+        if rho > 0:
+            late = -step / np.log(rho)
+            numbers[f"correlation_time_{name}"] = (late, late * error / -(rho * np.log(rho)), "s")
+        unit = np.nan_to_num(triad(fit, imu, kind))
+        unit = unit / max(unit.std(), 1e-9)
+        jump = (unit[1:] - rho * unit[:-1]) ** 2 / (1 - rho**2)
+        nats[1:] += np.sum(unit[1:] ** 2 - jump - np.log1p(-(rho**2)), axis=1) / 2
+    if not hits:
+        return None
+    imus = tuple(sorted({imu for imu, _ in hits}))
+    best = min(*logs, pooled_memory(fit, noise, memories), 0.0)
+    return Named("coloured_noise", imus, best, numbers, *held_out(nats))

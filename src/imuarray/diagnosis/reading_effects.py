@@ -1,0 +1,209 @@
+"""Effects of whole readings, found before any fit: repeats, rails, exchanged axes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import permutations, product
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import poisson
+
+from imuarray.diagnosis.linearise import polynomial_derivative
+from imuarray.diagnosis.readings import Readings
+from imuarray.model.effects import KINDS
+from imuarray.recording.validate import AXES
+
+LEFT_OUT = ("stale_samples", "saturation")  # their readings; exchanged axes are turned back
+LEAST_REPEATS = 1
+LEAST_CLIPPED = 3
+RARE = -12.0  # log p from which repeats are no chance of a coarse converter
+NEAR = 0.5  # a signed permutation is believed when the triad's matrix is this near to it
+TURNS = [
+    np.array(signs)[:, None] * np.eye(3)[list(order)]
+    for order in permutations(range(3)) for signs in product((1.0, -1.0), repeat=3)
+]  # fmt: skip
+
+
+class Structural(NamedTuple):
+    """One such effect: whose, log p, its numbers and the sentence that says it."""
+
+    effect: str
+    imus: tuple[int, ...]
+    log_p: float
+    parameters: dict  # name -> (value, sd, unit)
+    says: str
+
+
+def part(readings: Readings, kind: int) -> np.ndarray:
+    """The readings of the accelerometers (0) or the gyroscopes (1), (T, N, 3)."""
+    return readings.values[..., 3 * kind : 3 * kind + 3]
+
+
+def find_repeats(readings: Readings):
+    """Triads that repeat their former sample: (causes, lost (T, N, 6) bool)."""
+    together = np.diff(readings.run) == 0
+    lost = np.zeros(readings.values.shape, bool)
+    hit, shares, logs = [], [], []
+    for imu, kind in np.argwhere(readings.exists):
+        values = part(readings, kind)[:, imu]
+        same = (values[1:] == values[:-1]) & together[:, None]
+        every = same.all(axis=1)
+        chance = np.prod(same.mean(axis=0)) if not every.all() else 1.0
+        alone = np.prod((same & ~every[:, None]).mean(axis=0))
+        log_p = poisson.logsf(every.sum() - 1, max(min(chance, alone), 1e-9) * together.sum())
+        if every.sum() >= LEAST_REPEATS and log_p < RARE:
+            lost[1:, imu, 3 * kind : 3 * kind + 3] = every[:, None]
+            hit.append(int(imu))
+            shares.append(every.mean())
+            logs.append(log_p)
+    if not hit:
+        return [], lost
+    numbers = {"share": (float(np.mean(shares)), float(np.std(shares)), "1")}
+    says = f"{100 * np.mean(shares):.2g} % of the readings repeat the one before exactly"
+    return [Structural("stale_samples", unique(hit), float(min(logs)), numbers, says)], lost
+
+
+def find_rails(readings: Readings):
+    """Readings that pile up at a value below the declared range: (causes, lost)."""
+    lost = np.zeros(readings.values.shape, bool)
+    hit, rails, logs = [], {}, []
+    for imu, kind in np.argwhere(readings.exists):
+        values = part(readings, kind)[:, imu]
+        kept = readings.keep[:, imu, 3 * kind : 3 * kind + 3]
+        rail, at = _pile(values, kept)
+        if rail is None:
+            continue
+        lost[:, imu, 3 * kind : 3 * kind + 3] = at
+        hit.append(int(imu))
+        rails.setdefault(kind, []).append(rail)
+        logs.append(-9.0 * (at.sum() - 1))
+    if not hit:
+        return [], lost
+    units = ("m s-2", "rad s-1")
+    numbers = {
+        f"{KINDS[kind]}_rail": (float(np.median(found)), float(np.std(found)), units[kind])
+        for kind, found in rails.items()
+    }
+    where = ", ".join(f"{n} {v[0]:.4g} {v[2]}" for n, v in numbers.items())
+    says = f"readings pile up at a rail that the declared range does not tell of ({where})"
+    return [Structural("saturation", unique(hit), float(min(logs)), numbers, says)], lost
+
+
+def _pile(values, kept):
+    """(rail, at (T, 3)) of a triad whose largest sizes are one value over and over, or Nones."""
+    size = np.where(kept, np.abs(values), 0.0)
+    top = size.max()
+    at = size >= top * (1 - 1e-9)
+    count = int(at.sum())
+    if count < LEAST_CLIPPED or top == 0:
+        return None, None
+    # a coarse converter has ties by chance: the next values below must have far fewer
+    below = np.unique(size[size < top * (1 - 1e-9)])[-5:]
+    rivals = [int(np.sum(size == value)) for value in below]
+    most = max(rivals, default=0)
+    return (top, at) if most <= 1 or count > 3 * most + 1 else (None, None)
+
+
+def find_swaps(readings: Readings):
+    """Triads with exchanged or reversed axes: (causes, turns (N, 2, 3, 3), whether mended).
+
+    Axes are those that most triads of a kind agree on; without such a majority the turns stay
+    unknown and nothing is mended.
+    """
+    count = len(readings.exists)
+    turns, hit, mended = np.tile(np.eye(3), (count, 2, 1, 1)), [], True
+    lever = np.zeros((len(readings.time), count, 3))
+    for kind in (1, 0):
+        there = np.flatnonzero(readings.exists[:, kind])
+        values = part(readings, kind)
+        against = {j: _against(values, lever, j, there) for j in there}
+        best = max(there, key=lambda j: sum(map(_is_straight, against[j].values())))
+        agreeing = [k for k in there if _is_straight(against[best][k])]
+        if 2 * len(agreeing) <= len(there) and len(there) > 2:
+            mended = False
+            hit += [(int(k), kind) for k in there]
+            continue
+        common = np.median(values[:, agreeing] - lever[:, agreeing], axis=1)
+        for imu in there:
+            matrix = _matrix(common + lever[:, imu], values[:, imu])
+            nearest = min(TURNS, key=lambda turn: np.linalg.norm(turn - matrix))
+            limit = min(NEAR, np.linalg.norm(matrix - np.eye(3)) / 2)
+            if not _is_straight(nearest) and np.linalg.norm(matrix - nearest) < limit:
+                turns[imu, kind] = nearest
+                hit.append((int(imu), kind))
+        if kind:
+            lever = _lever(readings, common)
+    if not hit:
+        return [], turns, True
+    says = "; ".join(
+        f"{KINDS[kind]} {readings.labels[imu]}: {_axes(turns[imu, kind])}" for imu, kind in hit
+    )
+    if not mended:
+        turns[:] = np.eye(3)
+        says = "no majority of the triads agrees on the axes: put them right first"
+    found = Structural("axis_swap", unique([imu for imu, _ in hit]), -1e6, {}, says)
+    return [found], turns, mended
+
+
+def _matrix(reference, values) -> np.ndarray:
+    """The matrix that turns a reference (T, 3) into a triad's readings (T, 3)."""
+    return np.linalg.lstsq(reference, values, rcond=None)[0].T
+
+
+def _against(values, lever, one, there) -> dict:
+    """Signed permutations nearest to what each triad reads where triad ``one`` is right."""
+    found = {}
+    for k in there:
+        matrix = _matrix(values[:, one] - lever[:, one] + lever[:, k], values[:, k])
+        found[k] = min(TURNS, key=lambda turn: np.linalg.norm(turn - matrix))
+    return found
+
+
+def _is_straight(turn) -> bool:
+    return np.array_equal(turn, np.eye(3))
+
+
+def _lever(readings: Readings, rate) -> np.ndarray:
+    """What rotation adds to the specific force at the nominal places, (T, N, 3)."""
+    turning = polynomial_derivative(readings.time, readings.run, rate, readings.window, 1)
+    places = np.zeros((len(readings.exists), 3))
+    places[: readings.array.accelerometers] = readings.array.relative
+    return np.cross(rate[:, None], np.cross(rate[:, None], places)) + np.cross(
+        turning[:, None], places
+    )
+
+
+def _axes(turn) -> str:
+    """A signed permutation in words: reads (+y, +x, +z)."""
+    names = ["+-"[int(row.sum() < 0)] + AXES[int(np.argmax(np.abs(row)))] for row in turn]
+    return f"reads ({', '.join(names)})"
+
+
+def undo_swaps(readings: Readings, turns) -> Readings:
+    """The readings with the axes put right."""
+    values = readings.values.copy()
+    for imu, kind in np.argwhere(readings.exists):
+        block = slice(3 * kind, 3 * kind + 3)
+        values[:, imu, block] = readings.values[:, imu, block] @ turns[imu, kind]
+    return replace(readings, values=values)
+
+
+def unique(imus) -> tuple[int, ...]:
+    """Sorted, each once."""
+    return tuple(sorted(set(imus)))
+
+
+def find_structural(readings: Readings, without=()):
+    """(causes, readings put right, whether they could be): axes turned back, the rest left out."""
+    causes, mended = [], True
+    for name, find in (("stale_samples", find_repeats), ("saturation", find_rails)):
+        if name not in without:
+            found, lost = find(readings)
+            causes += found
+            readings = readings.without(lost)
+    if "axis_swap" not in without:
+        found, turns, mended = find_swaps(readings)
+        causes += found
+        readings = undo_swaps(readings, turns)
+    return causes, readings, mended

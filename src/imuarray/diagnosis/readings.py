@@ -1,0 +1,181 @@
+"""A recording arranged for its diagnosis: readings by IMU, which of them count, runs of time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from imuarray.errors import InputError
+from imuarray.estimation.selection import neighbours
+from imuarray.geometry import Array
+from imuarray.model.structure import design
+from imuarray.recording import Recording, array_of
+
+WEAKEST = 1e-2  # least information of a sample on omega_dot and s, against all readings'
+LEAST = 200  # samples; fewer tell next to nothing of any effect
+STRETCH = 128  # samples
+WINDOW = 0.04  # s, length of the polynomials that give time derivatives
+
+
+@dataclass(frozen=True)
+class Readings:
+    """T samples of N IMUs, six readings each: specific force x, y, z, angular rate x, y, z.
+
+    Attributes
+    ----------
+    time : (T,) s since the recording's first sample; span : s, the recording's length
+    values : (T, N, 6) m/s^2 and rad/s; zero where an IMU has no such triad
+    keep : (T, N, 6) bool, readings to use
+    exists : (N, 2) bool, which IMUs have an accelerometer and a gyroscope
+    declared : (N, 2) declared noise sd, m/s^2 and rad/s
+    sd : (N, 2) the noise sd in use
+    run : (T,) number of the gapless run a sample is in
+    labels : N str
+    """
+
+    array: Array
+    time: np.ndarray
+    span: float
+    values: np.ndarray
+    keep: np.ndarray
+    exists: np.ndarray
+    declared: np.ndarray
+    sd: np.ndarray
+    run: np.ndarray
+    labels: tuple[str, ...]
+    position_prior_sd: float
+
+    @property
+    def weights(self) -> np.ndarray:
+        """Square roots of the readings' weights, (T, N, 6): 1 / sd, 0 where left out."""
+        return self.keep / np.repeat(self.sd, 3, axis=1)
+
+    @property
+    def window(self) -> int:
+        """Samples in a derivative's polynomial, odd, at least five."""
+        return odd_window(self.time)
+
+    def with_sd(self, sd) -> Readings:
+        """The same with another noise sd (N, 2)."""
+        return replace(self, sd=np.asarray(sd, float))
+
+    def without(self, lost) -> Readings:
+        """The same without the readings in ``lost`` (T, N, 6) bool."""
+        return replace(self, keep=self.keep & ~lost)
+
+    def select(self, used) -> Readings:
+        """The samples in ``used`` (T,) bool, in new runs."""
+        time = self.time[used]
+        return replace(
+            self, time=time, values=self.values[used], keep=self.keep[used], run=runs(time)
+        )
+
+
+def determined(readings: Readings) -> np.ndarray:
+    """(T,) bool: samples whose readings tell the motion, in runs long enough for its derivatives.
+
+    Each axis has a gyroscope, and the accelerometers tell omega_dot and s. InputError where too
+    few are left.
+    """
+    positions = readings.array.relative
+    rows = design(positions)[:, 6:]
+    kept = readings.keep[:, : len(positions), :3].reshape(len(readings.time), -1)
+    least, whole = (
+        np.linalg.eigvalsh(np.einsum("tr,ri,rj->tij", part.astype(float), rows, rows))[:, 0]
+        for part in (kept, np.ones_like(kept[:1]))
+    )
+    good = (least > WEAKEST * whole) & readings.keep[..., 3:].any(axis=1).all(axis=1)
+    if good.all():
+        return good
+    used = _long_runs(readings.time, good)
+    if used.sum() < LEAST:
+        raise InputError(
+            f"recording: expected at least {LEAST} samples whose readings tell the motion,"
+            f" found {used.sum()} of {used.size}"
+        )
+    return used
+
+
+def part_of(readings: Readings, most: int) -> Readings:
+    """Stretches of a recording, spread evenly, of some ``most`` samples in all."""
+    samples = len(readings.time)
+    every = -(-samples // most)
+    stretch = np.arange(samples) // STRETCH
+    used = stretch % every == 0
+    both = readings.run[used] * (stretch[-1] + 1) + stretch[used]
+    run = np.unique(both, return_inverse=True)[1]
+    long = np.bincount(run)[run] >= readings.window
+    used[used] = long
+    run = np.unique(both[long], return_inverse=True)[1]
+    return replace(
+        readings, time=readings.time[used], values=readings.values[used],
+        keep=readings.keep[used], run=run,
+    )  # fmt: skip
+
+
+def odd_window(time) -> int:
+    """Samples in `WINDOW` seconds, odd, at least five."""
+    return max(5, 2 * int(WINDOW / np.median(np.diff(time)) / 2) + 1)
+
+
+def runs(time) -> np.ndarray:
+    """Number of the gapless run each sample is in, (T,): a gap is 1.5 sampling periods."""
+    step = np.diff(time)
+    return np.concatenate([[0], np.cumsum(step > 1.5 * np.median(step))])
+
+
+def by_imu(force, rate) -> np.ndarray:
+    """(T, N, 6) from (T, A, 3) and (T, G, 3), zero where a triad does not exist."""
+    count = max(force.shape[1], rate.shape[1])
+    out = np.zeros((len(force), count, 6), force.dtype)
+    out[:, : force.shape[1], :3] = force
+    out[:, : rate.shape[1], 3:] = rate
+    return out
+
+
+def arrange(recording: Recording) -> Readings:
+    """`Readings` of the moving samples whose motion is seen; InputError where too few are left.
+
+    Samples where some axis has no gyroscope off its rail are left out, as are their neighbours,
+    still poses, and runs too short for a time derivative.
+    """
+    array = array_of(recording)
+    force, rate = recording.saturated_accelerometers(), recording.saturated_gyroscopes()
+    blind = rate.all(axis=1).any(axis=1)
+    bad = neighbours(blind)
+    if recording.stationary is not None:
+        bad |= recording.stationary
+    used = _long_runs(recording.time, ~bad)
+    if used.sum() < LEAST:
+        raise InputError(
+            f"recording: expected at least {LEAST} moving samples off the rails in gapless runs,"
+            f" found {used.sum()} of {used.size}"
+        )
+    count = max(recording.specific_force.shape[1], recording.angular_rate.shape[1])
+    kinds = recording.specific_force.shape[1], recording.angular_rate.shape[1]
+    exists = np.arange(count)[:, None] < np.array(kinds)
+    noise = recording.accelerometer_noise_sd, recording.gyroscope_noise_sd
+    lost = by_imu(force, rate)[used]
+    longer = recording.accelerometer_labels if kinds[0] == count else recording.gyroscope_labels
+    time = recording.time - recording.time[0]
+    return Readings(
+        array, time[used], float(time[-1]) or 1.0,
+        by_imu(recording.specific_force, recording.angular_rate)[used],
+        ~lost & np.repeat(exists, 3, axis=1), exists, np.tile(noise, (count, 1)),
+        np.tile(noise, (count, 1)), runs(time[used]), tuple(longer), recording.position_prior_sd,
+    )  # fmt: skip
+
+
+def _long_runs(time, good) -> np.ndarray:
+    """Good samples in gapless runs of at least a derivative's window, (T,) bool."""
+    index = np.flatnonzero(good)
+    if len(index) < 2:
+        return np.zeros_like(good)
+    number = np.cumsum(np.concatenate([[False], np.diff(index) > 1])) + runs(time)[index] * len(
+        time
+    )
+    _, which, lengths = np.unique(number, return_inverse=True, return_counts=True)
+    kept = np.zeros_like(good)
+    kept[index[lengths[which] >= odd_window(time)]] = True
+    return kept

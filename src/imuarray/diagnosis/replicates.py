@@ -1,0 +1,202 @@
+"""Posterior predictive checks: the residual's test quantities beside those of simulations.
+
+A replicate is what the fitted model simulates at the recording's own times, motion and rails, and
+fits again: noise of the declared size, the motion and the parameters projected out of it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from imuarray.diagnosis.fit import Fit, normal
+from imuarray.diagnosis.noise import standardised
+from imuarray.diagnosis.words import first_up
+from imuarray.model.effects import KINDS
+
+REPLICATES = 99
+
+
+class Quantity(NamedTuple):
+    """A test quantity by sensor: values (n,) and labels, and what a sentence says of them."""
+
+    values: np.ndarray
+    sensors: tuple[str, ...]
+    words: str  # "the accelerometers' residual"
+    unit: str = ""
+
+
+class Discrepancy(NamedTuple):
+    """A test quantity beside its simulated band, and one sentence."""
+
+    check: str
+    statistic: float
+    simulated: dict  # median, q025, q975
+    p_value: float
+    sensors: list[str]
+    says: str
+
+    def as_dict(self) -> dict:
+        """As `diagnosis.json` has it."""
+        return dict(self._asdict())
+
+
+class Replicator:
+    """Draws residuals (T, N, 6) of the fitted model, in the units of the noise sd in use."""
+
+    def __init__(self, fit: Fit, ridge):
+        self.fit, self.pairs = fit, np.argwhere(fit.active)
+        information, _ = normal(fit.residual, fit.whitened, fit.through, fit.active)
+        self.inverse = np.linalg.pinv(information + ridge, hermitian=True)
+        self.along = [np.ascontiguousarray(fit.whitened[:, k, :, m]) for k, m in self.pairs]
+
+    def draw(self, rng) -> np.ndarray:
+        """One residual after motion and parameters have been fitted to it."""
+        fit = self.fit
+        noise = rng.standard_normal(fit.residual.shape) * fit.readings.keep
+        left = self._less_motion(noise)
+        by_imu = np.ascontiguousarray(left.transpose(1, 0, 2)).reshape(left.shape[1], -1)
+        score = np.array(
+            [
+                along.ravel() @ by_imu[k]
+                for along, (k, _) in zip(self.along, self.pairs, strict=True)
+            ]
+        )
+        step = np.zeros(fit.active.shape)
+        step[fit.active] = self.inverse @ score
+        return left - self._less_motion(np.einsum("tkim,km->tki", fit.whitened, step))
+
+    def _less_motion(self, values):
+        flat = values.reshape(len(values), -1)
+        taken = np.einsum("tri,tr->ti", self.fit.basis, flat)
+        return values - np.einsum("tri,ti->tr", self.fit.basis, taken).reshape(values.shape)
+
+
+def quantities(fit: Fit, unit) -> dict[str, Quantity]:
+    """Test quantities of a standardised residual (T, N, 6), NaN where left out."""
+    readings, motion = fit.readings, fit.state.motion
+    sizes = {
+        "|omega|": motion[:, :3], "|omega dot|": motion[:, 3:6], "|specific force|": motion[:, 6:9],
+        "jerk": fit.state.jerk[1],
+    }  # fmt: skip
+    found = {}
+    for kind, name in enumerate(KINDS):
+        there = np.flatnonzero(readings.exists[:, kind])
+        labels = tuple(readings.labels[k] for k in there)
+        part = unit[:, there, 3 * kind : 3 * kind + 3]
+        whose = f"the {name}s' residual"
+        rms = np.sqrt(np.nanmean(part**2, axis=0)).ravel()
+        axes = tuple(f"{label}{axis}" for label in labels for axis in "xyz")
+        found[f"{name} residual"] = Quantity(rms, axes, f"{whose}, in assumed sds,")
+        for size, values in sizes.items():
+            if np.any(values):
+                growth = _growth(part, np.linalg.norm(values, axis=1))
+                words = f"{whose} where {size} is large over where it is small"
+                found[f"{name} residual against {size}"] = Quantity(growth, labels, words)
+        found[f"{name} residual along omega dot"] = Quantity(
+            _along(part, motion[:, 3:6]), labels, f"the share of {whose} along omega dot"
+        )
+        found[f"{name} whiteness"] = Quantity(
+            _lag_one(part, readings.run),
+            labels,
+            f"the lag-one correlation of {whose}",
+        )
+        found[f"{name} kurtosis"] = Quantity(
+            _kurtosis(part), labels, f"the excess kurtosis of {whose}"
+        )
+        found[f"{name} drift"] = Quantity(
+            _drift(part, readings.time), axes, f"the drift of {whose} from start to end"
+        )
+        found[f"{name} company"] = Quantity(
+            _company(part), labels, f"the largest correlation of {whose} between two IMUs"
+        )
+    return found
+
+
+def _growth(part, size):
+    """rms in the highest quarter of a size over that in the lowest half, by triad."""
+    low, high = np.quantile(size, [0.5, 0.75])
+    square = part**2
+    return np.sqrt(
+        np.nanmean(square[size > high], axis=(0, 2)) / np.nanmean(square[size < low], axis=(0, 2))
+    )
+
+
+def _along(part, direction):
+    length = np.linalg.norm(direction, axis=1, keepdims=True)
+    way = direction / np.where(length > 0, length, 1.0)
+    filled = np.nan_to_num(part)
+    along = np.einsum("tki,ti->tk", filled, way)
+    return np.sum(along**2, axis=0) / np.maximum(np.sum(filled**2, axis=(0, 2)), 1e-300)
+
+
+def _lag_one(part, run):
+    together = (np.diff(run) == 0)[:, None, None]
+    pairs = np.where(together, part[1:] * part[:-1], np.nan)
+    return np.nanmean(pairs, axis=(0, 2)) / np.nanmean(part**2, axis=(0, 2))
+
+
+def _kurtosis(part):
+    square = part**2  # a fourth power by pow is slow
+    return np.nanmean(square * square, axis=(0, 2)) / np.nanmean(square, axis=(0, 2)) ** 2 - 3.0
+
+
+def _drift(part, time):
+    x = time - time.mean()
+    slope = np.einsum("t,tki->ki", x, np.nan_to_num(part)) / np.sum(x**2)
+    return (slope * np.ptp(time)).ravel()
+
+
+def _company(part):
+    flat = np.nan_to_num(part).reshape(len(part), -1)
+    matrix = np.corrcoef(flat.T) if flat.shape[1] > 3 else np.eye(flat.shape[1])
+    count = part.shape[1]
+    blocks = np.abs(matrix).reshape(count, 3, count, 3).max(axis=(1, 3))
+    np.fill_diagonal(blocks, 0.0)
+    return blocks.max(axis=1)
+
+
+def discrepancies(fit: Fit, ridge, rng, replicates=REPLICATES) -> list[Discrepancy]:
+    """Every test quantity of a fit beside its band over replicates, most striking first."""
+    replicator, share = Replicator(fit, ridge), np.sqrt(np.maximum(1.0 - fit.leverage, 1e-6))
+    keep = fit.readings.keep
+    measured = quantities(fit, standardised(fit))
+    drawn: dict[str, list] = {name: [] for name in measured}
+    for _ in range(replicates):
+        unit = np.where(keep, replicator.draw(rng) / share, np.nan)
+        for name, quantity in quantities(fit, unit).items():
+            drawn[name].append(quantity.values)
+    found = [_compare(name, measured[name], np.array(drawn[name])) for name in measured]
+    return [item for _, item in sorted(found, key=lambda pair: pair[0], reverse=True)]
+
+
+def _compare(name, quantity: Quantity, drawn):
+    """(how far out, Discrepancy) of the worst sensor, against the worst of each replicate."""
+    centre, spread = drawn.mean(axis=0), np.maximum(drawn.std(axis=0), 1e-12)
+    away = np.abs(quantity.values - centre) / spread
+    worst = int(np.nanargmax(away))
+    others = np.nanmax(np.abs(drawn - centre) / spread, axis=1)
+    p_value = (1 + np.sum(others >= away[worst])) / (1 + len(others))
+    own = drawn[:, worst]
+    band = {
+        "median": float(np.median(own)),
+        "q025": float(np.quantile(own, 0.025)), "q975": float(np.quantile(own, 0.975)),
+    }  # fmt: skip
+    limit = np.quantile(others, 0.95)
+    sensors = [quantity.sensors[k] for k in np.flatnonzero(away > limit)]
+    value = float(quantity.values[worst])
+    place = f"{first_up(quantity.words)} is {value:.3g} at IMU {quantity.sensors[worst]}"
+    says = f"{place}, {_beside(value, band, p_value)}."
+    return float(away[worst] / limit), Discrepancy(name, value, band, float(p_value), sensors, says)
+
+
+def _beside(value, band, p_value) -> str:
+    """Where a value lies: the worst of many sensors may leave its own band as often as not."""
+    simulated = f"simulated {band['q025']:.3g} to {band['q975']:.3g}"
+    within = band["q025"] <= value <= band["q975"]
+    if p_value <= 0.05:
+        return f"{'at the edge of' if within else 'outside'} the {simulated}"
+    if within:
+        return f"within the {simulated}"
+    return f"{simulated} there; in {100 * p_value:.0f} % of simulations some sensor is as far out"

@@ -1,0 +1,300 @@
+"""Is anything left? Tests of the residual against what no named cause need explain.
+
+For each reading's axis, regressions on a wide set of features of the motion and of time, the
+fitted parameters and the motion projected out; and the residual's size, colour and company.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import median_filter
+from scipy.stats import chi2, norm
+
+from imuarray.diagnosis.fit import Fit, pick
+from imuarray.diagnosis.noise import Noise, standardised, tail_log_p
+from imuarray.diagnosis.scans import delay_score
+from imuarray.diagnosis.scores import Evidence, log_tail, robust_inverse
+
+SEEN = 1e-4
+SAME = 1e-9  # m/s^2 or rad/s: equal readings
+COARSE = 2.0  # noise sds of a step between readings
+SLOW = 3  # turns in the recording; slower ages are a drift
+AROUND = 101  # frequencies that tell a periodogram's level
+CROWD = 1.3  # axes' tests are not quite independent: variance of their sum against chi-square's
+
+
+class Check(NamedTuple):
+    """A test of what is left: name, statistic, log p with its multiplicity, whose."""
+
+    name: str
+    statistic: float
+    log_p: float
+    imus: tuple[int, ...]
+
+
+def features(fit: Fit, imu: int) -> dict[str, np.ndarray]:
+    """Groups of features of an IMU's own motion, each (T, n) with unit mean square."""
+    motion, state = fit.state.motion, fit.state
+    rate, turn = motion[:, :3], motion[:, 3:6]
+    force = lever(motion, state.positions[min(imu, len(state.positions) - 1)]) + motion[:, 6:9]
+    jerk, force_rate = state.jerk
+    time = 2 * fit.readings.time[:, None] / fit.readings.span - 1
+    pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
+    groups = {
+        "offset": np.ones((len(rate), 1)),
+        "force": force,
+        "force squared": np.stack([force[:, i] * force[:, j] for i, j in pairs], 1),
+        "force cubed": force**3,
+        "force's size": np.abs(force),
+        "rate": rate,
+        "rate squared": np.stack([rate[:, i] * rate[:, j] for i, j in pairs], 1),
+        "rate cubed": rate**3,
+        "omega dot": turn,
+        "omega dot squared": np.sum(turn**2, axis=1, keepdims=True),
+        "force rate": force_rate,
+        "omega double dot": jerk,
+        "force rate's sign": np.sign(force_rate),
+        "time": np.hstack([time, time**2, time**3]),
+        "force in time": time * force,
+        "rate in time": time * rate,
+    }
+    return {name: unit(value) for name, value in groups.items()}
+
+
+def unit(values) -> np.ndarray:
+    """Columns (T, n) with unit mean square."""
+    size = np.sqrt(np.mean(values**2, axis=0))
+    return values / np.where(size > 0, size, 1.0)
+
+
+def lever(motion, place) -> np.ndarray:
+    """Acceleration (T, 3) of a place (3,) m against the origin's."""
+    rate, turn = motion[:, :3], motion[:, 3:6]
+    return np.cross(rate, np.cross(rate, place)) + np.cross(turn, place)
+
+
+def displaced(motion, causes, axis: int) -> np.ndarray:
+    """What an accelerometer's axis sees where ``causes`` (T, n) move it, (T, 3 n)."""
+    arms = np.stack([lever(motion, place)[:, axis] for place in np.eye(3)], axis=1)
+    return unit((arms[:, :, None] * causes[:, None, :]).reshape(len(motion), -1))
+
+
+def regression_checks(fit: Fit, given: Evidence, noise: Noise) -> list[Check]:
+    """Each group of features over all axes, and each IMU's axes over all features."""
+    active = given.places(fit.active)
+    both = given.information + given.precision
+    inner = robust_inverse(both[np.ix_(active, active)])
+    pairs, through = pick(fit.through, fit.active & fit.columns.owner)
+    samples, count = fit.residual.shape[:2]
+    basis = fit.basis.reshape(samples, count, 6, -1)
+    groups: dict[str, list] = {}
+    axes = []
+    for imu in range(count):
+        common = features(fit, imu)
+        for axis in range(6):
+            if not fit.readings.exists[imu, axis // 3]:
+                continue
+            table = dict(common)
+            if axis < 3:
+                # boards bend, mounts give way
+                for cause in ("force", "time"):
+                    moved = displaced(fit.state.motion, common[cause], axis)
+                    table[f"lever times {cause}"] = moved
+            names = np.repeat(list(table), [v.shape[1] for v in table.values()])
+            stacked = np.hstack(list(table.values()))
+            seen = -np.einsum("ti,tia->ta", basis[:, imu, axis], through)
+            own = np.flatnonzero(pairs[:, 0] == imu)
+            seen[:, own] += fit.whitened[:, imu, axis][:, pairs[own, 1]]
+            kept = fit.readings.keep[:, imu, axis].astype(float)
+            free = kept - np.sum(basis[:, imu, axis] ** 2, axis=1)
+            score = stacked.T @ fit.residual[:, imu, axis]
+            cross = stacked.T @ seen
+            block = stacked.T @ (free[:, None] * stacked) - cross @ inner @ cross.T
+            bare = np.diag(stacked.T @ (kept[:, None] * stacked))
+            # slow regressors see coloured noise larger than its sd, at most by this
+            rho = max(noise.correlation[imu, axis // 3], 0.0)
+            block = block * ((1 + rho) / (1 - rho))
+            for name in table:
+                chosen = np.flatnonzero(names == name)
+                groups.setdefault(name, []).append((imu, *_chi(block, score, bare, chosen)))
+            axes.append((imu, *_chi(block, score, bare, np.arange(len(names)))))
+    checks = [_either(f"residual against {name}", found) for name, found in groups.items()]
+    return [*checks, _pooled("residual against all", axes), _worst("an axis against all", axes)]
+
+
+def _chi(block, score, bare, chosen):
+    """(chi-square, degrees of freedom) of some features."""
+    scale = np.sqrt(np.maximum(bare[chosen], 1e-300))
+    values, vectors = np.linalg.eigh(block[np.ix_(chosen, chosen)] / np.outer(scale, scale))
+    seen = values > SEEN
+    along = vectors[:, seen].T @ (score[chosen] / scale)
+    return float(np.sum(along**2 / values[seen])), int(seen.sum())
+
+
+def _pooled(name, found) -> Check:
+    """All axes together: the sum of chi-squares, its variance widened by `CROWD`."""
+    total, freedom = sum(f[1] for f in found), max(sum(f[2] for f in found), 1)
+    widened = freedom + (total - freedom) / np.sqrt(CROWD)
+    worst = max(found, key=lambda f: f[1] - f[2])
+    return Check(name, total / freedom, log_tail(max(widened, 1e-9), freedom), (worst[0],))
+
+
+def _either(name, found) -> Check:
+    """All axes together, or the worst of them."""
+    together, worst = _pooled(name, found), _worst(name, found)
+    best = min(together, worst, key=lambda check: check.log_p)
+    return best._replace(log_p=min(best.log_p + np.log(2), 0.0))
+
+
+def _worst(name, found) -> Check:
+    """The worst axis, all of them allowed for."""
+    tested = [(log_tail(max(f[1], 1e-9), max(f[2], 1)), f) for f in found]
+    log_p, worst = min(tested, key=lambda t: t[0])
+    return Check(
+        name, worst[1] / max(worst[2], 1), min(log_p + np.log(len(found)), 0.0), (worst[0],)
+    )
+
+
+def size_checks(fit: Fit) -> list[Check]:
+    """Does the residual's size grow with the motion's? A regression of its square per triad."""
+    motion = fit.state.motion
+    sizes = {
+        "omega": motion[:, :3], "omega dot": motion[:, 3:6], "specific force": motion[:, 6:9],
+        "jerk": fit.state.jerk[1],
+    }  # fmt: skip
+    unit = standardised(fit)
+    triads = np.argwhere(fit.readings.exists)
+    checks = []
+    for name, values in sizes.items():
+        size = np.sum(values**2, axis=1)
+        if not np.any(size):
+            continue
+        trend = (size - size.mean()) / size.std()
+        found = []
+        for imu, kind in triads:
+            square = unit[:, imu, 3 * kind : 3 * kind + 3] ** 2
+            average = np.nanmean(square)
+            excess = np.nan_to_num(square / average - 1).sum(axis=1)
+            spread = np.sqrt(np.sum((trend * excess) ** 2))
+            found.append((int(imu), float((trend @ excess) / spread)))
+        checks.append(normal_checks(f"residual's size against {name}", found))
+    return checks
+
+
+def normal_checks(name, found, alike=False) -> Check:
+    """Worst and pooled of standard normals expected near zero; their mean where all are alike."""
+    worst = max(found, key=lambda f: abs(f[1]))
+    single = norm.logsf(abs(worst[1])) + np.log(2 * len(found))
+    pooled = chi2.logsf(sum(z**2 for _, z in found), len(found))
+    mean = norm.logsf(abs(sum(z for _, z in found)) / np.sqrt(len(found))) + np.log(2)
+    log_p = min(single, pooled, mean if alike else 0.0) + np.log(2 + alike)
+    return Check(name, worst[1], float(min(log_p, 0.0)), (worst[0],))
+
+
+def timing_check(fit: Fit) -> Check:
+    """Do ages come and go at some frequency? The periodogram of each IMU's delay.
+
+    Against white noise, or its own level around a frequency where that is higher.
+    """
+    score, information = delay_score(fit)
+    time = fit.readings.time
+    step = np.median(np.diff(time))
+    place = np.round((time - time[0]) / step).astype(int)
+    both = np.flatnonzero(fit.readings.exists.all(axis=1))
+    found = []
+    for imu in both:
+        own, known = score[:, imu], information[:, imu]
+        grid = np.zeros(place[-1] + 1)
+        np.add.at(grid, place, own - known * own.sum() / known.sum())
+        power = np.abs(np.fft.rfft(grid))[SLOW:] ** 2
+        if len(power) < AROUND:
+            continue
+        level = median_filter(power, AROUND, mode="nearest") / np.log(2)
+        highest = float(np.max(power / np.maximum(level, known.sum())))
+        found.append((int(imu), highest, np.log(len(power) * len(both)) - highest))
+    if not found:
+        return Check("ages in time", 0.0, 0.0, ())
+    imu, highest, log_p = min(found, key=lambda f: f[2])
+    return Check("ages in time", highest, float(min(log_p, 0.0)), (imu,))
+
+
+def jitter_check(fit: Fit) -> Check:
+    """Do ages wander from sample to sample? The residual along a delay where delays show most."""
+    score, information = delay_score(fit)
+    found = []
+    for imu in np.flatnonzero(fit.readings.exists.all(axis=1)):
+        known = information[:, imu]
+        square = score[:, imu] ** 2 / known
+        excess = (known - known.mean()) * (square - square.mean())
+        spread = np.sqrt(np.sum(excess**2))
+        found.append((int(imu), float(excess.sum() / max(spread, 1e-300))))
+    if not found:
+        return Check("ages that wander", 0.0, 0.0, ())
+    return normal_checks("ages that wander", found, alike=True)
+
+
+def company_check(fit: Fit, noise: Noise) -> Check:
+    """Correlations between axes beyond what the common motion explains."""
+    samples = len(fit.residual)
+    flat = np.where(fit.readings.keep, fit.residual, 0.0).reshape(samples, -1)
+    basis = fit.basis
+    kept = fit.readings.keep.reshape(samples, -1).astype(float)
+    expected = -np.einsum("tri,tsi->rs", basis, basis, optimize=True)
+    free = (kept - np.sum(basis**2, axis=2)) ** 0.5
+    spread = np.sqrt((free**2).T @ free**2)
+    # products of two memories vary more
+    memory = np.repeat(noise.correlation, 3, axis=1).ravel()
+    memory = np.outer(memory, memory)
+    spread = spread * np.sqrt((1 + memory) / (1 - memory))
+    there = np.flatnonzero(kept.any(axis=0))
+    z = (flat.T @ flat - expected) / np.maximum(spread, 1e-9)
+    upper = np.triu_indices(len(there), 1)
+    values = z[np.ix_(there, there)][upper]
+    place = int(np.argmax(np.abs(values)))
+    log_p = norm.logsf(abs(values[place])) + np.log(2 * len(values))
+    imus = sorted({int(there[i[place]] // 6) for i in upper})
+    return Check(
+        "correlation between sensors", float(values[place]), float(min(log_p, 0.0)), tuple(imus)
+    )
+
+
+def noise_checks(noise: Noise, exists) -> list[Check]:
+    """Outliers and colour that are still there."""
+    triads = np.argwhere(exists)
+    tails = tail_log_p(noise)
+    worst = min(triads, key=lambda t: tails[tuple(t)])
+    lone = Check(
+        "outliers", float(noise.outliers[tuple(worst)]),
+        float(min(tails[tuple(worst)] + np.log(len(triads)), 0.0)), (int(worst[0]),),
+    )  # fmt: skip
+    found = [(int(i), float(noise.slope[i, k])) for i, k in triads]
+    return [lone, normal_checks("whiteness", found)]
+
+
+def resolution_check(fit: Fit) -> Check:
+    """Are readings coarser than their noise? The least step between values against the sd.
+
+    Of so many continuous values some two would be far nearer to each other than any step.
+    """
+    readings, worst = fit.readings, (0.0, 0)
+    for imu, kind in np.argwhere(readings.exists):
+        values = np.sort(readings.values[:, imu, 3 * kind])
+        gaps = np.diff(values)
+        gaps = gaps[gaps > SAME]
+        if len(gaps):
+            worst = max(worst, (float(gaps.min()) / readings.sd[imu, kind], int(imu)))
+    return Check("resolution", worst[0], -50.0 if worst[0] > COARSE else 0.0, (worst[1],))
+
+
+def all_checks(fit: Fit, given: Evidence, noise: Noise) -> list[Check]:
+    """Everything that is tested of a residual."""
+    return [
+        *regression_checks(fit, given, noise), *size_checks(fit), timing_check(fit),
+        jitter_check(fit), company_check(fit, noise), *noise_checks(noise, fit.readings.exists),
+        resolution_check(fit),
+    ]  # fmt: skip
+
+
+__all__ = ["Check", "all_checks", "features", "normal_checks"]

@@ -1,0 +1,192 @@
+"""Score tests: what each effect would gain, from one fit, motion and positions projected out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.special import gammaln
+from scipy.stats import chi2
+
+from imuarray.diagnosis.fit import Fit, normal
+from imuarray.diagnosis.gauges import prior_precision
+from imuarray.diagnosis.parameters import POSITION, SCANNED, Columns
+from imuarray.model import EFFECTS
+
+SEEN = 1e-5  # of a parameter's own information must survive the projection to count
+DRIFTS = {"accelerometer": 0, "gyroscope": 1}
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect on some IMUs; ``variant`` tells its forms apart (which bias drifts, how)."""
+
+    effect: str
+    imus: tuple[int, ...]
+    variant: str = ""
+    whole: bool = False  # all IMUs that can have it
+
+
+@dataclass(frozen=True)
+class Score:
+    """A candidate's test: chi-square, its degrees of freedom and log p, many tests allowed for."""
+
+    candidate: Candidate
+    statistic: float
+    freedom: int
+    log_p: float
+
+
+def log_tail(statistic, freedom) -> float:
+    """log of the chi-square's tail, also where the tail itself underflows."""
+    tail = chi2.sf(statistic, freedom)
+    if tail > 1e-280:
+        return float(np.log(tail))
+    a, x = freedom / 2, statistic / 2
+    return float((a - 1) * np.log(x) - x - gammaln(a) - np.log1p(-(a - 1) / x))
+
+
+def variants(effect: str) -> tuple[str, ...]:
+    """The forms an effect is tested in."""
+    if effect == "bias_drift":
+        return tuple(f"{kind} {form}" for kind in DRIFTS for form in ("linear", "cubic"))
+    return ("",)
+
+
+def mask_of(columns: Columns, candidate: Candidate) -> np.ndarray:
+    """The parameters (N, m) bool of a candidate."""
+    chosen = columns.of(candidate.effect)
+    if candidate.effect == "bias_drift" and candidate.variant:
+        kind, form = candidate.variant.split()
+        degree = 1 if form == "linear" else 3
+        chosen = [
+            c for c in chosen
+            if columns.places[c][0] == DRIFTS[kind] and columns.places[c][2] <= degree
+        ]  # fmt: skip
+    out = np.zeros(columns.owner.shape, bool)
+    out[np.ix_(list(candidate.imus), chosen)] = True
+    return out & columns.owner
+
+
+def candidates(columns: Columns, exists, effects) -> list[Candidate]:
+    """Every effect that a score can see, on all IMUs and on each."""
+    found = []
+    for effect in effects:
+        if effect in SCANNED:
+            continue
+        kind = EFFECTS[effect].sensors
+        able = exists.any(axis=1) if kind == "imu" else exists[:, int(kind == "gyroscope")]
+        imus = tuple(int(k) for k in np.flatnonzero(able))
+        for variant in variants(effect):
+            found.append(Candidate(effect, imus, variant, True))
+            found += [Candidate(effect, (k,), variant) for k in imus if len(imus) > 1]
+    return found
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """The quadratic form of the misfit around a fit, in all parameters at once.
+
+    ``information`` (K, K), ``score`` (K,) at the fit, ``index`` (N, m) place of each parameter
+    (-1 where there is none), ``values`` (K,) of the parameters, ``ridge`` (K,) prior precision,
+    ``precision`` (K, K) that of what is fitted, gauges pinned.
+    ``meat`` (K, K) is the score's covariance where noise is not white, else None.
+    """
+
+    information: np.ndarray
+    score: np.ndarray
+    index: np.ndarray
+    values: np.ndarray
+    ridge: np.ndarray
+    precision: np.ndarray
+    meat: np.ndarray | None = None
+
+    @cached_property
+    def scale(self) -> np.ndarray:
+        """Square roots of the parameters' own information before projection, (K,)."""
+        return np.sqrt(np.maximum(np.diag(self.information), 1e-300))
+
+    def places(self, mask) -> np.ndarray:
+        """Places of the parameters in a mask (N, m)."""
+        found = self.index[mask]
+        return found[found >= 0]
+
+    def conditional(self, active, freed=None):
+        """Information, score and score covariance of all, given the active ones refitted.
+
+        ``freed``: places of parameters set back to zero before.
+        """
+        score = self.score
+        if freed is not None and len(freed):
+            score = score + self.information[:, freed] @ self.values[freed]
+        cross = self.information[:, active]
+        inner = cross[active] + self.precision[np.ix_(active, active)]
+        gain = cross @ robust_inverse(inner)
+        left = self.information - gain @ cross.T
+        score = score - gain @ score[active]
+        if self.meat is None:
+            return left, score, left
+        side = gain @ self.meat[active]
+        meat = self.meat - side - side.T + gain @ self.meat[np.ix_(active, active)] @ gain.T
+        return left, score, meat
+
+    def test(self, conditional, chosen):
+        """(chi-square, degrees of freedom) of the parameters at ``chosen`` places."""
+        information, score, meat = conditional
+        scale = self.scale[chosen]
+        block = information[np.ix_(chosen, chosen)] / np.outer(scale, scale)
+        values, vectors = np.linalg.eigh(block)
+        # a parameter stays within its prior: near a gauge, data alone would take it anywhere
+        ridge = vectors.T @ ((self.ridge[chosen] / scale**2)[:, None] * vectors)
+        seen = values > np.maximum(SEEN, np.diag(ridge))
+        along, ridge = vectors[:, seen].T @ (score[chosen] / scale), ridge[np.ix_(seen, seen)]
+        if meat is information:
+            spread = np.diag(values[seen])
+        else:
+            spread = vectors[:, seen].T @ (meat[np.ix_(chosen, chosen)] / np.outer(scale, scale))
+            spread = spread @ vectors[:, seen]
+        return float(along @ robust_inverse(spread + ridge) @ along), int(seen.sum())
+
+
+def robust_inverse(matrix) -> np.ndarray:
+    """Inverse of a symmetric positive matrix, scaled to a unit diagonal, flat directions capped."""
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
+    return (vectors / np.maximum(values, 1e-12)) @ vectors.T / np.outer(scale, scale)
+
+
+def evidence(fit: Fit, flat, meat=None) -> Evidence:
+    """`Evidence` at a fit; ``flat`` (N, m) are the parameters' values there."""
+    owner = fit.columns.owner
+    information, score = normal(fit.residual, fit.whitened, fit.through, owner)
+    index = np.full(owner.shape, -1)
+    index[owner] = np.arange(owner.sum())
+    ridge = 1.0 / np.broadcast_to(fit.columns.prior_sd, owner.shape)[owner] ** 2
+    precision, places = np.diag(ridge), index[fit.active]
+    precision[np.ix_(places, places)] = prior_precision(fit.columns, fit.active)
+    return Evidence(information, score, index, flat[owner], ridge, precision, meat)
+
+
+def score_all(given: Evidence, fit: Fit, tried: list[Candidate], freed=()) -> list[Score]:
+    """Each candidate's score test, most telling first; the active ones but ``freed`` refitted."""
+    freed = np.asarray(freed, int)
+    active = np.setdiff1d(given.places(fit.active), freed)
+    conditional = given.conditional(active, freed)
+    found = []
+    for candidate in tried:
+        chosen = np.setdiff1d(given.places(mask_of(fit.columns, candidate)), active)
+        if not len(chosen):
+            continue
+        statistic, freedom = given.test(conditional, chosen)
+        if freedom:
+            count = 1 if candidate.whole else sum(
+                c.effect == candidate.effect and c.variant == candidate.variant for c in tried
+            ) - 1  # fmt: skip
+            forms = len(variants(candidate.effect))
+            log_p = log_tail(statistic, freedom) + np.log(2 * max(count, 1) * forms)
+            found.append(Score(candidate, statistic, freedom, min(log_p, 0.0)))
+    return sorted(found, key=lambda item: item.log_p)
+
+
+__all__ = ["POSITION", "Candidate", "Evidence", "Score", "candidates", "evidence", "score_all"]

@@ -1,0 +1,42 @@
+"""Where a fit begins: nominal positions, no effects, the motion that the readings say."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from imuarray.diagnosis.linearise import State, no_derivatives, polynomial_derivative
+from imuarray.diagnosis.parameters import Columns
+from imuarray.diagnosis.readings import Readings
+from imuarray.model.structure import design, products
+
+SMOOTH = 0.8  # correlation of omega's slope and the accelerometers' omega_dot
+
+
+def start(readings: Readings, columns: Columns) -> State:
+    """The state of no effects: omega the gyroscopes' median, omega_dot and s by least squares."""
+    positions = readings.array.relative
+    used = readings.keep[..., 3:]
+    rate = np.nanmedian(np.where(used, readings.values[..., 3:], np.nan), axis=1)
+    linear = _linear_motion(readings, positions, rate)
+    motion = np.concatenate([rate, linear], axis=1)
+    parameters = np.zeros(columns.model.effect_size)
+    return State(motion, positions, parameters, no_derivatives(len(motion), len(positions)))
+
+
+def _linear_motion(readings, positions, rate) -> np.ndarray:
+    """omega_dot and s (T, 6) of the accelerometers off their rails, given omega."""
+    count = len(positions)
+    both = design(positions)
+    force = readings.values[:, :count, :3].reshape(len(rate), -1)
+    weight = readings.weights[:, :count, :3].reshape(len(rate), -1)
+    target = weight * (force - products(rate) @ both[:, :6].T)
+    matrix = weight[..., None] * both[None, :, 6:]
+    left = np.swapaxes(matrix, 1, 2) @ matrix
+    right = np.einsum("tri,tr->ti", matrix, target)
+    return np.linalg.solve(left, right[..., None])[..., 0]
+
+
+def is_smooth(readings: Readings, motion) -> bool:
+    """Whether neighbouring samples tell the motion's derivatives: omega's slope is omega_dot."""
+    slope = polynomial_derivative(readings.time, readings.run, motion[:, :3], readings.window, 1)
+    return bool(np.corrcoef(slope.ravel(), motion[:, 3:6].ravel())[0, 1] > SMOOTH)

@@ -1,0 +1,244 @@
+"""What a diagnosis draws of one recording: what is wrong, and what its causes gain."""
+
+from __future__ import annotations
+
+import matplotlib.ticker as ticks
+import numpy as np
+import pandas as pd
+
+from imuarray.figures.blind import words
+from imuarray.figures.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    ORANGE,
+    PAGE,
+    VERMILLION,
+    new_figure,
+    styled,
+)
+from imuarray.model.effects import KINDS
+
+MODELS = {
+    "base": {"color": VERMILLION, "marker": "o"},
+    "extended": {"color": BLUE, "marker": "s"},
+}
+NAMES = {"base": "papers' model", "extended": "extended model"}
+PLAIN = 0.05  # p-value below which a mark is filled
+
+
+def plain(text) -> str:
+    """A recording's own text as matplotlib shows it: no mathematics in it."""
+    return str(text).replace("$", r"\$")
+
+
+def imu_ticks(axes, labels, most=16) -> float:
+    """IMUs along the abscissa, every n-th named where they are many; a size for their marks."""
+    step = -(-len(labels) // most)
+    places = range(0, len(labels), step)
+    axes.set_xticks(places, [plain(labels[place]) for place in places])
+    axes.grid(False, axis="x")
+    axes.set_xlabel("IMU")
+    return 5.0 if len(labels) <= most else 2.5
+
+
+def legend_above(figure, handles) -> None:
+    """One legend for all panels."""
+    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
+
+
+@styled
+def discrepancy_figure(table: pd.DataFrame, footer=()):
+    """Every check as a dot beside the band of simulations, in sds of that band; both models.
+
+    ``table``: `imuarray.report.numbers.discrepancy_table`.
+    """
+    names = list(dict.fromkeys(table.label))
+    kinds = [kind for kind in KINDS if kind in set(table.kind)]
+    figure = new_figure(footer, PAGE, 0.75 + 0.23 * len(names))
+    panels = figure.subplots(1, len(kinds), sharey=True, squeeze=False)[0]
+    for axes, kind in zip(panels, kinds, strict=True):
+        part = table[table.kind == kind]
+        _bands(axes, part[part.model == "base"], names)
+        for model, shift in (("base", -0.16), ("extended", 0.16)):
+            _dots(axes, part[part.model == model], names, shift, MODELS[model])
+        axes.set(xlabel="sds of the simulated band", ylim=(len(names) - 0.4, -0.6))
+        axes.set_title(f"{kind}s")
+        _wide_scale(axes, part.standardised)
+    panels[0].set_yticks(range(len(names)), names)
+    _discrepancy_legend(figure, panels[0])
+    return figure
+
+
+def _bands(axes, table, names):
+    for row in table.itertuples():
+        place = names.index(row.label)
+        axes.fill_between([-row.limit, row.limit], place - 0.36, place + 0.36, color="0.87", lw=0)
+    axes.axvline(0, color=BLACK, linewidth=0.5)
+
+
+def _dots(axes, table, names, shift, style):
+    for row in table.itertuples():
+        face = style["color"] if row.p_value <= PLAIN else "white"
+        axes.plot(row.standardised, names.index(row.label) + shift, linestyle="", markersize=4.5,
+                  markerfacecolor=face, **style)  # fmt: skip
+
+
+def _wide_scale(axes, values):
+    """Linear where all is near the band, else logarithmic beyond it."""
+    far = float(np.max(np.abs(values)))
+    if far < 15:
+        edge = 1.15 * max(far, 4.5)
+        low = -edge if values.min() < -3.6 else -4.5
+        axes.set_xlim(low, edge if values.max() > 3.6 else 4.5)
+        return
+    axes.set_xscale("symlog", linthresh=5, linscale=1.2)
+    powers = 10.0 ** np.arange(1, np.ceil(np.log10(far)) + 1)
+    powers = powers[:: 1 + (len(powers) > 3)]
+    low = -powers[powers <= 3 * abs(min(values.min(), 0))][::-1]
+    axes.set_xticks([*low, 0, *powers[powers <= 3 * far]])
+    axes.xaxis.set_major_formatter(ticks.FuncFormatter(lambda x, _: f"{x:,.0f}".replace("-", "−")))
+    axes.xaxis.set_minor_locator(ticks.NullLocator())
+    axes.set_xlim(min(-5, 2 * values.min()), max(5, 2 * values.max()))
+
+
+def _discrepancy_legend(figure, axes):
+    handles = [
+        axes.plot([], [], linestyle="", markersize=4.5, label=NAMES[model], **style)[0]
+        for model, style in MODELS.items()
+    ]
+    handles += axes.plot([], [], linestyle="", marker="o", color=BLACK, markerfacecolor="white",
+                         markersize=4.5, label=f"open: p > {PLAIN:g}")  # fmt: skip
+    handles.append(axes.fill_between([], [], [], color="0.87", lw=0, label="95 % of simulations"))
+    legend_above(figure, handles)
+
+
+@styled
+def residual_figure(table: pd.DataFrame, footer=()):
+    """rms residual of every IMU before and after, in declared noise sds.
+
+    ``table``: `imuarray.report.numbers.residual_table`.
+    """
+    figure = new_figure(footer, PAGE, 2.7)
+    kinds = [kind for kind in KINDS if kind in set(table.kind)]
+    panels = figure.subplots(1, len(kinds), squeeze=False)[0]
+    for axes, kind in zip(panels, kinds, strict=True):
+        part = table[table.kind == kind]
+        _residuals(axes, part)
+        axes.set_title(f"{kind}s")
+    panels[0].set_ylabel("rms residual / declared noise")
+    axes = panels[0]
+    handles = [
+        axes.plot([], [], linestyle="", markersize=5, label=NAMES[model], **style)[0]
+        for model, style in MODELS.items()
+    ]
+    handles += axes.plot([], [], "_", color=GREY, markersize=5, label="single axes")
+    handles += axes.plot([], [], "-", color=BLACK, linewidth=1.5, label="noise, extended model")
+    handles.append(axes.fill_between([], [], [], color="0.87", lw=0, label="as simulated, 95 %"))
+    legend_above(figure, handles)
+    return figure
+
+
+def _residuals(axes, table):
+    labels = list(dict.fromkeys(table.imu))
+    large = imu_ticks(axes, labels)
+    triads, single = table[table["axis"] == "all"], table[table["axis"] != "all"]
+    for row in triads[triads.model == "extended"].itertuples():
+        place = labels.index(row.imu)
+        axes.plot([place - 0.3, place + 0.3], [row.noise] * 2, color=BLACK, linewidth=1.5,
+                  solid_capstyle="butt", zorder=2)  # fmt: skip
+        axes.fill_between([place - 0.45, place + 0.45], 1 - row.half_width, 1 + row.half_width,
+                          color="0.87", lw=0)  # fmt: skip
+    for model, shift in (("base", -0.17), ("extended", 0.17)):
+        style = MODELS[model]
+        for part, size, mark in ((single, 0.7 * large, "_"), (triads, large, style["marker"])):
+            part = part[part.model == model]
+            places = np.array([labels.index(name) for name in part.imu]) + shift
+            axes.plot(places, part.rms, linestyle="", marker=mark, markersize=size,
+                      color=style["color"], zorder=3)  # fmt: skip
+    _log_scale(axes, [*table.rms, *table.noise, *(1 - triads.half_width)])
+
+
+def _log_scale(axes, values):
+    """A log axis of plain numbers, also where it spans far less than a decade."""
+    values = np.array(values)[np.isfinite(values)]
+    low, high = values.min(), values.max()
+    room = (high / low) ** 0.08
+    axes.set(yscale="log", ylim=(low / room, high * room))
+    if high / low < 8:
+        axes.yaxis.set_major_locator(ticks.MaxNLocator(5, steps=[1, 2, 5, 10]))
+        axes.yaxis.set_minor_locator(ticks.NullLocator())
+    axes.yaxis.set_major_formatter(ticks.FuncFormatter(lambda y, _: f"{y:.10g}"))
+
+
+@styled
+def gain_figure(table: pd.DataFrame, footer=()):
+    """Nats gained on held-out time by each cause in the order of adoption, and by all.
+
+    ``table``: `imuarray.report.numbers.gain_table`.
+    """
+    figure = new_figure(footer, PAGE, 0.8 + 0.25 * len(table))
+    axes = figure.subplots()
+    places = np.arange(len(table))
+    total = (table.sensors == "model").to_numpy()
+    for chosen, color in ((~total, BLUE), (total, BLACK)):
+        part = table[chosen]
+        axes.barh(places[chosen], part.gain, 0.55, color=color, alpha=0.3, lw=0)
+        axes.errorbar(part.gain, places[chosen], xerr=2 * part.se, linestyle="", marker="s",
+                      color=color, markersize=4, elinewidth=1)  # fmt: skip
+    axes.plot(table.adopted, places + 0.2, linestyle="", marker="D", color=ORANGE, markersize=4,
+              markerfacecolor="white")  # fmt: skip
+    axes.plot(table.placebo, places, linestyle="", marker="x", color=VERMILLION, markersize=5)
+    axes.axvline(0, color=BLACK, linewidth=0.6)
+    if total.any() and not total.all():
+        axes.axhline(places[total][0] - 0.5, color=BLACK, linewidth=0.6)
+    axes.set_yticks(places, [_row_name(row) for row in table.itertuples()])
+    axes.set(xlabel="nats gained on held-out time (whiskers: 2 standard errors)")
+    axes.set_ylim(len(table) - 0.5, -0.5)
+    _gain_scale(axes, table)
+    _gain_legend(figure, axes, table)
+    return figure
+
+
+def _row_name(row) -> str:
+    if row.sensors == "model":
+        return f"all, {row.what}"
+    whose = "all IMUs" if row.sensors == "all" else f"IMU {row.sensors}"
+    return f"{words(row.what)} ({plain(whose if len(whose) < 24 else f'{whose[:22]}…')})"
+
+
+def _gain_scale(axes, table):
+    # a whisker may leave the axes: a handful of wild readings has an error as large as its gain
+    ends = pd.concat([1.3 * table.gain, table.placebo, table.adopted]).dropna()
+    axes.grid(False, axis="y")
+    if ends.abs().max() < 30 * max(table.gain.abs().min(), 30):
+        axes.margins(x=0.06)
+        return
+    axes.set_xscale("symlog", linthresh=100, linscale=0.7)
+    powers = 10.0 ** np.arange(2, np.ceil(np.log10(ends.abs().max())) + 1)
+    powers = powers[:: 1 + (len(powers) > 5)]
+    low = -powers[powers <= 1.5 * abs(min(ends.min(), 0))][::-1]
+    axes.set_xticks([*low, 0, *powers])
+    axes.xaxis.set_major_formatter(ticks.FuncFormatter(_power))
+    axes.set_xlim(min(2 * ends.min(), -30), 2 * ends.max())
+
+
+def _power(value, _) -> str:
+    """'−10⁴', and small numbers as they are."""
+    if abs(value) < 1000:
+        return f"{value:.0f}".replace("-", "−")
+    digits = str(int(round(np.log10(abs(value))))).translate(
+        str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+    )
+    return f"{'−' if value < 0 else ''}10{digits}"
+
+
+def _gain_legend(figure, axes, table):
+    handles = axes.plot([], [], "s", color=BLUE, label="beside all other causes")
+    if table.adopted.notna().any():
+        handles += axes.plot([], [], "D", color=ORANGE, markerfacecolor="white",
+                             label="when it was adopted")  # fmt: skip
+    if table.placebo.notna().any():
+        handles += axes.plot([], [], "x", color=VERMILLION,
+                             label="placebo: its numbers at other IMUs")  # fmt: skip
+    legend_above(figure, handles)

@@ -1,0 +1,89 @@
+"""The extended model's positions, and which effects a recording can tell apart."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from matplotlib.colors import LinearSegmentedColormap
+
+from imuarray.diagnosis.thresholds import read_thresholds
+from imuarray.figures.blind import words
+from imuarray.figures.style import BLACK, BLUE, PAGE, VERMILLION, new_figure, styled
+from imuarray.report.drawings import MODELS, NAMES, imu_ticks, legend_above
+
+ALIKE = read_thresholds().alike  # squared correlation from which two effects are one class
+DARK = 0.75  # from which numbers are white
+
+
+@styled
+def position_figure(table: pd.DataFrame, footer=()):
+    """Where the extended model puts each triad, from where the papers' model does, with 95 %.
+
+    ``table``: `imuarray.report.numbers.position_table`.
+    """
+    figure = new_figure(footer, PAGE, 2.4)
+    panels = figure.subplots(1, 3, sharey=True)
+    labels = list(dict.fromkeys(table.imu))
+    factor, unit = (1e6, "µm") if table.change.abs().max() < 2e-3 else (1e3, "mm")
+    for axes, axis in zip(panels, "xyz", strict=True):
+        part = table[table["axis"] == axis]
+        places = np.array([labels.index(name) for name in part.imu])
+        size = imu_ticks(axes, labels, 10)
+        for model, shift, centre in (
+            ("base", -0.15, 0 * part.change),
+            ("extended", 0.15, part.change),
+        ):
+            axes.errorbar(places + shift, factor * centre, factor * 1.96 * part[f"{model}_sd"],
+                          linestyle="", markersize=0.8 * size, elinewidth=0.9, label=NAMES[model],
+                          **MODELS[model])  # fmt: skip
+        axes.axhline(0, color=BLACK, linewidth=0.5)
+        axes.set_title(axis)
+    panels[0].set_ylabel(f"change of position ({unit})")
+    legend_above(figure, panels[0].get_legend_handles_labels()[0])
+    return figure
+
+
+@styled
+def separability_figure(table: pd.DataFrame, footer=()):
+    """Matrix of squared canonical correlations: largest below the diagonal, mean above.
+
+    ``table``: `imuarray.report.numbers.separability_table`.
+    """
+    names = list(dict.fromkeys(table.effect))
+    figure = new_figure(footer, PAGE, 1.2 + 0.29 * len(names))
+    axes = figure.subplots()
+    for row in table.itertuples():
+        i, j = names.index(row.effect), names.index(row.other)
+        if i != j:
+            _cell(axes, i, j, row.largest if i > j else row.mean)
+    labels = [words(name) for name in names]
+    axes.set_yticks(range(len(names)), labels, size=7)
+    axes.set_xticks(range(len(names)), labels, size=7, rotation=60, ha="left",
+                    rotation_mode="anchor")  # fmt: skip
+    axes.xaxis.tick_top()
+    axes.plot([-0.5, len(names) - 0.5], [-0.5, len(names) - 0.5], color=BLACK, linewidth=0.8)
+    axes.set(xlim=(-0.5, len(names) - 0.5), ylim=(len(names) - 0.5, -0.5))
+    axes.grid(False)
+    axes.tick_params(length=0)
+    axes.set_xlabel("below the diagonal: the two most alike forms;  above: mean over the forms")
+    return figure
+
+
+def _shades():
+    return LinearSegmentedColormap.from_list("shades", ["white", BLUE])
+
+
+def _cell(axes, line, column, value):
+    shade = _shades()(value)
+    axes.fill_between([column - 0.5, column + 0.5], line - 0.5, line + 0.5, color=shade, lw=0)
+    one_class = value > ALIKE
+    axes.text(
+        column, line, f"{value:.2f}".replace("0.", ".").replace("1.00", "1"), size=6.5,
+        ha="center", va="center_baseline", color="white" if value > DARK else BLACK,
+        weight="bold" if one_class else "normal",
+    )  # fmt: skip
+    if one_class:
+        axes.fill_between(
+            [column - 0.46, column + 0.46], line - 0.46, line + 0.46, facecolor="none",
+            edgecolor=VERMILLION, linewidth=1.3, zorder=4,
+        )  # fmt: skip

@@ -1,0 +1,202 @@
+"""The numbers behind a diagnosis's figures, one table (a row per mark) for each of them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from scipy.stats import norm
+
+from imuarray.diagnosis.fit import flat_parameters
+from imuarray.diagnosis.noise import standardised
+from imuarray.diagnosis.scans import scan_clocks, scan_shifts
+from imuarray.diagnosis.scores import candidates, evidence, score_all
+from imuarray.diagnosis.separability import separability
+from imuarray.model.effects import KINDS
+
+if TYPE_CHECKING:
+    from imuarray.diagnosis.document import Diagnosis, Fitted
+
+BAND = norm.ppf(0.975)  # sds of a 95 % band
+# A check's name, without its kind, as a figure says it; in the order drawn.
+CHECKS = {
+    "residual": "size",
+    "residual against |omega|": "growth with |ω|",
+    "residual against |omega dot|": "growth with |dω/dt|",
+    "residual against |specific force|": "growth with |specific force|",
+    "residual against jerk": "growth with |d²ω/dt²|",
+    "residual along omega dot": "share along dω/dt",
+    "whiteness": "correlation in time",
+    "drift": "drift",
+    "kurtosis": "tails (kurtosis)",
+    "company": "correlation between IMUs",
+}
+BY_AXIS = ("residual", "drift")  # checks whose worst place is an axis, not a triad
+
+
+def imu_labels(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Labels of the N IMUs."""
+    return diagnosis.found.search.readings.labels
+
+
+def discrepancy_table(diagnosis: Diagnosis) -> pd.DataFrame:
+    """One row for each check and model: the statistic in sds of its simulated band.
+
+    ``standardised`` has the band's median as 0 and its half width as 1.96; ``limit`` is what the
+    worst of the check's n sensors reaches in 95 % of simulations, if they are independent.
+    """
+    exists = diagnosis.base.fit.readings.exists
+    rows = []
+    for model in ("base", "extended"):
+        for item in getattr(diagnosis, model).discrepancies:
+            kind, name = item.check.split(" ", 1)
+            band = item.simulated
+            far = item.statistic - band["median"]
+            edge = (band["q975"] - band["q025"]) / 2
+            number = exists[:, KINDS.index(kind)].sum() * (3 if name in BY_AXIS else 1)
+            rows.append({
+                "model": model, "kind": kind, "check": name, "label": CHECKS.get(name, name),
+                "statistic": item.statistic, "q025": band["q025"], "q975": band["q975"],
+                "standardised": BAND * far / max(edge, 1e-300),
+                "limit": norm.isf((1 - 0.95 ** (1 / number)) / 2), "p_value": item.p_value,
+            })  # fmt: skip
+    table = pd.DataFrame(rows)
+    order = {name: place for place, name in enumerate(CHECKS)}
+    return table.sort_values(
+        "check", key=lambda names: names.map(order).fillna(len(order)), kind="stable"
+    ).reset_index(drop=True)
+
+
+def residual_table(diagnosis: Diagnosis) -> pd.DataFrame:
+    """One row for each model, IMU, kind and axis ("all": the triad): rms in declared noise sds.
+
+    ``noise`` is the extended model's own noise sd in that unit, ``half_width`` that of the 95 %
+    band of white noise of the declared size.
+    """
+    noise = diagnosis.found.search.readings
+    rows = []
+    for model in ("base", "extended"):
+        made = getattr(diagnosis, model).fit
+        readings = made.readings
+        unit = standardised(made) * np.repeat(readings.sd / readings.declared, 3, axis=1)
+        for imu, kind in np.argwhere(readings.exists):
+            triad = unit[:, imu, 3 * kind : 3 * kind + 3]
+            count = max(int(np.isfinite(triad).sum()), 1)
+            shared = {
+                "model": model, "kind": KINDS[kind], "imu": readings.labels[imu],
+                "noise": noise.sd[imu, kind] / noise.declared[imu, kind],
+            }  # fmt: skip
+            parts = {"all": triad, **dict(zip("xyz", triad.T, strict=True))}
+            for axis, part in parts.items():
+                size = float(np.sqrt(np.nanmean(part**2))) if np.isfinite(part).any() else np.nan
+                spread = BAND / np.sqrt(2 * count / (1 if axis == "all" else 3))
+                rows.append(shared | {"axis": axis, "rms": size, "half_width": spread})
+    return pd.DataFrame(rows)
+
+
+def gain_table(diagnosis: Diagnosis) -> pd.DataFrame:
+    """One row for each cause in the order of adoption, and for the whole model; nats.
+
+    ``adopted`` is the gain when a cause was adopted, with those before it alone; ``placebo`` what
+    its numbers gain when they are given to other IMUs.
+    """
+    document = diagnosis.document
+    first = {rung.effect: rung.gain for rung in reversed(diagnosis.found.search.trace)}
+    rows = []
+    for cause in document["causes"]:
+        lone = cause["effect"] == "sensor_clock" and len(cause["sensors"]) == 1
+        lone &= cause["sensors"] != ["all"]
+        # a lone clock's ages have no other to go to
+        placebo = np.nan if lone else cause.get("placebo_gain_nats", np.nan)
+        rows.append({
+            "what": cause["effect"], "sensors": ", ".join(cause["sensors"]),
+            "gain": cause["heldout_gain_nats"], "se": cause["heldout_gain_se"],
+            "adopted": first.get(cause["effect"], np.nan), "placebo": placebo,
+        })  # fmt: skip
+    gain, samples = document["gain"], document["samples"]
+    for key, what in (
+        ("heldout_log_score_nats_per_sample", "over the declared noise"),
+        ("over_inflated_noise_nats_per_sample", "over inflated noise"),
+    ):
+        rows.append({
+            "what": what, "sensors": "model", "gain": samples * gain[key],
+            "se": samples * gain[f"{key}_se"], "adopted": np.nan, "placebo": np.nan,
+        })  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def position_table(diagnosis: Diagnosis) -> pd.DataFrame:
+    """One row for each triad but the reference: positions and sds of both models, m."""
+    names, rows = imu_labels(diagnosis), []
+    base, extended = diagnosis.document["base"], diagnosis.document["extended"]
+    for number, label in enumerate(names[: len(base["positions_m"])]):
+        if not any(base["positions_sd_m"][number]):
+            continue  # the reference, the origin
+        for i, axis in enumerate("xyz"):
+            rows.append({
+                "imu": label, "axis": axis,
+                "base": base["positions_m"][number][i],
+                "base_sd": base["positions_sd_m"][number][i],
+                "extended": extended["positions_m"][number][i],
+                "extended_sd": extended["positions_sd_m"][number][i],
+            })  # fmt: skip
+    table = pd.DataFrame(rows)
+    return table.assign(change=table.extended - table.base)
+
+
+def separability_table(diagnosis: Diagnosis) -> pd.DataFrame:
+    """One row for each pair of effects: the largest and the mean squared canonical correlation."""
+    search = diagnosis.found.search
+    found = separability(search.given, search.fit, [(c.effect, c.imus) for c in search.causes])
+    pairs = [(i, j) for i in range(len(found.effects)) for j in range(len(found.effects))]
+    return pd.DataFrame({
+        "effect": [found.effects[i] for i, _ in pairs],
+        "other": [found.effects[j] for _, j in pairs],
+        "largest": found.largest.ravel(), "mean": found.mean.ravel(),
+    })  # fmt: skip
+
+
+def score_table(diagnosis: Diagnosis) -> pd.DataFrame:
+    """The most telling test of each effect at the papers' model, before any cause is adopted.
+
+    ``log10_p`` allows for its IMUs and forms; ``limit`` is the critical value.
+    """
+    search, made = diagnosis.found.search, diagnosis.found.base
+    given = evidence(made, flat_parameters(made.columns, made.state))
+    exists = made.readings.exists
+    scores = score_all(given, made, candidates(made.columns, exists, search.effects))
+    both = [int(k) for k in np.flatnonzero(exists.all(axis=1))]
+    if "sensor_clock" in search.effects and both:
+        delays = {
+            s.candidate.imus: s.statistic for s in scores if s.candidate.effect == "sensor_delay"
+        }
+        scores += [found.score for found in scan_clocks(made, both, delays)]
+    if "position_shift" in search.effects:
+        imus = [int(k) for k in np.flatnonzero(exists[:, 0])]
+        scores += [found.score for found in scan_shifts(made, given, imus)]
+    best = {}
+    for score in sorted(scores, key=lambda item: item.log_p):
+        best.setdefault(score.candidate.effect, score)
+    adopted = {cause.effect for cause in search.causes}
+    return pd.DataFrame([
+        {
+            "effect": effect, "form": score.candidate.variant,
+            "imus": "all" if len(score.candidate.imus) == len(exists)
+            else ", ".join(made.readings.labels[k] for k in score.candidate.imus),
+            "statistic": score.statistic, "freedom": score.freedom,
+            "log10_p": score.log_p / np.log(10),
+            "limit": search.thresholds.limit(effect) / np.log(10), "adopted": effect in adopted,
+        }
+        for effect, score in best.items()
+    ])  # fmt: skip
+
+
+def in_noise_sds(fitted: Fitted) -> dict[str, float]:
+    """rms of the residual over the declared noise, by kind: 1 where the noise is as declared."""
+    readings = fitted.fit.readings
+    unit = standardised(fitted.fit) * np.repeat(readings.sd / readings.declared, 3, axis=1)
+    return {
+        name: float(np.sqrt(np.nanmean(unit[:, :, 3 * kind : 3 * kind + 3] ** 2)))
+        for kind, name in enumerate(KINDS) if readings.exists[:, kind].any()
+    }  # fmt: skip

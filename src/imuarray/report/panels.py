@@ -1,0 +1,245 @@
+"""The numbers behind a cause's figure: an added-variable plot, and panels of its own physics."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from imuarray.diagnosis.parameters import POSITION
+from imuarray.diagnosis.scans import delay_score
+from imuarray.diagnosis.scores import robust_inverse
+from imuarray.model.effects import KINDS
+from imuarray.model.names import component
+from imuarray.model.timing import clock_turns
+from imuarray.recording.validate import AXES
+from imuarray.report.signals import BINS, Signal, binned, signal_of
+
+if TYPE_CHECKING:
+    from imuarray.diagnosis.document import Diagnosis
+
+PANELS = 3  # special drawings of a cause
+VAGUE = 12.0  # times the best block's sd, from which a block tells nothing of a position
+BLOCKS = 12  # of time, in which a position is estimated again
+IN_TIME = ("accelerometer_bias", "gyroscope_bias", "bias_drift")
+DELAYS = ("gyroscope_delay", "sensor_delay")
+# From SI to what the figures show, and its unit; the smaller unit for small signals.
+FORCE = ((1.0, "m/s²"), (1e3, "mm/s²"))
+RATE = ((np.degrees(1.0), "deg/s"), (1e3 * np.degrees(1.0), "10⁻³ deg/s"))
+
+
+def cause_table(diagnosis: Diagnosis, cause) -> pd.DataFrame:
+    """All marks of a cause's figure: ``panel``, its texts, ``series``, x, y, se and ``model``.
+
+    The first panel is the added-variable plot (in noise sds, every reading that the cause
+    touches), the others show the cause beside what it depends on.
+    """
+    signal = signal_of(diagnosis, cause)
+    frames = [added_variable(signal)]
+    if cause.effect == "sensor_clock":
+        frames += clock_panels(signal)
+    elif cause.effect == "position_shift":
+        frames += shift_panels(signal)
+    elif cause.effect in DELAYS:
+        frames += delay_panels(signal)
+    elif cause.effect in IN_TIME:
+        frames += time_panels(signal)
+    else:
+        frames += parameter_panels(signal)
+    frames = [frame for frame in frames if len(frame)]
+    for number, frame in enumerate(frames):
+        frame.insert(0, "panel", number)
+    return pd.concat(frames, ignore_index=True)
+
+
+def added_variable(signal: Signal) -> pd.DataFrame:
+    """Residual and signal against the signal, each kind of sensor for itself, in noise sds."""
+    frames = []
+    for kind, name in enumerate(("accelerometers", "gyroscopes")):
+        part = (slice(None), list(signal.imus), slice(3 * kind, 3 * kind + 3))
+        own = np.any(signal.made.whitened[part][..., signal.mask.any(axis=0)] != 0, axis=-1)
+        if not own.any():
+            continue
+        total, explained = np.where(own, signal.total[part], np.nan), signal.explained[part]
+        width = np.broadcast_to(signal.width[part[1:]], explained.shape)
+        frames.append(
+            binned(*(v.ravel() for v in (explained, total, explained, width))).assign(series=name)
+        )
+    return labelled(
+        pd.concat(frames, ignore_index=True), "all readings it touches",
+        "predicted (noise sds)", "seen without it (noise sds)",
+    )  # fmt: skip
+
+
+def labelled(frame, title, x_label, y_label) -> pd.DataFrame:
+    """The frame with its panel's texts."""
+    return frame.assign(title=title, x_label=x_label, y_label=y_label)
+
+
+def unit_of_axis(values, axis: int) -> tuple[float, str]:
+    """(factor, unit) in which an SI signal (its bins' values) of axis 0 ... 5 is legible."""
+    units = RATE if axis >= 3 else FORCE
+    large = np.max(np.abs(values), initial=0.0) * units[0][0]
+    return units[0] if large >= 0.1 else units[1]
+
+
+def axis_panel(signal: Signal, imu, axis, x, title, x_label, series="") -> pd.DataFrame:
+    """One reading axis of an IMU, in physical units, binned over x (T,)."""
+    sd = signal.made.readings.sd[imu, axis // 3]
+    found = binned(
+        x, signal.total[:, imu, axis], signal.explained[:, imu, axis], signal.width[imu, axis]
+    )
+    if not len(found):
+        return found
+    factor, unit = unit_of_axis(sd * found[["y", "model"]].to_numpy(), axis)
+    found[["y", "se", "model"]] *= factor * sd
+    kind = "gyroscope" if axis >= 3 else "accelerometer"
+    whose = f"{kind} {signal.made.readings.labels[imu]}, {AXES[axis % 3]}"
+    return labelled(found.assign(series=series), f"{whose}{title}", x_label, f"deviation ({unit})")
+
+
+def time_panels(signal: Signal) -> list[pd.DataFrame]:
+    """An offset or a drift: the deviation of the axes with the largest signal against time."""
+    power = np.where(np.isfinite(signal.total), signal.explained, 0.0) ** 2
+    power = power.sum(axis=0)
+    power[np.setdiff1d(np.arange(len(power)), signal.imus)] = 0.0
+    if signal.effect != "bias_drift":
+        kind = int(signal.effect.startswith("gyroscope"))
+        power[:, 3 - 3 * kind : 6 - 3 * kind] = 0.0
+    best = np.sort(np.argsort(power, axis=None)[::-1][:PANELS])
+    return [
+        axis_panel(signal, *np.unravel_index(place, power.shape), signal.made.readings.time,
+                   "", "time (s)")
+        for place in best if power.ravel()[place] > 0
+    ]  # fmt: skip
+
+
+def strongest(signal: Signal) -> list[tuple[int, int]]:
+    """(imu, column) of the free parameters that are most sds from zero."""
+    ratio = np.abs(signal.flat) / np.where(signal.sds > 0, signal.sds, np.inf)
+    ratio = np.where(signal.mask, ratio, 0.0)
+    best = np.sort(np.argsort(ratio, axis=None)[::-1][:PANELS])
+    return [tuple(map(int, np.unravel_index(place, ratio.shape))) for place in best
+            if ratio.ravel()[place] > 0]  # fmt: skip
+
+
+def parameter_panels(signal: Signal) -> list[pd.DataFrame]:
+    """The most certain parameters, each axis's deviation against what the parameter multiplies."""
+    made, panels = signal.made, []
+    for imu, column in strongest(signal):
+        derivative = made.whitened[:, imu, :, column]
+        axis = int(np.argmax(np.sum(derivative**2, axis=0)))
+        x = derivative[:, axis] * made.readings.sd[imu, axis // 3]
+        name = component(signal.effect, made.columns.places[column])
+        factor, label, root = abscissa(signal.effect, name)
+        x = factor * (x if not root else own_reading(signal, imu, axis))
+        panels.append(axis_panel(signal, imu, axis, x, f" ({name})" * (len(name) > 1), label))
+    return panels
+
+
+ROOTS = ("bias", "scale", "misalignment", "nonlinearity")
+DRAWN = {"size_effect", "gyroscope_g_sensitivity"} | {f"{k}_{r}" for k in KINDS for r in ROOTS}
+
+
+def abscissa(effect: str, name: str) -> tuple[float, str, bool]:
+    """(factor, label, whether it is the reading itself) of what a parameter multiplies."""
+    if effect not in DRAWN:  # somebody's own
+        return 1.0, "reading per unit parameter", False
+    along_axis = name[-1]
+    if effect == "size_effect":
+        return 1e-3, f"lever arm {along_axis} (m/s² per mm)", False
+    if effect.startswith("accelerometer") or effect == "gyroscope_g_sensitivity":
+        return 1.0, f"specific force {along_axis} (m/s²)", effect.endswith("nonlinearity")
+    return np.degrees(1.0), f"angular rate {along_axis} (deg/s)", effect.endswith("nonlinearity")
+
+
+def own_reading(signal: Signal, imu, axis) -> np.ndarray:
+    """(T,) the reading that a curved response bends, SI units."""
+    return signal.made.readings.values[:, imu, axis]
+
+
+def delay_panels(signal: Signal) -> list[pd.DataFrame]:
+    """Delays: the gyroscope's deviation along domega/dt against its size."""
+    made = signal.made
+    turn = made.state.motion[:, 3:6]
+    size = np.linalg.norm(turn, axis=1)
+    way = turn / np.maximum(size, 1e-12)[:, None]
+    panels = []
+    for imu, _ in strongest(signal):
+        if not made.readings.exists[imu, 1]:
+            continue
+        sd = made.readings.sd[imu, 1]
+        parts = (np.sum(v[:, imu, 3:] * way, axis=1) for v in (signal.total, signal.explained))
+        found = binned(size, *parts, signal.width[imu, 3:].mean())
+        factor, unit = unit_of_axis(sd * found[["y", "model"]].to_numpy(), 3)
+        found[["y", "se", "model"]] *= factor * sd
+        panels.append(labelled(
+            found.assign(series=""), f"gyroscope {made.readings.labels[imu]}, along dω/dt",
+            "|dω/dt| (rad/s²)", f"deviation ({unit})",
+        ))  # fmt: skip
+    return panels
+
+
+def clock_panels(signal: Signal) -> list[pd.DataFrame]:
+    """Clocks: the readings' age, from each sample alone, against the place in the sawtooth."""
+    made, panels = signal.made, []
+    clocks = made.columns.model.split(np.asarray(made.state.parameters))["sensor_clock"]
+    score, information = delay_score(made)
+    for imu in sorted(signal.imus, key=lambda k: -abs(clocks[k][0]))[:PANELS]:
+        period, frequency, _, offset, _ = map(float, clocks[imu])
+        turns = clock_turns(clocks[imu], made.readings.time, made.readings.span)
+        part = (turns - np.floor(turns)) if frequency > 0 else 1 - (turns - np.floor(turns))
+        age = offset + period * (turns - np.floor(turns) - 0.5)
+        place = np.clip((part * 2 * BINS).astype(int), 0, 2 * BINS - 1)
+        weight = np.bincount(place, information[:, imu], 2 * BINS)
+        some = weight > 1e-100
+        means = [
+            np.bincount(place, information[:, imu] * v, 2 * BINS)[some] / weight[some]
+            for v in (part, age - score[:, imu] / information[:, imu], age)
+        ]
+        frame = pd.DataFrame({
+            "x": 1e3 * means[0] / abs(frequency), "y": 1e3 * means[1],
+            "se": 1e3 / np.sqrt(weight[some]), "model": 1e3 * means[2], "series": "",
+        })  # fmt: skip
+        frame = pd.concat([frame, frame.assign(x=frame.x + 1e3 / abs(frequency))])
+        panels.append(labelled(
+            frame, f"IMU {made.readings.labels[imu]}, {abs(frequency):.4g} Hz",
+            "time mod 1/f, twice (ms)", "age of a reading (ms)",
+        ))  # fmt: skip
+    return panels
+
+
+def shift_panels(signal: Signal) -> list[pd.DataFrame]:
+    """A triad that moved: its position in blocks of time, from the residual without the step."""
+    made, panels = signal.made, []
+    chosen = made.columns.of(POSITION)
+    edges = np.linspace(0, len(made.residual), BLOCKS + 1).astype(int)
+    for imu in signal.imus[:1]:
+        found = [position_of_block(signal, imu, chosen, slice(a, b))
+                 for a, b in zip(edges[:-1], edges[1:], strict=True)]  # fmt: skip
+        for axis in range(3):
+            frame = pd.DataFrame(
+                [(t, *(value[axis] for value in values)) for t, *values in found],
+                columns=["x", "y", "se", "model"],
+            ).assign(series="")
+            frame = frame[frame.se < VAGUE * frame.se.min()]
+            large = frame[["y", "model"]].abs().to_numpy().max() >= 1e-3
+            factor, unit = (1e3, "mm") if large else (1e6, "µm")
+            frame[["y", "se", "model"]] *= factor
+            title = f"IMU {made.readings.labels[imu]}, position {AXES[axis]}"
+            panels.append(labelled(frame, title, "time (s)", f"from the mean ({unit})"))
+    return panels
+
+
+def position_of_block(signal: Signal, imu, chosen, part):
+    """(mean time, offset (3,) m, its sd, the same of the step alone) over some samples."""
+    made = signal.made
+    own = made.whitened[part, imu][..., chosen].reshape(-1, 3)
+    through = made.through[part, imu][..., chosen].reshape(-1, 3)
+    inverse = robust_inverse(own.T @ own - through.T @ through)
+    seen, step = (
+        inverse @ (own.T @ np.nan_to_num(values[part, imu]).ravel())
+        for values in (signal.total, signal.explained)
+    )
+    return float(made.readings.time[part].mean()), seen, np.sqrt(np.diag(inverse)), step

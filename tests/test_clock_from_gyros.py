@@ -1,0 +1,70 @@
+"""Clocks wound by the gyroscopes alone, where the motion is too rough for its samples."""
+
+import numpy as np
+import pytest
+
+from imuarray.diagnosis.clock_from_gyros import Gyroscopes, ages_of, moved, wind
+from imuarray.model.timing import clock_turns
+
+PERIOD, SPAN, NOISE = 1e-3, 90.0, 0.004
+
+
+class Rough:
+    """Eight gyroscopes at 62.5 Hz whose motion is white from sample to sample."""
+
+    def __init__(self, seed, samples=3000, wrong=0.02):
+        rng = np.random.default_rng(seed)
+        self.time = np.sort(rng.choice(int(62.5 * SPAN), samples, replace=False)) / 62.5
+        self.span, self.keep = SPAN, np.ones((samples, 8, 6), bool)
+        self.clocks = np.column_stack([
+            np.full(8, PERIOD), rng.uniform(-3, 3, 8), rng.uniform(0, 1, 8), np.zeros(8),
+            rng.normal(0, 1e-4, 8) + 2e-4,
+        ])  # fmt: skip
+        rate, self.turn = rng.normal(0, 15, (samples, 3)), rng.normal(0, 400, (samples, 3))
+        # half of what the accelerometers see turning is what the gyroscopes see, as strong
+        self.turning = (self.turn + rng.normal(0, 400, (samples, 3))) / np.sqrt(2)
+        ages = PERIOD * (np.mod(clock_turns(self.clocks.T, self.time[:, None], SPAN), 1) - 0.5)
+        ages += PERIOD * rng.choice([-1, 0, 1], ages.shape, p=[wrong / 2, 1 - wrong, wrong / 2])
+        maps = np.eye(3) + rng.normal(0, 0.01, (8, 3, 3))
+        seen = rate[:, None] - ages[..., None] * self.turn[:, None]
+        readings = np.einsum("kij,tkj->tki", maps, seen) + rng.normal(0, 0.01, (8, 3))
+        self.values = np.zeros((samples, 8, 6))
+        self.values[..., 3:] = readings + rng.normal(0, NOISE, readings.shape)
+
+    def guesses(self, rng):
+        """First guesses a little off, without drift."""
+        off = self.clocks.copy()
+        # the tangent of a drift in the middle is its rate there: none
+        off[:, 4] = 0.0
+        off[:, 2] += clock_turns(self.clocks.T, SPAN / 2, SPAN) - clock_turns(off.T, SPAN / 2, SPAN)
+        off[:, 2] += rng.uniform(-0.06, 0.06, 8)
+        off[:, 0] *= rng.uniform(0.6, 1.2, 8)
+        return dict(enumerate(off))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_phases_rates_drifts_and_the_period_are_found(seed):
+    there = Rough(seed)
+    found = wind(there, there.turning, there.guesses(np.random.default_rng(seed)))
+    clocks = np.array([found[imu] for imu in range(8)])
+    exact = clock_turns(there.clocks.T, there.time[:, None], SPAN)
+    off = clock_turns(clocks.T, there.time[:, None], SPAN) - exact
+    off -= np.round(off)
+    assert np.abs(off).max() < 0.03
+    # strengths as equal as the draw makes them
+    assert clocks[:, 0] == pytest.approx(PERIOD, rel=0.03)
+
+
+def test_with_true_ages_only_noise_is_left():
+    there = Rough(3, wrong=0.0)
+    maps = np.tile(np.eye(4)[:3], (8, 1, 1))
+    seen = Gyroscopes(there.time, SPAN, there.values[..., 3:], there.turning)
+    ages = ages_of(there.clocks, seen)
+    bare = there.values[..., 3:]
+    motion, left = moved(seen, maps, ages, np.ones(ages.shape))
+    # the oracle: ordinary least squares of each axis over the ages, sample by sample
+    design = np.stack([np.ones(8), -ages[100]], axis=1)
+    expected = np.linalg.lstsq(design, bare[100], rcond=None)[0]
+    np.testing.assert_allclose(motion[100].reshape(2, 3), expected, rtol=0.02, atol=0.02)
+    # two of eight readings are used up; the maps' own percent of the rate is left in this test
+    assert np.sqrt(np.mean(left**2)) < 0.01 * 15 * np.sqrt(3)

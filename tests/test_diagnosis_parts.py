@@ -1,0 +1,307 @@
+"""The parts of a diagnosis, each against a slow and obvious oracle."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+from scipy.sparse import lil_matrix
+from scipy.stats import chi2
+
+from imuarray.blind import Case
+from imuarray.blind.cases import make
+from imuarray.diagnosis import noise as noises
+from imuarray.diagnosis import noise_effects as variance
+from imuarray.diagnosis.fit import Fit, fit, flat_parameters, from_flat, normal
+from imuarray.diagnosis.gauges import prior_precision
+from imuarray.diagnosis.heldout import edges_of, log_scores
+from imuarray.diagnosis.linearise import linearise
+from imuarray.diagnosis.parameters import catalogue_effects, columns_of
+from imuarray.diagnosis.readings import LEAST, arrange, part_of
+from imuarray.diagnosis.replicates import Replicator, discrepancies
+from imuarray.diagnosis.scans import sawtooth
+from imuarray.diagnosis.scores import candidates, evidence, log_tail, mask_of, score_all
+from imuarray.diagnosis.start import start
+from imuarray.diagnosis.state import Search
+from imuarray.diagnosis.thresholds import read_thresholds
+from imuarray.errors import InputError
+
+SHORT = 4.0  # s
+
+
+def begun(case, seed=1):
+    """A search with the papers' model fitted, on a case's recording."""
+    recording, truth = make(case, seed)
+    readings = arrange(recording)
+    effects = catalogue_effects()
+    columns = columns_of(readings.array, effects, readings.position_prior_sd)
+    search = Search(readings, columns, effects, read_thresholds(), lambda text: None)
+    search.begin()
+    return search, truth
+
+
+@pytest.fixture(scope="module")
+def clean():
+    return begun(Case("criticism-clean", duration=SHORT))[0]
+
+
+@pytest.fixture(scope="module")
+def scaled():
+    """Gyroscope 3 scaled, 12 sigma."""
+    case = Case("criticism", (("gyroscope_scale", (2,)),), 12.0, kind="one", duration=SHORT)
+    return begun(case)[0]
+
+
+def ridge_of(made: Fit):
+    return prior_precision(made.columns, made.active)
+
+
+def test_derivatives_are_those_of_finite_differences(clean):
+    """Prediction by motion, positions and every effect, at values that are not zero."""
+    columns, readings = clean.columns, clean.readings
+    rng, state = np.random.default_rng(5), clean.fit.state
+    whole = flat_parameters(columns, state)
+    whole += 0.1 * rng.standard_normal(whole.shape) * columns.prior_sd * columns.owner
+    whole[0, :3] = 0.0
+    state = from_flat(columns, state, whole)
+
+    def residual(state, wanted=(0,)):
+        # the motion's share would hide it: readings less prediction, whitened
+        seen = linearise(readings, columns, state, wanted)
+        left = seen.residual.reshape(len(seen.residual), -1)
+        return left + np.einsum("tri,ti->tr", seen.basis, seen.taken), seen
+
+    here, seen = residual(state, None)
+    imu = 3
+    for column in range(columns.size):
+        if not columns.owner[imu, column]:
+            continue
+        step = 1e-5 * columns.prior_sd[column]
+        moved = []
+        for sign in (1, -1):
+            other = whole.copy()
+            other[imu, column] += sign * step
+            moved.append(residual(from_flat(columns, state, other))[0])
+        slope = -(moved[0] - moved[1]).reshape(len(here), -1, 6)[:, imu] / (2 * step)
+        wanted = seen.whitened[:, imu, :, column]
+        scale = np.abs(wanted).max() + 1e-12
+        assert np.abs(slope - wanted).max() < 2e-5 * scale, (columns.names[column], column)
+
+
+def test_fit_equals_least_squares_over_everything_at_once():
+    """Motion and positions of 40 samples, priors included, by scipy."""
+    recording, _ = make(Case("criticism-small", duration=SHORT), 2)
+    readings = arrange(recording)
+    readings = part_of(readings, 200)
+    columns = columns_of(readings.array, (), readings.position_prior_sd)
+    active = columns.owner.copy()
+    first = start(readings, columns)
+    made = fit(readings, columns, active, first, smooth=False)
+    samples = len(readings.time)
+    nominal = readings.array.relative[1:]
+
+    def cost(flat):
+        motion, places = flat[: 9 * samples].reshape(samples, 9), flat[9 * samples :]
+        positions = np.vstack([np.zeros(3), places.reshape(-1, 3)])
+        w, a, s = motion[:, None, :3], motion[:, None, 3:6], motion[:, None, 6:]
+        force = np.cross(w, np.cross(w, positions)) + np.cross(a, positions) + s
+        both = np.concatenate([force, np.broadcast_to(w, force.shape)], axis=2)
+        prior = (places - nominal.ravel()) / readings.position_prior_sd
+        return np.concatenate([(readings.weights * (readings.values - both)).ravel(), prior])
+
+    # near the optimum: the oracle has 9 T + 21 unknowns and no structure
+    begin = np.concatenate([made.state.motion.ravel(), made.state.positions[1:].ravel()])
+    begin[9 * samples :] += 1e-5
+    pattern = jacobian_pattern(samples, len(nominal) + 1)
+    found = least_squares(
+        cost, begin, jac_sparsity=pattern, x_scale="jac", xtol=1e-13, ftol=1e-13, max_nfev=40
+    )
+    places = found.x[9 * samples :].reshape(-1, 3)
+    sds = np.sqrt(np.diag(np.linalg.inv(information_of(made))))
+    away = (made.state.positions[1:] - places).ravel() / sds
+    assert np.abs(away).max() < 0.05
+    offset = (made.state.positions[1:] - nominal) / readings.position_prior_sd
+    assert made.misfit + np.sum(offset**2) == pytest.approx(2 * found.cost, rel=1e-5)
+
+
+def jacobian_pattern(samples, count):
+    rows = 6 * count
+    pattern = lil_matrix((samples * rows + 3 * (count - 1), 9 * samples + 3 * (count - 1)))
+    for t in range(samples):
+        pattern[t * rows : (t + 1) * rows, 9 * t : 9 * t + 9] = 1
+        pattern[t * rows : (t + 1) * rows, 9 * samples :] = 1
+    pattern[samples * rows :, 9 * samples :] = 1
+    return pattern
+
+
+def information_of(made):
+    given = evidence(made, flat_parameters(made.columns, made.state))
+    places = given.places(made.active)
+    return given.information[np.ix_(places, places)] + ridge_of(made)
+
+
+def test_a_score_is_what_a_refit_gains(scaled):
+    """Chi-square from one fit of the papers' model against the drop in misfit of a refit."""
+    tried = candidates(scaled.columns, scaled.readings.exists, scaled.effects)
+    scores = {
+        (s.candidate.effect, s.candidate.imus): s
+        for s in score_all(scaled.given, scaled.fit, tried)
+    }
+    for effect, imu in (("gyroscope_scale", 2), ("accelerometer_bias", 4), ("gyroscope_delay", 6)):
+        score = scores[effect, (imu,)]
+        active = scaled.active | mask_of(scaled.columns, score.candidate)
+        made = fit(scaled.readings, scaled.columns, active, scaled.fit.state, scaled.smooth)
+        gained = objective(scaled.fit) - objective(made)
+        assert score.statistic == pytest.approx(gained, rel=0.05, abs=0.3), effect
+    assert scores["gyroscope_scale", (2,)].statistic > 100
+
+
+def objective(made):
+    """Misfit and priors."""
+    values = flat_parameters(made.columns, made.state)
+    nominal = np.zeros_like(values)
+    nominal[: len(made.state.positions), :3] = made.readings.array.relative
+    away = ((values - nominal) / made.columns.prior_sd)[made.active]
+    return made.misfit + np.sum(away**2)
+
+
+def test_scores_of_a_clean_recording_are_chi_square(clean):
+    tried = candidates(clean.columns, clean.readings.exists, clean.effects)
+    scores = score_all(clean.given, clean.fit, [c for c in tried if not c.whole])
+    p = np.array([chi2.sf(s.statistic, s.freedom) for s in scores])
+    assert len(p) > 80
+    assert 0.3 < p.mean() < 0.7
+    assert min(s.log_p for s in scores) > read_thresholds().effect
+
+
+def test_log_tail_goes_on_where_the_tail_underflows():
+    for freedom in (1, 3, 24):
+        x = chi2.isf(1e-200, freedom)
+        assert log_tail(x, freedom) == pytest.approx(np.log(1e-200), rel=1e-6)
+        near, far = log_tail(1290.0 + freedom, freedom), log_tail(1310.0 + freedom, freedom)
+        assert near - far == pytest.approx(10.0, rel=0.05)
+
+
+def test_heldout_scores_are_those_of_refits_without_each_block(clean):
+    """Parameters trained on nine tenths of time, the last tenth's density from its own misfit."""
+    made = clean.fit
+    scores = log_scores(made, ridge_of(made))
+    edges = edges_of(len(made.residual))
+    for block in (0, 5):
+        inside = np.zeros(len(made.residual), bool)
+        inside[edges[block] : edges[block + 1]] = True
+        whole = [made.residual, made.whitened, made.through]
+        information, score = normal(*(part[~inside] for part in whole), made.active)
+        values = flat_parameters(made.columns, made.state)[made.active]
+        offset = values - nominal_of(made)[made.active]
+        step = np.linalg.solve(information + ridge_of(made), score - ridge_of(made) @ offset)
+        flat = flat_parameters(made.columns, made.state)
+        flat[made.active] += step
+        state = from_flat(made.columns, made.state, flat)
+        moved = fit(clean.readings, clean.columns, np.zeros_like(made.active), state, clean.smooth)
+        difference = -(moved.misfits[inside].sum() - made.misfits[inside].sum()) / 2
+        own = scores.nats[block] + made.misfits[inside].sum() / 2 + constants(made, inside)
+        assert own == pytest.approx(difference, abs=0.2)
+
+
+def nominal_of(made):
+    out = np.zeros(made.active.shape)
+    out[: len(made.state.positions), :3] = made.readings.array.relative
+    return out
+
+
+def constants(made, inside):
+    keep = made.readings.keep[inside]
+    logs = np.where(keep, np.repeat(np.log(made.readings.sd), 3, axis=1), 0.0).sum()
+    many = keep.sum() - 9 * inside.sum()
+    return logs + made.log_volume[inside].sum() / 2 + np.log(2 * np.pi) / 2 * many
+
+
+def test_noise_scales_are_unbiased_with_the_errors_they_claim(clean):
+    """The residual of replicates, refitted: z of the log ratios has mean 0 and sd 1."""
+    replicator = Replicator(clean.fit, ridge_of(clean.fit))
+    rng, z = np.random.default_rng(8), []
+    for _ in range(12):
+        drawn = replace(clean.fit, residual=replicator.draw(rng))
+        log_ratio, covariance = variance.whole_scales(drawn)
+        z.append(log_ratio / np.sqrt(np.diag(covariance)))
+    z = np.array(z)
+    assert abs(z.mean()) < 0.3
+    assert 0.8 < z.std() < 1.2
+
+
+def test_a_noisy_triad_is_found_and_the_others_are_not():
+    case = Case("criticism-noise", (("accelerometer_noise", (5,)),), 12.0, kind="one",
+                duration=SHORT)  # fmt: skip
+    search, truth = begun(case)
+    named = variance.noise_scale(search.fit, search.noise, 0, -7.5, np.zeros(8))
+    assert named.imus == (5,)
+    ratio, error, _ = named.parameters["ratio_6"]
+    factor = truth.effects[0]["parameters"]["factor"]["value"][0]
+    assert abs(ratio - factor) < 4 * error
+    assert variance.noise_scale(search.fit, search.noise, 1, -7.5, np.zeros(8)) is None
+
+
+def test_fast_part_passes_white_noise_and_stops_what_is_smooth():
+    rng = np.random.default_rng(3)
+    run = np.repeat([0, 1], 500)
+    noise = rng.standard_normal((1000, 2))
+    smooth = 50 * np.sin(2 * np.pi * 0.01 * np.arange(1000))[:, None]
+    fast = noises.fast_part(noise + smooth, run)
+    assert np.nanstd(fast) == pytest.approx(1.0, abs=0.06)
+    # no five samples across the gap between runs
+    assert np.isnan(fast[498:502]).all()
+    assert np.isfinite(fast[503:997]).all()
+
+
+def test_sawtooth_finds_its_period_frequency_and_offset():
+    rng, time = np.random.default_rng(6), np.arange(3000) / 125
+    information = rng.gamma(2.0, 1e8, 3000)
+    age = 2e-5 + 1e-3 * ((0.83 * time + 0.3) % 1 - 0.5)
+    score = -information * age + np.sqrt(information) * rng.standard_normal(3000)
+    gain, (period, frequency, _, offset, drift) = sawtooth(time, score, information)
+    assert gain > 1000
+    assert period == pytest.approx(1e-3, rel=0.05)
+    assert abs(frequency) == pytest.approx(0.83, abs=0.01)
+    assert offset == pytest.approx(2e-5, abs=2e-5)
+    assert drift == 0.0
+    null = sawtooth(time, np.sqrt(information) * rng.standard_normal(3000), information)[0]
+    assert null < 45
+
+
+def test_replicates_have_the_residual_s_size(clean):
+    replicator = Replicator(clean.fit, ridge_of(clean.fit))
+    rng = np.random.default_rng(4)
+    drawn = np.array([replicator.draw(rng) for _ in range(8)])
+    share = 1.0 - clean.fit.leverage
+    assert np.mean(drawn**2) / np.mean(share) == pytest.approx(1.0, abs=0.01)
+    ratio = np.mean(drawn**2, axis=(0, 1)) / np.mean(share, axis=0)
+    assert np.abs(ratio - 1).max() < 0.1
+
+
+def test_discrepancies_of_a_clean_recording_are_few(clean):
+    found = discrepancies(clean.fit, ridge_of(clean.fit), np.random.default_rng(1), 39)
+    p = np.array([item.p_value for item in found])
+    assert len(p) > 14
+    assert np.mean(p <= 0.05) < 0.3
+    assert all(np.isfinite(item.statistic) for item in found)
+
+
+def test_discrepancies_see_a_scaled_gyroscope(scaled):
+    found = discrepancies(scaled.fit, ridge_of(scaled.fit), np.random.default_rng(1), 39)
+    assert found[0].p_value <= 0.05
+    assert any("3" in sensor for sensor in found[0].sensors)
+
+
+def test_part_of_a_recording_keeps_whole_stretches(clean):
+    part = part_of(clean.readings, 250)
+    assert LEAST <= len(part.time) <= 300
+    assert np.all(np.isin(part.time, clean.readings.time))
+    steps = np.diff(part.time)
+    assert np.all((steps < 0.0121) | (np.diff(part.run) > 0))
+
+
+def test_too_few_samples_are_refused():
+    recording, _ = make(Case("criticism-short", duration=1.0), 1)
+    with pytest.raises(InputError, match="at least 200 moving samples"):
+        arrange(recording)
