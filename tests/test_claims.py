@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from imuarray.claims import CLAIMS, VERDICTS, Results, evaluate, markdown
-from imuarray.claims.registry import FAILS, HOLDS, UNTESTED, claim
+from imuarray.claims.registry import FAILS, HOLDS, REGISTER, UNTESTED, claim
 from imuarray.config import model_from, read_config
 from imuarray.errors import InputError
 from imuarray.motion import normal_motion
@@ -158,11 +158,12 @@ def table(results):
 
 def test_ids():
     assert all(re.fullmatch(r"20(17|21)-\d\d", item) for item in CLAIMS)
+    assert set(CLAIMS) == set(REGISTER)
     for paper in ("2017", "2021"):
         numbers = sorted(int(item[5:]) for item in CLAIMS if item.startswith(paper))
         assert numbers == list(range(1, len(numbers) + 1))
     with pytest.raises(ValueError, match="there already"):
-        claim("2017-01", "", "", "", "")(print)
+        claim("2017-01")(print)
 
 
 @pytest.mark.parametrize("paper", ["2017", "2021"])

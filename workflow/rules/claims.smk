@@ -167,7 +167,7 @@ rule claims:
         timing="results/{scale}/claims/timing.csv",
         acceptance="results/{scale}/claims/acceptance_variance.csv",
         experiment=lambda wc: MEASURED.claims(wc.scale),
-        code=library("claims"),
+        code=[*library("claims"), str(PACKAGE / "claims" / "register.yaml")],
     output:
         table=report(
             "results/{scale}/claims/claims.csv",

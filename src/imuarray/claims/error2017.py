@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import chdtrc
 
-from imuarray.claims.numbers import listed, power_law, ratio, rises, show
-from imuarray.claims.registry import Outcome, claim, judge
+from imuarray.claims.numbers import listed, near, power_law, ratio, rises, show
+from imuarray.claims.registry import claim, judged
 
 SAMPLES = "calibration/position_error_samples"
 MOTION = "calibration/position_error_motion"
@@ -34,70 +34,40 @@ def _exponent(results):
     return *fits[0], remark
 
 
-@claim(
-    "2017-01",
-    "IV",
-    "With enough iterations and N > 2 the RMSE falls as the inverse root of N.",
-    "exponent -1/2",
-    "exponent fitted over N >= 10 within max(0.05, 3 errors) of -1/2",
-)
+@claim("2017-01")
 def inverse_root(results):
     slope, error, late = _exponent(results)
-    return Outcome(
-        show(slope), show(error, 2), judge(abs(slope + 0.5) <= max(0.05, 3 * error)), late
-    )
+    return judged(slope, error, near(slope, -0.5, error, 0.05), late)
 
 
-@claim(
-    "2017-02",
-    "abstract",
-    "The position error is inversely proportional to the number of samples.",
-    "exponent -1",
-    "exponent of the RMSE over N >= 10 within max(0.05, 3 errors) of -1",
-)
+@claim("2017-02")
 def inverse(results):
     slope, error, _ = _exponent(results)
     remark = (
         "the abstract's word is right for the variance, not for the error; section IV says -1/2"
     )
-    return Outcome(
-        show(slope), show(error, 2), judge(abs(slope + 1) <= max(0.05, 3 * error)), remark
-    )
+    return judged(slope, error, near(slope, -1, error, 0.05), remark)
 
 
-@claim(
-    "2017-03",
-    "V",
-    "The variance of the positions falls with the inverse of the number of samples.",
-    "exponent -1",
-    "exponent of RMSE^2 over N >= 10 within max(0.1, 3 errors) of -1",
-)
+@claim("2017-03")
 def variance_inverse(results):
     slope, error, _ = _exponent(results)
-    stands = abs(2 * slope + 1) <= max(0.1, 6 * error)
-    return Outcome(show(2 * slope), show(2 * error, 2), judge(stands))
+    return judged(2 * slope, 2 * error, near(2 * slope, -1, 2 * error, 0.1))
 
 
-@claim(
-    "2017-04",
-    "abstract, V",
-    "1000 samples at 2000 deg/s and 2000 deg/s^2 give an accuracy of the order of 1e-6 m.",
-    "order of 1e-6 m",
-    "RMSE at N = 1000 within a factor sqrt(10) of 1e-6 m",
-)
-def micrometre(results):
+def _thousand(results) -> tuple[float, float, tuple[str, str]]:
+    """RMSE at N = 1000 and its error, m; both as they are shown."""
     row = _curve(results).set_index("samples").loc[1000]
-    stands = 1e-6 / np.sqrt(10) <= row.rmse_m <= 1e-6 * np.sqrt(10)
-    return Outcome(f"{show(row.rmse_m)} m", f"{show(row.rmse_se_m, 2)} m", judge(stands))
+    return row.rmse_m, row.rmse_se_m, (f"{show(row.rmse_m)} m", f"{show(row.rmse_se_m, 2)} m")
 
 
-@claim(
-    "2017-05",
-    "IV",
-    "For two samples the RMSE does not decrease with more iterations.",
-    "no decrease",
-    "last RMSE / first RMSE not below 1 by more than 3 errors",
-)
+@claim("2017-04")
+def micrometre(results):
+    rmse, _, shown = _thousand(results)
+    return judged(*shown, 1e-6 / np.sqrt(10) <= rmse <= 1e-6 * np.sqrt(10))
+
+
+@claim("2017-05")
 def two_samples(results):
     table = results.table(SAMPLES)
     two = table[table.samples == 2].sort_values("iterations")
@@ -108,16 +78,10 @@ def two_samples(results):
         f" {last.iterations:.0f} iterations; {100 * last.converged_share:.0f} % of the runs had"
         " converged by then: slower than for N > 2, and heavy-tailed"
     )
-    return Outcome(show(value), show(error, 2), judge(value >= 1 - 3 * error), remark)
+    return judged(value, error, value >= 1 - 3 * error, remark)
 
 
-@claim(
-    "2017-06",
-    "IV",
-    "Two samples leave the calibration ill posed: further conditions are needed.",
-    "not well posed at N = 2",
-    "joint information at N = 2, motion unknown, is rank deficient",
-)
+@claim("2017-06")
 def two_ill_posed(results):
     ranks = results.table("claims/ranks")
     two = ranks[ranks.samples == 2]
@@ -127,16 +91,10 @@ def two_ill_posed(results):
         f"Cramer-Rao bound at N = 2: {show(bound.bound_m)} +- {show(bound.bound_se_m, 2)} m; slow"
         " convergence, not a missing condition, keeps the RMSE up"
     )
-    return Outcome(f"{deficient} of {len(two)} arrays deficient", "", judge(deficient > 0), remark)
+    return judged(f"{deficient} of {len(two)} arrays deficient", "", deficient > 0, remark)
 
 
-@claim(
-    "2017-07",
-    "IV",
-    "For more than two samples the RMSE decreases with the number of iterations.",
-    "decreases",
-    "no step up by more than 3 errors, and last < first by 3 errors, for each N > 2",
-)
+@claim("2017-07")
 def more_iterations(results):
     table = results.table(SAMPLES)
     worst, up = 0.0, 0
@@ -147,16 +105,10 @@ def more_iterations(results):
         value, error = ratio(a.rmse_m, a.rmse_se_m, b.rmse_m, b.rmse_se_m)
         worst = max(worst, value + 3 * error)
     text = f"largest (last / first + 3 errors) {show(worst)}; {up} steps up"
-    return Outcome(text, "in the value", judge(up == 0 and worst < 1))
+    return judged(text, "in the value", up == 0 and worst < 1)
 
 
-@claim(
-    "2017-08",
-    "IV",
-    "For more than two samples the RMSE decreases with the number of samples.",
-    "decreases",
-    "no step up by more than 3 errors over N > 2 after the most iterations",
-)
+@claim("2017-08")
 def more_samples(results):
     curve = _curve(results)
     curve = curve[curve.samples > 2]
@@ -168,43 +120,29 @@ def more_samples(results):
         f"not so after the first iteration, where all N agree within a factor {show(spread, 2)}"
     )
     value = f"{listed(curve.rmse_m)} m for N = {listed(curve.samples, 4)}"
-    return Outcome(value, f"{listed(curve.rmse_se_m, 2)} m", judge(up == 0 and falls), remark)
+    return judged(value, f"{listed(curve.rmse_se_m, 2)} m", up == 0 and falls, remark)
 
 
-def _grid(table, along, across):
-    """Steps up along a column of figure 5's grid, and where they start."""
-    up, where = 0, []
-    for level, line in table.groupby(across):
-        line = line.sort_values(along)
-        found = rises(line.rmse_m, line.rmse_se_m)
-        up += found
-        where += [show(level, 6)] if found else []
-    return up, where
-
-
-def _bound_falls(results, along, across) -> int:
-    """Steps up of the Cramer-Rao bound over the same grid."""
+def _steps_up(results, table, along, across):
+    """Over figure 5's grid: what is said of its steps up, how many, where, the bound's own."""
+    table = table.sort_values(along)
+    up = {level: rises(line.rmse_m, line.rmse_se_m) for level, line in table.groupby(across)}
     bound = results.table("claims/position_bound")
     grid = bound[bound.samples == results.settings["paper2017"]["fig5_samples"]].iloc[1:]
-    lines = [line.sort_values(along) for _, line in grid.groupby(grid[across].round(3))]
-    return sum(rises(line.bound_m, line.bound_se_m) for line in lines)
+    lines = grid.sort_values(along).groupby(grid[across].round(3))
+    bounds = sum(rises(line.bound_m, line.bound_se_m) for _, line in lines)
+    count = sum(up.values())
+    text = f"{count} of {len(table) - table[across].nunique()} steps go up"
+    return text, count, ", ".join(show(level, 6) for level in up if up[level]), bounds
 
 
-@claim(
-    "2017-09",
-    "IV, figure 5",
-    "Faster rotation gives a smaller position error.",
-    "decreases",
-    "no step up by more than 3 errors along angular rate, N = 10, 200 iterations",
-)
+@claim("2017-09")
 def faster_rotation(results):
     names = ("angular_rate_dps", "angular_acceleration_dps2")
-    table = results.table(MOTION)
-    up, where = _grid(table, *names)
-    remark = f"at {', '.join(where)} deg/s^2; " if where else ""
-    remark += f"the Cramer-Rao bound itself goes up in {_bound_falls(results, *names)} steps"
-    value = f"{up} of {len(table) - table[names[1]].nunique()} steps go up"
-    return Outcome(value, "3 errors a step", judge(up == 0), remark)
+    text, up, where, bounds = _steps_up(results, results.table(MOTION), *names)
+    remark = f"at {where} deg/s^2; " if where else ""
+    remark += f"the Cramer-Rao bound itself goes up in {bounds} steps"
+    return judged(text, "3 errors a step", up == 0, remark)
 
 
 def _beyond(table, limit) -> str:
@@ -227,36 +165,20 @@ def _beyond(table, limit) -> str:
     return text
 
 
-@claim(
-    "2017-10",
-    "IV, figure 5",
-    "Faster angular acceleration gives a smaller position error.",
-    "decreases",
-    "no step up by more than 3 errors along angular acceleration up to hand motion (35 000"
-    " deg/s^2, paper 2021), N = 10, 200 iterations",
-)
+@claim("2017-10")
 def faster_acceleration(results):
     names = ("angular_acceleration_dps2", "angular_rate_dps")
     whole = results.table(MOTION)
     hand = results.settings["paper2021"]["angular_acceleration_sd_dps2"]
     table = whole[whole.angular_acceleration_dps2 <= hand]
-    up, where = _grid(table, *names)
-    remark = (
-        (f"at {', '.join(where)} deg/s; " if where else "")
-        + "figure 5's axes are not in the text; the Cramer-Rao bound goes up in"
-        f" {_bound_falls(results, *names)} steps of our whole grid" + _beyond(whole, hand)
-    )
-    value = f"{up} of {len(table) - table[names[1]].nunique()} steps go up"
-    return Outcome(value, "3 errors a step", judge(up == 0), remark)
+    text, up, where, bounds = _steps_up(results, table, *names)
+    remark = f"at {where} deg/s; " if where else ""
+    remark += "figure 5's axes are not in the text; the Cramer-Rao bound goes up in"
+    remark += f" {bounds} steps of our whole grid{_beyond(whole, hand)}"
+    return judged(text, "3 errors a step", up == 0, remark)
 
 
-@claim(
-    "2017-11",
-    "IV",
-    "The magnitude of the translational acceleration does not affect the accuracy.",
-    "no effect",
-    "RMSE at all magnitudes equal: chi-square p-value above 0.001",
-)
+@claim("2017-11")
 def translation(results):
     table = results.table("calibration/position_error_force")
     weight = table.rmse_se_m**-2.0
@@ -266,33 +188,20 @@ def translation(results):
     value = (
         f"{listed(table.rmse_m)} m at {listed(table.specific_force_mps2)} m/s^2 (p = {show(p, 2)})"
     )
-    return Outcome(value, f"{listed(table.rmse_se_m, 2)} m", judge(p > 0.001))
+    return judged(value, f"{listed(table.rmse_se_m, 2)} m", p > 0.001)
 
 
-@claim(
-    "2017-12",
-    "V",
-    "The variance's 1/N suggests that the estimator approaches the lower bound.",
-    "approaches the bound",
-    "RMSE / Cramer-Rao bound, plus 3 errors, below 1.1 at the largest N",
-)
+@claim("2017-12")
 def efficient(results):
     last = _curve(results).iloc[-1]
     bound = results.table("claims/position_bound")
     row = bound[bound.samples == last.samples].iloc[0]
     value, error = ratio(last.rmse_m, last.rmse_se_m, row.bound_m, row.bound_se_m)
     remark = "the paper leaves the bound for the calibration problem open; here it is computed"
-    return Outcome(show(value), show(error, 2), judge(value + 3 * error < 1.1), remark)
+    return judged(value, error, value + 3 * error < 1.1, remark)
 
 
-@claim(
-    "2017-13",
-    "V",
-    "Calibrated positions make the fusion algorithm of [4] reliable.",
-    "1e-6 m reached, 1e-5 m needed",
-    "RMSE at N = 1000 below the paper's own limit of 1e-5 m by 3 errors",
-)
+@claim("2017-13")
 def reliable(results):
-    row = _curve(results).set_index("samples").loc[1000]
-    stands = row.rmse_m + 3 * row.rmse_se_m < 1e-5
-    return Outcome(f"{show(row.rmse_m)} m", f"{show(row.rmse_se_m, 2)} m", judge(stands))
+    rmse, error, shown = _thousand(results)
+    return judged(*shown, rmse + 3 * error < 1e-5)

@@ -16,8 +16,9 @@ def listed(values, digits: int = 3) -> str:
 
 
 def by_samples(values: dict, digits: int = 3) -> str:
-    """T = ...: value; ..."""
-    return "; ".join(f"T = {samples}: {show(value, digits)}" for samples, value in values.items())
+    """T = ...: value; ...; a value may be several numbers."""
+    parts = ((samples, np.atleast_1d(value)) for samples, value in values.items())
+    return "; ".join(f"T = {samples}: {listed(value, digits)}" for samples, value in parts)
 
 
 def power_law(x, y, error) -> tuple[float, float]:
@@ -34,6 +35,16 @@ def rises(values, errors, z: float = 3.0) -> int:
     values, errors = np.asarray(values, float), np.asarray(errors, float)
     limit = z * np.hypot(errors[1:], errors[:-1])
     return int(np.sum(np.diff(values) > limit))
+
+
+def near(value: float, wanted: float, error: float, least: float) -> bool:
+    """Whether a value is within ``least`` or three standard errors of what is wanted."""
+    return abs(value - wanted) <= max(least, 3 * error)
+
+
+def falls(values) -> bool:
+    """Whether each of a sequence (of numbers or of arrays) is below the one before."""
+    return bool(np.all(np.diff(np.asarray(list(values), float), axis=0) < 0))
 
 
 def ratio(a, a_error, b, b_error):

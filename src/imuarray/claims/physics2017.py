@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from imuarray.claims.numbers import listed, show
-from imuarray.claims.registry import Outcome, claim, judge, untested
+from imuarray.claims.registry import claim, judged, untested
 
 GRAVITY = 9.80665  # m/s^2
 
@@ -15,45 +15,27 @@ def displacement(acceleration, frequency):
     return acceleration / (2 * np.pi * np.asarray(frequency)) ** 2
 
 
-@claim(
-    "2017-36",
-    "II",
-    "Resonance in the low kilohertz gives displacements of tens of nanometres at 1 g.",
-    "tens of nm",
-    "10 to 100 nm for 2 to 5 kHz, by (6)",
-)
+@claim("2017-36")
 def tens_of_nanometres(results):
     found = 1e9 * displacement(GRAVITY, [2000.0, 3000.0, 5000.0])
     stands = np.all((found > 9.5) & (found < 100))
     remark = f"1 kHz would give {show(1e9 * displacement(GRAVITY, 1000.0))} nm"
-    return Outcome(f"{listed(found)} nm at 2, 3, 5 kHz", "none", judge(stands), remark)
+    return judged(f"{listed(found)} nm at 2, 3, 5 kHz", "none", stands, remark)
 
 
-@claim(
-    "2017-37",
-    "V",
-    "At 5 kHz and 2 to 3 g the largest displacement is about 30 nm.",
-    "30 nm",
-    "within 10 % at 3 g",
-)
+@claim("2017-37")
 def thirty_nanometres(results):
     found = 1e9 * displacement(GRAVITY * np.array([2.0, 3.0]), 5000.0)
-    return Outcome(f"{listed(found)} nm", "none", judge(abs(found[1] / 30 - 1) < 0.1))
+    return judged(f"{listed(found)} nm", "none", abs(found[1] / 30 - 1) < 0.1)
 
 
-@claim("2017-38", "V", "1 um is about 30 times that displacement.", "factor 30", "within 25 %")
+@claim("2017-38")
 def factor_thirty(results):
     factor = float(1e-6 / displacement(3 * GRAVITY, 5000.0))
-    return Outcome(show(factor), "none", judge(abs(factor / 30 - 1) < 0.25))
+    return judged(factor, "none", abs(factor / 30 - 1) < 0.25)
 
 
-@claim(
-    "2017-39",
-    "V",
-    "In figure 4's motion the measured acceleration ranges between 2 and 3 g.",
-    "2 to 3 g",
-    "needs |s|, which the paper does not give",
-)
+@claim("2017-39")
 def two_to_three_g(results):
     cases = [
         (f"|s| = {show(found['specific_force_mps2'])} m/s^2 at the {place}",
@@ -71,48 +53,24 @@ def two_to_three_g(results):
     )
 
 
-@claim(
-    "2017-40",
-    "IV, figure 4",
-    "2000 deg/s is just below the gyroscopes' saturation.",
-    "2000 deg/s",
-    "fewer than 1 % of the samples have a saturated axis",
-)
+@claim("2017-40")
 def just_below(results):
     share = results.json("claims/identifiability")["accelerations"][1]["saturated_share"]
-    return Outcome(f"{show(100 * share)} %", "", judge(share < 0.01))
+    return judged(f"{show(100 * share)} %", "", share < 0.01)
 
 
-@claim(
-    "2017-41",
-    "I",
-    "An array of 32 chips with three triads each has 288 sensing elements.",
-    "288",
-    "3 triads x 3 axes x chips of the configured array",
-)
+@claim("2017-41")
 def elements(results):
     unknowns = int(results.table("claims/ranks").unknowns.max())
     found = 9 * (unknowns // 3 + 1)
-    return Outcome(str(found), "none", judge(found == 288))
+    return judged(str(found), "none", found == 288)
 
 
-@claim(
-    "2017-42",
-    "abstract",
-    "1000 samples are a few seconds of twisting by hand.",
-    "a few seconds",
-    "needs a sampling rate",
-)
+@claim("2017-42")
 def few_seconds(results):
     return untested("the paper gives no sampling rate; 1000 samples in 5 s would need 200 Hz")
 
 
-@claim(
-    "2017-43",
-    "I",
-    "The graph optimisation of [14] has a mean position error of 650 um and cost cubic in N.",
-    "650 um",
-    "needs the other paper's experiment",
-)
+@claim("2017-43")
 def other_method(results):
     return untested("quoted from [14]: another array, another method, measured data not published")

@@ -1,15 +1,21 @@
-"""The list of claims and how one is put on it."""
+"""The list of claims (`register.yaml`) and the functions that judge them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
 from typing import NamedTuple
 
 import pandas as pd
+import yaml
+
+from imuarray.claims.numbers import show
 
 HOLDS, FAILS, UNTESTED = "holds", "does not hold", "cannot be tested here"
 VERDICTS = (HOLDS, FAILS, UNTESTED)
+REGISTER = yaml.safe_load(Path(__file__).with_name("register.yaml").read_text(encoding="utf-8"))
 
 
 class Outcome(NamedTuple):
@@ -29,11 +35,11 @@ class Claim:
     """
 
     id: str
+    test: Callable
     section: str
     text: str
     paper_value: str
     criterion: str
-    test: Callable
     clock: bool = False
 
     @property
@@ -45,21 +51,26 @@ class Claim:
 CLAIMS: dict[str, Claim] = {}
 
 
-def claim(id, section, text, paper_value, criterion, clock=False):
-    """Register the decorated ``test(results) -> Outcome`` as the claim ``id``."""
+def claim(id: str, **given):
+    """Make the decorated ``test(results, **given) -> Outcome`` judge a claim of the register.
+
+    Raises ValueError for a claim that is judged already, KeyError for one not in the register.
+    """
 
     def register(test):
         if id in CLAIMS:
             raise ValueError(f"claim {id} is there already")
-        CLAIMS[id] = Claim(id, section, text, paper_value, criterion, test, clock)
+        CLAIMS[id] = Claim(id, partial(test, **given), **REGISTER[id])
         return test
 
     return register
 
 
-def judge(stands: bool) -> str:
-    """The verdict of a claim that can be tested."""
-    return HOLDS if stands else FAILS
+def judged(value: str | float, error: str | float, stands: bool, remark: str = "") -> Outcome:
+    """The outcome of a claim that can be tested; numbers get three digits, errors two."""
+    value = value if isinstance(value, str) else show(value)
+    error = error if isinstance(error, str) else show(error, 2)
+    return Outcome(value, error, HOLDS if stands else FAILS, remark)
 
 
 def untested(reason: str, value: str = "", error: str = "") -> Outcome:
@@ -70,21 +81,13 @@ def untested(reason: str, value: str = "", error: str = "") -> Outcome:
 def evaluate(results) -> pd.DataFrame:
     """One row for each claim, in the order of the ids."""
     rows = []
-    for item in sorted(CLAIMS.values(), key=lambda item: item.id):
+    for id, item in sorted(CLAIMS.items()):
         outcome = item.test(results)
-        rows.append(
-            {
-                "id": item.id,
-                "paper": item.paper,
-                "section": item.section,
-                "claim": item.text,
-                "paper_value": item.paper_value,
-                "our_value": outcome.value,
-                "our_error": outcome.error,
-                "criterion": item.criterion,
-                "verdict": outcome.verdict,
-                "remark": outcome.remark,
-                "rests_on": "clock" if item.clock else "seed",
-            }  # fmt: skip
-        )
+        rows.append({
+            "id": id, "paper": item.paper, "section": item.section, "claim": item.text,
+            "paper_value": item.paper_value, "our_value": outcome.value,
+            "our_error": outcome.error, "criterion": item.criterion,
+            "verdict": outcome.verdict, "remark": outcome.remark,
+            "rests_on": "clock" if item.clock else "seed",
+        })  # fmt: skip
     return pd.DataFrame(rows)

@@ -81,6 +81,14 @@ class Results:
         """The T's of paper 2021, increasing."""
         return sorted(self.settings["paper2021"]["samples"])
 
+    def each_table(self, path: str) -> dict[int, pd.DataFrame]:
+        """By T, the tables of ``path``, in which {} stands for T."""
+        return {t: self.table(path.format(t)) for t in self.samples}
+
+    def each_json(self, path: str) -> dict[int, dict]:
+        """By T, the summaries of ``path``, in which {} stands for T."""
+        return {t: self.json(path.format(t)) for t in self.samples}
+
     def posterior(self, name: str) -> tuple[pd.DataFrame, str]:
         """Truth, mean and sd (m) per coordinate, and where they come from.
 
@@ -95,14 +103,19 @@ class Results:
         table = self.table("claims/linearised")
         return table[table.name == name].reset_index(drop=True)
 
+    def posteriors(self, prefix: str = "") -> dict[int, pd.DataFrame]:
+        """By T, what `posterior` gives of ``prefix`` T..."""
+        return {t: self.posterior(f"{prefix}T{t}")[0] for t in self.samples}
+
     def unconverged(self, name: str) -> str:
         """A remark on chains that have not converged."""
         return (
             f"chains {name} not converged (R-hat {self.json(f'posterior/{name}')['rhat_max']:.3g})"
         )
 
-    def sources(self, names) -> str:
-        """A remark on where the posteriors ``names`` come from."""
+    def sources(self, *prefixes: str) -> str:
+        """A remark on where the posteriors of all T with these prefixes come from."""
+        names = [f"{prefix}T{t}" for prefix in prefixes or ("",) for t in self.samples]
         worst = {name: self.json(f"posterior/{name}") for name in names}
         short = [f"{n}: R-hat {v['rhat_max']:.3g}" for n, v in worst.items() if not v["converged"]]
         if not short:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from imuarray.claims.numbers import by_samples
-from imuarray.claims.registry import Outcome, claim, judge, untested
+from imuarray.claims.registry import claim, judged, untested
 from imuarray.geometry import array_from_config
 from imuarray.posterior.diagnostics import ess
 
@@ -27,14 +27,7 @@ def size_offset(results, name) -> tuple[float, float, float]:
     return scales.mean(), scales.std(ddof=1), scales.std(ddof=1) / np.sqrt(size)
 
 
-@claim(
-    "2021-54",
-    "II-A, III-B",
-    "Letting the motion prior's variance tend to infinity is a favourable simplification (no harm"
-    " is mentioned).",
-    "favorable theoretical simplifications",
-    "stand-in, whose data are nearly exact: the array's size within 2 posterior sds of the truth",
-)
+@claim("2021-54")
 def flat_prior(results):
     names = {t: f"standin_T{t}" for t in results.samples}
     if not all(results.json(f"posterior/{name}")["converged"] for name in names.values()):
@@ -49,4 +42,4 @@ def flat_prior(results):
         " (docs/findings.md)"
     )
     stands = all(abs(value) < 2 for value in off.values())
-    return Outcome(f"{by_samples(off, 2)} sd", by_samples(errors, 1), judge(stands), remark)
+    return judged(f"{by_samples(off, 2)} sd", by_samples(errors, 1), stands, remark)
