@@ -36,3 +36,30 @@ def test_a_change_in_a_kernel_reaches_those_that_call_it(tmp_path):
     assert [said(tmp_path), said(tmp_path)] == ["20 0", "20 1"]
     (package / "inner.py").write_text(INNER.format(2))
     assert said(tmp_path) == "30 0"
+
+
+JITTED = """
+from pathlib import Path
+from imuarray import caches
+caches.PACKAGE = Path.cwd()
+from imuarray.model.jax64 import jax, jnp
+print(jax.jit(lambda x: jnp.sum(jnp.sin(x) ** 2))(jnp.arange(5.0)))
+print(jax.config.jax_compilation_cache_dir)
+"""
+
+
+def test_what_jax_compiled_is_kept_and_a_damaged_entry_made_again(tmp_path):
+    def run():
+        done = subprocess.run(
+            [sys.executable, "-c", JITTED], cwd=tmp_path, capture_output=True, text=True, check=True
+        )
+        assert not done.stderr
+        return done.stdout.split()
+
+    first = run()
+    assert Path(first[1]).parent == tmp_path / "__pycache__"
+    entries = [path for path in Path(first[1]).iterdir() if path.stat().st_size > 100]
+    assert entries
+    for path in entries:
+        path.write_bytes(path.read_bytes()[:-20])
+    assert run() == first

@@ -8,15 +8,14 @@ those of the code that they name.
 from __future__ import annotations
 
 import hashlib
-import os
-from collections.abc import Iterator
-from contextlib import suppress
 from functools import cache, partial
 from pathlib import Path
 
 import numba
 from llvmlite import ir
 from numba.extending import intrinsic
+
+from imuarray.caches import cache_folder
 
 PACKAGE = Path(__file__).parent
 
@@ -75,20 +74,4 @@ def kernels_digest() -> str:
 @cache
 def _folder() -> Path | None:
     """Where these kernels are cached; None where nothing can be written."""
-    name = f"kernels-{kernels_digest()[:16]}"
-    for place in _places():
-        with suppress(OSError):
-            (place / name).mkdir(parents=True, exist_ok=True)
-            if os.access(place / name, os.W_OK):
-                return place / name
-    return None
-
-
-def _places() -> Iterator[Path]:
-    """NUMBA_CACHE_DIR if that is set; or beside the package, or with the user's caches."""
-    if numba.config.CACHE_DIR:
-        yield Path(numba.config.CACHE_DIR)
-        return
-    yield PACKAGE / "__pycache__"
-    with suppress(RuntimeError):  # no home
-        yield Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "imuarray"
+    return cache_folder(f"kernels-{kernels_digest()[:16]}", numba.config.CACHE_DIR)

@@ -17,7 +17,11 @@ from imuarray.model.noise import Noise
 from imuarray.model.probe import probe
 from imuarray.motion.state import Motion
 
-probed = cache(probe)  # once each
+
+@cache  # once each
+def probed(item: Effect) -> bool:
+    """`probe`, which the package's own effects have passed in its tests."""
+    return item.apply.__module__.startswith("imuarray.") or probe(item)
 
 
 class EffectPrior(NamedTuple):

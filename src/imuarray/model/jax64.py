@@ -2,7 +2,10 @@
 
 import jax
 
+from imuarray.caches import keep_compiled
+
 jax.config.update("jax_enable_x64", True)
+keep_compiled(jax)
 
 jnp = jax.numpy
 
