@@ -27,9 +27,9 @@ from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting, normal_motion
 from imuarray.posterior import Likelihood
 from imuarray.posterior.proposals import tilts
+from imuarray.posterior.rate_density import sample_covariance
 from imuarray.recording import write_recording
 from imuarray.simulation import simulate_recording, simulate_samples
-from imuarray.studies.bayes import sample_covariance
 
 BOARD = mimu4444_corners()
 

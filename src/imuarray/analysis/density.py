@@ -9,8 +9,8 @@ from imuarray.geometry import positions_of
 from imuarray.model import ArrayModel
 from imuarray.posterior import CompiledTarget, GaussianPrior, GenericTarget, Likelihood, tuning
 from imuarray.posterior.generic import GenericLikelihood
+from imuarray.posterior.rate_density import sample_covariance
 from imuarray.recording import Recording
-from imuarray.studies.bayes import sample_covariance
 
 GAP = 1e-3  # nats in total
 UNSETTLED = "the search for the posterior's mode did not converge; chains start from where it ended"

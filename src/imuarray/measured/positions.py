@@ -13,9 +13,9 @@ from imuarray.estimation import calibrate_bcd, calibrate_gauss_newton
 from imuarray.estimation.bcd import Calibration
 from imuarray.estimation.blocks import normal_equations, pack_motion, problem
 from imuarray.model import ArrayModel
+from imuarray.posterior.rate_density import rate_distribution
 from imuarray.recording import Recording, array_of
 from imuarray.simulation import simulate_samples
-from imuarray.studies.bayes import rate_distribution
 
 TOLERANCE = 1e-3  # of a position's own sd
 LIMIT = 500  # large residuals make Gauss-Newton converge linearly

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from imuarray.config import model_from
-from imuarray.errors import InputError
 from imuarray.estimation import calibrate_bcd
 from imuarray.estimation.selection import disjoint, neighbours
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting, normal_motion
 from imuarray.posterior import CompiledTarget, GaussianPrior, Likelihood
+from imuarray.posterior.rate_density import rate_distribution
 from imuarray.recording import Recording
 from imuarray.simulation import simulate_recording, simulate_samples
 from imuarray.streams import stream
@@ -91,31 +91,6 @@ def select_disjoint(recording: Recording, counts) -> dict[int, np.ndarray]:
     near = neighbours(recording.saturated_gyroscopes().any(axis=(1, 2)))
     speed = np.linalg.norm(recording.angular_rate.mean(axis=1), axis=1)
     return disjoint(np.flatnonzero(~near & (speed >= np.median(speed))), counts)
-
-
-def sample_covariance(angular_rate):
-    """p(omega_t | y_g) from the spread among gyroscopes, (30a) and (30b): mean, covariance.
-
-    ``angular_rate`` (T, G, 3) with G > 3, else InputError. The covariance is that of one
-    gyroscope, as the paper writes it.
-    """
-    if angular_rate.shape[1] < 4:
-        raise InputError(
-            "gyroscopes: expected at least 4 for the spread among them (30b), found"
-            f" {angular_rate.shape[1]}"
-        )
-    mean = angular_rate.mean(axis=1)
-    off = angular_rate - mean[:, None]
-    return mean, np.einsum("tgi,tgj->tij", off, off) / (angular_rate.shape[1] - 1)
-
-
-def rate_distribution(recording: Recording):
-    """`sample_covariance`, or the declared noise where there are fewer than 4 gyroscopes."""
-    rate = recording.angular_rate
-    if rate.shape[1] >= 4:
-        return sample_covariance(rate)
-    covariance = np.eye(3) * recording.gyroscope_noise_sd**2 / rate.shape[1]
-    return rate.mean(axis=1), np.broadcast_to(covariance, (len(rate), 3, 3))
 
 
 def target_for(

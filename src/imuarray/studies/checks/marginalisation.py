@@ -11,8 +11,8 @@ from imuarray.model import ArrayModel
 from imuarray.model.structure import design, products
 from imuarray.motion import normal_motion
 from imuarray.posterior import Likelihood
+from imuarray.posterior.rate_density import sample_covariance
 from imuarray.simulation import measure
-from imuarray.studies.bayes import sample_covariance
 
 TINY = np.array(
     [[0.0, 0.0, 0.0], [0.021, 0.002, -0.001], [-0.001, 0.019, 0.003], [0.017, 0.02, 0.002]]
