@@ -26,17 +26,18 @@ from imuarray.estimation import calibrate_bcd  # noqa: E402
 from imuarray.estimation.collapsed import Collapsed  # noqa: E402
 from imuarray.estimation.kernels import reduced  # noqa: E402
 from imuarray.estimation.newton import descend  # noqa: E402
+from imuarray.estimation.reference import skew  # noqa: E402
 from imuarray.geometry import positions_of, sub_array  # noqa: E402
 from imuarray.model import ArrayModel  # noqa: E402
 from imuarray.model.jax64 import jax  # noqa: E402
 from imuarray.motion import normal_motion, sphere_motion  # noqa: E402
-from imuarray.posterior import Likelihood, kernels, normals  # noqa: E402
+from imuarray.posterior import Likelihood, kernels, normals, reference  # noqa: E402
 from imuarray.posterior.draws import TILE  # noqa: E402
 from imuarray.posterior.marginal import Marginal  # noqa: E402
 from imuarray.posterior.target import CompiledTarget, GaussianPrior  # noqa: E402
 from imuarray.simulation import measure  # noqa: E402
 from imuarray.studies.bound import paths  # noqa: E402
-from tests.oracles import direct_log_likelihood, joint_jacobian, skew  # noqa: E402
+from tests.oracles import joint_jacobian  # noqa: E402
 
 
 def interleaved(functions, repeats):
@@ -71,13 +72,13 @@ def against_direct(model, rng, samples=500, draws=100):
 
     def direct():
         rates = mean[:, None] + sd * rng.standard_normal((samples, draws, 3))
-        return direct_log_likelihood(force, positions, model.noise.accelerometer, rates)
+        return reference.log_likelihood(force, positions, model.noise.accelerometer, rates)
 
     fast = [lambda n=n: likelihood.estimate(positions, draws, generator, n) for n in (1, 2)]
     slow, one, two = interleaved([direct, *fast], 9)
     rates = mean[:, None] + sd * rng.standard_normal((samples, draws, 3))
-    reference = direct_log_likelihood(force, positions, model.noise.accelerometer, rates)
-    error = abs(likelihood.on(positions, rates) / reference - 1)
+    direct_value = reference.log_likelihood(force, positions, model.noise.accelerometer, rates)
+    error = abs(likelihood.on(positions, rates) / direct_value - 1)
     return [
         ("direct numpy form, T = 500, N = 100", f"{1e3 * slow:.1f} ms", "1"),
         ("collapsed and compiled, one thread", f"{1e3 * one:.2f} ms", f"{slow / one:.0f}"),

@@ -12,7 +12,6 @@ Core seconds are those of all threads.
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +29,7 @@ from imuarray.posterior import (
     CompiledTarget,
     GaussianPrior,
     Likelihood,
+    reference,
     run_chains,
     tuning,
 )
@@ -209,16 +209,12 @@ def rows_of(problem, seconds, rng):
 
 def direct_ratio(problem, rng) -> float:
     """How much slower (26a) is evaluated directly, in 3 A dimensions a sample, N = 20."""
-    sys.path.insert(0, str(Path(__file__).parents[1]))
-    from tests.oracles import direct_log_likelihood
-
-    draws, sd = 20, np.sqrt(problem.model.noise.gyroscope[0, 0] / problem.model.array.gyroscopes)
-    mean = problem.likelihood.rate_mean
-    force = problem.recording.specific_force
+    draws, noise = 20, problem.model.noise
+    force, rate = problem.recording.specific_force, problem.recording.angular_rate
 
     def direct():
-        rates = mean[:, None] + sd * rng.standard_normal((problem.samples, draws, 3))
-        direct_log_likelihood(force, problem.centre, problem.model.noise.accelerometer, rates)
+        rates = reference.draw_rates(rate, np.sqrt(noise.gyroscope[0, 0]), draws, rng)
+        reference.log_likelihood(force, problem.centre, noise.accelerometer, rates)
 
     def fast():
         problem.likelihood.estimate(problem.centre, draws, rng)

@@ -3,38 +3,8 @@
 import numpy as np
 from scipy.special import logsumexp
 
-
-def skew(vector):
-    """Omega(a) with Omega(a) b = a x b, (..., 3, 3)."""
-    x, y, z = np.moveaxis(np.asarray(vector, float), -1, 0)
-    zero = np.zeros_like(x)
-    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-
-
-def linear_matrix(positions):
-    """H(theta) of (5a), (3A, 6)."""
-    return np.vstack([np.hstack([-skew(r), np.eye(3)]) for r in positions])
-
-
-def nonlinear_part(rates, positions):
-    """h(omega, theta) of (5a) for rates (..., 3): shape (..., 3A)."""
-    turns = skew(rates)
-    return np.einsum("...ij,...jl,kl->...ki", turns, turns, positions).reshape(
-        *np.shape(rates)[:-1], -1
-    )
-
-
-def direct_log_likelihood(specific_force, positions, covariance, rates, power=0.5):
-    """(26a) in its direct form, 3A dimensions a sample, on draws (T, N, 3)."""
-    precision = np.linalg.inv(covariance)
-    H = linear_matrix(positions)
-    gram = H.T @ precision @ H
-    S = precision - precision @ H @ np.linalg.solve(gram, H.T @ precision)
-    residual = specific_force.reshape(len(rates), 1, -1) - nonlinear_part(rates, positions)
-    square = np.einsum("tni,tni->tn", residual @ S, residual)
-    terms = logsumexp(-0.5 * square, axis=1) - np.log(rates.shape[1])
-    return terms.sum() - power * len(rates) * np.linalg.slogdet(gram)[1]
+from imuarray.estimation.reference import linear_part, nonlinear_part, skew
+from imuarray.posterior.reference import projection
 
 
 def proper_log_likelihood(specific_force, positions, covariance, rates, phi_sd):
@@ -43,7 +13,7 @@ def proper_log_likelihood(specific_force, positions, covariance, rates, phi_sd):
     No flat prior and no algebra of (19)-(26): a plain normal density whose covariance is
     that of noise plus H phi. For phi_sd -> infinity its differences in theta tend to (16).
     """
-    H = linear_matrix(positions)
+    H = linear_part(positions)
     total = covariance + phi_sd**2 * H @ H.T
     residual = specific_force.reshape(len(rates), 1, -1) - nonlinear_part(rates, positions)
     white = np.linalg.solve(np.linalg.cholesky(total), np.swapaxes(residual, -1, -2))
@@ -62,19 +32,14 @@ def gauss_hermite(mean, covariance, order):
 
 def exact_log_likelihood(specific_force, thetas, covariance, nodes, log_weights, power=0.5):
     """(16a) by quadrature in omega, direct form, for many theta (B, 3 (A - 1)): (B,)."""
-    precision = np.linalg.inv(covariance)
-    turns = skew(nodes) @ skew(nodes)
     out = np.empty(len(thetas))
     for i, theta in enumerate(thetas):
         positions = np.vstack([np.zeros(3), theta.reshape(-1, 3)])
-        H = linear_matrix(positions)
-        gram = H.T @ precision @ H
-        S = precision - precision @ H @ np.linalg.solve(gram, H.T @ precision)
-        h = np.swapaxes(turns @ positions.T, -1, -2).reshape(*nodes.shape[:2], -1)
-        residual = specific_force.reshape(len(nodes), 1, -1) - h
+        S, logdet = projection(positions, covariance)
+        residual = specific_force.reshape(len(nodes), 1, -1) - nonlinear_part(nodes, positions)
         square = ((residual @ S) * residual).sum(axis=-1)
         out[i] = logsumexp(log_weights - 0.5 * square, axis=1).sum()
-        out[i] -= power * len(nodes) * np.linalg.slogdet(gram)[1]
+        out[i] -= power * len(nodes) * logdet
     return out
 
 

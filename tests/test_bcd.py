@@ -8,6 +8,7 @@ from scipy.optimize import least_squares
 
 from imuarray.errors import InputError
 from imuarray.estimation import calibrate_bcd
+from imuarray.estimation.reference import ml_bcd
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from tests import oracles
@@ -65,6 +66,24 @@ def test_is_the_joint_optimum():
     np.testing.assert_allclose(found.motion.motion.angular_acceleration, motions[:, 3:6], atol=1e-2)
     apart = np.sum((rate - rate.mean(axis=1, keepdims=True)) ** 2) / 0.02**2
     assert found.cost[-1] + apart == pytest.approx(2 * best.cost, rel=1e-6)
+
+
+def test_every_iteration_is_that_of_the_reference():
+    """Algorithm 1 written out: the positions after each of four iterations."""
+    model, _, force, rate = problem()
+    found = calibrate_bcd(model, force, rate, tolerance=0.0, limit=4, marks=(1, 2, 3, 4))
+    path = ml_bcd(force, rate, model.array.relative, np.full(5, 0.04), 0.02, 4)
+    np.testing.assert_allclose(found.snapshots, path, rtol=0, atol=1e-9)
+    assert np.abs(np.diff(path, axis=0)).max(axis=(1, 2)).min() > 1e-6
+
+
+def test_triads_of_uneven_noise_are_the_references_too():
+    model, _, force, rate = problem()
+    noise = noises(np.random.default_rng(5), 5, 2)["per_triad"]
+    found = calibrate_bcd(ArrayModel(model.array, noise), force, rate, tolerance=0.0, limit=2)
+    sds = np.sqrt(np.diag(noise.accelerometer)[::3]), np.sqrt(noise.gyroscope[0, 0])
+    path = ml_bcd(force, rate, model.array.relative, *sds, 2)
+    np.testing.assert_allclose(found.positions, path[-1], rtol=0, atol=1e-9)
 
 
 def test_cost_falls_in_every_iteration():

@@ -27,9 +27,9 @@ from imuarray.blind.sizes import (
     size_of,
     total_size,
 )
+from imuarray.estimation.reference import skew
 from imuarray.recording import Recording
 from imuarray.recording.format import from_dataset
-from tests.oracles import skew
 
 NOISE_EFFECTS = {
     "accelerometer_noise",

@@ -7,6 +7,7 @@ from scipy.optimize import least_squares
 from imuarray.errors import IdentifiabilityError
 from imuarray.estimation import estimate_motion, rates
 from imuarray.estimation.collapsed import Collapsed
+from imuarray.estimation.reference import most_likely_motion
 from imuarray.geometry import mimu4444
 from imuarray.model import ArrayModel, Noise
 from tests import oracles
@@ -121,6 +122,18 @@ def test_given_positions_are_used():
     wrong = estimate_motion(model, force, rate)
     assert np.abs(right.cost).max() < 1e-4
     assert wrong.cost.min() > 1.0
+
+
+def test_is_the_references_motion():
+    _, model, _, force, rate = problem(seed=4)
+    found = estimate_motion(model, force, rate).motion
+    positions = model.array.relative
+    for t, given in enumerate(zip(force, rate, strict=True)):
+        sds = np.sqrt(np.diag(model.noise.accelerometer)[::3]), 0.05
+        omega, omega_dot, s = most_likely_motion(*given, positions, *sds)
+        np.testing.assert_allclose(found.angular_rate[t], omega, atol=1e-8)
+        np.testing.assert_allclose(found.angular_acceleration[t], omega_dot, atol=1e-6)
+        np.testing.assert_allclose(found.specific_force[t], s, atol=1e-7)
 
 
 def test_convergence_flags():

@@ -6,12 +6,14 @@ import math
 
 import numpy as np
 
+from imuarray.estimation.reference import linear_part, nonlinear_part
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.model.structure import design, products
 from imuarray.motion import normal_motion
 from imuarray.posterior import Likelihood
 from imuarray.posterior.rate_density import sample_covariance
+from imuarray.posterior.reference import draw_rates, log_likelihood, projection
 from imuarray.simulation import measure
 
 TINY = np.array(
@@ -49,17 +51,16 @@ def limits(rng, model, sds) -> dict:
     force, rate, _ = measure(model, motion, positions, rng)
     covariance = np.diag(np.repeat(np.square(sds[1:]), 3))
     prior = (np.sqrt(np.diag(covariance)) * rng.standard_normal(6), covariance)
-    H = design(positions)[:, 6:]
-    gram = H.T @ precision @ H
-    S = precision - precision @ H @ np.linalg.solve(gram, H.T @ precision)
-    plain = force[0].ravel() - design(positions)[:, :6] @ products(rate[0].mean(axis=0))
+    H = linear_part(positions)
+    S, logdet_gram = projection(positions, model.noise.accelerometer)
+    plain = force[0].ravel() - nonlinear_part(rate[0].mean(axis=0), positions)
     final = plain @ S @ plain
     common = np.linalg.slogdet(covariance)[1] - np.linalg.slogdet(precision)[1]
     table = []
     for beta in np.geomspace(1e-3, 1e7, 11):
         square, logdet, M, _ = _density(force[0].ravel(), positions, rate[0].mean(axis=0),
                                         precision, prior, beta)  # fmt: skip
-        rest = logdet - common - 6 * np.log(beta) - np.linalg.slogdet(gram)[1]
+        rest = logdet - common - 6 * np.log(beta) - logdet_gram
         table.append([beta, abs(square - final) / final, abs(np.expm1(rest))])
     _, logdet, M, inverse = _density(plain, positions, rate[0].mean(axis=0), precision, prior, 1e-3)
     return {
@@ -92,22 +93,13 @@ def determinant_power(rng, model, sds, beta=1e6, pairs=200) -> dict:
 
 def six_dimensions(rng, model, sds, samples=20, draws=8) -> dict:
     """The collapsed estimate (6 numbers a sample) against (26a) written out in 3A numbers."""
-    positions, precision = model.array.relative, model.noise.accelerometer_precision
+    positions, covariance = model.array.relative, model.noise.accelerometer
     force, rate, _ = measure(model, normal_motion(rng, (samples,), *sds), positions, rng)
     likelihood = Likelihood.of(model, force, rate)
-    mean = rate.mean(axis=1)[:, None]
-    rates = mean + np.sqrt(model.noise.gyroscope[0, 0] / rate.shape[1]) * rng.standard_normal(
-        (samples, draws, 3)
-    )
-    whole = design(positions)
-    H = whole[:, 6:]
-    gram = H.T @ precision @ H
-    S = precision - precision @ H @ np.linalg.solve(gram, H.T @ precision)
-    off = force.reshape(samples, 1, -1) - products(rates) @ whole[:, :6].T
-    exponents = -0.5 * np.einsum("tni,ij,tnj->tn", off, S, off)
-    direct = sum(recursive_log_sum_exp(row) - math.log(draws) for row in exponents)
-    direct -= 0.5 * samples * np.linalg.slogdet(gram)[1]
-    weak = np.linalg.svd(S @ whole[:, :6], compute_uv=False)
+    rates = draw_rates(rate, np.sqrt(model.noise.gyroscope[0, 0]), draws, rng)
+    direct = log_likelihood(force, positions, covariance, rates)
+    seen = projection(positions, covariance)[0] @ design(positions)[:, :6]
+    weak = np.linalg.svd(seen, compute_uv=False)
     return {
         "difference": float(abs(likelihood.on(positions, rates) - direct)),
         "value": float(direct), "dimensions": int(np.sum(weak > 1e-9 * weak[0])),
@@ -140,14 +132,10 @@ def underflow(rng, model, force, rate, places: dict, draws: int = 100) -> list[d
     ``force`` (T, A, 3) and ``rate`` (T, G, 3) measured; ``places`` (A, 3) m by name. One sum
     a sample; ``median_exponent`` is over samples and draws.
     """
-    precision, rows = model.noise.accelerometer_precision, []
-    sd = np.sqrt(model.noise.gyroscope[0, 0] / rate.shape[1])
-    rates = rate.mean(axis=1)[:, None] + sd * rng.standard_normal((len(rate), draws, 3))
+    rows, rates = [], draw_rates(rate, np.sqrt(model.noise.gyroscope[0, 0]), draws, rng)
     for name, positions in places.items():
-        whole = design(positions)
-        H = whole[:, 6:]
-        S = precision - precision @ H @ np.linalg.solve(H.T @ precision @ H, H.T @ precision)
-        off = force.reshape(len(force), 1, -1) - products(rates) @ whole[:, :6].T
+        S, _ = projection(positions, model.noise.accelerometer)
+        off = force.reshape(len(force), 1, -1) - nonlinear_part(rates, positions)
         exponents = -0.5 * np.sum((off @ S) * off, axis=-1)
         lost = int(np.sum(np.exp(exponents).sum(axis=1) == 0.0))
         rows.append({"place": name, "fails": lost, "sums": len(force),
@@ -207,9 +195,7 @@ def effective_draws(rng, model, sds, draws=4000, repeats=20) -> dict:
     """
     positions, force_sd = model.array.relative, np.sqrt(model.noise.accelerometer[0, 0])
     rate_sd = np.sqrt(model.noise.gyroscope[0, 0] / model.array.gyroscopes)
-    whole, precision = design(positions), model.noise.accelerometer_precision
-    H = whole[:, 6:]
-    S = precision - precision @ H @ np.linalg.solve(H.T @ precision @ H, H.T @ precision)
+    H, (S, _) = linear_part(positions), projection(positions, model.noise.accelerometer)
     scale = np.repeat(sds[1:], 3)
     found = {"naive": [], "conditioned": [], "rao_blackwellised": []}
     for _ in range(repeats):
@@ -219,12 +205,12 @@ def effective_draws(rng, model, sds, draws=4000, repeats=20) -> dict:
         near = centre + rate_sd * rng.standard_normal((draws, 3))
         rest = scale * rng.standard_normal((draws, 6))
         for name, rates in (("naive", wide), ("conditioned", near)):
-            off = y - products(rates) @ whole[:, :6].T - rest @ H.T
+            off = y - nonlinear_part(rates, positions) - rest @ H.T
             logs = -0.5 * np.sum(off**2, axis=1) / force_sd**2
             if name == "naive":
                 logs -= 0.5 * np.sum((rates - centre) ** 2, axis=1) / rate_sd**2
             found[name].append(_kish(logs))
-        off = y - products(near) @ whole[:, :6].T
+        off = y - nonlinear_part(near, positions)
         found["rao_blackwellised"].append(_kish(-0.5 * np.einsum("ni,ij,nj->n", off, S, off)))
     return {"draws": draws} | {name: float(np.median(values)) for name, values in found.items()}
 
