@@ -1,4 +1,4 @@
-"""The blind study: what the diagnosis is told, the grades, the bars, tables and figures."""
+"""The blind study: what the diagnosis is told, the grades, the criteria, tables and figures."""
 
 import json
 import re
@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 import imuarray.blind
-from imuarray.blind import Case, bars, grade, study, summary
+from imuarray.blind import Case, criteria, grade, study, summary
 from imuarray.blind.inject import CATALOGUE, EFFECTS
 from imuarray.figures import blind as drawing
 from imuarray.figures import blind_tables
@@ -223,7 +223,7 @@ def test_limits_of_shares():
 
 
 def bars_of(rows):
-    table = bars.bars(summary.recordings(rows))
+    table = criteria.criteria(summary.recordings(rows))
     return {row["id"]: row for row in table.to_dict("records")}
 
 
@@ -241,7 +241,7 @@ def test_bars_count_the_recordings_they_are_set_for():
     assert found["one_found"]["all_recordings"] == 11
     assert (found["crashes"]["recordings"], found["crashes"]["count"]) == (11, 1)
     assert found["crashes"]["verdict"].startswith("short")
-    assert found["pair_set"]["verdict"] == bars.NONE
+    assert found["pair_set"]["verdict"] == criteria.NONE
     # 7.95 sigma was 8 when asked for, 7 was not
     near = [graded("one", one, [], size=size) for size in (7.95, 7.0)]
     assert bars_of(near)["one_found"]["recordings"] == 1
@@ -379,7 +379,9 @@ def test_figures_and_tables(tmp_path):
     assert all(path.stat().st_size > 1000 for path in paths.values())
     paths = {kind: tmp_path / f"bars.{kind}" for kind in ("csv", "tex", "md")}
     notes = blind_tables.bars_notes(table, "Scale quick, seed 1")
-    write_table(blind_tables.shown(bars.bars(table)), blind_tables.BARS, "Bars", notes, **paths)
+    write_table(
+        blind_tables.shown(criteria.criteria(table)), blind_tables.BARS, "Bars", notes, **paths
+    )
     lines = [line for line in paths["md"].read_text().splitlines() if line.startswith("|")]
     assert {line.count("|") for line in lines} == {len(blind_tables.BARS) + 1}
     assert any("short by" in line for line in lines)
@@ -423,12 +425,12 @@ def test_papers_do_not_rest_on_the_blind_study_nor_diagnoses_on_grades():
 def test_files_a_script_rests_on_are_all_that_it_imports():
     """Against what Python itself has loaded."""
     code = (
-        "import sys, imuarray.blind.study, imuarray.figures.blind, imuarray.blind.bars;"
+        "import sys, imuarray.blind.study, imuarray.figures.blind, imuarray.blind.criteria;"
         "print(*(m.__file__ for n, m in sys.modules.items() if n.split('.')[0] == 'imuarray'))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     support = workflow_support()
-    found = support.resting_on("blind/study.py", "figures/blind.py", "blind/bars.py")
+    found = support.resting_on("blind/study.py", "figures/blind.py", "blind/criteria.py")
     assert set(done.stdout.split()) <= set(found)
     # what a package loads when it is used, too
     found = support.resting_on("studies/calibrated.py")

@@ -4,7 +4,7 @@ DIAGNOSING = resting_on(
 )
 GRADING = resting_on("blind/grade.py", "blind/summary.py", "provenance.py")
 BLIND_DRAWING = resting_on("figures/blind.py", "figures/notes.py", "figures/imuarray.mplstyle")
-BLIND_TABLES = resting_on("figures/blind_tables.py", "blind/bars.py")
+BLIND_TABLES = resting_on("figures/blind_tables.py", "blind/criteria.py")
 
 
 rule blind_diagnose:

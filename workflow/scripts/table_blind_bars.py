@@ -1,4 +1,4 @@
-"""The bars of the blind study, measured -> CSV, LaTeX, Markdown."""
+"""The criteria of the blind study, measured -> CSV, LaTeX, Markdown."""
 
 from job import job
 
@@ -6,7 +6,7 @@ with job(snakemake) as settings:
     import json
     from pathlib import Path
 
-    from imuarray.blind.bars import bars
+    from imuarray.blind.criteria import criteria
     from imuarray.blind.summary import recordings
     from imuarray.figures import blind_tables
     from imuarray.figures.notes import scale_line
@@ -17,6 +17,6 @@ with job(snakemake) as settings:
     notes = blind_tables.bars_notes(table, scale_line(settings))
     caption = "Blind study: what was asked of the diagnosis, and what was measured."
     write_table(
-        blind_tables.shown(bars(table)), blind_tables.BARS, caption, notes,
+        blind_tables.shown(criteria(table)), blind_tables.BARS, caption, notes,
         **dict(snakemake.output.items()),
     )  # fmt: skip

@@ -125,7 +125,7 @@ def _draw_effect(scene: Scene, case: Case, effect: str, sensors, rng) -> Change:
     entry = EFFECTS[effect]
     directions = int(rng.integers(2**63))
     amplitude = entry.realistic(rng)
-    if case.sigma is not None and entry.scalable and not effect.startswith("gauge_"):
+    if case.sigma is not None and entry.scalable:
         amplitude = scale_to(scene, effect, sensors, directions, case.sigma)
     return draw_seeded(scene, effect, sensors, directions, amplitude)
 

@@ -51,6 +51,10 @@ class Change:
         AR(1) coefficients of the noise.
     after : callable or None
         From noisy, clipped readings, a Pair, to the recorded ones.
+    stale : bool
+        Whether ``after`` moves readings in time: it comes after all others, and moves flags too.
+    divergence : callable or None
+        From a number of samples to the KL divergence in nats, for an effect on the noise.
     """
 
     effect: str
@@ -64,6 +68,8 @@ class Change:
     gain: Pair = NOTHING
     correlation: Pair = NOTHING
     after: Callable[[Pair], Pair] | None = None
+    stale: bool = False
+    divergence: Callable[[int], float] | None = None
 
 
 @dataclass(frozen=True)
@@ -81,14 +87,18 @@ class Effect:
         The amplitude stays below.
     scalable : bool
         Whether the amplitude can be set to reach a wanted size in sigma.
+    from_readings : bool
+        Whether readings suffice to inject it, without the true motion (or, of coloured noise,
+        without the noise apart from what it is added to).
     """
 
     draw: Callable[..., Change]
     unit: str
     low: float
     high: float
-    limit: float
-    scalable: bool
+    limit: float = np.inf
+    scalable: bool = True
+    from_readings: bool = True
 
     def realistic(self, rng) -> float:
         """An amplitude of the catalogue's column, in `unit`."""
@@ -98,8 +108,12 @@ class Effect:
 EFFECTS: dict[str, Effect] = {}
 
 
-def effect(unit: str, low: float, high: float, limit: float = np.inf, scalable: bool = True):
-    """Register a function under its own name; it returns the keyword arguments of a Change."""
+def effect(unit: str, low: float, high: float, everywhere: bool = False, **entry):
+    """Register a function under its own name; it returns the keyword arguments of a Change.
+
+    ``everywhere``: the effect is on all IMUs, whatever sensors are asked for; ``entry``: other
+    fields of `Effect`.
+    """
 
     def register(function):
         def draw(scene, rng, sensors: Sequence[int], size: float) -> Change:
@@ -109,13 +123,35 @@ def effect(unit: str, low: float, high: float, limit: float = np.inf, scalable: 
                 raise ValueError(
                     f"sensors: expected different indices below {len(known)}, found {sensors}"
                 )
+            chosen = tuple(known) if everywhere else chosen
             parts = function(scene, rng, chosen, float(size))
-            chosen = parts.pop("sensors", chosen)
             return Change(function.__name__, chosen, float(size), **parts)
 
         draw.__doc__, draw.__name__ = function.__doc__, function.__name__
-        EFFECTS[function.__name__] = Effect(draw, unit, low, high, limit, scalable)
+        EFFECTS[function.__name__] = Effect(draw, unit, low, high, **entry)
         return draw
+
+    return register
+
+
+def error_of(kind: str, parameter: str, unit: str, low: float, high: float, draw=None, **entry):
+    """Register a function that gives an error of the readings, as `effect` does.
+
+    The function is given the parameter's value, a `Field` and the list of sensors, and returns
+    what is added, (T, n, 3) after broadcasting; ``kind`` is "force" or "rate"; ``draw`` (rng,
+    sensors, size) draws the value, by default `entries`, (n, 3).
+    """
+
+    def register(function):
+        def parts(scene, rng, sensors, size):
+            value = (draw or entries)(rng, sensors, size)
+            return {
+                "parameters": {parameter: Parameter(value, unit)},
+                f"{kind}_error": lambda field: function(value, field, list(sensors)),
+            }
+
+        parts.__name__, parts.__doc__ = function.__name__, function.__doc__
+        return effect(unit, low, high, **entry)(parts)
 
     return register
 
@@ -138,9 +174,36 @@ def kind_names(kinds: tuple[bool, bool]) -> Parameter:
     return Parameter([name for name, chosen in known if chosen], "1")
 
 
-def entries(rng, sensors, size, *shape) -> np.ndarray:
-    """Normal entries, (n, *shape), three to a sensor if nothing is said, of sd ``size``."""
-    return size * rng.standard_normal((len(sensors), *(shape or (3,))))
+def of_kinds(kinds: tuple[bool, bool], value) -> Pair:
+    """The value for the affected kinds of sensors, None for the other."""
+    return Pair(*(value if chosen else None for chosen in kinds))
+
+
+def entries(rng, sensors, size) -> np.ndarray:
+    """Normal entries of sd ``size``, (n, 3)."""
+    return size * rng.standard_normal((len(sensors), 3))
+
+
+def matrices(rng, sensors, size) -> np.ndarray:
+    """Normal matrices with entries of sd ``size``, (n, 3, 3)."""
+    return size * rng.standard_normal((len(sensors), 3, 3))
+
+
+def altered(sensors, rules: Pair) -> Callable[[Pair], Pair]:
+    """A change of finished readings: each rule is from some sensors' (T, n, 3) to others.
+
+    A rule of None leaves its kind of sensors as it is.
+    """
+    chosen = list(sensors)
+
+    def change(readings: Pair) -> Pair:
+        found = [values.copy() for values in readings]
+        for values, rule in zip(found, rules, strict=True):
+            if rule is not None:
+                values[:, chosen] = rule(values[:, chosen])
+        return Pair(*found)
+
+    return change
 
 
 def applied(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
@@ -150,18 +213,20 @@ def applied(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 
 def mean_readings(scene: Scene, changes: Sequence[Change]) -> Pair:
     """Readings with the effects but without noise and rails, (T, A, 3) and (T, G, 3)."""
-    known = scene.field(_total_ages(changes))
-    force, rate = np.array(known.force), np.array(known.rate)
-    for change in changes:
-        chosen = list(change.sensors)
-        if change.force_error is not None:
-            force[:, chosen] += change.force_error(known)
-        if change.rate_error is not None:
-            rate[:, chosen] += change.rate_error(known)
-    readings = Pair(force, rate)
+    readings = with_errors(scene.field(_total_ages(changes)), changes)
     for change in changes:
         if change.relabel is not None:
             readings = change.relabel(readings)
+    return readings
+
+
+def with_errors(field: Field, changes: Sequence[Change]) -> Pair:
+    """The true readings of a field with the sensors' errors added up, (T, A, 3) and (T, G, 3)."""
+    readings = Pair(np.array(field.force), np.array(field.rate))
+    for change in changes:
+        for values, error in zip(readings, (change.force_error, change.rate_error), strict=True):
+            if error is not None:
+                values[:, list(change.sensors)] += error(field)
     return readings
 
 
@@ -213,7 +278,7 @@ def _coloured(noise: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
 def finish(scene: Scene, changes: Sequence[Change], readings: Pair) -> Pair:
     """Clip at the declared ranges, then saturate, quantise and, last, repeat former readings."""
     readings = Pair(*(np.clip(x, -m, m) for x, m in zip(readings, scene.limits, strict=True)))
-    for change in sorted(changes, key=lambda change: change.effect == "stale_samples"):
+    for change in sorted(changes, key=lambda change: change.stale):
         if change.after is not None:
             readings = change.after(readings)
     return readings

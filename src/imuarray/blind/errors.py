@@ -1,7 +1,7 @@
 """Effects of the catalogue on the sensors' mean: bias, scale, axes, curvature, place.
 
 u is the true specific force at a triad and w the true angular rate, at the sensor's own instants.
-Each function returns the parts of a `Change`; ``size`` is the sd of the drawn entries.
+The drawn entries have the sd ``size``; see `change.error_of` and `change.effect`.
 """
 
 from __future__ import annotations
@@ -12,13 +12,17 @@ from imuarray.blind.change import (
     UNIT_FORCE,
     UNIT_RATE,
     Parameter,
+    altered,
     applied,
     effect,
     entries,
+    error_of,
     kind_names,
+    matrices,
+    of_kinds,
     which_kinds,
 )
-from imuarray.blind.scene import ACCELEROMETER_RAIL, GYROSCOPE_RAIL, Pair
+from imuarray.blind.scene import ACCELEROMETER_RAIL, GYROSCOPE_RAIL
 
 DEGREE = float(np.radians(1.0))
 GRAVITY = 9.80665  # m/s^2
@@ -28,109 +32,77 @@ DRIFT_FORCE, DRIFT_RATE = 0.1, 0.3 * DEGREE
 
 def _off_diagonal(rng, sensors, size) -> np.ndarray:
     """Matrices (n, 3, 3) without diagonal."""
-    return entries(rng, sensors, size, 3, 3) * (1 - np.eye(3))
+    return matrices(rng, sensors, size) * (1 - np.eye(3))
 
 
-@effect(UNIT_FORCE, 0.01, 0.1)
-def accelerometer_bias(scene, rng, sensors, size):
+@error_of("force", "bias", UNIT_FORCE, 0.01, 0.1)
+def accelerometer_bias(bias, field, sensors):
     """u + b; size in m/s^2."""
-    bias = entries(rng, sensors, size)
-    return {
-        "parameters": {"bias": Parameter(bias, UNIT_FORCE)},
-        "force_error": lambda field: bias,
-    }
+    return bias
 
 
-@effect("1", 1e-3, 0.03)
-def accelerometer_scale(scene, rng, sensors, size):
+@error_of("force", "scale", "1", 1e-3, 0.03)
+def accelerometer_scale(scale, field, sensors):
     """(1 + c_i) u_i."""
-    scale = entries(rng, sensors, size)
-    return {
-        "parameters": {"scale": Parameter(scale, "1")},
-        "force_error": lambda field: scale * field.force[:, list(sensors)],
-    }
+    return scale * field.force[:, sensors]
 
 
-@effect("1", 1e-3, 0.02)
-def accelerometer_misalignment(scene, rng, sensors, size):
+@error_of("force", "misalignment", "1", 1e-3, 0.02, _off_diagonal)
+def accelerometer_misalignment(matrix, field, sensors):
     """u + M u, M without diagonal."""
-    matrix = _off_diagonal(rng, sensors, size)
-    return {
-        "parameters": {"misalignment": Parameter(matrix, "1")},
-        "force_error": lambda field: applied(matrix, field.force[:, list(sensors)]),
-    }
+    return applied(matrix, field.force[:, sensors])
 
 
-@effect("s2 m-1", 0.0015 / ACCELEROMETER_RAIL, 0.005 / ACCELEROMETER_RAIL)
-def accelerometer_nonlinearity(scene, rng, sensors, size):
+@error_of(
+    "force", "curvature", "s2 m-1", 0.0015 / ACCELEROMETER_RAIL, 0.005 / ACCELEROMETER_RAIL
+)  # fmt: skip
+def accelerometer_nonlinearity(curvature, field, sensors):
     """u_i + c_i u_i^2; size in s^2/m."""
-    curvature = entries(rng, sensors, size)
-    return {
-        "parameters": {"curvature": Parameter(curvature, "s2 m-1")},
-        "force_error": lambda field: curvature * field.force[:, list(sensors)] ** 2,
-    }
+    return curvature * field.force[:, sensors] ** 2
 
 
-@effect("m", 1e-4, 1.5e-3)
-def size_effect(scene, rng, sensors, size):
+@error_of("force", "lever_arm", "m", 1e-4, 1.5e-3, matrices, from_readings=False)
+def size_effect(arms, field, sensors):
     """Axis i of triad k sits at r_k + d_k,i; size in metres; value (n, axis i, 3)."""
-    arms = entries(rng, sensors, size, 3, 3)
-
-    def error(field):
-        seen = [field.lever(arms[:, axis], sensors)[..., axis] for axis in range(3)]
-        return np.stack(seen, axis=-1)
-
-    return {"parameters": {"lever_arm": Parameter(arms, "m")}, "force_error": error}
+    return apart(arms, field, sensors)
 
 
-@effect(UNIT_RATE, 0.01 * DEGREE, DEGREE)
-def gyroscope_bias(scene, rng, sensors, size):
+def apart(arms, field, sensors) -> np.ndarray:
+    """Specific force that axes at ``arms`` (n, axis, 3) m from their triads add, (T, n, 3)."""
+    seen = [field.lever(arms[:, axis], sensors)[..., axis] for axis in range(3)]
+    return np.stack(seen, axis=-1)
+
+
+@error_of("rate", "bias", UNIT_RATE, 0.01 * DEGREE, DEGREE)
+def gyroscope_bias(bias, field, sensors):
     """w + b; size in rad/s."""
-    bias = entries(rng, sensors, size)
-    return {
-        "parameters": {"bias": Parameter(bias, UNIT_RATE)},
-        "rate_error": lambda field: bias,
-    }
+    return bias
 
 
-@effect("1", 1e-3, 0.03)
-def gyroscope_scale(scene, rng, sensors, size):
+@error_of("rate", "scale", "1", 1e-3, 0.03)
+def gyroscope_scale(scale, field, sensors):
     """(1 + c_i) w_i."""
-    scale = entries(rng, sensors, size)
-    return {
-        "parameters": {"scale": Parameter(scale, "1")},
-        "rate_error": lambda field: scale * field.rate[:, list(sensors)],
-    }
+    return scale * field.rate[:, sensors]
 
 
-@effect("1", 1e-3, 0.02)
-def gyroscope_misalignment(scene, rng, sensors, size):
+@error_of("rate", "misalignment", "1", 1e-3, 0.02, _off_diagonal)
+def gyroscope_misalignment(matrix, field, sensors):
     """w + M w, M without diagonal."""
-    matrix = _off_diagonal(rng, sensors, size)
-    return {
-        "parameters": {"misalignment": Parameter(matrix, "1")},
-        "rate_error": lambda field: applied(matrix, field.rate[:, list(sensors)]),
-    }
+    return applied(matrix, field.rate[:, sensors])
 
 
-@effect("rad s m-1", 0.03 * DEGREE / GRAVITY, 0.3 * DEGREE / GRAVITY)
-def gyroscope_g_sensitivity(scene, rng, sensors, size):
+@error_of(
+    "rate", "sensitivity", "rad s m-1", 0.03 * DEGREE / GRAVITY, 0.3 * DEGREE / GRAVITY, matrices
+)  # fmt: skip
+def gyroscope_g_sensitivity(matrix, field, sensors):
     """w + G u, u the specific force at the same IMU; size in rad/s per m/s^2."""
-    matrix = entries(rng, sensors, size, 3, 3)
-    return {
-        "parameters": {"sensitivity": Parameter(matrix, "rad s m-1")},
-        "rate_error": lambda field: applied(matrix, field.force_at_gyroscopes[:, list(sensors)]),
-    }
+    return applied(matrix, field.force_at_gyroscopes[:, sensors])
 
 
-@effect("s rad-1", 0.0006 / GYROSCOPE_RAIL, 0.002 / GYROSCOPE_RAIL)
-def gyroscope_nonlinearity(scene, rng, sensors, size):
+@error_of("rate", "curvature", "s rad-1", 0.0006 / GYROSCOPE_RAIL, 0.002 / GYROSCOPE_RAIL)
+def gyroscope_nonlinearity(curvature, field, sensors):
     """w_i + c_i w_i^2; size in s/rad."""
-    curvature = entries(rng, sensors, size)
-    return {
-        "parameters": {"curvature": Parameter(curvature, "s rad-1")},
-        "rate_error": lambda field: curvature * field.rate[:, list(sensors)] ** 2,
-    }
+    return curvature * field.rate[:, sensors] ** 2
 
 
 @effect("0.1 m s-2 or 0.3 deg s-1", 0.33, 3.3)
@@ -159,18 +131,9 @@ def axis_swap(scene, rng, sensors, size):
     """Two axes exchanged or a sign wrong; the amplitude means nothing."""
     kinds = which_kinds(rng)
     tables = np.stack([_wrong_axes(rng) for _ in sensors])
-
-    def relabel(readings):
-        turned = []
-        for values, chosen in zip(readings, kinds, strict=True):
-            values = values.copy()
-            if chosen:
-                values[:, list(sensors)] = applied(tables, values[:, list(sensors)])
-            turned.append(values)
-        return Pair(*turned)
-
+    rules = of_kinds(kinds, lambda values: applied(tables, values))
     said = {"reading_from_true": Parameter(tables, "1"), "of": kind_names(kinds)}
-    return {"parameters": said, "relabel": relabel}
+    return {"parameters": said, "relabel": altered(sensors, rules)}
 
 
 def _wrong_axes(rng) -> np.ndarray:
@@ -182,7 +145,7 @@ def _wrong_axes(rng) -> np.ndarray:
     return table
 
 
-@effect("m", 1e-4, 3e-3)
+@effect("m", 1e-4, 3e-3, from_readings=False)
 def position_shift(scene, rng, sensors, size):
     """r_k + d_k from one instant on; size in metres; the instant is the same for all."""
     shift = entries(rng, sensors, size)

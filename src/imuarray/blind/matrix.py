@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from imuarray.blind.cases import Case
 from imuarray.blind.inject import CATALOGUE, EFFECTS, GAUGE, OUTSIDE
@@ -22,7 +22,7 @@ REPEATS = {
 # The quick scale takes so many of the default one, evenly spread.
 QUICK = {"clean": 4, "one": 12, "pair": 4, "gauge": 3, "outside": 4, "struck": 3}
 
-# Settings and how often: the bars are for 8 IMUs, 125 Hz, 24 s.
+# Settings and how often: the criteria are for 8 IMUs, 125 Hz, 24 s.
 SETTINGS = (
     (0.68, {}),
     (0.17, {"rails": True}),
@@ -75,13 +75,23 @@ def _clean(repeats: int, rng) -> Iterator[tuple]:
     yield from (((), (), None) for _ in range(repeats))
 
 
-def _one(repeats: int, rng) -> Iterator[tuple]:
-    for name in CATALOGUE:
-        # without an amplitude to set, fewer levels make sense
-        levels = SIZES if EFFECTS[name].scalable else (None,) * 3
-        for sigma in levels:
-            for how in HOW_MANY:
-                yield from (((name,), (how,), sigma) for _ in range(repeats))
+def _gauge(repeats: int, rng) -> Iterator[tuple]:
+    yield from (((name,), ("all",), None) for name in GAUGE for _ in range(repeats))
+
+
+def _single(names, sizes, without: int) -> Callable:
+    """Each effect alone at each size, on one and on all IMUs.
+
+    An effect without an amplitude to set comes ``without`` times instead.
+    """
+
+    def plans(repeats: int, rng) -> Iterator[tuple]:
+        for name in names:
+            for sigma in sizes if EFFECTS[name].scalable else (None,) * without:
+                for how in HOW_MANY:
+                    yield from (((name,), (how,), sigma) for _ in range(repeats))
+
+    return plans
 
 
 def _pair(repeats: int, rng) -> Iterator[tuple]:
@@ -92,30 +102,11 @@ def _pair(repeats: int, rng) -> Iterator[tuple]:
         yield chosen, wanted, PAIR_SIZE
 
 
-def _gauge(repeats: int, rng) -> Iterator[tuple]:
-    yield from (((name,), ("all",), None) for name in GAUGE for _ in range(repeats))
-
-
-def _outside(repeats: int, rng) -> Iterator[tuple]:
-    for name in OUTSIDE:
-        levels = OUTSIDE_SIZES if EFFECTS[name].scalable else (None,) * 2
-        for sigma in levels:
-            for how in HOW_MANY:
-                yield from (((name,), (how,), sigma) for _ in range(repeats))
-
-
-def _struck(repeats: int, rng) -> Iterator[tuple]:
-    for name in CATALOGUE:
-        sigma = STRUCK_SIZE if EFFECTS[name].scalable else None
-        for how in HOW_MANY:
-            yield from (((name,), (how,), sigma) for _ in range(repeats))
-
-
 _KINDS = {
     "clean": _clean,
-    "one": _one,
+    "one": _single(CATALOGUE, SIZES, 3),
     "pair": _pair,
     "gauge": _gauge,
-    "outside": _outside,
-    "struck": _struck,
+    "outside": _single(OUTSIDE, OUTSIDE_SIZES, 2),
+    "struck": _single(CATALOGUE, (STRUCK_SIZE,), 1),
 }

@@ -8,20 +8,12 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from imuarray.blind.change import Change, Pair
+from imuarray.blind.change import Change, Pair, with_errors
 from imuarray.blind.inject import EFFECTS
 from imuarray.recording import Recording
 from imuarray.streams import stream
 
-# These need the true motion, or (coloured noise) the noise apart from what it is added to.
-NOT_FROM_READINGS = (
-    "size_effect",
-    "position_shift",
-    "gauge_lever_arm",
-    "outside_flexible_board",
-    "outside_vibration_rectification",
-    "coloured_noise",
-)
+NOT_FROM_READINGS = tuple(name for name, entry in EFFECTS.items() if not entry.from_readings)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +129,7 @@ def inject_measured(
     """
     change = measured_change(recording, effect, sensors, amplitude, seed)
     scene = MeasuredScene(recording)
-    readings = _with_noise(scene, change, _with_errors(scene, change), seed)
+    readings = _with_noise(scene, change, with_errors(scene.field(change.ages), [change]), seed)
     flags = Pair(recording.saturated_accelerometers(), recording.saturated_gyroscopes())
     found = [
         _within_rails(*parts)
@@ -147,20 +139,10 @@ def inject_measured(
     for step in (change.relabel, change.after):
         readings = step(readings) if step else readings
     # where readings move, so do their flags
-    moving = change.after if effect == "stale_samples" else change.relabel
+    moving = change.after if change.stale else change.relabel
     if moving:
         flags = Pair(*(np.abs(x) > 0.5 for x in moving(Pair(*(f.astype(float) for f in flags)))))
     return _rebuilt(recording, readings, flags)
-
-
-def _with_errors(scene: MeasuredScene, change: Change) -> Pair:
-    known = scene.field(change.ages)
-    readings = Pair(np.array(known.force), np.array(known.rate))
-    errors = (change.force_error, change.rate_error)
-    for values, error in zip(readings, errors, strict=True):
-        if error is not None:
-            values[:, list(change.sensors)] += error(known)
-    return readings
 
 
 def _with_noise(scene: MeasuredScene, change: Change, readings: Pair, seed: int) -> Pair:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from imuarray.blind.change import (
     UNIT_FORCE,
     UNIT_RATE,
     Parameter,
+    altered,
     effect,
     kind_names,
+    of_kinds,
     spread,
     which_kinds,
 )
@@ -21,19 +25,17 @@ LOUDEST, QUIETEST = 5.0, 0.5
 
 @effect("1", np.log(1.3), np.log(LOUDEST), limit=np.log(50.0))
 def accelerometer_noise(scene, rng, sensors, size):
-    """The noise of the triad is c times the declared one; size is ln c (see `_factors`)."""
-    factors, said = _factors(scene, rng, sensors, size)
-    return {"parameters": said, "gain": Pair(factors, None)}
+    """The noise of the triad is c times the declared one; size is ln c (see `_louder`)."""
+    return _louder(scene, rng, sensors, size, (True, False))
 
 
 @effect("1", np.log(1.3), np.log(LOUDEST), limit=np.log(50.0))
 def gyroscope_noise(scene, rng, sensors, size):
-    """The noise of the triad is c times the declared one; size is ln c (see `_factors`)."""
-    factors, said = _factors(scene, rng, sensors, size)
-    return {"parameters": said, "gain": Pair(None, factors)}
+    """The noise of the triad is c times the declared one; size is ln c (see `_louder`)."""
+    return _louder(scene, rng, sensors, size, (False, True))
 
 
-def _factors(scene, rng, sensors, size):
+def _louder(scene, rng, sensors, size, kinds):
     """c_k = exp(size x_k), x_k of one sign: all alike or each its own, in half the draws each.
 
     A quarter of the draws are quieter, scaled so that ln 5 louder is answered by 0.5.
@@ -44,7 +46,17 @@ def _factors(scene, rng, sensors, size):
     own /= own.max()
     direction = np.log(QUIETEST) / np.log(LOUDEST) if quiet else 1.0
     factors = np.exp(size * direction * own)
-    return spread(scene, sensors, factors, 1.0)[:1], {"factor": Parameter(factors, "1")}
+    return {
+        "parameters": {"factor": Parameter(factors, "1")},
+        "gain": of_kinds(kinds, spread(scene, sensors, factors, 1.0)[:1]),
+        # a louder triad is held against the declared level
+        "divergence": lambda samples: level_divergence(factors[None]) * samples,
+    }
+
+
+def level_divergence(gain: np.ndarray) -> float:
+    """KL of N(0, gain^2) from N(0, 1), per sample over triads and axes; gain (T or 1, n)."""
+    return float(1.5 * (gain**2 - 1 - np.log(gain**2)).mean(axis=0).sum())
 
 
 @effect("1", 4.0, 19.0)
@@ -62,15 +74,41 @@ def heavy_tails(scene, rng, sensors, size):
         rank = rng.random((len(scene.time), len(sensors))).argsort(axis=0).argsort(axis=0)
         gain = spread(scene, sensors, np.where(rank < wild_ones, 1 + size, 1.0), 1.0)
         gains.append(gain if chosen else None)
+    true_share, triads = wild_ones / len(scene.time), len(sensors) * sum(kinds)
     said = {
-        "share": Parameter(wild_ones / len(scene.time), "1"),
+        "share": Parameter(true_share, "1"),
         "factor": Parameter(1 + size, "1"),
         "of": kind_names(kinds),
     }
-    return {"parameters": said, "gain": Pair(*gains)}
+    return {
+        "parameters": said,
+        "gain": Pair(*gains),
+        # the level is another effect's
+        "divergence": lambda samples: _tails_divergence(true_share, 1 + size) * triads * samples,
+    }
 
 
-@effect("1", 0.6, 0.9, limit=0.999)
+@lru_cache(maxsize=256)
+def _tails_divergence(share: float, factor: float) -> float:
+    """KL per triad-sample of a mixture from the Gaussian with its covariance.
+
+    The mixture is (1 - share) N(0, I) + share N(0, factor^2 I) in three dimensions, so the
+    integral is over the radius alone.
+    """
+    radius = np.geomspace(1e-3, 12 * max(factor, 1.0), 4000)
+    variance = 1 + share * (factor**2 - 1)
+
+    def log_normal(v):
+        return -1.5 * np.log(2 * np.pi * v) - radius**2 / (2 * v)
+
+    with np.errstate(divide="ignore"):
+        parts = np.log([1 - share, share])[:, None] + [log_normal(1.0), log_normal(factor**2)]
+    mixture = np.logaddexp(*parts)
+    density = 4 * np.pi * radius**2 * np.exp(mixture)
+    return float(max(np.trapezoid(density * (mixture - log_normal(variance)), radius), 0.0))
+
+
+@effect("1", 0.6, 0.9, limit=0.999, from_readings=False)
 def coloured_noise(scene, rng, sensors, size):
     """AR(1) noise of the declared sd; size is the coefficient rho."""
     kinds = which_kinds(rng)
@@ -80,29 +118,29 @@ def coloured_noise(scene, rng, sensors, size):
     if 0 < size < 1:
         lasting = -1 / (scene.sampling_rate * np.log(size))
         said["correlation_time"] = Parameter(float(lasting), "s")
-    return {"parameters": said, "correlation": Pair(*(rho if c else None for c in kinds))}
+    triads = len(sensors) * sum(kinds)
+    return {
+        "parameters": said,
+        "correlation": of_kinds(kinds, rho),
+        # against white noise
+        "divergence": lambda samples: -1.5 * np.log1p(-(size**2)) * triads * samples,
+    }
 
 
 @effect("1", 0.05, 0.4, limit=0.95)
 def saturation(scene, rng, sensors, size):
     """Clipped at (1 - size) times the largest reading, below the declared range."""
     kinds = which_kinds(rng)
-    rails, said = [], {}
+    rules, said = [], {}
     names = (("accelerometer_rail", UNIT_FORCE), ("gyroscope_rail", UNIT_RATE))
     known = zip(scene.ideal(), scene.limits, kinds, names, strict=True)
     for values, limit, chosen, (name, unit) in known:
         peak = min(float(np.abs(values[:, list(sensors)]).max()), limit)
-        rails.append((1 - size) * peak if chosen else np.inf)
+        rail = (1 - size) * peak
+        rules.append((lambda x, rail=rail: np.clip(x, -rail, rail)) if chosen else None)
         if chosen:
-            said[name] = Parameter(rails[-1], unit)
-
-    def clip(readings):
-        clipped = [values.copy() for values in readings]
-        for values, rail in zip(clipped, rails, strict=True):
-            values[:, list(sensors)] = np.clip(values[:, list(sensors)], -rail, rail)
-        return Pair(*clipped)
-
-    return {"parameters": said, "after": clip}
+            said[name] = Parameter(rail, unit)
+    return {"parameters": said, "after": altered(sensors, Pair(*rules))}
 
 
 @effect("1", 1e-3, 0.1, limit=1.0, scalable=False)
@@ -119,11 +157,7 @@ def stale_samples(scene, rng, sensors, size):
     rows = np.arange(len(scene.time))[:, None]
     source = np.maximum.accumulate(np.where(stale, 0, rows), axis=0)
 
-    def repeat(readings):
-        repeated = [values.copy() for values in readings]
-        for values in repeated:
-            values[:, list(sensors)] = values[source, list(sensors)]
-        return Pair(*repeated)
-
+    columns = np.arange(len(sensors))
+    rules = of_kinds((True, True), lambda values: values[source, columns])
     said = {"share": Parameter(stale.mean(axis=0), "1")}
-    return {"parameters": said, "after": repeat}
+    return {"parameters": said, "after": altered(sensors, rules), "stale": True}

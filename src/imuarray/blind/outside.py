@@ -7,47 +7,40 @@ import numpy as np
 from imuarray.blind.change import (
     UNIT_FORCE,
     Parameter,
+    altered,
     applied,
     effect,
     entries,
+    error_of,
     kind_names,
+    matrices,
+    of_kinds,
     spread,
     which_kinds,
 )
+from imuarray.blind.noise import level_divergence
 from imuarray.blind.scene import ACCELEROMETER_RAIL, Pair
 
 
-@effect("s4 m-2", 0.001 / ACCELEROMETER_RAIL**2, 0.01 / ACCELEROMETER_RAIL**2)
-def outside_cubic(scene, rng, sensors, size):
+@error_of(
+    "force", "coefficient", "s4 m-2", 0.001 / ACCELEROMETER_RAIL**2, 0.01 / ACCELEROMETER_RAIL**2
+)  # fmt: skip
+def outside_cubic(coefficient, field, sensors):
     """u_i + c_i u_i^3; size in (m/s^2)^-2."""
-    coefficient = entries(rng, sensors, size)
-    return {
-        "parameters": {"coefficient": Parameter(coefficient, "s4 m-2")},
-        "force_error": lambda field: coefficient * field.force[:, list(sensors)] ** 3,
-    }
+    return coefficient * field.force[:, sensors] ** 3
 
 
-@effect("s2", 1e-6, 3e-5)
-def outside_flexible_board(scene, rng, sensors, size):
+@error_of("force", "compliance", "s2", 1e-6, 3e-5, matrices, from_readings=False)
+def outside_flexible_board(compliance, field, sensors):
     """The triad sits at r_k + K u_k, quasi-statically; size in metres per m/s^2."""
-    compliance = entries(rng, sensors, size, 3, 3)
-
-    def error(field):
-        return field.lever(applied(compliance, field.force[:, list(sensors)]), sensors)
-
-    return {"parameters": {"compliance": Parameter(compliance, "s2")}, "force_error": error}
+    return field.lever(applied(compliance, field.force[:, sensors]), sensors)
 
 
-@effect("m s2", 1e-7, 3e-6)
-def outside_vibration_rectification(scene, rng, sensors, size):
+@error_of("force", "coefficient", "m s2", 1e-7, 3e-6, from_readings=False)
+def outside_vibration_rectification(coefficient, field, sensors):
     """u + c |w'|^2; size in m/s^2 per (rad/s^2)^2."""
-    coefficient = entries(rng, sensors, size)
-
-    def error(field):
-        shaking = field.states.columns(sensors).acceleration
-        return coefficient * (shaking**2).sum(axis=-1, keepdims=True)
-
-    return {"parameters": {"coefficient": Parameter(coefficient, "m s2")}, "force_error": error}
+    shaking = field.states.columns(sensors).acceleration
+    return coefficient * (shaking**2).sum(axis=-1, keepdims=True)
 
 
 @effect("m s-1", 1e-3, 0.05)
@@ -58,7 +51,7 @@ def outside_cross_talk(scene, rng, sensors, size):
     the same rate, and the catalogue holds those. size in m/s^2 per rad/s.
     """
     others = [int(rng.choice([j for j in range(scene.accelerometers) if j != k])) for k in sensors]
-    leak = entries(rng, sensors, size, 3, 3)
+    leak = matrices(rng, sensors, size)
     said = {"leak": Parameter(leak, "m s-1"), "from": Parameter(others, "index")}
     return {
         "parameters": said,
@@ -118,25 +111,30 @@ def outside_rate_noise(scene, rng, sensors, size):
     turning = np.linalg.norm(scene.ideal().rate[:, list(sensors)], axis=-1)
     relative = turning / np.sqrt(np.mean(turning**2))
     gain = spread(scene, sensors, np.exp(size * relative), 1.0)
-    said = {"growth": Parameter(size, "1"), "of": kind_names(kinds)}
-    return {"parameters": said, "gain": Pair(*(gain if k else None for k in kinds))}
+    own = gain[:, list(sensors)]
+    # against the constant level of the same mean square: the level is another effect's
+    shape = own / np.sqrt((own**2).mean(axis=0))
+    return {
+        "parameters": {"growth": Parameter(size, "1"), "of": kind_names(kinds)},
+        "gain": of_kinds(kinds, gain),
+        "divergence": lambda samples: level_divergence(shape) * sum(kinds) * samples,
+    }
 
 
 @effect("1", 3.0, 10.0, scalable=False)
 def outside_quantisation(scene, rng, sensors, size):
     """Readings rounded to multiples of an LSB of ``size`` times the declared noise."""
     kinds = which_kinds(rng)
-    steps = [size * sd if chosen else 0.0 for sd, chosen in zip(scene.noise, kinds, strict=True)]
 
-    def quantise(readings):
-        rounded = [values.copy() for values in readings]
-        for values, step, limit in zip(rounded, steps, scene.limits, strict=True):
-            if step:
-                part = values[:, list(sensors)]
-                coarse = np.clip(step * np.round(part / step), -limit, limit)
-                # the rail itself is a code
-                values[:, list(sensors)] = np.where(np.abs(part) >= limit, part, coarse)
-        return Pair(*rounded)
+    def rounding(step, limit):
+        def coarse(values):
+            rounded = np.clip(step * np.round(values / step), -limit, limit)
+            # the rail itself is a code
+            return np.where(np.abs(values) >= limit, values, rounded)
 
+        return coarse
+
+    steps = zip(scene.noise, scene.limits, kinds, strict=True)
+    rules = [rounding(size * sd, limit) if chosen else None for sd, limit, chosen in steps]
     said = {"lsb_in_noise_sd": Parameter(size, "1"), "of": kind_names(kinds)}
-    return {"parameters": said, "after": quantise}
+    return {"parameters": said, "after": altered(sensors, Pair(*rules))}

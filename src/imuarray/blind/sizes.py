@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from imuarray.blind.change import EFFECTS, Change, noiseless_readings
@@ -43,62 +41,16 @@ def size_of(scene: Scene, changes: Change | list[Change], steps: int = 1) -> flo
 
 def is_of_noise(change: Change) -> bool:
     """Whether the effect changes the law of the noise and not the mean."""
-    return any(part is not None for part in (*change.gain, *change.correlation))
+    return change.divergence is not None
 
 
 def noise_divergence(scene: Scene, change: Change, samples: int) -> float:
-    """KL divergence in nats, times the share of readings that the motion leaves over.
+    """KL divergence in nats of an effect on the noise (its own), in so many samples.
 
-    A louder triad is held against the declared level; heavy tails and noise that grows with |w|
-    against the Gaussian of the same variance (the level is another effect's); coloured noise
-    against white.
+    Times the share of readings that the motion leaves over.
     """
-    count = len(change.sensors)
-    kinds = sum(part is not None for part in (*change.gain, *change.correlation))
-    if change.effect == "heavy_tails":
-        each = _tails_divergence(*(float(change.parameters[n].value) for n in ("share", "factor")))
-        total = each * count * kinds * samples
-    elif change.effect == "coloured_noise":
-        rho = float(change.parameters["coefficient"].value)
-        total = -1.5 * np.log1p(-(rho**2)) * count * kinds * samples
-    else:
-        alike = change.effect == "outside_rate_noise"
-        chosen = list(change.sensors)
-        gains = [part[:, chosen] for part in change.gain if part is not None]
-        total = sum(_level_divergence(gain, alike) for gain in gains) * samples
-    triads = 2 * scene.accelerometers
-    return float(total * (3 * triads - 9) / (3 * triads))
-
-
-def _level_divergence(gain: np.ndarray, alike: bool) -> float:
-    """KL of N(0, gain^2) from N(0, 1), per sample over triads and axes; gain (T or 1, n).
-
-    With ``alike``, from the constant level of the same mean square in each triad.
-    """
-    squared = gain**2
-    if alike:
-        squared = squared / squared.mean(axis=0)
-    return float(1.5 * (squared - 1 - np.log(squared)).mean(axis=0).sum())
-
-
-@lru_cache(maxsize=256)
-def _tails_divergence(share: float, factor: float) -> float:
-    """KL per triad-sample of a mixture from the Gaussian with its covariance.
-
-    The mixture is (1 - share) N(0, I) + share N(0, factor^2 I) in three dimensions, so the
-    integral is over the radius alone.
-    """
-    radius = np.geomspace(1e-3, 12 * max(factor, 1.0), 4000)
-    variance = 1 + share * (factor**2 - 1)
-
-    def log_normal(v):
-        return -1.5 * np.log(2 * np.pi * v) - radius**2 / (2 * v)
-
-    with np.errstate(divide="ignore"):
-        parts = np.log([1 - share, share])[:, None] + [log_normal(1.0), log_normal(factor**2)]
-    mixture = np.logaddexp(*parts)
-    density = 4 * np.pi * radius**2 * np.exp(mixture)
-    return float(max(np.trapezoid(density * (mixture - log_normal(variance)), radius), 0.0))
+    readings = 6 * scene.accelerometers
+    return float(change.divergence(samples) * (readings - 9) / readings)
 
 
 def draw_seeded(scene, effect: str, sensors, rng_seed: int, size: float) -> Change:

@@ -16,7 +16,7 @@ from imuarray.blind.matrix import SIZES
 
 NOTHING, UNEXPLAINED, CRASH = "nothing", "unexplained", "crash"
 ALL = "all effects"
-STANDARD = {"imus": 8, "sampling_rate": 125.0, "duration": 24.0}  # what the bars are set for
+STANDARD = {"imus": 8, "sampling_rate": 125.0, "duration": 24.0}  # what the criteria are set for
 LARGE = 8.0  # sigma, from which an effect is to be found
 LEVEL = 0.95  # of all intervals
 REACHED = 0.98  # of a size that was asked for counts as that size
