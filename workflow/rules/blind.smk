@@ -1,6 +1,6 @@
 # By what is imported: no page or drawing of the diagnosis, and no grading, runs a diagnosis again.
 DIAGNOSING = resting_on(
-    "diagnosis/document.py", "diagnosis/thresholds.json", "blind/study.py", "provenance.py"
+    "diagnosis/document.py", "blind/study.py", "provenance.py"
 )
 GRADING = resting_on("blind/grade.py", "blind/summary.py", "provenance.py")
 BLIND_DRAWING = resting_on("figures/blind.py", "figures/notes.py", "figures/imuarray.mplstyle")

@@ -4,7 +4,6 @@ from imuarray.blind.added import ADDED
 DIAGNOSED = resting_on(
     "diagnosis/document.py",
     "report/write.py",
-    "diagnosis/thresholds.json",
     "figures/imuarray.mplstyle",
     "provenance.py",
 )
