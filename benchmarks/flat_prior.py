@@ -19,7 +19,8 @@ from scipy.optimize import minimize  # noqa: E402
 from written import publish  # noqa: E402
 
 import imuarray  # noqa: E402
-from imuarray.analysis import density_of, model_of  # noqa: E402
+from imuarray.analysis.density import density_of  # noqa: E402
+from imuarray.analysis.model import model_of  # noqa: E402
 from imuarray.config import read_config  # noqa: E402
 from imuarray.geometry import positions_of, sub_array  # noqa: E402
 from imuarray.model.jax64 import jax  # noqa: E402

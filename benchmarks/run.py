@@ -31,8 +31,9 @@ from imuarray.geometry import positions_of, sub_array  # noqa: E402
 from imuarray.model import ArrayModel  # noqa: E402
 from imuarray.model.jax64 import jax  # noqa: E402
 from imuarray.motion import normal_motion, sphere_motion  # noqa: E402
-from imuarray.posterior import Likelihood, kernels, normals, reference  # noqa: E402
+from imuarray.posterior import kernels, normals, reference
 from imuarray.posterior.draws import TILE  # noqa: E402
+from imuarray.posterior.likelihood import Likelihood  # noqa: E402
 from imuarray.posterior.marginal import Marginal  # noqa: E402
 from imuarray.posterior.target import CompiledTarget, GaussianPrior  # noqa: E402
 from imuarray.simulation import measure  # noqa: E402

@@ -21,19 +21,15 @@ import numpy as np
 from samplers_figure import CONVERGED, statistics
 from written import publish
 
-from imuarray.analysis import density_of, model_of
+from imuarray.analysis.density import density_of
+from imuarray.analysis.model import model_of
 from imuarray.config import read_config
 from imuarray.geometry import positions_of
-from imuarray.posterior import (
-    AutoregressiveTarget,
-    CompiledTarget,
-    GaussianPrior,
-    Likelihood,
-    reference,
-    run_chains,
-    tuning,
-)
+from imuarray.posterior import reference, tuning
 from imuarray.posterior.diagnostics import ess, find_burn_in, rhat
+from imuarray.posterior.likelihood import Likelihood
+from imuarray.posterior.pmmh import run_chains
+from imuarray.posterior.target import AutoregressiveTarget, CompiledTarget, GaussianPrior
 from imuarray.provenance import write_csv
 from imuarray.studies.bayes import simulate_dataset
 

@@ -18,7 +18,8 @@ from imuarray.estimation.reference import linear_part, nonlinear_part
 from imuarray.geometry import mimu4444
 from imuarray.model import ArrayModel
 from imuarray.motion import normal_motion
-from imuarray.posterior import Likelihood, draws, kernels, reference
+from imuarray.posterior import draws, kernels, reference
+from imuarray.posterior.likelihood import Likelihood
 from imuarray.simulation import measure
 from tests import oracles
 from tests.cases import noises, simulate, small_array

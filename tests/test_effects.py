@@ -9,8 +9,10 @@ from imuarray.estimation.blocks import pack_motion
 from imuarray.geometry import mimu4444_corners
 from imuarray.model import EFFECTS, ArrayModel, Noise, effect
 from imuarray.motion import Motion, hand_twisting
-from imuarray.posterior import GaussianPrior, GenericTarget, Likelihood, run_chains
 from imuarray.posterior.generic import GenericLikelihood
+from imuarray.posterior.likelihood import Likelihood
+from imuarray.posterior.pmmh import run_chains
+from imuarray.posterior.target import GaussianPrior, GenericTarget
 from imuarray.simulation import measure
 
 RATE = np.radians(0.06)

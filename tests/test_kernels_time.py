@@ -19,7 +19,8 @@ from imuarray.estimation import calibrate_bcd, estimate_motion
 from imuarray.model import ArrayModel, kinematics
 from imuarray.model.jax64 import jax
 from imuarray.model.structure import _force
-from imuarray.posterior import CompiledTarget, GaussianPrior, Likelihood
+from imuarray.posterior.target import CompiledTarget, GaussianPrior
+from imuarray.posterior.likelihood import Likelihood
 from tests.cases import noises, simulate, small_array
 
 faulthandler.dump_traceback_later({limit} - 10, exit=True)

@@ -6,8 +6,8 @@ import pytest
 from imuarray.errors import InputError
 from imuarray.model import ArrayModel
 from imuarray.model.jax64 import jax
-from imuarray.posterior import Likelihood
 from imuarray.posterior.generic import GenericLikelihood
+from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.marginal import Marginal
 from tests import oracles, test_pmmh_targets
 from tests.cases import noises, simulate, small_array

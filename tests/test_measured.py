@@ -25,7 +25,7 @@ from imuarray.measured.positions import (
 from imuarray.measured.residuals import compare
 from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting, normal_motion
-from imuarray.posterior import Likelihood
+from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.proposals import tilts
 from imuarray.posterior.rate_density import sample_covariance
 from imuarray.recording import write_recording

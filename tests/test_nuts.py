@@ -8,14 +8,15 @@ import xarray as xr
 
 import imuarray
 import imuarray.estimation
-from imuarray.analysis import density_of, model_of
+from imuarray.analysis.density import density_of
+from imuarray.analysis.model import model_of
 from imuarray.blind.cases import Case, make
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.geometry import positions_of, sub_array
 from imuarray.model.jax64 import jnp
-from imuarray.posterior import Likelihood
 from imuarray.posterior.diagnostics import ess, rhat
+from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.marginal import Marginal
 from imuarray.posterior.nuts import Whitened, run_nuts
 from imuarray.recording import write_recording

@@ -1,6 +1,7 @@
 """The pipeline end to end: `quick` in a temporary directory, and one core against two."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -13,10 +14,14 @@ import xarray as xr
 
 ROOT = Path(__file__).parents[1]
 
+DRAWN = {f"figure_{name}" for name in (
+    "2017_fig3", "2017_fig4", "2017_fig5", *(f"2021_fig{number}" for number in range(1, 6))
+)} | {"table_2021_table1", "table_2021_table2"}  # fmt: skip
+
 pytestmark = pytest.mark.slow
 
 
-def snakemake(directory, *arguments, timeout=1500):
+def snakemake(directory, *arguments, timeout=1500, source=ROOT / "src"):
     """Run the workflow with ``directory`` as its working directory; fail with its output."""
     shutil.copy(ROOT / "config.yaml", directory)
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
@@ -26,7 +31,8 @@ def snakemake(directory, *arguments, timeout=1500):
         *("--workflow-profile", "none", *arguments),
     ]
     done = subprocess.run(
-        command, cwd=directory, env={**os.environ, "PATH": path}, timeout=timeout,
+        command, cwd=directory, env={**os.environ, "PATH": path, "PYTHONPATH": str(source)},
+        timeout=timeout,
         capture_output=True, text=True,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-6000:]
@@ -114,6 +120,44 @@ def test_a_rule_reruns_alone(quick):
     snakemake(quick.parents[1], "--cores", "1", "results/quick/tuning/T50.json")
     assert table.read_bytes() == before
     assert (quick / "tuning" / "acceptance_T50.csv").stat().st_mtime_ns == upstream.st_mtime_ns
+
+
+def test_a_changed_source_reruns_what_rests_on_it(quick, tmp_path):
+    """One file of each stage, by dry runs with a copy of the package."""
+    shutil.copytree(ROOT / "src", tmp_path / "src", ignore=shutil.ignore_patterns("__pycache__"))
+    assert rerun(quick.parents[1], tmp_path / "src") == set()
+    for names, rules in (
+        (("blind/scene.py", "report/write.py", "diagnosis/thresholds.json", "studies/bound.py"),
+         set()),
+        (("studies/rate_error.py",), {"rate_error", "figure_2017_fig3", "claims", "quick"}),
+        (("studies/checks/timing.py",), {"claims_timing", "claims", "quick"}),
+        (("figures/imuarray.mplstyle",), {*DRAWN, "quick"}),
+    ):  # fmt: skip
+        texts = {tmp_path / "src" / "imuarray" / name: "" for name in names}
+        for path in texts:
+            texts[path] = path.read_text(encoding="utf-8")
+            path.write_text(texts[path] + "\n", encoding="utf-8")
+        assert rerun(quick.parents[1], tmp_path / "src") == rules, names
+        for path, text in texts.items():
+            path.write_text(text, encoding="utf-8")
+
+
+def rerun(directory, source):
+    """Rules that a dry run lists with the package of ``source``."""
+    said = snakemake(directory, "--cores", "1", "-n", "quick", source=source).stdout
+    return set(re.findall(r"(?m)^(\w+) +\d+$", said)) - {"total"}
+
+
+def test_what_is_printed_is_short(tmp_path):
+    shutil.copy(ROOT / "config.yaml", tmp_path)
+    done = subprocess.run(
+        [sys.executable, "-m", "snakemake", "-s", str(ROOT / "Snakefile"), "--cores", "2",
+         "--directory", str(tmp_path), "-n", "quick", "--workflow-profile",
+         str(ROOT / "profiles" / "default")],
+        capture_output=True, text=True, timeout=600,
+    )  # fmt: skip
+    assert done.returncode == 0 and len(done.stdout) + len(done.stderr) < 10_000
+    assert "figure 3 of 2017 (quick)" in done.stdout + done.stderr
 
 
 def test_bad_configuration_is_one_clear_line(tmp_path):

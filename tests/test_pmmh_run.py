@@ -8,14 +8,10 @@ import pytest
 
 from imuarray.errors import InputError
 from imuarray.model import ArrayModel
-from imuarray.posterior import (
-    CompiledTarget,
-    GaussianPrior,
-    GenericTarget,
-    Likelihood,
-    pmmh,
-    run_chains,
-)
+from imuarray.posterior import pmmh
+from imuarray.posterior.likelihood import Likelihood
+from imuarray.posterior.pmmh import run_chains
+from imuarray.posterior.target import CompiledTarget, GaussianPrior, GenericTarget
 from imuarray.streams import stream
 from tests.cases import simulate, small_array
 

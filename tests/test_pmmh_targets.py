@@ -11,15 +11,15 @@ import pytest
 
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
-from imuarray.posterior import (
+from imuarray.posterior.diagnostics import ess
+from imuarray.posterior.likelihood import Likelihood
+from imuarray.posterior.pmmh import run_chains
+from imuarray.posterior.target import (
     AutoregressiveTarget,
     CompiledTarget,
     GaussianPrior,
     GenericTarget,
-    Likelihood,
-    run_chains,
 )
-from imuarray.posterior.diagnostics import ess
 from tests import oracles
 from tests.cases import SHAPE, simulate
 

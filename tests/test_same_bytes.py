@@ -12,7 +12,7 @@ from imuarray.geometry import mimu4444
 from imuarray.model import ArrayModel
 from imuarray.motion import normal_motion
 from imuarray.model.jax64 import jax
-from imuarray.posterior import Likelihood
+from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.marginal import Marginal
 from imuarray.simulation import measure
 

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from imuarray.model import ArrayModel
-from imuarray.posterior import GaussianPrior, GenericTarget, Likelihood
+from imuarray.posterior.likelihood import Likelihood
+from imuarray.posterior.target import GaussianPrior, GenericTarget
 from imuarray.posterior.tuning import (
     acceptance,
     acceptance_sweep,

@@ -8,7 +8,7 @@ from imuarray.config import read_config
 from imuarray.estimation.newton import descend
 from imuarray.figures import validation
 from imuarray.geometry import positions_of, sub_array
-from imuarray.posterior import Likelihood
+from imuarray.posterior.likelihood import Likelihood
 from imuarray.studies import calibrated, joint, truths
 from imuarray.studies.calibrated import METHODS, coverage
 from imuarray.studies.truths import setting_from

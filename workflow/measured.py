@@ -1,9 +1,23 @@
 """Which measured recordings there are, once they have been fetched."""
 
 import json
+import re
 from pathlib import Path
 
 STANDIN = "standin"
+FIGURE = ("pdf", "png", "csv")  # endings of what a drawing rule writes
+TABLE = ("csv", "tex", "md")
+
+# By pattern of its name, the folder of what paper_figures/ shows; the first that fits counts.
+PLACES = {
+    r"\d{4}_fig\d|theory_(efficiency|convergence|size)|validation_ranks": "results/{scale}/figures",
+    r"\d{4}_table\d|theory_ranks|validation_(coverage|joint)": "results/{scale}/tables",
+    "claims": "results/{scale}/claims",
+    "blind_confusion": "results/blind/{scale}/figures",
+    "blind_bars": "results/blind/{scale}/tables",
+    "diagnosis_(positions|parameters|recordings)_.*|added_.*": "results/measured/tables",
+    "diagnosis_.*|past_rail_.*": "results/measured/figures",
+}
 
 
 class Measured:
@@ -17,13 +31,22 @@ class Measured:
         path = self.checkpoints.fetch_recordings.get().output[0]
         return json.loads(Path(path).read_text(encoding="utf-8"))["available"]
 
+    def is_first_order(self, name: str) -> bool:
+        """Whether each triad of a recording is calibrated from still poses first."""
+        return self.config["recordings"][name].get("first_order", True)
+
+    def recording(self, name: str) -> str:
+        """The file of a recording that all that follows reads."""
+        folder = "corrected" if self.is_first_order(name) else "recordings"
+        return f"results/measured/{folder}/{name}.nc"
+
     def board(self, group: str) -> list[str]:
         """All recordings of a board that went through the first-order calibration."""
         entries = self.config["recordings"]
         return [
             name
             for name in self.available()
-            if entries[name].get("group", name) == group and entries[name].get("first_order", True)
+            if entries[name].get("group", name) == group and self.is_first_order(name)
         ]
 
     def others(self, name: str) -> list[str]:
@@ -86,7 +109,7 @@ class Measured:
         name = self.experiment(scale)
         group = self.config["recordings"][name].get("group", name)
         paths = [f"results/measured/positions/{name}.csv"]
-        if self.config["recordings"][name].get("first_order", True):
+        if self.is_first_order(name):
             paths.append(f"results/measured/first_order/{name}_noise.csv")
         if group in self.groups():
             paths.append(f"results/measured/agreement/{group}.csv")
@@ -97,16 +120,16 @@ class Measured:
 
     def targets(self) -> list[str]:
         """What the default target asks of the measured data, for each recording and group."""
-        kinds, entries, paths = ("pdf", "png", "csv"), self.config["recordings"], []
+        entries, paths = self.config["recordings"], []
         for name in self.available():
-            paths += [f"results/measured/figures/residuals_{name}.{kind}" for kind in kinds]
+            paths += [f"results/measured/figures/residuals_{name}.{kind}" for kind in FIGURE]
             paths.append(f"results/measured/positions/{name}.csv")
-            if entries[name].get("first_order", True):
-                paths += [f"results/measured/figures/noise_{name}.{kind}" for kind in kinds]
+            if self.is_first_order(name):
+                paths += [f"results/measured/figures/noise_{name}.{kind}" for kind in FIGURE]
                 group = entries[name].get("group", name)
                 paths.append(f"results/measured/tables/first_order_{group}.md")
         for group in self.groups():
-            paths += [f"results/measured/figures/agreement_{group}.{kind}" for kind in kinds]
+            paths += [f"results/measured/figures/agreement_{group}.{kind}" for kind in FIGURE]
             paths.append(f"results/measured/tables/agreement_{group}.md")
         return sorted(set(paths))
 
@@ -116,31 +139,42 @@ class Measured:
         paths = [f"{folder}/diagnosis/{name}/diagnosis.json" for name in self.available()]
         paths += [f"{folder}/figures/past_rail_{name}.png" for name in self.available()]
         for group in self.groups():
-            paths += [f"{folder}/figures/diagnosis_{group}.{k}" for k in ("pdf", "png", "csv")]
+            paths += [f"{folder}/figures/diagnosis_{group}.{k}" for k in FIGURE]
         return paths
 
-    def published_tables(self, scale: str) -> dict[str, str]:
-        """Names of the measured tables that go to paper_figures/, and what they copy."""
+    def published(self, scale: str) -> dict[str, str]:
+        """Names of the measured figures and tables in paper_figures/, and what they copy."""
         name = self.experiment(scale)
         if name == STANDIN:
             return {}
         group = self.config["recordings"][name].get("group", name)
-        copies = {}
+        copies = {"measured_residuals": f"figures/residuals_{name}"}
+        if self.is_first_order(name):
+            copies["measured_noise"] = f"figures/noise_{name}"
         if self.board(group):
-            copies["measured_first_order_table"] = f"first_order_{group}"
+            copies["measured_first_order_table"] = f"tables/first_order_{group}"
         if group in self.groups():
-            copies["measured_agreement_table"] = f"agreement_{group}"
+            copies["measured_agreement"] = f"figures/agreement_{group}"
+            copies["measured_agreement_table"] = f"tables/agreement_{group}"
         return copies
 
-    def published(self, scale: str) -> dict[str, str]:
-        """Names of the measured figures that go to paper_figures/, and what they copy."""
-        name = self.experiment(scale)
-        if name == STANDIN:
-            return {}
-        group = self.config["recordings"][name].get("group", name)
-        copies = {"measured_residuals": f"residuals_{name}"}
-        if self.config["recordings"][name].get("first_order", True):
-            copies["measured_noise"] = f"noise_{name}"
-        if group in self.groups():
-            copies["measured_agreement"] = f"agreement_{group}"
-        return copies
+    def published_names(self, scale: str, folder: str) -> list[str]:
+        """Those of them that are "figures", or "tables"."""
+        return [name for name, of in self.published(scale).items() if of.startswith(folder)]
+
+    def published_files(self, scale: str) -> list[str]:
+        """Their files in paper_figures/."""
+        return [
+            f"paper_figures/{name}.{kind}"
+            for folder, kinds in (("figures", FIGURE), ("tables", TABLE))
+            for name in self.published_names(scale, folder)
+            for kind in kinds
+        ]
+
+    def origin(self, name: str) -> str:
+        """What paper_figures/<name> copies, but for the ending."""
+        scale = self.config["scale"]
+        for pattern, folder in PLACES.items():
+            if re.fullmatch(pattern, name):
+                return f"{folder.format(scale=scale)}/{name}"
+        return f"results/measured/{self.published(scale)[name]}"

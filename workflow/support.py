@@ -1,105 +1,80 @@
-"""What the rules share: effective settings and the library files a rule rests on."""
+"""What the rules share: effective settings, digests of the sources a rule rests on, outputs."""
 
-import ast
 import hashlib
 import json
-import threading
 import time
-from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+import grimp
+from snakemake.io import report
+
 import imuarray
+from imuarray.provenance import digest
 
-PACKAGE = Path(imuarray.__file__).parent
-
-BASE = ("compiled.py", "config.py", "errors.py", "provenance.py", "streams.py")  # under every stage
+ROOTS = {"imuarray": Path(imuarray.__file__).parents[1], "scripts": Path(__file__).parent}
 
 APART = ("blind_", "theory_", "validation_")  # sizes of targets that nothing else rests on
-CREWS = ("threads", "parts")  # how work is shared: no result depends on it
-
-# Files that nothing of the papers rests on: theory and validation.
-ASIDE = ("blind", "theory", "validation", "bound.", "calibrated", "joint", "levels",
-         "truths")  # fmt: skip
-# Every stage rests on those before it: the package's folders are the path of the data.
-STAGES = {
-    "simulation": ("geometry", "motion", "model", "simulation", "recording", "studies"),
-    "estimation": ("estimation",),
-    "posterior": ("posterior",),
-    "measured": ("firstorder", "measured"),
-    "figures": ("figures",),
-    "claims": ("claims",),
-}
+SHARING = ("threads", "parts")  # how work is shared: no result depends on it
 
 
-def library(stage: str) -> list[str]:
-    """Source files of ``stage`` and the stages before it (figures and claims: theirs alone)."""
-    if stage in ("figures", "claims"):
-        folders = list(STAGES[stage])
-    else:
-        folders = []
-        for name, members in STAGES.items():
-            folders.extend(members)
-            if name == stage:
-                break
-    files = [path for folder in folders for path in (PACKAGE / folder).glob("*.py")]
-    files = [path for path in files if not path.name.startswith(ASIDE)]
-    return sorted(str(path) for path in [*files, *(PACKAGE / name for name in BASE)])
+class Sources:
+    """The source files that each script rests on, from the graph of imports."""
 
+    def __init__(self):
+        # while workflow/ is on Python's path, the folder of scripts is a package like any other
+        self.graph = grimp.build_graph(*ROOTS, exclude_type_checking_imports=True, cache_dir=None)
+        for module in self.graph.find_descendants("imuarray"):  # its packages run before it
+            self.graph.add_import(importer=module, imported=module.rpartition(".")[0])
 
-def resting_on(*names: str) -> list[str]:
-    """The package's files ``names`` and all of its files that they import, however far down."""
-    found, waiting = set(), [PACKAGE / name for name in names]
-    while waiting:
-        path = waiting.pop()
-        if path not in found:
-            found.add(path)
-            waiting += imported(path) if path.suffix == ".py" else []
-    return sorted(map(str, found))
+    def files(self, *scripts: str) -> dict[str, Path]:
+        """By name, ``scripts`` and all that they import, and the data beside those modules."""
+        names = {f"scripts.{name}" for name in scripts}
+        modules = names.union(*map(self.graph.find_upstream_modules, names))
+        return {name: path for module in modules for name, path in _places(module).items()}
+
+    def digest(self, *scripts: str) -> str:
+        """SHA-256 of the files' names and texts: a parameter that changes when one of them does."""
+        return digest({name: _text(path) for name, path in self.files(*scripts).items()})
 
 
 @cache
-def imported(path: Path) -> list[Path]:
-    """Files of the package that a file of it imports, those of the packages on the way too."""
-    names = []
-    for node in _run(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom):
-            names += [node.module, *(homes(node.module, alias.name) for alias in node.names)]
-        elif isinstance(node, ast.Import):
-            names += [alias.name for alias in node.names]
-    parts = [name.split(".")[1:] for name in names if name.split(".")[0] == "imuarray"]
-    steps = {PACKAGE.joinpath(*part[:depth]) for part in parts for depth in range(len(part) + 1)}
-    files = [place for step in steps for place in (step / "__init__.py", step.with_suffix(".py"))]
-    return [file for file in files if file.is_file() and PACKAGE in file.parents]
-
-
-def homes(module: str, name: str) -> str:
-    """The module of what another one gives, also where a package loads it when it is used."""
-    home = _homes(module).get(name, name)
-    return home if home.startswith("imuarray.") else f"{module}.{home}"
+def _places(module: str) -> dict[str, Path]:
+    """A module's file; of a package in the package, also the data in its folder."""
+    root = ROOTS[module.partition(".")[0]]
+    place = root.joinpath(*module.split("."))
+    files = [place / "__init__.py" if place.is_dir() else place.with_suffix(".py")]
+    if place.is_dir() and module not in ROOTS:
+        found = (path for path in place.rglob("*.*") if "__pycache__" not in path.parts)
+        files += [path for path in found if path.is_file() and path.suffix != ".py"]
+    return {path.relative_to(root).as_posix(): path for path in files}
 
 
 @cache
-def _homes(module: str) -> dict[str, str]:
-    """The table by which a package loads modules when they are used; empty for others."""
-    place = PACKAGE.joinpath(*module.split(".")[1:]) / "__init__.py"
-    if module.split(".")[0] == "imuarray" and place.is_file():
-        for node in ast.parse(place.read_text(encoding="utf-8")).body:
-            if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_HOME":
-                return ast.literal_eval(node.value)
-    return {}
+def _text(path: Path) -> str:
+    return path.read_text(encoding="utf-8")
 
 
-def _run(tree: ast.AST) -> Iterator[ast.AST]:
-    """The nodes of a file but for those that only type checkers see."""
-    for node in ast.iter_child_nodes(tree):
-        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
-            continue
-        yield node
-        yield from _run(node)
+def figure(name: str, category: str, caption: str = "", folder: str = "results/{scale}") -> dict:
+    """Outputs of a rule that draws: PDF, PNG for the report, and the numbers drawn."""
+    path = f"{folder}/figures/{name}"
+    caption = f"../report/{caption or name}.rst"
+    png = report(f"{path}.png", caption=caption, category=category)
+    return {"pdf": f"{path}.pdf", "png": png, "csv": f"{path}.csv"}
 
 
-class Crew:
+def table(
+    name: str, category: str = "", caption: str = "", folder: str = "results/{scale}"
+) -> dict:
+    """Outputs of a rule that writes a table: CSV (in a report's category), LaTeX, Markdown."""
+    path = f"{folder}/tables/{name}"
+    csv = f"{path}.csv"
+    if category:
+        csv = report(csv, caption=f"../report/{caption or name}.rst", category=category)
+    return {"csv": csv, "tex": f"{path}.tex", "md": f"{path}.md"}
+
+
+class CoreBudget:
     """How work is shared: among ``cores`` of this machine, or a cluster's (None)."""
 
     def __init__(self, config: dict, cores: int | None):
@@ -113,26 +88,6 @@ class Crew:
     def parts(self, scale: str, study: str = "samples") -> int:
         """Jobs that the realisations of a study are dealt to; those but "samples" are small."""
         return self.scales[scale]["parts"] if study == "samples" else 1
-
-
-def one_look_at_a_time(scheduler) -> None:
-    """Keep Snakemake from looking for jobs to start ever more often.
-
-    Because of its limit of starts a second it looks again a second after each look, and every job's
-    end begins another such series: a hundred looks a second at last, half of a core.
-    """
-    pending = threading.Event()
-
-    def look():
-        pending.clear()
-        scheduler._open_jobs.release()
-
-    def later(delay):
-        if not pending.is_set():
-            pending.set()
-            threading.Timer(delay, look).start()
-
-    scheduler._schedule_reevalutation = later
 
 
 def contents(*paths: str) -> list[str]:
@@ -171,7 +126,7 @@ def effective(config: dict, scale: str, *sections: str, scaled: bool = True, own
     sizes = {
         key: value
         for key, value in config["scales"][scale].items()
-        if key not in CREWS and (key.startswith(own) if own else not key.startswith(APART))
+        if key not in SHARING and (key.startswith(own) if own else not key.startswith(APART))
     }
     return {**found, "scale": {"name": scale, **sizes}}
 

@@ -1,6 +1,4 @@
 rule position_error_part:
-    input:
-        code=library("estimation"),
     output:
         "results/{scale}/calibration/parts/{study}_{part}.npz",
     log:
@@ -8,13 +6,15 @@ rule position_error_part:
     benchmark:
         "results/{scale}/benchmarks/calibration/parts/{study}_{part}.tsv"
     priority: 8
-    threads: lambda wc: CREW.threads(wc.scale)
+    threads: lambda wc: CORES.threads(wc.scale)
     resources:
-        mem_mb=2000,
         runtime=90,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017"),
-        parts=lambda wc: CREW.parts(wc.scale, wc.study),
+        parts=lambda wc: CORES.parts(wc.scale, wc.study),
+        code=CODE.digest("position_error_part"),
+    message:
+        "position error of 2017 over {wildcards.study}, part {wildcards.part} ({wildcards.scale})"
     script:
         "../scripts/position_error_part.py"
 
@@ -23,39 +23,37 @@ rule position_error:
     input:
         parts=lambda wc: expand(
             "results/{{scale}}/calibration/parts/{{study}}_{part}.npz",
-            part=range(CREW.parts(wc.scale, wc.study)),
+            part=range(CORES.parts(wc.scale, wc.study)),
         ),
-        code=library("estimation"),
     output:
         "results/{scale}/calibration/position_error_{study}.csv",
     log:
         "results/{scale}/logs/calibration/position_error_{study}.log",
     benchmark:
         "results/{scale}/benchmarks/calibration/position_error_{study}.tsv"
-    threads: 1
-    resources:
-        mem_mb=2000,
-        runtime=10,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017"),
+        code=CODE.digest("position_error"),
+    message:
+        "position error of 2017 over {wildcards.study} ({wildcards.scale})"
     script:
         "../scripts/position_error.py"
 
 
 rule rate_error:
-    input:
-        code=library("estimation"),
     output:
         "results/{scale}/calibration/rate_error.csv",
     log:
         "results/{scale}/logs/calibration/rate_error.log",
     benchmark:
         "results/{scale}/benchmarks/calibration/rate_error.tsv"
-    threads: lambda wc: CREW.threads(wc.scale)
+    threads: lambda wc: CORES.threads(wc.scale)
     resources:
-        mem_mb=2000,
         runtime=90,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017"),
+        code=CODE.digest("rate_error"),
+    message:
+        "angular rate error of 2017 ({wildcards.scale})"
     script:
         "../scripts/rate_error.py"

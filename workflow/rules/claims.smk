@@ -1,7 +1,3 @@
-from support import PACKAGE
-
-# Apart from library(): the chains must not be sampled again for an edited check.
-CHECKS = sorted(map(str, (PACKAGE / "studies" / "checks").glob("*.py")))
 SIMULATED = [*KINDS, *expand("T{samples}", samples=SAMPLES)]
 POSTERIORS = [
     *expand("T{samples}", samples=SAMPLES),
@@ -10,8 +6,6 @@ POSTERIORS = [
 
 
 rule claims_identifiability:
-    input:
-        code=[*library("estimation"), *CHECKS],
     output:
         checks="results/{scale}/claims/identifiability.json",
         ranks="results/{scale}/claims/ranks.csv",
@@ -20,50 +14,43 @@ rule claims_identifiability:
         "results/{scale}/logs/claims/identifiability.log",
     benchmark:
         "results/{scale}/benchmarks/claims/identifiability.tsv"
-    threads: 1
-    resources:
-        mem_mb=2000,
-        runtime=30,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017"),
+        code=CODE.digest("claims_identifiability"),
+    message:
+        "claims: identifiability ({wildcards.scale})"
     script:
         "../scripts/claims_identifiability.py"
 
 
 rule claims_position_bound:
-    input:
-        code=[*library("estimation"), *CHECKS],
     output:
         "results/{scale}/claims/position_bound.csv",
     log:
         "results/{scale}/logs/claims/position_bound.log",
     benchmark:
         "results/{scale}/benchmarks/claims/position_bound.tsv"
-    threads: 1
-    resources:
-        mem_mb=2000,
-        runtime=30,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017"),
+        code=CODE.digest("claims_position_bound"),
+    message:
+        "claims: bound of the positions ({wildcards.scale})"
     script:
         "../scripts/claims_position_bound.py"
 
 
 rule claims_accelerometers_only:
-    input:
-        code=[*library("estimation"), *CHECKS],
     output:
         "results/{scale}/claims/accelerometers_only.csv",
     log:
         "results/{scale}/logs/claims/accelerometers_only.log",
     benchmark:
         "results/{scale}/benchmarks/claims/accelerometers_only.tsv"
-    threads: 1
-    resources:
-        mem_mb=2000,
-        runtime=30,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017"),
+        code=CODE.digest("claims_accelerometers_only"),
+    message:
+        "claims: accelerometers only ({wildcards.scale})"
     script:
         "../scripts/claims_accelerometers_only.py"
 
@@ -71,19 +58,17 @@ rule claims_accelerometers_only:
 rule claims_marginalisation:
     input:
         recording=expand("results/{{scale}}/recordings/T{samples}.nc", samples=min(SAMPLES)),
-        code=[*library("posterior"), *CHECKS],
     output:
         "results/{scale}/claims/marginalisation.json",
     log:
         "results/{scale}/logs/claims/marginalisation.log",
     benchmark:
         "results/{scale}/benchmarks/claims/marginalisation.tsv"
-    threads: 1
-    resources:
-        mem_mb=2000,
-        runtime=30,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2021"),
+        code=CODE.digest("claims_marginalisation"),
+    message:
+        "claims: marginalisation ({wildcards.scale})"
     script:
         "../scripts/claims_marginalisation.py"
 
@@ -91,7 +76,6 @@ rule claims_marginalisation:
 rule claims_linearised:
     input:
         recordings=expand("results/{{scale}}/recordings/{name}.nc", name=SIMULATED),
-        code=[*library("posterior"), *CHECKS],
     output:
         coordinates="results/{scale}/claims/linearised.csv",
         determinant="results/{scale}/claims/determinant.csv",
@@ -99,14 +83,13 @@ rule claims_linearised:
         "results/{scale}/logs/claims/linearised.log",
     benchmark:
         "results/{scale}/benchmarks/claims/linearised.tsv"
-    threads: 1
-    resources:
-        mem_mb=2000,
-        runtime=30,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2021", "experiment"),
         names=SIMULATED,
         kinds=KINDS,
+        code=CODE.digest("claims_linearised"),
+    message:
+        "claims: linearised model ({wildcards.scale})"
     script:
         "../scripts/claims_linearised.py"
 
@@ -115,7 +98,6 @@ rule claims_timing:
     input:
         recordings=expand("results/{{scale}}/recordings/T{samples}.nc", samples=SAMPLES),
         tuning=expand("results/{{scale}}/tuning/T{samples}.json", samples=SAMPLES),
-        code=[*library("posterior"), *CHECKS],
     output:
         timing="results/{scale}/claims/timing.csv",
         acceptance="results/{scale}/claims/acceptance_variance.csv",
@@ -123,12 +105,11 @@ rule claims_timing:
         "results/{scale}/logs/claims/timing.log",
     benchmark:
         "results/{scale}/benchmarks/claims/timing.tsv"
-    threads: 1
-    resources:
-        mem_mb=2000,
-        runtime=30,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017", "paper2021"),
+        code=CODE.digest("claims_timing"),
+    message:
+        "claims: timing ({wildcards.scale})"
     script:
         "../scripts/claims_timing.py"
 
@@ -167,7 +148,6 @@ rule claims:
         timing="results/{scale}/claims/timing.csv",
         acceptance="results/{scale}/claims/acceptance_variance.csv",
         experiment=lambda wc: MEASURED.claims(wc.scale),
-        code=[*library("claims"), str(PACKAGE / "claims" / "register.yaml")],
     output:
         table=report(
             "results/{scale}/claims/claims.csv",
@@ -179,15 +159,16 @@ rule claims:
         "results/{scale}/logs/claims/claims.log",
     benchmark:
         "results/{scale}/benchmarks/claims/claims.tsv"
-    threads: 1
     resources:
         mem_mb=4000,
-        runtime=30,
     params:
         settings=lambda wc: effective(
             config, wc.scale, "paper2017", "paper2021", "experiment", "recordings"
         ),
         experiment=lambda wc: MEASURED.experiment(wc.scale),
         simulation=lambda wc: MEASURED.simulation(wc.scale),
+        code=CODE.digest("claims"),
+    message:
+        "claims: verdicts ({wildcards.scale})"
     script:
         "../scripts/claims.py"

@@ -1,7 +1,6 @@
 rule sample_experiment:
     input:
         recording="results/{scale}/recordings/{kind}.nc",
-        code=library("posterior"),
     output:
         expand("results/{{scale}}/chains/{{kind}}_T{samples}.nc", samples=SAMPLES),
     log:
@@ -9,12 +8,15 @@ rule sample_experiment:
     benchmark:
         "results/{scale}/benchmarks/chains/{kind}.tsv"
     priority: 8
-    threads: lambda wc: CREW.threads(wc.scale)
+    threads: lambda wc: CORES.threads(wc.scale)
     resources:
         mem_mb=4000,
         runtime=60,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017", "paper2021", "experiment"),
+        code=CODE.digest("sample_experiment", "chains"),
+    message:
+        "chains of the experiment: {wildcards.kind} ({wildcards.scale})"
     script:
         "../scripts/sample_experiment.py"
 
@@ -23,7 +25,6 @@ rule judge_experiment:
     input:
         recordings="results/{scale}/recordings/{kind}.nc",
         chains=expand("results/{{scale}}/chains/{{kind}}_T{samples}.nc", samples=SAMPLES),
-        code=library("posterior"),
     output:
         verdicts=expand("results/{{scale}}/posterior/{{kind}}_T{samples}.json", samples=SAMPLES),
         coordinates=expand("results/{{scale}}/posterior/{{kind}}_T{samples}.csv", samples=SAMPLES),
@@ -34,11 +35,12 @@ rule judge_experiment:
         "results/{scale}/logs/posterior/{kind}.log",
     benchmark:
         "results/{scale}/benchmarks/posterior/{kind}.tsv"
-    threads: 1
     resources:
         mem_mb=4000,
-        runtime=30,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017", "paper2021", "experiment"),
+        code=CODE.digest("judge_chains"),
+    message:
+        "chains of {wildcards.kind}: burn-in, R-hat, effective sample size ({wildcards.scale})"
     script:
         "../scripts/judge_chains.py"

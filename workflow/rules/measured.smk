@@ -1,5 +1,4 @@
 RECORDINGS = config["recordings"]
-READING = library("measured")
 
 
 # The published files may be out of reach: the rest is done without them, and one line says so.
@@ -12,13 +11,11 @@ checkpoint fetch_recordings:
     benchmark:
         "results/measured/benchmarks/fetch_recordings.tsv"
     priority: 9  # the second longest path
-    threads: 1
-    resources:
-        mem_mb=500,
-        runtime=30,
     params:
         recordings=RECORDINGS,
         attempt=attempt("results/measured/available.json"),
+    message:
+        "measured recordings, fetched"
     script:
         "../scripts/fetch_recordings.py"
 
@@ -26,7 +23,6 @@ checkpoint fetch_recordings:
 rule convert_recording:
     input:
         available="results/measured/available.json",
-        code=READING,
     output:
         "results/measured/recordings/{name}.nc",
     log:
@@ -34,13 +30,12 @@ rule convert_recording:
     benchmark:
         "results/measured/benchmarks/recordings/{name}.tsv"
     priority: 9
-    threads: 1
-    resources:
-        mem_mb=2000,
-        runtime=10,
     params:
         entry=lambda wc: RECORDINGS[wc.name],
         own=lambda wc: contents(*own_files(RECORDINGS[wc.name])),
+        code=CODE.digest("convert_recording"),
+    message:
+        "recording {wildcards.name}, converted"
     script:
         "../scripts/convert_recording.py"
 
@@ -48,7 +43,6 @@ rule convert_recording:
 rule first_order:
     input:
         recording="results/measured/recordings/{name}.nc",
-        code=READING,
     output:
         recording="results/measured/corrected/{name}.nc",
         parameters="results/measured/first_order/{name}_parameters.csv",
@@ -60,22 +54,18 @@ rule first_order:
     benchmark:
         "results/measured/benchmarks/corrected/{name}.tsv"
     priority: 9
-    threads: 1
-    resources:
-        mem_mb=2000,
-        runtime=10,
     params:
         entry=lambda wc: RECORDINGS[wc.name],
+        code=CODE.digest("first_order"),
+    message:
+        "first-order calibration of {wildcards.name}"
     script:
         "../scripts/first_order.py"
 
 
 rule subset_recording:
     input:
-        recording=lambda wc: "results/measured/{}/{}.nc".format(
-            "corrected" if RECORDINGS[wc.name].get("first_order", True) else "recordings", wc.name
-        ),
-        code=READING,
+        recording=lambda wc: MEASURED.recording(wc.name),
     output:
         measured=expand("results/measured/subsets/{{name}}_T{samples}.nc", samples=SAMPLES),
         simulated=expand(
@@ -87,12 +77,11 @@ rule subset_recording:
     benchmark:
         "results/measured/benchmarks/subsets/{name}.tsv"
     priority: 9
-    threads: 1
-    resources:
-        mem_mb=2000,
-        runtime=10,
     params:
         settings=effective(config, config["scale"], "paper2021", "experiment", scaled=False),
+        code=CODE.digest("subset_recording"),
+    message:
+        "moving samples of {wildcards.name}, chosen"
     script:
         "../scripts/subset_recording.py"
 
@@ -100,19 +89,17 @@ rule subset_recording:
 rule locate_positions:
     input:
         subsets=expand("results/measured/subsets/{{name}}_T{samples}.nc", samples=SAMPLES),
-        code=READING,
     output:
         "results/measured/positions/{name}.csv",
     log:
         "results/measured/logs/positions/{name}.log",
     benchmark:
         "results/measured/benchmarks/positions/{name}.tsv"
-    threads: 1
-    resources:
-        mem_mb=2000,
-        runtime=20,
     params:
         settings=effective(config, config["scale"], "paper2021", "experiment", scaled=False),
+        code=CODE.digest("locate_positions"),
+    message:
+        "positions from {wildcards.name}"
     script:
         "../scripts/locate_positions.py"
 
@@ -122,7 +109,6 @@ rule agreement:
         positions=lambda wc: expand(
             "results/measured/positions/{name}.csv", name=MEASURED.groups()[wc.group]
         ),
-        code=READING,
     output:
         summary="results/measured/agreement/{group}.csv",
         pairs="results/measured/agreement/{group}_pairs.csv",
@@ -130,20 +116,17 @@ rule agreement:
         "results/measured/logs/agreement/{group}.log",
     benchmark:
         "results/measured/benchmarks/agreement/{group}.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
-        runtime=10,
+    params:
+        code=CODE.digest("agreement"),
+    message:
+        "agreement between recordings of {wildcards.group}"
     script:
         "../scripts/agreement.py"
 
 
 rule residuals:
     input:
-        recording=lambda wc: "results/measured/{}/{}.nc".format(
-            "corrected" if RECORDINGS[wc.name].get("first_order", True) else "recordings", wc.name
-        ),
-        code=READING,
+        recording=lambda wc: MEASURED.recording(wc.name),
     output:
         summary="results/measured/residuals/{name}.csv",
         histogram="results/measured/residuals/{name}_histogram.csv",
@@ -151,12 +134,11 @@ rule residuals:
         "results/measured/logs/residuals/{name}.log",
     benchmark:
         "results/measured/benchmarks/residuals/{name}.tsv"
-    threads: 1
-    resources:
-        mem_mb=2000,
-        runtime=20,
     params:
         settings=effective(config, config["scale"], scaled=False),
+        code=CODE.digest("residuals"),
+    message:
+        "residuals of {wildcards.name}"
     script:
         "../scripts/residuals.py"
 
@@ -164,7 +146,6 @@ rule residuals:
 rule sample_measured:
     input:
         recordings=expand("results/measured/subsets/{{kind}}_T{samples}.nc", samples=SAMPLES),
-        code=library("measured"),
     output:
         expand("results/{{scale}}/chains/{{kind}}_T{samples}.nc", samples=SAMPLES),
     log:
@@ -174,12 +155,15 @@ rule sample_measured:
     wildcard_constraints:
         kind=MEASURED_KINDS,
     priority: 9
-    threads: lambda wc: CREW.threads(wc.scale)
+    threads: lambda wc: CORES.threads(wc.scale)
     resources:
         mem_mb=4000,
         runtime=60,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017", "paper2021", "experiment"),
+        code=CODE.digest("sample_measured", "chains"),
+    message:
+        "chains of {wildcards.kind} ({wildcards.scale})"
     script:
         "../scripts/sample_measured.py"
 
@@ -188,7 +172,6 @@ rule judge_measured:
     input:
         recordings=expand("results/measured/subsets/{{kind}}_T{samples}.nc", samples=SAMPLES),
         chains=expand("results/{{scale}}/chains/{{kind}}_T{samples}.nc", samples=SAMPLES),
-        code=library("posterior"),
     output:
         verdicts=expand("results/{{scale}}/posterior/{{kind}}_T{samples}.json", samples=SAMPLES),
         coordinates=expand("results/{{scale}}/posterior/{{kind}}_T{samples}.csv", samples=SAMPLES),
@@ -201,12 +184,13 @@ rule judge_measured:
         "results/{scale}/benchmarks/posterior/{kind}.tsv"
     wildcard_constraints:
         kind=MEASURED_KINDS,
-    threads: 1
     resources:
         mem_mb=4000,
-        runtime=30,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017", "paper2021", "experiment"),
+        code=CODE.digest("judge_chains"),
+    message:
+        "chains of {wildcards.kind}: burn-in, R-hat, effective sample size ({wildcards.scale})"
     script:
         "../scripts/judge_chains.py"
 
@@ -215,25 +199,19 @@ rule figure_residuals:
     input:
         summary="results/measured/residuals/{name}.csv",
         histogram="results/measured/residuals/{name}_histogram.csv",
-        code=DRAWING,
     output:
-        pdf="results/measured/figures/residuals_{name}.pdf",
-        png=report(
-            "results/measured/figures/residuals_{name}.png",
-            caption="../report/measured_residuals.rst",
-            category="Measured",
+        **figure(
+            "residuals_{name}", "Measured", caption="measured_residuals", folder="results/measured"
         ),
-        csv="results/measured/figures/residuals_{name}.csv",
     log:
         "results/measured/logs/figures/residuals_{name}.log",
     benchmark:
         "results/measured/benchmarks/figures/residuals_{name}.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
-        runtime=10,
     params:
         settings=effective(config, config["scale"], scaled=False),
+        code=CODE.digest("figure_residuals"),
+    message:
+        "figure: residuals of {wildcards.name}"
     script:
         "../scripts/figure_residuals.py"
 
@@ -241,25 +219,17 @@ rule figure_residuals:
 rule figure_noise:
     input:
         allan="results/measured/first_order/{name}_allan.csv",
-        code=DRAWING,
     output:
-        pdf="results/measured/figures/noise_{name}.pdf",
-        png=report(
-            "results/measured/figures/noise_{name}.png",
-            caption="../report/measured_noise.rst",
-            category="Measured",
-        ),
-        csv="results/measured/figures/noise_{name}.csv",
+        **figure("noise_{name}", "Measured", caption="measured_noise", folder="results/measured"),
     log:
         "results/measured/logs/figures/noise_{name}.log",
     benchmark:
         "results/measured/benchmarks/figures/noise_{name}.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
-        runtime=10,
     params:
         settings=effective(config, config["scale"], scaled=False),
+        code=CODE.digest("figure_noise"),
+    message:
+        "figure: noise of {wildcards.name}"
     script:
         "../scripts/figure_noise.py"
 
@@ -268,25 +238,22 @@ rule figure_agreement:
     input:
         summary="results/measured/agreement/{group}.csv",
         pairs="results/measured/agreement/{group}_pairs.csv",
-        code=DRAWING,
     output:
-        pdf="results/measured/figures/agreement_{group}.pdf",
-        png=report(
-            "results/measured/figures/agreement_{group}.png",
-            caption="../report/measured_agreement.rst",
-            category="Measured",
+        **figure(
+            "agreement_{group}",
+            "Measured",
+            caption="measured_agreement",
+            folder="results/measured",
         ),
-        csv="results/measured/figures/agreement_{group}.csv",
     log:
         "results/measured/logs/figures/agreement_{group}.log",
     benchmark:
         "results/measured/benchmarks/figures/agreement_{group}.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
-        runtime=10,
     params:
         settings=effective(config, config["scale"], scaled=False),
+        code=CODE.digest("figure_agreement"),
+    message:
+        "figure: agreement within {wildcards.group}"
     script:
         "../scripts/figure_agreement.py"
 
@@ -299,25 +266,22 @@ rule table_first_order:
         noise=lambda wc: expand(
             "results/measured/first_order/{name}_noise.csv", name=MEASURED.board(wc.group)
         ),
-        code=library("figures"),
     output:
-        csv=report(
-            "results/measured/tables/first_order_{group}.csv",
-            caption="../report/measured_first_order_table.rst",
-            category="Measured",
+        **table(
+            "first_order_{group}",
+            "Measured",
+            caption="measured_first_order_table",
+            folder="results/measured",
         ),
-        tex="results/measured/tables/first_order_{group}.tex",
-        md="results/measured/tables/first_order_{group}.md",
     log:
         "results/measured/logs/tables/first_order_{group}.log",
     benchmark:
         "results/measured/benchmarks/tables/first_order_{group}.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
-        runtime=10,
     params:
         names=lambda wc: MEASURED.board(wc.group),
+        code=CODE.digest("table_first_order"),
+    message:
+        "table: first-order calibration of {wildcards.group}"
     script:
         "../scripts/table_first_order.py"
 
@@ -325,22 +289,20 @@ rule table_first_order:
 rule table_agreement:
     input:
         summary="results/measured/agreement/{group}.csv",
-        code=library("figures"),
     output:
-        csv=report(
-            "results/measured/tables/agreement_{group}.csv",
-            caption="../report/measured_agreement_table.rst",
-            category="Measured",
+        **table(
+            "agreement_{group}",
+            "Measured",
+            caption="measured_agreement_table",
+            folder="results/measured",
         ),
-        tex="results/measured/tables/agreement_{group}.tex",
-        md="results/measured/tables/agreement_{group}.md",
     log:
         "results/measured/logs/tables/agreement_{group}.log",
     benchmark:
         "results/measured/benchmarks/tables/agreement_{group}.tsv"
-    threads: 1
-    resources:
-        mem_mb=1000,
-        runtime=10,
+    params:
+        code=CODE.digest("table_agreement"),
+    message:
+        "table: agreement within {wildcards.group}"
     script:
         "../scripts/table_agreement.py"

@@ -2,7 +2,6 @@ rule sample_posterior:
     input:
         recording="results/{scale}/recordings/T{samples}.nc",
         tuning="results/{scale}/tuning/T{samples}.json",
-        code=library("posterior"),
     output:
         "results/{scale}/chains/T{samples}.nc",
     log:
@@ -10,12 +9,15 @@ rule sample_posterior:
     benchmark:
         "results/{scale}/benchmarks/chains/T{samples}.tsv"
     priority: 10  # the longest path
-    threads: lambda wc: CREW.threads(wc.scale)
+    threads: lambda wc: CORES.threads(wc.scale)
     resources:
         mem_mb=4000,
         runtime=90,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2021"),
+        code=CODE.digest("sample_posterior", "chains"),
+    message:
+        "chains, T = {wildcards.samples} ({wildcards.scale})"
     script:
         "../scripts/sample_posterior.py"
 
@@ -24,7 +26,6 @@ rule judge_chains:
     input:
         recordings=expand("results/{{scale}}/recordings/T{samples}.nc", samples=SAMPLES),
         chains=expand("results/{{scale}}/chains/T{samples}.nc", samples=SAMPLES),
-        code=library("posterior"),
     output:
         verdicts=expand("results/{{scale}}/posterior/T{samples}.json", samples=SAMPLES),
         coordinates=expand("results/{{scale}}/posterior/T{samples}.csv", samples=SAMPLES),
@@ -33,11 +34,12 @@ rule judge_chains:
         "results/{scale}/logs/posterior/samples.log",
     benchmark:
         "results/{scale}/benchmarks/posterior/samples.tsv"
-    threads: 1
     resources:
         mem_mb=4000,
-        runtime=30,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2021"),
+        code=CODE.digest("judge_chains"),
+    message:
+        "chains of the simulation: burn-in, R-hat, effective sample size ({wildcards.scale})"
     script:
         "../scripts/judge_chains.py"

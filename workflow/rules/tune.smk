@@ -1,7 +1,6 @@
 rule sweep_variance:
     input:
         recordings=expand("results/{{scale}}/recordings/T{samples}.nc", samples=SAMPLES),
-        code=library("posterior"),
     output:
         expand("results/{{scale}}/tuning/variance_T{samples}.csv", samples=SAMPLES),
     log:
@@ -9,12 +8,12 @@ rule sweep_variance:
     benchmark:
         "results/{scale}/benchmarks/tuning/variance.tsv"
     priority: 10
-    threads: lambda wc: CREW.threads(wc.scale)
-    resources:
-        mem_mb=2000,
-        runtime=30,
+    threads: lambda wc: CORES.threads(wc.scale)
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2021"),
+        code=CODE.digest("sweep_variance"),
+    message:
+        "variance of the log-likelihood estimate over N ({wildcards.scale})"
     script:
         "../scripts/sweep_variance.py"
 
@@ -23,7 +22,6 @@ rule sweep_acceptance:
     input:
         recordings=expand("results/{{scale}}/recordings/T{samples}.nc", samples=SAMPLES),
         variances=expand("results/{{scale}}/tuning/variance_T{samples}.csv", samples=SAMPLES),
-        code=library("posterior"),
     output:
         expand("results/{{scale}}/tuning/acceptance_T{samples}.csv", samples=SAMPLES),
     log:
@@ -31,12 +29,12 @@ rule sweep_acceptance:
     benchmark:
         "results/{scale}/benchmarks/tuning/acceptance.tsv"
     priority: 10
-    threads: lambda wc: CREW.threads(wc.scale)
-    resources:
-        mem_mb=2000,
-        runtime=30,
+    threads: lambda wc: CORES.threads(wc.scale)
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2021"),
+        code=CODE.digest("sweep_acceptance"),
+    message:
+        "acceptance over the step length ({wildcards.scale})"
     script:
         "../scripts/sweep_acceptance.py"
 
@@ -44,7 +42,6 @@ rule sweep_acceptance:
 rule tune:
     input:
         acceptances=expand("results/{{scale}}/tuning/acceptance_T{samples}.csv", samples=SAMPLES),
-        code=library("posterior"),
     output:
         expand("results/{{scale}}/tuning/T{samples}.json", samples=SAMPLES),
     log:
@@ -52,11 +49,10 @@ rule tune:
     benchmark:
         "results/{scale}/benchmarks/tuning/tune.tsv"
     priority: 10
-    threads: 1
-    resources:
-        mem_mb=2000,
-        runtime=30,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2021"),
+        code=CODE.digest("tune"),
+    message:
+        "tuning: N and the step length ({wildcards.scale})"
     script:
         "../scripts/tune.py"

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from imuarray.posterior import run_chains
+from imuarray.posterior.pmmh import run_chains
 from imuarray.posterior.store import write_chains
 from imuarray.provenance import code_digest, digest, stamp
 from imuarray.studies.bayes import starts_for

@@ -11,7 +11,7 @@ with job(snakemake) as settings:  # noqa: F821
     import pandas as pd
 
     from imuarray.config import model_from
-    from imuarray.posterior import CompiledTarget
+    from imuarray.posterior.target import CompiledTarget
     from imuarray.provenance import write_csv
     from imuarray.recording import read_recording, read_truth
     from imuarray.streams import stream

@@ -21,8 +21,9 @@ def job(snakemake):
             try:
                 with redirect_stdout(log), redirect_stderr(log):
                     yield snakemake.params.get("settings", {})
-            except Exception:
-                traceback.print_exc(file=log)
+            except Exception as error:
+                told = [str(error)] if isinstance(error, InputError) else traceback.format_exc()
+                log.writelines(told)
                 raise
     except Exception as error:  # of the log, too: its disk may be full
         status = 2 if isinstance(error, InputError) else 1

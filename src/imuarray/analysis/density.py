@@ -7,9 +7,11 @@ import numpy as np
 from imuarray.analysis.model import Say, silent
 from imuarray.geometry import positions_of
 from imuarray.model import ArrayModel
-from imuarray.posterior import CompiledTarget, GaussianPrior, GenericTarget, Likelihood, tuning
+from imuarray.posterior import tuning
 from imuarray.posterior.generic import GenericLikelihood
+from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.rate_density import sample_covariance
+from imuarray.posterior.target import CompiledTarget, GaussianPrior, GenericTarget
 from imuarray.recording import Recording
 
 GAP = 1e-3  # nats in total

@@ -17,7 +17,9 @@ from imuarray.analysis.model import Say, chosen_model, silent, usable
 from imuarray.errors import InputError, require_integer
 from imuarray.model import ArrayModel
 from imuarray.model.names import parameter_names
-from imuarray.posterior import Chains, GaussianPrior, run_chains
+from imuarray.posterior.chains import Chains
+from imuarray.posterior.pmmh import run_chains
+from imuarray.posterior.target import GaussianPrior
 from imuarray.provenance import code_digest, digest, stamp
 from imuarray.recording import Recording
 from imuarray.streams import stream

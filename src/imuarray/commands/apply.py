@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from imuarray.analysis import apply as applied
-from imuarray.analysis import diagnosed
+from imuarray.analysis.extension import diagnosed
 from imuarray.analysis.motion import UNITS
+from imuarray.analysis.motion import apply as applied
 from imuarray.commands.output import Output
 from imuarray.errors import InputError
 from imuarray.provenance import write_netcdf

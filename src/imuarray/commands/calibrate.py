@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from imuarray.analysis import calibrate as calibrated
+from imuarray.analysis.calibration import calibrate as calibrated
 from imuarray.commands.output import Output
 from imuarray.estimation.informative import weak_directions
 from imuarray.provenance import write_netcdf

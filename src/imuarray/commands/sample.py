@@ -7,8 +7,8 @@ from pathlib import Path
 import pandas as pd
 import xarray as xr
 
-from imuarray.analysis import sample as sampled
-from imuarray.analysis import summary
+from imuarray.analysis.sampling import sample as sampled
+from imuarray.analysis.sampling import summary
 from imuarray.commands.output import Output
 from imuarray.provenance import write_netcdf
 from imuarray.recording import read_recording

@@ -14,8 +14,7 @@ from imuarray.diagnosis.readings import Readings
 from imuarray.model.effects import KINDS
 from imuarray.recording.validate import AXES
 
-RAILS = "saturation"
-UNITS = ("m s-2", "rad s-1")  # of the two kinds
+LEFT_OUT = ("stale_samples", "saturation")  # their readings; exchanged axes are turned back
 LEAST_REPEATS = 1
 LEAST_CLIPPED = 3
 RARE = -12.0  # log p from which repeats are no chance of a coarse converter
@@ -27,14 +26,13 @@ TURNS = [
 
 
 class Structural(NamedTuple):
-    """One such effect: whose, log p, its numbers and the words for what was read."""
+    """One such effect: whose, log p, its numbers and the sentence that says it."""
 
     effect: str
     imus: tuple[int, ...]
     log_p: float
     parameters: dict  # name -> (value, sd, unit)
     says: str
-    doubtful: bool = False  # named only where it gains on held-out time
 
 
 def part(readings: Readings, kind: int) -> np.ndarray:
@@ -63,15 +61,13 @@ def find_repeats(readings: Readings):
         return [], lost
     numbers = {"share": (float(np.mean(shares)), float(np.std(shares)), "1")}
     says = f"{100 * np.mean(shares):.2g} % of the readings repeat the one before exactly"
-    # a coarse converter at rest repeats itself, too, and is right
-    found = Structural("stale_samples", unique(hit), float(min(logs)), numbers, says, doubtful=True)
-    return [found], lost
+    return [Structural("stale_samples", unique(hit), float(min(logs)), numbers, says)], lost
 
 
 def find_rails(readings: Readings):
     """Readings that pile up at a value below the declared range: (causes, lost)."""
     lost = np.zeros(readings.values.shape, bool)
-    found, logs = [], []
+    hit, rails, logs = [], {}, []
     for imu, kind in np.argwhere(readings.exists):
         values = part(readings, kind)[:, imu]
         kept = readings.keep[:, imu, 3 * kind : 3 * kind + 3]
@@ -79,24 +75,19 @@ def find_rails(readings: Readings):
         if rail is None:
             continue
         lost[:, imu, 3 * kind : 3 * kind + 3] = at
-        found.append((int(imu), int(kind), rail))
+        hit.append(int(imu))
+        rails.setdefault(kind, []).append(rail)
         logs.append(-9.0 * (at.sum() - 1))
-    if not found:
+    if not hit:
         return [], lost
-    says = "readings pile up at a rail that the declared range does not give"
-    return [rails_cause(found, float(min(logs)), says)], lost
-
-
-def rails_cause(found, log_p: float, says: str) -> Structural:
-    """The cause of triads (imu, kind, rail in SI) whose readings a rail clips."""
-    numbers = {}
-    for kind, name in enumerate(KINDS):
-        sizes = [rail for _, own, rail in found if own == kind]
-        if sizes:
-            numbers[f"{name}_rail"] = float(np.median(sizes)), float(np.std(sizes)), UNITS[kind]
+    units = ("m s-2", "rad s-1")
+    numbers = {
+        f"{KINDS[kind]}_rail": (float(np.median(found)), float(np.std(found)), units[kind])
+        for kind, found in rails.items()
+    }
     where = ", ".join(f"{n} {v[0]:.4g} {v[2]}" for n, v in numbers.items())
-    imus = unique(imu for imu, *_ in found)
-    return Structural(RAILS, imus, log_p, numbers, f"{says} ({where})")
+    says = f"readings pile up at a rail that the declared range does not tell of ({where})"
+    return [Structural("saturation", unique(hit), float(min(logs)), numbers, says)], lost
 
 
 def _pile(values, kept):
@@ -151,7 +142,7 @@ def find_swaps(readings: Readings):
     if not mended:
         turns[:] = np.eye(3)
         says = "no majority of the triads agrees on the axes: put them right first"
-    found = Structural(SWAP, unique([imu for imu, _ in hit]), -1e6, {}, says)
+    found = Structural("axis_swap", unique([imu for imu, _ in hit]), -1e6, {}, says)
     return [found], turns, mended
 
 
@@ -203,19 +194,15 @@ def unique(imus) -> tuple[int, ...]:
     return tuple(sorted(set(imus)))
 
 
-FINDERS = {"stale_samples": find_repeats, RAILS: find_rails}
-SWAP = "axis_swap"
-
-
 def find_structural(readings: Readings, without=()):
     """(causes, readings put right, whether they could be): axes turned back, the rest left out."""
     causes, mended = [], True
-    for name, find in FINDERS.items():
+    for name, find in (("stale_samples", find_repeats), ("saturation", find_rails)):
         if name not in without:
             found, lost = find(readings)
             causes += found
             readings = readings.without(lost)
-    if SWAP not in without:
+    if "axis_swap" not in without:
         found, turns, mended = find_swaps(readings)
         causes += found
         readings = undo_swaps(readings, turns)

@@ -15,7 +15,10 @@ from imuarray.posterior.likelihood import Likelihood
 class Target(Protocol):
     """A posterior density estimated with fresh randomness at each evaluation."""
 
-    size: int
+    @property
+    def size(self) -> int:
+        """Number of parameters."""
+        ...
 
     def log_target(self, theta, rng) -> float:
         """log prior + log p-hat at theta (size,)."""

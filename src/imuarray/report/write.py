@@ -9,19 +9,18 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pandas as pd
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 import imuarray
-from imuarray.diagnosis.words import sensors_of, whose, words
 from imuarray.figures.style import styled
-from imuarray.model import EFFECTS
 from imuarray.provenance import atomic_write
 from imuarray.report import drawings as drawn
 from imuarray.report import numbers
 from imuarray.report.answers import answers, verdict
+from imuarray.report.cause_words import whose_short, words
 from imuarray.report.drawings_cause import cause_figure
 from imuarray.report.drawings_model import ALIKE, position_figure, separability_figure
+from imuarray.report.page import render
 from imuarray.report.panels import cause_table
 from imuarray.report.tables import tables
 
@@ -73,13 +72,15 @@ CAUSE_CAPTION = (
     " means of bins with two standard errors), and what the cause predicts (lines); where points"
     " leave the lines, the cause does not fit. Left: all readings that it touches. Right: {}."
 )
-PARAMETERS = "the most certain parameters, against what each multiplies"
-BESIDE = {  # by what it is drawn against
-    "age": "the age of the readings from each sample alone, against the time within a turn"
+BESIDE = {
+    "sensor_clock": "the age of the readings from each sample alone, against the time within a turn"
     " of the sawtooth, drawn twice",
-    "place": "the triad's position in blocks of time",
-    "time": "the axes that it changes most, against time",
-    "turning": "the gyroscope along dω/dt against its size; the slope is the delay",
+    "position_shift": "the triad's position in blocks of time",
+    "bias_drift": "the axes that it changes most, against time",
+    "accelerometer_bias": "the axes that it changes most, against time",
+    "gyroscope_bias": "the axes that it changes most, against time",
+    "gyroscope_delay": "the gyroscope along dω/dt against its size; the slope is the delay",
+    "sensor_delay": "the gyroscope along dω/dt against its size; the slope is the delay",
 }
 
 
@@ -140,11 +141,14 @@ def draw(diagnosis: Diagnosis) -> list[Drawing]:
         found.append(_drawing("gain", diagnosis, footer))
     for number, cause in enumerate(diagnosis.found.search.causes):
         table = cause_table(diagnosis, cause)
-        sensors = sensors_of(numbers.imu_labels(diagnosis), cause.imus)
+        labels = numbers.imu_labels(diagnosis)
+        sensors = ["all"] if len(cause.imus) == len(labels) else [labels[k] for k in cause.imus]
         found.append(Drawing(
             f"cause_{number + 1:02d}_{cause.effect}",
-            f"Cause: {words(cause.effect)}, {whose(sensors)}",
-            CAUSE_CAPTION.format(BESIDE.get(EFFECTS[cause.effect].against, PARAMETERS)),
+            f"Cause: {words(cause.effect)}, {whose_short(sensors)}",
+            CAUSE_CAPTION.format(BESIDE.get(
+                cause.effect, "the most certain parameters, against what each multiplies"
+            )),
             files(cause_figure(table, footer), table),
         ))  # fmt: skip
     return [*found, _drawing("separability", diagnosis, footer),
@@ -179,11 +183,7 @@ def files(figure: Figure, table: pd.DataFrame) -> dict[str, bytes]:
 def html(diagnosis: Diagnosis, drawings: list[Drawing]) -> str:
     """report.html."""
     document = diagnosis.document
-    # every text is escaped
-    environment = Environment(
-        loader=PackageLoader("imuarray.report", "."), undefined=StrictUndefined, autoescape=True
-    )
-    return environment.get_template("report.html.j2").render(
+    return render(
         recording=str(document["recording"]) or "a recording",
         facts=facts(diagnosis),
         verdict=verdict(diagnosis),

@@ -13,8 +13,9 @@ from imuarray.estimation.selection import disjoint, neighbours
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting, normal_motion
-from imuarray.posterior import CompiledTarget, GaussianPrior, Likelihood
+from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.rate_density import rate_distribution
+from imuarray.posterior.target import CompiledTarget, GaussianPrior
 from imuarray.recording import Recording
 from imuarray.simulation import simulate_recording, simulate_samples
 from imuarray.streams import stream

@@ -17,8 +17,9 @@ from scipy import stats
 from imuarray.geometry import Array, positions_of
 from imuarray.model import ArrayModel
 from imuarray.motion import normal_motion
-from imuarray.posterior import AutoregressiveTarget, CompiledTarget, GaussianPrior, Likelihood
 from imuarray.posterior.diagnostics import ess_of_mean
+from imuarray.posterior.likelihood import Likelihood
+from imuarray.posterior.target import AutoregressiveTarget, CompiledTarget, GaussianPrior
 from imuarray.simulation import measure
 from imuarray.streams import stream
 from imuarray.studies.truths import misfit

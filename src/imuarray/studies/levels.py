@@ -9,8 +9,9 @@ import numpy as np
 from scipy import stats
 
 from imuarray.geometry import positions_of
-from imuarray.posterior import AutoregressiveTarget, CompiledTarget, tuning
+from imuarray.posterior import tuning
 from imuarray.posterior.diagnostics import ess
+from imuarray.posterior.target import AutoregressiveTarget, CompiledTarget
 from imuarray.streams import stream
 from imuarray.studies.batches import run_batches
 from imuarray.studies.truths import SPARE, Replicate, Setting, misfit, replicate

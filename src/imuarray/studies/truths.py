@@ -12,7 +12,8 @@ from imuarray.estimation.newton import descend
 from imuarray.geometry import positions_of, sub_array
 from imuarray.model import ArrayModel
 from imuarray.motion import normal_motion
-from imuarray.posterior import GaussianPrior, Likelihood
+from imuarray.posterior.likelihood import Likelihood
+from imuarray.posterior.target import GaussianPrior
 from imuarray.simulation import measure
 from imuarray.streams import stream
 

@@ -12,7 +12,7 @@ import pandas as pd
 from imuarray.geometry import positions_of
 from imuarray.model.structure import design
 from imuarray.motion import Motion
-from imuarray.posterior import Likelihood
+from imuarray.posterior.likelihood import Likelihood
 from imuarray.studies.checks.information import Noise, position_information
 
 

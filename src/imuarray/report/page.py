@@ -1,10 +1,10 @@
-<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>Diagnosis of {{ recording }}</title>
-<style>
+"""report.html: one file, readable without a network, every text escaped."""
+
+from __future__ import annotations
+
+from jinja2 import Environment, StrictUndefined
+
+STYLE = """
 :root { --ink: #1a1a1a; --soft: #5a5a5a; --line: #d8d8d8; --wash: #f5f6f7; --blue: #0072B2;
   --loud: #D55E00; }
 * { box-sizing: border-box; }
@@ -41,7 +41,15 @@ summary { cursor: pointer; font-weight: 600; }
   border-top: 1px solid var(--line); padding-top: .6rem; }
 @media print { body { max-width: none; padding: 0; font-size: 10pt; }
   figure, tr, .loud, .verdict { break-inside: avoid; } }
-</style>
+"""
+
+TEMPLATE = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>Diagnosis of {{ recording }}</title>
+<style>STYLE</style>
 </head>
 <body>
 {%- macro shown(table) %}
@@ -112,3 +120,10 @@ summary { cursor: pointer; font-weight: 600; }
 </footer>
 </body>
 </html>
+"""
+
+
+def render(**parts) -> str:
+    """The page; ``parts`` are texts, escaped here, figures (base64) and tables."""
+    environment = Environment(undefined=StrictUndefined, autoescape=True)
+    return environment.from_string(TEMPLATE.replace("STYLE", STYLE)).render(**parts)

@@ -1,0 +1,29 @@
+from . import plots as plots
+from .analysis.calibration import calibrate as calibrate
+from .analysis.extension import diagnosed as diagnosed
+from .analysis.files import read_calibration as read_calibration
+from .analysis.files import read_csv as read_csv
+from .analysis.files import read_mimu as read_mimu
+from .analysis.files import read_posterior as read_posterior
+from .analysis.motion import apply as apply
+from .analysis.prepare import first_order as first_order
+from .analysis.prepare import select as select
+from .analysis.prepare import simulate as simulate
+from .analysis.sampling import sample as sample
+from .analysis.sampling import summary as summary
+from .diagnosis.document import diagnose as diagnose
+from .errors import InputError as InputError
+from .estimation.bcd import calibrate_bcd as calibrate_bcd
+from .estimation.gauss_newton import calibrate_gauss_newton as calibrate_gauss_newton
+from .estimation.motion_ml import estimate_motion as estimate_motion
+from .estimation.online import Online as Online
+from .geometry.array import Array as Array
+from .geometry.mimu4444 import mimu4444 as mimu4444
+from .model.array_model import ArrayModel as ArrayModel
+from .model.own import read_effects as read_effects
+from .recording.format import Recording as Recording
+from .recording.format import read_recording as read_recording
+from .recording.format import write_recording as write_recording
+from .report.write import write_report as write_report
+
+__version__: str
