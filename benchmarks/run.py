@@ -25,7 +25,7 @@ from imuarray.config import model_from, read_config  # noqa: E402
 from imuarray.estimation import calibrate_bcd  # noqa: E402
 from imuarray.estimation.collapsed import Collapsed  # noqa: E402
 from imuarray.estimation.kernels import reduced  # noqa: E402
-from imuarray.estimation.newton import descend  # noqa: E402
+from imuarray.estimation.newton import fisher_scoring  # noqa: E402
 from imuarray.estimation.reference import skew  # noqa: E402
 from imuarray.geometry import positions_of, sub_array  # noqa: E402
 from imuarray.model import ArrayModel  # noqa: E402
@@ -266,7 +266,7 @@ def one_to_the_bound(model, rng, samples):
 
     def fast(covariance):
         data = Collapsed.of(model, force, rate, saturated)
-        descend(data, model.array.relative, limit=int(made.newton), covariance=covariance)
+        fisher_scoring(data, model.array.relative, limit=int(made.newton), covariance=covariance)
 
     def arranged():
         Collapsed.of(model, force, rate, saturated)
@@ -303,7 +303,7 @@ def against_scipy(model, rng, samples=30):
         return least_squares(residual, start, slope, x_scale="jac")
 
     def own():
-        return descend(Collapsed.of(model, force, rate), model.array.relative)
+        return fisher_scoring(Collapsed.of(model, force, rate), model.array.relative)
 
     slow, fast = interleaved([peer, own], 3)
     solved = peer()

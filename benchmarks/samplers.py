@@ -2,10 +2,11 @@
 
 `python benchmarks/samplers.py [--samples 5 50 500] [--seconds 60] [--out results/samplers.md]`.
 Every sampler runs twice on the same data of section IV-A of paper 2021: PmMH's walks and NUTS from
-starts spread over the prior, autoregressive proposals and emcee's walkers around the mode, whose
-search is not counted; NUTS 300 + 1000 draws, the others for a budget of core seconds. ESS is the
-smallest over all parameters, bulk, after the burn-in that the chains themselves show; emcee's by
-its own autocorrelation time, as its walkers are not independent, and R-hat between two ensembles.
+starts spread over the prior, preconditioned Crank-Nicolson (pCN) proposals and emcee's walkers
+around the mode, whose search is not counted; NUTS 300 + 1000 draws, the others for a budget of core
+seconds. ESS is the smallest over all parameters, bulk, after the burn-in that the chains themselves
+show; emcee's by its own autocorrelation time, as its walkers are not independent, and R-hat between
+two ensembles.
 Core seconds are those of all threads.
 """
 
@@ -29,11 +30,11 @@ from imuarray.posterior import reference, tuning
 from imuarray.posterior.diagnostics import ess, find_burn_in, rhat
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.pmmh import run_chains
-from imuarray.posterior.target import AutoregressiveTarget, CompiledTarget, GaussianPrior
+from imuarray.posterior.target import GaussianPrior
 from imuarray.provenance import write_csv
 from imuarray.studies.bayes import simulate_dataset
 
-WIDER = 1.05  # than the mode's curvature, for autoregressive proposals
+WIDER = 1.05  # than the mode's curvature, for pCN proposals
 WIDENING = 1.005  # of the draws of omega beyond the integrand's curvature
 PAPER_CORE_SECONDS = 320 * 3600.0  # 8 hours on 40 cores, T = 500
 ENOUGH = 1000
@@ -121,21 +122,20 @@ def pmmh_rows(problem, seconds, rng):
     prior = GaussianPrior.of(problem.prior.mean, problem.prior.sd)
 
     def walk(likelihood):
-        draws = tuning.enough_draws(likelihood, problem.centre, rng)
-        target = CompiledTarget(likelihood, prior, draws)
-        steps = problem.prior.sd[0] * np.geomspace(1e-6, 0.3, 16)
-        rates = tuning.acceptance_sweep(target, problem.mode, steps, 1000, rng)
-        return f", N = {draws}", target, tuning.choose_step(steps, rates)
+        sweeps = tuning.Sweeps(problem.prior.sd[0] * np.geomspace(1e-6, 0.3, 16))
+        found = tuning.tune(
+            likelihood, prior, problem.centre, lambda _: problem.mode, sweeps, lambda _: rng,
+            may_centre=False,
+        )  # fmt: skip
+        return f", N = {found.target.draws}", found.target, found.step
 
     def shaped():
         centred = problem.likelihood.centred(problem.centre, WIDENING)
-        draws = tuning.enough_draws(centred, problem.centre, rng)
-        factor = WIDER * problem.factor
-        target = AutoregressiveTarget(centred, prior, draws, problem.mode, factor)
-        lengths = np.geomspace(0.02, 0.999, 12)
-        rates = tuning.acceptance_sweep(target, problem.mode, lengths, 1000, rng)
-        step = float(lengths[np.argmax(rates * lengths**2)])
-        return f", N = {draws}, step {step:.2f}", target, step
+        lengths, factor = np.geomspace(0.02, 0.999, 12), WIDER * problem.factor
+        target, step = tuning.tune_preconditioned(
+            centred, prior, problem.mode, factor, lengths, rng
+        )
+        return f", N = {target.draws}, step {step:.2f}", target, step
 
     spread, near = problem.starts(rng), problem.starts(rng, 2.0)
     yield compiled(
@@ -144,7 +144,7 @@ def pmmh_rows(problem, seconds, rng):
     centred = problem.likelihood.centred(problem.centre, WIDENING)
     name = "the same, omega drawn around each mode"
     yield compiled(problem, name, lambda: walk(centred), spread, seconds)
-    name = "PmMH, autoregressive around the mode"
+    name = "PmMH, pCN around the mode"
     yield compiled(problem, name, shaped, near, seconds)
 
 

@@ -10,10 +10,10 @@ from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.estimation import calibrate_gauss_newton, newton
 from imuarray.estimation.blocks import normal_equations
 from imuarray.estimation.blocks import problem as problem_of
-from imuarray.estimation.collapsed import Collapsed, tables
+from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.gauss_newton import calibrate_blocks
 from imuarray.estimation.information import arms, halves, information
-from imuarray.estimation.newton import descend
+from imuarray.estimation.newton import fisher_scoring
 from imuarray.estimation.online import Online
 from imuarray.estimation.threads import one_thread
 from imuarray.model import EFFECTS, ArrayModel, Noise
@@ -74,7 +74,7 @@ def test_covariance_is_the_bound_of_the_direct_jacobian():
     model = ArrayModel.isotropic(array, 0.04, 0.02)
     motion, force, rate = simulate(rng, model, 7, noise=False)
     data = Collapsed.of(model, force, rate)
-    found = descend(data, array.relative)
+    found = fisher_scoring(data, array.relative)
     jacobian = oracles.joint_jacobian(np.hstack(motion[:3]), array.relative, 2, 0.04, 0.02)
     bound = np.linalg.inv(oracles.position_information(jacobian, 12))
     np.testing.assert_allclose(found.covariance, bound, rtol=1e-6, atol=1e-9 * bound.max())
@@ -177,7 +177,7 @@ def test_nan_information_is_refused():
     data = Collapsed.of(model, force, rate)
     data.gyroscope_information[..., 3] = np.nan
     with pytest.raises(IdentifiabilityError, match="informative motion"):
-        descend(data, model.array.relative)
+        fisher_scoring(data, model.array.relative)
 
 
 @pytest.mark.parametrize("still", ["motion", "weight"])
@@ -191,7 +191,7 @@ def test_information_that_is_zero_is_refused(still):
     if still == "weight":
         data.weights[2] = 0.0
     with pytest.raises(IdentifiabilityError, match="informative motion"):
-        descend(data, model.array.relative)
+        fisher_scoring(data, model.array.relative)
 
 
 def test_a_prior_of_another_size_is_refused():
@@ -210,7 +210,7 @@ def test_covariance_is_of_where_a_search_stopped(limit):
     _, force, rate = simulate(rng, model, 20)
     data = Collapsed.of(model, force, rate)
     start = np.asfortranarray(model.array.relative + 1e-3 * rng.standard_normal((5, 3)))
-    found = descend(data, start, limit=limit, tolerance=0)
+    found = fisher_scoring(data, start, limit=limit, tolerance=0)
     assert not found.converged and len(found.cost) == max(limit, 0) + 1
     moved = np.ascontiguousarray(found.motion.motion.angular_rate.T)
     state = np.zeros((12, 20))
@@ -227,10 +227,7 @@ def test_covariance_where_no_shorter_step_is_better():
     model = ArrayModel(small_array(5, 4), noises(rng, 5, 4)["isotropic"])
     _, force, rate = simulate(rng, model, 20)
     data = Collapsed.of(model, force, rate)
-    given = newton.Given(
-        data.specific_force, data.energy, data.base, data.mean, data.gyroscope_information,
-        data.weights, np.empty(0), np.empty((0, 0)), tables(), halves(),
-    )  # fmt: skip
+    given = newton.Given(data.arrays, np.empty(0), np.empty((0, 0)), halves())
     here, there = (newton._place(given, model.array.relative) for _ in range(2))
     cost, _ = newton._evaluate(given, here)
     before = newton._information(given, here)

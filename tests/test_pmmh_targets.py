@@ -15,10 +15,10 @@ from imuarray.posterior.diagnostics import ess
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.pmmh import run_chains
 from imuarray.posterior.target import (
-    AutoregressiveTarget,
     CompiledTarget,
     GaussianPrior,
     GenericTarget,
+    PreconditionedTarget,
 )
 from tests import oracles
 from tests.cases import SHAPE, simulate
@@ -157,7 +157,7 @@ def test_generic_target_has_the_same_law():
     assert np.abs(deviations(sample, 0.5)).max() < 5
 
 
-def test_autoregressive_proposals_have_the_same_law():
+def test_preconditioned_proposals_have_the_same_law():
     """Around a centre that is off and a shape too wide: quantiles within five standard errors."""
     model, force, rate, prior = problem()
     thetas, weights = exact(0.5)
@@ -166,7 +166,7 @@ def test_autoregressive_proposals_have_the_same_law():
     centre = mean + 0.3 * np.sqrt(np.diag(spread))
     factor = 1.2 * np.linalg.cholesky(spread)
     likelihood = Likelihood.of(model, force, rate)
-    target = AutoregressiveTarget(likelihood, prior, 20, centre, factor)
+    target = PreconditionedTarget(likelihood, prior, 20, centre, factor)
     starts = mean + 1e-3 * np.random.default_rng(5).standard_normal((4, 6))
     run = run_chains(target, starts, 0.7, 2000, 20, seed=6, quiet=True)
     sample = run.draws[:, 200:]

@@ -36,7 +36,7 @@ def test_position_errors(name):
     assert np.all(table.realisations == 80) and np.all(table.rmse_m > 0)
 
 
-@pytest.mark.parametrize("method", ["ML", "PmMH, autoregressive", "NUTS"])
+@pytest.mark.parametrize("method", ["ML", "PmMH, pCN", "NUTS"])
 def test_levels(method):
     whole = calibrated(setting(), range(4), methods=[method])
     parts = [calibrated(setting(), share(range(4), k, 3), methods=[method]) for k in range(3)]

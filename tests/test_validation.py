@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from imuarray.config import read_config
-from imuarray.estimation.newton import descend
+from imuarray.estimation.newton import fisher_scoring
 from imuarray.figures import validation
 from imuarray.geometry import positions_of, sub_array
 from imuarray.posterior.likelihood import Likelihood
@@ -44,7 +44,7 @@ def test_widths_that_are_wrong_are_seen(monkeypatch, factor):
         return measure(type(model)(model.array, noise), *arguments)
 
     monkeypatch.setattr(truths, "measure", measured)
-    levels = calibrated.calibrated(setting(), range(100), methods=["PmMH, autoregressive"])
+    levels = calibrated.calibrated(setting(), range(100), methods=["PmMH, pCN"])
     assert np.sign(np.log(factor)) * coverage(levels).width_z[0] > 5
 
 
@@ -60,7 +60,7 @@ def test_levels_are_uniform_where_data_tell_little():
 def test_samplers_agree_truth_by_truth_where_data_tell_little():
     """Numbers 69 and 138 stuck before the burn-in learnt where the mass is, 4 sds off the mode."""
     numbers = [*range(4), 69, 138]
-    methods = ["PmMH, autoregressive", "NUTS"]
+    methods = ["PmMH, pCN", "NUTS"]
     levels = calibrated.calibrated(setting("hard"), numbers, methods=methods)
     table = coverage(levels).set_index("method")
     assert table.apart[methods[0]] < 0.15 and np.isnan(table.apart["NUTS"])
@@ -120,7 +120,7 @@ def test_local_optima_are_told_by_their_residuals_and_left():
     for number in range(200):
         one = truths.replicate(chosen, number)
         data, nominal = one.likelihood.collapsed, positions_of(prior.mean)
-        alone = descend(data, nominal, (prior.mean, precision), covariance=False)
+        alone = fisher_scoring(data, nominal, (prior.mean, precision), covariance=False)
         sd = np.sqrt(np.diag(one.covariance))
         assert np.abs((one.mode - one.truth) / sd).max() < 6
         if np.abs((alone.positions[1:].ravel() - one.truth) / sd).max() > 6:

@@ -1,11 +1,9 @@
 """Shared by the sampling scripts: run two chains with a checkpoint and store them."""
 
-from pathlib import Path
-
-from imuarray.posterior.pmmh import run_chains
+from imuarray.posterior.pmmh import checkpoint_beside, run_chains, spread_starts
 from imuarray.posterior.store import write_chains
 from imuarray.provenance import code_digest, digest, stamp
-from imuarray.studies.bayes import starts_for
+from imuarray.streams import stream
 
 
 def sample_paired(settings, recording, target, step, transitions, names, path, attrs, threads):
@@ -15,12 +13,14 @@ def sample_paired(settings, recording, target, step, transitions, names, path, a
         settings, recording.specific_force, recording.angular_rate, step, target.draws,
         code_digest(),
     )  # fmt: skip
-    checkpoint = Path(path).parent / f".checkpoint_{Path(path).stem}_{key[:16]}.npz"
-    starts = starts_for(settings, recording, names)
+    checkpoint, seed = checkpoint_beside(path, key), settings["seed"]
+    starts = spread_starts(
+        target.prior.mean, settings["paper2021"]["start_sd"], stream(seed, *names, "starts")
+    )
     chains = run_chains(
-        target, starts, step, draws, transitions // draws, settings["seed"], names,
+        target, starts, step, draws, transitions // draws, seed, names,
         checkpoint=checkpoint, key=key, threads=threads,
     )  # fmt: skip
     labels = recording.accelerometer_labels[1:]
-    write_chains(path, chains, labels, target.prior, {**stamp(settings, settings["seed"]), **attrs})
+    write_chains(path, chains, labels, target.prior, {**stamp(settings, seed), **attrs})
     checkpoint.unlink(missing_ok=True)

@@ -11,12 +11,11 @@ from imuarray.posterior import tuning
 from imuarray.posterior.generic import GenericLikelihood
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.rate_density import sample_covariance
-from imuarray.posterior.target import CompiledTarget, GaussianPrior, GenericTarget
+from imuarray.posterior.target import GaussianPrior, GenericTarget
 from imuarray.recording import Recording
 
 GAP = 1e-3  # nats in total
 UNSETTLED = "the search for the posterior's mode did not converge; chains start from where it ended"
-VARIANCE = 0.1  # wanted of log p-hat, section III-C of paper 2021
 
 
 def density_of(recording: Recording, model: ArrayModel, rates: str = "declared", say: Say = silent):
@@ -61,22 +60,15 @@ def tuned_target(recording: Recording, model: ArrayModel, rates: str, rng, say: 
     if model.effects:
         return _tuned_generic(recording, model, rng, say)
     spread = rates == "spread"
-    likelihood = _likelihood(recording, model, spread)
-    prior = prior_of(recording, model)
-    counts = tuning.COUNTS
-    variances = tuning.variance_sweep(likelihood, model.array.relative, counts, 200, rng)
-    mode, _ = _mode(recording, model, spread, say)
-    if variances.min() > 2 * VARIANCE:
-        say(f"variance of log p-hat {variances[-1]:.3g} at N = {counts[-1]}: omega is drawn"
-            " around the integrand's mode instead")  # fmt: skip
-        centre = positions_of(mode)
-        likelihood = likelihood.centred(centre)
-        variances = tuning.variance_sweep(likelihood, centre, counts, 200, rng)
-    draws = tuning.choose_draws(counts, variances, VARIANCE)
-    target = CompiledTarget(likelihood, prior, draws)
-    steps = recording.position_prior_sd * np.geomspace(1e-6, 0.3, 16)
-    rates_of = tuning.acceptance_sweep(target, mode, steps, 1000, rng)
-    return target, mode, tuning.choose_step(steps, rates_of), draws
+    sweeps = tuning.Sweeps(recording.position_prior_sd * np.geomspace(1e-6, 0.3, 16))
+    found = tuning.tune(
+        _likelihood(recording, model, spread), prior_of(recording, model), model.array.relative,
+        lambda centred: _mode(recording, model, spread, say)[0], sweeps, lambda name: rng,
+    )  # fmt: skip
+    if found.centred:
+        say(f"variance of log p-hat {found.variances[-1]:.3g} at N = {sweeps.draws[-1]}: omega is"
+            " drawn around the integrand's mode instead")  # fmt: skip
+    return found.target, found.start, found.step, found.target.draws
 
 
 def _tuned_generic(recording, model, rng, say):
@@ -86,9 +78,8 @@ def _tuned_generic(recording, model, rng, say):
     target = GenericTarget(
         estimate, prior_of(recording, model), np.linalg.cholesky(found.covariance)
     )
-    steps = np.geomspace(1e-3, 1.0, 8)
-    rates = tuning.acceptance_sweep(target, mode, steps, 200, rng)
-    return target, mode, tuning.choose_step(steps, rates), estimate.draws
+    step = tuning.tune_step(target, mode, np.geomspace(1e-3, 1.0, 8), 200, rng)
+    return target, mode, step, estimate.draws
 
 
 def _likelihood(recording, model, spread: bool) -> Likelihood:

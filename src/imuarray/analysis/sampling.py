@@ -18,7 +18,7 @@ from imuarray.errors import InputError, require_integer
 from imuarray.model import ArrayModel
 from imuarray.model.names import parameter_names
 from imuarray.posterior.chains import Chains
-from imuarray.posterior.pmmh import run_chains
+from imuarray.posterior.pmmh import checkpoint_beside, run_chains, spread_starts
 from imuarray.posterior.target import GaussianPrior
 from imuarray.provenance import code_digest, digest, stamp
 from imuarray.recording import Recording
@@ -205,12 +205,9 @@ def _pmmh(recording, model, asked: Asked) -> Made:
     key = _key(recording, model, target.prior, asked, draws, step, steps)
     checkpoint = _checkpoint(asked, key)
     rng = _stream(asked, "starts")
-    spread = target.prior.sd / 3
-    starts = np.array([mode, mode + 0.0])
-    starts += spread * rng.standard_normal(starts.shape)
     chains = run_chains(
-        target, starts, step, max(4, steps // thin), thin, asked.seed,
-        checkpoint=checkpoint, key=key, quiet=not asked.progress,
+        target, spread_starts(mode, target.prior.sd / 3, rng), step, max(4, steps // thin), thin,
+        asked.seed, checkpoint=checkpoint, key=key, quiet=not asked.progress,
     )  # fmt: skip
     return Made(chains, target.prior, key, {"draws_per_sample": draws}, checkpoint)
 
@@ -220,7 +217,7 @@ def _checkpoint(asked: Asked, key: str) -> Path | None:
     out = asked.beside
     if out is None:
         return None
-    checkpoint = out.with_name(f".{out.name}.{key[:16]}.npz")
+    checkpoint = checkpoint_beside(out, key)
     for other in out.parent.glob(f".{out.name}.*.npz"):
         if other != checkpoint:
             asked.say(f"{other}: a checkpoint of other data, settings or code, not continued")
@@ -234,11 +231,10 @@ def _nuts(recording, model, asked: Asked) -> Made:
     asked.say("finding the mode ...")
     log_density, prior, mode, covariance = density_of(recording, model, asked.rates, asked.say)
     rng = _stream(asked, "starts")
-    chains = np.zeros((2, mode.size))
     if model.effects:  # clocks and shifts have modes of their own far away
-        starts = rng.multivariate_normal(mode, APART**2 * covariance, size=len(chains))
+        starts = rng.multivariate_normal(mode, APART**2 * covariance, size=2)
     else:
-        starts = prior.mean + prior.sd * rng.standard_normal(chains.shape)
+        starts = spread_starts(prior.mean, prior.sd, rng)
     steps = asked.steps or NUTS_STEPS
     found = run_nuts(
         log_density, mode, covariance, starts, NUTS_WARMUP, steps, asked.seed,

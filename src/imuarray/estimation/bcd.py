@@ -9,7 +9,7 @@ import numpy as np
 from imuarray.compiled import njit
 from imuarray.errors import IdentifiabilityError, InputError, require_shape
 from imuarray.estimation import kernels
-from imuarray.estimation.collapsed import Collapsed, tables
+from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.motion_ml import MotionEstimate, motion_from
 from imuarray.estimation.rates import most_likely, workspace
 from imuarray.geometry.array import require_planar_extent
@@ -72,41 +72,39 @@ def _position_block(force, state, rows, values, A, positions):
 
 
 @njit
-def descend(
-    force, energy, base, mean, P, weights, rows, values, pairs, products, positions,
-    tolerance, cost_tolerance, limit, marks, snapshots, cost_trace, step_trace,
-):  # fmt: skip
-    """Algorithm 1 on one realisation; ``positions`` is start and result.
+def block_descent(data, positions, tolerance, cost_tolerance, limit, marks):
+    """Algorithm 1 on a recording's `Arrays`; ``positions`` (A, 3) is start and result.
 
-    Returns (iterations, status): status 1 converged, 0 stopped at the limit, -1 sum A'A
-    singular, -2 H' Lambda H singular.
+    Returns (status, cost (n,), step (n,), snapshots (S, A, 3)) as `Calibration` has them after n
+    iterations: status 1 converged, 0 stopped at the limit, -1 sum A'A singular, -2 H' Lambda H
+    singular.
     """
-    work, rate = workspace(energy.size), mean.copy()
-    mark = 0
-    for iteration in range(limit):
-        logdet = most_likely(
-            positions, force, energy, base, mean, P, weights, rows, values, pairs, products,
-            rate, 1e-7, 50, work,
-        )  # fmt: skip
-        if np.isnan(logdet):
-            return iteration, -2
-        step = _position_block(force, work.state, rows, values, work.arms, positions)
+    work, rate, known = workspace(data.energy.size), data.mean.copy(), data.tables
+    cost, moved = np.empty(limit), np.empty(limit)
+    snapshots = np.empty((len(marks), *positions.shape))
+    mark, done, status = 0, 0, 0
+    while done < limit and status == 0:
+        if np.isnan(most_likely(data, positions, rate, 1e-7, 50, work)):
+            status = -2
+            break
+        step = _position_block(
+            data.force, work.state, known.rows, known.values, work.arms, positions
+        )
         if step < 0.0:
-            return iteration, -1
-        cost_trace[iteration] = work.cost.sum() + work.reduced.const.sum()
-        step_trace[iteration] = step
-        while mark < len(marks) and marks[mark] == iteration + 1:
+            status = -1
+            break
+        cost[done] = work.cost.sum() + work.reduced.const.sum()
+        moved[done] = step
+        fallen = cost[max(done - 1, 0)] - cost[done]
+        settled = done > 0 and fallen <= cost_tolerance * abs(cost[done])
+        done += 1
+        while mark < len(marks) and marks[mark] == done:
             snapshots[mark] = positions
             mark += 1
-        fallen = cost_trace[max(iteration - 1, 0)] - cost_trace[iteration]
-        settled = iteration > 0 and fallen <= cost_tolerance * abs(cost_trace[iteration])
         if step <= tolerance or settled:
-            for later in range(mark, len(marks)):
-                snapshots[later] = positions
-            return iteration + 1, 1
-    for later in range(mark, len(marks)):
-        snapshots[later] = positions
-    return limit, 0
+            status = 1
+    snapshots[mark:] = positions
+    return status, cost[:done], moved[:done], snapshots
 
 
 def require_samples(samples: int) -> None:
@@ -167,18 +165,15 @@ def calibrate_bcd(
     if data.weights is None:
         raise InputError("bcd: expected isotropic noise per triad; use --method gauss-newton")
     require_rotation(data, positions)
-    cost, step = np.empty(limit), np.empty(limit)
     marks = np.asarray(sorted(marks), np.int64)
-    snapshots = np.empty((len(marks), *positions.shape))
-    done, status = descend(
-        data.specific_force, data.energy, data.base, data.mean,
-        data.gyroscope_information, data.weights, *tables(),
-        positions, tolerance, cost_tolerance, limit, marks, snapshots, cost, step,
-    )  # fmt: skip
+    status, *path = block_descent(
+        data.arrays, positions, float(tolerance), float(cost_tolerance), limit, marks
+    )
     explain(status)
     require_rotation(data, positions)  # again: the start's errors no longer blur the motion
     motion = motion_from(data, positions)
-    return Calibration(positions, motion, cost[:done], step[:done], status == 1, snapshots)
+    cost, step, snapshots = path
+    return Calibration(positions, motion, cost, step, status == 1, snapshots)
 
 
 def require_rotation(data: Collapsed, positions) -> None:

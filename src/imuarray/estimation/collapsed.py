@@ -32,6 +32,18 @@ def tables() -> Tables:
     return Tables(rows, tensor[tuple(rows.T)].copy(), pairs, gram[tuple(pairs.T)].copy())
 
 
+class Arrays(NamedTuple):
+    """A recording as the compiled searches for isotropic triads want it; see `Collapsed`."""
+
+    force: np.ndarray  # (A, 3, T) m/s^2
+    energy: np.ndarray  # (T,)
+    base: np.ndarray  # (3, T)
+    mean: np.ndarray  # (3, T) rad/s
+    rate_information: np.ndarray  # (3, 3, T)
+    weights: np.ndarray  # (A,)
+    tables: Tables
+
+
 def _weighted(precision, force) -> np.ndarray:
     """Lambda y (A, 3, T) for any precision (3A, 3A)."""
     return (precision @ force.reshape(len(precision), -1)).reshape(force.shape)
@@ -65,6 +77,14 @@ class Collapsed:
     def samples(self) -> int:
         """Number T of samples."""
         return self.energy.size
+
+    @property
+    def arrays(self) -> Arrays:
+        """The same for compiled code; ``weights`` must not be None."""
+        return Arrays(
+            self.specific_force, self.energy, self.base, self.mean, self.gyroscope_information,
+            self.weights, tables(),
+        )  # fmt: skip
 
     @classmethod
     def of(cls, model: ArrayModel, specific_force, angular_rate, saturated=None) -> Collapsed:

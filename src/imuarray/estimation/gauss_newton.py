@@ -11,7 +11,7 @@ from imuarray.estimation.bcd import Calibration, require_rotation, require_sampl
 from imuarray.estimation.blocks import Blocks, normal_equations, pack_motion, problem
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.motion_ml import MotionEstimate, motion_from
-from imuarray.estimation.newton import descend
+from imuarray.estimation.newton import fisher_scoring
 from imuarray.estimation.samplewise import descend as samplewise
 from imuarray.geometry.array import positions_of, require_planar_extent
 from imuarray.model import ArrayModel
@@ -70,8 +70,8 @@ def calibrate_gauss_newton(
 ) -> Calibration:
     """ML (or MAP) positions and effect parameters of any model, with their covariance.
 
-    The papers' model with isotropic triads takes the collapsed form of `newton.descend`, any other
-    `calibrate_blocks`: the same optimum, far slower.
+    The papers' model with isotropic triads takes the collapsed form of `newton.fisher_scoring`, any
+    other `calibrate_blocks`: the same optimum, far slower.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def calibrate_gauss_newton(
         if position_prior is not None:
             mean, sd = np.asarray(position_prior[0], float), position_prior[1]
             position_prior = mean, np.diag(np.broadcast_to(sd, mean.shape) ** -2.0)
-        found = descend(data, positions, position_prior, tolerance, limit)
+        found = fisher_scoring(data, positions, position_prior, tolerance, limit)
         # the collapsed cost leaves out how the gyroscopes differ among themselves
         spread = angular_rate - data.mean.T[:, None]
         apart = model.noise.misfit(np.zeros((len(spread), 3 * len(positions))), spread, saturated)

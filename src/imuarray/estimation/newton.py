@@ -15,7 +15,7 @@ import scipy.linalg
 from imuarray.compiled import njit
 from imuarray.errors import IdentifiabilityError, require_shape
 from imuarray.estimation.bcd import Calibration
-from imuarray.estimation.collapsed import Collapsed, Tables, tables
+from imuarray.estimation.collapsed import Arrays, Collapsed
 from imuarray.estimation.information import Halves, fisher, halves, slope
 from imuarray.estimation.motion_ml import motion_estimate
 from imuarray.estimation.rates import Work, most_likely, workspace
@@ -36,7 +36,7 @@ WHY = {
 }
 
 
-def descend(
+def fisher_scoring(
     data: Collapsed, start, prior=None, tolerance: float = 1e-6, limit: int = 50,
     covariance: bool = True,
 ) -> Calibration:  # fmt: skip
@@ -49,10 +49,7 @@ def descend(
     is below ``tolerance``: no coordinate then moves by more of its own sd. IdentifiabilityError
     where the information is singular.
     """
-    given = Given(
-        data.specific_force, data.energy, data.base, data.mean, data.gyroscope_information,
-        data.weights, *_prior(prior, data), tables(), halves(),
-    )  # fmt: skip
+    given = Given(data.arrays, *_prior(prior, data), halves())
     # one layout and one type each, or all would be compiled again
     start, tolerance, limit = np.array(start, float, order="C"), float(tolerance), max(limit, 0)
     require_shape("start", start, (len(data.specific_force), 3))
@@ -95,17 +92,11 @@ def _none():
 
 
 class Given(NamedTuple):
-    """Data, prior and tables of a search; `Collapsed` tells what they are."""
+    """Data, prior and tables of a search."""
 
-    force: np.ndarray  # (A, 3, T)
-    energy: np.ndarray  # (T,)
-    base: np.ndarray  # (3, T)
-    mean: np.ndarray  # (3, T)
-    rate_information: np.ndarray  # (3, 3, T)
-    weights: np.ndarray  # (A,)
+    data: Arrays
     prior_mean: np.ndarray  # (3 (A - 1),), or (0,) for none
     prior_precision: np.ndarray  # its square
-    tables: Tables
     halves: Halves
 
 
@@ -122,8 +113,8 @@ class Place(NamedTuple):
 @njit
 def _place(given, positions):
     return Place(
-        positions.copy(), given.mean.copy(), np.empty(given.energy.size),
-        np.empty(3 * len(positions) - 3), workspace(given.energy.size),
+        positions.copy(), given.data.mean.copy(), np.empty(given.data.energy.size),
+        np.empty(3 * len(positions) - 3), workspace(given.data.energy.size),
     )  # fmt: skip
 
 
@@ -132,7 +123,7 @@ def _search(given, start, tolerance, limit):
     """(where it ends, costs and position steps (n,), how it ended)."""
     here, there = _place(given, start), _place(given, start)
     costs, steps = np.zeros(limit + 1), np.zeros(limit + 1)
-    size, enough = here.slope.size, ROUNDED * given.energy.sum()
+    size, enough = here.slope.size, ROUNDED * given.data.energy.sum()
     factor, step, last, known = np.empty((size, size)), np.empty(size), np.inf, False
     costs[0], sound = _evaluate(given, here)
     if not sound:
@@ -165,13 +156,8 @@ def _evaluate(given, place):
 
     Fills the rest of it; the motion is searched from its rate.
     """
-    work, known = place.work, given.tables
-    logdet = most_likely(
-        place.positions, given.force, given.energy, given.base, given.mean, given.rate_information,
-        given.weights, known.rows, known.values, known.pairs, known.products, place.rate, RATE,
-        LIMIT, work,
-    )  # fmt: skip
-    if np.isnan(logdet):
+    work, data, known = place.work, given.data, given.data.tables
+    if np.isnan(most_likely(data, place.positions, place.rate, RATE, LIMIT, work)):
         return np.nan, False
     total = 0.0
     for first in range(0, place.costs.size, BLOCK):
@@ -181,7 +167,7 @@ def _evaluate(given, place):
             part += place.costs[t]
         total += part
     by_triad = slope(
-        place.positions, given.force, given.weights, work.state, known.rows, known.values, work.arms
+        place.positions, data.force, data.weights, work.state, known.rows, known.values, work.arms
     )
     flat = place.positions.reshape(-1)[3:]
     place.slope[:] = by_triad.reshape(-1)[3:]
@@ -219,8 +205,8 @@ def _information(given, place):
     """The Fisher information of the positions, the prior's included."""
     work = place.work
     known = fisher(
-        place.positions, given.weights, place.rate, work.arms[1:], work.reduced,
-        given.rate_information, given.halves,
+        place.positions, given.data.weights, place.rate, work.arms[1:], work.reduced,
+        given.data.rate_information, given.halves,
     )  # fmt: skip
     for i in range(given.prior_mean.size):
         known[i] += given.prior_precision[i]

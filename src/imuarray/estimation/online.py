@@ -8,7 +8,7 @@ import numpy as np
 
 from imuarray.errors import InputError
 from imuarray.estimation.collapsed import Collapsed
-from imuarray.estimation.newton import descend
+from imuarray.estimation.newton import fisher_scoring
 from imuarray.model import ArrayModel
 
 BLOCK = 200  # samples that are calibrated together
@@ -90,7 +90,7 @@ class Online:
 
     def _learn(self, force, rate, saturated) -> None:
         data = Collapsed.of(self.model, np.asarray(force), np.asarray(rate), saturated)
-        found = descend(data, self.positions, (self.positions[1:].ravel(), self.precision))
+        found = fisher_scoring(data, self.positions, (self.positions[1:].ravel(), self.precision))
         self.positions = found.positions
         self.precision = np.linalg.inv(found.covariance)
         self.samples += data.samples

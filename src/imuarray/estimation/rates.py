@@ -231,23 +231,24 @@ def workspace(samples):
 
 
 @njit
-def most_likely(
-    positions, force, energy, base, mean, P, weights, rows, values, pairs, products,
-    rate, tolerance, limit, work,
-):  # fmt: skip
-    """The most likely motion at ``positions`` for isotropic triads; omega from ``rate`` (3, T).
+def most_likely(data, positions, rate, tolerance, limit, work):
+    """The most likely motion at ``positions`` (A, 3) of a recording's `Arrays`.
 
-    Fills ``rate`` and ``work``; returns log |H' Lambda H|, NaN where that is singular.
+    The search for omega starts at ``rate`` (3, T). Fills ``rate`` and ``work``; returns
+    log |H' Lambda H|, NaN where that is singular.
     """
-    found = work.reduced
-    information(positions, weights, pairs, products, found.K)
+    found, known = work.reduced, data.tables
+    information(positions, data.weights, known.pairs, known.products, found.K)
     scaled = np.empty_like(positions)
     for k in range(len(positions)):
         for i in range(3):
-            scaled[k, i] = weights[k] * positions[k, i]
-    logdet = reduce(scaled, force, base, energy, rows, values, found)
+            scaled[k, i] = data.weights[k] * positions[k, i]
+    logdet = reduce(scaled, data.force, data.base, data.energy, known.rows, known.values, found)
     if np.isnan(logdet):
         return logdet
-    angular_rates(rate, found.C, found.b, mean, P, tolerance, limit, work.cost, work.counts)
+    angular_rates(
+        rate, found.C, found.b, data.mean, data.rate_information, tolerance, limit, work.cost,
+        work.counts,
+    )  # fmt: skip
     linear_motion(rate, found.X, found.phi, work.state)
     return logdet

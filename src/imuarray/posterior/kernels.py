@@ -7,10 +7,11 @@ import numpy as np
 
 from imuarray.compiled import njit
 from imuarray.estimation import kernels
+from imuarray.estimation.collapsed import Tables
 from imuarray.posterior import draws
 
 
-class Data(NamedTuple):
+class LikelihoodData(NamedTuple):
     """A recording as the compiled likelihood wants it; time is the last axis."""
 
     weighted: np.ndarray  # (A, 3, T) Lambda y
@@ -22,10 +23,7 @@ class Data(NamedTuple):
     weights: np.ndarray  # (A,) 1 / sigma_k^2, empty for a general covariance
     precision: np.ndarray  # (3A, 3A) Lambda, empty for isotropic triads
     tensor: np.ndarray  # (4, 3, 12)
-    rows: np.ndarray
-    values: np.ndarray
-    pairs: np.ndarray
-    products: np.ndarray
+    tables: Tables
     ridge: np.ndarray  # (3,) prior precision of omega_dot (s^4/rad^2), zero where flat
 
 
@@ -46,13 +44,14 @@ def workspace(samples, count, rng):
 def collapse(positions, data, out):
     """Everything that depends on theta but not on omega; returns log |H' Lambda H|."""
     if data.weights.size:
-        kernels.information(positions, data.weights, data.pairs, data.products, out.K)
+        kernels.information(positions, data.weights, data.tables.pairs, data.tables.products, out.K)
     else:
         kernels.information_general(positions, data.precision, data.tensor, out.K)
     for i in range(3):
         out.K[6 + i, 6 + i] += data.ridge[i]
+    known = data.tables
     return kernels.reduce(
-        positions, data.weighted, data.base, data.energy, data.rows, data.values, out
+        positions, data.weighted, data.base, data.energy, known.rows, known.values, out
     )
 
 
@@ -147,12 +146,12 @@ def transitions(theta, log_target, prior, step, draws, power, data, rng, count):
 
 
 @njit
-def autoregressive(theta, log_target, prior, centre, factor, step, draws, power, data, rng, count):
-    """``count`` transitions from ``theta`` in place, proposals reversible for a normal density.
+def crank_nicolson(theta, log_target, prior, centre, factor, step, draws, power, data, rng, count):
+    """``count`` transitions by preconditioned Crank-Nicolson proposals from ``theta``, in place.
 
-    That density has mean ``centre`` (3 (A - 1),) and covariance factor factor', ``factor`` lower:
-    in its own coordinates a proposal is sqrt(1 - step^2) z + step n. Only what the target departs
-    from it can be refused. Returns (accepted, log_target).
+    They are reversible for a normal density of mean ``centre`` (3 (A - 1),) and covariance factor
+    factor', ``factor`` lower: in its own coordinates a proposal is sqrt(1 - step^2) z + step n.
+    Only what the target departs from it can be refused. Returns (accepted, log_target).
     """
     work = workspace(data.energy.size, draws, rng)
     size = theta.size

@@ -26,7 +26,7 @@ class Likelihood:
     ``rate_mean`` (T, 3) rad/s and ``rate_covariance`` (T, 3, 3) are those of p(omega_t | y_g).
     """
 
-    data: kernels.Data
+    data: kernels.LikelihoodData
     power: float
     collapsed: Collapsed
     rate_mean: np.ndarray
@@ -155,10 +155,9 @@ def _lower(covariance) -> np.ndarray:
     return np.array([factor[:, i, j] for i in range(3) for j in range(i + 1)])
 
 
-def _arrange(collapsed: Collapsed, mean, covariance, ridge) -> kernels.Data:
+def _arrange(collapsed: Collapsed, mean, covariance, ridge) -> kernels.LikelihoodData:
     general = collapsed.weights is None
-    known = tables()
-    return kernels.Data(
+    return kernels.LikelihoodData(
         collapsed.weighted,
         collapsed.energy,
         collapsed.base,
@@ -168,6 +167,6 @@ def _arrange(collapsed: Collapsed, mean, covariance, ridge) -> kernels.Data:
         np.empty(0) if general else collapsed.weights,
         np.ascontiguousarray(collapsed.precision) if general else np.empty((0, 0)),
         np.array(structure_tensor()),
-        *known,
+        tables(),
         ridge,
     )

@@ -32,7 +32,7 @@ NEWTON = 6  # steps to the mode at most, from where it is at the reference posit
 NEAR = 1e-4  # sds: a step as short is the last, the next would be its square
 
 
-class Data(NamedTuple):
+class MarginalData(NamedTuple):
     """Measurements as the marginal needs them (T samples, D = 3 A)."""
 
     weighted: jnp.ndarray  # (T, D) Lambda y
@@ -66,7 +66,7 @@ for _row, (_i, _j) in enumerate(PAIRS):
     _TENSOR[_row, _j, _i] += 1.0
 
 
-def collapse(positions, data: Data):
+def collapse(positions, data: MarginalData):
     """(C (6, 6), b (T, 6), constant (T,), log |H' Lambda H|) at positions (A, 3) m.
 
     Minus twice the exponent of (26a) is constant - 2 b . w + w' C w.
@@ -121,7 +121,7 @@ def _modes_at(C, b, data):
     return rate, jax.vmap(cholesky)(second)
 
 
-def log_marginal(positions, data: Data, nodes, log_weights):
+def log_marginal(positions, data: MarginalData, nodes, log_weights):
     """log p(y_a | theta, y_g) at positions (A, 3) m, up to the constant that (26a) leaves out.
 
     One node is Laplace's method.
@@ -182,7 +182,7 @@ class Marginal:
     Build it with `Marginal.of`; ``nodes`` (n^3, 3) and ``log_weights`` (n^3,) as `grid` has them.
     """
 
-    data: Data
+    data: MarginalData
     nodes: np.ndarray
     log_weights: np.ndarray
     gap: float = np.nan  # nats in total to the next finer quadrature, where that was looked at
@@ -218,7 +218,7 @@ class Marginal:
             np.append(likelihood.data.ridge, np.full(3, weight)), start,
             0.5 * np.sum(np.linalg.slogdet(information)[1]),
         )  # fmt: skip
-        data = Data(*map(jnp.asarray, parts))
+        data = MarginalData(*map(jnp.asarray, parts))
         if nodes is not None:
             return cls(data, *grid(nodes))
         rung = cls(data, *grid(LADDER[0]))

@@ -75,8 +75,8 @@ class CompiledTarget:
 
 
 @dataclass(frozen=True)
-class AutoregressiveTarget(CompiledTarget):
-    """The papers' model, proposals made around the posterior's own mode and shape.
+class PreconditionedTarget(CompiledTarget):
+    """The papers' model with preconditioned Crank-Nicolson proposals.
 
     Proposals leave the normal density of mean ``centre`` (size,) and covariance factor factor'
     (``factor`` lower (size, size)) as it is: with a posterior close to it nearly all are accepted,
@@ -91,7 +91,7 @@ class AutoregressiveTarget(CompiledTarget):
     def transitions(self, theta, log_target, step, count, rng) -> tuple[int, float]:
         """`Target.transitions`, compiled; releases the interpreter for other chains."""
         prior = np.stack([self.prior.mean, self.prior.sd**-2.0])
-        return kernels.autoregressive(
+        return kernels.crank_nicolson(
             theta, log_target, prior, self.centre, self.factor, step, self.draws,
             self.likelihood.power, self.likelihood.data, rng, count,
         )  # fmt: skip

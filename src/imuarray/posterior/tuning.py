@@ -1,18 +1,98 @@
-"""Tuning as in section III-C of paper 2021: first N, then sigma_q."""
+"""Tuning of PmMH as in section III-C of paper 2021: first N, then sigma_q."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from imuarray.posterior.likelihood import Likelihood
-    from imuarray.posterior.target import Target
+from imuarray.geometry import positions_of
+from imuarray.posterior.likelihood import Likelihood
+from imuarray.posterior.target import CompiledTarget, GaussianPrior, PreconditionedTarget, Target
 
 
-COUNTS = (1, 2, 5, 10, 20, 50, 100)  # numbers N of draws that are tried
+class Sweeps(NamedTuple):
+    """What is tried to choose N and sigma_q, and what is aimed at."""
+
+    steps: Sequence[float]  # m, sigma_q
+    draws: Sequence[int] = (1, 2, 5, 10, 20, 50, 100)  # N
+    realisations: int = 200  # of log p-hat, for each N
+    transitions: int = 1000  # for each sigma_q, after as many to settle
+    variance: float = 0.1  # of log p-hat
+    acceptance: float = 0.18
+
+
+class Tuned(NamedTuple):
+    """The walk (27) ready to run."""
+
+    target: CompiledTarget
+    start: np.ndarray  # (P,) m, near the posterior's mode
+    step: float  # m, sigma_q
+    variances: np.ndarray  # of log p-hat with omega from p(omega | y_g), for each N tried
+    centred: bool  # whether omega is drawn around the integrand's mode instead
+
+
+def tune(
+    likelihood: Likelihood, prior: GaussianPrior, positions, mode: Callable, sweeps: Sweeps,
+    rng: Callable, threads: int = 1, may_centre: bool = True,
+) -> Tuned:  # fmt: skip
+    """N by the variance of log p-hat, then sigma_q by the acceptance.
+
+    Where not even the largest N brings the variance near what is aimed at, as in measured data,
+    omega is drawn around the integrand's mode instead (`Likelihood.centred`).
+
+    Parameters
+    ----------
+    positions : (A, 3) m, where the variance is looked at
+    mode : callable, whether omega is drawn around the integrand's mode -> theta (P,) m
+        Where the sweep of sigma_q starts.
+    rng : callable, "variance" or "acceptance" -> numpy.random.Generator
+    may_centre : bool
+        False: omega from p(omega | y_g), however large the variance.
+    """
+
+    def variances(likelihood, positions):
+        return variance_sweep(
+            likelihood, positions, sweeps.draws, sweeps.realisations, rng("variance"), threads
+        )
+
+    first = found = variances(likelihood, positions)
+    centred = may_centre and bool(found.min() > 2 * sweeps.variance)
+    start = mode(centred)
+    if centred:
+        likelihood = likelihood.centred(positions_of(start))
+        found = variances(likelihood, positions_of(start))
+    draws = choose_draws(sweeps.draws, found, sweeps.variance)
+    target = CompiledTarget(likelihood, prior, draws)
+    step = tune_step(
+        target, start, sweeps.steps, sweeps.transitions, rng("acceptance"), sweeps.acceptance,
+        threads,
+    )  # fmt: skip
+    return Tuned(target, start, step, first, centred)
+
+
+def tune_step(target: Target, start, steps, transitions: int, rng, aim=0.18, threads=1) -> float:
+    """The step length at which the acceptance crosses ``aim``, from ``start`` (P,)."""
+    rates = acceptance_sweep(target, start, steps, transitions, rng, threads)
+    return choose_step(steps, rates, aim)
+
+
+def tune_preconditioned(
+    likelihood: Likelihood, prior: GaussianPrior, centre, factor, lengths, rng
+) -> tuple[PreconditionedTarget, float]:
+    """(target, step) of preconditioned Crank-Nicolson proposals: N at the mode, the longest jumps.
+
+    ``centre`` (P,) and ``factor`` (P, P) as in `PreconditionedTarget`; of the ``lengths`` that
+    with the largest expected squared jump.
+    """
+    tried = Sweeps(lengths)
+    found = variance_sweep(likelihood, positions_of(centre), tried.draws, tried.realisations, rng)
+    draws = choose_draws(tried.draws, found, tried.variance)
+    target = PreconditionedTarget(likelihood, prior, draws, centre, factor)
+    rates = acceptance_sweep(target, centre, lengths, tried.transitions, rng)
+    return target, float(lengths[np.argmax(rates * lengths**2)])
 
 
 def _each(function, jobs, threads: int) -> np.ndarray:
@@ -46,12 +126,6 @@ def choose_draws(draws, variances, target: float = 0.1) -> int:
     regime = variances < 1.0 if np.any(variances < 1.0) else variances > 0
     scale = np.exp(np.mean(np.log(draws[regime] * variances[regime])))
     return max(1, int(np.ceil(scale / target)))
-
-
-def enough_draws(likelihood: Likelihood, positions, rng, target: float = 0.1) -> int:
-    """N for a variance of log p-hat of at most ``target`` at ``positions`` (A, 3) m."""
-    variances = variance_sweep(likelihood, positions, COUNTS, 200, rng)
-    return choose_draws(COUNTS, variances, target)
 
 
 def acceptance(target: Target, start, step: float, count: int, rng) -> float:

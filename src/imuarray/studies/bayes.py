@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -11,8 +10,10 @@ from imuarray.config import model_from
 from imuarray.estimation import calibrate_bcd
 from imuarray.estimation.selection import disjoint, neighbours
 from imuarray.geometry import Array
+from imuarray.measured.positions import locate
 from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting, normal_motion
+from imuarray.posterior import tuning
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.rate_density import rate_distribution
 from imuarray.posterior.target import CompiledTarget, GaussianPrior
@@ -127,57 +128,35 @@ def mode_of(settings: dict, recording: Recording, accelerometer_sd=None) -> np.n
     return (start if wild else found)[1:].ravel()
 
 
-def starts_for(settings: dict, recording: Recording, names) -> np.ndarray:
-    """Two different starts (2, 3 (A - 1)) m around the prior mean."""
-    rng = stream(settings["seed"], *names, "starts")
-    mean = recording.relative_positions()[1:].ravel()
-    return mean + settings["paper2021"]["start_sd"] * rng.standard_normal((2, mean.size))
-
-
 def tuned_experiment(settings: dict, recording: Recording, names, threads: int = 1):
     """(target, sigma_q, record) of section IV-B: sigma_a enlarged, (30a)/(30b), III-C.
 
-    Where not even the largest N of the sweep brings the variance of log p-hat near its target,
-    as in measured data, omega is drawn around the integrand's mode instead (`centred`);
-    ``record`` says which, and the variance with p(omega | y_g) at the largest N.
+    ``record`` says where omega is drawn from, and the variance with p(omega | y_g) at the largest N
+    of the sweep.
     """
-    from imuarray.posterior import tuning
-
     paper, scale, seed = settings["paper2021"], settings["scale"], settings["seed"]
     assumed = settings["experiment"]["accelerometer_sd"]
-    likelihood = target_for(settings, recording, 1, assumed, spread=True).likelihood
-    counts, mode = paper["sweep_draws"], None
+    target = target_for(settings, recording, 1, assumed, spread=True)
 
-    def sweep(likelihood, positions):
-        return tuning.variance_sweep(
-            likelihood, positions, counts, scale["variance_realisations"] // 4,
-            stream(seed, *names, "variance"), threads,
-        )  # fmt: skip
+    def mode(centred):
+        if centred:
+            return locate(recording, assumed).mean[1:].ravel()
+        return mode_of(settings, recording, assumed)
 
-    variances = sweep(likelihood, recording.relative_positions())
+    swept = paper["sweep_steps"]
+    sweeps = tuning.Sweeps(
+        # the enlarged noise widens the posterior, so the same sweep ten times longer
+        10 * np.geomspace(*(swept[key] for key in ("first", "last", "count"))),
+        paper["sweep_draws"], scale["variance_realisations"] // 4, scale["acceptance_steps"],
+        paper["variance_target"], paper["acceptance_target"],
+    )  # fmt: skip
+    found = tuning.tune(
+        target.likelihood, target.prior, recording.relative_positions(), mode, sweeps,
+        lambda name: stream(seed, *names, name), threads,
+    )  # fmt: skip
     record = {
-        "draws_from": "p(omega | y_g)",
-        "variance_at_most_draws": float(variances[-1]), "most_draws": int(counts[-1]),
-    }  # fmt: skip
-    if variances.min() > 2 * paper["variance_target"]:
-        from imuarray.measured.positions import locate
-
-        mode = locate(recording, assumed).mean
-        record["draws_from"] = "integrand's mode"
-        likelihood = likelihood.centred(mode)
-        variances = sweep(likelihood, mode)
-    draws = tuning.choose_draws(counts, variances, paper["variance_target"])
-    target = replace(target_for(settings, recording, draws, assumed, spread=True),
-                     likelihood=likelihood)  # fmt: skip
-    sweep = paper["sweep_steps"]
-    # the enlarged noise widens the posterior, so the same sweep ten times longer
-    steps = 10 * np.geomspace(*(sweep[key] for key in ("first", "last", "count")))
-    rates = tuning.acceptance_sweep(
-        target,
-        mode_of(settings, recording, assumed) if mode is None else mode[1:].ravel(),
-        steps,
-        scale["acceptance_steps"],
-        stream(seed, *names, "acceptance"),
-        threads,
-    )
-    return target, tuning.choose_step(steps, rates, paper["acceptance_target"]), record
+        "draws_from": "integrand's mode" if found.centred else "p(omega | y_g)",
+        "variance_at_most_draws": float(found.variances[-1]),
+        "most_draws": int(sweeps.draws[-1]),
+    }
+    return found.target, found.step, record

@@ -11,7 +11,7 @@ import pandas as pd
 from imuarray.estimation.bcd import calibrate_bcd
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.information import arms, information
-from imuarray.estimation.newton import descend
+from imuarray.estimation.newton import fisher_scoring
 from imuarray.geometry import Array, sub_array
 from imuarray.linear import scaled_eigh
 from imuarray.model import ArrayModel
@@ -124,7 +124,7 @@ def _one(model, rng, samples, motion, options):
     known = information_at(model, moves, truth, saturated)
     out = []
     for given in (None, prior):
-        found = descend(data, model.array.relative, given, limit=PATIENCE, covariance=False)
+        found = fisher_scoring(data, model.array.relative, given, limit=PATIENCE, covariance=False)
         error = (found.positions - truth)[1:].ravel()
         whole = known if given is None else known + given[1]
         out.append([
@@ -182,7 +182,7 @@ class Paths(NamedTuple):
 def paths(model: ArrayModel, force, rate, saturated, limit: int = BCD_LIMIT) -> Paths:
     """Both methods on the same measurements (T, A, 3) and (T, G, 3)."""
     data = Collapsed.of(model, force, rate, saturated)
-    best = descend(data, model.array.relative)
+    best = fisher_scoring(data, model.array.relative)
     bound = np.sqrt(np.trace(best.covariance) / len(best.covariance))
     if not best.converged:  # data that tell too little: there is no way to go
         return Paths(bound, np.empty(0, int), np.empty(0), np.nan, np.nan)
@@ -195,7 +195,7 @@ def paths(model: ArrayModel, force, rate, saturated, limit: int = BCD_LIMIT) -> 
     near = np.flatnonzero(away <= enough)
     newton = np.nan
     for iteration in range(1, SCORING_LIMIT + 1):
-        tried = descend(data, model.array.relative, limit=iteration, covariance=False)
+        tried = fisher_scoring(data, model.array.relative, limit=iteration, covariance=False)
         if np.sqrt(np.mean((tried.positions - best.positions)[1:] ** 2)) <= enough:
             newton = iteration
             break

@@ -19,7 +19,7 @@ from imuarray.model import ArrayModel
 from imuarray.motion import normal_motion
 from imuarray.posterior.diagnostics import ess_of_mean
 from imuarray.posterior.likelihood import Likelihood
-from imuarray.posterior.target import AutoregressiveTarget, CompiledTarget, GaussianPrior
+from imuarray.posterior.target import CompiledTarget, GaussianPrior, PreconditionedTarget
 from imuarray.simulation import measure
 from imuarray.streams import stream
 from imuarray.studies.truths import misfit
@@ -33,12 +33,13 @@ PRIOR_SD = 2e-3  # m
 MOTION_SD = (15.0, 500.0, 20.0)  # rad/s, rad/s^2, m/s^2; the last is flat to the samplers,
 # who see differences between triads only
 SAMPLES, DRAWS = 2, 5
-STEPS = {"walk": (1.0e-3, 10), "autoregressive": (0.6, 5)}  # length, transitions a round
+# Length, transitions a round; the names are also those of the random streams.
+STEPS = {"walk": (1.0e-3, 10), "autoregressive": (0.6, 5)}
 LEAPS, LEAP = 2, 0.5  # NUTS: transitions a round, step length in prior sds
 NODES = 5
 
 
-class Data(NamedTuple):
+class Round(NamedTuple):
     """A round's measurements, with the motion that made them."""
 
     likelihood: Likelihood
@@ -52,16 +53,16 @@ def problem() -> tuple[ArrayModel, GaussianPrior]:
     return model, GaussianPrior.of(array.parameters, PRIOR_SD)
 
 
-def simulated(model: ArrayModel, theta, rng) -> Data:
+def simulated(model: ArrayModel, theta, rng) -> Round:
     """Motion from its prior, measurements given it and theta (P,)."""
     motion = normal_motion(rng, (SAMPLES,), *MOTION_SD)
     positions = positions_of(theta)
     force, rate, _ = measure(model, motion, positions, rng)
     likelihood = Likelihood.of(model, force, rate, motion_sd=MOTION_SD[:2])
-    return Data(likelihood, np.asarray(motion.angular_rate))
+    return Round(likelihood, np.asarray(motion.angular_rate))
 
 
-def begun(target: CompiledTarget, theta, data: Data, rng) -> float:
+def begun(target: CompiledTarget, theta, data: Round, rng) -> float:
     """log target at theta with draws of omega as they are, given that theta made the data.
 
     One of N draws a sample is the omega that did: fresh ones alone would be of another law than
@@ -82,13 +83,13 @@ def _walk(likelihood: Likelihood, model: ArrayModel, prior: GaussianPrior) -> Co
     return CompiledTarget(likelihood, prior, DRAWS)
 
 
-def _autoregressive(likelihood, model, prior) -> CompiledTarget:
+def _preconditioned(likelihood, model, prior) -> CompiledTarget:
     """Omega drawn around each integrand's mode, at positions that do not hang on theta."""
     centred = likelihood.centred(model.array.relative)
-    return AutoregressiveTarget(centred, prior, DRAWS, prior.mean, np.diag(prior.sd))
+    return PreconditionedTarget(centred, prior, DRAWS, prior.mean, np.diag(prior.sd))
 
 
-TARGETS = {"walk": _walk, "autoregressive": _autoregressive}
+TARGETS = {"walk": _walk, "autoregressive": _preconditioned}
 
 
 def pmmh_rounds(name: str, seed: int, rounds: int) -> Iterator[np.ndarray]:
@@ -143,7 +144,7 @@ def nuts_rounds(name: str, seed: int, rounds: int) -> Iterator[np.ndarray]:
 
 SAMPLERS: dict[str, tuple[str, Callable]] = {
     "walk": ("PmMH, (27)", pmmh_rounds),
-    "autoregressive": ("PmMH, autoregressive, centred", pmmh_rounds),
+    "autoregressive": ("PmMH, pCN, centred", pmmh_rounds),
     "nuts": ("NUTS", nuts_rounds),
 }
 

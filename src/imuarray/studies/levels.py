@@ -11,7 +11,7 @@ from scipy import stats
 from imuarray.geometry import positions_of
 from imuarray.posterior import tuning
 from imuarray.posterior.diagnostics import ess
-from imuarray.posterior.target import AutoregressiveTarget, CompiledTarget
+from imuarray.posterior.target import CompiledTarget, PreconditionedTarget
 from imuarray.streams import stream
 from imuarray.studies.batches import run_batches
 from imuarray.studies.truths import SPARE, Replicate, Setting, misfit, replicate
@@ -25,8 +25,8 @@ ROUNDS, LEARNT = 6, 100  # of a burn-in, draws in each
 FIRST = 100  # transitions between them at least
 TINY = 1e-12
 Found = tuple[np.ndarray, np.ndarray]  # levels (R, P + 2), how many draws are independent (R,)
-WIDER = 1.05  # than the mode's curvature, for autoregressive proposals
-SHORTER = 4.0  # every other stretch of transitions of autoregressive proposals
+WIDER = 1.05  # than the mode's curvature, for preconditioned Crank-Nicolson proposals
+SHORTER = 4.0  # every other stretch of transitions of preconditioned Crank-Nicolson proposals
 
 
 def names_of(setting: Setting) -> list[str]:
@@ -115,31 +115,36 @@ def _walk(setting: Setting, pilot: Replicate, rng):
 
     But N at the mode: here the prior's mean is as far off as the prior says, not a thirtieth of it.
     """
-    draws = tuning.enough_draws(pilot.likelihood, positions_of(pilot.mode), rng)
+    steps = np.sqrt(np.diag(pilot.covariance)).mean() * np.geomspace(1e-3, 3.0, 12)
+    found = tuning.tune(
+        pilot.likelihood, setting.prior, positions_of(pilot.mode), lambda _: pilot.mode,
+        tuning.Sweeps(steps), lambda _: rng, may_centre=False,
+    )  # fmt: skip
 
     def target(one):
-        return CompiledTarget(one.likelihood, setting.prior, draws)
+        return CompiledTarget(one.likelihood, setting.prior, found.target.draws)
 
-    steps = np.sqrt(np.diag(pilot.covariance)).mean() * np.geomspace(1e-3, 3.0, 12)
-    rates = tuning.acceptance_sweep(target(pilot), pilot.mode, steps, 1000, rng)
-    return target, (tuning.choose_step(steps, rates),)
+    return target, (found.step,)
 
 
-def _shaped(setting: Setting, pilot: Replicate, rng):
+def _preconditioned(setting: Setting, pilot: Replicate, rng):
     """The same likelihood, proposals of the posterior's shape.
 
     Omega is drawn as the paper has it: draws around the integrand's mode at one theta are too
     narrow for others as far off as these posteriors are wide, and chains stick.
     """
-    draws = tuning.enough_draws(pilot.likelihood, positions_of(pilot.mode), rng)
 
-    def target(one):
-        factor = WIDER * np.linalg.cholesky(one.covariance)
-        return AutoregressiveTarget(one.likelihood, setting.prior, draws, one.mode, factor)
+    def shape(one):
+        return one.mode, WIDER * np.linalg.cholesky(one.covariance)
 
     lengths = np.geomspace(0.05, 0.99, 10)
-    rates = tuning.acceptance_sweep(target(pilot), pilot.mode, lengths, 1000, rng)
-    best = float(lengths[np.argmax(rates * lengths**2)])
+    tuned, best = tuning.tune_preconditioned(
+        pilot.likelihood, setting.prior, *shape(pilot), lengths, rng
+    )
+
+    def target(one):
+        return PreconditionedTarget(one.likelihood, setting.prior, tuned.draws, *shape(one))
+
     # the tails are not the normal density's: where long steps are refused, short ones are not
     return target, (best, best / SHORTER)
 
@@ -175,8 +180,8 @@ def _pmmh(kernel: Callable, name: str):
 def _learnt(target, theta, lengths, spacing: int, rng):
     """(target, log target) after a burn-in that moves ``theta`` in place.
 
-    Autoregressive proposals learn centre and shape in it, and keep them from then on: where data
-    tell little the posterior's mass is some sds from its mode.
+    Preconditioned Crank-Nicolson proposals learn centre and shape in it, and keep them from then
+    on: where data tell little the posterior's mass is some sds from its mode.
     """
     value = target.log_target(theta, rng)
     for _ in range(ROUNDS):
@@ -184,12 +189,12 @@ def _learnt(target, theta, lengths, spacing: int, rng):
         for row in kept:
             value = _moved(target, theta, value, lengths, spacing, rng)
             row[:] = theta
-        if isinstance(target, AutoregressiveTarget):
+        if isinstance(target, PreconditionedTarget):
             target = _reshaped(target, kept[LEARNT // 4 :])
     return target, value
 
 
-def _reshaped(target: AutoregressiveTarget, kept) -> AutoregressiveTarget:
+def _reshaped(target: PreconditionedTarget, kept) -> PreconditionedTarget:
     """Around what was seen; the shape's prior weighs as much as a draw for each coordinate."""
     centre, (count, size) = kept.mean(axis=0), kept.shape
     seen, before = np.cov(kept.T), target.factor @ target.factor.T / WIDER**2
@@ -223,6 +228,6 @@ def _thinning(target, start, lengths, rng) -> int:
 METHODS: dict[str, Callable] = {
     "ML": ml,
     "PmMH": _pmmh(_walk, "walk"),
-    "PmMH, autoregressive": _pmmh(_shaped, "autoregressive"),
+    "PmMH, pCN": _pmmh(_preconditioned, "autoregressive"),  # the random stream's name
     "NUTS": nuts,
 }

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from imuarray.estimation.bcd import descend
-from imuarray.estimation.collapsed import Collapsed, tables
+from imuarray.estimation.bcd import block_descent
+from imuarray.estimation.collapsed import Collapsed
 from imuarray.model import ArrayModel
 from imuarray.motion import sphere_motion
 from imuarray.simulation import measure
@@ -38,12 +38,10 @@ def calibrate_batch(model, rng, count, samples, motion, position_sd, rail, limit
     for i in range(count):
         data = Collapsed.of(model, force[i], rate[i], saturated[i])
         positions = array.relative.copy()
-        snapshots = np.empty((len(marks), *positions.shape))
-        iterations[i], status[i] = descend(
-            data.specific_force, data.energy, data.base, data.mean,
-            data.gyroscope_information, data.weights, *tables(), positions,
-            tolerance, 0.0, limit, marks, snapshots, np.empty(limit), np.empty(limit),
-        )  # fmt: skip
+        status[i], cost, _, snapshots = block_descent(
+            data.arrays, positions, tolerance, 0.0, limit, marks
+        )
+        iterations[i] = len(cost)
         if status[i] >= 0:
             squares[i] = np.mean((snapshots - truth[i])[:, 1:] ** 2, axis=(1, 2))
     return squares, iterations, status

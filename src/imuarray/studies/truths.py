@@ -8,7 +8,7 @@ import numpy as np
 
 from imuarray.config import model_from
 from imuarray.errors import IdentifiabilityError
-from imuarray.estimation.newton import descend
+from imuarray.estimation.newton import fisher_scoring
 from imuarray.geometry import positions_of, sub_array
 from imuarray.model import ArrayModel
 from imuarray.motion import normal_motion
@@ -99,7 +99,7 @@ def replicate(setting: Setting, number: int) -> Replicate:
 def _descended(data, start, prior: GaussianPrior):
     """The mode found from ``start`` (P,), or None where the search ran to positions all in line."""
     try:
-        return descend(data, positions_of(start), (prior.mean, np.diag(prior.sd**-2.0)))
+        return fisher_scoring(data, positions_of(start), (prior.mean, np.diag(prior.sd**-2.0)))
     except IdentifiabilityError:
         return None
 
@@ -107,7 +107,7 @@ def _descended(data, start, prior: GaussianPrior):
 def _without_prior(likelihood: Likelihood, start):
     """(most likely positions (P,), their covariance, converged); NaN where data do not tell."""
     try:
-        found = descend(likelihood.collapsed, start)
+        found = fisher_scoring(likelihood.collapsed, start)
     except IdentifiabilityError:
         size = start[1:].size
         return np.full(size, np.nan), np.full((size, size), np.nan), False
