@@ -22,7 +22,9 @@ def differences(one: Path, other: Path) -> list[str]:
 
 
 def _files(root: Path) -> list[str]:
+    # of what a killed process was writing, a hidden folder is left
     paths = [path.relative_to(root) for path in root.rglob("*") if path.is_file()]
+    paths = [p for p in paths if not any(part.startswith(".") for part in p.parts[:-1])]
     return sorted(str(p) for p in paths if not set(p.parts) & set(TIMED) and CLOCKED not in p.stem)
 
 

@@ -11,7 +11,7 @@ import io
 import json
 import os
 import platform
-import secrets
+import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib import metadata
@@ -62,34 +62,18 @@ def digest(*objects: Any) -> str:
     difference; 1 and 1.0 do, as do the types of two arrays. Raises TypeError for anything else,
     since the text of an arbitrary object may hold its address.
     """
-    state = hashlib.sha256()
-    _feed(state, list(objects))
-    return state.hexdigest()
+    text = json.dumps(objects, default=_fingerprint, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _feed(state: Any, value: Any) -> None:
-    """Add one value to the hash, each with its type and length so that no two nestings agree."""
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, Mapping):
-        items = sorted(value.items(), key=lambda item: (type(item[0]).__name__, item[0]))
-        state.update(f"dict {len(items)};".encode())
-        for pair in items:
-            _feed(state, pair)
-    elif isinstance(value, list | tuple):
-        state.update(f"list {len(value)};".encode())
-        for item in value:
-            _feed(state, item)
-    elif isinstance(value, np.ndarray) and value.dtype.kind in "biufcUS":
+def _fingerprint(value: Any) -> Any:
+    """What JSON does not know, as it does; of an array type, shape and SHA-256."""
+    if isinstance(value, np.ndarray) and value.dtype.kind in "biufcUS":
         array = np.ascontiguousarray(value.astype(value.dtype.newbyteorder("<"), copy=False))
-        state.update(f"array {array.dtype.str} {value.shape};".encode())
-        state.update(array.tobytes())
-    elif value is None or isinstance(value, bool | int | float | complex | str | Path):
-        text = str(value) if isinstance(value, Path) else value
-        body = repr(text).encode()
-        state.update(f"{type(text).__name__} {len(body)};".encode() + body)
-    else:
-        raise TypeError(f"digest: no stable bytes for an object of type {type(value).__name__}")
+        return {"array": [array.dtype.str, value.shape, hashlib.sha256(array.data).hexdigest()]}
+    if isinstance(value, np.generic | Path):
+        return _plain(value)
+    raise TypeError(f"digest: no stable bytes for an object of type {type(value).__name__}")
 
 
 def code_digest() -> str:
@@ -133,51 +117,26 @@ def _json(value: Any, **options: Any) -> str:
 
 @contextmanager
 def atomic_write(path: str | Path) -> Iterator[Path]:
-    """Give a temporary path beside `path`; it becomes `path` if the block ends without an error.
+    """Give a temporary path, which becomes `path` if the block ends without an error.
 
-    A reader sees the old file or the new one, never a part; a failure leaves nothing behind.
+    It is in a folder beside `path`. A reader sees the old file or the new one, never a part; a
+    failure leaves nothing behind, a process that is killed the hidden folder.
+
     Raises FileNotFoundError if the folder does not exist; an OSError in the block, such as that
     of a full disk, names ``path``.
     """
     path = Path(path)
     if not path.parent.is_dir():
         raise FileNotFoundError(errno.ENOENT, "the output's folder does not exist", str(path))
-    own = f".{path.stem}.{platform.node()}-"
-    _sweep(path.parent, own)
-    # the ending stays last: some writers choose the format by it
-    temporary = path.with_name(f"{own}{os.getpid()}-{secrets.token_hex(4)}{path.suffix}")
     try:
-        yield temporary
-        os.replace(temporary, path)
+        with tempfile.TemporaryDirectory(prefix=f".{path.stem}.", dir=path.parent) as folder:
+            # the same name: some writers choose the format by its ending
+            yield Path(folder, path.name)
+            os.replace(Path(folder, path.name), path)
     except OSError as error:
         if error.errno is None:
             raise
         raise OSError(error.errno, os.strerror(error.errno), str(path)) from error
-    finally:
-        # after a success there is nothing left to delete
-        temporary.unlink(missing_ok=True)
-
-
-def _sweep(folder: Path, own: str) -> None:
-    """Remove the temporary files of this machine's processes that were killed."""
-    for left in folder.iterdir():
-        if not left.name.startswith(own):
-            continue
-        process = left.name.removeprefix(own).partition("-")[0]
-        if process.isdigit() and not _runs(int(process)):
-            left.unlink(missing_ok=True)
-
-
-def _runs(process: int) -> bool:
-    if os.name != "posix":  # signal 0 is another thing there
-        return True
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:  # another user's
-        return True
-    return True
 
 
 def write_json(value: Any, path: str | Path) -> None:
@@ -231,10 +190,5 @@ def is_damaged(path: str | Path) -> bool:
     found = seal_of(path)
     if found is None:
         return False
-    state, left = hashlib.sha256(), os.path.getsize(path) - len(SEAL) - len(found)
-    with open(path, "rb") as handle:
-        while left:
-            piece = handle.read(min(left, 1 << 20))
-            state.update(piece)
-            left -= len(piece)
-    return found != state.digest()
+    content = Path(path).read_bytes()[: -len(SEAL) - len(found)]
+    return hashlib.sha256(content).digest() != found

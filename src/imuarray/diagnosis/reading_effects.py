@@ -12,7 +12,7 @@ from scipy.stats import poisson
 from imuarray.diagnosis.linearise import polynomial_derivative
 from imuarray.diagnosis.readings import Readings
 from imuarray.model.effects import KINDS
-from imuarray.recording.validate import AXES
+from imuarray.recording.record import AXES
 
 LEFT_OUT = ("stale_samples", "saturation")  # their readings; exchanged axes are turned back
 LEAST_REPEATS = 1

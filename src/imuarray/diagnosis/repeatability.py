@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from imuarray.measured.positions import agreement, pairwise
-from imuarray.recording.validate import AXES
+from imuarray.recording.record import AXES
 
 MODELS = ("base", "inflated", "extended")
 

@@ -8,7 +8,7 @@ import xarray as xr
 from imuarray.firstorder.correct import FirstOrder, correct
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording, write_recording
-from imuarray.recording.validate import FIRST_ORDER
+from imuarray.recording.record import FIRST_ORDER
 
 
 def write_corrected(recording: Recording, found: FirstOrder, path) -> None:

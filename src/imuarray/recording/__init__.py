@@ -1,14 +1,13 @@
 """Recordings of an array: NetCDF-4 files, read with validation."""
 
 from imuarray.recording.format import (
-    Recording,
-    array_of,
     has_truth,
     load_dataset,
     read_recording,
     read_truth,
     write_recording,
 )
+from imuarray.recording.record import Recording, array_of
 
 __all__ = [
     "Recording",

@@ -9,8 +9,8 @@ import numpy as np
 
 from imuarray.errors import InputError
 from imuarray.geometry.mimu4444 import UNDERSIDE_ROTATION
-from imuarray.recording.format import Recording
 from imuarray.recording.mimu import MimuStream
+from imuarray.recording.record import Recording
 
 GRAVITY = 9.80665  # m/s^2, the unit g of the data sheet
 COUNTS_PER_G = 2048.0

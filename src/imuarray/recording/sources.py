@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from imuarray.errors import InputError
-from imuarray.recording.format import Recording, read_recording
+from imuarray.recording.format import read_recording
 from imuarray.recording.published import SOURCES, fetch
+from imuarray.recording.record import Recording
 
 
 def locate_source(entry: dict, folder: str | Path) -> dict[str, str]:

@@ -11,8 +11,8 @@ import pandas as pd
 import yaml
 
 from imuarray.errors import InputError
-from imuarray.recording.format import Recording
 from imuarray.recording.mimu_recording import GRAVITY
+from imuarray.recording.record import Recording
 
 UNITS = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},

@@ -1,4 +1,4 @@
-"""What makes a file a recording: names, dimensions, units, values; the one place that knows them.
+"""What makes a file a recording: names, dimensions, units, values.
 
 Every error says what was expected, what was found and where.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections import Counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import h5py
 import numpy as np
@@ -16,55 +16,16 @@ import xarray as xr
 
 from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.geometry.array import require_planar_extent
-
-if TYPE_CHECKING:
-    from imuarray.recording.format import Recording
-
-AXES = ("x", "y", "z")
-
-# Group with what a simulated recording was made from.
-TRUTH = "truth"
-
-# Group with the per-triad calibration that a corrected recording went through.
-FIRST_ORDER = "first_order"
-
-DIMENSIONS = {
-    "time": ("time",),
-    "specific_force": ("time", "accelerometer", "axis"),
-    "angular_rate": ("time", "gyroscope", "axis"),
-    "accelerometer_position": ("accelerometer", "axis"),
-    "stationary": ("time",),
-    "specific_force_saturated": ("time", "accelerometer", "axis"),
-    "angular_rate_saturated": ("time", "gyroscope", "axis"),
-}
-
-# Optional variables that are true or false.
-FLAGS = ("stationary", "specific_force_saturated", "angular_rate_saturated")
-
-# Accepted values of the attribute `units`; the first is written, and is SI.
-UNITS = {
-    "time": ("s",),
-    "specific_force": ("m s-2",),
-    "angular_rate": ("rad s-1", "deg s-1"),
-    "accelerometer_position": ("m",),
-}
-
-LABELS = ("accelerometer", "gyroscope")
-
-# Attributes that are positive numbers, and their units.
-NUMBERS = {
-    "accelerometer_noise_sd": "m s-2",
-    "gyroscope_noise_sd": "rad s-1",
-    "accelerometer_range": "m s-2",
-    "gyroscope_range": "rad s-1",
-    "position_prior_sd": "m",
-}
-
-# A simulated sensor need not have a rail.
-MAY_BE_INFINITE = ("accelerometer_range", "gyroscope_range")
-
-# Optional attributes that are text.
-TEXTS = ("title", "source", "license", "selected")
+from imuarray.recording.record import (
+    AXES,
+    DIMENSIONS,
+    FLAGS,
+    LABELS,
+    MAY_BE_INFINITE,
+    NUMBERS,
+    UNITS,
+    Recording,
+)
 
 # 1.6 GB as float64. A file of a few bytes can declare far more than any memory holds.
 MAX_VALUES = 200_000_000

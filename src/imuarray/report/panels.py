@@ -13,7 +13,7 @@ from imuarray.diagnosis.scores import robust_inverse
 from imuarray.model.effects import KINDS
 from imuarray.model.names import component
 from imuarray.model.timing import clock_turns
-from imuarray.recording.validate import AXES
+from imuarray.recording.record import AXES
 from imuarray.report.signals import BINS, Signal, binned, signal_of
 
 if TYPE_CHECKING:

@@ -1,0 +1,82 @@
+"""An array from a file or a configuration, checked."""
+
+from __future__ import annotations
+
+import csv
+
+import numpy as np
+
+from imuarray.errors import IdentifiabilityError, InputError
+from imuarray.geometry.array import Array, require_planar_extent
+from imuarray.geometry.mimu4444 import mimu4444, mimu4444_corners
+
+
+def array_from_csv(path: str, gyroscopes: int | None = None) -> Array:
+    """Read positions in metres from a CSV file with a header ``label,x,y,z``.
+
+    Raises InputError for a missing file, a wrong header, or a field that is no finite number.
+    """
+    try:
+        with open(path, newline="", encoding="utf-8") as handle:
+            rows = [[cell.strip() for cell in row] for row in csv.reader(handle) if row]
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: expected a readable CSV file of positions: {error}") from None
+    if not rows or [cell.lower() for cell in rows[0]] != ["label", "x", "y", "z"]:
+        raise InputError(f"{path}: expected the header label,x,y,z, found {rows[:1]}")
+    labels, values = [], []
+    for number, row in enumerate(rows[1:], start=2):
+        try:
+            values.append([float(cell) for cell in row[1:4]])
+            if len(row) != 4 or not np.all(np.isfinite(values[-1])):
+                raise ValueError
+        except ValueError:
+            raise InputError(
+                f"{path}:{number}: expected label,x,y,z in metres, found {row}"
+            ) from None
+        labels.append(row[0])
+    return _checked(np.array(values).reshape(-1, 3), labels, gyroscopes, path)
+
+
+def array_from_config(section: dict) -> Array:
+    """Build the array that a config's ``array`` section names.
+
+    ``board``: ``mimu4444`` or ``mimu4444_corners``; or ``file``: a CSV of positions;
+    or ``positions``: a list of [x, y, z] in metres. ``gyroscopes`` defaults to A.
+    """
+    count = section.get("gyroscopes")
+    boards = {"mimu4444": mimu4444, "mimu4444_corners": mimu4444_corners}
+    if "positions" in section:
+        try:
+            values = np.asarray(section["positions"], float)
+        except (TypeError, ValueError):
+            raise InputError(
+                f"array.positions: expected rows of three numbers, found {section['positions']}"
+            ) from None
+        labels = [str(k + 1) for k in range(len(values))]
+        return _checked(values, section.get("labels", labels), count, "array.positions")
+    if "file" in section:
+        return array_from_csv(section["file"], count)
+    if section.get("board") not in boards:
+        raise InputError(
+            f"array: expected board ({', '.join(boards)}), file or positions, found {section}"
+        )
+    board = boards[section["board"]]()
+    checked = _checked(board.positions, board.labels, count, board.name)
+    return board if count is None else checked
+
+
+def _checked(values, labels, gyroscopes, where) -> Array:
+    if values.ndim != 2 or values.shape[1] != 3:
+        raise InputError(f"{where}: expected rows of x, y, z, found shape {values.shape}")
+    if not np.all(np.isfinite(values)):
+        row = int(np.argwhere(~np.isfinite(values))[0, 0]) + 1
+        raise InputError(
+            f"{where}: expected finite positions, found {values[row - 1]} in row {row}"
+        )
+    if len(set(labels)) != len(values):
+        raise InputError(f"{where}: expected {len(values)} different labels, found {list(labels)}")
+    require_planar_extent(values, where)
+    count = len(values) if gyroscopes is None else int(gyroscopes)
+    if count < 1:
+        raise IdentifiabilityError(f"{where}: expected at least 1 gyroscope triad, found {count}")
+    return Array(values, tuple(str(x) for x in labels), count, name=str(where))

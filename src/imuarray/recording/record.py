@@ -1,0 +1,162 @@
+"""A recording in memory, in SI units, and the names, dimensions and units of its file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from imuarray.errors import InputError
+from imuarray.geometry import Array
+
+AXES = ("x", "y", "z")
+
+# Group with what a simulated recording was made from.
+TRUTH = "truth"
+
+# Group with the per-triad calibration that a corrected recording went through.
+FIRST_ORDER = "first_order"
+
+DIMENSIONS = {
+    "time": ("time",),
+    "specific_force": ("time", "accelerometer", "axis"),
+    "angular_rate": ("time", "gyroscope", "axis"),
+    "accelerometer_position": ("accelerometer", "axis"),
+    "stationary": ("time",),
+    "specific_force_saturated": ("time", "accelerometer", "axis"),
+    "angular_rate_saturated": ("time", "gyroscope", "axis"),
+}
+
+# Optional variables that are true or false.
+FLAGS = ("stationary", "specific_force_saturated", "angular_rate_saturated")
+
+# Accepted values of the attribute `units`; the first is written, and is SI.
+UNITS = {
+    "time": ("s",),
+    "specific_force": ("m s-2",),
+    "angular_rate": ("rad s-1", "deg s-1"),
+    "accelerometer_position": ("m",),
+}
+
+LABELS = ("accelerometer", "gyroscope")
+
+# Attributes that are positive numbers, and their units.
+NUMBERS = {
+    "accelerometer_noise_sd": "m s-2",
+    "gyroscope_noise_sd": "rad s-1",
+    "accelerometer_range": "m s-2",
+    "gyroscope_range": "rad s-1",
+    "position_prior_sd": "m",
+}
+
+# A simulated sensor need not have a rail.
+MAY_BE_INFINITE = ("accelerometer_range", "gyroscope_range")
+
+# Optional attributes that are text.
+TEXTS = ("title", "source", "license", "selected")
+
+# A rail is a count; turning counts into SI units and back may cost the last digits.
+_RAIL_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What the triads of one rigid array measured, in one array frame.
+
+    Attributes
+    ----------
+    time : ndarray (T,), seconds, strictly increasing
+    specific_force : ndarray (T, A, 3), m/s^2
+    angular_rate : ndarray (T, G, 3), rad/s
+    accelerometer_position : ndarray (A, 3), metres
+        Nominal; the first triad is the reference.
+    accelerometer_labels, gyroscope_labels : tuples of A and of G str
+    accelerometer_noise_sd : float, m/s^2
+    gyroscope_noise_sd : float, rad/s
+    accelerometer_range : float, m/s^2, may be infinite
+    gyroscope_range : float, rad/s, may be infinite
+    position_prior_sd : float, metres
+    stationary : ndarray (T,) bool, or None
+        Still poses.
+    specific_force_saturated, angular_rate_saturated : ndarray (T, A or G, 3) bool, or None
+        Readings at a rail, where a correction moved them off the range (first-order calibration).
+    title, source, license : str, empty if not known
+    selected : str
+        How many samples of how many, where these are not all that were recorded; else empty.
+    """
+
+    time: np.ndarray
+    specific_force: np.ndarray
+    angular_rate: np.ndarray
+    accelerometer_position: np.ndarray
+    accelerometer_labels: tuple[str, ...]
+    gyroscope_labels: tuple[str, ...]
+    accelerometer_noise_sd: float
+    gyroscope_noise_sd: float
+    accelerometer_range: float
+    gyroscope_range: float
+    position_prior_sd: float
+    stationary: np.ndarray | None = None
+    specific_force_saturated: np.ndarray | None = None
+    angular_rate_saturated: np.ndarray | None = None
+    title: str = ""
+    source: str = ""
+    license: str = ""
+    selected: str = ""
+
+    def to_dataset(self) -> xr.Dataset:
+        """The recording as the file holds it, rates in rad/s; InputError for shapes at odds."""
+        variables = {
+            name: (DIMENSIONS[name], np.asarray(getattr(self, name), float), {"units": units[0]})
+            for name, units in UNITS.items()
+        }
+        for name in FLAGS:
+            if getattr(self, name) is not None:
+                variables[name] = (DIMENSIONS[name], np.asarray(getattr(self, name), bool))
+        coordinates = {
+            "time": variables.pop("time"),
+            "accelerometer": ("accelerometer", np.array(self.accelerometer_labels, object)),
+            "gyroscope": ("gyroscope", np.array(self.gyroscope_labels, object)),
+            "axis": ("axis", np.array(AXES, object)),
+        }
+        attributes = {name: float(getattr(self, name)) for name in NUMBERS}
+        attributes |= {name: getattr(self, name) for name in TEXTS if getattr(self, name)}
+        try:
+            return xr.Dataset(variables, coordinates, attributes)
+        except ValueError as error:
+            raise InputError(f"recording: expected arrays of matching shapes, {error}") from error
+
+    def relative_positions(self) -> np.ndarray:
+        """Nominal positions relative to the reference triad, (A, 3) metres; row 0 is zero."""
+        return self.accelerometer_position - self.accelerometer_position[0]
+
+    def saturated_gyroscopes(self) -> np.ndarray:
+        """Which rates are at the gyroscopes' rail, (T, G, 3) bool."""
+        if self.angular_rate_saturated is not None:
+            return self.angular_rate_saturated
+        return np.abs(self.angular_rate) >= self.gyroscope_range * (1 - _RAIL_TOLERANCE)
+
+    def saturated_accelerometers(self) -> np.ndarray:
+        """Which specific forces are at the accelerometers' rail, (T, A, 3) bool."""
+        if self.specific_force_saturated is not None:
+            return self.specific_force_saturated
+        return np.abs(self.specific_force) >= self.accelerometer_range * (1 - _RAIL_TOLERANCE)
+
+    def select(self, index: Any) -> Recording:
+        """The samples that `index` picks: a slice, a (T,) mask or an array of time indices."""
+        names = ("time", "specific_force", "angular_rate", *FLAGS)
+        parts = {name: getattr(self, name) for name in names}
+        left = {n: x[index] for n, x in parts.items() if x is not None}
+        whole = self.selected.partition(" of ")[2] or f"{len(self.time)} samples"
+        said = f"{len(left['time'])} of {whole}"
+        unchanged = len(left["time"]) == len(self.time)
+        return replace(self, **left, selected=self.selected if unchanged else said)
+
+
+def array_of(recording: Recording, gyroscopes: int | None = None) -> Array:
+    """The geometry a recording declares, with its own or another number of gyroscope triads."""
+    count = recording.angular_rate.shape[1] if gyroscopes is None else gyroscopes
+    labels = recording.accelerometer_labels
+    return Array(recording.accelerometer_position, labels, count, "recording")
