@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from imuarray.commands.argument_types import InputFile
 from imuarray.commands.parser import make_parser
 from imuarray.errors import InputError
 
@@ -72,7 +73,7 @@ def _warnings_in_one_line() -> Iterator[None]:
 def _check_output(arguments: argparse.Namespace) -> None:
     """Refuse an output that cannot be written now, not after an hour of sampling."""
     out: Path = arguments.out
-    _require_writable("--out", out, getattr(arguments, "folder", False))
+    _require_writable("--out", out, arguments.folder)
     figure: Path | None = getattr(arguments, "figure", None)
     if figure is not None:
         _require_writable("--figure", figure)
@@ -122,23 +123,10 @@ def _read_effects(arguments: argparse.Namespace) -> None:
         )
 
 
-def _inputs(arguments: argparse.Namespace) -> list[Path]:
+def _inputs(arguments: argparse.Namespace) -> list[InputFile]:
     """The files a command reads."""
-    found = []
-    for name in (
-        "config",
-        "data",
-        "positions",
-        "columns",
-        "diagnosis",
-        "effect_file",
-        "calibration",
-        "recording",
-        "recordings",
-    ):
-        value = getattr(arguments, name, None)
-        found += value if isinstance(value, list) else [value] if value is not None else []
-    return found
+    values = (value if isinstance(value, list) else [value] for value in vars(arguments).values())
+    return [item for each in values for item in each if isinstance(item, InputFile)]
 
 
 if __name__ == "__main__":

@@ -1,6 +1,11 @@
 """What a command line's texts become; each refuses a wrong one with what was expected."""
 
 import argparse
+from pathlib import Path
+
+
+class InputFile(type(Path())):  # type: ignore[misc]
+    """A file that a command reads."""
 
 
 def effects(text: str) -> tuple[str, ...]:

@@ -1,20 +1,207 @@
 """The command line's parser: commands, options and their help; nothing heavy loads here."""
 
 import argparse
+from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
+from typing import Any, NamedTuple, NoReturn
 
 import imuarray
 from imuarray.analysis import methods
-from imuarray.commands.argument_types import count, effects, positive, seed
-from imuarray.commands.options import (
-    Parser,
-    add_command,
-    add_effect_file,
-    add_effects,
-    add_model,
-    add_recording,
-    later,
+from imuarray.commands.argument_types import InputFile, count, effects, positive, seed
+from imuarray.errors import InputError
+
+
+class Option(NamedTuple):
+    """What argparse's ``add_argument`` is called with."""
+
+    name: str
+    given: dict[str, Any]
+
+
+def _option(name: str, help: str, **given: Any) -> Option:
+    return Option(name, {"help": help, **given})
+
+
+def _number(name: str, metavar: str, help: str, default: Any = None, type=positive) -> Option:
+    return _option(name, help, metavar=metavar, default=default, type=type)
+
+
+def _file(name: str, help: str, type=InputFile, **given: Any) -> Option:
+    return _option(name, help, metavar="FILE", type=type, **given)
+
+
+RECORDING = _option("recording", "NetCDF-4 recording to read", type=InputFile)
+SEED = _number("--seed", "S", "of the random numbers (default: 0)", 0, seed)
+NOISE = _number(
+    "--accelerometer-noise", "SD", "assumed sd, m/s^2 (default: as the recording declares)"
 )
+EFFECT_FILE = _file(
+    "--effect-file", "Python file with effects of your own, which is run: they join the catalogue;"
+    " may be given again", action="append",
+)  # fmt: skip
+EFFECTS = (
+    EFFECT_FILE,
+    _option(
+        "--effects", "effects that extend the measurement model, separated by commas (default:"
+        " none)", type=effects, default=(), metavar="A,B",
+    ),
+    _file("--diagnosis", "diagnosis.json whose extended model to use: its effects, their values,"
+          " its noise"),
+)  # fmt: skip
+
+
+class Command(NamedTuple):
+    """One command; ``run`` is its function's place in `imuarray.commands`."""
+
+    name: str
+    run: str
+    summary: str
+    example: str
+    out: str
+    options: tuple[Option, ...]
+    folder: bool = False
+
+
+COMMANDS = (
+    Command(
+        "simulate", "simulate.simulate",
+        "Simulate a recording; its truth is stored in the group 'truth'.",
+        "--config config.yaml --out rec.nc", "recording to write (NetCDF-4)",
+        (_file("--config", "configuration (YAML)", required=True), *EFFECTS),
+    ),
+    Command(
+        "convert mimu", "convert.convert_mimu",
+        "Read the packets of a MIMU board; damage is located and counted.",
+        "data.bin --positions IMU_positions.csv --out rec.nc", "recording to write (NetCDF-4)",
+        (
+            _option("data", "binary file of packets", type=InputFile),
+            _file("--positions", "CSV of nominal positions in m: header 'axes, IMU 1, ...', rows x,"
+                  " y, z", required=True),
+            _option("--underside", "IMUs turned over (default: the even-numbered ones)",
+                    metavar="2,4"),
+            _number("--accelerometer-noise", "SD", "sd of one reading, m/s^2 (default: 0.04)",
+                    0.04),
+            _number("--gyroscope-noise-dps", "SD", "sd of one reading, deg/s (default: 0.06)",
+                    0.06),
+            _number("--position-prior", "SD", "sd of the nominal positions, m (default: 0.003)",
+                    3e-3),
+        ),
+    ),
+    Command(
+        "convert csv", "convert.convert_csv",
+        "Read a table; a small YAML names its columns and units (docs/convert.md).",
+        "log.csv --columns columns.yaml --out rec.nc", "recording to write (NetCDF-4)",
+        (
+            _option("data", "CSV file with a header", type=InputFile),
+            _file("--columns", "YAML: columns, units, positions", required=True),
+        ),
+    ),
+    Command(
+        "first-order", "measured.first_order",
+        "Calibrate each triad by itself from the recording's still poses, and correct it.",
+        "rec.nc --gravity 9.818 --out corrected.nc",
+        "corrected recording to write (NetCDF-4), with the calibration in group 'first_order'",
+        (
+            RECORDING,
+            _number("--gravity", "G", "magnitude of gravity where it was recorded, m/s^2 (default:"
+                    " 9.80665)", 9.80665),
+        ),
+    ),
+    Command(
+        "select", "measured.select",
+        "Keep moving, unsaturated, informative samples; says what each criterion removed.",
+        "corrected.nc --samples 500 --out subset.nc", "recording to write (NetCDF-4)",
+        (
+            RECORDING,
+            _number("--samples", "T", "how many, spread evenly (default: all informative ones)",
+                    type=count),
+        ),
+    ),
+    Command(
+        "calibrate", "calibrate.calibrate",
+        "Estimate the accelerometer positions and the motion by maximum likelihood.",
+        "rec.nc --method bcd --out cal.nc", "estimates to write (NetCDF-4)",
+        (
+            RECORDING, NOISE, *EFFECTS,
+            _option("--method", "bcd: block coordinate descent (default); gauss-newton: any"
+                    " effects, fewer iterations", choices=methods.CALIBRATION, default="bcd"),
+        ),
+    ),
+    Command(
+        "apply", "apply.apply",
+        "The calibrated array as one sensor: angular rate, angular acceleration and specific force"
+        " at each sample, with covariances.",
+        "cal.nc rec.nc --out motion.nc", "motion to write (NetCDF-4)",
+        (
+            _option("calibration", "what `imuarray calibrate` has written, or the diagnosis.json"
+                    " of `imuarray diagnose`", type=InputFile),
+            RECORDING, EFFECT_FILE, NOISE,
+        ),
+    ),
+    Command(
+        "sample", "sample.sample",
+        "Sample the posterior distribution of the accelerometer positions.",
+        "rec.nc --method pmmh --steps 5000 --seed 1 --out posterior.nc",
+        "posterior to write (NetCDF-4)",
+        (
+            RECORDING, NOISE, *EFFECTS,
+            _option("--method", "pmmh: pseudo-marginal Metropolis-Hastings, as paper 2021"
+                    " (default); nuts: the no-U-turn sampler on the exact marginal likelihood, in"
+                    " seconds", choices=methods.SAMPLING, default="pmmh"),
+            _option("--rates", "p(omega | y_g) from the declared gyroscope noise (default), or"
+                    " from the spread among the gyroscopes of each sample, as paper 2021 does with"
+                    " measured data (30)", choices=methods.RATES, default="declared"),
+            _number("--steps", "N", "steps of each chain", type=count),
+            SEED,
+        ),
+    ),
+    Command(
+        "residuals", "measured.residuals",
+        "Residuals of the papers' model beside those of the recording's own simulation.",
+        "corrected.nc --figure residuals.png --out residuals.csv", "table to write (CSV)",
+        (RECORDING, _file("--figure", "figure to write (PNG or PDF)", type=Path), SEED),
+    ),
+    Command(
+        "repeat", "measured.repeat",
+        "Do several recordings of one board agree within their claimed widths?",
+        "one.nc two.nc three.nc --samples 500 --out agreement.csv",
+        "table to write (CSV): z-scores of all pairs",
+        (
+            _option("recordings", "two or more recordings", type=InputFile, nargs="+",
+                    metavar="recording"),
+            _number("--samples", "T", "of each recording (default: 500)", 500, count),
+            _number("--accelerometer-noise", "SD", "assumed sd, m/s^2 (default: estimated from"
+                    " each recording's residual)"),
+        ),
+    ),
+    Command(
+        "diagnose", "diagnose.diagnose",
+        "What does the simulation get wrong, why, and what does the extended model gain?",
+        "corrected.nc --out diagnosis/", "folder to write: diagnosis.json, report.html, figures",
+        (
+            RECORDING, EFFECT_FILE,
+            _option("--without", "effects to strike from the catalogue, separated by commas"
+                    " (default: none)", type=effects, default=(), metavar="A,B"),
+            SEED,
+        ),
+        folder=True,
+    ),
+)  # fmt: skip
+
+
+class Parser(argparse.ArgumentParser):
+    """Reports a wrong command line as one line, like every other wrong input."""
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{message} (see '{self.prog} --help')")
+
+    def parse_known_args(self, args=None, namespace=None):
+        """A subcommand refuses what it does not know itself, so its own help is named."""
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return found, unknown
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -27,246 +214,44 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"imuarray {imuarray.__version__}")
     commands = parser.add_subparsers(dest="command", metavar="command", required=True)
-    _add_simulate(commands)
-    _add_convert(commands)
-    _add_first_order(commands)
-    _add_select(commands)
-    _add_calibrate(commands)
-    _add_apply(commands)
-    _add_sample(commands)
-    _add_residuals(commands)
-    _add_repeat(commands)
-    _add_diagnose(commands)
+    kinds = None
+    for command in COMMANDS:
+        name, _, kind = command.name.partition(" ")
+        if kind and kinds is None:
+            kinds = _add_convert(commands)
+        _add(kinds if kind else commands, kind or name, command)
     return parser
 
 
-def _add_simulate(commands) -> None:
-    parser = add_command(
-        commands,
-        "simulate",
-        later("simulate", "simulate"),
-        "Simulate a recording; its truth is stored in the group 'truth'.",
-        "--config config.yaml --out rec.nc",
-        "recording to write (NetCDF-4)",
-    )
-    parser.add_argument(
-        "--config", required=True, type=Path, metavar="FILE", help="configuration (YAML)"
-    )
-    add_effects(parser)
-
-
-def _add_convert(commands) -> None:
+def _add_convert(commands):
     summary = "Turn a logger's file into a recording."
-    kinds = commands.add_parser(
-        "convert",
-        help=summary,
-        description=summary,
+    parser = commands.add_parser(
+        "convert", help=summary, description=summary,
         epilog="example: imuarray convert csv log.csv --columns columns.yaml --out rec.nc",
-    ).add_subparsers(dest="kind", metavar="format", required=True)
-    _add_convert_mimu(kinds)
-    _add_convert_csv(kinds)
-
-
-def _add_convert_mimu(kinds) -> None:
-    parser = add_command(
-        kinds,
-        "mimu",
-        later("convert", "convert_mimu"),
-        "Read the packets of a MIMU board; damage is located and counted.",
-        "data.bin --positions IMU_positions.csv --out rec.nc",
-        "recording to write (NetCDF-4)",
-        "convert mimu",
-    )
-    parser.add_argument("data", type=Path, help="binary file of packets")
-    parser.add_argument(
-        "--positions", required=True, type=Path, metavar="FILE",
-        help="CSV of nominal positions in m: header 'axes, IMU 1, ...', rows x, y, z",
     )  # fmt: skip
-    parser.add_argument(
-        "--underside", metavar="2,4", help="IMUs turned over (default: the even-numbered ones)"
-    )
-    for name, default, unit in (
-        ("--accelerometer-noise", 0.04, "sd of one reading, m/s^2"),
-        ("--gyroscope-noise-dps", 0.06, "sd of one reading, deg/s"),
-        ("--position-prior", 3e-3, "sd of the nominal positions, m"),
-    ):
-        parser.add_argument(
-            name, type=positive, default=default, metavar="SD", help=f"{unit} (default: {default})"
-        )
+    return parser.add_subparsers(dest="kind", metavar="format", required=True)
 
 
-def _add_convert_csv(kinds) -> None:
-    parser = add_command(
-        kinds,
-        "csv",
-        later("convert", "convert_csv"),
-        "Read a table; a small YAML names its columns and units (docs/convert.md).",
-        "log.csv --columns columns.yaml --out rec.nc",
-        "recording to write (NetCDF-4)",
-        "convert csv",
-    )
-    parser.add_argument("data", type=Path, help="CSV file with a header")
-    parser.add_argument(
-        "--columns",
-        required=True,
-        type=Path,
-        metavar="FILE",
-        help="YAML: columns, units, positions",
-    )
-
-
-def _add_first_order(commands) -> None:
-    parser = add_command(
-        commands,
-        "first-order",
-        later("measured", "first_order"),
-        "Calibrate each triad by itself from the recording's still poses, and correct it.",
-        "rec.nc --gravity 9.818 --out corrected.nc",
-        "corrected recording to write (NetCDF-4), with the calibration in group 'first_order'",
-    )
-    add_recording(parser)
-    parser.add_argument(
-        "--gravity", type=positive, default=9.80665, metavar="G",
-        help="magnitude of gravity where it was recorded, m/s^2 (default: 9.80665)",
+def _add(commands, name: str, command: Command) -> None:
+    """One subcommand, with what all of them have."""
+    parser = commands.add_parser(
+        name, help=command.summary, description=command.summary,
+        epilog=f"example: imuarray {command.name} {command.example}",
     )  # fmt: skip
-
-
-def _add_select(commands) -> None:
-    parser = add_command(
-        commands,
-        "select",
-        later("measured", "select"),
-        "Keep moving, unsaturated, informative samples; says what each criterion removed.",
-        "corrected.nc --samples 500 --out subset.nc",
-        "recording to write (NetCDF-4)",
-    )
-    add_recording(parser)
+    parser.add_argument("--out", required=True, type=Path, metavar="FILE", help=command.out)
+    parser.add_argument("--quiet", action="store_true", help="no progress, no summary")
     parser.add_argument(
-        "--samples", type=count, default=None, metavar="T",
-        help="how many, spread evenly (default: all informative ones)",
-    )  # fmt: skip
+        "--json", action="store_true", help="the summary as one JSON object (SI units)"
+    )
+    for option in command.options:
+        parser.add_argument(option.name, **option.given)
+    parser.set_defaults(run=_later(*command.run.split(".")), folder=command.folder)
 
 
-def _add_residuals(commands) -> None:
-    parser = add_command(
-        commands,
-        "residuals",
-        later("measured", "residuals"),
-        "Residuals of the papers' model beside those of the recording's own simulation.",
-        "corrected.nc --figure residuals.png --out residuals.csv",
-        "table to write (CSV)",
-    )
-    add_recording(parser)
-    parser.add_argument("--figure", type=Path, metavar="FILE", help="figure to write (PNG or PDF)")
-    parser.add_argument("--seed", type=seed, default=0, metavar="S", help="of the simulation")
+def _later(module: str, name: str) -> Callable[[argparse.Namespace], None]:
+    """The function ``name`` of ``imuarray.commands.<module>``, loaded when it is called."""
 
+    def run(arguments: argparse.Namespace) -> None:
+        getattr(import_module(f"imuarray.commands.{module}"), name)(arguments)
 
-def _add_repeat(commands) -> None:
-    parser = add_command(
-        commands,
-        "repeat",
-        later("measured", "repeat"),
-        "Do several recordings of one board agree within their claimed widths?",
-        "one.nc two.nc three.nc --samples 500 --out agreement.csv",
-        "table to write (CSV): z-scores of all pairs",
-    )
-    parser.add_argument(
-        "recordings", type=Path, nargs="+", metavar="recording", help="two or more recordings"
-    )
-    parser.add_argument(
-        "--samples", type=count, default=500, metavar="T", help="of each recording (default: 500)"
-    )
-    parser.add_argument(
-        "--accelerometer-noise", type=positive, default=None, metavar="SD",
-        help="assumed sd, m/s^2 (default: estimated from each recording's residual)",
-    )  # fmt: skip
-
-
-def _add_diagnose(commands) -> None:
-    parser = add_command(
-        commands,
-        "diagnose",
-        later("diagnose", "diagnose"),
-        "What does the simulation get wrong, why, and what does the extended model gain?",
-        "corrected.nc --out diagnosis/",
-        "folder to write: diagnosis.json, report.html, figures",
-    )
-    parser.set_defaults(folder=True)
-    add_recording(parser)
-    add_effect_file(parser)
-    parser.add_argument(
-        "--without", type=effects, default=(), metavar="A,B",
-        help="effects to strike from the catalogue, separated by commas (default: none)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--seed", type=seed, default=0, metavar="S", help="of the replicates (default: 0)"
-    )
-
-
-def _add_calibrate(commands) -> None:
-    parser = add_command(
-        commands,
-        "calibrate",
-        later("calibrate", "calibrate"),
-        "Estimate the accelerometer positions and the motion by maximum likelihood.",
-        "rec.nc --method bcd --out cal.nc",
-        "estimates to write (NetCDF-4)",
-    )
-    add_recording(parser)
-    add_model(parser)
-    parser.add_argument(
-        "--method", choices=methods.CALIBRATION, default="bcd",
-        help="bcd: block coordinate descent (default); gauss-newton: any effects, fewer iterations",
-    )  # fmt: skip
-
-
-def _add_apply(commands) -> None:
-    parser = add_command(
-        commands,
-        "apply",
-        later("apply", "apply"),
-        "The calibrated array as one sensor: angular rate, angular acceleration and specific force"
-        " at each sample, with covariances.",
-        "cal.nc rec.nc --out motion.nc",
-        "motion to write (NetCDF-4)",
-    )
-    parser.add_argument(
-        "calibration",
-        type=Path,
-        help="what `imuarray calibrate` has written, or the diagnosis.json of `imuarray diagnose`",
-    )
-    add_recording(parser)
-    add_effect_file(parser)
-    parser.add_argument(
-        "--accelerometer-noise", type=positive, default=None, metavar="SD",
-        help="assumed sd, m/s^2 (default: as the recording declares)",
-    )  # fmt: skip
-
-
-def _add_sample(commands) -> None:
-    parser = add_command(
-        commands,
-        "sample",
-        later("sample", "sample"),
-        "Sample the posterior distribution of the accelerometer positions.",
-        "rec.nc --method pmmh --steps 5000 --seed 1 --out posterior.nc",
-        "posterior to write (NetCDF-4)",
-    )
-    add_recording(parser)
-    add_model(parser)
-    parser.add_argument(
-        "--method", choices=methods.SAMPLING, default="pmmh",
-        help="pmmh: pseudo-marginal Metropolis-Hastings, as paper 2021 (default); nuts: the"
-        " no-U-turn sampler on the exact marginal likelihood, in seconds",
-    )  # fmt: skip
-    parser.add_argument(
-        "--rates", choices=methods.RATES, default="declared",
-        help="p(omega | y_g) from the declared gyroscope noise (default), or from the spread among"
-        " the gyroscopes of each sample, as paper 2021 does with measured data (30)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--steps", type=count, default=None, metavar="N", help="steps of each chain"
-    )
-    parser.add_argument(
-        "--seed", type=seed, default=0, metavar="S", help="of the random numbers (default: 0)"
-    )
+    return run
