@@ -102,7 +102,7 @@ rule add_effect:
         "../scripts/add_effect.py"
 
 
-rule diagnose_added:
+use rule diagnose_recording as diagnose_added with:
     input:
         recording="results/measured/added/{name}/{effect}.nc",
     output:
@@ -114,16 +114,9 @@ rule diagnose_added:
         "results/measured/benchmarks/added/{name}_{effect}_diagnosis.tsv"
     wildcard_constraints:
         effect="|".join(ADDED),
-    resources:
-        mem_mb=8000,
-        runtime=60,
-    params:
-        settings=lambda wc: {"seed": config["seed"]},
-        code=CODE.digest("diagnose_recording"),
+    threads: 1
     message:
         "diagnosis of {wildcards.name} with {wildcards.effect} added"
-    script:
-        "../scripts/diagnose_recording.py"
 
 
 rule grade_added:

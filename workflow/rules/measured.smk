@@ -168,31 +168,12 @@ rule sample_measured:
         "../scripts/sample_measured.py"
 
 
-rule judge_measured:
+use rule judge_experiment as judge_measured with:
     input:
         recordings=expand("results/measured/subsets/{{kind}}_T{samples}.nc", samples=SAMPLES),
         chains=expand("results/{{scale}}/chains/{{kind}}_T{samples}.nc", samples=SAMPLES),
-    output:
-        verdicts=expand("results/{{scale}}/posterior/{{kind}}_T{samples}.json", samples=SAMPLES),
-        coordinates=expand("results/{{scale}}/posterior/{{kind}}_T{samples}.csv", samples=SAMPLES),
-        burn_ins=expand(
-            "results/{{scale}}/posterior/burn_in_{{kind}}_T{samples}.csv", samples=SAMPLES
-        ),
-    log:
-        "results/{scale}/logs/posterior/{kind}.log",
-    benchmark:
-        "results/{scale}/benchmarks/posterior/{kind}.tsv"
     wildcard_constraints:
         kind=MEASURED_KINDS,
-    resources:
-        mem_mb=4000,
-    params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017", "paper2021", "experiment"),
-        code=CODE.digest("judge_chains"),
-    message:
-        "chains of {wildcards.kind}: burn-in, R-hat, effective sample size ({wildcards.scale})"
-    script:
-        "../scripts/judge_chains.py"
 
 
 rule figure_residuals:

@@ -33,15 +33,12 @@ def read_mimu(
     separated by commas, by default the even-numbered ones; noise sds in m/s^2 and rad/s, the
     positions' prior sd in m. InputError says what does not fit.
     """
-    from imuarray.recording import mimu
-    from imuarray.recording.mimu_recording import read_positions, to_recording, turned_labels
+    from imuarray.recording.mimu_recording import read_board
 
-    places, labels = read_positions(Path(positions))
-    turned = turned_labels(labels, underside)
-    return to_recording(
-        mimu.read_mimu(Path(path)), places, labels, turned, accelerometer_noise, gyroscope_noise,
-        position_prior, source=Path(path).name,
-    )  # fmt: skip
+    return read_board(
+        Path(path), Path(positions), underside, accelerometer_noise_sd=accelerometer_noise,
+        gyroscope_noise_sd=gyroscope_noise, position_prior_sd=position_prior,
+    )[0]  # fmt: skip
 
 
 def read_calibration(path: str | PathLike) -> xr.Dataset:

@@ -91,7 +91,4 @@ def select(recording: Recording, samples: int | None = None) -> Recording:
         require_integer("samples", samples)
     from imuarray.estimation.selection import select_dynamic
 
-    found = select_dynamic(recording)
-    if samples is None:
-        return recording.select(found.informative)
-    return recording.select(found.disjoint([samples])[samples])
+    return recording.select(select_dynamic(recording).spread(samples))

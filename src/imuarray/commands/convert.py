@@ -11,20 +11,17 @@ from imuarray.recording import Recording, write_recording
 
 def convert_mimu(arguments) -> None:
     """A MIMU board's packets to a recording, with an account of what was dropped."""
-    from imuarray.recording.mimu import read_mimu
-    from imuarray.recording.mimu_recording import read_positions, to_recording, turned_labels
+    from imuarray.recording.mimu_recording import read_board
 
-    positions, labels = read_positions(arguments.positions)
-    underside = turned_labels(labels, arguments.underside)
-    stream = read_mimu(arguments.data)
-    recording = to_recording(
-        stream, positions, labels, underside, arguments.accelerometer_noise,
-        float(np.radians(arguments.gyroscope_noise_dps)), arguments.position_prior,
-        source=arguments.data.name,
+    recording, account = read_board(
+        arguments.data, arguments.positions, arguments.underside,
+        accelerometer_noise_sd=arguments.accelerometer_noise,
+        gyroscope_noise_sd=float(np.radians(arguments.gyroscope_noise_dps)),
+        position_prior_sd=arguments.position_prior,
     )  # fmt: skip
-    attrs = stamp({"source": str(arguments.data)}, 0) | stream.account.attributes()
+    attrs = stamp({"source": str(arguments.data)}, 0) | account.attributes()
     write_recording(recording, arguments.out, attrs=attrs)
-    _report(arguments, recording, stream.account.lines())
+    _report(arguments, recording, account.lines())
 
 
 def convert_csv(arguments) -> None:

@@ -49,9 +49,7 @@ def select(arguments) -> None:
 
     recording, output = read_recording(arguments.recording), Output(arguments)
     found = select_dynamic(recording)
-    index = found.informative
-    if arguments.samples is not None:
-        index = found.disjoint([arguments.samples])[arguments.samples]
+    index = found.spread(arguments.samples)
     data = digest(recording.specific_force, recording.angular_rate)
     write_recording(recording.select(index), arguments.out, attrs=stamp({"recording": data}, 0))
     lines = [f"{len(recording.time)} samples"]
@@ -121,7 +119,7 @@ def _located(arguments, output: Output) -> list[pd.DataFrame]:
         labels = labels or recording.accelerometer_labels
         if recording.accelerometer_labels != labels:
             raise InputError(f"{path}: expected the triads {', '.join(labels)}, found others")
-        chosen = select_dynamic(recording).disjoint([arguments.samples])[arguments.samples]
+        chosen = select_dynamic(recording).spread(arguments.samples)
         found = locate(recording.select(chosen), arguments.accelerometer_noise)
         parts.append(position_table(found, labels, recording=str(path)))
         state = "" if found.converged else ", NOT converged"

@@ -35,6 +35,10 @@ class Selection:
         """
         return disjoint(self.informative, counts)
 
+    def spread(self, count: int | None) -> np.ndarray:
+        """Indices of ``count`` informative samples, spread evenly; of all of them for None."""
+        return self.informative if count is None else self.disjoint([count])[count]
+
 
 def disjoint(left: np.ndarray, counts) -> dict[int, np.ndarray]:
     """Of the samples ``left``, disjoint subsets of ``counts`` each, the largest first.

@@ -9,7 +9,7 @@ import numpy as np
 
 from imuarray.errors import InputError
 from imuarray.geometry.mimu4444 import UNDERSIDE_ROTATION
-from imuarray.recording.mimu import MimuStream
+from imuarray.recording.mimu import Account, MimuStream, read_mimu
 from imuarray.recording.record import Recording
 
 GRAVITY = 9.80665  # m/s^2, the unit g of the data sheet
@@ -54,6 +54,21 @@ def turned_labels(labels, text: str | None) -> tuple[str, ...]:
     if unknown:
         raise InputError(f"--underside: expected labels of {', '.join(labels)}, found {unknown[0]}")
     return turned
+
+
+def read_board(
+    path: str | Path, positions: str | Path, underside: str | None = None, **declared
+) -> tuple[Recording, Account]:
+    """A file of packets as a recording, and the account of what was dropped.
+
+    ``positions`` as `read_positions` has them, ``underside`` as `turned_labels`; ``declared``
+    goes to `to_recording`.
+    """
+    places, labels = read_positions(positions)
+    turned = turned_labels(labels, underside)
+    stream = read_mimu(path)
+    declared = {"source": Path(path).name, **declared}
+    return to_recording(stream, places, labels, turned, **declared), stream.account
 
 
 def to_recording(

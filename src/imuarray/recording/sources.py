@@ -38,13 +38,11 @@ def read_source(entry: dict, files: dict[str, str]) -> tuple[Recording, dict]:
         from imuarray.recording.table import read_table
 
         return read_table(files["data"], files["columns"]), {}
-    from imuarray.recording.mimu import read_mimu
-    from imuarray.recording.mimu_recording import read_positions, to_recording
+    from imuarray.recording.mimu_recording import read_board
 
-    stream = read_mimu(files["data"])
-    known = SOURCES.get(entry.get("published", "").partition("/")[0])
-    recording = to_recording(
-        stream, *read_positions(files["positions"]), title=known.title if known else "",
-        source=entry.get("published", Path(files["data"]).name),
-    )  # fmt: skip
-    return recording, stream.account.attributes()
+    declared = {}
+    if "published" in entry:
+        known = SOURCES[entry["published"].partition("/")[0]]
+        declared = {"title": known.title, "source": entry["published"]}
+    recording, account = read_board(files["data"], files["positions"], **declared)
+    return recording, account.attributes()
