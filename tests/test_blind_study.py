@@ -353,18 +353,17 @@ def study_of_everything():
 
 
 def test_figures_and_tables(tmp_path):
-    rows = study_of_everything()
-    effects, table = summary.effects(rows), summary.recordings(rows)
+    given = {"rows": study_of_everything()}
+    settings = {"scale": {"name": "quick"}, "seed": 1}
     for against in ("sigma", "amplitude"):
-        bins = summary.detection(effects, against)
-        figure = drawing.detection_figure(bins, effects, ["Scale quick"])
+        figure, bins = drawing.figure_blind_detection(given, against, settings)
+        assert set(bins.against) == {against}
         titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
         assert len(titles) == len(CATALOGUE) + (against == "sigma")
         for axes in figure.axes[: len(titles)]:
             low, high = axes.get_xlim()
             assert high > 2.9 * low and len(axes.get_xticks())
-    confusion = summary.confusion(rows)
-    figure = drawing.confusion_figure(confusion, ["Scale quick"])
+    figure, confusion = drawing.figure_blind_confusion(given, settings)
     axes = figure.axes[0]
     labels = [label.get_text() for label in axes.get_yticklabels()]
     struck = f"{drawing.STRUCK} ({3 * len(CATALOGUE)})"
@@ -375,15 +374,12 @@ def test_figures_and_tables(tmp_path):
     write_figure(figure, confusion, **paths)
     assert all(path.stat().st_size > 1000 for path in paths.values())
     paths = {kind: tmp_path / f"bars.{kind}" for kind in ("csv", "tex", "md")}
-    notes = blind_tables.bars_notes(table, "Scale quick, seed 1")
-    write_table(
-        blind_tables.shown(criteria.criteria(table)), blind_tables.BARS, "Bars", notes, **paths
-    )
+    write_table(*blind_tables.table_blind_bars(given, settings), **paths)
     lines = [line for line in paths["md"].read_text().splitlines() if line.startswith("|")]
     assert {line.count("|") for line in lines} == {len(blind_tables.BARS) + 1}
     assert any("short by" in line for line in lines)
     paths["tex"].read_text().encode("latin-1")  # what LaTeX reads as it is
-    write_table(summary.gain_table(table), blind_tables.GAIN, "Gain", ["A note."], **paths)
+    write_table(*blind_tables.table_blind_gain(given, settings), **paths)
     assert len(pd.read_csv(paths["csv"])) == len(EFFECTS) + len(CATALOGUE) + 5
 
 

@@ -12,10 +12,13 @@ import pandas as pd
 import pytest
 import yaml
 
-from imuarray.figures import calibration, chains, ellipses, layout, notes, tables, tuning
+from imuarray.figures import notes, paper2017, paper2021, paper2021_array, tables
 from imuarray.figures.gallery import caption, gallery, title
 from imuarray.figures.style import significant, write_figure
-from imuarray.geometry import Array, mimu4444, mimu4444_corners
+from imuarray.geometry import mimu4444
+from imuarray.posterior.chains import Chains
+from imuarray.posterior.store import chain_tree
+from imuarray.posterior.target import GaussianPrior
 
 ROOT = Path(__file__).parents[1]
 SAMPLES = (5, 50, 500)
@@ -48,7 +51,7 @@ def sample_errors():
 def motion_errors():
     rows = [(r, a, 1 / (r * a)) for a in (200.00000000000003, 2e5) for r in (50.0, 2000.0)]
     table = pd.DataFrame(rows, columns=["angular_rate_dps", "angular_acceleration_dps2", "rmse_m"])
-    return table.assign(rmse_se_m=table.rmse_m / 20)
+    return table.assign(rmse_se_m=table.rmse_m / 20, samples=10, iterations=200, realisations=10)
 
 
 def sweep(samples):
@@ -59,44 +62,70 @@ def sweep(samples):
     )
 
 
-def case(name, array=None):
-    """(table, figure) of one figure, drawn afresh."""
+def effective():
+    config = yaml.safe_load((ROOT / "config.yaml").read_text(encoding="utf-8"))
+    return config | {"scale": {"name": "test", **config["scales"]["quick"]}}
+
+
+def chained(draws, prior_mean):
+    """What `read_chains` gives of (chains, draws, A - 1, 3) m: thinned to every 20th step."""
+    labels = [str(k) for k in range(2, 2 + draws.shape[2])]
+    flat = draws.reshape(*draws.shape[:2], -1)
+    chains = Chains(flat, np.zeros(draws.shape[:2]), np.array([0.2, 0.19]), 20, 4e-7)
+    prior = GaussianPrior.of(prior_mean.ravel(), 3e-3)
+    return chains, chain_tree(chains, labels, prior, {})
+
+
+def figure_2021_fig3(draws, burn_in, truth=1e-6):
+    """Of chains of one coordinate, (chains, draws) m."""
+    made = np.stack([draws] * 3, axis=-1)[:, :, None]
+    judged = verdict(burn_in_draws=burn_in, burn_in_steps=20 * burn_in)
+    truths = pd.DataFrame({"truth_m": [truth] * 3})
+    given = [chained(made, np.zeros((1, 3)))], [judged], [truths]
+    return paper2021.figure_2021_fig3(*given, effective())
+
+
+def case(name, section=None):
+    """(figure, table) of one figure, drawn afresh; ``section`` of the configuration: the array."""
     rng = np.random.default_rng(7)
-    footer = ["Scale test, seed 1", *notes.chain_lines({5: verdict()})]
-    array = array or mimu4444()
-    count = array.accelerometers - 1
-    if name == "2017_fig3":
-        table = calibration.fig3_table(rate_errors(), 0.06, 32)
-        return table, calibration.fig3(table, 2000.0, footer)
-    if name == "2017_fig4":
-        table = calibration.fig4_table(sample_errors())
-        return table, calibration.fig4(table, footer)
-    if name == "2017_fig5":
-        table = calibration.fig5_table(motion_errors())
-        return table, calibration.fig5(table, 1e-3, footer)
-    if name == "2021_fig1":
-        table = layout.layout_table(array)
-        return table, layout.fig1(table, footer)
-    if name == "2021_fig2":
-        table = tuning.fig2_table([sweep(samples) for samples in SAMPLES])
-        return table, tuning.fig2(table, 0.1, footer)
+    settings = effective()
+    settings["array"] = section or settings["array"]
+    array = paper2021_array.array_from_config(settings["array"])
+    places = array.relative[1:]
+    simple = {
+        "2017_fig3": (paper2017.figure_2017_fig3, rate_errors()),
+        "2017_fig4": (paper2017.figure_2017_fig4, sample_errors()),
+        "2017_fig5": (paper2017.figure_2017_fig5, motion_errors()),
+        "2021_fig1": (paper2021_array.figure_2021_fig1,),
+        "2021_fig2": (paper2021.figure_2021_fig2, [sweep(samples) for samples in SAMPLES]),
+    }
+    if name in simple:
+        function, *given = simple[name]
+        return function(*given, settings)
     if name == "2021_fig3":
-        table = chains.fig3_table(1e-5 * rng.standard_normal((2, 200)), 40, 20, 1e-6)
-        return table, chains.fig3(table, 800, "x of IMU 2", footer)
-    prior = np.zeros((count, 3)), np.full((count, 3), 3e-3)
+        return figure_2021_fig3(1e-5 * rng.standard_normal((2, 200)), 40)
+    verdicts = [verdict(samples, burn_in_draws=0) for samples in SAMPLES]
     if name == "2021_fig4":
-        draws = {T: 1e-4 / T * rng.standard_normal((2, 100, 3)) for T in SAMPLES}
-        table = chains.fig4_table(draws, [part[0] for part in prior], np.full(3, -1e-6))
-        return table, chains.fig4(table, "IMU 2", footer)
-    prior = array.relative[1:], prior[1]
-    draws = {T: prior[0] + 1e-3 / T * rng.standard_normal((100, count, 3)) for T in SAMPLES}
-    table = ellipses.fig5_table(array, draws, prior, prior[0])
-    return table, ellipses.fig5(table, array, 0.5, "standin", footer)
+        chains = [
+            chained(1e-4 / T * rng.standard_normal((2, 100, 1, 3)), np.zeros((1, 3)))
+            for T in SAMPLES
+        ]
+        truths = [pd.DataFrame({"truth_m": np.full(3, -1e-6)})]
+        return paper2021.figure_2021_fig4(chains, verdicts, truths, settings)
+    chains = [
+        chained(places + 1e-3 / T * rng.standard_normal((2, 50, *places.shape)), places)
+        for T in SAMPLES
+    ]
+    truths = [pd.DataFrame({"truth_m": places.ravel()})]
+    source = notes.SOURCES["standin"]
+    return paper2021_array.figure_2021_fig5(
+        chains, verdicts, truths, [], "standin", source, settings
+    )
 
 
 def save(name, folder):
     folder.mkdir(exist_ok=True)
-    table, figure = case(name)
+    figure, table = case(name)
     paths = {kind: folder / f"{name}.{kind}" for kind in ("pdf", "png", "csv")}
     write_figure(figure, table, **paths)
     return table, paths
@@ -110,7 +139,7 @@ def curves(figure):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_labels_name_their_units(name):
-    _, figure = case(name)
+    figure, _ = case(name)
     labels = [text for axes in figure.axes for text in (axes.get_xlabel(), axes.get_ylabel())]
     labels = [text for text in labels if text]
     assert len(labels) >= 2
@@ -143,19 +172,25 @@ def test_2017_figures_plot_their_tables():
         ("2017_fig3", "angular_rate_dps", "rmse_dps"),
         ("2017_fig4", "samples", "rmse_m"),
     ):
-        table, figure = case(name)
+        figure, table = case(name)
         drawn = curves(figure)
         assert sum(map(len, drawn)) == len(table)
         assert all(rows_of(curve, table, x, y) for curve in drawn)
-    table, figure = case("2017_fig5")
+    figure, table = case("2017_fig5")
     lines = [line for line in figure.axes[0].get_lines() if line.get_marker() in ("o", "s")]
     assert len(lines) == 2
     assert all(rows_of(x.get_xydata(), table, "angular_rate_dps", "rmse_m") for x in lines)
     assert sorted(table.angular_acceleration_dps2.unique()) == [200.0, 2e5]
 
 
+def gyroscopes_of_nine():
+    settings = effective()
+    settings["array"] = {"board": "mimu4444", "gyroscopes": 9}
+    return paper2017.figure_2017_fig3(rate_errors(), settings)[1]
+
+
 def test_gyroscopes_are_averaged_over_position_errors():
-    table = calibration.fig3_table(rate_errors(), 0.06, 9)
+    table = gyroscopes_of_nine()
     means = table[table.series == "gyroscopes"]
     np.testing.assert_allclose(means.rmse_dps, np.sqrt([5e-4, 4e-4, 905000.0]))
     np.testing.assert_allclose(means.rmse_se_dps.iloc[1], 1e-3 / np.sqrt(2))
@@ -163,14 +198,14 @@ def test_gyroscopes_are_averaged_over_position_errors():
 
 
 def test_reference_line_passes_through_the_last_line():
-    table = calibration.fig4_table(sample_errors())
+    _, table = case("2017_fig4")
     last = table[(table.series == "bcd") & (table.iterations == 10)]
     reference = table[table.series == "reference"]
     np.testing.assert_allclose(reference.rmse_m, last.rmse_m)
 
 
 def test_2021_fig2_plots_its_table_with_the_fit():
-    table, figure = case("2021_fig2")
+    figure, table = case("2021_fig2")
     np.testing.assert_allclose(table.fit, table.variance)
     drawn = curves(figure)
     assert len(drawn) == 2 * len(SAMPLES)
@@ -179,7 +214,7 @@ def test_2021_fig2_plots_its_table_with_the_fit():
 
 
 def test_2021_fig3_plots_its_table():
-    table, figure = case("2021_fig3")
+    figure, table = case("2021_fig3")
     for panel in ("trace", "autocorrelation"):
         for chain in (1, 2):
             rows = table[(table.panel == panel) & (table.chain == chain)]
@@ -196,13 +231,13 @@ def test_2021_fig3_plots_its_table():
 def test_2021_fig3_leaves_the_burn_in_out_of_the_histogram():
     draws = np.concatenate([np.full((2, 30), 1.0), np.zeros((2, 70))], axis=1)
     draws += 1e-6 * np.random.default_rng(3).standard_normal(draws.shape)
-    table = chains.fig3_table(draws, 30, 10)
+    table = paper2021.chain_panels(draws, 30, 10)
     assert table.high_um.max() < 10 and table[table.panel == "trace"].value.max() > 9e5
     assert not (table.panel == "truth").any()
 
 
 def test_2021_fig4_plots_its_table():
-    table, figure = case("2021_fig4")
+    figure, table = case("2021_fig4")
     for axes, axis in zip(figure.axes[::2], "xyz", strict=True):
         rows = table[table.axis == axis]
         drawn = [line.get_xydata() for line in axes.get_lines() if len(line.get_xydata()) > 2]
@@ -217,7 +252,7 @@ def test_2021_fig4_plots_its_table():
 
 
 def test_2021_fig5_plots_its_table():
-    table, figure = case("2021_fig5")
+    figure, table = case("2021_fig5")
     board = [axes for axes in figure.axes if axes.get_title().endswith("from above")]
     for axes, side in zip(board, ("topside", "underside"), strict=True):
         rows = table[(table.side == side) & (table.samples > 0)]
@@ -242,22 +277,20 @@ def test_ellipse_holds_its_share():
             "cov_yy_mm2": 1.0,
         }
     )
-    outline = matplotlib.path.Path(ellipses.ellipse(row, 0.5, 721))
+    outline = matplotlib.path.Path(paper2021_array.ellipse(row, 0.5, 721))
     assert abs(outline.contains_points(draws).mean() - 0.5) < 4.5 * 0.5 / np.sqrt(20000)
 
 
 @pytest.mark.parametrize("name", ["2021_fig1", "2021_fig5"])
 def test_other_arrays_can_be_drawn(name, tmp_path):
-    flat = Array(
-        np.array([[0, 0, 0], [0.01, 0, 0], [0, 0.01, 0], [0.01, 0.02, 0]]), tuple("1234"), 4
-    )
-    for array in (mimu4444_corners(), flat):
-        table, figure = case(name, array)
+    flat = {"positions": [[0, 0, 0], [0.01, 0, 0], [0, 0.01, 0], [0.01, 0.02, 0]]}
+    for section in ({"board": "mimu4444_corners"}, flat):
+        figure, table = case(name, section)
         write_figure(figure, table, tmp_path / "a.pdf", tmp_path / "a.png", tmp_path / "a.csv")
 
 
 def test_underside_lies_beneath_and_is_turned():
-    table = layout.layout_table(mimu4444())
+    table = paper2021_array.layout_table(mimu4444())
     assert (table.side == "underside").to_numpy().tolist() == [False, True] * 16
     marker = table[["marker_x_m", "marker_y_m"]].to_numpy() - table[["x_m", "y_m"]].to_numpy()
     np.testing.assert_allclose(marker[1::2], -marker[::2][:, ::-1])
@@ -276,13 +309,12 @@ def test_significant():
 
 DRAW_ALONE = """
 import sys
-import numpy as np, pandas as pd
-from imuarray.figures import calibration, chains, ellipses, gallery, layout, tables, tuning
-from imuarray.geometry import mimu4444
-trace = pd.DataFrame({"panel": "trace", "chain": 1, "step": [1, 2], "value": [0.0, 1.0]})
-bins = {"panel": "histogram", "chain": 1, "low_um": [0.0], "high_um": [1.0], "value": [1.0]}
-chains.fig3(pd.concat([trace, pd.DataFrame(bins)]), 1, "x")
-layout.fig1(layout.layout_table(mimu4444()))
+import pandas as pd
+from imuarray.figures import gallery, paper2017, paper2021, paper2021_array, tables
+settings = {"array": {"board": "mimu4444"}, "scale": {"name": "test"}, "seed": 1}
+paper2021_array.figure_2021_fig1(settings)
+rows = {"samples": [1, 2], "draws": 1, "variance": 1.0, "variance_se": 0.1, "realisations": 9}
+paper2021.figure_2021_fig2([pd.DataFrame(rows)], settings | {"paper2021": {"variance_target": 1}})
 bad = ("emcee", "arviz", "numba", "jax", "imuarray.posterior", "imuarray.simulation")
 print([name for name in sys.modules if name.startswith(bad)])
 """
@@ -297,45 +329,38 @@ def two_tables():
     tunings = [
         {"samples": T, "draws": 3, "step_length_m": 4.1e-7, "variance": 0.09} for T in SAMPLES
     ]
-    first = tables.table1(tunings, [verdict(T) for T in SAMPLES])
-    frames = [
-        pd.DataFrame({"axis": list("xyz"), "sd_m": np.array([1.0, 2.0, 3.0]) * scale})
+    first = paper2021.table_2021_table1(tunings, [verdict(T) for T in SAMPLES], effective())
+    sources = [
+        [part for T in SAMPLES for part in (
+            pd.DataFrame({"axis": list("xyz"), "sd_m": np.array([1.0, 2.0, 3.0]) * scale}),
+            verdict(T, converged=True))]
         for scale in (1e-4, 1.1e-4, 1e-6)
-    ]
-    sources = {
-        name: {T: (frame, verdict(T, converged=True), 0.79) for T in SAMPLES}
-        for name, frame in zip(tables.source_names("standin"), frames, strict=True)
-    }
-    return first, tables.table2(sources)
+    ]  # fmt: skip
+    return first, paper2021.table_2021_table2(*sources, "standin", "a source", effective())
 
 
 def test_tables(tmp_path):
-    for number, (table, columns) in enumerate(
-        zip(two_tables(), (tables.TABLE1, tables.TABLE2), strict=True)
-    ):
+    for number, (table, columns, heading, lines) in enumerate(two_tables()):
         paths = {kind: tmp_path / f"{number}.{kind}" for kind in ("csv", "tex", "md")}
-        tables.write_table(table, columns, "A caption, 50 %", ["A note."], **paths)
+        tables.write_table(table, columns, f"{heading}, 50 %", lines, **paths)
         read = pd.read_csv(paths["csv"])
         pd.testing.assert_frame_equal(read, table, check_dtype=False, check_exact=True)
-        lines = [line for line in paths["md"].read_text().splitlines() if line.startswith("|")]
-        assert len(lines) == len(table) + 2
-        assert {line.count("|") for line in lines} == {len(columns) + 1}
+        rows = [line for line in paths["md"].read_text().splitlines() if line.startswith("|")]
+        assert len(rows) == len(table) + 2
+        assert {row.count("|") for row in rows} == {len(columns) + 1}
         tex = paths["tex"].read_text()
-        assert r"50 \%" in tex and "A note." in tex and tex.count(r"\\") == len(table) + 1
+        assert r"50 \%" in tex and "these are ours" in tex
+        assert tex.count(r"\\") == len(table) + 1
 
 
 def test_table2_compares_with_the_last_source():
-    _, table = two_tables()
+    (first, *_), (table, _, _, lines) = two_tables()
     np.testing.assert_allclose(table.ratio, [100, 110, 1] * 3)
     np.testing.assert_allclose(table.sd_median_m[:3], [2e-4, 2.2e-4, 2e-6])
     assert "simulated stand-in; no measured data here" in table.source[0]
-    assert tables.unfinished(table, 1.05) == []
-    assert "3 of 3" in tables.unfinished(two_tables()[0], 1.05)[0]
-
-
-def effective():
-    config = yaml.safe_load((ROOT / "config.yaml").read_text(encoding="utf-8"))
-    return config | {"scale": {"name": "quick", **config["scales"]["quick"]}}
+    assert "IMUs: 2 (experiment" in lines[1] and "a source" in lines[0]
+    assert notes.unfinished(table, 1.05) == []
+    assert "3 of 3" in notes.unfinished(first, 1.05)[0]
 
 
 def test_captions_and_gallery():

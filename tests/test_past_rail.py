@@ -10,7 +10,7 @@ import imuarray
 from imuarray.analysis.past_rail import past_rail
 from imuarray.cli import main
 from imuarray.errors import InputError
-from imuarray.figures.past_rail import past_rail_figure
+from imuarray.figures.measured import figure_past_rail
 from imuarray.model.names import parameter_names
 from tests.test_bound import model
 
@@ -64,7 +64,7 @@ def test_the_right_model_foretells_what_is_hidden(hidden, diagnosis):
     assert np.all(errors.calibrated < errors.clipped)
     extended = table[table.model == "extended"]
     assert np.all(np.abs(extended.within_95 - 0.95) < 0.05)
-    figure = past_rail_figure(table, 300, ["a footer"])
+    figure = figure_past_rail(table, 300, ["a footer"])
     assert all(len(axes.lines) == 7 for axes in figure.axes)
 
 
@@ -85,7 +85,7 @@ def test_positions_and_delay_of_another_recording(hidden, diagnosis):
     size = np.degrees(2e-3 * np.sqrt(np.mean(truth["angular_acceleration"].to_numpy() ** 2)))
     more = np.sqrt(errors[2e-3].transferred ** 2 - errors[0.0].transferred ** 2)
     assert np.all((more > 0.4 * size) & (more < 2.5 * size))
-    assert all(len(axes.lines) == 8 for axes in past_rail_figure(tables[0.0], 300, []).axes)
+    assert all(len(axes.lines) == 8 for axes in figure_past_rail(tables[0.0], 300, []).axes)
 
 
 def test_a_diagnosis_is_a_calibration_for_the_command(hidden, diagnosis, tmp_path):

@@ -8,6 +8,11 @@ from imuarray.figures import theory
 from imuarray.studies import bound
 from tests.test_bound import MOTION, OPTIONS, model
 
+SETTINGS = {
+    "scale": {"name": "quick"}, "seed": 1, "theory": {"convergence_samples": 30},
+    "paper2017": {"position_sd": OPTIONS["position_sd"]},
+}  # fmt: skip
+
 
 def test_efficiency():
     few = {**OPTIONS, "realisations": 10}
@@ -15,7 +20,7 @@ def test_efficiency():
         bound.efficiency(model(), 2, [10, 30], MOTION, few),
         bound.efficiency(model(), 2, [10], MOTION, few, noise=10.0),
     ]
-    figure = theory.efficiency_figure(pd.concat(tables), ["Scale quick"])
+    figure, _ = theory.figure_theory_efficiency(pd.concat(tables), SETTINGS)
     top, below, louder = figure.axes
     assert [len(line.get_xdata()) for line in louder.lines[:1]] == [2]
     assert len(top.get_legend().get_texts()) == 4
@@ -32,7 +37,7 @@ def test_convergence_shows_other_arrays_and_leaves_out_what_tells_nothing():
     table = pd.concat(tables)
     assert list(table.array) == [model().array.name] * 2 + ["4 triads"]
     assert table.bound_m.iloc[1] > OPTIONS["position_sd"] / 3
-    top, below = theory.convergence_figure(table, OPTIONS["position_sd"]).axes
+    top, below = theory.figure_theory_convergence(table, SETTINGS)[0].axes
     drawn = [x for line in top.lines for x in line.get_xdata()]
     assert set(np.round(drawn)) == {round(np.degrees(MOTION[0]))}
     assert [text.get_text() for text in below.get_legend().get_texts()] == ["4 triads"]
@@ -40,7 +45,7 @@ def test_convergence_shows_other_arrays_and_leaves_out_what_tells_nothing():
 
 def test_size():
     table = bound.against_size(model(), 4, 30, MOTION, [1.0, 2.0], count=2)
-    top, below = theory.size_figure(table).axes
+    top, below = theory.figure_theory_size(table, SETTINGS)[0].axes
     assert top.lines[0].get_ydata() == pytest.approx(1e6 * table.bound_m.to_numpy())
     assert "ppm" in below.get_ylabel()
 

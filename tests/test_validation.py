@@ -148,5 +148,7 @@ def test_histogram_of_uniform_levels_is_flat():
     assert len(table) == validation.BINS
     assert table.density.mean() == pytest.approx(1.0)
     assert np.abs((table.density - 1) / table.se).max() < 4.5
-    figure = validation.rank_figure(table, ["Scale quick"])
+    settings = {"scale": {"name": "quick"}, "seed": 1}
+    figure, same = validation.figure_validation_ranks([levels], settings)
+    pd.testing.assert_frame_equal(same, table)
     assert [axes.get_title() for axes in figure.axes] == ["x: s, T = 5, n = 400"]

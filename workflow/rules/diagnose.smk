@@ -54,7 +54,7 @@ rule diagnosis_agreement:
         "../scripts/diagnosis_agreement.py"
 
 
-rule past_rail:
+rule figure_past_rail:
     input:
         recording=lambda wc: MEASURED.recording(wc.name),
         diagnosis="results/measured/diagnosis/{name}/diagnosis.json",
@@ -74,11 +74,11 @@ rule past_rail:
         mem_mb=4000,
     params:
         others=lambda wc: MEASURED.others(wc.name),
-        code=CODE.digest("past_rail"),
+        code=CODE.digest("figure_past_rail"),
     message:
         "motion of {wildcards.name} past the rail"
     script:
-        "../scripts/past_rail.py"
+        "../scripts/figure_past_rail.py"
 
 
 rule add_effect:
@@ -119,7 +119,7 @@ use rule diagnose_recording as diagnose_added with:
         "diagnosis of {wildcards.name} with {wildcards.effect} added"
 
 
-rule grade_added:
+rule table_added:
     input:
         before="results/measured/diagnosis/{name}/diagnosis.json",
         truths=expand("results/measured/added/{{name}}/{effect}.json", effect=ADDED),
@@ -131,8 +131,8 @@ rule grade_added:
     benchmark:
         "results/measured/benchmarks/added/{name}.tsv"
     params:
-        code=CODE.digest("grade_added"),
+        code=CODE.digest("table_added"),
     message:
         "table: effects added to {wildcards.name}"
     script:
-        "../scripts/grade_added.py"
+        "../scripts/table_added.py"

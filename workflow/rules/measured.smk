@@ -176,7 +176,7 @@ use rule judge_experiment as judge_measured with:
         kind=MEASURED_KINDS,
 
 
-rule figure_residuals:
+rule figure_measured_residuals:
     input:
         summary="results/measured/residuals/{name}.csv",
         histogram="results/measured/residuals/{name}_histogram.csv",
@@ -190,14 +190,14 @@ rule figure_residuals:
         "results/measured/benchmarks/figures/residuals_{name}.tsv"
     params:
         settings=effective(config, config["scale"], scaled=False),
-        code=CODE.digest("figure_residuals"),
+        code=CODE.digest("figure_measured_residuals"),
     message:
         "figure: residuals of {wildcards.name}"
     script:
-        "../scripts/figure_residuals.py"
+        "../scripts/figure_measured_residuals.py"
 
 
-rule figure_noise:
+rule figure_measured_noise:
     input:
         allan="results/measured/first_order/{name}_allan.csv",
     output:
@@ -208,14 +208,14 @@ rule figure_noise:
         "results/measured/benchmarks/figures/noise_{name}.tsv"
     params:
         settings=effective(config, config["scale"], scaled=False),
-        code=CODE.digest("figure_noise"),
+        code=CODE.digest("figure_measured_noise"),
     message:
         "figure: noise of {wildcards.name}"
     script:
-        "../scripts/figure_noise.py"
+        "../scripts/figure_measured_noise.py"
 
 
-rule figure_agreement:
+rule figure_measured_agreement:
     input:
         summary="results/measured/agreement/{group}.csv",
         pairs="results/measured/agreement/{group}_pairs.csv",
@@ -232,14 +232,14 @@ rule figure_agreement:
         "results/measured/benchmarks/figures/agreement_{group}.tsv"
     params:
         settings=effective(config, config["scale"], scaled=False),
-        code=CODE.digest("figure_agreement"),
+        code=CODE.digest("figure_measured_agreement"),
     message:
         "figure: agreement within {wildcards.group}"
     script:
-        "../scripts/figure_agreement.py"
+        "../scripts/figure_measured_agreement.py"
 
 
-rule table_first_order:
+rule table_measured_first_order:
     input:
         residuals=lambda wc: expand(
             "results/measured/first_order/{name}_residuals.csv", name=MEASURED.board(wc.group)
@@ -260,14 +260,14 @@ rule table_first_order:
         "results/measured/benchmarks/tables/first_order_{group}.tsv"
     params:
         names=lambda wc: MEASURED.board(wc.group),
-        code=CODE.digest("table_first_order"),
+        code=CODE.digest("table_measured_first_order"),
     message:
         "table: first-order calibration of {wildcards.group}"
     script:
-        "../scripts/table_first_order.py"
+        "../scripts/table_measured_first_order.py"
 
 
-rule table_agreement:
+rule table_measured_agreement:
     input:
         summary="results/measured/agreement/{group}.csv",
     output:
@@ -282,8 +282,8 @@ rule table_agreement:
     benchmark:
         "results/measured/benchmarks/tables/agreement_{group}.tsv"
     params:
-        code=CODE.digest("table_agreement"),
+        code=CODE.digest("table_measured_agreement"),
     message:
         "table: agreement within {wildcards.group}"
     script:
-        "../scripts/table_agreement.py"
+        "../scripts/table_measured_agreement.py"

@@ -2,14 +2,8 @@
 
 from job import job
 
-with job(snakemake) as settings:  # noqa: F821
-    import pandas as pd
+with job(snakemake):
+    from imuarray.figures.paper2017 import figure_2017_fig4
+    from imuarray.figures.publish import publish
 
-    from imuarray.figures import calibration
-    from imuarray.figures.notes import scale_line
-    from imuarray.figures.style import write_figure
-
-    errors = pd.read_csv(snakemake.input.errors)  # noqa: F821
-    table = calibration.fig4_table(errors)
-    footer = [scale_line(settings, f"{errors.realisations.max()} realisations per point")]
-    write_figure(calibration.fig4(table, footer), table, **dict(snakemake.output.items()))  # noqa: F821
+    publish(figure_2017_fig4, snakemake)

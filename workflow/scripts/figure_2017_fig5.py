@@ -2,16 +2,8 @@
 
 from job import job
 
-with job(snakemake) as settings:  # noqa: F821
-    import pandas as pd
+with job(snakemake):
+    from imuarray.figures.paper2017 import figure_2017_fig5
+    from imuarray.figures.publish import publish
 
-    from imuarray.figures import calibration
-    from imuarray.figures.notes import scale_line
-    from imuarray.figures.style import write_figure
-
-    errors = pd.read_csv(snakemake.input.errors)  # noqa: F821
-    table = calibration.fig5_table(errors)
-    counts = f"N = {errors.samples.max()} time samples, {errors.iterations.max()} iterations"
-    footer = [scale_line(settings, f"{errors.realisations.max()} realisations per point"), counts]
-    start = settings["paper2017"]["position_sd"]
-    write_figure(calibration.fig5(table, start, footer), table, **dict(snakemake.output.items()))  # noqa: F821
+    publish(figure_2017_fig5, snakemake)

@@ -2,14 +2,8 @@
 
 from job import job
 
-with job(snakemake) as settings:  # noqa: F821
-    import pandas as pd
+with job(snakemake):
+    from imuarray.figures.paper2021 import figure_2021_fig2
+    from imuarray.figures.publish import publish
 
-    from imuarray.figures import tuning
-    from imuarray.figures.notes import scale_line
-    from imuarray.figures.style import write_figure
-
-    table = tuning.fig2_table([pd.read_csv(path) for path in snakemake.input.variances])  # noqa: F821
-    footer = [scale_line(settings, f"{table.realisations.max()} realisations per point")]
-    target = settings["paper2021"]["variance_target"]
-    write_figure(tuning.fig2(table, target, footer), table, **dict(snakemake.output.items()))  # noqa: F821
+    publish(figure_2021_fig2, snakemake)

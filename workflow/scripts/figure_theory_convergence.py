@@ -2,14 +2,8 @@
 
 from job import job
 
-with job(snakemake) as settings:
-    import pandas as pd
+with job(snakemake):
+    from imuarray.figures.theory import figure_theory_convergence
+    from imuarray.figures.publish import publish
 
-    from imuarray.figures import theory
-    from imuarray.figures.notes import scale_line
-    from imuarray.figures.style import write_figure
-
-    table = pd.read_csv(snakemake.input.rows)
-    footer = [scale_line(settings, f"N = {table.samples.max()}")]
-    figure = theory.convergence_figure(table, settings["paper2017"]["position_sd"], footer)
-    write_figure(figure, table, **dict(snakemake.output.items()))
+    publish(figure_theory_convergence, snakemake)

@@ -2,18 +2,8 @@
 
 from job import job
 
-with job(snakemake) as settings:
-    import pandas as pd
+with job(snakemake):
+    from imuarray.figures.validation import figure_validation_ranks
+    from imuarray.figures.publish import publish
 
-    from imuarray.figures import validation
-    from imuarray.figures.notes import scale_line
-    from imuarray.figures.style import write_figure
-
-    levels = pd.concat([pd.read_csv(path) for path in snakemake.input.levels])
-    table = validation.histogram(levels)
-    footer = [
-        scale_line(settings, "n: truths from the prior, those without intervals left out"),
-        "Histograms of all positions' coordinates; band: 95 % for all bins of a panel together.",
-    ]
-    figure = validation.rank_figure(table, footer)
-    write_figure(figure, table, **dict(snakemake.output.items()))
+    publish(figure_validation_ranks, snakemake)

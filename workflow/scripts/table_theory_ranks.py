@@ -2,15 +2,8 @@
 
 from job import job
 
-with job(snakemake) as settings:
-    import pandas as pd
+with job(snakemake):
+    from imuarray.figures.theory import table_theory_ranks
+    from imuarray.figures.publish import publish
 
-    from imuarray.figures import theory
-    from imuarray.figures.notes import scale_line
-    from imuarray.figures.tables import write_table
-
-    write_table(
-        pd.read_csv(snakemake.input.rows), theory.RANKS,
-        "Which motion and geometry tell the positions.",
-        [*theory.RANKS_NOTES, scale_line(settings)], **dict(snakemake.output.items()),
-    )  # fmt: skip
+    publish(table_theory_ranks, snakemake)

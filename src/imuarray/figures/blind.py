@@ -7,8 +7,10 @@ import pandas as pd
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.ticker import NullFormatter
 
+from imuarray.blind import summary
 from imuarray.blind.inject import CATALOGUE
 from imuarray.blind.summary import ALL, CRASH, NOTHING, UNEXPLAINED
+from imuarray.figures.notes import scale_line
 from imuarray.figures.style import BLACK, BLUE, PAGE, SKY, VERMILLION, new_figure, styled
 
 COLUMNS = 6  # panels in a row
@@ -40,12 +42,14 @@ def words(name: str) -> str:
 
 
 @styled
-def detection_figure(bins: pd.DataFrame, effects: pd.DataFrame, footer=()):
+def figure_blind_detection(rows: dict, against: str, settings: dict):
     """Share found over size, a panel for each effect; ticks are single recordings.
 
-    ``bins``: `imuarray.blind.summary.detection`; ``effects``: the same's `effects`.
+    ``rows``: graded recordings; ``against``: "sigma", or "amplitude" in each effect's own unit.
     """
-    against = bins.against.iloc[0]
+    effects = summary.effects(rows["rows"])
+    bins = summary.detection(effects, against)
+    footer = [scale_line(settings, f"{(effects.kind == 'one').sum()} recordings of one effect")]
     names = list(dict.fromkeys(bins.effect))
     lines = -(-(len(names) + 1) // COLUMNS)
     figure = new_figure(footer, PAGE, 0.1 + 1.25 * lines)
@@ -68,7 +72,7 @@ def detection_figure(bins: pd.DataFrame, effects: pd.DataFrame, footer=()):
         for axes in panels[max(len(names) - COLUMNS, 0) : len(names)]:
             axes.tick_params(labelbottom=True)
             axes.set_xlabel("size (σ)", size=6, labelpad=1)
-    return figure
+    return figure, bins
 
 
 def _detection_panel(axes, bins, effects, against, name):
@@ -134,15 +138,22 @@ def names_of(table: pd.DataFrame) -> list[str]:
 
 
 @styled
-def confusion_figure(table: pd.DataFrame, footer=()):
+def figure_blind_confusion(rows: dict, settings: dict):
     """Truth by name, percent of recordings; blue where the name is right, vermillion where not.
 
-    ``table``: `imuarray.blind.summary.confusion`.
+    ``rows``: graded recordings.
     """
-    table = confusion_rows(table)
+    found = summary.confusion(rows["rows"])
+    footer = scale_line(
+        settings,
+        "percent of the recordings (their number behind the effect) in which a name is given."
+        " Blue: right by class; vermillion and bold: wrong, in all or some of them. A recording"
+        " with several names is in several columns; unexplained: the flag, whatever is named.",
+    )
+    table = confusion_rows(found)
     columns = names_of(table)
     lines = list(dict.fromkeys(zip(table.kind, table.truth, strict=True)))
-    figure = new_figure(footer, PAGE, 1.3 + 0.165 * len(lines))
+    figure = new_figure([footer], PAGE, 1.3 + 0.165 * len(lines))
     axes = figure.subplots()
     counts = table.drop_duplicates(["kind", "truth"]).recordings
     place = {line: number for number, line in enumerate(lines)}
@@ -154,7 +165,7 @@ def confusion_figure(table: pd.DataFrame, footer=()):
     axes.xaxis.tick_top()
     axes.set(xlim=(-0.5, len(columns) - 0.5), ylim=(len(lines) - 0.5, -0.5))
     _separate(axes, lines, columns)
-    return figure
+    return figure, found
 
 
 def _shade(color: str, share: float):

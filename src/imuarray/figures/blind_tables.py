@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import pandas as pd
 
+from imuarray.blind import summary
+from imuarray.blind.added import grade_added
+from imuarray.blind.criteria import criteria
+from imuarray.figures.notes import scale_line
 from imuarray.figures.tables import Column
+
+YES_NO = {True: "yes", False: "no"}
 
 BARS = (
     Column("bar", "set and what is counted", "set and what is counted"),
@@ -52,23 +58,46 @@ ADDED = (
 )
 
 
-def added_notes(name: str) -> list[str]:
-    """The small print under the effects added to a measured recording."""
-    return [
+def table_added(before: dict, truths: list[dict], after: list[dict], name: str):
+    """Effects added to the recording ``name``: found on top of what is there?
+
+    ``before``: the diagnosis of the recording as it is; ``truths``, ``after``: what was added, and
+    the diagnosis then.
+    """
+    pairs = zip(truths, after, strict=True)
+    table = pd.DataFrame([grade_added(truth, before, found) for truth, found in pairs])
+    table["found"] = table.found.map(YES_NO)
+    note = (
         f"Recording {name}; each effect alone, of its largest realistic size, added to one IMU's"
         " readings. Found: named, or among what the named one cannot be told from; other new"
-        " names are causes that the recording as it is does not have.",
+        " names are causes that the recording as it is does not have."
+    )
+    return table, ADDED, "Effects added to a measured recording.", [note]
+
+
+def table_blind_bars(rows: dict, settings: dict):
+    """What was asked of the diagnosis and what was measured; ``rows``: graded recordings."""
+    found = summary.recordings(rows["rows"])
+    table = criteria(found)
+    # empty where there is no verdict to be sure of
+    table["sure"] = [YES_NO.get(value, "") for value in table.sure]
+    notes = [
+        f"{scale_line(settings)}; {len(found)} recordings, {int(found.crash.sum())} without an"
+        " answer. Measured: on 8 IMUs, 125 Hz, 24 s, for which the bars are set; all settings"
+        " beside it. Limits: Clopper and Pearson's; of the coverage, from the spread between"
+        " recordings.",
+        "Right class: the effect is named, or among those that the named one is said to be"
+        " indistinguishable from. A wrong name: in its class there is nothing of the truth. A"
+        " crash counts as a miss where a bar is a least share, and has a bar of its own. In a"
+        " gauge the array is not determined, and no intervals around one answer can cover.",
+        _time_line(found),
     ]
+    caption = "Blind study: what was asked of the diagnosis, and what was measured."
+    return table, BARS, caption, notes
 
 
-def shown(table: pd.DataFrame) -> pd.DataFrame:
-    """The bars with words for yes and no, empty where a bar has no such thing."""
-    words = {True: "yes", False: "no"}
-    return table.assign(sure=[words.get(value, "") for value in table.sure])
-
-
-def time_line(recordings: pd.DataFrame) -> str:
-    """How long the diagnoses took, from `imuarray.blind.summary.recordings`."""
+def _time_line(recordings: pd.DataFrame) -> str:
+    """How long the diagnoses took."""
     part = recordings[recordings.standard & ~recordings.crash]
     if part.empty:
         return "No diagnosis of 8 IMUs, 125 Hz, 24 s."
@@ -79,26 +108,14 @@ def time_line(recordings: pd.DataFrame) -> str:
     )
 
 
-def bars_notes(recordings: pd.DataFrame, scale: str) -> list[str]:
-    """The small print under the bars."""
-    return [
-        f"{scale}; {len(recordings)} recordings, {int(recordings.crash.sum())} without an answer."
-        " Measured: on 8 IMUs, 125 Hz, 24 s, for which the bars are set; all settings beside it."
-        " Limits: Clopper and Pearson's; of the coverage, from the spread between recordings.",
-        "Right class: the effect is named, or among those that the named one is said to be"
-        " indistinguishable from. A wrong name: in its class there is nothing of the truth. A"
-        " crash counts as a miss where a bar is a least share, and has a bar of its own. In a"
-        " gauge the array is not determined, and no intervals around one answer can cover.",
-        time_line(recordings),
-    ]
-
-
-def gain_notes(scale: str) -> list[str]:
-    """The small print under gain and coverage."""
-    return [
-        f"{scale}. Gains over the base model (and over the same with its noise enlarged to what"
-        " its residual shows) are means over recordings, their errors those of the recordings'"
-        " own. RMSE: pooled over recordings and coordinates. Coverage: mean share of the"
-        " intervals of all coordinates; errors between recordings, medians and the rest are in"
-        " the CSV file. In a gauge, the array is not determined: no model can cover.",
-    ]
+def table_blind_gain(rows: dict, settings: dict):
+    """Gain, position error and coverage before and after, by effect; ``rows``: as graded."""
+    table = summary.gain_table(summary.recordings(rows["rows"]))
+    note = (
+        f"{scale_line(settings)}. Gains over the base model (and over the same with its noise"
+        " enlarged to what its residual shows) are means over recordings, their errors those of"
+        " the recordings' own. RMSE: pooled over recordings and coordinates. Coverage: mean share"
+        " of the intervals of all coordinates; errors between recordings, medians and the rest are"
+        " in the CSV file. In a gauge, the array is not determined: no model can cover."
+    )
+    return table, GAIN, "Blind study: what the extended model gains.", [note]

@@ -1,4 +1,4 @@
-"""Measured data: residuals beside the simulation's, agreement between recordings, noise."""
+"""Measured data: residuals beside the simulation's, agreement between recordings, noise, rails."""
 
 from __future__ import annotations
 
@@ -11,20 +11,112 @@ from imuarray.figures.style import (
     BLUE,
     PAGE,
     VERMILLION,
+    logarithmic,
     look,
     new_figure,
     styled,
 )
+from imuarray.figures.tables import Column
 
 SOURCES = {
     "measured": {"color": VERMILLION, "marker": "o", "linestyle": "-"},
     "simulated": {"color": BLUE, "marker": "s", "linestyle": (0, (4, 1.5))},
 }
 QUANTITIES = {"specific_force": "accelerometers", "angular_rate": "gyroscopes"}
+SERIES = {
+    "clipped": "gyroscopes at the rail",
+    "nominal": "papers' model, nominal positions",
+    "calibrated": "papers' model, calibrated positions",
+    "delayed": "the same and one delay",
+    "transferred": "both from another recording",
+    "extended": "extended model",
+}
+FIRST_ORDER = (
+    Column("recording", "recording", "recording"),
+    Column("triad", "IMU", "IMU"),
+    Column(
+        "residual_rms", "residual in still poses (mm/s²)", r"residual (mm/s$^2$)", "{:.2f}", 1e3
+    ),
+    Column("left_out", "poses left out", "left out"),
+    Column("force_sd", "accelerometer noise (mm/s²)", r"acc. (mm/s$^2$)", "{:.1f}", 1e3),
+    Column("force_ratio", "/ papers' σa", r"/ $\sigma_a$", "{:.2f}"),
+    Column("rate_sd", "gyroscope noise (deg/s)", "gyro. (deg/s)", "{:.3f}", float(np.degrees(1.0))),
+    Column("rate_ratio", "/ papers' σg", r"/ $\sigma_g$", "{:.2f}"),
+    Column("rate_correlation", "gyroscopes, neighbours' correlation", "corr.", "{:+.2f}"),
+)
+
+AGREEMENT = (
+    Column("samples", "T", "$T$"),
+    Column("assumed", "assumed σa", r"assumed $\sigma_a$"),
+    Column("accelerometer_sd", "its value (m/s²)", r"$\sigma_a$ (m/s$^2$)", "{:.2f}"),
+    Column("claimed_m", "claimed sd (µm)", r"claimed ($\mu$m)", "{:.3g}", 1e6),
+    Column("spread_m", "sd between recordings (µm)", r"between ($\mu$m)", "{:.3g}", 1e6),
+    Column("z_rms", "rms z", "rms $z$", "{:.2f}"),
+    Column("coverage_50", "50 % intervals cover (%)", r"50 \%", "{:.0f}", 100.0),
+    Column("coverage_95", "95 % intervals cover (%)", r"95 \%", "{:.0f}", 100.0),
+)
 
 
 def _rms(values) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
+
+
+def table_measured_first_order(residuals: list, noise: list, names: list[str]):
+    """First-order calibration of a board: residuals and noise of each IMU, a row for each.
+
+    ``residuals``, ``noise`` of the recordings ``names``: `firstorder.report`. The noise of an IMU
+    is the root mean square over its axes, SI units.
+    """
+    rows = []
+    for name, own, noises in zip(names, residuals, noise, strict=True):
+        sizes = {
+            (sensor, str(triad)): part
+            for (sensor, triad), part in noises.groupby(["sensor", "triad"])
+        }
+        for row in own.itertuples():
+            entry = {"recording": name, "triad": str(row.triad)}
+            entry |= {"residual_rms": row.residual_rms, "left_out": row.left_out}
+            for sensor, short in (("specific_force", "force"), ("angular_rate", "rate")):
+                part = sizes.get((sensor, str(row.triad)))
+                if part is None:
+                    continue
+                sd = _rms(part.sd)
+                entry |= {f"{short}_sd": sd, f"{short}_ratio": sd / part.declared.iloc[0]}
+                entry[f"{short}_correlation"] = part.correlation.mean()
+            rows.append(entry)
+    table = pd.DataFrame(rows)
+    note = (
+        "Noise: root mean square over the axes, from differences of neighbouring readings in the"
+        " still poses, beside the noise the recording declared (the papers')."
+    )
+    columns = [column for column in FIRST_ORDER if column.name in table]
+    caption = "First-order calibration from still poses: residual and noise of each IMU"
+    return table, columns, caption, [note]
+
+
+def table_measured_agreement(summary: pd.DataFrame):
+    """Coverage and z-scores between recordings of a board; ``summary``: `measured.agreement`."""
+    table = summary.astype({"assumed": str})
+    note = (
+        f"{table.recordings.max()} recordings, differences of all pairs in all coordinates. Pairs"
+        " share recordings and coordinates share a motion, so the shares have no simple error."
+    )
+    caption = "Do recordings of one board agree within their claimed widths?"
+    return table, AGREEMENT, caption, [note]
+
+
+def figure_measured_residuals(
+    summary: pd.DataFrame, histogram: pd.DataFrame, name: str, settings: dict
+):
+    """What the simulation gets wrong; `measured.residuals.compare` of the recording ``name``."""
+    noise = settings["noise"]
+    footer = [
+        f"Recording {name}, seed {settings['seed']}. Papers' model with"
+        f" σa = {noise['accelerometer_sd']:g} m/s² and σg = {noise['gyroscope_sd_dps']:g} deg/s,"
+        " positions and motion fitted; the simulation has the fitted motion, this noise and the"
+        " same rails, and is fitted likewise."
+    ]
+    return residual_figure(summary, histogram, footer), summary
 
 
 @styled
@@ -87,11 +179,17 @@ def _against(axes, table, factor, label):
 
 
 @styled
-def agreement_figure(summary: pd.DataFrame, pairs: pd.DataFrame, footer=()):
+def figure_measured_agreement(summary: pd.DataFrame, pairs: pd.DataFrame, group: str):
     """How far recordings of one board lie apart, in claimed widths, and the intervals' coverage.
 
-    ``summary``, ``pairs``: one row each per number of samples and assumed sigma_a (and pair).
+    ``summary``, ``pairs``: `measured.agreement`, one row each per number of samples and assumed
+    sigma_a (and pair); ``group``: the board.
     """
+    footer = [
+        f"{summary.recordings.max()} recordings of board {group}; differences"
+        " of all pairs in all coordinates, over their claimed sd. Pairs share recordings, and a"
+        " recording's coordinates share its motion."
+    ]
     figure = new_figure(footer, PAGE, 2.7)
     left, middle, right = figure.subplots(1, 3)
     most = summary.samples.max()
@@ -115,14 +213,14 @@ def agreement_figure(summary: pd.DataFrame, pairs: pd.DataFrame, footer=()):
     left.plot(grid, 2 * ndtr(grid) - 1, color=BLACK, linewidth=1, label="if widths were right")
     left.set(xscale="log", xlabel="|z| between recordings", ylabel="share of differences")
     left.set_title(f"$T = {most}$, {len(size)} differences")
-    middle.set(xscale="log", yscale="log", xlabel="samples $T$", ylabel="sd (µm)")
+    logarithmic(middle, "samples $T$", "sd (µm)")
     middle.set_title("between recordings (filled)\nand claimed (open, dotted)")
     for nominal in (50, 95):
         right.axhline(nominal, color=BLACK, linewidth=0.6)
     right.set(xscale="log", ylim=(0, 102), xlabel="samples $T$", ylabel="covered (%)")
     right.set_title("95 % intervals (filled)\nand 50 % intervals (open)")
     figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=4)
-    return figure
+    return figure, summary
 
 
 def _assumed(name, summary, most):
@@ -133,11 +231,21 @@ def _assumed(name, summary, most):
 
 
 @styled
-def noise_figure(allan: pd.DataFrame, papers: dict[str, float], footer=()):
+def figure_measured_noise(allan: pd.DataFrame, name: str, settings: dict):
     """Allan deviation of the still poses, every axis of every IMU, and the papers' white noise.
 
-    ``papers``: sd of one reading by sensor, SI units, drawn as tau^(-1/2).
+    ``allan``: `firstorder.report.allan_table` of the recording ``name``. The papers' sd of one
+    reading is drawn as tau^(-1/2).
     """
+    noise = settings["noise"]
+    papers = {
+        "specific_force": noise["accelerometer_sd"],
+        "angular_rate": np.radians(noise["gyroscope_sd_dps"]),
+    }
+    footer = [
+        f"Still poses of recording {name}. Black: the papers' σa ="
+        f" {noise['accelerometer_sd']:g} m/s² and σg = {noise['gyroscope_sd_dps']:g} deg/s."
+    ]
     figure = new_figure(footer, PAGE, 2.8)
     titles = {
         "specific_force": (1e3, "accelerometers (mm/s²)"),
@@ -152,7 +260,35 @@ def noise_figure(allan: pd.DataFrame, papers: dict[str, float], footer=()):
         taus = np.sort(part.tau_s.unique())
         white = factor * papers[sensor] * np.sqrt(taus[0] / taus)
         axes.plot(taus, white, color=BLACK, linewidth=1.2, label="papers' σ, white")
-        axes.set(xscale="log", yscale="log", xlabel="averaging time τ (s)",
-                 ylabel=f"Allan deviation, {title}")  # fmt: skip
+        logarithmic(axes, "averaging time τ (s)", f"Allan deviation, {title}")
         axes.legend()
+    return figure, allan
+
+
+@styled
+def figure_past_rail(table: pd.DataFrame, rail_dps: float, footer=()):
+    """Median error and RMSE of the hidden readings over the angular rate; log-log."""
+    figure = new_figure(footer, PAGE, 2.8)
+    panels = figure.subplots(1, 2, sharey=True)
+    # a normal error of sd 1 has the median 0.674
+    columns = (
+        ("median_dps", "median |error|", "sd_dps", 0.674),
+        ("rmse_dps", "RMSE", "rms_sd_dps", 1),
+    )
+    for axes, (column, title, claimed, factor) in zip(panels, columns, strict=True):
+        for number, (name, label) in enumerate(SERIES.items()):
+            rows = table[table.model == name]
+            if len(rows):
+                axes.plot(rows.rate_dps, rows[column], label=label, **look(number), markersize=4)
+        rows = table[table.model == "extended"]
+        axes.plot(rows.rate_dps, factor * rows[claimed], color="0.4", linestyle=(0, (1, 1.5)),
+                  linewidth=1, label="extended model, as noise alone claims")  # fmt: skip
+        axes.axvline(rail_dps, color="0.6", linewidth=0.8)
+        logarithmic(axes, "angular rate of the hidden axis (deg/s)", None)
+        axes.set_xticks([250, 500, 1000, 2000], ["250", "500", "1000", "2000"])
+        axes.set_xticks([], minor=True)
+        axes.set_title(title)
+    panels[0].set_ylabel("error of the predicted reading (deg/s)")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=3)
     return figure

@@ -43,3 +43,11 @@ def chain_lines(verdicts: dict[int, dict]) -> list[str]:
     if bad:
         last += f" R-hat not below {threshold:g}, preliminary: T = {', '.join(bad)}."
     return [*lines, last]
+
+
+def unfinished(table, threshold: float) -> list[str]:
+    """A note on the rows whose chains fail the criterion; none if there are no such rows."""
+    failed = (~table.converged).sum()
+    if not failed:
+        return []
+    return [f"R-hat is not below {threshold:g} in {failed} of {len(table)} rows: preliminary."]

@@ -77,6 +77,25 @@ def legend_items(axes, last=()):
     return [handles[i] for i in order], [labels[i] for i in order]
 
 
+def points(axes, x, y, error, index: int, without=(), **options) -> None:
+    """Hollow markers with error bars, in the look of series ``index``."""
+    axes.errorbar(x, y, error, markerfacecolor="none", **(look(index, *without) | options))
+
+
+def level(axes, value: float, text: str, **options) -> None:
+    """A thin horizontal line with a small text above its right end."""
+    axes.axhline(value, linewidth=0.8, **options)
+    axes.annotate(
+        text, (0.99, value), xycoords=("axes fraction", "data"), xytext=(0, 2),
+        textcoords="offset points", ha="right", size=7, color="0.3",
+    )  # fmt: skip
+
+
+def logarithmic(axes, x: str, y: str, **options) -> None:
+    """Both axes logarithmic, with their labels."""
+    axes.set(xscale="log", yscale="log", xlabel=x, ylabel=y, **options)
+
+
 def significant(value: float) -> str:
     """Three significant digits without an exponent: '2100', '31.4', '0.412'."""
     return f"{float(f'{value:.3g}'):.10g}"

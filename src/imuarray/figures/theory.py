@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from imuarray.figures.style import BLACK, GREY, MARKERS, look, new_figure, styled
+from imuarray.figures.notes import scale_line
+from imuarray.figures.style import (
+    BLACK,
+    GREY,
+    MARKERS,
+    logarithmic,
+    look,
+    new_figure,
+    points,
+    styled,
+)
 from imuarray.figures.tables import Column
 
 ESTIMATORS = ("maximum likelihood", "with the prior")
@@ -17,41 +27,41 @@ RANKS = (
     Column("rank", "rank of the information", "rank"),
     Column("condition", "condition of what is seen", "condition", "{:.2g}"),
 )
-RANKS_NOTES = (
-    "Fisher information of the positions r_2 ... r_A with the motion unknown, scaled to a unit"
-    " diagonal. A rank below the number of unknowns: the positions cannot be identified.",
-)
+
+
+def table_theory_ranks(rows: pd.DataFrame, settings: dict):
+    """Rank of the information over N, motion and geometry; ``rows``: `studies.bound.ranks`."""
+    note = (
+        "Fisher information of the positions r_2 ... r_A with the motion unknown, scaled to a unit"
+        " diagonal. A rank below the number of unknowns: the positions cannot be identified."
+    )
+    caption = "Which motion and geometry tell the positions."
+    return rows, RANKS, caption, [note, scale_line(settings)]
 
 
 @styled
-def efficiency_figure(table: pd.DataFrame, footer=()):
+def figure_theory_efficiency(rows: pd.DataFrame, settings: dict):
     """RMSE over N beside the bound, their ratio, and that over the noise.
 
-    ``table``: `studies.bound.efficiency` for the model's noise, then for others at one N.
+    ``rows``: `studies.bound.efficiency` for the model's noise, then for others at one N.
     """
+    table = rows
+    footer = [scale_line(settings, f"{table.realisations.max()} realisations per point")]
     figure = new_figure(footer, height=5.4)
     top, below, louder = figure.subplots(3, 1, height_ratios=[2, 1, 1])
     others = table[table.noise != 1.0]
     for index, name in enumerate(ESTIMATORS):
         rows = table[(table.estimator == name) & (table.noise == 1.0)]
-        style = look(index, "linestyle")
-        top.errorbar(
-            rows.samples, rows.rmse_m, rows.rmse_se_m, linestyle="none", label=f"RMSE, {name}",
-            markerfacecolor="none", **style,
-        )  # fmt: skip
+        points(top, rows.samples, rows.rmse_m, rows.rmse_se_m, index, linestyle="none",
+               label=f"RMSE, {name}")  # fmt: skip
         top.plot(
-            rows.samples, rows.bound_m, color=style["color"], linestyle=look(index)["linestyle"],
+            rows.samples, rows.bound_m, **look(index, "marker"),
             label="bound" if index == 0 else "linearised posterior",
         )  # fmt: skip
-        below.errorbar(
-            rows.samples * 1.04**index, rows.ratio, rows.ratio_se, linestyle="none",
-            markerfacecolor="none", **style,
-        )  # fmt: skip
+        places = rows.samples * 1.04**index
+        points(below, places, rows.ratio, rows.ratio_se, index, linestyle="none")
         rows = table[(table.estimator == name) & table.samples.isin(others.samples)]
-        louder.errorbar(
-            rows.noise * 1.04**index, rows.ratio, rows.ratio_se, markerfacecolor="none",
-            **look(index),
-        )  # fmt: skip
+        points(louder, rows.noise * 1.04**index, rows.ratio, rows.ratio_se, index)
     for panel in (below, louder):
         panel.axhline(1.0, color=BLACK, linewidth=0.8)
         panel.set(ylabel="error / bound")
@@ -60,24 +70,25 @@ def efficiency_figure(table: pd.DataFrame, footer=()):
     counts = ", ".join(map(str, others.samples.unique()))
     louder.set(xscale="log", xlabel=f"Noise, times the sensors' own ($N$ = {counts})")
     top.legend(loc="upper right")
-    return figure
+    return figure, table
 
 
 @styled
-def convergence_figure(table: pd.DataFrame, nominal_sd: float, footer=()):
-    """Iterations to 1.01 times the bound over the motion, and ML-BCD's rate, foreseen and seen.
+def figure_theory_convergence(rows: pd.DataFrame, settings: dict):
+    """Iterations to 1.01 times the bound over the motion, and ML-BCD's rate, predicted and seen.
 
-    ``table``: `studies.bound.convergence` of the array, then of others. Motions that tell hardly
-    more than the nominal positions, off by ``nominal_sd`` (m), do are left out above; filled
-    triangles at the top are medians beyond the limit of iterations.
+    ``rows``: `studies.bound.convergence` of the array, then of others. Motions that determine the
+    positions hardly better than they are known nominally are left out above; filled triangles at
+    the top are medians beyond the limit of iterations.
     """
-    figure = new_figure(footer, height=5.4)
+    table, nominal_sd = rows, settings["paper2017"]["position_sd"]
+    figure = new_figure([scale_line(settings, f"N = {table.samples.max()}")], height=5.4)
     top, below = figure.subplots(2, 1)
     own = table[table.array == table.array.iloc[0]]
     for index, (acceleration, rows) in enumerate(own.groupby("angular_acceleration_dps2")):
         # medians: a run that did not come to an end counts as longer than any other
-        told = rows[rows.groupby("angular_rate_dps").bound_m.transform("median") < nominal_sd / 3]
-        counts = told[["angular_rate_dps", "bcd_iterations", "newton_iterations"]].fillna(np.inf)
+        known = rows[rows.groupby("angular_rate_dps").bound_m.transform("median") < nominal_sd / 3]
+        counts = known[["angular_rate_dps", "bcd_iterations", "newton_iterations"]].fillna(np.inf)
         medians = counts.groupby("angular_rate_dps").median()
         never = medians.index[np.isinf(medians.bcd_iterations)]
         medians = medians.replace(np.inf, np.nan)
@@ -102,28 +113,24 @@ def convergence_figure(table: pd.DataFrame, nominal_sd: float, footer=()):
             marker=MARKERS[-1 - index], markerfacecolor="none", label=name,
         )  # fmt: skip
     top.plot([], [], color=GREY, linestyle=":", label="Gauss-Newton, each")
-    top.set(
-        xscale="log", yscale="log", xlabel=r"Angular rate $\|\omega\|$ (deg/s)",
-        ylabel="iterations to 1.01 × bound",
-    )  # fmt: skip
+    logarithmic(top, r"Angular rate $\|\omega\|$ (deg/s)", "iterations to 1.01 × bound")
     top.legend(loc="lower center", bbox_to_anchor=(0.5, 0.12), ncols=2, columnspacing=1.0)
     drawn = 1 - table.contraction[table.observed.notna()]
     ends = np.array([drawn.min() / 2, min(drawn.max() * 2, 1.0)])
     below.plot(ends, ends, color=BLACK, linewidth=0.8)
-    below.set(
-        xscale="log", yscale="log", xlabel="share of the error lost in an iteration, foreseen",
-        ylabel="seen",
-    )  # fmt: skip
+    logarithmic(below, "share of the error lost in an iteration, foreseen", "seen")
     below.legend(loc="upper left", title="other arrays", title_fontsize=7)
-    return figure
+    return figure, table
 
 
 @styled
-def size_figure(table: pd.DataFrame, footer=()):
+def figure_theory_size(rows: pd.DataFrame, settings: dict):
     """The bound over the array's size, absolute and relative to it; `studies.bound.against_size`.
 
     Both on one axis of lengths would hide that the one falls: two panels.
     """
+    table = rows
+    footer = [scale_line(settings, f"N = {settings['theory']['convergence_samples']}")]
     figure = new_figure(footer, height=4.0)
     top, below = figure.subplots(2, 1, sharex=True)
     top.plot(1e3 * table.extent_m, 1e6 * table.bound_m, markerfacecolor="none", **look(0))
@@ -131,12 +138,7 @@ def size_figure(table: pd.DataFrame, footer=()):
     # both panels over as many decades, so that what does not change looks so
     decades = np.log10(table.relative.max() / table.relative.min()) * 0.6
     middle = 1e6 * np.median(table.bound_m)
-    top.set(
-        xscale="log", yscale="log", ylabel="bound (µm)",
-        ylim=(middle * 10**-decades, middle * 10**decades),
-    )  # fmt: skip
-    below.set(
-        xscale="log", yscale="log", xlabel="size of the array, corner to corner (mm)",
-        ylabel="bound / size (ppm)",
-    )  # fmt: skip
-    return figure
+    span = (middle * 10**-decades, middle * 10**decades)
+    logarithmic(top, None, "bound (µm)", ylim=span)
+    logarithmic(below, "size of the array, corner to corner (mm)", "bound / size (ppm)")
+    return figure, table

@@ -6,9 +6,10 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from imuarray.figures.notes import scale_line
 from imuarray.figures.style import BLACK, PAGE, SKY, look, new_figure, styled
 from imuarray.figures.tables import Column
-from imuarray.studies.calibrated import WHOLE
+from imuarray.studies.calibrated import WHOLE, coverage
 
 BINS = 20
 
@@ -32,7 +33,7 @@ COVERAGE = (
     Column("slow", "slow chains", "slow"),
     Column("apart", "farthest from NUTS", "from NUTS", "{:.2f}"),
 )
-NOTES = (
+COVERAGE_NOTE = (
     "Truths drawn from the prior, motion from its own, which the samplers know (the paper's limit"
     " of a flat motion prior cannot be simulated; docs/findings.md says what it does to the array's"
     " size). ±: standard errors over replicates."
@@ -40,7 +41,7 @@ NOTES = (
     " small."
     " p: Kolmogorov and Smirnov's, the smallest of all quantities times their number."
     " Slow: fewer than 50 of 199 kept draws are worth an independent one. Farthest from NUTS: the"
-    " largest rms difference between both methods' levels of one truth; 0.05 is chance.",
+    " largest rms difference between both methods' levels of one truth; 0.05 is chance."
 )
 JOINT = (
     Column("sampler", "sampler", "sampler"),
@@ -52,13 +53,26 @@ JOINT = (
     Column("misfit_z", "|z| of the misfit", r"$|z|$, misfit", "{:.2f}"),
     Column("p", "p", "$p$", "{:.2g}"),
 )
-JOINT_NOTES = (
+JOINT_NOTE = (
     "Measurements are drawn given the positions, then the positions moved by the sampler given the"
     " measurements, over and over: right samplers leave the positions' prior as it is, and the"
     " misfit between both as in independent draws. z: means of the coordinates and their squares"
     " against the prior's, of the misfit against the independent ones', in Monte Carlo standard"
-    " errors; p: of the largest, times the number of comparisons.",
+    " errors; p: of the largest, times the number of comparisons."
 )
+
+
+def table_validation_coverage(levels: list[pd.DataFrame], settings: dict):
+    """How often intervals hold the truth, by method and T; ``levels``: `studies.calibrated`."""
+    table = coverage(pd.concat(levels))
+    notes = [COVERAGE_NOTE, scale_line(settings)]
+    return table, COVERAGE, "How often intervals hold the truth.", notes
+
+
+def table_validation_joint(rows: pd.DataFrame, settings: dict):
+    """The joint test of samplers and simulation; ``rows``: `studies.joint`."""
+    caption = "Samplers and simulation by turns: do the positions keep their prior?"
+    return rows, JOINT, caption, [JOINT_NOTE, scale_line(settings)]
 
 
 def histogram(levels: pd.DataFrame) -> pd.DataFrame:
@@ -88,8 +102,16 @@ def histogram(levels: pd.DataFrame) -> pd.DataFrame:
 
 
 @styled
-def rank_figure(table: pd.DataFrame, footer=()):
-    """A histogram for each method (row) and T (column); band: all 20 bins of a panel, 95 %."""
+def figure_validation_ranks(levels: list[pd.DataFrame], settings: dict):
+    """A histogram for each method (row) and T (column); band: all 20 bins of a panel, 95 %.
+
+    ``levels``: `studies.calibrated`, of each setting.
+    """
+    table = histogram(pd.concat(levels))
+    footer = [
+        scale_line(settings, "n: truths from the prior, those without intervals left out"),
+        "Histograms of all positions' coordinates; band: 95 % for all bins of a panel together.",
+    ]
     methods = list(dict.fromkeys(table.method))
     settings = list(dict.fromkeys(zip(table.setting, table.samples, strict=True)))
     figure = new_figure(footer, PAGE, 0.3 + 1.35 * len(methods))
@@ -110,4 +132,4 @@ def rank_figure(table: pd.DataFrame, footer=()):
     for axes in panels[:, 0]:
         axes.set_ylabel("density")
     panels[0, 0].set(xlim=(0, 1), ylim=(0, None))
-    return figure
+    return figure, table

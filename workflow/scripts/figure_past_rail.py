@@ -1,4 +1,4 @@
-"""Hidden gyroscope readings foretold by several models -> table, PDF, PNG, CSV."""
+"""Hidden gyroscope readings predicted by several models -> table, PDF, PNG, CSV."""
 
 from job import job
 
@@ -10,7 +10,7 @@ with job(snakemake):
 
     from imuarray.analysis.extension import diagnosed
     from imuarray.analysis.past_rail import ASSUMED, BINS, lead_of, past_rail
-    from imuarray.figures.past_rail import past_rail_figure
+    from imuarray.figures.measured import figure_past_rail
     from imuarray.figures.style import write_figure
     from imuarray.recording import read_recording
 
@@ -28,10 +28,10 @@ with job(snakemake):
     table = past_rail(recording, found, base_of(snakemake.input.diagnosis), elsewhere=elsewhere)
     footer = [
         f"Recording {snakemake.wildcards.name}: gyroscope readings beyond a made-up rail of"
-        f" {BINS[0]} deg/s are hidden and foretold from the rest, 150 samples a bin of their"
+        f" {BINS[0]} deg/s are withheld and predicted from the rest, 150 samples a bin of their"
         f" fastest axis; papers' model with σa = {ASSUMED:g} m/s². Positions and effects are from"
         " the same recording's diagnosis"
         + (f"; 'another recording' is {others[0]}." if others else ".")
     ]
-    figure = past_rail_figure(table, BINS[0], footer)
+    figure = figure_past_rail(table, BINS[0], footer)
     write_figure(figure, table, **dict(snakemake.output.items()))

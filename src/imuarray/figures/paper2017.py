@@ -6,22 +6,53 @@ import matplotlib
 import numpy as np
 import pandas as pd
 
-from imuarray.figures.style import BLACK, GREY, MARKERS, legend_items, look, new_figure, styled
+from imuarray.figures.notes import scale_line
+from imuarray.figures.style import (
+    BLACK,
+    GREY,
+    MARKERS,
+    legend_items,
+    level,
+    logarithmic,
+    new_figure,
+    points,
+    styled,
+)
+from imuarray.geometry import array_from_config
 
 MICROMETRE = 1e-6  # m, the level that the paper's conclusions speak of
+RATE = r"Angular rate $\|\omega\|$ (deg/s)"
 
 
-def fig3_table(rates: pd.DataFrame, gyroscope_sd_dps: float, gyroscopes: int) -> pd.DataFrame:
-    """The plotted numbers of figure 3 from `calibration/rate_error.csv`.
+def _footer(errors: pd.DataFrame, settings: dict) -> list[str]:
+    return [scale_line(settings, f"{errors.realisations.max()} realisations per point")]
 
-    Columns: series (array, gyroscopes, unsaturated), position_sd_m, angular_rate_dps,
-    rmse_dps, rmse_se_dps. The gyroscopes' average does not know the positions: its mean
-    squared errors are averaged over all position errors. ``unsaturated`` is what it would
-    be if no gyroscope ever saturated, sigma_g / sqrt(G).
+
+@styled
+def figure_2017_fig3(rates: pd.DataFrame, settings: dict):
+    """RMSE of the angular rate over |omega|, a line for each position error; log-log.
+
+    ``rates``: `calibration/rate_error.csv`. Plotted are the columns series (array, gyroscopes,
+    unsaturated), position_sd_m, angular_rate_dps, rmse_dps, rmse_se_dps; ``unsaturated`` is what
+    the gyroscopes' average would be if none ever saturated, sigma_g / sqrt(G).
     """
+    gyroscopes = array_from_config(settings["array"]).gyroscopes
+    least = settings["noise"]["gyroscope_sd_dps"] / np.sqrt(gyroscopes)
     array = rates[["position_sd_m", "angular_rate_dps"]].assign(
         series="array", rmse_dps=rates.array_rmse_dps, rmse_se_dps=rates.array_rmse_se_dps
     )
+    means = _gyroscopes_average(rates).assign(series="gyroscopes")
+    unsaturated = means.assign(series="unsaturated", rmse_dps=least, rmse_se_dps=0.0)
+    columns = ["series", "position_sd_m", "angular_rate_dps", "rmse_dps", "rmse_se_dps"]
+    table = pd.concat([array, means, unsaturated], ignore_index=True)[columns]
+    return _draw_fig3(table, settings, _footer(rates, settings)), table
+
+
+def _gyroscopes_average(rates: pd.DataFrame) -> pd.DataFrame:
+    """RMSE of the gyroscopes' average and its error by rate.
+
+    It does not know the positions: its mean squared errors are averaged over position errors.
+    """
     square = rates.gyroscopes_rmse_dps**2
     error = 2 * rates.gyroscopes_rmse_dps * rates.gyroscopes_rmse_se_dps
     groups = pd.DataFrame(
@@ -29,26 +60,16 @@ def fig3_table(rates: pd.DataFrame, gyroscope_sd_dps: float, gyroscopes: int) ->
     ).groupby("angular_rate_dps", as_index=False)
     means = groups.mean().assign(rmse_dps=lambda x: np.sqrt(x.square))
     counts = groups.size()["size"]
-    means["rmse_se_dps"] = np.sqrt(means.error / counts) / (2 * means.rmse_dps)
-    level = means[["angular_rate_dps"]].assign(
-        series="unsaturated", rmse_dps=gyroscope_sd_dps / np.sqrt(gyroscopes), rmse_se_dps=0.0
-    )
-    joined = pd.concat([array, means.assign(series="gyroscopes"), level], ignore_index=True)
-    return joined[["series", "position_sd_m", "angular_rate_dps", "rmse_dps", "rmse_se_dps"]]
+    return means.assign(rmse_se_dps=np.sqrt(means.error / counts) / (2 * means.rmse_dps))
 
 
-@styled
-def fig3(table: pd.DataFrame, saturation_dps: float, footer=()):
-    """RMSE of the angular rate over |omega|, a line for each position error; log-log."""
+def _draw_fig3(table, settings, footer):
     figure = new_figure(footer, height=3.2)
     axes = figure.subplots()
     array = table[table.series == "array"]
     for index, (sd, rows) in enumerate(array.groupby("position_sd_m", sort=False)):
         label = rf"$\sigma_r = {'0' if sd == 0 else _power(sd)}$ m"
-        axes.errorbar(
-            rows.angular_rate_dps, rows.rmse_dps, rows.rmse_se_dps, label=label,
-            markerfacecolor="none", **look(index),
-        )  # fmt: skip
+        points(axes, rows.angular_rate_dps, rows.rmse_dps, rows.rmse_se_dps, index, label=label)
     averages = {
         "average of the gyroscopes": ("gyroscopes", (0, (5, 2))),
         "the same without saturation": ("unsaturated", (0, (1, 2))),
@@ -56,25 +77,25 @@ def fig3(table: pd.DataFrame, saturation_dps: float, footer=()):
     for label, (name, dashes) in averages.items():
         rows = table[table.series == name]
         axes.plot(rows.angular_rate_dps, rows.rmse_dps, color=BLACK, linestyle=dashes, label=label)
-    axes.axvline(saturation_dps, color=GREY, linewidth=0.8)
+    saturation = settings["paper2017"]["gyroscope_range_dps"]
+    axes.axvline(saturation, color=GREY, linewidth=0.8)
     axes.annotate(
-        f"saturation\n{saturation_dps:g} deg/s", (saturation_dps, 0.5),
+        f"saturation\n{saturation:g} deg/s", (saturation, 0.5),
         xycoords=("data", "axes fraction"), xytext=(-3, 0), textcoords="offset points",
         ha="right", va="top", size=7, color="0.3",
     )  # fmt: skip
-    axes.set(
-        xscale="log", yscale="log", xlabel=r"Angular rate $\|\omega\|$ (deg/s)",
-        ylabel="RMSE of the angular rate (deg/s)",
-    )  # fmt: skip
+    logarithmic(axes, RATE, "RMSE of the angular rate (deg/s)")
     axes.legend(*legend_items(axes, averages), loc="upper left")
     return figure
 
 
-def fig4_table(errors: pd.DataFrame) -> pd.DataFrame:
-    """The plotted numbers of figure 4 from `calibration/position_error_samples.csv`.
+@styled
+def figure_2017_fig4(errors: pd.DataFrame, settings: dict):
+    """RMSE of the positions over N, a line for each number of iterations; log-log.
 
-    Columns: series (bcd, reference), iterations, samples, rmse_m, rmse_se_m. The reference
-    is c N^-1/2, with c the geometric mean of the last line's RMSE N^1/2 at N >= 10.
+    ``errors``: `calibration/position_error_samples.csv`. Plotted are the columns series (bcd,
+    reference), iterations, samples, rmse_m, rmse_se_m; the reference is c N^-1/2, with c the
+    geometric mean of the last line's RMSE N^1/2 at N >= 10.
     """
     lines = errors[["iterations", "samples", "rmse_m", "rmse_se_m"]].assign(series="bcd")
     last = lines[lines.iterations == lines.iterations.max()]
@@ -83,14 +104,13 @@ def fig4_table(errors: pd.DataFrame) -> pd.DataFrame:
     reference = last.assign(
         series="reference", rmse_m=constant / np.sqrt(last.samples), rmse_se_m=0.0
     )
-    joined = pd.concat([lines, reference], ignore_index=True)
-    joined = joined.sort_values(["series", "iterations", "samples"], ignore_index=True)
-    return joined[["series", "iterations", "samples", "rmse_m", "rmse_se_m"]]
+    table = pd.concat([lines, reference], ignore_index=True)
+    table = table.sort_values(["series", "iterations", "samples"], ignore_index=True)
+    table = table[["series", "iterations", "samples", "rmse_m", "rmse_se_m"]]
+    return _draw_fig4(table, _footer(errors, settings)), table
 
 
-@styled
-def fig4(table: pd.DataFrame, footer=()):
-    """RMSE of the positions over N, a line for each number of iterations; log-log."""
+def _draw_fig4(table, footer):
     figure = new_figure(footer, height=3.5)
     axes = figure.subplots()
     groups = list(table[table.series == "bcd"].groupby("iterations"))
@@ -108,10 +128,7 @@ def fig4(table: pd.DataFrame, footer=()):
         "1 µm", (rows.samples.min(), MICROMETRE), xytext=(0, 2), textcoords="offset points",
         size=7, color="0.3",
     )  # fmt: skip
-    axes.set(
-        xscale="log", yscale="log", xlabel="Time samples $N$ (count)",
-        ylabel="RMSE of the positions (m)",
-    )  # fmt: skip
+    logarithmic(axes, "Time samples $N$ (count)", "RMSE of the positions (m)")
     axes.set_ylim(bottom=min(0.7 * MICROMETRE, 0.7 * table.rmse_m.min()))
     figure.legend(
         *legend_items(axes, [r"$N^{-1/2}$"]), loc="outside upper center", ncols=4,
@@ -120,40 +137,26 @@ def fig4(table: pd.DataFrame, footer=()):
     return figure
 
 
-def fig5_table(errors: pd.DataFrame) -> pd.DataFrame:
-    """The plotted numbers of figure 5 from `calibration/position_error_motion.csv`."""
-    columns = ["angular_acceleration_dps2", "angular_rate_dps", "rmse_m", "rmse_se_m"]
-    # degrees went through radians on the way
-    return errors[columns].assign(
-        angular_acceleration_dps2=errors.angular_acceleration_dps2.round(6),
-        angular_rate_dps=errors.angular_rate_dps.round(6),
-    )
-
-
 @styled
-def fig5(table: pd.DataFrame, position_sd: float, footer=()):
+def figure_2017_fig5(errors: pd.DataFrame, settings: dict):
     """RMSE of the positions over |omega|, a line for each |omega_dot|; log-log.
 
-    ``position_sd`` (m): the error of the starting positions, drawn as a level.
+    ``errors``: `calibration/position_error_motion.csv`, of which all that is plotted is a column.
     """
-    figure = new_figure(footer, height=3.0)
+    counts = f"N = {errors.samples.max()} time samples, {errors.iterations.max()} iterations"
+    columns = ["angular_acceleration_dps2", "angular_rate_dps", "rmse_m", "rmse_se_m"]
+    # degrees went through radians on the way
+    table = errors[columns].round({name: 6 for name in columns[:2]})
+    figure = new_figure([*_footer(errors, settings), counts], height=3.0)
     axes = figure.subplots()
     for index, (value, rows) in enumerate(table.groupby("angular_acceleration_dps2")):
-        axes.errorbar(
-            rows.angular_rate_dps, rows.rmse_m, rows.rmse_se_m, label=_number(value),
-            markerfacecolor="none", **look(index),
-        )  # fmt: skip
-    axes.axhline(position_sd, color=GREY, linewidth=0.8)
-    axes.annotate(
-        r"start ($\sigma_r$)", (0.99, position_sd), xycoords=("axes fraction", "data"),
-        xytext=(0, 2), textcoords="offset points", size=7, color="0.3", ha="right",
-    )  # fmt: skip
-    axes.set(
-        xscale="log", yscale="log", xlabel=r"Angular rate $\|\omega\|$ (deg/s)",
-        ylabel="RMSE of the positions (m)",
-    )  # fmt: skip
+        label = _number(value)
+        points(axes, rows.angular_rate_dps, rows.rmse_m, rows.rmse_se_m, index, label=label)
+    start = settings["paper2017"]["position_sd"]
+    level(axes, start, r"start ($\sigma_r$)", color=GREY)
+    logarithmic(axes, RATE, "RMSE of the positions (m)")
     axes.legend(loc="lower left", title=r"$\|\dot{\omega}\|$ (deg/s$^2$)", title_fontsize=7)
-    return figure
+    return figure, table
 
 
 def _power(value: float) -> str:

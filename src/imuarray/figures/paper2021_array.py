@@ -1,0 +1,312 @@
+"""Paper 2021, figures 1 and 5: the array, and where in its package each triad is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+from scipy.stats import chi2
+
+from imuarray.figures.notes import SOURCES, chain_lines, scale_line
+from imuarray.figures.paper2021 import after_burn_in, prior_of
+from imuarray.figures.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    PAGE,
+    SKY,
+    VERMILLION,
+    look,
+    new_figure,
+    styled,
+)
+from imuarray.geometry import UNDERSIDE_ROTATION, Array, array_from_config
+
+# The orientation marker in a topside package, in units of the package's sides. The text does
+# not say in which corner it is; on the axis that the underside is turned around, as here, both
+# sides' markers lie one above the other.
+MARKER = np.array([0.36, -0.36, 0.0])
+
+
+def below(array: Array) -> np.ndarray:
+    """Which triads (A,) lie on the underside: those below the middle of the board's height."""
+    height = array.positions[:, 2]
+    return height < (height.min() + height.max()) / 2 - 1e-9
+
+
+def layout_table(array: Array) -> pd.DataFrame:
+    """One row per triad: label, side, position, position relative to the first, marker (m)."""
+    under = below(array)
+    turn = np.where(under[:, None, None], UNDERSIDE_ROTATION, np.eye(3))
+    marker = turn @ (MARKER * np.array(array.package))
+    table = pd.DataFrame({"accelerometer": array.labels})
+    table["side"] = np.where(under, "underside", "topside")
+    for name, values in (
+        ("", array.positions), ("relative_", array.relative),
+        ("marker_", array.positions + marker),
+    ):  # fmt: skip
+        for axis, column in zip("xyz", values.T, strict=True):
+            table[f"{name}{axis}_m"] = column
+    for axis, length in zip(("length", "width", "height"), array.package, strict=True):
+        table[f"package_{axis}_m"] = length
+    return table
+
+
+@styled
+def figure_2021_fig1(settings: dict):
+    """Layout and dimensions: top view (y axis downwards) with numbers and pitch, and side view."""
+    array = array_from_config(settings["array"])
+    table = layout_table(array)
+    figure = new_figure([scale_line(settings, f"array {array.name}, nominal")], height=4.0)
+    top, side = figure.subplots(2, 1, height_ratios=[6.2, 1], sharex=True)
+    _top_view(top, table)
+    _side_view(side, table)
+    return figure, table
+
+
+def _top_view(axes, table):
+    mm = table[[c for c in table if c.endswith("_m")]] * 1e3
+    length, width = mm.package_length_m.iloc[0], mm.package_width_m.iloc[0]
+    under = (table.side == "underside").to_numpy()
+    for row in mm.itertuples():
+        if not under[row.Index]:
+            draw_package(axes, row.x_m, row.y_m, length, width, facecolor="0.35")
+            axes.plot(row.marker_x_m, row.marker_y_m, "o", color="white", markersize=3.2)
+        shift = 0.62 if under[row.Index] else -0.62
+        axes.text(
+            row.x_m, row.y_m + shift, table.accelerometer[row.Index], ha="center", va="center",
+            color="#9AD0F5" if under[row.Index] else "white", size=8,
+            style="italic" if under[row.Index] else "normal",
+        )  # fmt: skip
+    _dimension(axes, mm.x_m, mm.y_m.max() + 0.75 * width, "x")
+    _dimension(axes, mm.y_m, mm.x_m.min() - 0.75 * length, "y")
+    axes.set(aspect="equal", ylabel="y (mm), downwards")
+    axes.set_ylim(mm.y_m.max() + 1.3 * width, mm.y_m.min() - 0.8 * width)
+    axes.set_xlim(mm.x_m.min() - 2.15 * length, mm.x_m.max() + length)
+    axes.grid(False)
+    axes.set_title("Seen from above: upright topside, italic underside", size=8)
+
+
+def draw_package(axes, x, y, length, width, **options):
+    """The outline of a package centred at x, y; all in mm."""
+    options = {"edgecolor": BLACK, "linewidth": 0.6} | options
+    axes.add_patch(Rectangle((x - length / 2, y - width / 2), length, width, **options))
+
+
+def _dimension(axes, values, place, along):
+    """An arrow between the first two distinct centres, at ``place`` across, and its length."""
+    centres = np.unique(np.round(values, 9))
+    if centres.size < 2:
+        return
+    first, second = (centres[0], centres[1]) if along == "x" else (centres[-1], centres[-2])
+    ends = [(first, place), (second, place)] if along == "x" else [(place, first), (place, second)]
+    axes.annotate(
+        "", *ends, arrowprops={"arrowstyle": "<->", "linewidth": 0.7, "shrinkA": 0, "shrinkB": 0}
+    )
+    middle = np.mean(ends, axis=0)
+    axes.annotate(
+        f"{abs(second - first):.1f} mm", middle, ha="center", va="center", size=7.5,
+        rotation=0 if along == "x" else 90, xytext=(0, -7) if along == "x" else (-7, 0),
+        textcoords="offset points",
+    )  # fmt: skip
+
+
+def _side_view(axes, table):
+    mm = table[[c for c in table if c.endswith("_m")]] * 1e3
+    length, height = mm.package_length_m.iloc[0], mm.package_height_m.iloc[0]
+    low, high = mm.z_m.min(), mm.z_m.max()
+    if high - low > height:  # what is between the packages is the circuit board
+        axes.add_patch(
+            Rectangle(
+                (mm.x_m.min() - 0.7 * length, low + height / 2),
+                np.ptp(mm.x_m) + 1.4 * length,
+                high - low - height,
+                facecolor="#BFD8C6",
+                edgecolor="0.4",
+                linewidth=0.5,
+            )  # fmt: skip
+        )
+    for x, z in sorted(set(zip(mm.x_m.round(6), mm.z_m.round(6), strict=True))):
+        draw_package(axes, x, z, length, height, facecolor="0.35")
+        axes.plot(x, z, "+", color="white", markersize=4)
+    if high > low:
+        _height(axes, mm.x_m.min() - 0.8 * length, mm.x_m.min() - length / 2, low, high)
+    axes.set(aspect="equal", xlabel="x (mm)", ylabel="z (mm)", ylim=(low - 1.2, high + 1.2))
+    axes.grid(False)
+    axes.set_title("Side view", size=8)
+
+
+def _height(axes, place, edge, low, high):
+    """The distance between the sides' centres: an arrow at ``place``, lines to ``edge``."""
+    axes.annotate(
+        "", (place, low), (place, high),
+        arrowprops={"arrowstyle": "<->", "linewidth": 0.7, "shrinkA": 0, "shrinkB": 0},
+    )  # fmt: skip
+    for z in (low, high):
+        axes.plot([place, edge], [z, z], color=BLUE, linewidth=0.4)
+    axes.annotate(
+        f"{high - low:.1f} mm", (place, (low + high) / 2), xytext=(-3, 0), size=7.5,
+        textcoords="offset points", va="center", ha="right",
+    )  # fmt: skip
+
+
+@styled
+def figure_2021_fig5(
+    chains: list, verdicts: list[dict], coordinates: list, recordings: list, kind: str,
+    source: str, settings: dict,
+):  # fmt: skip
+    """Ellipses of the posteriors on (a) topside and (b) underside, at their true size.
+
+    Both seen from above with the y axis downwards. ``chains`` as `posterior.store.read_chains`
+    gives them, ``verdicts`` and ``coordinates`` of `posterior/`, one for each T; the array is
+    the first of those of ``recordings``, if any; ``kind`` (`notes.SOURCES`) is written over it.
+    """
+    array = recordings[0] if recordings else array_from_config(settings["array"])
+    draws, verdicts = after_burn_in(chains, verdicts)
+    draws = {samples: values.reshape(-1, *values.shape[2:]) for samples, values in draws.items()}
+    known = "truth_m" in coordinates[0]
+    truth = coordinates[0].truth_m.to_numpy().reshape(-1, 3) if known else None
+    table = ellipse_table(array, draws, prior_of(chains), truth)
+    footer = [scale_line(settings, source), *chain_lines(verdicts)]
+    level = settings["experiment"]["ellipse_level"]
+    figure = new_figure(footer, PAGE, 6.6)
+    mosaic = figure.subplot_mosaic(
+        [["topside", "underside"], ["top zoom", "under zoom"], ["legend", "legend"]],
+        height_ratios=[3.3, 2.2, 0.2],
+    )  # fmt: skip
+    names = sorted(samples for samples in table.samples.unique() if samples > 0)
+    reference = layout_table(array).iloc[0]
+    for letter, side, zoom in (("a", "topside", "top zoom"), ("b", "underside", "under zoom")):
+        axes, rows = mosaic[side], table[table.side == side]
+        _packages(axes, rows, array, reference if side == reference.side else None)
+        for row in rows.itertuples():
+            style = _style(names, row.samples)
+            axes.plot(*ellipse(row, level).T, linewidth=0.8, **style)
+            if row.samples > 0:
+                axes.plot(row.mean_x_mm, row.mean_y_mm, ".", color=style["color"], markersize=1.5)
+        reach = 1e3 * np.abs(array.positions[:, :2]).max() + 4.4
+        axes.set(
+            aspect="equal", xlabel="x (mm)", ylabel="y (mm), downwards", xlim=(-reach, reach),
+            ylim=(reach, -reach), title=f"({letter}) {side}, seen from above",
+        )  # fmt: skip
+        axes.grid(False)
+        _zoom(mosaic[zoom], rows[rows.samples == names[-1]], level, _style(names, names[-1]))
+        mosaic[zoom].set_title(f"({letter}) all packages laid over each other, $T = {names[-1]}$")
+    figure.suptitle(
+        SOURCES.get(kind, kind).upper(), size=8, weight="bold",
+        color=BLACK if kind == "measured" else VERMILLION,
+    )  # fmt: skip
+    mosaic["legend"].axis("off")
+    mosaic["legend"].legend(handles=_handles(names, level, table), loc="center", ncols=7)
+    return figure, table
+
+
+def ellipse_table(
+    array: Array, posteriors: dict[int, np.ndarray], prior, truth=None
+) -> pd.DataFrame:
+    """Means and covariances of x and y, in mm in the array frame, per triad and T.
+
+    ``posteriors[T]`` (draws, A - 1, 3) m relative to the first triad; ``prior`` mean and sd,
+    each (A - 1, 3) m; ``truth`` (A - 1, 3) m where known. Rows with samples 0 are the prior.
+    """
+    layout = layout_table(array).iloc[1:].reset_index(drop=True)
+    origin = array.positions[0, :2]
+    table = layout[["accelerometer", "side"]]
+    for name in ("", "marker_"):
+        for axis in "xy":
+            table = table.assign(
+                **{f"{name or 'package_'}{axis}_mm": 1e3 * layout[f"{name}{axis}_m"]}
+            )
+    known = np.full((len(table), 2), np.nan) if truth is None else truth[:, :2] + origin
+    table = table.assign(truth_x_mm=1e3 * known[:, 0], truth_y_mm=1e3 * known[:, 1])
+    variances = np.zeros((len(table), 2, 2))
+    variances[:, [0, 1], [0, 1]] = prior[1][:, :2] ** 2
+    parts = [_moments(table, 0, prior[0][:, :2] + origin, variances)]
+    for samples, draws in posteriors.items():
+        plane = draws[..., :2]
+        covariance = np.array([np.cov(plane[:, k].T) for k in range(plane.shape[1])])
+        parts.append(_moments(table, samples, plane.mean(axis=0) + origin, covariance))
+    return pd.concat(parts, ignore_index=True)
+
+
+def _moments(table, samples, mean, covariance):
+    return table.assign(
+        samples=samples, mean_x_mm=1e3 * mean[:, 0], mean_y_mm=1e3 * mean[:, 1],
+        cov_xx_mm2=1e6 * covariance[:, 0, 0], cov_xy_mm2=1e6 * covariance[:, 0, 1],
+        cov_yy_mm2=1e6 * covariance[:, 1, 1],
+    )  # fmt: skip
+
+
+def ellipse(row, level: float, points: int = 73) -> np.ndarray:
+    """Outline (points, 2) mm of the Gaussian's ellipse that holds the share ``level``."""
+    covariance = [[row.cov_xx_mm2, row.cov_xy_mm2], [row.cov_xy_mm2, row.cov_yy_mm2]]
+    values, vectors = np.linalg.eigh(covariance)
+    angle = np.linspace(0, 2 * np.pi, points)
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    radii = np.sqrt(chi2.ppf(level, 2) * np.maximum(values, 0))
+    return [row.mean_x_mm, row.mean_y_mm] + (circle * radii) @ vectors.T
+
+
+def _zoom(axes, rows, level, style):
+    """Ellipses, means and truths about the packages' centres, as large as the panel allows."""
+    outlines = [np.zeros((1, 2))]
+    for row in rows.itertuples():
+        centre = np.array([row.package_x_mm, row.package_y_mm])
+        outlines.append(ellipse(row, level) - centre)
+        axes.plot(*outlines[-1].T, linewidth=0.7, **style)
+        axes.plot(*(np.array([row.mean_x_mm, row.mean_y_mm]) - centre), ".", color=style["color"])
+        truth = np.array([row.truth_x_mm, row.truth_y_mm]) - centre
+        axes.plot(*truth, "x", color=BLACK, markersize=3, markeredgewidth=0.6)
+        outlines.append(truth[None])
+    for line in (axes.axhline, axes.axvline):
+        line(0, linestyle=(0, (3, 2)), linewidth=0.5, color=GREY)
+    reach = 1.08 * np.nanmax(np.abs(np.concatenate(outlines))) or 1.0
+    axes.set(
+        aspect="equal", xlabel="x from the centre (mm)", ylabel="y from the centre (mm)",
+        xlim=(-reach, reach), ylim=(reach, -reach),
+    )  # fmt: skip
+
+
+def _style(names, samples) -> dict:
+    if samples == 0:
+        return {"color": SKY, "linestyle": (0, (1, 1))}
+    return look(names.index(samples), "marker")
+
+
+def _packages(axes, rows, array, reference):
+    """Dashed outlines and quadrants, orientation markers and numbers; the reference as a star."""
+    length, width = 1e3 * array.package[0], 1e3 * array.package[1]
+    dashes = {"linestyle": (0, (3, 2)), "linewidth": 0.5, "color": GREY}
+    centres = rows.drop_duplicates("accelerometer")
+    places = [(r.accelerometer, r.package_x_mm, r.package_y_mm, r.marker_x_mm, r.marker_y_mm)
+              for r in centres.itertuples()]  # fmt: skip
+    if reference is not None:
+        values = [1e3 * reference[f"{name}_m"] for name in ("x", "y", "marker_x", "marker_y")]
+        places.append((reference.accelerometer, *values))
+        axes.plot(*values[:2], "*", color=BLACK, markersize=6)
+    for label, x, y, marker_x, marker_y in places:
+        draw_package(axes, x, y, length, width, facecolor="none", edgecolor=GREY,
+                     linestyle=(0, (3, 2)), linewidth=0.5)  # fmt: skip
+        axes.plot([x - length / 2, x + length / 2], [y, y], **dashes)
+        axes.plot([x, x], [y - width / 2, y + width / 2], **dashes)
+        axes.plot(marker_x, marker_y, "o", color=BLACK, markersize=2.2)
+        # in the gap above the package: inside, ellipses would cross it
+        axes.text(x - 0.5 * length, y - 0.53 * width, label, size=6.5, va="bottom", ha="left")
+
+
+def _handles(names, level, table):
+    share = f"{100 * level:g} %"
+    handles = [Line2D([], [], label=f"prior, {share}", **_style(names, 0))]
+    for samples in names:
+        handles.append(
+            Line2D([], [], label=f"$T = {samples}$", marker=".", **_style(names, samples))
+        )
+    if table.truth_x_mm.notna().any():
+        handles.append(
+            Line2D([], [], linestyle="", marker="x", color=BLACK, markersize=3, label="truth")
+        )
+    handles.append(Line2D([], [], linestyle="", marker="*", color=BLACK, label="reference"))
+    handles.append(Line2D([], [], linestyle="", marker="o", color=BLACK, markersize=2.2,
+                          label="orientation marker"))  # fmt: skip
+    return handles
