@@ -3,7 +3,7 @@
 from job import job
 
 with job(snakemake):
-    from imuarray.figures.theory import figure_theory_convergence
     from imuarray.figures.publish import publish
+    from imuarray.figures.theory import figure_theory_convergence
 
     publish(figure_theory_convergence, snakemake)

@@ -3,7 +3,7 @@
 from job import job
 
 with job(snakemake):
-    from imuarray.figures.validation import figure_validation_ranks
     from imuarray.figures.publish import publish
+    from imuarray.figures.validation import figure_validation_ranks
 
     publish(figure_validation_ranks, snakemake)

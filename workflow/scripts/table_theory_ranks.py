@@ -3,7 +3,7 @@
 from job import job
 
 with job(snakemake):
-    from imuarray.figures.theory import table_theory_ranks
     from imuarray.figures.publish import publish
+    from imuarray.figures.theory import table_theory_ranks
 
     publish(table_theory_ranks, snakemake)

@@ -3,7 +3,7 @@
 from job import job
 
 with job(snakemake):
-    from imuarray.figures.validation import table_validation_joint
     from imuarray.figures.publish import publish
+    from imuarray.figures.validation import table_validation_joint
 
     publish(table_validation_joint, snakemake)
