@@ -26,7 +26,7 @@ from imuarray.measured.residuals import compare
 from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting, normal_motion
 from imuarray.posterior.likelihood import Likelihood
-from imuarray.posterior.proposals import tilts
+from imuarray.posterior.proposals import log_weights
 from imuarray.posterior.rate_density import sample_covariance
 from imuarray.recording import write_recording
 from imuarray.simulation import simulate_recording, simulate_samples
@@ -89,12 +89,12 @@ def test_a_recording_at_rest_has_nothing_to_select():
         select_dynamic(replace(recording, angular_rate=0 * recording.angular_rate))
 
 
-def test_tilt_is_the_difference_of_the_log_densities():
+def test_log_weight_is_the_difference_of_the_log_densities():
     rng = np.random.default_rng(3)
     mean, other = rng.standard_normal((2, 4, 3))
     factors = rng.standard_normal((2, 4, 3, 3)) + 2 * np.eye(3)
     first, second = factors @ factors.transpose(0, 1, 3, 2)
-    found = tilts(mean, first, other, second)
+    found = log_weights(mean, first, other, second)
     for t in range(4):
         x, y, z = w = rng.standard_normal(3)
         value = found[:, t] @ [1, x, y, z, x * x, y * y, z * z, x * y, x * z, y * z]

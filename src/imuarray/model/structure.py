@@ -16,6 +16,9 @@ from imuarray.model.jax64 import jax, jnp
 from imuarray.motion.state import Motion
 
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+CURVATURES = np.array(  # d2w_a / domega_i domega_j, (6, 3, 3)
+    [np.outer(np.eye(3)[i], np.eye(3)[j]) + np.outer(np.eye(3)[j], np.eye(3)[i]) for i, j in PAIRS]
+)
 
 
 def _force(rate, linear, position):
@@ -56,3 +59,8 @@ def products(rate) -> np.ndarray:
     """w from angular rates (..., 3) rad/s: shape (..., 6)."""
     rate = np.asarray(rate)
     return np.stack([rate[..., i] * rate[..., j] for i, j in PAIRS], axis=-1)
+
+
+def product_slopes(rate) -> np.ndarray:
+    """dw / domega at rates (..., 3) rad/s: shape (..., 6, 3)."""
+    return np.einsum("aij,...j->...ai", CURVATURES, rate)

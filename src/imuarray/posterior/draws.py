@@ -99,7 +99,7 @@ def exponents(first, size, mean, factor, quartic, b, numbers, out):
 
 
 @njit(inline="always")
-def tilted(k, t, x, y, z):
+def log_weight(k, t, x, y, z):
     """log p(omega | y_g) less the log of the density it is drawn from."""
     along_x = fma(k[4, t], x, fma(k[7, t], y, fma(k[8, t], z, k[1, t])))
     along_y = fma(k[5, t], y, fma(k[9, t], z, k[2, t]))
@@ -108,13 +108,13 @@ def tilted(k, t, x, y, z):
 
 
 @njit
-def tilt(first, size, k, mean, factor, numbers, out):
-    """Add `tilted` to `exponents`."""
+def add_log_weights(first, size, k, mean, factor, numbers, out):
+    """Add `log_weight` to `exponents`."""
     for n in range(out.shape[0]):
         for i in range(size):
             t = np.uint64(first + i)
             x, y, z = _rate(t, mean, factor, numbers[n, 0, i], numbers[n, 1, i], numbers[n, 2, i])
-            out[n, i] += tilted(k, t, x, y, z)
+            out[n, i] += log_weight(k, t, x, y, z)
 
 
 @njit

@@ -19,7 +19,7 @@ class LikelihoodData(NamedTuple):
     base: np.ndarray  # (3, T) sum_k (Lambda y)_k
     mean: np.ndarray  # (3, T) mean of the density omega_t is drawn from, p(omega_t | y_g)
     factor: np.ndarray  # (6, T) its covariance's Cholesky factor: xx, yx, yy, zx, zy, zz
-    tilt: np.ndarray  # (10, T) log p - log of that density: 1, x, y, z, and the six products
+    log_weight: np.ndarray  # (10, T) log p - log of that density: 1, x, y, z, the six products
     weights: np.ndarray  # (A,) 1 / sigma_k^2, empty for a general covariance
     precision: np.ndarray  # (3A, 3A) Lambda, empty for isotropic triads
     tensor: np.ndarray  # (4, 3, 12)
@@ -79,7 +79,7 @@ def fixed_draws(positions, data, rates, power):
     """log p-hat (26a) on given draws ``rates`` (T, N, 3) rad/s."""
     found = kernels.reduced(rates.shape[0])
     logdet = collapse(positions, data, found)
-    total, tilted = 0.0, data.tilt.shape[1] > 0
+    total, weighted = 0.0, data.log_weight.shape[1] > 0
     exponent = np.empty(rates.shape[1])
     for t in range(rates.shape[0]):
         b = found.b[:, t]
@@ -88,8 +88,8 @@ def fixed_draws(positions, data, rates, power):
             exponent[n] = -0.5 * kernels.quadratic(
                 x, y, z, found.C, b[0], b[1], b[2], b[3], b[4], b[5]
             )
-            if tilted:
-                exponent[n] += draws.tilted(data.tilt, t, x, y, z)
+            if weighted:
+                exponent[n] += draws.log_weight(data.log_weight, t, x, y, z)
         total += _log_mean_exp(exponent)
     return _assemble(total, found.const, logdet, power)
 
@@ -106,8 +106,10 @@ def fresh_draws(positions, data, work, power, first, last):
         mean, factor = data.mean, data.factor
         numbers = draws.drawn(size, tile)
         draws.exponents(start, size, mean, factor, tile.quartic, found.b, numbers, tile.exponent)
-        if data.tilt.shape[1] > 0:
-            draws.tilt(start, size, data.tilt, mean, factor, numbers, tile.exponent)
+        if data.log_weight.shape[1] > 0:
+            draws.add_log_weights(
+                start, size, data.log_weight, mean, factor, numbers, tile.exponent
+            )
         total += draws.log_means(size, tile)
     return _assemble(total, found.const[first:last], logdet, power)
 

@@ -11,7 +11,7 @@ from imuarray.errors import InputError, require_shape
 from imuarray.estimation.collapsed import Collapsed, tables
 from imuarray.model import ArrayModel, structure_tensor
 from imuarray.posterior import kernels
-from imuarray.posterior.proposals import WIDENING, proposals, tilts
+from imuarray.posterior.proposals import WIDENING, log_weights, proposals
 
 # (19) and (23) imply |H' Lambda H|^(-1/2) for each sample; (25) and (26a) print the
 # determinant without the root. "derived" is right; "printed" exists to show the difference.
@@ -90,9 +90,9 @@ class Likelihood:
         mean, covariance = proposals(
             self.collapsed, self.rate_mean, self.rate_covariance, centre, widening
         )
-        tilt = tilts(self.rate_mean, self.rate_covariance, mean, covariance)
+        weights = log_weights(self.rate_mean, self.rate_covariance, mean, covariance)
         data = self.data._replace(
-            mean=np.ascontiguousarray(mean.T), factor=_lower(covariance), tilt=tilt
+            mean=np.ascontiguousarray(mean.T), factor=_lower(covariance), log_weight=weights
         )
         return replace(self, data=data)
 

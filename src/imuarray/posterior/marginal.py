@@ -22,7 +22,7 @@ from imuarray.model.small_linear import (
     solve_lower,
     solve_upper,
 )
-from imuarray.model.structure import PAIRS
+from imuarray.model.structure import CURVATURES, PAIRS
 from imuarray.posterior.likelihood import DETERMINANTS, Likelihood
 from imuarray.posterior.proposals import proposals
 
@@ -60,12 +60,6 @@ def _products(rate):
     return jnp.stack([rate[..., i] * rate[..., j] for i, j in PAIRS], axis=-1)
 
 
-_TENSOR = np.zeros((6, 3, 3))  # d2 w_a / d omega_i d omega_j
-for _row, (_i, _j) in enumerate(PAIRS):
-    _TENSOR[_row, _i, _j] += 1.0
-    _TENSOR[_row, _j, _i] += 1.0
-
-
 def collapse(positions, data: MarginalData):
     """(C (6, 6), b (T, 6), constant (T,), log |H' Lambda H|) at positions (A, 3) m.
 
@@ -85,10 +79,10 @@ def collapse(positions, data: MarginalData):
 
 def _curvature(rate, C, b, information):
     """(gradient (3,), second derivatives (3, 3) or their first-order part) of one exponent."""
-    slope = jnp.einsum("aij,j->ai", _TENSOR, rate)
+    slope = jnp.einsum("aij,j->ai", CURVATURES, rate)
     misfit = C @ _products(rate) - b
     first = information + slope.T @ C @ slope
-    full = first + jnp.einsum("a,aij->ij", misfit, _TENSOR)
+    full = first + jnp.einsum("a,aij->ij", misfit, CURVATURES)
     minors = full[0, 0], full[0, 0] * full[1, 1] - full[0, 1] ** 2, jnp.linalg.det(full)
     sound = (minors[0] > 0) & (minors[1] > 0) & (minors[2] > 1e-3 * jnp.linalg.det(first))
     return slope.T @ misfit, jnp.where(sound, full, first)

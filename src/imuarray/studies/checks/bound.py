@@ -7,18 +7,17 @@ import pandas as pd
 
 from imuarray.motion import sphere_motion
 from imuarray.studies.batches import batch_stream, root_mean_square
-from imuarray.studies.checks.information import noise_of, position_information
+from imuarray.studies.bound import information_at
 
 REPEATS = 20  # motions averaged over; the bound varies little between them
 
 
 def bound_squares(rng, model, samples: int, motion_sizes) -> np.ndarray:
     """Mean bound variance (m^2) over coordinates for ``REPEATS`` random motions, (REPEATS,)."""
-    noise, out = noise_of(model), []
+    out = []
     for _ in range(REPEATS):
         motion = sphere_motion(rng, (samples,), *motion_sizes)
-        information, _ = position_information(model.array.relative, motion, noise)
-        values = np.linalg.eigvalsh(information)
+        values = np.linalg.eigvalsh(information_at(model, motion, model.array.relative))
         floor = 1e-14 * values[-1]
         out.append(np.mean(1.0 / np.maximum(values, floor)))
     return np.array(out)

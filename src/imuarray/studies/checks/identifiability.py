@@ -10,7 +10,7 @@ from imuarray.motion import Motion, sphere_motion
 from imuarray.motion.random import directions
 from imuarray.simulation import measure
 from imuarray.studies.checks.information import (
-    Noise,
+    NoiseLevels,
     joint_singular_values,
     lever_matrices,
     motion_jacobian,
@@ -18,7 +18,7 @@ from imuarray.studies.checks.information import (
     state_of,
 )
 
-UNIT = Noise(1.0, 1.0)  # ranks do not depend on the noise; this keeps them well conditioned
+UNIT = NoiseLevels(1.0, 1.0)  # ranks do not depend on the noise; this keeps them well conditioned
 
 
 def lemma(rng, count: int) -> dict:

@@ -7,21 +7,15 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.model import structure_tensor
-from imuarray.model.structure import PAIRS, design, products
+from imuarray.model.structure import design, product_slopes, products
 from imuarray.motion import Motion
 
 
-class Noise(NamedTuple):
+class NoiseLevels(NamedTuple):
     """Accelerometer sd (m/s^2) and the gyroscopes' information on omega (s^2/rad^2)."""
 
     accelerometer_sd: float
     rate_information: float
-
-
-def noise_of(model) -> Noise:
-    """From an `ArrayModel` with isotropic noise: G / sigma_g^2."""
-    deviations = np.sqrt(model.noise.accelerometer[0, 0]), np.sqrt(model.noise.gyroscope[0, 0])
-    return Noise(deviations[0], model.array.gyroscopes / deviations[1] ** 2)
 
 
 def state_of(motion: Motion) -> np.ndarray:
@@ -37,16 +31,12 @@ def lever_matrices(state) -> np.ndarray:
 
 def motion_jacobian(positions, rates) -> np.ndarray:
     """Derivative of the stacked specific force in (omega, omega_dot, s), (T, 3A, 9)."""
-    slopes = np.zeros((len(rates), 6, 3))
-    for row, (i, j) in enumerate(PAIRS):
-        slopes[:, row, i] += rates[:, j]
-        slopes[:, row, j] += rates[:, i]
-    whole = design(positions)
+    whole, slopes = design(positions), product_slopes(rates)
     linear = np.broadcast_to(whole[:, 6:], (len(rates), len(whole), 6))
     return np.concatenate([whole[:, :6] @ slopes, linear], axis=2)
 
 
-def joint_jacobian(positions, motion: Motion, noise: Noise):
+def joint_jacobian(positions, motion: Motion, noise: NoiseLevels):
     """Whitened derivatives in theta (T (3A + 3), 3 (A - 1)) and in all motion (.., 9 T)."""
     rates = np.asarray(motion.angular_rate)
     samples, count = len(rates), len(positions)
@@ -61,7 +51,7 @@ def joint_jacobian(positions, motion: Motion, noise: Noise):
     return shared.reshape(-1, shared.shape[-1]), moving.reshape(len(shared) * shared.shape[1], -1)
 
 
-def joint_singular_values(positions, motion: Motion, noise: Noise) -> np.ndarray:
+def joint_singular_values(positions, motion: Motion, noise: NoiseLevels) -> np.ndarray:
     """Singular values of the derivative in theta with the motion projected out, decreasing."""
     shared, moving = joint_jacobian(positions, motion, noise)
     left, values, _ = np.linalg.svd(moving, full_matrices=False)
@@ -74,7 +64,7 @@ def numerical_rank(values, tolerance: float = 1e-9) -> int:
     return int(np.sum(values > tolerance * max(values[0], 1e-300))) if len(values) else 0
 
 
-def position_information(positions, motion: Motion, noise: Noise, residual=None, offset=None):
+def position_information(positions, motion: Motion, noise: NoiseLevels, residual=None, offset=None):
     """Information on theta with the motion eliminated, and the score, by Schur complements.
 
     ``positions`` (A, 3) m relative to the reference; ``residual`` (T, A, 3) m/s^2 measured

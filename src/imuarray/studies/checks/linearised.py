@@ -13,7 +13,7 @@ from imuarray.geometry import positions_of
 from imuarray.model.structure import design
 from imuarray.motion import Motion
 from imuarray.posterior.likelihood import Likelihood
-from imuarray.studies.checks.information import Noise, position_information
+from imuarray.studies.checks.information import NoiseLevels, position_information
 
 
 def true_motion(truth) -> Motion:
@@ -29,7 +29,7 @@ def linearise(recording, truth, model, accelerometer_sd, gyroscopes: int):
     """
     motion = true_motion(truth)
     positions = truth["position"].to_numpy()
-    noise = Noise(accelerometer_sd, gyroscopes / model.noise.gyroscope[0, 0])
+    noise = NoiseLevels(accelerometer_sd, gyroscopes / model.noise.gyroscope[0, 0])
     residual = recording.specific_force - model.predict_many(motion, positions).specific_force
     offset = recording.angular_rate.mean(axis=1) - motion.angular_rate
     information, score = position_information(positions, motion, noise, residual, offset)
