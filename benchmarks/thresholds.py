@@ -4,7 +4,7 @@
 
 One row a recording: what was named, whether `unexplained`, the smallest log p of the effects'
 tests on the papers' model and of the checks at the end. The summary says how often each would pass
-the thresholds in src/imuarray/diagnosis/thresholds.json, and what the smallest of so many
+the thresholds in src/imuarray/diagnosis/settings.py, and what the smallest of so many
 recordings reached: a threshold below that of most tests, by a margin, keeps all of them together
 under 5 % false alarms.
 """
@@ -22,7 +22,7 @@ from imuarray.blind import Case
 from imuarray.blind.cases import make
 from imuarray.diagnosis.adoption import proposals
 from imuarray.diagnosis.procedure import investigate
-from imuarray.diagnosis.thresholds import read_thresholds
+from imuarray.diagnosis.settings import SETTINGS
 
 
 def one(seed: int) -> dict:
@@ -49,14 +49,14 @@ def limits(hits: int, count: int) -> tuple[float, float]:
 
 def summary(table: pd.DataFrame) -> str:
     """False alarms with limits, and the smallest log p of each test."""
-    count, known = len(table), read_thresholds()
+    count = len(table)
     lines = []
     for what, hit in (("named", table.named != ""), ("unexplained", table.unexplained)):
         low, high = limits(int(hit.sum()), count)
         lines.append(f"{what}: {hit.sum()} of {count} ({100 * low:.1f} to {100 * high:.1f} %)")
     for name in table.columns[3:]:
         values = np.sort(table[name].dropna())
-        limit = known.limit(name[5:]) if name.startswith("test ") else known.check
+        limit = SETTINGS.limit(name[5:]) if name.startswith("test ") else SETTINGS.check
         beyond = int(np.sum(values < limit))
         lines.append(f"{name}: smallest {values[:3].round(1)}, beyond {limit}: {beyond}")
     return "\n".join(lines)

@@ -1,9 +1,14 @@
-"""Clocks wound by the gyroscopes alone, where the motion is too rough for its samples."""
+"""Clocks estimated from the gyroscopes alone, where the motion is too rough for its samples."""
 
 import numpy as np
 import pytest
 
-from imuarray.diagnosis.clock_from_gyros import Gyroscopes, ages_of, moved, wind
+from imuarray.diagnosis.clock_from_gyros import (
+    Gyroscopes,
+    ages_of,
+    clocks_from_gyroscopes,
+    moved,
+)
 from imuarray.model.timing import clock_turns
 
 PERIOD, SPAN, NOISE = 1e-3, 90.0, 0.004
@@ -45,7 +50,7 @@ class Rough:
 @pytest.mark.parametrize("seed", [1, 2])
 def test_phases_rates_drifts_and_the_period_are_found(seed):
     there = Rough(seed)
-    found = wind(there, there.turning, there.guesses(np.random.default_rng(seed)))
+    found = clocks_from_gyroscopes(there, there.turning, there.guesses(np.random.default_rng(seed)))
     clocks = np.array([found[imu] for imu in range(8)])
     exact = clock_turns(there.clocks.T, there.time[:, None], SPAN)
     off = clock_turns(clocks.T, there.time[:, None], SPAN) - exact

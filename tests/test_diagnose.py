@@ -12,9 +12,8 @@ from imuarray.diagnosis.document import diagnose, precision_of, structural_gain
 from imuarray.diagnosis.extension import extended_model, read_extension
 from imuarray.diagnosis.heldout import gain, log_scores
 from imuarray.diagnosis.reading_effects import find_structural
-from imuarray.diagnosis.words import MEANING
 from imuarray.model import EFFECTS, ArrayModel
-from imuarray.model.effects import effect
+from imuarray.model.effects import effect, known_effect
 from imuarray.recording import write_recording
 from imuarray.streams import stream
 
@@ -251,7 +250,7 @@ def test_the_command_writes_a_complete_folder(diagnosed):
         assert {"check", "statistic", "simulated", "p_value", "sensors", "says"} <= set(item)
         assert set(item["simulated"]) == {"median", "q025", "q975"}
     for cause in document["causes"]:
-        assert cause["effect"] in MEANING and cause["says"].endswith(".")
+        assert known_effect(cause["effect"]).meaning and cause["says"].endswith(".")
         assert all({"value", "sd", "unit"} == set(p) for p in cause["parameters"].values())
     assert (diagnosed / "out" / "report.html").stat().st_size > 10_000
 

@@ -12,18 +12,17 @@ from imuarray.blind import Case
 from imuarray.blind.cases import make
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects as variance
+from imuarray.diagnosis.clocks import sawtooth
 from imuarray.diagnosis.fit import Fit, fit, flat_parameters, from_flat, normal
-from imuarray.diagnosis.gauges import prior_precision
 from imuarray.diagnosis.heldout import edges_of, log_scores
 from imuarray.diagnosis.linearise import linearise
-from imuarray.diagnosis.parameters import catalogue_effects, columns_of
+from imuarray.diagnosis.parameters import catalogue_effects, columns_of, prior_precision
 from imuarray.diagnosis.readings import LEAST, arrange, part_of
 from imuarray.diagnosis.replicates import Replicator, discrepancies
-from imuarray.diagnosis.scans import sawtooth
-from imuarray.diagnosis.scores import candidates, evidence, log_tail, mask_of, score_all
+from imuarray.diagnosis.scores import candidates, information_at, log_tail, mask_of, score_all
+from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.start import start
 from imuarray.diagnosis.state import Search
-from imuarray.diagnosis.thresholds import read_thresholds
 from imuarray.errors import InputError
 
 SHORT = 4.0  # s
@@ -35,9 +34,8 @@ def begun(case, seed=1):
     readings = arrange(recording)
     effects = catalogue_effects()
     columns = columns_of(readings.array, effects, readings.position_prior_sd)
-    search = Search(readings, columns, effects, read_thresholds(), lambda text: None)
-    search.begin()
-    return search, truth
+    search = Search(readings, columns, effects, lambda text: None)
+    return search.begun(), truth
 
 
 @pytest.fixture(scope="module")
@@ -135,7 +133,7 @@ def jacobian_pattern(samples, count):
 
 
 def information_of(made):
-    given = evidence(made, flat_parameters(made.columns, made.state))
+    given = information_at(made)
     places = given.places(made.active)
     return given.information[np.ix_(places, places)] + ridge_of(made)
 
@@ -171,7 +169,7 @@ def test_scores_of_a_clean_recording_are_chi_square(clean):
     p = np.array([chi2.sf(s.statistic, s.freedom) for s in scores])
     assert len(p) > 80
     assert 0.3 < p.mean() < 0.7
-    assert min(s.log_p for s in scores) > read_thresholds().effect
+    assert min(s.log_p for s in scores) > SETTINGS.effect
 
 
 def test_log_tail_goes_on_where_the_tail_underflows():

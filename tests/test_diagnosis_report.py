@@ -14,6 +14,7 @@ from scipy.linalg import subspace_angles
 from imuarray.blind import Case
 from imuarray.blind.cases import make
 from imuarray.diagnosis.document import diagnose
+from imuarray.diagnosis.quantities import number, plus_minus, probability, quantity, span
 from imuarray.diagnosis.replicates import _beside
 from imuarray.diagnosis.separability import (
     conditional,
@@ -21,16 +22,14 @@ from imuarray.diagnosis.separability import (
     separability,
     squared_correlations,
 )
-from imuarray.diagnosis.words import MEANING, sentence
-from imuarray.model import EFFECTS
+from imuarray.diagnosis.words import cause_in_words, equation, sizes, split_name
+from imuarray.model.effects import DATA_EFFECTS, EFFECTS
 from imuarray.report import drawings as drawn
 from imuarray.report import numbers
 from imuarray.report import write as report
 from imuarray.report.answers import answers, verdict
-from imuarray.report.cause_words import cause_in_words, equation, sizes, split_name
 from imuarray.report.drawings_cause import cause_figure
 from imuarray.report.panels import abscissa, cause_table
-from imuarray.report.quantities import number, plus_minus, probability, quantity, span
 from imuarray.report.signals import binned, signal_of
 
 PATH = "a folder/<script>alert(1)</script> & $x$_{.nc"
@@ -246,8 +245,8 @@ def test_numbers_as_people_read_them(text, expected):
 
 
 def test_every_effect_has_words():
-    for effect in MEANING:
-        assert equation(effect) and "omega" not in equation(effect)
+    for effect, item in {**EFFECTS, **DATA_EFFECTS}.items():
+        assert item.meaning and equation(effect) and "omega" not in equation(effect)
         parameters = {"x_a_b": {"value": 0.1, "sd": 0.01, "unit": "1"}}
         cause = {"effect": effect, "sensors": ["all"], "parameters": parameters}
         assert "0.1" in sizes(cause, ("b", "a_b")) or "10" in sizes(cause, ("b", "a_b"))
@@ -267,8 +266,8 @@ def test_sentences_follow_the_p_value():
         "share_gyroscope_1": {"value": 0.1, "sd": 0.0, "unit": "1"},
         "factor_gyroscope_1": {"value": 10.0, "sd": 0.0, "unit": "1"},
     }
-    says = sentence("heavy_tails", ["1"], parameters, 5.0, [])
-    assert "share 0.1" in says and "factor 10" in says
+    says = sizes({"effect": "heavy_tails", "parameters": parameters}, ("1",)).replace("\u00a0", " ")
+    assert says == "share gyroscope 10 %, factor gyroscope 10"
 
 
 def test_separability_is_that_of_subspaces():

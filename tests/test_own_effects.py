@@ -1,14 +1,17 @@
 """Effects of a user's own file, through the commands."""
 
 import json
+from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 
 import imuarray
 from imuarray import provenance
 from imuarray.cli import main
-from imuarray.model import EFFECTS, own
+from imuarray.diagnosis.parameters import prior_precision
+from imuarray.model import DATA_EFFECTS, EFFECTS, own
 from tests.test_bound import model
 
 CUBIC = '''
@@ -20,6 +23,28 @@ def accelerometer_cubic(curvature, instant, predicted):
     """u_i + c_i u_i^3."""
     force = predicted.specific_force
     return predicted._replace(specific_force=force + curvature * force**3)
+'''
+
+
+GAIN = '''
+import numpy as np
+
+from imuarray.model.effects import effect
+
+
+def common_gain(shape):
+    """One gain of all accelerometers is a unit of length."""
+    return [np.ones(shape, bool)]
+
+
+@effect(
+    "accelerometer_gain", unit="1", prior_sd=0.02, shape=lambda a, g: (a,), shown="%",
+    components=(("gain",),), gauge=common_gain, resembles=("accelerometer_scale",),
+    meaning="each accelerometer has one gain", against="specific force",
+)
+def accelerometer_gain(gain, instant, predicted):
+    """(1 + c) u."""
+    return predicted._replace(specific_force=(1.0 + gain[:, None]) * predicted.specific_force)
 '''
 
 
@@ -120,3 +145,41 @@ def test_a_wrong_file_is_one_line(text, told, tmp_path, capsys):
     assert not (tmp_path / "cal.nc").exists()
     if told != "left as it is":
         assert known == EFFECTS
+
+
+def test_an_effect_with_a_gauge_of_its_own_is_one_place(tmp_path):
+    """Simulated, calibrated, sampled and diagnosed; no other file knows of it."""
+    path = tmp_path / "gain.py"
+    path.write_text(GAIN)
+    effects = imuarray.read_effects(path)
+    recording, truth = imuarray.simulate(model().array, 2.5, 100.0, seed=3, effects=effects)
+    true = truth["effect_parameter"].to_numpy()
+    assert list(truth.parameter.values) == [f"accelerometer_gain gain_{k + 1} 1" for k in range(5)]
+    found = imuarray.calibrate(recording, method="gauss-newton", effects=effects)
+    off = (found["effect_parameter"].to_numpy() - true) / found["effect_sd"].to_numpy()
+    assert np.abs(off).max() < 4
+    few = imuarray.select(recording, 5)
+    posterior = imuarray.sample(few, method="nuts", steps=16, effects=effects)
+    assert posterior["effect_parameter"].shape[-1] == 5
+    without = [name for name in EFFECTS if name not in (*effects, "gyroscope_bias")]
+    made = imuarray.diagnose(recording, without=without, replicates=2)
+    (cause,) = made.document["causes"]
+    assert cause["effect"] == "accelerometer_gain" and cause["sensors"] == ["all"]
+    assert "each accelerometer has one gain" in cause["says"] and "%" in cause["says"]
+    # the mean is pinned: single gains are told against it
+    gains = np.array([item["value"] for item in cause["parameters"].values()])
+    assert abs(gains.mean()) < 1e-4
+    assert np.abs(gains - (true - true.mean())).max() < 2e-3
+    pinned = prior_precision(made.extended.fit.columns, made.extended.fit.active)
+    assert np.linalg.eigvalsh(pinned)[-1] > 1e5 / 0.02**2
+
+
+def test_no_module_beside_the_finders_names_an_effect():
+    """What an effect is stands with it; what is special in finding it, with its finder."""
+    finders = {"clocks", "shifts", "special", "reading_effects", "noise_effects"}
+    package = Path(imuarray.__file__).parent
+    for folder in ("diagnosis", "report", "analysis", "commands", "estimation", "posterior"):
+        for path in (package / folder).rglob("*.py"):
+            text = path.read_text(encoding="utf-8")
+            named = [name for name in {**EFFECTS, **DATA_EFFECTS} if f'"{name}"' in text]
+            assert path.stem in finders or not named, (path, named)

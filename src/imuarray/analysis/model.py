@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 
 from imuarray.errors import InputError
-from imuarray.model import ArrayModel
+from imuarray.model import DATA_EFFECTS, ArrayModel
 from imuarray.recording import Recording, array_of
 
 Say = Callable[[str], None]
@@ -74,11 +74,9 @@ def extender(
             f" {accelerometer_noise:g}"
         )
     extension = read_extension(Path(diagnosis))
-    if "axis_swap" in extension.before:
-        raise InputError(
-            f"{diagnosis}: expected right axes, found an axis_swap; mend the recording"
-        )
     for name in extension.before:
+        if not DATA_EFFECTS[name].left_out:
+            raise InputError(f"{diagnosis}: expected right axes, found {name}; mend the recording")
         say(f"{name}: concerns readings, not the model; they are used as they are")
 
     def extended(model: ArrayModel, labels=None) -> ArrayModel:

@@ -7,19 +7,18 @@ import time
 
 from imuarray.commands.output import Output
 from imuarray.diagnosis.document import diagnose as criticise
-from imuarray.diagnosis.words import MEANING
 from imuarray.errors import InputError
-from imuarray.model import EFFECTS
+from imuarray.model.effects import DATA_EFFECTS, EFFECTS
 from imuarray.recording import read_recording
 from imuarray.report.write import write_report
 
 
 def diagnose(arguments) -> None:
     """Name what the papers' model gets wrong on a recording; a folder with the evidence."""
+    known = {*EFFECTS, *DATA_EFFECTS}
     for name in arguments.without:
-        if name not in {*MEANING, *EFFECTS}:
-            known = ", ".join(sorted({*MEANING, *EFFECTS}))
-            raise InputError(f"--without: expected any of {known}, found {name}")
+        if name not in known:
+            raise InputError(f"--without: expected any of {', '.join(sorted(known))}, found {name}")
     recording, output = read_recording(arguments.recording), Output(arguments)
     begun = time.monotonic()
 
@@ -35,7 +34,7 @@ def diagnose(arguments) -> None:
 
 def report(document: dict) -> list[str]:
     """diagnosis.json for a person: the causes, what is left, the gain."""
-    lines = [f"{cause['effect']}: {cause['says']}" for cause in document["causes"]]
+    lines = [cause["says"] for cause in document["causes"]]
     if not lines:
         lines = ["no cause named: the recording is what the model simulates, as far as it shows"]
     if document["unexplained"]:

@@ -6,19 +6,20 @@ Where a rail clips several readings they pile up at one value, which needs no mo
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import norm
 
-from imuarray.diagnosis.reading_effects import Structural, unique
+from imuarray.diagnosis.reading_effects import RAILS, Structural, rails_cause, unique
 from imuarray.diagnosis.residual_checks import Check
+from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Search
 from imuarray.model.effects import KINDS
 
 ALONE = 1.5  # times farther than any other reading of its triad
 NEXT = 30  # largest readings after it
-UNITS = ("m s-2", "rad s-1")
 
 
 class Peak(NamedTuple):
@@ -67,41 +68,31 @@ def clipped(found: list[Peak], limit: float) -> tuple[list[Peak], float]:
     return hit, least
 
 
-def leave_out_clips(search: Search) -> list[Structural]:
+def leave_out_clips(search: Search, without=()) -> tuple[Search, list[Structural]]:
     """Triads whose largest reading falls short of its prediction, far more than any other does.
 
-    Those readings are left out of ``search`` from here on.
+    Those readings are left out of the search from here on.
     """
-    hit, log_p = clipped(peaks(search), search.thresholds.check)
+    hit, log_p = ([], 0.0) if RAILS in without else clipped(peaks(search), SETTINGS.check)
     if not hit:
-        return []
+        return search, []
     lost = np.zeros(search.readings.keep.shape, bool)
     for peak in hit:
         lost[:, peak.imu, 3 * peak.kind : 3 * peak.kind + 3] = peak.at
-    search.readings = search.readings.without(lost)
-    search.refit()
-    search.allowed = search.allowed & ~lost
-    numbers = {}
-    for kind in sorted({peak.kind for peak in hit}):
-        sizes = [peak.size for peak in hit if peak.kind == kind]
-        numbers[f"{KINDS[kind]}_rail"] = float(np.median(sizes)), float(np.std(sizes)), UNITS[kind]
-    where = ", ".join(f"{n} {v[0]:.4g} {v[2]}" for n, v in numbers.items())
-    says = f"the largest reading alone stays below what it should be, as at a rail ({where})"
-    return [Structural("saturation", unique(p.imu for p in hit), log_p, numbers, says)]
+    search = replace(search, readings=search.readings.without(lost)).refit()
+    says = "the largest reading alone stays below what it should be, as at a rail"
+    found = rails_cause([(peak.imu, peak.kind, peak.size) for peak in hit], log_p, says)
+    return replace(search, allowed=search.allowed & ~lost), [found]
 
 
 def together(first: list[Structural], second: list[Structural]) -> list[Structural]:
-    """Both lists, what is in both as one cause."""
+    """Both lists, what is in both as one cause in the first's words."""
     names = {item.effect: item for item in first}
-    for item in second:
-        old = names.get(item.effect)
-        names[item.effect] = item if old is None else replaced(old, item)
+    for new in second:
+        old = names.get(new.effect, new)
+        imus, log_p = unique([*old.imus, *new.imus]), min(old.log_p, new.log_p)
+        names[new.effect] = old._replace(imus=imus, log_p=log_p)
     return list(names.values())
-
-
-def replaced(old: Structural, new: Structural) -> Structural:
-    """One cause of two findings; the words are the first's."""
-    return old._replace(imus=unique([*old.imus, *new.imus]), log_p=min(old.log_p, new.log_p))
 
 
 def lone_checks(search: Search, tailed) -> list[Check]:

@@ -36,7 +36,7 @@ class Gyroscopes(NamedTuple):
     turning: np.ndarray  # (T, 3) rad/s^2
 
 
-def wind(readings: Readings, turning, clocks: dict) -> dict:
+def clocks_from_gyroscopes(readings: Readings, turning, clocks: dict) -> dict:
     """{imu: (P, f, phi, c, g)} from first guesses of the same form, `ENOUGH` of them at least.
 
     ``turning`` (T, 3): omega_dot by the accelerometers. The period that all get makes what the
@@ -66,7 +66,7 @@ def wind(readings: Readings, turning, clocks: dict) -> dict:
     return dict(zip(imus, guess, strict=True))
 
 
-def windable(readings: Readings, imus) -> bool:
+def enough_gyroscopes(readings: Readings, imus) -> bool:
     """Whether there are gyroscopes and samples enough."""
     together = readings.keep[:, sorted(imus), 3:].all(axis=(1, 2))
     return len(imus) >= ENOUGH and together.sum() >= LEAST

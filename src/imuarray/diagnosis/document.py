@@ -4,39 +4,39 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 import imuarray
-from imuarray.diagnosis import words as describe
 from imuarray.diagnosis.elimination import heldout_gain, need
-from imuarray.diagnosis.fit import Fit, at, fit, flat_parameters
-from imuarray.diagnosis.gauges import prior_precision
+from imuarray.diagnosis.fit import Fit, at, fit
 from imuarray.diagnosis.heldout import BLOCKS, Scores, gain, log_scores
 from imuarray.diagnosis.noise import coloured_meat, per_triad, standardised
 from imuarray.diagnosis.noise_effects import held_out
+from imuarray.diagnosis.parameters import prior_precision
 from imuarray.diagnosis.placebo import placebo_gain
 from imuarray.diagnosis.procedure import Found, investigate
-from imuarray.diagnosis.reading_effects import LEFT_OUT
 from imuarray.diagnosis.replicates import Discrepancy, discrepancies
-from imuarray.diagnosis.scores import evidence, robust_inverse
-from imuarray.model.effects import KINDS
+from imuarray.diagnosis.scores import information_at, robust_inverse
+from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.words import cause_in_words, parameters_of, sensors_of
+from imuarray.model.effects import DATA_EFFECTS, KINDS
 from imuarray.recording import Recording
 from imuarray.streams import stream
 
 LEAST = -1e6  # log p; JSON has no infinity
 
 
-@dataclass
+@dataclass(frozen=True)
 class Fitted:
     """A model of the recording: its fit, its score on held-out time, its positions."""
 
     fit: Fit
     scores: Scores
     sds: np.ndarray  # (N, m) of the parameters
-    discrepancies: list[Discrepancy] = field(default_factory=list)
+    discrepancies: tuple[Discrepancy, ...] = ()
 
     def section(self) -> dict:
         """As `diagnosis.json` has it."""
@@ -51,7 +51,7 @@ class Fitted:
         }
 
 
-@dataclass
+@dataclass(frozen=True)
 class Diagnosis:
     """What `imuarray diagnose` writes, and what its figures are drawn from.
 
@@ -83,13 +83,14 @@ def diagnose(
     say("fitting the papers' model to the same readings")
     extended = fitted(search.fit, search.noise.correlation)
     nats = extended.scores.nats + nats_beside(found)
-    extended.scores = extended.scores._replace(nats=nats)
+    extended = replace(extended, scores=extended.scores._replace(nats=nats))
     base, inflated = rivals_of(found)
     rng = stream(seed, "diagnose", "replicates")
     say("replicating the recording")
-    for model in (base, extended):
-        precision = precision_of(model.fit)
-        model.discrepancies = discrepancies(model.fit, precision, rng, replicates)
+    base, extended = (
+        replace(m, discrepancies=discrepancies(m.fit, precision_of(m.fit), rng, replicates))
+        for m in (base, extended)
+    )
     document = {
         "recording": str(recording_path),
         "seed": int(seed),
@@ -100,7 +101,7 @@ def diagnose(
         "discrepancies": [d.as_dict() for d in base.discrepancies],
         "causes": causes_of(found, extended),
         "unexplained": bool(found.unexplained),
-        "remaining": [c.name for c in found.checks if c.log_p < search.thresholds.check],
+        "remaining": [c.name for c in found.checks if c.log_p < SETTINGS.check],
         "inflated": inflated.section(),
         "extended": extended.section(),
         "discrepancies_after": [d.as_dict() for d in extended.discrepancies],
@@ -117,10 +118,10 @@ def nats_beside(found: Found) -> np.ndarray:
     it stands with its cause.
     """
     # a fit's score takes noise for white
-    beside = [i.blocks for i in found.in_noise if i.effect == "coloured_noise"]
+    beside = [item.blocks for item in found.in_noise if item.beside]
     # nor has any model's score the readings left out; exchanged axes are in the rivals' scores,
     # which take the readings as they are
-    left_out = [item for item in found.structural if item.effect in LEFT_OUT]
+    left_out = [item for item in found.structural if DATA_EFFECTS[item.effect].left_out]
     beside += [structural_gain(found, item)[2] for item in left_out]
     return sum((blocks for blocks in beside if np.sum(blocks) > 0), np.zeros(BLOCKS))
 
@@ -135,7 +136,7 @@ def fitted(made: Fit, correlation=None) -> Fitted:
 
     Where noise is coloured (``correlation`` (N, 2)) the sds are those of the sandwich.
     """
-    given = evidence(made, flat_parameters(made.columns, made.state))
+    given = information_at(made)
     # gauges are pinned for the fit; what is known of them is what the priors say
     places, ridge = given.places(made.active), np.diag(given.ridge[given.places(made.active)])
     inner = given.information[np.ix_(places, places)]
@@ -226,47 +227,42 @@ def causes_of(found: Found, extended: Fitted) -> list[dict]:
     causes = []
     for item in found.structural:
         nats = structural_gain(found, item)[:2]
-        if item.effect == "stale_samples" and nats[0] <= 0:
-            continue  # a coarse converter at rest repeats itself, too, and is right
-        causes.append(_entry(item, labels, item.parameters, nats, [], item.says))
+        if not item.doubtful or nats[0] > 0:
+            causes.append(_entry(item, labels, item.parameters, nats, says=item.says))
     for cause in search.causes:
-        parameters = describe.parameters_of(search, cause, extended.sds)
-        nats, names = heldout_gain(search, cause.effect), found.rivals.get(cause.effect, [])
-        entry = _entry(cause, labels, parameters, nats, names)
         statistic, freedom = need(search, cause.effect)
         true, placebo = placebo_gain(search, cause)
-        entry |= {
-            "chi_square": statistic, "degrees_of_freedom": freedom,
-            "placebo_gain_nats": placebo, "gain_in_sample_nats": true,
-        }  # fmt: skip
-        causes.append(entry)
+        causes.append(_entry(
+            cause, labels, parameters_of(search, cause, extended.sds),
+            heldout_gain(search, cause.effect), found.rivals.get(cause.effect, ()),
+            chi_square=statistic, degrees_of_freedom=freedom, placebo_gain_nats=placebo,
+            gain_in_sample_nats=true,
+        ))  # fmt: skip
     causes += [
-        _entry(item, labels, item.parameters, (item.gain, item.gain_se), [])
-        for item in found.in_noise
+        _entry(item, labels, item.parameters, (item.gain, item.gain_se)) for item in found.in_noise
     ]
     return causes
 
 
-def _entry(item, labels, parameters, nats, rivals, says=None) -> dict:
+def _entry(item, labels, parameters, nats, rivals=(), says="", **tests) -> dict:
     """One cause of `diagnosis.json`; parameters are dicts or (value, sd, unit)."""
     plain = {
         name: value if isinstance(value, dict)
         else {"value": value[0], "sd": value[1], "unit": value[2]}
         for name, value in parameters.items()
     }  # fmt: skip
-    sensors = describe.sensors_of(labels, item.imus)
-    words = describe.sentence(item.effect, sensors, plain, nats[0], rivals)
-    return {
+    entry = {
         "effect": item.effect,
-        "sensors": sensors,
+        "sensors": sensors_of(labels, item.imus),
         "parameters": plain,
         "p_value": float(np.exp(item.log_p)),
         "log10_p_value": float(max(item.log_p, LEAST) / np.log(10)),
         "heldout_gain_nats": nats[0],
         "heldout_gain_se": nats[1],
         "indistinguishable_from": list(rivals),
-        "says": f"{words[:-1]}: {says}." if says else words,
+        **tests,
     }
+    return entry | {"says": cause_in_words(entry, labels, says)}
 
 
 def structural_gain(found: Found, item) -> tuple[float, float, np.ndarray]:
@@ -278,7 +274,7 @@ def structural_gain(found: Found, item) -> tuple[float, float, np.ndarray]:
     """
     search, raw = found.search, found.raw
     touched, values = raw.keep & ~search.allowed, search.readings.values
-    if item.effect == "axis_swap":
+    if not DATA_EFFECTS[item.effect].left_out:  # it is mended
         touched, values = raw.keep & (raw.values != values), raw.values
     mine = np.zeros_like(touched)
     mine[:, list(item.imus)] = touched[:, list(item.imus)]

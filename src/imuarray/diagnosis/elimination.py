@@ -1,13 +1,16 @@
-"""What adopted effects are worth: tested against zero, on held-out time; the needless go."""
+"""Backward elimination: adopted effects tested against zero, and on held-out time."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
 from imuarray.diagnosis.fit import flat_parameters, from_flat
 from imuarray.diagnosis.heldout import normal_blocks
-from imuarray.diagnosis.scores import Candidate, log_tail
-from imuarray.diagnosis.state import Search, started
+from imuarray.diagnosis.scores import log_tail
+from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.state import Search
 
 
 def freed_places(search: Search, effect: str, imus=None, among=None) -> np.ndarray:
@@ -32,7 +35,7 @@ def need(search: Search, effect: str, imus=None, among=None) -> tuple[float, int
 def heldout_gain(search: Search, effect: str) -> tuple[float, float]:
     """Nats gained on held-out blocks of time by an adopted effect, with standard error.
 
-    Both rivals are trained without the block, the effect's parameters shrunk as their evidence
+    Both rivals are trained without the block, the effect's parameters shrunk as their score
     in the training blocks deserves (positive-part James-Stein).
     """
     given, mask = search.given, search.active
@@ -79,37 +82,39 @@ def _predicted(step, block, slope) -> float:
     return float(slope @ step - step @ block @ step / 2)
 
 
-def prune(search: Search, effect: str) -> None:
+def prune(search: Search, effect: str) -> Search:
     """Of an effect adopted for many IMUs, keep those that need it, where they are the fewer."""
-    cause = next((c for c in search.causes if c.effect == effect), None)
-    if cause is None or len(cause.imus) < 3:
-        return
-    limit = search.thresholds.limit(effect) - np.log(len(cause.imus))
-    keep = []
-    for imu in cause.imus:
-        statistic, freedom = need(search, effect, [imu])
-        if freedom and log_tail(statistic, freedom) < limit:
-            keep.append(imu)
-    rest = [imu for imu in cause.imus if imu not in keep]
-    if not keep or len(keep) > len(cause.imus) / 2:
-        return
-    statistic, freedom = need(search, effect, rest)
-    if freedom and log_tail(statistic, freedom) < search.thresholds.limit(effect):
-        return
-    cause.imus = tuple(keep)
-    state = started(search, Candidate(effect, tuple(keep)), None)
+    imus = search.imus_with(effect)
+    if len(imus) < 3:
+        return search
+    limit = SETTINGS.limit(effect)
+    keep = tuple(k for k in imus if needed(search, effect, limit - np.log(len(imus)), [k]))
+    rest = [imu for imu in imus if imu not in keep]
+    if not keep or len(keep) > len(imus) / 2 or needed(search, effect, limit, rest):
+        return search
+    causes = tuple(
+        replace(cause, imus=keep) if cause.effect == effect else cause for cause in search.causes
+    )
+    search = replace(search, causes=causes)
+    state = search.started(effect)
     whole = flat_parameters(search.columns, state)
     whole[np.ix_(rest, search.columns.of(effect))] = 0.0
-    search.refit(from_flat(search.columns, state, whole))
+    return search.refit(from_flat(search.columns, state, whole))
 
 
-def clear(search: Search) -> None:
-    """Backward: causes that are not needed beside the others go."""
-    for cause in list(search.causes):
-        statistic, freedom = need(search, cause.effect)
-        limit = search.thresholds.limit(cause.effect)
-        small = statistic < search.least()
-        if not freedom or log_tail(statistic, freedom) > limit or small:
-            search.causes.remove(cause)
+def needed(search: Search, effect: str, limit: float, imus=None) -> bool:
+    """Whether an adopted effect is significant beside all else."""
+    statistic, freedom = need(search, effect, imus)
+    return bool(freedom) and log_tail(statistic, freedom) < limit
+
+
+def eliminate(search: Search) -> Search:
+    """Causes that are not needed beside the others go, one after the other."""
+    for cause in search.causes:
+        small = need(search, cause.effect)[0] < search.least
+        if small or not needed(search, cause.effect, SETTINGS.limit(cause.effect)):
             search.say(f"dropped {cause.effect}: not needed beside the others")
-            search.refit(started(search, Candidate("", ()), None))
+            rest = tuple(other for other in search.causes if other.effect != cause.effect)
+            search = replace(search, causes=rest)
+            search = search.refit(search.started())
+    return search

@@ -9,24 +9,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis.reading_effects import LEFT_OUT
-from imuarray.diagnosis.words import MEANING
 from imuarray.errors import InputError
 from imuarray.model import EFFECTS, ArrayModel
 from imuarray.model.array_model import EffectPrior
-from imuarray.model.effects import KINDS
+from imuarray.model.effects import DATA_EFFECTS, KINDS
 from imuarray.model.names import component
 from imuarray.model.noise import Noise
 
 PINNED = 1e-9  # of a prior sd: parameters that the diagnosis fixed, or found no need of; so little
 # that misfit does not move a clock's sawtooth past a sample
-BEFORE = ("axis_swap", *LEFT_OUT)  # mended in the data, not in the model
 
 
 class Extension(NamedTuple):
     """Effects with their parameters, and the noise sds, of a diagnosis.
 
-    ``values``: {effect: {parameter's name: (value, sd or None)}}; sds by label, m/s^2 and rad/s.
+    ``values``: {effect: {parameter's name: (value, sd or None)}}; sds by label, m/s^2 and rad/s;
+    ``before``: effects that are mended in the readings, not in the model.
     """
 
     effects: tuple[str, ...]
@@ -49,7 +47,9 @@ def read_extension(path: Path) -> Extension:
             for c in causes if c["effect"] in EFFECTS
         }  # fmt: skip
         sds = [{label: float(item["sd"]) for label, item in noise[kind].items()} for kind in KINDS]
-        before = tuple(name for name in named if name in BEFORE)
+        before = tuple(
+            name for name in named if name in DATA_EFFECTS and DATA_EFFECTS[name].kind == "readings"
+        )
         times = float(document["clock"]["origin_s"]), float(document["clock"]["span_s"])
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: expected a diagnosis.json, found no text") from error
@@ -57,7 +57,7 @@ def read_extension(path: Path) -> Extension:
         what = f"no {error}" if isinstance(error, KeyError) else str(error)[:80]
         raise InputError(f"{path}: expected a diagnosis.json, found {what}") from error
     for name in named:
-        if name not in EFFECTS and name not in MEANING:
+        if name not in EFFECTS and name not in DATA_EFFECTS:
             raise InputError(
                 f"{path}: expected causes that this installation knows, found {name}; is the"
                 " module that defines it imported?"

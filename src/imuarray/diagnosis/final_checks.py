@@ -1,4 +1,4 @@
-"""What is left after the last cause: is it forgiven, and are the causes what they seem?"""
+"""What is left after the last cause: is it within tolerance, and are the causes what they seem?"""
 
 from __future__ import annotations
 
@@ -7,20 +7,29 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import norm
 
-from imuarray.diagnosis import noise_effects as variance
+from imuarray.diagnosis import noise_effects
+from imuarray.diagnosis.clipping import lone_checks
 from imuarray.diagnosis.elimination import need
 from imuarray.diagnosis.fit import flat_parameters
 from imuarray.diagnosis.linearise import linearise
 from imuarray.diagnosis.parameters import POSITION
 from imuarray.diagnosis.residual_checks import Check, normal_checks
-from imuarray.diagnosis.scores import log_tail
+from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.special import SPECIAL
 from imuarray.diagnosis.state import Search
 
-LITTLE = 0.03  # of the noise's own misfit: so little left over may be forgiven
+LITTLE = 0.03  # of the noise's own misfit: so little left over may be within tolerance
 IMPLAUSIBLE = 10.0  # prior sds
-CHANGING = 0.05  # of a drift's chi-square that its change must be worth
-STEADY = -50.0  # log p of a drift that does not change: what it names is not what it is
-UNFORGIVEN = ("outliers", "size of", "change of")  # checks that a small remainder does not excuse
+STRICT = ("outliers", "size of", "change of")  # checks that a small remainder does not excuse
+
+
+def final_checks(search: Search, tailed) -> list[Check]:
+    """All tests of an extended model beside those of its residual; ``tailed``: known mixtures."""
+    checks = [*outlier_checks(search), *plausibility_checks(search)]
+    for cause in search.causes:
+        special = SPECIAL.get(cause.effect)
+        checks += special.check(search, cause) if special and special.check else []
+    return [*checks, *tail_checks(search, tailed), *lone_checks(search, tailed)]
 
 
 def outlier_checks(search: Search) -> list[Check]:
@@ -41,13 +50,13 @@ def outlier_checks(search: Search) -> list[Check]:
     found = []
     for imu, kind in np.argwhere(whole.exists):
         own = products[:, imu, kind].sum(axis=1)
-        if np.count_nonzero(own) > variance.FEW:
+        if np.count_nonzero(own) > noise_effects.FEW:
             found.append((int(imu), float(own.sum() / np.sqrt(np.sum(own**2)))))
     return [normal_checks("outliers against the reading's change", found)] if found else []
 
 
 def plausibility_checks(search: Search) -> list[Check]:
-    """Causes whose parameters are larger than such sensors have: another cause in their clothes."""
+    """Causes whose parameters are larger than such sensors have: misattributed."""
     columns, found = search.columns, []
     whole = flat_parameters(columns, search.fit.state) / columns.prior_sd
     for cause in search.causes:
@@ -65,37 +74,21 @@ def plausibility_checks(search: Search) -> list[Check]:
 def tail_checks(search: Search, tailed) -> list[Check]:
     """Triads whose residual a mixture describes better, where ``tailed`` does not say so."""
     there = {(imu, kind) for imu, kind, _ in tailed}
-    named, hits, _ = variance.heavy_tails(search.fit, search.noise, search.thresholds.check)
+    named, hits, _ = noise_effects.heavy_tails(search.fit, search.noise, SETTINGS.check)
     left = sorted({imu for imu, kind, _ in hits if (imu, kind) not in there})
     return [Check("outliers' mixture", len(left), named.log_p, tuple(left))] if left else []
 
 
-def drift_checks(search: Search) -> list[Check]:
-    """Drifts that need their constants only: an offset in their clothes."""
-    cause = next((c for c in search.causes if c.effect == "bias_drift"), None)
-    if cause is None:
-        return []
-    columns = search.columns
-    changing = [c for c in columns.of("bias_drift") if columns.places[c][2] > 0]
-    statistic, freedom = need(search, "bias_drift", among=changing)
-    steady = log_tail(statistic, max(freedom, 1)) > search.thresholds.limit("bias_drift")
-    steady |= statistic < CHANGING * need(search, "bias_drift")[0]
-    return [Check("change of bias_drift", statistic, STEADY if steady else 0.0, cause.imus)]
-
-
-def judged(search: Search, checks, in_noise) -> tuple[float, bool]:
-    """(share of the base's excess that is explained, whether checks fail beyond forgiveness)."""
-    left = max(search.fit.misfit - search.fit.free, 0.0)
-    explained = 1.0 - left / search.excess if search.excess > 0 else 1.0
-    named = {item.effect for item in in_noise}
-    failing = [c for c in checks if c.log_p < search.thresholds.check]
-    if "coloured_noise" in named:
-        failing = [c for c in failing if c.name != "whiteness"]
+def within_tolerance(search: Search, checks, in_noise) -> tuple[float, bool]:
+    """(share of the base's excess that is explained, whether checks fail beyond tolerance)."""
+    explained = 1.0 - search.left / search.excess if search.excess > 0 else 1.0
+    accounted = {name for item in in_noise for name in item.accounts_for}
+    failing = [c for c in checks if c.log_p < SETTINGS.check and c.name not in accounted]
     large = search.excess > 30 * np.sqrt(2 * search.fit.free)
-    small = left < LITTLE * search.fit.free
-    forgiven = large and small and explained > search.thresholds.explained
+    small = search.left < LITTLE * search.fit.free
+    tolerated = large and small and explained > SETTINGS.explained
     # what a large cause leaves over does not excuse a small one that takes up as little
     weakest = min((need(search, c.effect)[0] for c in search.causes), default=np.inf)
-    forgiven = forgiven and left - 2 * np.sqrt(2 * search.fit.free) < weakest
-    forgiven = forgiven and not any(c.name.startswith(UNFORGIVEN) for c in failing)
-    return explained, bool(failing) and not forgiven
+    tolerated = tolerated and search.left - 2 * np.sqrt(2 * search.fit.free) < weakest
+    tolerated = tolerated and not any(c.name.startswith(STRICT) for c in failing)
+    return explained, bool(failing) and not tolerated

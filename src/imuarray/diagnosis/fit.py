@@ -7,16 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from imuarray.diagnosis.gauges import prior_precision
 from imuarray.diagnosis.linearise import (
     Eliminated,
-    Loose,
+    RoughPrior,
     State,
     derivatives,
     linearise,
     no_derivatives,
 )
-from imuarray.diagnosis.parameters import POSITION, Columns
+from imuarray.diagnosis.parameters import POSITION, Columns, prior_precision
 from imuarray.diagnosis.readings import Readings
 
 STEPS = 15
@@ -117,7 +116,7 @@ def search_optimum(readings, columns, active, state, smooth, rough):
     """(state, whether it converged, the recording linearised there or a step before)."""
     prior_mean = prior_means(readings, columns)[active]
     precision = prior_precision(columns, active)
-    held = held_periods(columns, active) if state.loose is not None and state.loose.free else None
+    held = held_where_rough(columns, active) if state.gyroscopes_free else None
     if held is not None:
         precision[held, held] += HELD_SD**-2
     wanted = np.flatnonzero(active.any(axis=0))
@@ -152,13 +151,11 @@ def search_optimum(readings, columns, active, state, smooth, rough):
     return state, converged, seen
 
 
-def held_periods(columns: Columns, active) -> np.ndarray:
-    """Which of the active parameters are clocks' periods, (n,) bool.
-
-    A period and the fast turning that it multiplies are one where the motion is rough.
-    """
+def held_where_rough(columns: Columns, active) -> np.ndarray:
+    """Which of the active parameters are not to move where the motion is rough, (n,) bool."""
     mask = np.zeros_like(active)
-    mask[:, columns.of("sensor_clock")[:1]] = True
+    for item in columns.model.chain:
+        mask[:, columns.of(item.id)[list(item.held_rough)]] = True
     return mask[active]
 
 
@@ -208,7 +205,7 @@ def with_derivatives(readings, state, smooth) -> State:
     return state._replace(derivatives=found)
 
 
-def loosened(readings: Readings, state: State) -> State:
+def with_rough_prior(readings: Readings, state: State) -> State:
     """The state with omega double dot and s dot free: neighbours tell them only roughly.
 
     Their prior has the polynomials' mean, and for sd ten times the size of the differences near by.
@@ -227,8 +224,9 @@ def loosened(readings: Readings, state: State) -> State:
     sd = np.hstack([WIDE * size, TIED * own])
     nothing = no_derivatives(len(mean), len(state.positions))
     return state._replace(
-        motion=np.hstack([state.motion, mean]), derivatives=nothing, loose=Loose(mean, sd, own)
-    )
+        motion=np.hstack([state.motion, mean]), derivatives=nothing,
+        rough_prior=RoughPrior(mean, sd, own),
+    )  # fmt: skip
 
 
 def flat_parameters(columns: Columns, state: State) -> np.ndarray:

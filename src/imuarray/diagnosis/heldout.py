@@ -52,8 +52,8 @@ def log_scores(fit: Fit, ridge) -> Scores:
     fixed = np.where(readings.keep, np.repeat(np.log(readings.sd), 3, axis=1), 0.0)
     constant = fixed.sum(axis=(1, 2)) + fit.log_volume / 2
     constant += np.log(2 * np.pi) / 2 * (readings.keep.sum(axis=(1, 2)) - 9)
-    if fit.state.loose is not None:
-        constant += np.log(fit.state.loose.sd).sum(axis=1)
+    if fit.state.rough_prior is not None:
+        constant += np.log(fit.state.rough_prior.sd).sum(axis=1)
     nats = []
     for (block, slope), first, last in zip(parts, edges[:-1], edges[1:], strict=True):
         # at the optimum score and prior balance: without the block, minus its score is left

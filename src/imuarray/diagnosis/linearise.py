@@ -19,7 +19,7 @@ KNOWN = 9  # the motion that the papers' model knows: omega, omega_dot, s
 CHUNK = 256  # samples per compiled call: one compiled shape, bounded memory
 
 
-class Loose(NamedTuple):
+class RoughPrior(NamedTuple):
     """Normal prior of what rough motion adds to a sample's unknowns: mean and sd, (T, 9) each.
 
     omega double dot, s dot, and by how much the gyroscopes' omega dot differs: they and the
@@ -30,7 +30,7 @@ class Loose(NamedTuple):
     sd: np.ndarray
     own: np.ndarray  # (T, 3) sd of what the gyroscopes' omega dot has of its own, once free
 
-    def freed(self) -> Loose:
+    def freed(self) -> RoughPrior:
         """The gyroscopes' omega dot free."""
         return self._replace(sd=np.hstack([self.sd[:, :6], self.own]))
 
@@ -43,16 +43,21 @@ class Loose(NamedTuple):
 class State(NamedTuple):
     """Where the model is linearised."""
 
-    motion: np.ndarray  # (T, D): omega, omega_dot, s, and what is `Loose`
+    motion: np.ndarray  # (T, D): omega, omega_dot, s, and what is `RoughPrior`
     positions: np.ndarray  # (A, 3) m, relative to the reference
     parameters: np.ndarray  # (P,) of the model with all effects
     derivatives: tuple  # omega double dot, s dot (T, 3); second, third of (force, rate)
-    loose: Loose | None = None  # where the motion is rough
+    rough_prior: RoughPrior | None = None  # where the motion is rough
+
+    @property
+    def gyroscopes_free(self) -> bool:
+        """Whether the angular acceleration seen by the gyroscopes is free."""
+        return self.rough_prior is not None and self.rough_prior.free
 
     @property
     def jerk(self) -> tuple[np.ndarray, np.ndarray]:
         """omega double dot and s dot (T, 3), free or from neighbours."""
-        if self.loose is None:
+        if self.rough_prior is None:
             return self.derivatives[0], self.derivatives[1]
         return self.motion[:, 9:12], self.motion[:, 12:15]
 
@@ -162,7 +167,7 @@ def linearise(
         room = min([size for size in BUCKETS if size >= number], default=whole)
         directions = np.vstack([directions[wanted], np.zeros((room - number, directions.shape[1]))])
     nothing = np.zeros((samples, 0))
-    prior = (nothing, nothing) if state.loose is None else state.loose
+    prior = (nothing, nothing) if state.rough_prior is None else state.rough_prior
     shared, weights = (state.positions, state.parameters, directions), readings.weights
 
     def one(start):

@@ -69,13 +69,8 @@ def to_unit(readings: Readings, residual, basis) -> np.ndarray:
     return np.where(readings.keep, residual / share, np.nan)
 
 
-def judge(fit: Fit) -> Noise:
-    """The noise of each triad from a fit's residual."""
-    return judge_parts(fit.readings, fit.residual, fit.basis)
-
-
-def judge_parts(readings: Readings, residual, basis) -> Noise:
-    """The same from residual and basis."""
+def judge(readings: Readings, residual, basis) -> Noise:
+    """The noise of each triad from a residual (T, N, 6) and the motion's basis (T, 6 N, D)."""
     unit = to_unit(readings, residual, basis)
     fast = fast_part(unit, readings.run)
     values = np.where(readings.exists[..., None], per_triad(fast), 1.0)

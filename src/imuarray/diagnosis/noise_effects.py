@@ -13,6 +13,8 @@ from imuarray.diagnosis.noise import FLAT, Noise, expected_ratio, standardised
 from imuarray.diagnosis.scores import log_tail
 from imuarray.model.effects import KINDS
 
+TAILS, COLOURED = "heavy_tails", "coloured_noise"
+SCALES = tuple(f"{kind}_noise" for kind in KINDS)
 FEW = 4  # outliers; so few are an accident, not a law
 MAYBE = -3.0  # log p of one triad's tails, where another's are sure
 AGREE = 3.5  # sds within which two estimates are of one thing
@@ -28,6 +30,8 @@ class Named(NamedTuple):
     gain: float  # nats
     gain_se: float
     blocks: np.ndarray  # nats of each held-out block
+    beside: bool = False  # whether its gain is in no fit's score, which takes noise for white
+    accounts_for: tuple[str, ...] = ()  # checks that must fail where it is
 
 
 class Mixture(NamedTuple):
@@ -104,11 +108,11 @@ def _width(fit: Fit, imu: int, kind: int) -> float:
     return float(np.sqrt(max(tails / 2, 1.0) * (1 + rho**2) / (1 - rho**2)))
 
 
-def scales(fit: Fit, noise: Noise, calm: bool) -> tuple[np.ndarray, np.ndarray]:
+def scales(fit: Fit, noise: Noise, untied: bool) -> tuple[np.ndarray, np.ndarray]:
     """(log ratio to the declared sd (n,), covariance (n, n)) of the n triads that exist.
 
     From the whole residual where that agrees with its fast part, or where nothing ties it to the
-    motion (``calm``) and its spectrum is that of its own memory; else from the fast part, which
+    motion (``untied``) and its spectrum is that of its own colour; else from the fast part, which
     smooth misfit does not reach.
     """
     there = fit.readings.exists
@@ -118,7 +122,7 @@ def scales(fit: Fit, noise: Noise, calm: bool) -> tuple[np.ndarray, np.ndarray]:
     spread, rough = np.diag(covariance), noise.error[there] ** 2
     apart = np.sqrt(np.maximum(rough - spread, spread))
     agree = (noise.correlation[there] != 0) | (np.abs(whole - fast) < AGREE * apart)
-    if calm:
+    if untied:
         agree |= np.array([alike(fit, noise, int(i), int(k)) for i, k in np.argwhere(there)])
     own = np.diag(np.where(agree, spread, rough))
     covariance = np.where(np.outer(agree, agree), covariance, own)
@@ -132,7 +136,7 @@ def alike(fit: Fit, noise: Noise, imu: int, kind: int) -> bool:
 
 
 def noise_scale(
-    fit: Fit, noise: Noise, kind: int, limit, least, skip=(), calm=True
+    fit: Fit, noise: Noise, kind: int, limit, least, skip=(), untied=True
 ) -> Named | None:
     """A triad's (0 accelerometer, 1 gyroscope) noise against the declared one, or None.
 
@@ -140,7 +144,7 @@ def noise_scale(
     """
     readings = fit.readings
     pairs = np.argwhere(readings.exists)
-    log_ratio, covariance = scales(fit, noise, calm)
+    log_ratio, covariance = scales(fit, noise, untied)
     chosen = np.flatnonzero(
         (pairs[:, 1] == kind)
         & (np.abs(log_ratio) > np.asarray(least)[pairs[:, 0]])
@@ -164,7 +168,7 @@ def noise_scale(
         error = ratio * float(np.sqrt(covariance[place, place]))
         numbers[f"ratio_{readings.labels[imu]}"] = (ratio, error, "1")
     imus = tuple(int(k) for k in pairs[chosen, 0])
-    return Named(f"{KINDS[kind]}_noise", imus, log_p, numbers, *held_out(nats))
+    return Named(SCALES[kind], imus, log_p, numbers, *held_out(nats))
 
 
 def mixture(fit: Fit, imu: int, kind: int, steps=60) -> Mixture:
@@ -215,10 +219,10 @@ def heavy_tails(fit: Fit, noise: Noise, limit: float):
     there = {item[:2] for item in hits}
     others = [m for m, may in zip(tried, maybe, strict=True) if may and m[:2] not in there]
     imus = tuple(sorted({imu for imu, *_ in hits}))
-    return Named("heavy_tails", imus, float(logs.min()), *_told(fit, hits)), hits, others
+    return Named(TAILS, imus, float(logs.min()), *_numbers(fit, hits)), hits, others
 
 
-def _told(fit: Fit, hits):
+def _numbers(fit: Fit, hits):
     """(numbers, gain, its standard error, blocks) of the triads with heavy tails."""
     nats, numbers, count = np.zeros(len(fit.residual)), {}, len(fit.residual)
     for imu, kind, mix in hits:
@@ -241,9 +245,9 @@ def _tail_gain(fit: Fit, noise: Noise, imu: int, kind: int, mix: Mixture) -> flo
     return mix.gain * (1 - rho**2) / (1 + rho**2) if several else 0.0
 
 
-def pooled_memory(fit: Fit, noise: Noise, memories) -> float:
+def pooled_autocorrelation(fit: Fit, noise: Noise, lagged) -> float:
     """log p of all triads' lag-one correlations (n, 2: value, pairs), 0 where spectra disagree."""
-    rho, pairs = np.asarray(memories).T
+    rho, pairs = np.asarray(lagged).T
     statistic = float(np.sum(rho**2 * pairs))
     slopes = noise.slope[fit.readings.exists]
     implied = np.array([expected_ratio(value, len(fit.residual)) for value in rho])
@@ -254,28 +258,26 @@ def pooled_memory(fit: Fit, noise: Noise, memories) -> float:
     return log_tail(statistic, len(rho)) if apart < AGREE < there else 0.0
 
 
-def coloured(fit: Fit, noise: Noise, limit: float, calm: bool) -> Named | None:
+def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Named | None:
     """Noise correlated in time: neighbours alike, and a spectrum that agrees with it.
 
-    ``calm``: no check finds the residual tied to the motion; else only the spectrum above the
+    ``untied``: no check finds the residual tied to the motion; else only the spectrum above the
     motion's frequencies counts.
     """
     readings, number = fit.readings, int(fit.readings.exists.sum())
     hits, nats, numbers, logs = [], np.zeros(len(fit.residual)), {}, []
     step = float(np.median(np.diff(readings.time)))
     triads = np.argwhere(readings.exists)
-    memories = [autocorrelation(fit, *pair) for pair in triads]
-    # the common motion passes a little of one triad's memory on to the others
-    loudest = max(abs(rho) for rho, _ in memories)
-    for (imu, kind), (rho, pairs) in zip(triads, memories, strict=True):
+    lagged = [autocorrelation(fit, *pair) for pair in triads]
+    # the common motion passes a little of one triad's autocorrelation on to the others
+    loudest = max(abs(rho) for rho, _ in lagged)
+    for (imu, kind), (rho, pairs) in zip(triads, lagged, strict=True):
         slope = noise.slope[imu, kind]
         sharp = norm.logsf(abs(slope)) + np.log(2 * number)
         plain = norm.logsf(abs(rho) * np.sqrt(pairs)) + np.log(2 * number)
-        log_p = min(sharp, plain if calm and alike(fit, noise, imu, kind) else 0.0)
-        remembered = noise.correlation[imu, kind] != 0
-        if (log_p > limit and not remembered) or (
-            sharp > limit and abs(rho) < max(FLAT, loudest / 5)
-        ):
+        log_p = min(sharp, plain if untied and alike(fit, noise, imu, kind) else 0.0)
+        marked = noise.correlation[imu, kind] != 0
+        if (log_p > limit and not marked) or (sharp > limit and abs(rho) < max(FLAT, loudest / 5)):
             continue
         hits.append((int(imu), int(kind)))
         logs.append(float(log_p))
@@ -292,5 +294,5 @@ def coloured(fit: Fit, noise: Noise, limit: float, calm: bool) -> Named | None:
     if not hits:
         return None
     imus = tuple(sorted({imu for imu, _ in hits}))
-    best = min(*logs, pooled_memory(fit, noise, memories), 0.0)
-    return Named("coloured_noise", imus, best, numbers, *held_out(nats))
+    best = min(*logs, pooled_autocorrelation(fit, noise, lagged), 0.0)
+    return Named(COLOURED, imus, best, numbers, *held_out(nats), True, ("whiteness",))

@@ -1,7 +1,12 @@
-"""Which parameter is which: columns of an IMU's derivative block, and where they live.
+"""Which parameter is which: columns of an IMU's derivative block, where they live, their priors.
 
 Every parameter of the model, positions included, belongs to one IMU, and concerns its readings
 alone. So the derivative of a sample by all parameters is a block per IMU, (N, 6, m).
+
+Directions that no recording determines, because the model's own freedom takes them up, are pinned:
+a common scale of all gyroscopes is a dilation of the array, for instance. Left to their priors such
+directions wander as soon as anything else is misfitted; pinned they stay where the effect has no
+common part, and the reported sds say what the priors leave open.
 """
 
 from __future__ import annotations
@@ -16,10 +21,7 @@ from imuarray.model import EFFECTS, ArrayModel
 from imuarray.model.noise import Noise
 
 POSITION = "position"
-# Effects that a score at zero cannot see: an instant or a frequency is to be found first.
-SCANNED = ("sensor_clock", "position_shift")
-# Parameters that the scans fix: an instant, a clock's frequency and phase (its sawtooth jumps).
-HELD = {"position_shift": (3,), "sensor_clock": (1, 2, 4)}
+STIFF = 1e-3  # of a parameter's prior sd: the sd that a pinned mean keeps
 
 
 @dataclass(frozen=True)
@@ -59,11 +61,10 @@ def columns_of(array: Array, effects, position_sd: float) -> Columns:
     owner += [(np.arange(count) < array.accelerometers) & (np.arange(count) > 0)] * 3
     for item, shape in zip(model.chain, model.shapes, strict=True):
         spread = np.broadcast_to(item.prior_sd, shape)[0]
-        held = HELD.get(item.id, ())
         for place in np.ndindex(*shape[1:]):
             names.append(item.id)
             places.append(place)
-            free = not (place and place[-1] in held)
+            free = not (place and place[-1] in item.held)
             owner.append((np.arange(count) < shape[0]) & free)
             sds.append(float(spread[place]))
     return Columns(model, tuple(names), tuple(places), np.array(owner).T, np.array(sds))
@@ -94,4 +95,23 @@ def catalogue_effects(without=()) -> tuple[str, ...]:
     return tuple(name for name in EFFECTS if name not in without)
 
 
-__all__ = ["POSITION", "SCANNED", "Columns", "catalogue_effects", "columns_of", "tangents"]
+def prior_precision(columns: Columns, active) -> np.ndarray:
+    """(n, n) precision of the active parameters (N, m): their priors, and the pinned gauges."""
+    sds = np.broadcast_to(columns.prior_sd, active.shape)[active]
+    precision = np.diag(1.0 / sds**2)
+    for mask in gauge_masks(columns, active):
+        along = mask[active].astype(float)
+        along /= along.sum() * STIFF * sds[along > 0].mean()
+        precision += np.outer(along, along)
+    return precision
+
+
+def gauge_masks(columns: Columns, active) -> list[np.ndarray]:
+    """(N, m) bool of the parameters whose mean is a gauge, where all of them are active."""
+    found, model = [], columns.model
+    for item, shape in zip(model.chain, model.shapes, strict=True):
+        for own in item.gauge(shape) if item.gauge else ():
+            mask = np.zeros_like(active)
+            mask[: shape[0], columns.of(item.id)] = np.reshape(own, (shape[0], -1))
+            found.append(mask & columns.owner)
+    return [mask for mask in found if mask.any() and active[mask].all()]

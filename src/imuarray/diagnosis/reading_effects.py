@@ -14,7 +14,8 @@ from imuarray.diagnosis.readings import Readings
 from imuarray.model.effects import KINDS
 from imuarray.recording.record import AXES
 
-LEFT_OUT = ("stale_samples", "saturation")  # their readings; exchanged axes are turned back
+RAILS = "saturation"
+UNITS = ("m s-2", "rad s-1")  # of the two kinds
 LEAST_REPEATS = 1
 LEAST_CLIPPED = 3
 RARE = -12.0  # log p from which repeats are no chance of a coarse converter
@@ -26,13 +27,14 @@ TURNS = [
 
 
 class Structural(NamedTuple):
-    """One such effect: whose, log p, its numbers and the sentence that says it."""
+    """One such effect: whose, log p, its numbers and the words for what was read."""
 
     effect: str
     imus: tuple[int, ...]
     log_p: float
     parameters: dict  # name -> (value, sd, unit)
     says: str
+    doubtful: bool = False  # named only where it gains on held-out time
 
 
 def part(readings: Readings, kind: int) -> np.ndarray:
@@ -61,13 +63,15 @@ def find_repeats(readings: Readings):
         return [], lost
     numbers = {"share": (float(np.mean(shares)), float(np.std(shares)), "1")}
     says = f"{100 * np.mean(shares):.2g} % of the readings repeat the one before exactly"
-    return [Structural("stale_samples", unique(hit), float(min(logs)), numbers, says)], lost
+    # a coarse converter at rest repeats itself, too, and is right
+    found = Structural("stale_samples", unique(hit), float(min(logs)), numbers, says, doubtful=True)
+    return [found], lost
 
 
 def find_rails(readings: Readings):
     """Readings that pile up at a value below the declared range: (causes, lost)."""
     lost = np.zeros(readings.values.shape, bool)
-    hit, rails, logs = [], {}, []
+    found, logs = [], []
     for imu, kind in np.argwhere(readings.exists):
         values = part(readings, kind)[:, imu]
         kept = readings.keep[:, imu, 3 * kind : 3 * kind + 3]
@@ -75,19 +79,24 @@ def find_rails(readings: Readings):
         if rail is None:
             continue
         lost[:, imu, 3 * kind : 3 * kind + 3] = at
-        hit.append(int(imu))
-        rails.setdefault(kind, []).append(rail)
+        found.append((int(imu), int(kind), rail))
         logs.append(-9.0 * (at.sum() - 1))
-    if not hit:
+    if not found:
         return [], lost
-    units = ("m s-2", "rad s-1")
-    numbers = {
-        f"{KINDS[kind]}_rail": (float(np.median(found)), float(np.std(found)), units[kind])
-        for kind, found in rails.items()
-    }
+    says = "readings pile up at a rail that the declared range does not give"
+    return [rails_cause(found, float(min(logs)), says)], lost
+
+
+def rails_cause(found, log_p: float, says: str) -> Structural:
+    """The cause of triads (imu, kind, rail in SI) whose readings a rail clips."""
+    numbers = {}
+    for kind, name in enumerate(KINDS):
+        sizes = [rail for _, own, rail in found if own == kind]
+        if sizes:
+            numbers[f"{name}_rail"] = float(np.median(sizes)), float(np.std(sizes)), UNITS[kind]
     where = ", ".join(f"{n} {v[0]:.4g} {v[2]}" for n, v in numbers.items())
-    says = f"readings pile up at a rail that the declared range does not tell of ({where})"
-    return [Structural("saturation", unique(hit), float(min(logs)), numbers, says)], lost
+    imus = unique(imu for imu, *_ in found)
+    return Structural(RAILS, imus, log_p, numbers, f"{says} ({where})")
 
 
 def _pile(values, kept):
@@ -142,7 +151,7 @@ def find_swaps(readings: Readings):
     if not mended:
         turns[:] = np.eye(3)
         says = "no majority of the triads agrees on the axes: put them right first"
-    found = Structural("axis_swap", unique([imu for imu, _ in hit]), -1e6, {}, says)
+    found = Structural(SWAP, unique([imu for imu, _ in hit]), -1e6, {}, says)
     return [found], turns, mended
 
 
@@ -194,15 +203,19 @@ def unique(imus) -> tuple[int, ...]:
     return tuple(sorted(set(imus)))
 
 
+FINDERS = {"stale_samples": find_repeats, RAILS: find_rails}
+SWAP = "axis_swap"
+
+
 def find_structural(readings: Readings, without=()):
     """(causes, readings put right, whether they could be): axes turned back, the rest left out."""
     causes, mended = [], True
-    for name, find in (("stale_samples", find_repeats), ("saturation", find_rails)):
+    for name, find in FINDERS.items():
         if name not in without:
             found, lost = find(readings)
             causes += found
             readings = readings.without(lost)
-    if "axis_swap" not in without:
+    if SWAP not in without:
         found, turns, mended = find_swaps(readings)
         causes += found
         readings = undo_swaps(readings, turns)

@@ -12,7 +12,7 @@ import numpy as np
 
 from imuarray.diagnosis.fit import Fit, normal
 from imuarray.diagnosis.noise import standardised
-from imuarray.diagnosis.words import first_up
+from imuarray.diagnosis.quantities import first_up
 from imuarray.model.effects import KINDS
 
 REPLICATES = 99
@@ -108,8 +108,8 @@ def quantities(fit: Fit, unit) -> dict[str, Quantity]:
         found[f"{name} drift"] = Quantity(
             _drift(part, readings.time), axes, f"the drift of {whose} from start to end"
         )
-        found[f"{name} company"] = Quantity(
-            _company(part), labels, f"the largest correlation of {whose} between two IMUs"
+        found[f"{name} correlation between IMUs"] = Quantity(
+            _between(part), labels, f"the largest correlation of {whose} between two IMUs"
         )
     return found
 
@@ -148,7 +148,7 @@ def _drift(part, time):
     return (slope * np.ptp(time)).ravel()
 
 
-def _company(part):
+def _between(part):
     flat = np.nan_to_num(part).reshape(len(part), -1)
     matrix = np.corrcoef(flat.T) if flat.shape[1] > 3 else np.eye(flat.shape[1])
     count = part.shape[1]

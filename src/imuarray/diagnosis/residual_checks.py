@@ -1,7 +1,8 @@
 """Is anything left? Tests of the residual against what no named cause need explain.
 
 For each reading's axis, regressions on a wide set of features of the motion and of time, the
-fitted parameters and the motion projected out; and the residual's size, colour and company.
+fitted parameters and the motion projected out; and the residual's size, its autocorrelation and
+the correlation between sensors.
 """
 
 from __future__ import annotations
@@ -12,10 +13,10 @@ import numpy as np
 from scipy.ndimage import median_filter
 from scipy.stats import chi2, norm
 
+from imuarray.diagnosis.clocks import delay_score
 from imuarray.diagnosis.fit import Fit, pick
 from imuarray.diagnosis.noise import Noise, standardised, tail_log_p
-from imuarray.diagnosis.scans import delay_score
-from imuarray.diagnosis.scores import Evidence, log_tail, robust_inverse
+from imuarray.diagnosis.scores import Information, log_tail, robust_inverse
 
 SEEN = 1e-4
 SAME = 1e-9  # m/s^2 or rad/s: equal readings
@@ -81,7 +82,7 @@ def displaced(motion, causes, axis: int) -> np.ndarray:
     return unit((arms[:, :, None] * causes[:, None, :]).reshape(len(motion), -1))
 
 
-def regression_checks(fit: Fit, given: Evidence, noise: Noise) -> list[Check]:
+def regression_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]:
     """Each group of features over all axes, and each IMU's axes over all features."""
     active = given.places(fit.active)
     both = given.information + given.precision
@@ -235,7 +236,7 @@ def jitter_check(fit: Fit) -> Check:
     return normal_checks("ages that wander", found, alike=True)
 
 
-def company_check(fit: Fit, noise: Noise) -> Check:
+def correlation_check(fit: Fit, noise: Noise) -> Check:
     """Correlations between axes beyond what the common motion explains."""
     samples = len(fit.residual)
     flat = np.where(fit.readings.keep, fit.residual, 0.0).reshape(samples, -1)
@@ -244,10 +245,10 @@ def company_check(fit: Fit, noise: Noise) -> Check:
     expected = -np.einsum("tri,tsi->rs", basis, basis, optimize=True)
     free = (kept - np.sum(basis**2, axis=2)) ** 0.5
     spread = np.sqrt((free**2).T @ free**2)
-    # products of two memories vary more
-    memory = np.repeat(noise.correlation, 3, axis=1).ravel()
-    memory = np.outer(memory, memory)
-    spread = spread * np.sqrt((1 + memory) / (1 - memory))
+    # products of two autocorrelated series vary more
+    rho = np.repeat(noise.correlation, 3, axis=1).ravel()
+    rho = np.outer(rho, rho)
+    spread = spread * np.sqrt((1 + rho) / (1 - rho))
     there = np.flatnonzero(kept.any(axis=0))
     z = (flat.T @ flat - expected) / np.maximum(spread, 1e-9)
     upper = np.triu_indices(len(there), 1)
@@ -288,11 +289,11 @@ def resolution_check(fit: Fit) -> Check:
     return Check("resolution", worst[0], -50.0 if worst[0] > COARSE else 0.0, (worst[1],))
 
 
-def all_checks(fit: Fit, given: Evidence, noise: Noise) -> list[Check]:
+def all_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]:
     """Everything that is tested of a residual."""
     return [
         *regression_checks(fit, given, noise), *size_checks(fit), timing_check(fit),
-        jitter_check(fit), company_check(fit, noise), *noise_checks(noise, fit.readings.exists),
+        jitter_check(fit), correlation_check(fit, noise), *noise_checks(noise, fit.readings.exists),
         resolution_check(fit),
     ]  # fmt: skip
 

@@ -4,23 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import gammaln
 from scipy.stats import chi2
 
-from imuarray.diagnosis.fit import Fit, normal
-from imuarray.diagnosis.gauges import prior_precision
-from imuarray.diagnosis.parameters import POSITION, SCANNED, Columns
-from imuarray.model import EFFECTS
+from imuarray.diagnosis.fit import Fit, flat_parameters, normal
+from imuarray.diagnosis.parameters import Columns, prior_precision
+from imuarray.model.effects import EFFECTS, KINDS
 
 SEEN = 1e-5  # of a parameter's own information must survive the projection to count
-DRIFTS = {"accelerometer": 0, "gyroscope": 1}
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect on some IMUs; ``variant`` tells its forms apart (which bias drifts, how)."""
+    """An effect on some IMUs; ``variant`` its form (which bias drifts, how)."""
 
     effect: str
     imus: tuple[int, ...]
@@ -47,37 +46,42 @@ def log_tail(statistic, freedom) -> float:
     return float((a - 1) * np.log(x) - x - gammaln(a) - np.log1p(-(a - 1) / x))
 
 
+class Scanned(NamedTuple):
+    """A scanned candidate's test and where its nonlinear parameters begin, by IMU."""
+
+    score: Score
+    values: dict[int, np.ndarray]
+
+
 def variants(effect: str) -> tuple[str, ...]:
     """The forms an effect is tested in."""
-    if effect == "bias_drift":
-        return tuple(f"{kind} {form}" for kind in DRIFTS for form in ("linear", "cubic"))
-    return ("",)
+    return tuple(name for name, _ in EFFECTS[effect].forms) or ("",)
 
 
 def mask_of(columns: Columns, candidate: Candidate) -> np.ndarray:
     """The parameters (N, m) bool of a candidate."""
     chosen = columns.of(candidate.effect)
-    if candidate.effect == "bias_drift" and candidate.variant:
-        kind, form = candidate.variant.split()
-        degree = 1 if form == "linear" else 3
-        chosen = [
-            c for c in chosen
-            if columns.places[c][0] == DRIFTS[kind] and columns.places[c][2] <= degree
-        ]  # fmt: skip
+    if candidate.variant:
+        inside = dict(EFFECTS[candidate.effect].forms)[candidate.variant]
+        chosen = [column for column in chosen if inside(columns.places[column])]
     out = np.zeros(columns.owner.shape, bool)
     out[np.ix_(list(candidate.imus), chosen)] = True
     return out & columns.owner
+
+
+def able(exists, effect: str) -> np.ndarray:
+    """(N,) bool: IMUs that have a sensor which the effect changes."""
+    kind = EFFECTS[effect].sensors
+    return exists.any(axis=1) if kind == "imu" else exists[:, KINDS.index(kind)]
 
 
 def candidates(columns: Columns, exists, effects) -> list[Candidate]:
     """Every effect that a score can see, on all IMUs and on each."""
     found = []
     for effect in effects:
-        if effect in SCANNED:
+        if EFFECTS[effect].scanned:
             continue
-        kind = EFFECTS[effect].sensors
-        able = exists.any(axis=1) if kind == "imu" else exists[:, int(kind == "gyroscope")]
-        imus = tuple(int(k) for k in np.flatnonzero(able))
+        imus = tuple(int(k) for k in np.flatnonzero(able(exists, effect)))
         for variant in variants(effect):
             found.append(Candidate(effect, imus, variant, True))
             found += [Candidate(effect, (k,), variant) for k in imus if len(imus) > 1]
@@ -85,7 +89,7 @@ def candidates(columns: Columns, exists, effects) -> list[Candidate]:
 
 
 @dataclass(frozen=True)
-class Evidence:
+class Information:
     """The quadratic form of the misfit around a fit, in all parameters at once.
 
     ``information`` (K, K), ``score`` (K,) at the fit, ``index`` (N, m) place of each parameter
@@ -156,8 +160,9 @@ def robust_inverse(matrix) -> np.ndarray:
     return (vectors / np.maximum(values, 1e-12)) @ vectors.T / np.outer(scale, scale)
 
 
-def evidence(fit: Fit, flat, meat=None) -> Evidence:
-    """`Evidence` at a fit; ``flat`` (N, m) are the parameters' values there."""
+def information_at(fit: Fit) -> Information:
+    """The quadratic form at a fit."""
+    flat = flat_parameters(fit.columns, fit.state)
     owner = fit.columns.owner
     information, score = normal(fit.residual, fit.whitened, fit.through, owner)
     index = np.full(owner.shape, -1)
@@ -165,11 +170,11 @@ def evidence(fit: Fit, flat, meat=None) -> Evidence:
     ridge = 1.0 / np.broadcast_to(fit.columns.prior_sd, owner.shape)[owner] ** 2
     precision, places = np.diag(ridge), index[fit.active]
     precision[np.ix_(places, places)] = prior_precision(fit.columns, fit.active)
-    return Evidence(information, score, index, flat[owner], ridge, precision, meat)
+    return Information(information, score, index, flat[owner], ridge, precision)
 
 
-def score_all(given: Evidence, fit: Fit, tried: list[Candidate], freed=()) -> list[Score]:
-    """Each candidate's score test, most telling first; the active ones but ``freed`` refitted."""
+def score_all(given: Information, fit: Fit, tried: list[Candidate], freed=()) -> list[Score]:
+    """Each candidate's score test, best first; the active ones but ``freed`` refitted."""
     freed = np.asarray(freed, int)
     active = np.setdiff1d(given.places(fit.active), freed)
     conditional = given.conditional(active, freed)
@@ -187,6 +192,3 @@ def score_all(given: Evidence, fit: Fit, tried: list[Candidate], freed=()) -> li
             log_p = log_tail(statistic, freedom) + np.log(2 * max(count, 1) * forms)
             found.append(Score(candidate, statistic, freedom, min(log_p, 0.0)))
     return sorted(found, key=lambda item: item.log_p)
-
-
-__all__ = ["POSITION", "Candidate", "Evidence", "Score", "candidates", "evidence", "score_all"]

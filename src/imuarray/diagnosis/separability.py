@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from imuarray.diagnosis.fit import Fit
-from imuarray.diagnosis.parameters import POSITION, SCANNED
-from imuarray.diagnosis.scores import Candidate, Evidence, mask_of, robust_inverse
+from imuarray.diagnosis.parameters import POSITION
+from imuarray.diagnosis.scores import Candidate, Information, able, mask_of, robust_inverse
 from imuarray.model import EFFECTS
 
 # Share of its own information that a combination of parameters must keep to count. What keeps less
@@ -32,10 +32,10 @@ class Separability:
     mean: np.ndarray
 
 
-def separability(given: Evidence, fit: Fit, adopted=()) -> Separability:
+def separability(given: Information, fit: Fit, adopted=()) -> Separability:
     """How alike the effects are on this recording, each on all IMUs that can have it.
 
-    ``given`` is the evidence at ``fit``, ``adopted`` holds the causes there ((effect, imus) pairs).
+    ``given`` is the `Information` at ``fit``, ``adopted`` its causes, as (effect, imus) pairs.
     Effects that only a scan sees (a clock, a step) have a direction once they are adopted, on the
     IMUs that have them; else they are left out.
     """
@@ -45,11 +45,11 @@ def separability(given: Evidence, fit: Fit, adopted=()) -> Separability:
     imus = dict(adopted)
     bases = {}
     for effect in fit.columns.model.effects:
-        if effect in SCANNED and effect not in imus:
+        if EFFECTS[effect].scanned and effect not in imus:
             continue
-        whose = imus[effect] if effect in SCANNED else range(len(fit.columns.owner))
+        whose = imus[effect] if EFFECTS[effect].scanned else range(len(fit.columns.owner))
         mask = mask_of(fit.columns, Candidate(effect, tuple(whose)))
-        chosen = given.places(mask & able(fit, effect))
+        chosen = given.places(mask & able(fit.readings.exists, effect)[:, None])
         basis = orthonormal(left, chosen, given.scale[chosen])
         if basis.shape[1]:
             bases[effect] = chosen, basis
@@ -62,7 +62,7 @@ def separability(given: Evidence, fit: Fit, adopted=()) -> Separability:
     )
 
 
-def conditional(given: Evidence, known) -> np.ndarray:
+def conditional(given: Information, known) -> np.ndarray:
     """Information (K, K) on all parameters when those at ``known`` are refitted to any change.
 
     Their own prior alone holds them: no gauge is pinned, whatever the fit did.
@@ -70,13 +70,6 @@ def conditional(given: Evidence, known) -> np.ndarray:
     cross = given.information[:, known]
     inner = cross[known] + np.diag(given.ridge[known])
     return given.information - cross @ robust_inverse(inner) @ cross.T
-
-
-def able(fit: Fit, effect: str) -> np.ndarray:
-    """(N, m) bool: parameters of IMUs that have the sensor which the effect changes."""
-    exists, kind = fit.readings.exists, EFFECTS[effect].sensors
-    there = exists.any(axis=1) if kind == "imu" else exists[:, int(kind == "gyroscope")]
-    return np.broadcast_to(there[:, None], fit.active.shape)
 
 
 def orthonormal(information, chosen, scale) -> np.ndarray:
@@ -95,6 +88,3 @@ def squared_correlations(information, one, other) -> np.ndarray:
     (rows, left), (columns, right) = one, other
     cross = left.T @ information[np.ix_(rows, columns)] @ right
     return np.clip(np.linalg.svd(cross, compute_uv=False) ** 2, 0.0, 1.0)
-
-
-__all__ = ["Separability", "separability"]

@@ -1,47 +1,37 @@
-"""Causes in words and numbers: parameters with sd and unit, sensors, one sentence each."""
+"""Causes in words: what they are, how large, how sure, what cannot be told from them.
+
+The sentences of `diagnosis.json` and of its page alike.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from imuarray.diagnosis.fit import flat_parameters
-from imuarray.diagnosis.parameters import HELD
-from imuarray.diagnosis.state import Cause, Search, own_turning
+from imuarray.diagnosis.quantities import (
+    NARROW,
+    first_up,
+    joined,
+    plus_minus,
+    probability,
+    quantity,
+    span,
+    symbols,
+    unit_shown,
+)
+from imuarray.diagnosis.state import Cause, Search
+from imuarray.model.effects import known_effect
 from imuarray.model.names import component, unit_of
 
-# What an effect is, in the words of one who holds the board.
-MEANING = {
-    "accelerometer_bias": "the accelerometers have an offset",
-    "accelerometer_scale": "the accelerometers' axes are scaled",
-    "accelerometer_misalignment": "the accelerometers' axes are skewed",
-    "accelerometer_nonlinearity": "the accelerometers' response is curved",
-    "size_effect": "the three axes of an accelerometer sit at places of their own",
-    "gyroscope_bias": "the gyroscopes have an offset",
-    "gyroscope_scale": "the gyroscopes' axes are scaled",
-    "gyroscope_misalignment": "the gyroscopes' axes are skewed against each other",
-    "gyroscope_g_sensitivity": "the gyroscopes respond to specific force",
-    "gyroscope_nonlinearity": "the gyroscopes' response is curved",
-    "sensor_delay": "whole IMUs are read at instants of their own",
-    "gyroscope_delay": "gyroscopes tell another instant than accelerometers, later for delays > 0",
-    "sensor_clock": "the IMUs sample on clocks of their own, so that a reading's age is a sawtooth",
-    "saturation": "readings pile up at a rail below the declared range",
-    "accelerometer_noise": "the accelerometers' noise is not the declared one",
-    "gyroscope_noise": "the gyroscopes' noise is not the declared one",
-    "heavy_tails": "a share of the readings is far noisier than the rest",
-    "coloured_noise": "noise remembers itself from sample to sample",
-    "bias_drift": "an offset changes through the recording",
-    "axis_swap": "axes are exchanged or reversed",
-    "stale_samples": "former samples are repeated",
-    "position_shift": "a triad moved on the board during the recording",
-}
+DOUBTFUL = 0.5  # share of a cause's gain that a placebo must not have
+FEW = 3  # parameters that are told one by one
 
 
 def parameters_of(search: Search, cause: Cause, sds) -> dict:
     """{name: {value, sd, unit}} of a cause; ``sds`` (N, m), of what a scan fixed there is none."""
     values, columns = flat_parameters(search.columns, search.fit.state), search.columns
-    active, held = search.active, HELD.get(cause.effect, ())
-    if cause.effect == "sensor_clock" and own_turning(search.fit.state):
-        held = (0, *held)  # where the gyroscopes' turning is free it takes the period's place
+    active, item = search.active, known_effect(cause.effect)
+    held = (*item.held, *(item.held_rough if search.fit.state.gyroscopes_free else ()))
     found = {}
     for imu in cause.imus:
         for column in columns.of(cause.effect):
@@ -64,45 +54,95 @@ def sensors_of(labels, imus) -> list[str]:
 
 
 def whose(sensors) -> str:
-    """In a sentence."""
+    """'all IMUs', 'IMU 3', 'IMUs 3, 4'."""
     if sensors == ["all"]:
-        return "in all IMUs"
-    return f"in IMU{'s' if len(sensors) > 1 else ''} {', '.join(sensors)}"
+        return "all IMUs"
+    return f"IMU{'s' if len(sensors) > 1 else ''} {', '.join(sensors)}"
 
 
-def sentence(effect: str, sensors, parameters: dict, gain, rivals) -> str:
-    """What a cause is, how large, and what cannot be told from it."""
-    meaning = MEANING.get(effect, effect.replace("_", " "))
-    text = f"{first_up(meaning)} ({whose(sensors)})"
-    size = _size(parameters)
+def words(effect: str) -> str:
+    """An effect's id without underscores."""
+    return effect.replace("_", " ")
+
+
+def cause_in_words(cause: dict, labels, says: str = "") -> str:
+    """A cause of `diagnosis.json` with its size, or what was read (``says``), test and class."""
+    effect, item = cause["effect"], known_effect(cause["effect"])
+    text = f"{words(effect)}, {whose(cause['sensors'])}: {item.meaning or words(effect)}"
+    size = says or sizes(cause, labels)
     text += f"; {size}" if size else ""
-    if gain is not None:
-        text += f"; {gain:.3g} nats gained on held-out time"
-    if rivals:
-        text += f". This recording cannot tell it from {', '.join(rivals)}"
-    return text + "."
+    gain = plus_minus(cause["heldout_gain_nats"], cause["heldout_gain_se"])
+    p_value = probability(cause["log10_p_value"])
+    text += f". Gain on held-out time {gain} nats, p{NARROW}={NARROW}{p_value}."
+    if 0 < DOUBTFUL * cause.get("gain_in_sample_nats", 0.0) < cause.get("placebo_gain_nats", 0.0):
+        text += (
+            " Its placebo, the same numbers at other IMUs, gains too: it is doubtful whose it is."
+        )
+    if cause["indistinguishable_from"]:
+        rivals = joined(words(name) for name in cause["indistinguishable_from"])
+        text += f" On this recording it cannot be told from {rivals}: one class."
+    return first_up(text)
 
 
-# Components that are told apart by name; all others of a unit are one size.
-NAMED = ("period", "frequency", "delay", "ratio", "share", "factor", "correlation", "time")
+def split_name(name: str, labels) -> tuple[str, str]:
+    """(component, IMU) of a parameter's name; IMU is "" where the name has none."""
+    for label in sorted(labels, key=len, reverse=True):
+        if name.endswith(f"_{label}"):
+            return name[: -len(label) - 1], label
+    return name, ""
 
 
-def _size(parameters: dict) -> str:
-    """Root mean squares of the parameters, by kind of component with a unit."""
-    groups: dict[tuple[str, str], list[float]] = {}
-    for name, item in parameters.items():
-        kind = "correlation time" if name.startswith("correlation_time") else name.split("_")[0]
-        kind = kind if kind.split(" ")[0] in NAMED else ""
-        if name.startswith(("phase", "offset")):
+def sizes(cause: dict, labels) -> str:
+    """A cause's parameters: each of a few, else their rms and the largest."""
+    groups: dict[tuple[str, str], list] = {}
+    for name, item in cause["parameters"].items():
+        part, label = split_name(name, labels)
+        if part == "phase":
             continue
-        groups.setdefault((kind, item["unit"]), []).append(item["value"])
-    words = []
-    for (kind, unit), values in groups.items():
-        size = float(np.sqrt(np.mean(np.square(values))))
-        words.append(f"{kind or 'size'} {size:.3g}{'' if unit == '1' else ' ' + unit}")
-    return ", ".join(words)
+        unit = unit_shown(cause["effect"], name, item["unit"])
+        effect = known_effect(cause["effect"])
+        kind = part if effect.scanned and unit != "m" else ""
+        if effect.kind != "mean":
+            kind = "correlation time" if part.startswith("correlation_time") else part.split("_")[0]
+        groups.setdefault((kind, unit), []).append((part, label, item))
+    return ", ".join(_group(kind, unit, items) for (kind, unit), items in groups.items())
 
 
-def first_up(text: str) -> str:
-    """With a capital."""
-    return text[:1].upper() + text[1:]
+def _group(kind, unit, items) -> str:
+    values = np.array([item["value"] for *_, item in items])
+    # the sign of a clock's frequency says which way its sawtooth runs
+    values = np.abs(values) if kind == "frequency" else values
+    several = len({label for _, label, _ in items}) > 1
+    if len(items) <= FEW:
+        size = np.max(np.abs(values))
+        return ", ".join(
+            f"{part_in_words(part)}{f' of IMU {label}' if several and label else ''} ".replace(
+                "value ", ""
+            )
+            + quantity(value, item["sd"], unit, size)
+            for value, (part, label, item) in zip(values, items, strict=True)
+        )
+    if kind:
+        return f"{kind} {span(float(values.min()), float(values.max()), unit)}"
+    place = int(np.argmax(np.abs(values)))
+    part, label, item = items[place]
+    rms = quantity(float(np.sqrt(np.mean(values**2))), None, unit)
+    largest = quantity(float(values[place]), item["sd"], unit)
+    text = f"rms {rms}, the largest, {part_in_words(part)} of IMU {label}, {largest}"
+    if item["sd"] is not None and abs(values[place]) < 2 * item["sd"]:
+        text += " (single values are uncertain: the motion can take up combinations of them)"
+    return text
+
+
+def part_in_words(part: str) -> str:
+    """'accelerometer z, degree 1' of 'accelerometer_z_degree1'."""
+    return part.replace("_degree", ", degree ").replace("_", " ")
+
+
+def equation(effect: str) -> str:
+    """What an effect does to a reading, in the model's own words."""
+    item = known_effect(effect)
+    if item.apply is None:
+        return item.remedy or words(effect)
+    text = symbols((item.apply.__doc__ or "").strip().split("\n")[0].rstrip("."))
+    return text[:1].lower() + text[1:] if text[1:2].islower() else text

@@ -2,12 +2,13 @@
 
 from imuarray.model import catalogue, timing  # register the effects
 from imuarray.model.array_model import ArrayModel, Prediction
-from imuarray.model.effects import EFFECTS, Effect, effect
+from imuarray.model.effects import DATA_EFFECTS, EFFECTS, Effect, effect
 from imuarray.model.noise import Noise
 from imuarray.model.own import read_effects
 from imuarray.model.structure import structure_tensor
 
 __all__ = [
+    "DATA_EFFECTS",
     "EFFECTS",
     "ArrayModel",
     "Effect",

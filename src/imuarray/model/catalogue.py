@@ -1,13 +1,15 @@
-"""The catalogue of effects that a sample's motion determines; ids are fixed.
+"""The catalogue of effects that a sample's motion determines, and of those in the data.
 
 u is the true specific force at a triad, omega the true angular rate; each function says how the
-predicted measurement departs from them. Prior scales are those of consumer MEMS.
+predicted measurement departs from them. Prior scales are those of consumer MEMS; ids are fixed.
 """
 
 from __future__ import annotations
 
+import numpy as np
+
 from imuarray.model import kinematics
-from imuarray.model.effects import effect
+from imuarray.model.effects import KINDS, common_mean, common_means, data_effect, effect
 from imuarray.model.jax64 import jnp
 
 # Rows and columns of the off-diagonal entries of a 3 x 3 matrix, row by row.
@@ -23,19 +25,28 @@ def _off_diagonal(entries):
     return matrix.at[:, OFF_ROWS, OFF_COLUMNS].set(entries)
 
 
-@effect("accelerometer_bias", unit="m s-2", prior_sd=0.05, shape=lambda a, g: (a, 3))
+@effect(
+    "accelerometer_bias", unit="m s-2", prior_sd=0.05, shape=lambda a, g: (a, 3),
+    meaning="the accelerometers have an offset", against="time",
+)  # fmt: skip
 def accelerometer_bias(bias, instant, predicted):
     """u + b."""
     return predicted._replace(specific_force=predicted.specific_force + bias)
 
 
-@effect("accelerometer_scale", unit="1", prior_sd=0.01, shape=lambda a, g: (a, 3))
+@effect(
+    "accelerometer_scale", unit="1", prior_sd=0.01, shape=lambda a, g: (a, 3), gauge=common_mean,
+    meaning="the accelerometers' axes are scaled", shown="%", against="specific force",
+)  # fmt: skip
 def accelerometer_scale(scale, instant, predicted):
     """(1 + c_i) u_i at each axis."""
     return predicted._replace(specific_force=(1.0 + scale) * predicted.specific_force)
 
 
-@effect("accelerometer_misalignment", unit="1", prior_sd=0.01, shape=lambda a, g: (a, 6))
+@effect(
+    "accelerometer_misalignment", unit="1", prior_sd=0.01, shape=lambda a, g: (a, 6),
+    meaning="the accelerometers' axes are skewed", shown="rad", against="specific force",
+)  # fmt: skip
 def accelerometer_misalignment(entries, instant, predicted):
     """u + M u, M without diagonal: xy, xz, yx, yz, zx, zy."""
     force = predicted.specific_force
@@ -46,7 +57,7 @@ def accelerometer_misalignment(entries, instant, predicted):
 
 @effect(
     "accelerometer_nonlinearity", unit="s2 m-1", prior_sd=0.005 / FULL_SCALE_FORCE,
-    shape=lambda a, g: (a, 3),
+    shape=lambda a, g: (a, 3), meaning="the accelerometers' response is curved", against="reading",
 )  # fmt: skip
 def accelerometer_nonlinearity(curvature, instant, predicted):
     """u_i + c_i u_i^2; the prior is 0.5 % of full scale, at full scale."""
@@ -54,7 +65,21 @@ def accelerometer_nonlinearity(curvature, instant, predicted):
     return predicted._replace(specific_force=force + curvature * force**2)
 
 
-@effect("size_effect", unit="m", prior_sd=5e-4, shape=lambda a, g: (a, 3, 3), sampling=True)
+def _axes_places(shape):
+    """The mean over triads of each axis' place; the mean place of a triad's axes: its position."""
+    masks = common_means(shape)
+    for triad in range(shape[0]):
+        for coordinate in range(3):
+            masks.append(np.zeros(shape, bool))
+            masks[-1][triad, :, coordinate] = True
+    return masks
+
+
+@effect(
+    "size_effect", unit="m", prior_sd=5e-4, shape=lambda a, g: (a, 3, 3), sampling=True,
+    gauge=_axes_places, against="lever arm",
+    meaning="the three axes of an accelerometer sit at places of their own",
+)  # fmt: skip
 def size_effect(offset, instant, predicted):
     """Axis i of triad k sits at r_k + d_ki: its own lever arm; ``offset`` (A, axis, xyz)."""
 
@@ -67,13 +92,19 @@ def size_effect(offset, instant, predicted):
     return predicted._replace(specific_force=predicted.specific_force + change)
 
 
-@effect("gyroscope_bias", unit="rad s-1", prior_sd=0.005, shape=lambda a, g: (g, 3))
+@effect(
+    "gyroscope_bias", unit="rad s-1", prior_sd=0.005, shape=lambda a, g: (g, 3),
+    meaning="the gyroscopes have an offset", against="time",
+)  # fmt: skip
 def gyroscope_bias(bias, instant, predicted):
     """omega + b."""
     return predicted._replace(angular_rate=predicted.angular_rate + bias)
 
 
-@effect("gyroscope_misalignment", unit="1", prior_sd=0.01, shape=lambda a, g: (g, 6))
+@effect(
+    "gyroscope_misalignment", unit="1", prior_sd=0.01, shape=lambda a, g: (g, 6), shown="rad",
+    meaning="the gyroscopes' axes are skewed against each other", against="angular rate",
+)  # fmt: skip
 def gyroscope_misalignment(entries, instant, predicted):
     """omega + M omega, M without diagonal: xy, xz, yx, yz, zx, zy."""
     rate = predicted.angular_rate
@@ -82,7 +113,10 @@ def gyroscope_misalignment(entries, instant, predicted):
     )
 
 
-@effect("gyroscope_g_sensitivity", unit="rad s m-1", prior_sd=2e-4, shape=lambda a, g: (g, 3, 3))
+@effect(
+    "gyroscope_g_sensitivity", unit="rad s m-1", prior_sd=2e-4, shape=lambda a, g: (g, 3, 3),
+    meaning="the gyroscopes respond to specific force", against="specific force",
+)  # fmt: skip
 def gyroscope_g_sensitivity(matrix, instant, predicted):
     """omega + G u, u the specific force at the same IMU."""
     force = kinematics.specific_force(instant.motion, instant.positions)
@@ -93,9 +127,37 @@ def gyroscope_g_sensitivity(matrix, instant, predicted):
 
 @effect(
     "gyroscope_nonlinearity", unit="s rad-1", prior_sd=0.002 / FULL_SCALE_RATE,
-    shape=lambda a, g: (g, 3),
+    shape=lambda a, g: (g, 3), meaning="the gyroscopes' response is curved", against="reading",
 )  # fmt: skip
 def gyroscope_nonlinearity(curvature, instant, predicted):
     """omega_i + c_i omega_i^2; the prior is 0.2 % of full scale, at full scale."""
     rate = predicted.angular_rate
     return predicted._replace(angular_rate=rate + curvature * rate**2)
+
+
+data_effect(
+    "stale_samples", kind="readings", meaning="former samples are repeated",
+    remedy="repeated readings are left out", left_out=True,
+)  # fmt: skip
+data_effect(
+    "saturation", kind="readings", meaning="readings pile up at a rail below the declared range",
+    remedy="readings at the rail are left out", left_out=True,
+)  # fmt: skip
+data_effect(
+    "axis_swap", kind="readings", meaning="axes are exchanged or reversed",
+    remedy="the axes are turned back",
+)  # fmt: skip
+for _kind in KINDS:
+    data_effect(
+        f"{_kind}_noise", kind="noise", meaning=f"the {_kind}s' noise is not the declared one",
+        remedy="the noise has the size given below",
+    )  # fmt: skip
+data_effect(
+    "heavy_tails", kind="noise", meaning="a share of the readings is far noisier than the rest",
+    remedy="the noise is a mixture of two normals; the readings of the wide one are left out of the"
+    " fit",
+)  # fmt: skip
+data_effect(
+    "coloured_noise", kind="noise", meaning="noise is autocorrelated from sample to sample",
+    remedy="noise is autocorrelated, AR(1), and widths allow for it",
+)  # fmt: skip

@@ -1,9 +1,11 @@
-"""Effects: what real triads add to the papers' model, each a small forward function.
+"""Effects: what real triads add to the papers' model, each in one place.
 
-An effect names its parameters' shape, unit and prior scale, and turns a predicted
-measurement into another one. Nothing else is needed: simulation, both estimators and
-the likelihood call `ArrayModel.predict`, and derivatives come from autodiff. The package's
-are in `imuarray.model.catalogue` and `imuarray.model.timing`; `docs/effects.md` adds one.
+An effect of the mean names its parameters' shape, unit and prior scale, and turns a predicted
+measurement into another one: simulation, both estimators and the likelihood call
+`ArrayModel.predict`, and derivatives come from autodiff. What a diagnosis must know of it beside
+that (its words, its gauge, what contains it, what only a scan finds) are fields of the same
+`Effect`. The package's are in `imuarray.model.catalogue` and `imuarray.model.timing`;
+`docs/effects.md` adds one.
 """
 
 from __future__ import annotations
@@ -11,6 +13,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
+
+import numpy as np
 
 from imuarray.errors import InputError
 from imuarray.motion.state import Motion
@@ -27,8 +31,8 @@ class Instant(NamedTuple):
     """The truth an effect may look at: the motion, where the triads are and what time it is.
 
     ``second`` and ``third`` are the ideal measurement's time derivatives of those orders, zero
-    where they are not known (only a recording's smooth motion tells them). Where it is rough, what
-    the gyroscopes' filters let pass may turn otherwise than what the accelerometers' do.
+    where they are not known (only a recording's smooth motion determines them). Where it is rough,
+    the gyroscopes' filters may pass another angular acceleration than the accelerometers' do.
     """
 
     motion: Motion
@@ -42,39 +46,95 @@ class Instant(NamedTuple):
 
 @dataclass(frozen=True)
 class Effect:
-    """A named extension of the measurement model.
+    """A named cause by which real readings depart from the papers' model.
 
     Attributes
     ----------
+    unit : str
+        Of its parameters, in SI as files have it; `imuarray.model.names.unit_of` for several.
+    prior_sd : float, or nested tuples that broadcast to ``shape``
+        Prior standard deviation of each parameter around zero, in ``unit``.
     shape : callable (A, G) -> tuple
         Shape of its parameters for A accelerometer and G gyroscope triads.
         The first axis counts the triads, each of which its own row alone concerns.
-    prior_sd : float, or nested tuples that broadcast to ``shape``
-        Prior standard deviation of each parameter around zero, in ``unit``.
+    apply : callable (parameters, Instant, Prediction) -> Prediction
+        The forward function; its docstring's first line is the equation that reports print.
     derivatives : bool
         Whether it needs omega double dot and s dot (12-column H instead of 6).
     sensors : str
         Whose reading it changes: accelerometer, gyroscope or imu (both).
     sampling : bool
         Whether it says when or where a triad samples: that comes before the triad's own errors.
+    components : tuple of tuples of str
+        Names of a triad's parameters along each axis after the first, joined by underscores; of
+        a scalar, its one name. By default axes (x, xy), or numbers.
+    gauge : callable (shape) -> list of bool arrays, or None
+        Sets of parameters whose mean the motion or the positions take up: `common_mean`, ...
+    meaning : str
+        What it is, in the words of one who holds the board.
+    shown : str
+        What parameters of unit 1 are shown in: %, rad or, by default, bare.
+    against : str
+        What a diagnosis draws it against: "specific force", "angular rate", "reading" (its own),
+        "lever arm", "time", "turning", "age", "place"; by default what each parameter multiplies.
+    contains : tuple of str
+        Effects that are a part of it: adopted, it takes their place.
+    resembles : tuple of str
+        Effects that it can stand for without containing them.
+    forms : tuple of (str, callable (place) -> bool)
+        Forms that it is tested in, and which of a triad's parameters (their indices) each frees.
+    scanned : bool
+        Whether a score at zero cannot see it: an instant or a frequency is to be found first.
+    held, held_rough : tuple of int
+        Entries of the last axis that a scan fixes; those that are fixed too where the motion is
+        rough and the gyroscopes' angular acceleration is free.
+    critical : float or None
+        log p from which it is believed, where its test has another tail than all others' tests.
+    kind : str
+        "mean", or where it is: in the "readings" themselves, in the "noise" (no parameters then).
+    remedy : str
+        What the extended model does about it, if it is no part of the mean.
+    left_out : bool
+        Whether that is leaving readings out.
     """
 
     id: str
-    unit: str
-    prior_sd: float | tuple
-    shape: Callable[[int, int], tuple[int, ...]]
-    derivatives: bool
-    sensors: str
-    apply: Callable[[object, Instant, Prediction], Prediction]
+    unit: str = "1"
+    prior_sd: float | tuple = 1.0
+    shape: Callable[[int, int], tuple[int, ...]] | None = None
+    apply: Callable[[object, Instant, Prediction], Prediction] | None = None
+    derivatives: bool = False
+    sensors: str = "imu"
     sampling: bool = False
+    components: tuple[tuple[str, ...], ...] = ()
+    gauge: Callable[[tuple[int, ...]], list] | None = None
+    meaning: str = ""
+    shown: str = ""
+    against: str = ""
+    contains: tuple[str, ...] = ()
+    resembles: tuple[str, ...] = ()
+    forms: tuple[tuple[str, Callable[[tuple[int, ...]], bool]], ...] = ()
+    scanned: bool = False
+    held: tuple[int, ...] = ()
+    held_rough: tuple[int, ...] = ()
+    critical: float | None = None
+    kind: str = "mean"
+    remedy: str = ""
+    left_out: bool = False
+
+    @property
+    def shifts_time(self) -> bool:
+        """Whether it says when a triad samples: its first parameter is a time."""
+        return self.sampling and self.unit.split(",")[0] == "s"
 
 
-EFFECTS: dict[str, Effect] = {}
+EFFECTS: dict[str, Effect] = {}  # of the mean: a model can have them
+DATA_EFFECTS: dict[str, Effect] = {}  # of the readings themselves, and of their noise
 KINDS = ("accelerometer", "gyroscope")
 
 
-def effect(id, *, unit, prior_sd, shape, derivatives=False, sensors=None, sampling=False):
-    """Register the decorated function as the effect ``id`` of the catalogue."""
+def effect(id, *, unit, prior_sd, shape, sensors=None, **fields):
+    """Register the decorated function as the effect ``id``; ``fields`` are those of `Effect`."""
 
     def register(function):
         if "," in id or " " in id:
@@ -83,10 +143,34 @@ def effect(id, *, unit, prior_sd, shape, derivatives=False, sensors=None, sampli
             raise ValueError(f"effect {id}: expected a new id, found it registered already")
         prior = tuple(prior_sd) if isinstance(prior_sd, list) else prior_sd
         whose = sensors or (id.split("_")[0] if id.split("_")[0] in KINDS else "imu")
-        EFFECTS[id] = Effect(id, unit, prior, shape, derivatives, whose, function, sampling)
+        EFFECTS[id] = Effect(id, unit, prior, shape, function, sensors=whose, **fields)
         return function
 
     return register
+
+
+def data_effect(id, *, kind, meaning, remedy, left_out=False) -> None:
+    """Register an effect of the "readings" themselves or of their "noise"."""
+    DATA_EFFECTS[id] = Effect(id, meaning=meaning, kind=kind, remedy=remedy, left_out=left_out)
+
+
+def known_effect(id) -> Effect:
+    """An effect of either registry; for an unknown id, one that says no more than it."""
+    return EFFECTS.get(id) or DATA_EFFECTS.get(id) or Effect(id)
+
+
+def common_mean(shape) -> list[np.ndarray]:
+    """A gauge: the mean of all parameters of all triads together."""
+    return [np.ones(shape, bool)]
+
+
+def common_means(shape) -> list[np.ndarray]:
+    """A gauge: the mean over all triads, of each of a triad's parameters."""
+    masks = []
+    for place in np.ndindex(*shape[1:]):
+        masks.append(np.zeros(shape, bool))
+        masks[-1][(slice(None), *place)] = True
+    return masks
 
 
 def _again(old, new) -> bool:
@@ -102,7 +186,10 @@ def find_effects(ids) -> tuple[Effect, ...]:
     return tuple(EFFECTS[name] for name in ids)
 
 
-@effect("gyroscope_scale", unit="1", prior_sd=0.02, shape=lambda a, g: (g, 3))
+@effect(
+    "gyroscope_scale", unit="1", prior_sd=0.02, shape=lambda a, g: (g, 3), gauge=common_mean,
+    meaning="the gyroscopes' axes are scaled", shown="%", against="angular rate",
+)  # fmt: skip
 def gyroscope_scale(scale, instant, predicted):
     """(1 + c_i) omega_i at each gyroscope axis."""
     return predicted._replace(angular_rate=(1.0 + scale) * predicted.angular_rate)

@@ -5,25 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from imuarray.model.array_model import ArrayModel
-from imuarray.model.effects import EFFECTS, KINDS
+from imuarray.model.effects import EFFECTS, known_effect
 
 AXES = "xyz"
 OFF_DIAGONAL = ("xy", "xz", "yx", "yz", "zx", "zy")
-COMPONENTS = {
-    "sensor_clock": ("period", "frequency", "phase", "offset", "drift"),
-    "position_shift": ("x", "y", "z", "time"),
-}
 
 
 def component(effect: str, place: tuple[int, ...]) -> str:
     """The name of a parameter within its IMU's: ``place`` are its indices but the IMU's."""
+    item = known_effect(effect)
+    if item.components:
+        parts = zip(item.components, place or (0,), strict=True)
+        return "_".join(names[index] for names, index in parts)
     if not place:
-        return "delay" if effect.endswith("delay") else "value"
-    if effect == "bias_drift":
-        return f"{KINDS[place[0]]}_{AXES[place[1]]}_degree{place[2]}"
-    if effect in COMPONENTS:
-        return COMPONENTS[effect][place[0]]
-    sizes = EFFECTS[effect].shape(2, 2)[1:] if effect in EFFECTS else (3,) * len(place)
+        return "value"
+    sizes = item.shape(2, 2)[1:] if item.shape else (3,) * len(place)
     if set(sizes) == {3}:
         return "".join(AXES[index] for index in place)
     if sizes == (len(OFF_DIAGONAL),):
@@ -32,7 +28,7 @@ def component(effect: str, place: tuple[int, ...]) -> str:
 
 
 def unit_of(effect: str, place: tuple[int, ...]) -> str:
-    """The parameter's unit."""
+    """The parameter's unit: commas count along the last axis, bars along the second."""
     unit = EFFECTS[effect].unit
     if "|" in unit:
         return unit.split("|")[place[0]].strip()

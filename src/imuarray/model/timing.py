@@ -1,13 +1,15 @@
 """Effects in time: delays, clocks, drifts, shifts; ids are those of the catalogue.
 
 A reading taken at t + tau is the ideal one plus tau times its derivative, and the second and third
-order where the recording's smooth motion tells them (`Instant`).
+order where the recording's smooth motion determines them (`Instant`).
 """
 
 from __future__ import annotations
 
+import numpy as np
+
 from imuarray.model import kinematics
-from imuarray.model.effects import Prediction, effect
+from imuarray.model.effects import KINDS, Prediction, common_mean, effect
 from imuarray.model.jax64 import jnp
 
 
@@ -28,8 +30,8 @@ def later(delay, instant, predicted, accelerometers=True):
 def _rate_later(tau, instant, common):
     """What the angular rate gains in ``tau`` (n, 1) s.
 
-    Where the gyroscopes' own turning is free, a delay against the accelerometers (``common``) has
-    the mean of both turnings, any other its own.
+    Where the angular acceleration seen by the gyroscopes is free, a delay against the
+    accelerometers (``common``) has the mean of both, any other that one.
     """
     turn, own = instant.motion.angular_acceleration, instant.gyroscope_turn
     if own is not None:
@@ -39,24 +41,46 @@ def _rate_later(tau, instant, common):
     )
 
 
+DELAY = (("delay",),)
+
+
 @effect(
     "sensor_delay", unit="s", prior_sd=1e-3, shape=lambda a, g: (max(a, g),), derivatives=True,
-    sampling=True,
+    sampling=True, gauge=common_mean, components=DELAY, against="turning",
+    meaning="whole IMUs are read at instants of their own",
 )  # fmt: skip
 def sensor_delay(delay, instant, predicted):
     """Both triads of IMU k sampled tau_k late; a delay common to all is the motion's."""
     return later(delay, instant, predicted)
 
 
-@effect("gyroscope_delay", unit="s", prior_sd=2e-3, shape=lambda a, g: (g,), sampling=True)
+@effect(
+    "gyroscope_delay", unit="s", prior_sd=2e-3, shape=lambda a, g: (g,), sampling=True,
+    components=DELAY, against="turning",
+    meaning="gyroscopes sample at another instant than accelerometers, later for delays > 0",
+)  # fmt: skip
 def gyroscope_delay(delay, instant, predicted):
     """Gyroscope k sampled tau_k late, accelerometers in time (their filters differ)."""
     return later(delay, instant, predicted, accelerometers=False)
 
 
+CLOCK = ("period", "frequency", "phase", "offset", "drift")
+
+
+def _common_offset(shape):
+    """The mean age of all IMUs is the motion's."""
+    return [np.broadcast_to(np.array(CLOCK) == "offset", shape)]
+
+
+# A sawtooth jumps, so a scan fixes its frequency, phase and drift. So many sawtooths are tried that
+# its test has a tail of its own (`benchmarks/thresholds.py`). Where the motion is rough a period
+# and the fast angular acceleration that it multiplies are one.
 @effect(
     "sensor_clock", unit="s, Hz, 1, s, Hz/s", prior_sd=(1e-3, 50.0, 1.0, 1e-3, 1e-3),
-    shape=lambda a, g: (max(a, g), 5), derivatives=True, sampling=True,
+    shape=lambda a, g: (max(a, g), 5), derivatives=True, sampling=True, scanned=True,
+    held=(1, 2, 4), held_rough=(0,), critical=-12.0, gauge=_common_offset, components=(CLOCK,),
+    contains=("sensor_delay",), resembles=("gyroscope_delay",), against="age",
+    meaning="the IMUs sample on clocks of their own, so that a reading's age is a sawtooth",
 )  # fmt: skip
 def sensor_clock(clock, instant, predicted):
     """IMU k's newest sample has age c + P (frac(n) - 1/2), n = f t + phi + g t'^2 / 2 turns.
@@ -78,9 +102,20 @@ def clock_turns(clock, time, span):
 DRIFT_SD = (((0.1,) * 4,) * 3, ((0.005,) * 4,) * 3)
 
 
+def _drift_form(kind, highest):
+    """Whether a parameter is of a kind of sensor, and of no higher degree."""
+    return lambda place: place[0] == kind and place[2] <= highest
+
+
 @effect(
     "bias_drift", unit="m s-2 | rad s-1", prior_sd=DRIFT_SD,
-    shape=lambda a, g: (max(a, g), 2, 3, 4),
+    shape=lambda a, g: (max(a, g), 2, 3, 4), contains=("accelerometer_bias", "gyroscope_bias"),
+    components=(KINDS, ("x", "y", "z"), tuple(f"degree{degree}" for degree in range(4))),
+    forms=tuple(
+        (f"{name} {form}", _drift_form(kind, highest))
+        for kind, name in enumerate(KINDS) for form, highest in (("linear", 1), ("cubic", 3))
+    ),
+    meaning="an offset changes through the recording", against="time",
 )  # fmt: skip
 def bias_drift(drift, instant, predicted):
     """Biases that are cubic polynomials of time: (accelerometer | gyroscope, axis, degree)."""
@@ -95,7 +130,9 @@ def bias_drift(drift, instant, predicted):
 
 @effect(
     "position_shift", unit="m, m, m, s", prior_sd=(1e-3, 1e-3, 1e-3, 1e3),
-    shape=lambda a, g: (a, 4), sensors="accelerometer", sampling=True,
+    shape=lambda a, g: (a, 4), sensors="accelerometer", sampling=True, scanned=True, held=(3,),
+    components=(("x", "y", "z", "time"),), against="place",
+    meaning="a triad moved on the board during the recording",
 )  # fmt: skip
 def position_shift(shift, instant, predicted):
     """Triad k sits at r_k + d_k from the instant t_k on: d_k, t_k."""

@@ -6,11 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis.reading_effects import LEFT_OUT
-from imuarray.model.effects import KINDS
-from imuarray.report.cause_words import cause_in_words, equation, whose_short, words
-from imuarray.report.numbers import imu_labels, in_noise_sds, position_table
-from imuarray.report.quantities import (
+from imuarray.diagnosis.quantities import (
     NARROW,
     joined,
     number,
@@ -20,6 +16,9 @@ from imuarray.report.quantities import (
     span,
     symbols,
 )
+from imuarray.diagnosis.words import equation, whose, words
+from imuarray.model.effects import DATA_EFFECTS, KINDS
+from imuarray.report.numbers import in_noise_sds, position_table
 
 if TYPE_CHECKING:
     from imuarray.diagnosis.document import Diagnosis
@@ -49,7 +48,7 @@ def verdict(diagnosis: Diagnosis) -> str:
     document = diagnosis.document
     named = [
         f"{' or '.join(map(words, [c['effect'], *c['indistinguishable_from']]))}"
-        f" ({whose_short(c['sensors'])})"
+        f" ({whose(c['sensors'])})"
         for c in document["causes"]
     ]
     if document["unexplained"]:
@@ -117,9 +116,7 @@ def quoted(check: dict) -> str:
 def why(diagnosis: Diagnosis) -> Answer:
     """Why? The causes in their order; what is left is said loudly."""
     document = diagnosis.document
-    read = {item.effect: item.says for item in diagnosis.found.structural}
-    items = [cause_in_words(c, imu_labels(diagnosis), read.get(c["effect"], ""))
-             for c in document["causes"]]  # fmt: skip
+    items = [cause["says"] for cause in document["causes"]]
     loud = ""
     if document["unexplained"]:
         loud = (
@@ -159,7 +156,7 @@ def extended(diagnosis: Diagnosis) -> Answer:
         lead = f"It is the papers' model as it stands, {PAPERS}."
         return Answer(question, lead, [noise])
     items = [
-        f"{words(cause['effect'])} ({whose_short(cause['sensors'])}): {equation(cause['effect'])}"
+        f"{words(cause['effect'])} ({whose(cause['sensors'])}): {equation(cause['effect'])}"
         for cause in document["causes"]
     ]
     fits = diagnosis.base.fit, diagnosis.extended.fit
@@ -221,14 +218,15 @@ def gained(diagnosis: Diagnosis) -> Answer:
 
 def readings_in_words(causes) -> list[str]:
     """Where readings count that were left out or turned back."""
-    effects = {cause["effect"] for cause in causes if cause["heldout_gain_nats"] > 0}
+    gaining = [DATA_EFFECTS.get(c["effect"]) for c in causes if c["heldout_gain_nats"] > 0]
+    mended = [item for item in gaining if item and item.kind == "readings"]
     said = []
-    if effects & set(LEFT_OUT):
+    if any(item.left_out for item in mended):
         said.append(
             "Readings that are left out count in the nats, by how far they miss what the extended"
             " model predicts; neither the residuals nor the positions have them."
         )
-    if "axis_swap" in effects:
+    if not all(item.left_out for item in mended):
         said.append(
             "Axes that are turned back count in all of these numbers: the papers' model takes the"
             " readings as they were recorded."

@@ -6,7 +6,7 @@ import matplotlib.ticker as ticks
 import numpy as np
 import pandas as pd
 
-from imuarray.figures.blind import words
+from imuarray.diagnosis.words import words
 from imuarray.figures.style import (
     BLACK,
     BLUE,

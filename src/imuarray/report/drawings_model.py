@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 from matplotlib.colors import LinearSegmentedColormap
 
-from imuarray.diagnosis.thresholds import read_thresholds
-from imuarray.figures.blind import words
+from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.words import words
 from imuarray.figures.style import BLACK, BLUE, PAGE, VERMILLION, new_figure, styled
 from imuarray.report.drawings import MODELS, NAMES, imu_ticks, legend_above
 
-ALIKE = read_thresholds().alike  # squared correlation from which two effects are one class
+ALIKE = SETTINGS.alike  # squared correlation from which two effects are one class
 DARK = 0.75  # from which numbers are white
 
 

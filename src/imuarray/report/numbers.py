@@ -8,11 +8,11 @@ import numpy as np
 import pandas as pd
 from scipy.stats import norm
 
-from imuarray.diagnosis.fit import flat_parameters
 from imuarray.diagnosis.noise import standardised
-from imuarray.diagnosis.scans import scan_clocks, scan_shifts
-from imuarray.diagnosis.scores import candidates, evidence, score_all
+from imuarray.diagnosis.scores import candidates, information_at, score_all
 from imuarray.diagnosis.separability import separability
+from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.special import scans
 from imuarray.model.effects import KINDS
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ CHECKS = {
     "whiteness": "correlation in time",
     "drift": "drift",
     "kurtosis": "tails (kurtosis)",
-    "company": "correlation between IMUs",
+    "correlation between IMUs": "correlation between IMUs",
 }
 BY_AXIS = ("residual", "drift")  # checks whose worst place is an axis, not a triad
 
@@ -105,10 +105,8 @@ def gain_table(diagnosis: Diagnosis) -> pd.DataFrame:
     first = {rung.effect: rung.gain for rung in reversed(diagnosis.found.search.trace)}
     rows = []
     for cause in document["causes"]:
-        lone = cause["effect"] == "sensor_clock" and len(cause["sensors"]) == 1
-        lone &= cause["sensors"] != ["all"]
-        # a lone clock's ages have no other to go to
-        placebo = np.nan if lone else cause.get("placebo_gain_nats", np.nan)
+        # a lone clock's ages have no other to go to: its placebo is exactly 0
+        placebo = cause.get("placebo_gain_nats") or np.nan
         rows.append({
             "what": cause["effect"], "sensors": ", ".join(cause["sensors"]),
             "gain": cause["heldout_gain_nats"], "se": cause["heldout_gain_se"],
@@ -163,18 +161,10 @@ def score_table(diagnosis: Diagnosis) -> pd.DataFrame:
     ``log10_p`` allows for its IMUs and forms; ``limit`` is the critical value.
     """
     search, made = diagnosis.found.search, diagnosis.found.base
-    given = evidence(made, flat_parameters(made.columns, made.state))
+    given = information_at(made)
     exists = made.readings.exists
     scores = score_all(given, made, candidates(made.columns, exists, search.effects))
-    both = [int(k) for k in np.flatnonzero(exists.all(axis=1))]
-    if "sensor_clock" in search.effects and both:
-        delays = {
-            s.candidate.imus: s.statistic for s in scores if s.candidate.effect == "sensor_delay"
-        }
-        scores += [found.score for found in scan_clocks(made, both, delays)]
-    if "position_shift" in search.effects:
-        imus = [int(k) for k in np.flatnonzero(exists[:, 0])]
-        scores += [found.score for found in scan_shifts(made, given, imus)]
+    scores += [found.score for found in scans(made, given, search.effects, scores)]
     best = {}
     for score in sorted(scores, key=lambda item: item.log_p):
         best.setdefault(score.candidate.effect, score)
@@ -186,7 +176,7 @@ def score_table(diagnosis: Diagnosis) -> pd.DataFrame:
             else ", ".join(made.readings.labels[k] for k in score.candidate.imus),
             "statistic": score.statistic, "freedom": score.freedom,
             "log10_p": score.log_p / np.log(10),
-            "limit": search.thresholds.limit(effect) / np.log(10), "adopted": effect in adopted,
+            "limit": SETTINGS.limit(effect) / np.log(10), "adopted": effect in adopted,
         }
         for effect, score in best.items()
     ])  # fmt: skip

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from imuarray.diagnosis.clocks import age_of, delay_score
 from imuarray.diagnosis.parameters import POSITION
-from imuarray.diagnosis.scans import delay_score
 from imuarray.diagnosis.scores import robust_inverse
-from imuarray.model.effects import KINDS
+from imuarray.model.effects import EFFECTS, KINDS
 from imuarray.model.names import component
 from imuarray.model.timing import clock_turns
 from imuarray.recording.record import AXES
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 PANELS = 3  # special drawings of a cause
 VAGUE = 12.0  # times the best block's sd, from which a block tells nothing of a position
 BLOCKS = 12  # of time, in which a position is estimated again
-IN_TIME = ("accelerometer_bias", "gyroscope_bias", "bias_drift")
-DELAYS = ("gyroscope_delay", "sensor_delay")
 # From SI to what the figures show, and its unit; the smaller unit for small signals.
 FORCE = ((1.0, "m/s²"), (1e3, "mm/s²"))
 RATE = ((np.degrees(1.0), "deg/s"), (1e3 * np.degrees(1.0), "10⁻³ deg/s"))
@@ -37,16 +35,7 @@ def cause_table(diagnosis: Diagnosis, cause) -> pd.DataFrame:
     """
     signal = signal_of(diagnosis, cause)
     frames = [added_variable(signal)]
-    if cause.effect == "sensor_clock":
-        frames += clock_panels(signal)
-    elif cause.effect == "position_shift":
-        frames += shift_panels(signal)
-    elif cause.effect in DELAYS:
-        frames += delay_panels(signal)
-    elif cause.effect in IN_TIME:
-        frames += time_panels(signal)
-    else:
-        frames += parameter_panels(signal)
+    frames += PANELS_AGAINST.get(EFFECTS[cause.effect].against, parameter_panels)(signal)
     frames = [frame for frame in frames if len(frame)]
     for number, frame in enumerate(frames):
         frame.insert(0, "panel", number)
@@ -104,8 +93,8 @@ def time_panels(signal: Signal) -> list[pd.DataFrame]:
     power = np.where(np.isfinite(signal.total), signal.explained, 0.0) ** 2
     power = power.sum(axis=0)
     power[np.setdiff1d(np.arange(len(power)), signal.imus)] = 0.0
-    if signal.effect != "bias_drift":
-        kind = int(signal.effect.startswith("gyroscope"))
+    if EFFECTS[signal.effect].sensors in KINDS:
+        kind = KINDS.index(EFFECTS[signal.effect].sensors)
         power[:, 3 - 3 * kind : 6 - 3 * kind] = 0.0
     best = np.sort(np.argsort(power, axis=None)[::-1][:PANELS])
     return [
@@ -138,20 +127,22 @@ def parameter_panels(signal: Signal) -> list[pd.DataFrame]:
     return panels
 
 
-ROOTS = ("bias", "scale", "misalignment", "nonlinearity")
-DRAWN = {"size_effect", "gyroscope_g_sensitivity"} | {f"{k}_{r}" for k in KINDS for r in ROOTS}
+# What a parameter multiplies: from SI to what is drawn.
+ABSCISSAE = {
+    "specific force": (1.0, "m/s²"), "angular rate": (np.degrees(1.0), "deg/s"),
+    "lever arm": (1e-3, "m/s² per mm"),
+}  # fmt: skip
 
 
 def abscissa(effect: str, name: str) -> tuple[float, str, bool]:
     """(factor, label, whether it is the reading itself) of what a parameter multiplies."""
-    if effect not in DRAWN:  # somebody's own
+    item = EFFECTS[effect]
+    if item.against not in (*ABSCISSAE, "reading"):
         return 1.0, "reading per unit parameter", False
-    along_axis = name[-1]
-    if effect == "size_effect":
-        return 1e-3, f"lever arm {along_axis} (m/s² per mm)", False
-    if effect.startswith("accelerometer") or effect == "gyroscope_g_sensitivity":
-        return 1.0, f"specific force {along_axis} (m/s²)", effect.endswith("nonlinearity")
-    return np.degrees(1.0), f"angular rate {along_axis} (deg/s)", effect.endswith("nonlinearity")
+    own = "specific force" if item.sensors == "accelerometer" else "angular rate"
+    quantity = own if item.against == "reading" else item.against
+    factor, unit = ABSCISSAE[quantity]
+    return factor, f"{quantity} {name[-1]} ({unit})", item.against == "reading"
 
 
 def own_reading(signal: Signal, imu, axis) -> np.ndarray:
@@ -184,13 +175,13 @@ def delay_panels(signal: Signal) -> list[pd.DataFrame]:
 def clock_panels(signal: Signal) -> list[pd.DataFrame]:
     """Clocks: the readings' age, from each sample alone, against the place in the sawtooth."""
     made, panels = signal.made, []
-    clocks = made.columns.model.split(np.asarray(made.state.parameters))["sensor_clock"]
+    clocks = made.columns.model.split(np.asarray(made.state.parameters))[signal.effect]
     score, information = delay_score(made)
     for imu in sorted(signal.imus, key=lambda k: -abs(clocks[k][0]))[:PANELS]:
-        period, frequency, _, offset, _ = map(float, clocks[imu])
+        frequency = float(clocks[imu][1])
         turns = clock_turns(clocks[imu], made.readings.time, made.readings.span)
         part = (turns - np.floor(turns)) if frequency > 0 else 1 - (turns - np.floor(turns))
-        age = offset + period * (turns - np.floor(turns) - 0.5)
+        age = age_of(clocks[imu], turns)
         place = np.clip((part * 2 * BINS).astype(int), 0, 2 * BINS - 1)
         weight = np.bincount(place, information[:, imu], 2 * BINS)
         some = weight > 1e-100
@@ -243,3 +234,8 @@ def position_of_block(signal: Signal, imu, chosen, part):
         for values in (signal.total, signal.explained)
     )
     return float(made.readings.time[part].mean()), seen, np.sqrt(np.diag(inverse)), step
+
+
+PANELS_AGAINST = {
+    "age": clock_panels, "place": shift_panels, "turning": delay_panels, "time": time_panels,
+}  # fmt: skip

@@ -6,22 +6,22 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from imuarray.model.effects import KINDS
-from imuarray.report.answers import USUAL
-from imuarray.report.cause_words import part_in_words, split_name, whose_short, words
-from imuarray.report.numbers import (
-    imu_labels,
-    position_table,
-    residual_table,
-    score_table,
-)
-from imuarray.report.quantities import (
+from imuarray.diagnosis.quantities import (
     number,
     plus_minus,
     probability,
     quantity,
     symbols,
     unit_shown,
+)
+from imuarray.diagnosis.words import part_in_words, split_name, whose, words
+from imuarray.model.effects import KINDS
+from imuarray.report.answers import USUAL
+from imuarray.report.numbers import (
+    imu_labels,
+    position_table,
+    residual_table,
+    score_table,
 )
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def tables(diagnosis: Diagnosis) -> list[Table]:
     causes = diagnosis.document["causes"]
     return [
         checks(diagnosis),
-        *([evidence_of(causes)] if causes else []),
+        *([tests_of(causes)] if causes else []),
         *[parameters(cause, imu_labels(diagnosis)) for cause in causes if cause["parameters"]],
         positions(diagnosis),
         noise(diagnosis),
@@ -85,13 +85,13 @@ def checks(diagnosis: Diagnosis) -> Table:
     return Table("Checks of the residual", caption, columns, rows)
 
 
-def evidence_of(causes) -> Table:
+def tests_of(causes) -> Table:
     """Tests, held-out gains and placebos of the causes."""
     rows = []
     for cause in causes:
         tested = "chi_square" in cause
         rows.append(Row([
-            f"{words(cause['effect'])} ({whose_short(cause['sensors'])})",
+            f"{words(cause['effect'])} ({whose(cause['sensors'])})",
             number(cause["chi_square"], 4) if tested else "",
             str(cause["degrees_of_freedom"]) if tested else "",
             probability(cause["log10_p_value"]),
@@ -126,7 +126,7 @@ def parameters(cause: dict, labels) -> Table:
         ("IMU", False), ("parameter", False), ("value", False), ("SI value", True), ("sd", True),
         ("unit", False),
     ]  # fmt: skip
-    title = f"Parameters of {words(cause['effect'])} ({whose_short(cause['sensors'])})"
+    title = f"Parameters of {words(cause['effect'])} ({whose(cause['sensors'])})"
     caption = "As fitted beside all other causes; an sd is missing where a scan fixed the value."
     return Table(title, caption, columns, rows, folded=True)
 

@@ -12,12 +12,13 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 import imuarray
+from imuarray.diagnosis.words import sensors_of, whose, words
 from imuarray.figures.style import styled
+from imuarray.model import EFFECTS
 from imuarray.provenance import atomic_write
 from imuarray.report import drawings as drawn
 from imuarray.report import numbers
 from imuarray.report.answers import answers, verdict
-from imuarray.report.cause_words import whose_short, words
 from imuarray.report.drawings_cause import cause_figure
 from imuarray.report.drawings_model import ALIKE, position_figure, separability_figure
 from imuarray.report.page import render
@@ -72,15 +73,13 @@ CAUSE_CAPTION = (
     " means of bins with two standard errors), and what the cause predicts (lines); where points"
     " leave the lines, the cause does not fit. Left: all readings that it touches. Right: {}."
 )
-BESIDE = {
-    "sensor_clock": "the age of the readings from each sample alone, against the time within a turn"
+PARAMETERS = "the most certain parameters, against what each multiplies"
+BESIDE = {  # by what it is drawn against
+    "age": "the age of the readings from each sample alone, against the time within a turn"
     " of the sawtooth, drawn twice",
-    "position_shift": "the triad's position in blocks of time",
-    "bias_drift": "the axes that it changes most, against time",
-    "accelerometer_bias": "the axes that it changes most, against time",
-    "gyroscope_bias": "the axes that it changes most, against time",
-    "gyroscope_delay": "the gyroscope along dω/dt against its size; the slope is the delay",
-    "sensor_delay": "the gyroscope along dω/dt against its size; the slope is the delay",
+    "place": "the triad's position in blocks of time",
+    "time": "the axes that it changes most, against time",
+    "turning": "the gyroscope along dω/dt against its size; the slope is the delay",
 }
 
 
@@ -141,14 +140,11 @@ def draw(diagnosis: Diagnosis) -> list[Drawing]:
         found.append(_drawing("gain", diagnosis, footer))
     for number, cause in enumerate(diagnosis.found.search.causes):
         table = cause_table(diagnosis, cause)
-        labels = numbers.imu_labels(diagnosis)
-        sensors = ["all"] if len(cause.imus) == len(labels) else [labels[k] for k in cause.imus]
+        sensors = sensors_of(numbers.imu_labels(diagnosis), cause.imus)
         found.append(Drawing(
             f"cause_{number + 1:02d}_{cause.effect}",
-            f"Cause: {words(cause.effect)}, {whose_short(sensors)}",
-            CAUSE_CAPTION.format(BESIDE.get(
-                cause.effect, "the most certain parameters, against what each multiplies"
-            )),
+            f"Cause: {words(cause.effect)}, {whose(sensors)}",
+            CAUSE_CAPTION.format(BESIDE.get(EFFECTS[cause.effect].against, PARAMETERS)),
             files(cause_figure(table, footer), table),
         ))  # fmt: skip
     return [*found, _drawing("separability", diagnosis, footer),

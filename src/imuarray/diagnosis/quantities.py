@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from imuarray.model.catalogue import FULL_SCALE_FORCE, FULL_SCALE_RATE
+from imuarray.model.effects import known_effect
 
 DEGREE = math.degrees(1.0)
 NARROW = "\u00a0"  # a space at which no line is broken
@@ -28,16 +29,13 @@ SHOWN = {
     "%": (((100.0, "%"), (1e6, "ppm")), None),
     "1": (((1.0, ""),), None),
 }
-SHARES = ("scale", "share")  # of effects and parameters without a unit, those that are shares
 
 
 def unit_shown(effect: str, name: str, unit: str) -> str:
     """The unit that a parameter is shown in: what "1" means depends on whose it is."""
-    if unit == "1" and effect.endswith("misalignment"):
-        return "rad"
-    if unit == "1" and (effect.endswith(SHARES[0]) or name.startswith(SHARES[1])):
-        return "%"
-    return unit
+    if unit != "1":
+        return unit
+    return "%" if name.startswith("share") else known_effect(effect).shown or unit
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -130,3 +128,8 @@ def joined(items) -> str:
     """'a', 'a and b', 'a, b and c'."""
     items = [str(item) for item in items]
     return " and ".join([", ".join(items[:-1]), items[-1]] if len(items) > 1 else items)
+
+
+def first_up(text: str) -> str:
+    """With a capital."""
+    return text[:1].upper() + text[1:]

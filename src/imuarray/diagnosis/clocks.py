@@ -1,35 +1,36 @@
-"""Effects that a score at zero cannot see: an instant or a frequency is to be found first."""
+"""IMUs on clocks of their own: how `sensor_clock` is found, started and estimated.
+
+Each sample's score and information of an IMU's delay show its age; a clock's ages are a sawtooth,
+whose frequency and phase are found by a scan. Frequency, phase and drift stay fixed in fits, which
+cannot move them past the sawtooth's jumps, and are estimated again between them.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import replace
 
 import numpy as np
 
-from imuarray.diagnosis.fit import Fit, normal
-from imuarray.diagnosis.parameters import POSITION
+from imuarray.diagnosis.clock_from_gyros import clocks_from_gyroscopes, enough_gyroscopes
+from imuarray.diagnosis.fit import Fit, flat_parameters, from_flat
+from imuarray.diagnosis.linearise import State, linearise
+from imuarray.diagnosis.noise import few_at_once
+from imuarray.diagnosis.parameters import Columns
 from imuarray.diagnosis.readings import Readings
-from imuarray.diagnosis.scores import Candidate, Evidence, Score, log_tail, robust_inverse
+from imuarray.diagnosis.scores import Candidate, Scanned, Score, log_tail
 from imuarray.model.timing import clock_turns
 
+CLOCK, DELAY = "sensor_clock", "sensor_delay"
 PHASES = np.arange(32) / 32  # of a turn, tried at first
-CUTS = 24  # instants tried at first
 BELIEVED = -10.0  # log p of a sawtooth beyond a constant delay
 MANY = 2.6  # log of the independent sawtooths per sample, from simulated white scores
 FAIR = 0.05  # of the constant delay's chi-square
 LEAST_TURNS = 3  # of a clock against the host's; fewer are a drift of the delay
 
 
-class Found(NamedTuple):
-    """A scanned candidate's test and where its nonlinear parameters begin, by IMU."""
-
-    score: Score
-    values: dict[int, np.ndarray]
-
-
 def delay_score(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     """Each sample's score and information of each IMU's delay, (T, N) each, motion projected."""
-    column = int(fit.columns.of("sensor_delay")[0])
+    column = int(fit.columns.of(DELAY)[0])
     return delay_parts(fit.residual, fit.whitened[..., column], fit.through[..., column])
 
 
@@ -40,7 +41,7 @@ def delay_parts(residual, along, through) -> tuple[np.ndarray, np.ndarray]:
     return score, np.maximum(information, 1e-300)
 
 
-def scan_clocks(fit: Fit, imus, delays: dict) -> list[Found]:
+def scan_clocks(fit: Fit, imus, delays: dict) -> list[Scanned]:
     """A sawtooth age for each IMU, and for those together that show one beyond a constant delay.
 
     ``delays`` (imu tuple -> chi-square of a constant delay) is what a clock must go beyond: its
@@ -58,13 +59,13 @@ def scan_clocks(fit: Fit, imus, delays: dict) -> list[Found]:
         if any(_echo(each[imu], other) for other in each.values()):
             del each[imu]
     found = [
-        Found(_clock_score((imu,), gain, delays, len(time), len(imus)), {imu: values})
+        Scanned(_clock_score((imu,), gain, delays, len(time), len(imus)), {imu: values})
         for imu, (gain, values) in each.items()
     ]
     if len(each) > 1:
         gain = sum(gain for gain, _ in each.values())
         several = _clock_score(tuple(each), gain, delays, len(time), 1)
-        found.append(Found(several, {imu: values for imu, (_, values) in each.items()}))
+        found.append(Scanned(several, {imu: values for imu, (_, values) in each.items()}))
     return found
 
 
@@ -78,7 +79,7 @@ def _clock_score(imus, gain, delays, samples, count) -> Score:
     freedom = 4 * len(imus)
     statistic = gain + delays.get(imus, sum(delays.get((imu,), 0.0) for imu in imus))
     log_p = log_tail(statistic, freedom) + len(imus) * (MANY + np.log(samples)) + np.log(count)
-    return Score(Candidate("sensor_clock", imus), float(statistic), freedom, min(log_p, 0.0))
+    return Score(Candidate(CLOCK, imus), float(statistic), freedom, min(log_p, 0.0))
 
 
 def sawtooth(time, score, information):
@@ -130,7 +131,7 @@ def refine_clock(readings: Readings, clock, score, information) -> np.ndarray:
     """
     time, span = readings.time, readings.span
     turns = clock_turns(clock, time, span)
-    age = clock[3] + clock[0] * (turns - np.floor(turns) - 0.5)
+    age = age_of(clock, turns)
     age_score = score - information * age  # of a delay counted from nothing
     powers = np.stack([np.ones_like(time), time, (time - span / 2) ** 2 / 2], axis=1)
     root = np.sqrt(information)[:, None]
@@ -156,71 +157,89 @@ def refine_clock(readings: Readings, clock, score, information) -> np.ndarray:
     return np.array([period, clock[1] + shift[1], clock[2] + shift[0], offset, clock[4] + shift[2]])
 
 
-def scan_shifts(fit: Fit, given: Evidence, imus) -> list[Found]:
-    """A step of each triad's position, at the instant where it gains most."""
-    active = given.places(fit.active)
-    chosen = fit.columns.of(POSITION)
-    outside = robust_inverse(
-        given.information[np.ix_(active, active)] + given.precision[np.ix_(active, active)]
-    )
-    edges = np.linspace(0, len(fit.residual), CUTS + 1).astype(int)
-    found = []
-    for imu in imus:
-        mask = fit.active.copy()
-        mask[imu, chosen] = True
-        parts = [normal(fit.residual, fit.whitened, fit.through, mask, slice(a, b))
-                 for a, b in zip(edges[:-1], edges[1:], strict=True)]  # fmt: skip
-        own, rest = _places(mask, fit.active, imu, chosen)
-        ridge = np.diag(1.0 / fit.columns.prior_sd[fit.columns.of("position_shift")[:3]] ** 2)
-        best = (0.0, 0, np.zeros(3))
-        for cut in range(1, CUTS):
-            gain, shift = _step_gain(parts[cut:], own, rest, outside, ridge)
-            best = max(best, (gain, edges[cut], shift), key=lambda b: b[0])
-        gain, place, shift = best
-        log_p = log_tail(gain, 3) + np.log(2 * len(imus) * CUTS)
-        score = Score(Candidate("position_shift", (imu,)), gain, 3, min(log_p, 0.0))
-        found.append(Found(score, {imu: np.append(shift, fit.readings.time[place])}))
-    return found
+def estimated_again(readings: Readings, columns: Columns, state: State, imus) -> State:
+    """The state with its clocks' frequency, phase and drift where the ages say.
 
-
-def _places(mask, active, imu, chosen):
-    """Places in the mask's parameters of the IMU's position, and of the active ones."""
-    number = np.full(mask.shape, -1)
-    number[mask] = np.arange(mask.sum())
-    return number[imu, chosen], number[active]
-
-
-def _step_gain(parts, own, rest, outside, ridge):
-    """(chi-square, shift (3,) m) of a position step over the given stretches of time."""
-    information = sum(part[0] for part in parts)
-    score = sum(part[1] for part in parts)[own]
-    cross = information[np.ix_(own, rest)]
-    block = information[np.ix_(own, own)] - cross @ outside @ cross.T + ridge
-    inverse = robust_inverse(block)
-    shift = inverse @ score
-    return float(score @ shift), shift
-
-
-def refine_instant(fit: Fit, imu: int, around: float) -> float:
-    """The instant of an adopted step, to a sample: where moving it gains most.
-
-    The step's derivative, taken from the residual sample by sample, is added before or removed
-    after; the shift itself stays.
+    ``readings`` with those near the sawtooth's jumps: they are the ones that determine the phase.
     """
-    columns, state = fit.columns, fit.state
-    place = np.flatnonzero(columns.of(POSITION) >= 0)
-    chosen = columns.of(POSITION)[place]
-    shift = columns.model.split(state.parameters)["position_shift"][imu, :3]
-    along = fit.whitened[:, imu][..., chosen] @ shift
-    through = fit.through[:, imu][..., chosen] @ shift
-    linear = np.einsum("ti,ti->t", along, fit.residual[:, imu])
-    square = np.sum(along**2, axis=1) - np.sum(through**2, axis=1)
-    after = fit.readings.time >= around
-    # switching the step off where it is on costs s + i / 2, on where it is off -s + i / 2
-    change = np.where(after, linear + square / 2, -(linear - square / 2))
-    # cost of starting at sample n instead: samples between change their state
-    first = int(np.argmax(after)) if after.any() else len(after) - 1
-    forward = np.concatenate([[0.0], np.cumsum(change[first:])])
-    backward = np.concatenate([[0.0], np.cumsum(-(linear - square / 2)[:first][::-1])])[::-1]
-    cost = np.concatenate([backward[:-1], forward[:-1]])
-    return float(fit.readings.time[int(np.argmin(cost))])
+    if not imus or state.gyroscopes_free:
+        return state
+    seen = linearise(readings, columns, state, columns.of(DELAY)[:1])
+    parts = delay_parts(seen.residual, seen.whitened[..., 0], seen.through[..., 0])
+    whole, chosen = flat_parameters(columns, state), columns.of(CLOCK)
+    for imu in imus:
+        own = (part[:, imu] for part in parts)
+        whole[imu, chosen] = refine_clock(readings, whole[imu, chosen], *own)
+    return from_flat(columns, state, whole)
+
+
+def without_jumps(readings: Readings, columns: Columns, state: State, imus, width):
+    """(readings, (T, N, 6) bool of those left out): which side of a jump one is on is a gamble.
+
+    ``width``: share of a turn within which samples of the clocked ``imus`` are left out.
+    """
+    near = np.zeros((*readings.keep.shape[:2], 2), bool)
+    values = columns.model.split(np.asarray(state.parameters))
+    for imu in imus:
+        turns = clock_turns(values[CLOCK][imu], readings.time, readings.span)
+        near[:, imu] = (np.abs(turns - np.round(turns)) < width)[:, None]
+    # what is left must determine the motion
+    near = np.repeat(few_at_once(near), 3, axis=2)
+    return replace(readings, keep=readings.keep & ~near), near & readings.keep
+
+
+def started_by_gyroscopes(readings: Readings, state: State, clocks: dict) -> tuple[State, dict]:
+    """Rough motion: (state, {imu: (P, f, phi, c, g)}), all clocks from the gyroscopes alone.
+
+    As they are where too few gyroscopes have one.
+    """
+    if not enough_gyroscopes(readings, clocks):
+        return state, clocks
+    clocks = clocks_from_gyroscopes(readings, state.motion[:, 3:6], clocks)
+    return state._replace(rough_prior=state.rough_prior.freed()), clocks
+
+
+def age_of(clock, turns):
+    """Age (s) by clocks (5, ...) after so many turns."""
+    return clock[3] + clock[0] * (turns - np.floor(turns) - 0.5)
+
+
+def maybe_clock(search, cause, own: float) -> bool:
+    """Whether a clock, whose sawtooth has a third of its constant's power, is not ruled out.
+
+    ``own``: chi-square of the delay that was adopted as ``cause``.
+    """
+    score, information = delay_score(search.fit)
+    gains = [
+        sawtooth(search.readings.time, score[:, imu], information[:, imu])[0] for imu in cause.imus
+    ]
+    return bool(np.sum(gains) > own / 6)
+
+
+def placebo_of_ages(search) -> tuple[float, float]:
+    """(nats that all IMUs' ages gain at once, nats with each one's given to the next).
+
+    What they have in common the motion takes up; 0 where a lone clock's have no other to go to.
+    """
+    fit, column = search.fit, search.columns.of(DELAY)[0]
+    along, through = fit.whitened[..., column], fit.through[..., column]
+    score, _ = delay_score(fit)
+    clocks = search.columns.model.split(np.asarray(fit.state.parameters))[CLOCK]
+    readings = search.readings
+    delay = -age_of(clocks.T, clock_turns(clocks.T, readings.time[:, None], readings.span))
+
+    def informed(values):
+        common = np.einsum("tkd,tk->td", through, values)
+        own = np.sum(along**2, axis=2) * values
+        return own - np.einsum("tkd,td->tk", through, common)
+
+    imus = list(search.clocks)
+    own, moved = np.zeros_like(delay), np.zeros_like(delay)
+    own[:, imus] = delay[:, imus]
+    moved[:, imus] = np.roll(delay[:, imus], 1, axis=1)
+    bare = score + informed(own)
+
+    def nats(values):
+        return float(np.sum(values * (bare - informed(values) / 2)))
+
+    return nats(own), nats(moved) if len(imus) > 1 else 0.0

@@ -1,0 +1,84 @@
+"""What is special in the search for some effects: the one place that says so, by id."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from imuarray.diagnosis import clocks, shifts
+from imuarray.diagnosis.elimination import need
+from imuarray.diagnosis.residual_checks import Check
+from imuarray.diagnosis.scores import Candidate, log_tail, score_all
+from imuarray.diagnosis.settings import SETTINGS
+from imuarray.model.effects import EFFECTS
+
+DRIFT = "bias_drift"
+LIKELY = -4.6  # log p of a drift beside an adopted bias
+CHANGING = 0.05  # of a drift's chi-square that its change must be worth
+STEADY = -50.0  # log p of a drift that does not change: what it names is not what it is
+
+
+class Special(NamedTuple):
+    """An effect's own steps; None where it has none.
+
+    ``scan`` (fit, given, imus, scores) -> [Scanned] of those IMUs; ``linear``: whether one
+    linearisation at what was found predicts anything; ``refine`` (search, imus) -> search, after
+    its adoption; ``maybe`` (search, cause, chi-square) -> whether it may be what was named as
+    another ``cause``; ``placebo`` (search) -> (nats, nats); ``check`` (search, cause) -> [Check].
+    """
+
+    scan: Callable | None = None
+    linear: bool = True
+    refine: Callable | None = None
+    maybe: Callable | None = None
+    placebo: Callable | None = None
+    check: Callable | None = None
+
+
+def scans(fit, given, effects, scores, taken=lambda effect: ()) -> list[clocks.Scanned]:
+    """All scans, of IMUs that can have the effect and have not (``taken`` (effect) -> IMUs)."""
+    exists, found = fit.readings.exists, []
+    for effect, special in SPECIAL.items():
+        if special.scan is None or effect not in effects:
+            continue
+        whole = EFFECTS[effect].sensors == "imu"
+        able = exists.all(axis=1) if whole else exists[:, 0]
+        imus = [int(k) for k in np.flatnonzero(able) if k not in taken(effect)]
+        found += special.scan(fit, given, imus, scores) if imus else []
+    return found
+
+
+def scan_clocks(fit, given, imus, scores) -> list[clocks.Scanned]:
+    """Clocks, beyond the constant delays that were tested."""
+    delays = {s.candidate.imus: s.statistic for s in scores if s.candidate.effect == clocks.DELAY}
+    return clocks.scan_clocks(fit, imus, delays)
+
+
+def maybe_drift(search, cause, own) -> bool:
+    """Whether a bias may change through the recording: not enough to be adopted, but likely."""
+    kind = EFFECTS[cause.effect].sensors
+    tried = [Candidate(DRIFT, cause.imus, f"{kind} {form}") for form in ("linear", "cubic")]
+    scores = score_all(search.given, search.fit, tried)
+    return any(log_tail(max(s.statistic, 1e-9), s.freedom) < LIKELY for s in scores)
+
+
+def drift_check(search, cause) -> list[Check]:
+    """A drift that needs its constants only: a misattributed offset."""
+    columns = search.columns
+    changing = [c for c in columns.of(DRIFT) if columns.places[c][2] > 0]
+    statistic, freedom = need(search, DRIFT, among=changing)
+    steady = log_tail(statistic, max(freedom, 1)) > SETTINGS.limit(DRIFT)
+    steady |= statistic < CHANGING * need(search, DRIFT)[0]
+    return [Check(f"change of {DRIFT}", statistic, STEADY if steady else 0.0, cause.imus)]
+
+
+SPECIAL = {
+    clocks.CLOCK: Special(
+        scan=scan_clocks, linear=False, maybe=clocks.maybe_clock, placebo=clocks.placebo_of_ages
+    ),
+    shifts.SHIFT: Special(scan=lambda fit, given, imus, _: shifts.scan_shifts(fit, given, imus),
+                          refine=shifts.refine_instants),
+    DRIFT: Special(maybe=maybe_drift, check=drift_check),
+}  # fmt: skip
