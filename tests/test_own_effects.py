@@ -160,7 +160,7 @@ def test_an_effect_with_a_gauge_of_its_own_is_one_place(tmp_path):
     assert np.abs(off).max() < 4
     few = imuarray.select(recording, 5)
     posterior = imuarray.sample(few, method="nuts", steps=16, effects=effects)
-    assert posterior["effect_parameter"].shape[-1] == 5
+    assert posterior["posterior"]["effect_parameter"].shape[-1] == 5
     without = [name for name in EFFECTS if name not in (*effects, "gyroscope_bias")]
     made = imuarray.diagnose(recording, without=without, replicates=2)
     (cause,) = made.document["causes"]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pandas as pd
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 import imuarray
@@ -21,7 +22,6 @@ from imuarray.report import numbers
 from imuarray.report.answers import answers, verdict
 from imuarray.report.drawings_cause import cause_figure
 from imuarray.report.drawings_model import ALIKE, position_figure, separability_figure
-from imuarray.report.page import render
 from imuarray.report.panels import cause_table
 from imuarray.report.tables import tables
 
@@ -179,7 +179,11 @@ def files(figure: Figure, table: pd.DataFrame) -> dict[str, bytes]:
 def html(diagnosis: Diagnosis, drawings: list[Drawing]) -> str:
     """report.html."""
     document = diagnosis.document
-    return render(
+    # every text is escaped
+    environment = Environment(
+        loader=PackageLoader("imuarray.report", "."), undefined=StrictUndefined, autoescape=True
+    )
+    return environment.get_template("report.html.j2").render(
         recording=str(document["recording"]) or "a recording",
         facts=facts(diagnosis),
         verdict=verdict(diagnosis),
