@@ -27,7 +27,7 @@ class Rough:
         ])  # fmt: skip
         rate, self.turn = rng.normal(0, 15, (samples, 3)), rng.normal(0, 400, (samples, 3))
         # half of what the accelerometers see turning is what the gyroscopes see, as strong
-        self.turning = (self.turn + rng.normal(0, 400, (samples, 3))) / np.sqrt(2)
+        self.acceleration = (self.turn + rng.normal(0, 400, (samples, 3))) / np.sqrt(2)
         ages = PERIOD * (np.mod(clock_turns(self.clocks.T, self.time[:, None], SPAN), 1) - 0.5)
         ages += PERIOD * rng.choice([-1, 0, 1], ages.shape, p=[wrong / 2, 1 - wrong, wrong / 2])
         maps = np.eye(3) + rng.normal(0, 0.01, (8, 3, 3))
@@ -50,7 +50,8 @@ class Rough:
 @pytest.mark.parametrize("seed", [1, 2])
 def test_phases_rates_drifts_and_the_period_are_found(seed):
     there = Rough(seed)
-    found = clocks_from_gyroscopes(there, there.turning, there.guesses(np.random.default_rng(seed)))
+    guesses = there.guesses(np.random.default_rng(seed))
+    found = clocks_from_gyroscopes(there, there.acceleration, guesses)
     clocks = np.array([found[imu] for imu in range(8)])
     exact = clock_turns(there.clocks.T, there.time[:, None], SPAN)
     off = clock_turns(clocks.T, there.time[:, None], SPAN) - exact
@@ -63,7 +64,7 @@ def test_phases_rates_drifts_and_the_period_are_found(seed):
 def test_with_true_ages_only_noise_is_left():
     there = Rough(3, wrong=0.0)
     maps = np.tile(np.eye(4)[:3], (8, 1, 1))
-    seen = Gyroscopes(there.time, SPAN, there.values[..., 3:], there.turning)
+    seen = Gyroscopes(there.time, SPAN, there.values[..., 3:], there.acceleration)
     ages = ages_of(there.clocks, seen)
     bare = there.values[..., 3:]
     motion, left = moved(seen, maps, ages, np.ones(ages.shape))

@@ -14,10 +14,10 @@ from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects as variance
 from imuarray.diagnosis.clocks import sawtooth
 from imuarray.diagnosis.fit import Fit, fit, flat_parameters, from_flat, normal
-from imuarray.diagnosis.heldout import edges_of, log_scores
+from imuarray.diagnosis.heldout import blocks_of, log_scores
 from imuarray.diagnosis.linearise import linearise
 from imuarray.diagnosis.parameters import catalogue_effects, columns_of, prior_precision
-from imuarray.diagnosis.readings import LEAST, arrange, part_of
+from imuarray.diagnosis.readings import arrange, part_of
 from imuarray.diagnosis.replicates import Replicator, discrepancies
 from imuarray.diagnosis.scores import candidates, information_at, log_tail, mask_of, score_all
 from imuarray.diagnosis.settings import SETTINGS
@@ -184,10 +184,10 @@ def test_heldout_scores_are_those_of_refits_without_each_block(clean):
     """Parameters trained on nine tenths of time, the last tenth's density from its own misfit."""
     made = clean.fit
     scores = log_scores(made, ridge_of(made))
-    edges = edges_of(len(made.residual))
+    blocks = blocks_of(len(made.residual))
     for block in (0, 5):
         inside = np.zeros(len(made.residual), bool)
-        inside[edges[block] : edges[block + 1]] = True
+        inside[blocks[block]] = True
         whole = [made.residual, made.whitened, made.through]
         information, score = normal(*(part[~inside] for part in whole), made.active)
         values = flat_parameters(made.columns, made.state)[made.active]
@@ -293,7 +293,7 @@ def test_discrepancies_see_a_scaled_gyroscope(scaled):
 
 def test_part_of_a_recording_keeps_whole_stretches(clean):
     part = part_of(clean.readings, 250)
-    assert LEAST <= len(part.time) <= 300
+    assert SETTINGS.least_samples <= len(part.time) <= 300
     assert np.all(np.isin(part.time, clean.readings.time))
     steps = np.diff(part.time)
     assert np.all((steps < 0.0121) | (np.diff(part.run) > 0))

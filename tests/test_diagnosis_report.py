@@ -28,7 +28,7 @@ from imuarray.report import drawings as drawn
 from imuarray.report import numbers
 from imuarray.report import write as report
 from imuarray.report.answers import answers, verdict
-from imuarray.report.drawings_cause import cause_figure
+from imuarray.report.drawings_model import cause_figure
 from imuarray.report.panels import abscissa, cause_table
 from imuarray.report.signals import binned, signal_of
 

@@ -14,13 +14,6 @@ from imuarray.diagnosis.special import SPECIAL, scans
 from imuarray.diagnosis.state import Adoption, Cause, Search
 from imuarray.model.effects import EFFECTS
 
-PATIENCE = 8  # refusals in a row: what is left is none of the catalogue
-MOST = 12  # causes
-KEPT = 0.05  # of the gain that a test promises must be there on held-out time
-LEAST_Z = 1.5  # standard errors that a gain on held-out time must have
-ROUGH_Z = 2.0  # the same where the motion is rough, and few stretches decide
-SURE = 50.0  # nats; smaller promises may break
-
 
 def tried(search: Search) -> list[Candidate]:
     """What may be adopted: neither refused before, nor there already."""
@@ -51,7 +44,7 @@ def proposals(search: Search):
 def adopt(search: Search) -> Search:
     """Forward: adopt while a test is significant, large enough and gains on held-out time."""
     vain = 0
-    while len(search.causes) < MOST and vain < PATIENCE:
+    while len(search.causes) < SETTINGS.most_causes and vain < SETTINGS.patience:
         best, values = (proposals(search) or [(None, None)])[0]
         if best is None or best.log_p > SETTINGS.limit(best.candidate.effect):
             break
@@ -91,8 +84,9 @@ def attempt(search: Search, score, values) -> Search:
 
 def keeps(search: Search, score, gain: float, error: float) -> bool:
     """Whether a gain on held-out time is clear, and a fair part of what the test promised."""
-    least = LEAST_Z if search.smooth else ROUGH_Z
-    return gain > least * error and gain > KEPT * (score.statistic / 2 - SURE)
+    least = SETTINGS.least_z if search.smooth else SETTINGS.rough_z
+    promised = score.statistic / 2 - SETTINGS.uncertain
+    return gain > least * error and gain > SETTINGS.kept * promised
 
 
 def predicted_gain(search: Search, candidate: Candidate, values) -> tuple[float, float]:

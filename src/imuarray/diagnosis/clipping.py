@@ -18,9 +18,6 @@ from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Search
 from imuarray.model.effects import KINDS
 
-ALONE = 1.5  # times farther than any other reading of its triad
-NEXT = 30  # largest readings after it
-
 
 class Peak(NamedTuple):
     """A triad's largest reading."""
@@ -45,8 +42,8 @@ def peaks(search: Search) -> list[Peak]:
         short = -np.sign(values) * residual[block]
         rest = kept & ~at
         # what bends all large readings alike is no rail
-        near = short[rest][np.argsort(size[rest])[-NEXT:]]
-        spread = max(float(np.std(near)), 1.0) * np.sqrt(1 + 1 / NEXT)
+        near = short[rest][np.argsort(size[rest])[-SETTINGS.next_largest :]]
+        spread = max(float(np.std(near)), 1.0) * np.sqrt(1 + 1 / SETTINGS.next_largest)
         inward = float(np.max(short[at]))
         others = float(np.max(np.abs(residual[block])[rest]))
         apart = (inward - float(np.mean(near))) / spread
@@ -57,7 +54,7 @@ def peaks(search: Search) -> list[Peak]:
 def clipped(found: list[Peak], limit: float) -> tuple[list[Peak], float]:
     """Those that fall short far more than anything else does, or all of a kind together."""
     logs = {id(p): float(norm.logsf(p.inward) + np.log(len(found))) for p in found}
-    hit = [p for p in found if logs[id(p)] < limit and p.inward > ALONE * p.others]
+    hit = [p for p in found if logs[id(p)] < limit and p.inward > SETTINGS.alone * p.others]
     least = min((logs[id(p)] for p in hit), default=0.0)
     for kind in range(len(KINDS)):
         own = [p for p in found if p.kind == kind]

@@ -16,52 +16,47 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.diagnosis.readings import Readings
+from imuarray.diagnosis.settings import SETTINGS
 from imuarray.model.timing import clock_turns
 
-ENOUGH = 4  # gyroscopes with a clock
-LEAST = 200  # samples
-MOST = 2500  # samples, those of the fastest turning
-ROUNDS = 18
-REACH = 0.1  # turns, rms, by which a first guess may be off
-DRAWN_IN = 0.85  # factor of the reach from round to round
 UNIT = 1e-3  # s, of the ages until their size is known
 
 
 class Gyroscopes(NamedTuple):
-    """Readings of the gyroscopes that have clocks, and the turning that accelerometers see."""
+    """Readings of the gyroscopes that have clocks, and omega_dot as accelerometers see it."""
 
     time: np.ndarray  # (T,)
     span: float
     values: np.ndarray  # (T, K, 3) rad/s
-    turning: np.ndarray  # (T, 3) rad/s^2
+    acceleration: np.ndarray  # (T, 3) rad/s^2
 
 
-def clocks_from_gyroscopes(readings: Readings, turning, clocks: dict) -> dict:
-    """{imu: (P, f, phi, c, g)} from first guesses of the same form, `ENOUGH` of them at least.
+def clocks_from_gyroscopes(readings: Readings, acceleration, clocks: dict) -> dict:
+    """{imu: (P, f, phi, c, g)} from as many first guesses of the same form.
 
-    ``turning`` (T, 3): omega_dot by the accelerometers. The period that all get makes what the
+    ``acceleration`` (T, 3): omega_dot by the accelerometers. The period that all get makes what the
     gyroscopes see turn as much as what the accelerometers see.
     """
     imus = sorted(clocks)
-    seen = informative(readings, turning, imus)
+    seen = informative(readings, acceleration, imus)
     guess = np.array([clocks[imu] for imu in imus])
     guess[:, 0], guess[:, 3] = UNIT, 0.0
     maps, weights = np.tile(np.eye(4)[:3], (len(imus), 1, 1)), np.ones(seen.values.shape[:2])
-    for number in range(ROUNDS):
+    for number in range(SETTINGS.rounds):
         ages = ages_of(guess, seen)
         motion, left = moved(seen, maps, ages, weights)
         size = 1.4826 * np.median(np.abs(left))
         weights = robust(left, size)
         maps = remapped(seen, motion, ages, weights)
         if number:
-            guess = turned(seen, maps, motion, guess, REACH * DRAWN_IN**number)
+            guess = turned(seen, maps, motion, guess, SETTINGS.reach * SETTINGS.drawn_in**number)
     # over all samples: those that were picked turn fast by the accelerometers, and less by others
-    seen = informative(readings, turning, imus, None)
+    seen = informative(readings, acceleration, imus, None)
     ages = ages_of(guess, seen)
     motion, left = moved(seen, maps, ages, np.ones(ages.shape))
     motion = moved(seen, maps, ages, robust(left, size))[0]
-    both = [np.sqrt(np.mean(part**2)) for part in (motion[:, 3:], seen.turning)]
-    sign = np.sign(np.sum(motion[:, 3:] * seen.turning))
+    both = [np.sqrt(np.mean(part**2)) for part in (motion[:, 3:], seen.acceleration)]
+    sign = np.sign(np.sum(motion[:, 3:] * seen.acceleration))
     guess[:, 0] = sign * UNIT * both[0] / both[1]
     return dict(zip(imus, guess, strict=True))
 
@@ -69,7 +64,7 @@ def clocks_from_gyroscopes(readings: Readings, turning, clocks: dict) -> dict:
 def enough_gyroscopes(readings: Readings, imus) -> bool:
     """Whether there are gyroscopes and samples enough."""
     together = readings.keep[:, sorted(imus), 3:].all(axis=(1, 2))
-    return len(imus) >= ENOUGH and together.sum() >= LEAST
+    return len(imus) >= SETTINGS.enough and together.sum() >= SETTINGS.least_gyroscope_samples
 
 
 def robust(left, size) -> np.ndarray:
@@ -77,13 +72,15 @@ def robust(left, size) -> np.ndarray:
     return 1 / (1 + (np.sum(left**2, axis=2) / (4 * size) ** 2) ** 2)
 
 
-def informative(readings: Readings, turning, imus, most=MOST) -> Gyroscopes:
-    """The ``most`` samples of the fastest turning at which all the gyroscopes were read."""
+def informative(
+    readings: Readings, acceleration, imus, most=SETTINGS.most_gyroscope_samples
+) -> Gyroscopes:
+    """The ``most`` samples of the largest omega_dot at which all the gyroscopes were read."""
     good = np.flatnonzero(readings.keep[:, imus, 3:].all(axis=(1, 2)))
-    fast = np.linalg.norm(turning[good], axis=1)
+    fast = np.linalg.norm(acceleration[good], axis=1)
     good = np.sort(good[np.argsort(fast)[-(most or len(good)) :]])
     values = readings.values[good][:, imus, 3:]
-    return Gyroscopes(readings.time[good], readings.span, values, turning[good])
+    return Gyroscopes(readings.time[good], readings.span, values, acceleration[good])
 
 
 def ages_of(clocks, seen: Gyroscopes) -> np.ndarray:
@@ -98,11 +95,11 @@ def moved(seen: Gyroscopes, maps, ages, weights):
     target = seen.values - maps[..., 3]
     heavy = weights[..., None, None] * matrix
     gram = np.einsum("tkia,tkib->tab", heavy, matrix, optimize=True)
-    # ages that agree at a sample tell no turning: the accelerometers' own then
+    # ages that agree at a sample do not determine it: it is the accelerometers' then
     ridge = 1e-3 * UNIT**2 * np.eye(3)
     gram[:, 3:, 3:] += ridge
     right = np.einsum("tkia,tki->ta", heavy, target)
-    right[:, 3:] += seen.turning @ ridge
+    right[:, 3:] += seen.acceleration @ ridge
     motion = np.linalg.solve(gram, right[..., None])[..., 0]
     return motion, target - np.einsum("tkia,ta->tki", matrix, motion)
 
@@ -153,13 +150,13 @@ def turned(seen: Gyroscopes, maps, motion, clocks, reach) -> np.ndarray:
 
 
 def polynomials(seen: Gyroscopes) -> tuple[np.ndarray, np.ndarray]:
-    """(T, 3) of time, orthonormal under the turning's square, and their phase, rate, drift (3, 3).
+    """(T, 3) of time, orthonormal under the square of omega_dot, and their phase, rate, drift.
 
     So they change where the board turns: a recording may be still for most of its time.
     """
     since = seen.time - seen.span / 2
     powers = np.stack([np.ones_like(since), seen.time, since**2 / 2], axis=1)
-    weight = np.linalg.norm(seen.turning, axis=1, keepdims=True)
+    weight = np.linalg.norm(seen.acceleration, axis=1, keepdims=True)
     weight = weight / np.sqrt(np.sum(weight**2))
     scale = np.abs(powers).max(axis=0)
     exact = np.linalg.inv(np.linalg.qr(weight * powers / scale)[1]) / scale[:, None]

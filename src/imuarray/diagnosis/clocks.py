@@ -18,14 +18,11 @@ from imuarray.diagnosis.noise import few_at_once
 from imuarray.diagnosis.parameters import Columns
 from imuarray.diagnosis.readings import Readings
 from imuarray.diagnosis.scores import Candidate, Scanned, Score, log_tail
+from imuarray.diagnosis.settings import SETTINGS
 from imuarray.model.timing import clock_turns
 
 CLOCK, DELAY = "sensor_clock", "sensor_delay"
 PHASES = np.arange(32) / 32  # of a turn, tried at first
-BELIEVED = -10.0  # log p of a sawtooth beyond a constant delay
-MANY = 2.6  # log of the independent sawtooths per sample, from simulated white scores
-FAIR = 0.05  # of the constant delay's chi-square
-LEAST_TURNS = 3  # of a clock against the host's; fewer are a drift of the delay
 
 
 def delay_score(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
@@ -52,8 +49,8 @@ def scan_clocks(fit: Fit, imus, delays: dict) -> list[Scanned]:
     time, each = fit.readings.time, {}
     for imu in imus:
         gain, values = sawtooth(time, score[:, imu], information[:, imu])
-        log_p = log_tail(max(gain, 1e-9), 3) + MANY + np.log(len(time) * len(imus))
-        if log_p < BELIEVED and gain > FAIR * delays.get((imu,), 0.0):
+        log_p = log_tail(max(gain, 1e-9), 3) + SETTINGS.many + np.log(len(time) * len(imus))
+        if log_p < SETTINGS.believed and gain > SETTINGS.fair * delays.get((imu,), 0.0):
             each[imu] = (gain, values)
     for imu in list(each):
         if any(_echo(each[imu], other) for other in each.values()):
@@ -78,7 +75,8 @@ def _echo(one, other) -> bool:
 def _clock_score(imus, gain, delays, samples, count) -> Score:
     freedom = 4 * len(imus)
     statistic = gain + delays.get(imus, sum(delays.get((imu,), 0.0) for imu in imus))
-    log_p = log_tail(statistic, freedom) + len(imus) * (MANY + np.log(samples)) + np.log(count)
+    tried = len(imus) * (SETTINGS.many + np.log(samples)) + np.log(count)
+    log_p = log_tail(statistic, freedom) + tried
     return Score(Candidate(CLOCK, imus), float(statistic), freedom, min(log_p, 0.0))
 
 
@@ -91,7 +89,7 @@ def sawtooth(time, score, information):
     np.add.at(grid, place, score - information * score.sum() / information.sum())
     power = np.abs(np.fft.rfft(grid)) ** 2
     frequency = np.fft.rfftfreq(size, step)
-    power[frequency * (time[-1] - time[0]) < LEAST_TURNS] = 0.0
+    power[frequency * (time[-1] - time[0]) < SETTINGS.least_turns] = 0.0
     best = (0.0, np.zeros(5))
     width = frequency[1]
     for guess in frequency[np.argsort(power)[-3:]]:

@@ -12,16 +12,17 @@ import numpy as np
 import imuarray
 from imuarray.diagnosis.elimination import heldout_gain, need
 from imuarray.diagnosis.fit import Fit, at, fit
-from imuarray.diagnosis.heldout import BLOCKS, Scores, gain, log_scores
+from imuarray.diagnosis.heldout import Scores, gain, log_scores
 from imuarray.diagnosis.noise import coloured_meat, per_triad, standardised
 from imuarray.diagnosis.noise_effects import held_out
 from imuarray.diagnosis.parameters import prior_precision
-from imuarray.diagnosis.placebo import placebo_gain
 from imuarray.diagnosis.procedure import Found, investigate
 from imuarray.diagnosis.replicates import Discrepancy, discrepancies
-from imuarray.diagnosis.scores import information_at, robust_inverse
+from imuarray.diagnosis.scores import information_at
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.special import placebo_gain
 from imuarray.diagnosis.words import cause_in_words, parameters_of, sensors_of
+from imuarray.linear import scaled_inverse
 from imuarray.model.effects import DATA_EFFECTS, KINDS
 from imuarray.recording import Recording
 from imuarray.streams import stream
@@ -123,7 +124,7 @@ def nats_beside(found: Found) -> np.ndarray:
     # which take the readings as they are
     left_out = [item for item in found.structural if DATA_EFFECTS[item.effect].left_out]
     beside += [structural_gain(found, item)[2] for item in left_out]
-    return sum((blocks for blocks in beside if np.sum(blocks) > 0), np.zeros(BLOCKS))
+    return sum((blocks for blocks in beside if np.sum(blocks) > 0), np.zeros(SETTINGS.blocks))
 
 
 def precision_of(made: Fit) -> np.ndarray:
@@ -140,7 +141,7 @@ def fitted(made: Fit, correlation=None) -> Fitted:
     # gauges are pinned for the fit; what is known of them is what the priors say
     places, ridge = given.places(made.active), np.diag(given.ridge[given.places(made.active)])
     inner = given.information[np.ix_(places, places)]
-    covariance = robust_inverse(inner + ridge)
+    covariance = scaled_inverse(inner + ridge)
     meat = None
     if correlation is not None:
         meat = coloured_meat(made, given.information, correlation)

@@ -18,8 +18,6 @@ from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL
 from imuarray.diagnosis.state import Search
 
-LITTLE = 0.03  # of the noise's own misfit: so little left over may be within tolerance
-IMPLAUSIBLE = 10.0  # prior sds
 STRICT = ("outliers", "size of", "change of")  # checks that a small remainder does not excuse
 
 
@@ -50,7 +48,7 @@ def outlier_checks(search: Search) -> list[Check]:
     found = []
     for imu, kind in np.argwhere(whole.exists):
         own = products[:, imu, kind].sum(axis=1)
-        if np.count_nonzero(own) > noise_effects.FEW:
+        if np.count_nonzero(own) > SETTINGS.few:
             found.append((int(imu), float(own.sum() / np.sqrt(np.sum(own**2)))))
     return [normal_checks("outliers against the reading's change", found)] if found else []
 
@@ -62,7 +60,7 @@ def plausibility_checks(search: Search) -> list[Check]:
     for cause in search.causes:
         free = search.active[:, columns.of(cause.effect)]
         sizes = np.where(free, np.abs(whole[:, columns.of(cause.effect)]), 0.0)
-        if sizes.max() > IMPLAUSIBLE:
+        if sizes.max() > SETTINGS.implausible:
             imu = int(np.argmax(sizes.max(axis=1)))
             largest = float(sizes.max())
             found.append(
@@ -85,7 +83,7 @@ def within_tolerance(search: Search, checks, in_noise) -> tuple[float, bool]:
     accounted = {name for item in in_noise for name in item.accounts_for}
     failing = [c for c in checks if c.log_p < SETTINGS.check and c.name not in accounted]
     large = search.excess > 30 * np.sqrt(2 * search.fit.free)
-    small = search.left < LITTLE * search.fit.free
+    small = search.left < SETTINGS.little * search.fit.free
     tolerated = large and small and explained > SETTINGS.explained
     # what a large cause leaves over does not excuse a small one that takes up as little
     weakest = min((need(search, c.effect)[0] for c in search.causes), default=np.inf)

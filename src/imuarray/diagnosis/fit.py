@@ -17,18 +17,8 @@ from imuarray.diagnosis.linearise import (
 )
 from imuarray.diagnosis.parameters import POSITION, Columns, prior_precision
 from imuarray.diagnosis.readings import Readings
-
-STEPS = 15
-LITTLE = 0.02  # nats; a step that promises less is not taken
-ROUGH = 1e-4  # of the misfit that a step must gain while causes are looked for
-FINE = 3e-6  # the same at the end
-SETTLED = 0.02  # of a parameter's own sd
-HELD_SD = 1e-8  # s, of a period that is not to move
-SHORTEST = 0.2  # share of a Gauss-Newton step
-WIDE = 10.0  # prior sd of the third derivatives, in sizes of the differences near by
-OWN = 2.0  # prior sd of what turning the gyroscopes see alone, in steps of omega dot
-TIED = 1e-5  # of that, as long as it is not free
-NEAR = 9  # samples that tell the size of the motion's third derivatives
+from imuarray.diagnosis.settings import SETTINGS
+from imuarray.linear import scaled_eigh
 
 
 @dataclass(frozen=True)
@@ -67,6 +57,11 @@ class Fit:
     def leverage(self) -> np.ndarray:
         """Share of each reading's variance that the motion takes up, (T, N, 6)."""
         return np.einsum("tij,tij->ti", self.basis, self.basis).reshape(self.residual.shape)
+
+    def less_motion(self, values) -> np.ndarray:
+        """Whitened readings (T, N, 6) without what the motion can explain of them."""
+        taken = np.einsum("tri,tr->ti", self.basis, values.reshape(len(values), -1))
+        return values - np.einsum("tri,ti->tr", self.basis, taken).reshape(values.shape)
 
     @property
     def free(self) -> int:
@@ -118,11 +113,11 @@ def search_optimum(readings, columns, active, state, smooth, rough):
     precision = prior_precision(columns, active)
     held = held_where_rough(columns, active) if state.gyroscopes_free else None
     if held is not None:
-        precision[held, held] += HELD_SD**-2
+        precision[held, held] += SETTINGS.held_sd**-2
     wanted = np.flatnonzero(active.any(axis=0))
     converged, last, length, seen = False, np.inf, 1.0, None
-    enough = ROUGH if rough else FINE
-    for number in range(STEPS):
+    enough = SETTINGS.rough_gain if rough else SETTINGS.fine_gain
+    for number in range(SETTINGS.steps):
         state = with_derivatives(readings, state, smooth)
         seen = linearise(readings, columns, state, wanted, seen)
         few = padded(active[:, wanted], seen.whitened.shape[-1])
@@ -135,8 +130,8 @@ def search_optimum(readings, columns, active, state, smooth, rough):
         step, sds = scaled_solve(information + precision, score)
         moved, astray = np.max(np.abs(step) / sds, initial=0.0), float(np.sum(seen.taken**2))
         promised = score @ step + astray
-        still = moved < SETTLED and astray < 0.01 * len(seen.taken)
-        if still or promised < max(LITTLE, enough * misfit):
+        still = moved < SETTINGS.settled and astray < 0.01 * len(seen.taken)
+        if still or promised < max(SETTINGS.least_step, enough * misfit):
             # what the last step leaves is of second order in what it promised
             state = advance(columns, state, active, step, few, seen, 1.0)
             converged = True
@@ -145,7 +140,7 @@ def search_optimum(readings, columns, active, state, smooth, rough):
         if number > 3 and abs(cost - last) < 0.3 * enough * last:
             break  # it wanders around the optimum, by less than anything told apart here
         # full steps may leap to and fro across a valley: half of them lead into it
-        length = max(length / 2, SHORTEST) if cost > last else min(1.0, 1.2 * length)
+        length = max(length / 2, SETTINGS.shortest) if cost > last else min(1.0, 1.2 * length)
         last = cost
         state = advance(columns, state, active, step, few, seen, length)
     return state, converged, seen
@@ -190,8 +185,7 @@ def padded(mask, size) -> np.ndarray:
 
 def scaled_solve(information, right):
     """(solution, sds) of a positive definite system, scaled to a unit diagonal first."""
-    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    values, vectors, scale = scaled_eigh(information)
     values = np.maximum(values, 1e-13)
     solution = (vectors @ ((vectors.T @ (right / scale)) / values)) / scale
     return solution, np.sqrt(np.sum(vectors**2 / values, axis=1)) / scale
@@ -206,7 +200,7 @@ def with_derivatives(readings, state, smooth) -> State:
 
 
 def with_rough_prior(readings: Readings, state: State) -> State:
-    """The state with omega double dot and s dot free: neighbours tell them only roughly.
+    """The state with omega double dot and s dot free: neighbours determine them only roughly.
 
     Their prior has the polynomials' mean, and for sd ten times the size of the differences near by.
     It is that of the first motion and stays: one that followed the fit would shrink with it.
@@ -218,10 +212,10 @@ def with_rough_prior(readings: Readings, state: State) -> State:
     mean = np.hstack([*found[:2], np.zeros_like(found[0])])
     steps = np.diff(state.motion[:, 3:], axis=0, append=state.motion[-1:, 3:]) / dt
     steps[np.diff(readings.run, append=readings.run[-1]) > 0] = 0.0
-    near = uniform_filter1d(np.mean(steps.reshape(-1, 2, 3) ** 2, axis=-1), NEAR, axis=0)
+    near = uniform_filter1d(np.mean(steps.reshape(-1, 2, 3) ** 2, axis=-1), SETTINGS.near, axis=0)
     size = np.repeat(np.sqrt(near) + 0.1 * np.sqrt(near.mean(axis=0)), 3, axis=1)
-    own = OWN * dt * size[:, :3]
-    sd = np.hstack([WIDE * size, TIED * own])
+    own = SETTINGS.gyroscopes_own * dt * size[:, :3]
+    sd = np.hstack([SETTINGS.wide * size, SETTINGS.tied * own])
     nothing = no_derivatives(len(mean), len(state.positions))
     return state._replace(
         motion=np.hstack([state.motion, mean]), derivatives=nothing,

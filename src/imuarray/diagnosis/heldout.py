@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.diagnosis.fit import Fit, normal
-
-BLOCKS = 10
+from imuarray.diagnosis.settings import SETTINGS
 
 
 class Scores(NamedTuple):
@@ -23,18 +22,16 @@ class Scores(NamedTuple):
         return float(self.nats.sum() / self.samples.sum())
 
 
-def edges_of(samples: int, blocks=BLOCKS) -> np.ndarray:
-    """Where the blocks begin and end, (blocks + 1,)."""
-    return np.linspace(0, samples, blocks + 1).astype(int)
+def blocks_of(samples: int, number=SETTINGS.blocks) -> list[slice]:
+    """Consecutive blocks of time, as equal as whole samples allow."""
+    edges = np.linspace(0, samples, number + 1).astype(int)
+    return [slice(first, last) for first, last in zip(edges[:-1], edges[1:], strict=True)]
 
 
 def normal_blocks(fit: Fit, active) -> list[tuple[np.ndarray, np.ndarray]]:
     """(information (n, n), score (n,)) of the n ``active`` (N, m) parameters from each block."""
-    edges = edges_of(len(fit.residual))
-    return [
-        normal(fit.residual, fit.whitened, fit.through, active, slice(a, b))
-        for a, b in zip(edges[:-1], edges[1:], strict=True)
-    ]
+    parts = fit.residual, fit.whitened, fit.through
+    return [normal(*parts, active, block) for block in blocks_of(len(fit.residual))]
 
 
 def log_scores(fit: Fit, ridge) -> Scores:
@@ -46,7 +43,7 @@ def log_scores(fit: Fit, ridge) -> Scores:
     ``ridge`` (n, n) prior precision of the active parameters.
     """
     readings = fit.readings
-    edges = edges_of(len(fit.residual))
+    blocks = blocks_of(len(fit.residual))
     parts = normal_blocks(fit, fit.active)
     information, score = sum(p[0] for p in parts), sum(p[1] for p in parts)
     fixed = np.where(readings.keep, np.repeat(np.log(readings.sd), 3, axis=1), 0.0)
@@ -55,14 +52,14 @@ def log_scores(fit: Fit, ridge) -> Scores:
     if fit.state.rough_prior is not None:
         constant += np.log(fit.state.rough_prior.sd).sum(axis=1)
     nats = []
-    for (block, slope), first, last in zip(parts, edges[:-1], edges[1:], strict=True):
+    for (block, slope), part in zip(parts, blocks, strict=True):
         # at the optimum score and prior balance: without the block, minus its score is left
         left = information - block + ridge
         step = np.linalg.solve(left, (score - slope) - score) if len(score) else np.zeros(0)
         better = slope @ step - step @ block @ step / 2
-        misfit = np.sum(fit.misfits[first:last])
-        nats.append(float(better - misfit / 2 - constant[first:last].sum()))
-    return Scores(np.array(nats), np.diff(edges))
+        misfit = np.sum(fit.misfits[part])
+        nats.append(float(better - misfit / 2 - constant[part].sum()))
+    return Scores(np.array(nats), np.array([part.stop - part.start for part in blocks]))
 
 
 def gain(one: Scores, other: Scores) -> tuple[float, float]:

@@ -85,8 +85,10 @@ def _reading(model, count, x, positions, parameters, extra, time, span):
     if len(x) > KNOWN:
         jerk, force_rate, turn = x[9:12], x[12:15], x[3:6] + x[15:18]
     motion = Motion(x[:3], x[3:6], x[6:9], jerk, force_rate)
-    when = {"time": time, "span": span, "second": second, "third": third, "gyroscope_turn": turn}
-    out = model.predict(motion, positions, parameters, **when)
+    out = model.predict(
+        motion, positions, parameters, time=time, span=span, second=second, third=third,
+        gyroscope_acceleration=turn,
+    )  # fmt: skip
     force = jnp.zeros((count, 3)).at[: len(out.specific_force)].set(out.specific_force)
     rate = jnp.zeros((count, 3)).at[: len(out.angular_rate)].set(out.angular_rate)
     return jnp.concatenate([force, rate], axis=1)

@@ -13,6 +13,7 @@ from scipy.stats import norm, poisson
 
 from imuarray.diagnosis.fit import Fit, pick
 from imuarray.diagnosis.readings import Readings
+from imuarray.diagnosis.settings import SETTINGS
 
 DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / np.sqrt(70.0)
 HALF = len(DIFFERENCE) // 2
@@ -20,10 +21,6 @@ HALF = len(DIFFERENCE) // 2
 ECHO = np.correlate(DIFFERENCE, DIFFERENCE, "full")[len(DIFFERENCE) :]
 # so many differences are worth one independent value in a mean square
 WORTH = float(1 + 2 * np.sum(ECHO**2))
-FAR = 4.0  # sds of a difference; beyond is an outlier's
-FLAT = 0.02  # autocorrelation too small to speak of
-BANDS = (0.2, 0.35)  # of the sampling rate, where the two bands begin
-COLOURED = 4.5  # sds of the spectrum's slope from which noise is not white
 
 
 class Noise(NamedTuple):
@@ -78,7 +75,7 @@ def judge(readings: Readings, residual, basis) -> Noise:
     core = np.nanmedian(np.abs(values), axis=-1) / norm.ppf(0.75)
     scale = np.sqrt(np.nanmean(values**2, axis=-1))
     far = _outliers(fast, core)
-    expected = 2 * norm.sf(FAR) * counts
+    expected = 2 * norm.sf(SETTINGS.far) * counts
     slope, correlation = _colour(np.nan_to_num(unit), readings)
     passed = 1 + 2 * sum(echo * correlation ** (lag + 1) for lag, echo in enumerate(ECHO))
     tails = np.nanmean(values**4, axis=-1) / scale**4 - 3.0
@@ -91,7 +88,7 @@ def _outliers(fast, core) -> np.ndarray:
     """Triad-samples that stand out of their neighbours, (T, N, 2) bool."""
     size = np.abs(np.nan_to_num(fast)) / np.repeat(core, 3, axis=1)
     worst = size.reshape(len(size), -1, 2, 3).max(axis=-1)
-    peak = worst > FAR
+    peak = worst > SETTINGS.far
     for shift in range(1, HALF + 1):
         peak[shift:] &= worst[shift:] >= worst[:-shift]
         peak[:-shift] &= worst[:-shift] >= worst[shift:]
@@ -121,13 +118,13 @@ def _colour(unit, readings: Readings):
     grid = np.linspace(-0.95, 0.98, 194)
     expected = np.array([_ar_ratio(rho, part[low], part[high]) for rho in grid])
     correlation = grid[np.argmin(np.abs(expected[:, None, None] - ratio), axis=0)]
-    return slope, np.where(np.abs(slope) > COLOURED, correlation, 0.0)
+    return slope, np.where(np.abs(slope) > SETTINGS.coloured, correlation, 0.0)
 
 
 def _bands(samples):
     """Frequencies in units of the sampling rate, and which are in the two bands."""
     part = np.fft.rfftfreq(samples)
-    return part, (part >= BANDS[0]) & (part < BANDS[1]), part >= BANDS[1]
+    return part, (part >= SETTINGS.bands[0]) & (part < SETTINGS.bands[1]), part >= SETTINGS.bands[1]
 
 
 def _slope_error(low, high) -> float:

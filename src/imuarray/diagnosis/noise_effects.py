@@ -8,16 +8,14 @@ import numpy as np
 from scipy.stats import norm
 
 from imuarray.diagnosis.fit import Fit
-from imuarray.diagnosis.heldout import edges_of
-from imuarray.diagnosis.noise import FLAT, Noise, expected_ratio, standardised
+from imuarray.diagnosis.heldout import blocks_of
+from imuarray.diagnosis.noise import Noise, expected_ratio, standardised
 from imuarray.diagnosis.scores import log_tail
+from imuarray.diagnosis.settings import SETTINGS
 from imuarray.model.effects import KINDS
 
 TAILS, COLOURED = "heavy_tails", "coloured_noise"
 SCALES = tuple(f"{kind}_noise" for kind in KINDS)
-FEW = 4  # outliers; so few are an accident, not a law
-MAYBE = -3.0  # log p of one triad's tails, where another's are sure
-AGREE = 3.5  # sds within which two estimates are of one thing
 
 
 class Named(NamedTuple):
@@ -41,7 +39,12 @@ class Mixture(NamedTuple):
     factor: float
     core: float  # sd of the rest, in assumed sds
     outlier: np.ndarray  # (T,) probability of being of the share
-    gain: float  # twice the log likelihood above a single normal's
+    nats: np.ndarray  # (T,) log likelihood above a single normal's
+
+    @property
+    def gain(self) -> float:
+        """Twice its log likelihood above a single normal's."""
+        return 2 * float(self.nats.sum())
 
 
 def triad(fit: Fit, imu: int, kind: int) -> np.ndarray:
@@ -51,8 +54,7 @@ def triad(fit: Fit, imu: int, kind: int) -> np.ndarray:
 
 def held_out(nats) -> tuple[float, float, np.ndarray]:
     """Sum over samples, the standard error that blocks of time show, and the blocks' sums."""
-    edges = edges_of(len(nats))
-    parts = np.array([nats[a:b].sum() for a, b in zip(edges[:-1], edges[1:], strict=True)])
+    parts = np.array([nats[block].sum() for block in blocks_of(len(nats))])
     return float(parts.sum()), float(np.std(parts, ddof=1) * np.sqrt(len(parts))), parts
 
 
@@ -121,7 +123,7 @@ def scales(fit: Fit, noise: Noise, untied: bool) -> tuple[np.ndarray, np.ndarray
     fast = np.log(noise.sd / fit.readings.declared)[there]
     spread, rough = np.diag(covariance), noise.error[there] ** 2
     apart = np.sqrt(np.maximum(rough - spread, spread))
-    agree = (noise.correlation[there] != 0) | (np.abs(whole - fast) < AGREE * apart)
+    agree = (noise.correlation[there] != 0) | (np.abs(whole - fast) < SETTINGS.agree * apart)
     if untied:
         agree |= np.array([alike(fit, noise, int(i), int(k)) for i, k in np.argwhere(there)])
     own = np.diag(np.where(agree, spread, rough))
@@ -132,7 +134,9 @@ def scales(fit: Fit, noise: Noise, untied: bool) -> tuple[np.ndarray, np.ndarray
 def alike(fit: Fit, noise: Noise, imu: int, kind: int) -> bool:
     """Whether a triad's spectrum has the slope that its lag-one correlation implies."""
     rho = autocorrelation(fit, imu, kind)[0]
-    return bool(abs(noise.slope[imu, kind] - expected_ratio(rho, len(fit.residual))) < AGREE)
+    return bool(
+        abs(noise.slope[imu, kind] - expected_ratio(rho, len(fit.residual))) < SETTINGS.agree
+    )
 
 
 def noise_scale(
@@ -187,7 +191,7 @@ def mixture(fit: Fit, imu: int, kind: int, steps=60) -> Mixture:
         wide = np.sum(outlier * square) / max(np.sum(outlier * axes), 1e-9)
         factor = max(float(np.sqrt(wide)) / core, 1.05)
     nats = _tail_nats(axes, square, share, factor, core, plain)
-    return Mixture(share, factor, core, outlier, 2 * float(nats.sum()))
+    return Mixture(share, factor, core, outlier, nats)
 
 
 def _tail_nats(axes, square, share, factor, core, plain) -> np.ndarray:
@@ -210,7 +214,7 @@ def heavy_tails(fit: Fit, noise: Noise, limit: float):
     if logs.min() > limit:
         return None, [], []
     hits = [item for item, log_p in zip(tried, logs, strict=True) if log_p < limit]
-    maybe = logs - np.log(len(triads)) < MAYBE
+    maybe = logs - np.log(len(triads)) < SETTINGS.maybe
     for kind in {k for _, k, _ in hits}:
         rest = (triads[:, 1] == kind) & (logs >= limit)
         if rest.any() and log_tail(max(gains[rest].sum(), 1e-9), 2 * rest.sum()) < limit:
@@ -226,10 +230,7 @@ def _numbers(fit: Fit, hits):
     """(numbers, gain, its standard error, blocks) of the triads with heavy tails."""
     nats, numbers, count = np.zeros(len(fit.residual)), {}, len(fit.residual)
     for imu, kind, mix in hits:
-        unit = triad(fit, imu, kind)
-        axes, square = np.sum(np.isfinite(unit), axis=1), np.nansum(unit**2, axis=1)
-        plain = np.sqrt(np.sum(square) / max(np.sum(axes), 1))
-        nats += _tail_nats(axes, square, mix.share, mix.factor, mix.core, plain)
+        nats += mix.nats
         name = f"{KINDS[kind]}_{fit.readings.labels[imu]}"
         error = float(np.sqrt(mix.share * (1 - mix.share) / count))
         numbers[f"share_{name}"] = (mix.share, error, "1")
@@ -241,7 +242,7 @@ def _numbers(fit: Fit, hits):
 def _tail_gain(fit: Fit, noise: Noise, imu: int, kind: int, mix: Mixture) -> float:
     """A mixture's gain, less where neighbours are alike; none for a handful of outliers."""
     rho = noise.correlation[imu, kind]
-    several = mix.share * len(fit.residual) > FEW
+    several = mix.share * len(fit.residual) > SETTINGS.few
     return mix.gain * (1 - rho**2) / (1 + rho**2) if several else 0.0
 
 
@@ -255,7 +256,7 @@ def pooled_autocorrelation(fit: Fit, noise: Noise, lagged) -> float:
     signed = np.sign(rho)
     apart = abs(np.sum(signed * (slopes - implied))) / root
     there = -np.sum(signed * slopes) / root
-    return log_tail(statistic, len(rho)) if apart < AGREE < there else 0.0
+    return log_tail(statistic, len(rho)) if apart < SETTINGS.agree < there else 0.0
 
 
 def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Named | None:
@@ -277,7 +278,9 @@ def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Named | None
         plain = norm.logsf(abs(rho) * np.sqrt(pairs)) + np.log(2 * number)
         log_p = min(sharp, plain if untied and alike(fit, noise, imu, kind) else 0.0)
         marked = noise.correlation[imu, kind] != 0
-        if (log_p > limit and not marked) or (sharp > limit and abs(rho) < max(FLAT, loudest / 5)):
+        if (log_p > limit and not marked) or (
+            sharp > limit and abs(rho) < max(SETTINGS.flat, loudest / 5)
+        ):
             continue
         hits.append((int(imu), int(kind)))
         logs.append(float(log_p))

@@ -16,12 +16,12 @@ from functools import cache
 
 import numpy as np
 
+from imuarray.diagnosis.settings import SETTINGS
 from imuarray.geometry import Array
 from imuarray.model import EFFECTS, ArrayModel
 from imuarray.model.noise import Noise
 
 POSITION = "position"
-STIFF = 1e-3  # of a parameter's prior sd: the sd that a pinned mean keeps
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def prior_precision(columns: Columns, active) -> np.ndarray:
     precision = np.diag(1.0 / sds**2)
     for mask in gauge_masks(columns, active):
         along = mask[active].astype(float)
-        along /= along.sum() * STIFF * sds[along > 0].mean()
+        along /= along.sum() * SETTINGS.stiff * sds[along > 0].mean()
         precision += np.outer(along, along)
     return precision
 

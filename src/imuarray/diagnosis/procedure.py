@@ -19,16 +19,11 @@ from imuarray.diagnosis.parameters import catalogue_effects, columns_of
 from imuarray.diagnosis.reading_effects import Structural, find_structural
 from imuarray.diagnosis.readings import Readings, arrange, determined, part_of
 from imuarray.diagnosis.residual_checks import Check, all_checks
-from imuarray.diagnosis.rivals import rivals
+from imuarray.diagnosis.separability import rivals
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Search
 from imuarray.model.effects import EFFECTS
 from imuarray.recording import Recording
-
-LONG = 3500  # samples; longer recordings are looked at in part first
-CLEAR = 2.5  # sds of a triad's autocorrelation, where all together are beyond doubt
-TAILED = 0.25  # log ratio by which a mixture's core may miss the noise
-DELAYED = 0.1  # log ratio of noise that an adopted delay may bring with it
 
 
 @dataclass(frozen=True)
@@ -72,7 +67,7 @@ def investigate(
     base_checks = all_checks(base, search.given, search.noise)
     if not mended:
         return Found(search, base, base_checks, structural, [], base_checks, 0.0, True, raw)
-    if len(readings.time) > LONG:
+    if len(readings.time) > SETTINGS.long:
         search = looked_ahead(search)
     search = adopt(drop_outliers(search))
     say("fitting to the end")
@@ -96,7 +91,7 @@ def investigate(
 
 def looked_ahead(whole: Search) -> Search:
     """The whole recording's search, begun with the causes that a part of it shows."""
-    part = part_of(whole.readings, LONG)
+    part = part_of(whole.readings, SETTINGS.long)
     ahead = adopt(drop_outliers(Search(part, whole.columns, whole.effects, whole.say).begun()))
     search = Search(
         whole.readings, whole.columns, whole.effects, whole.say, causes=ahead.causes,
@@ -150,7 +145,7 @@ def fit_coloured_noise(search: Search, without) -> Search:
     coloured = search.noise.correlation[search.readings.exists] != 0
     pooled = noise_effects.pooled_autocorrelation(search.fit, search.noise, lagged)
     if pooled < SETTINGS.limit(COLOURED):
-        coloured |= np.abs(lagged[:, 0]) * np.sqrt(lagged[:, 1]) > CLEAR
+        coloured |= np.abs(lagged[:, 0]) * np.sqrt(lagged[:, 1]) > SETTINGS.clear
     if not coloured.any():
         return search
     correlation, sd = search.noise.correlation.copy(), search.readings.sd.copy()
@@ -175,7 +170,7 @@ def named_noise(search: Search, without, tailed, untied: bool) -> list[noise_eff
             skip = [
                 imu for imu, k, mix in tailed
                 if k == kind and abs(np.log(mix.core * readings.sd[imu, k]
-                                            / readings.declared[imu, k])) < TAILED
+                                            / readings.declared[imu, k])) < SETTINGS.tailed
             ]  # fmt: skip
             found.append(noise_effects.noise_scale(
                 made, search.noise, kind, SETTINGS.limit(name), least_ratios(search), skip, untied
@@ -191,5 +186,5 @@ def least_ratios(search: Search) -> np.ndarray:
     least = np.zeros(len(search.readings.labels))
     for cause in search.causes:
         if EFFECTS[cause.effect].shifts_time:
-            least[list(cause.imus)] = DELAYED
+            least[list(cause.imus)] = SETTINGS.delayed
     return least

@@ -69,37 +69,37 @@ def plus_minus(value: float, error: float | None) -> str:
     return f"{texts[0]}{NARROW}±{NARROW}{texts[1]}"
 
 
+def shown_in(unit: str, size: float) -> list[tuple[float, str]]:
+    """(factor, unit) that a value of some size is shown in, and what is said beside it.
+
+    ``unit``: a key of `SHOWN`, others are shown as they are.
+    """
+    choices, beside = SHOWN.get(unit, (((1.0, unit),), None))
+    large = [choice for choice in choices if choice[0] * size >= 0.0999]
+    return [large[0] if large else choices[-1], *([beside] if beside else [])]
+
+
+def with_units(texts, parts) -> str:
+    """'10.0 mrad/s (0.573 deg/s)': numbers as text with the units of `shown_in`."""
+    both = [f"{t}{NARROW}{name}" if name else t for t, (_, name) in zip(texts, parts, strict=True)]
+    return both[0] if len(both) == 1 else f"{both[0]} ({both[1]})"
+
+
 def quantity(value: float, error: float | None, unit: str, size: float | None = None) -> str:
     """A value in SI with its error as a page shows it, degrees beside radians.
 
-    ``unit``: a key of `SHOWN`, others are shown as they are; ``size``: what chooses the prefix,
-    the value itself if None.
+    ``size``: what chooses the prefix, the value itself if None.
     """
-    choices, beside = SHOWN.get(unit, (((1.0, unit),), None))
-    size = abs(value) if size is None else size
-    large = [choice for choice in choices if choice[0] * size >= 0.0999]
-    factor, name = large[0] if large else choices[-1]
-    error = None if error is None else abs(error)
-    text = plus_minus(factor * value, None if error is None else factor * error)
-    text = f"{text}{NARROW}{name}" if name else text
-    if beside is None:
-        return text
-    also = plus_minus(beside[0] * value, None if error is None else beside[0] * error)
-    return f"{text} ({also}{NARROW}{beside[1]})"
+    parts = shown_in(unit, abs(value) if size is None else size)
+    texts = [plus_minus(f * value, None if error is None else f * abs(error)) for f, _ in parts]
+    return with_units(texts, parts)
 
 
 def span(low: float, high: float, unit: str) -> str:
     """'1.02 to 1.07 mrad/s (0.0586 to 0.0612 deg/s)'; one value where both read alike."""
-    choices, beside = SHOWN.get(unit, (((1.0, unit),), None))
-    size = max(abs(low), abs(high))
-    large = [choice for choice in choices if choice[0] * size >= 0.0999]
-    parts = [large[0] if large else choices[-1], *([beside] if beside else [])]
-    texts = []
-    for factor, name in parts:
-        ends = [number(factor * end) for end in (low, high)]
-        unit_text = f"{NARROW}{name}" if name else ""
-        texts.append(f"{' to '.join(dict.fromkeys(ends))}{unit_text}")
-    return texts[0] if beside is None else f"{texts[0]} ({texts[1]})"
+    parts = shown_in(unit, max(abs(low), abs(high)))
+    ends = [[number(factor * end) for end in (low, high)] for factor, _ in parts]
+    return with_units([" to ".join(dict.fromkeys(both)) for both in ends], parts)
 
 
 def ratio(value: float) -> str:
@@ -133,3 +133,8 @@ def joined(items) -> str:
 def first_up(text: str) -> str:
     """With a capital."""
     return text[:1].upper() + text[1:]
+
+
+def fixed(value: float, decimals: int) -> str:
+    """A number whose column lines up."""
+    return f"{value:.{decimals}f}".replace("-", "−")

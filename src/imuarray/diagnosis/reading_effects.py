@@ -11,15 +11,12 @@ from scipy.stats import poisson
 
 from imuarray.diagnosis.linearise import polynomial_derivative
 from imuarray.diagnosis.readings import Readings
+from imuarray.diagnosis.settings import SETTINGS
 from imuarray.model.effects import KINDS
 from imuarray.recording.record import AXES
 
 RAILS = "saturation"
 UNITS = ("m s-2", "rad s-1")  # of the two kinds
-LEAST_REPEATS = 1
-LEAST_CLIPPED = 3
-RARE = -12.0  # log p from which repeats are no chance of a coarse converter
-NEAR = 0.5  # a signed permutation is believed when the triad's matrix is this near to it
 TURNS = [
     np.array(signs)[:, None] * np.eye(3)[list(order)]
     for order in permutations(range(3)) for signs in product((1.0, -1.0), repeat=3)
@@ -54,7 +51,7 @@ def find_repeats(readings: Readings):
         chance = np.prod(same.mean(axis=0)) if not every.all() else 1.0
         alone = np.prod((same & ~every[:, None]).mean(axis=0))
         log_p = poisson.logsf(every.sum() - 1, max(min(chance, alone), 1e-9) * together.sum())
-        if every.sum() >= LEAST_REPEATS and log_p < RARE:
+        if every.sum() >= SETTINGS.least_repeats and log_p < SETTINGS.rare_repeats:
             lost[1:, imu, 3 * kind : 3 * kind + 3] = every[:, None]
             hit.append(int(imu))
             shares.append(every.mean())
@@ -105,7 +102,7 @@ def _pile(values, kept):
     top = size.max()
     at = size >= top * (1 - 1e-9)
     count = int(at.sum())
-    if count < LEAST_CLIPPED or top == 0:
+    if count < SETTINGS.least_clipped or top == 0:
         return None, None
     # a coarse converter has ties by chance: the next values below must have far fewer
     below = np.unique(size[size < top * (1 - 1e-9)])[-5:]
@@ -137,7 +134,7 @@ def find_swaps(readings: Readings):
         for imu in there:
             matrix = _matrix(common + lever[:, imu], values[:, imu])
             nearest = min(TURNS, key=lambda turn: np.linalg.norm(turn - matrix))
-            limit = min(NEAR, np.linalg.norm(matrix - np.eye(3)) / 2)
+            limit = min(SETTINGS.near_turn, np.linalg.norm(matrix - np.eye(3)) / 2)
             if not _is_straight(nearest) and np.linalg.norm(matrix - nearest) < limit:
                 turns[imu, kind] = nearest
                 hit.append((int(imu), kind))

@@ -6,16 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from imuarray.diagnosis.settings import SETTINGS
 from imuarray.errors import InputError
 from imuarray.estimation.selection import neighbours
 from imuarray.geometry import Array
 from imuarray.model.structure import design
 from imuarray.recording import Recording, array_of
-
-WEAKEST = 1e-2  # least information of a sample on omega_dot and s, against all readings'
-LEAST = 200  # samples; fewer tell next to nothing of any effect
-STRETCH = 128  # samples
-WINDOW = 0.04  # s, length of the polynomials that give time derivatives
 
 
 @dataclass(frozen=True)
@@ -73,10 +69,10 @@ class Readings:
 
 
 def determined(readings: Readings) -> np.ndarray:
-    """(T,) bool: samples whose readings tell the motion, in runs long enough for its derivatives.
+    """(T,) bool: samples whose readings determine the motion, in runs that do its derivatives.
 
-    Each axis has a gyroscope, and the accelerometers tell omega_dot and s. InputError where too
-    few are left.
+    Each axis has a gyroscope, and the accelerometers determine omega_dot and s. InputError where
+    too few are left.
     """
     positions = readings.array.relative
     rows = design(positions)[:, 6:]
@@ -85,14 +81,14 @@ def determined(readings: Readings) -> np.ndarray:
         np.linalg.eigvalsh(np.einsum("tr,ri,rj->tij", part.astype(float), rows, rows))[:, 0]
         for part in (kept, np.ones_like(kept[:1]))
     )
-    good = (least > WEAKEST * whole) & readings.keep[..., 3:].any(axis=1).all(axis=1)
+    good = (least > SETTINGS.weakest * whole) & readings.keep[..., 3:].any(axis=1).all(axis=1)
     if good.all():
         return good
     used = _long_runs(readings.time, good)
-    if used.sum() < LEAST:
+    if used.sum() < SETTINGS.least_samples:
         raise InputError(
-            f"recording: expected at least {LEAST} samples whose readings tell the motion,"
-            f" found {used.sum()} of {used.size}"
+            f"recording: expected at least {SETTINGS.least_samples} samples whose readings"
+            f" determine the motion, found {used.sum()} of {used.size}"
         )
     return used
 
@@ -101,7 +97,7 @@ def part_of(readings: Readings, most: int) -> Readings:
     """Stretches of a recording, spread evenly, of some ``most`` samples in all."""
     samples = len(readings.time)
     every = -(-samples // most)
-    stretch = np.arange(samples) // STRETCH
+    stretch = np.arange(samples) // SETTINGS.stretch
     used = stretch % every == 0
     both = readings.run[used] * (stretch[-1] + 1) + stretch[used]
     run = np.unique(both, return_inverse=True)[1]
@@ -115,8 +111,8 @@ def part_of(readings: Readings, most: int) -> Readings:
 
 
 def odd_window(time) -> int:
-    """Samples in `WINDOW` seconds, odd, at least five."""
-    return max(5, 2 * int(WINDOW / np.median(np.diff(time)) / 2) + 1)
+    """Samples in `SETTINGS.window` seconds, odd, at least five."""
+    return max(5, 2 * int(SETTINGS.window / np.median(np.diff(time)) / 2) + 1)
 
 
 def runs(time) -> np.ndarray:
@@ -147,10 +143,10 @@ def arrange(recording: Recording) -> Readings:
     if recording.stationary is not None:
         bad |= recording.stationary
     used = _long_runs(recording.time, ~bad)
-    if used.sum() < LEAST:
+    if used.sum() < SETTINGS.least_samples:
         raise InputError(
-            f"recording: expected at least {LEAST} moving samples off the rails in gapless runs,"
-            f" found {used.sum()} of {used.size}"
+            f"recording: expected at least {SETTINGS.least_samples} moving samples off the rails"
+            f" in gapless runs, found {used.sum()} of {used.size}"
         )
     count = max(recording.specific_force.shape[1], recording.angular_rate.shape[1])
     kinds = recording.specific_force.shape[1], recording.angular_rate.shape[1]

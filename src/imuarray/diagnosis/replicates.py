@@ -55,7 +55,7 @@ class Replicator:
         """One residual after motion and parameters have been fitted to it."""
         fit = self.fit
         noise = rng.standard_normal(fit.residual.shape) * fit.readings.keep
-        left = self._less_motion(noise)
+        left = fit.less_motion(noise)
         by_imu = np.ascontiguousarray(left.transpose(1, 0, 2)).reshape(left.shape[1], -1)
         score = np.array(
             [
@@ -65,12 +65,7 @@ class Replicator:
         )
         step = np.zeros(fit.active.shape)
         step[fit.active] = self.inverse @ score
-        return left - self._less_motion(np.einsum("tkim,km->tki", fit.whitened, step))
-
-    def _less_motion(self, values):
-        flat = values.reshape(len(values), -1)
-        taken = np.einsum("tri,tr->ti", self.fit.basis, flat)
-        return values - np.einsum("tri,ti->tr", self.fit.basis, taken).reshape(values.shape)
+        return left - fit.less_motion(np.einsum("tkim,km->tki", fit.whitened, step))
 
 
 def quantities(fit: Fit, unit) -> dict[str, Quantity]:

@@ -16,14 +16,9 @@ from scipy.stats import chi2, norm
 from imuarray.diagnosis.clocks import delay_score
 from imuarray.diagnosis.fit import Fit, pick
 from imuarray.diagnosis.noise import Noise, standardised, tail_log_p
-from imuarray.diagnosis.scores import Information, log_tail, robust_inverse
-
-SEEN = 1e-4
-SAME = 1e-9  # m/s^2 or rad/s: equal readings
-COARSE = 2.0  # noise sds of a step between readings
-SLOW = 3  # turns in the recording; slower ages are a drift
-AROUND = 101  # frequencies that tell a periodogram's level
-CROWD = 1.3  # axes' tests are not quite independent: variance of their sum against chi-square's
+from imuarray.diagnosis.scores import Information, log_tail
+from imuarray.diagnosis.settings import SETTINGS
+from imuarray.linear import scaled_inverse, scaled_square
 
 
 class Check(NamedTuple):
@@ -86,7 +81,7 @@ def regression_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]
     """Each group of features over all axes, and each IMU's axes over all features."""
     active = given.places(fit.active)
     both = given.information + given.precision
-    inner = robust_inverse(both[np.ix_(active, active)])
+    inner = scaled_inverse(both[np.ix_(active, active)])
     pairs, through = pick(fit.through, fit.active & fit.columns.owner)
     samples, count = fit.residual.shape[:2]
     basis = fit.basis.reshape(samples, count, 6, -1)
@@ -128,16 +123,14 @@ def regression_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]
 def _chi(block, score, bare, chosen):
     """(chi-square, degrees of freedom) of some features."""
     scale = np.sqrt(np.maximum(bare[chosen], 1e-300))
-    values, vectors = np.linalg.eigh(block[np.ix_(chosen, chosen)] / np.outer(scale, scale))
-    seen = values > SEEN
-    along = vectors[:, seen].T @ (score[chosen] / scale)
-    return float(np.sum(along**2 / values[seen])), int(seen.sum())
+    inner = block[np.ix_(chosen, chosen)]
+    return scaled_square(inner, score[chosen], SETTINGS.seen_feature, scale)
 
 
 def _pooled(name, found) -> Check:
-    """All axes together: the sum of chi-squares, its variance widened by `CROWD`."""
+    """All axes together: the sum of chi-squares, its variance widened by `SETTINGS.crowd`."""
     total, freedom = sum(f[1] for f in found), max(sum(f[2] for f in found), 1)
-    widened = freedom + (total - freedom) / np.sqrt(CROWD)
+    widened = freedom + (total - freedom) / np.sqrt(SETTINGS.crowd)
     worst = max(found, key=lambda f: f[1] - f[2])
     return Check(name, total / freedom, log_tail(max(widened, 1e-9), freedom), (worst[0],))
 
@@ -209,10 +202,10 @@ def timing_check(fit: Fit) -> Check:
         own, known = score[:, imu], information[:, imu]
         grid = np.zeros(place[-1] + 1)
         np.add.at(grid, place, own - known * own.sum() / known.sum())
-        power = np.abs(np.fft.rfft(grid))[SLOW:] ** 2
-        if len(power) < AROUND:
+        power = np.abs(np.fft.rfft(grid))[SETTINGS.slow :] ** 2
+        if len(power) < SETTINGS.around:
             continue
-        level = median_filter(power, AROUND, mode="nearest") / np.log(2)
+        level = median_filter(power, SETTINGS.around, mode="nearest") / np.log(2)
         highest = float(np.max(power / np.maximum(level, known.sum())))
         found.append((int(imu), highest, np.log(len(power) * len(both)) - highest))
     if not found:
@@ -283,10 +276,10 @@ def resolution_check(fit: Fit) -> Check:
     for imu, kind in np.argwhere(readings.exists):
         values = np.sort(readings.values[:, imu, 3 * kind])
         gaps = np.diff(values)
-        gaps = gaps[gaps > SAME]
+        gaps = gaps[gaps > SETTINGS.same]
         if len(gaps):
             worst = max(worst, (float(gaps.min()) / readings.sd[imu, kind], int(imu)))
-    return Check("resolution", worst[0], -50.0 if worst[0] > COARSE else 0.0, (worst[1],))
+    return Check("resolution", worst[0], -50.0 if worst[0] > SETTINGS.coarse else 0.0, (worst[1],))
 
 
 def all_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]:

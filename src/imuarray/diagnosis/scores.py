@@ -12,9 +12,9 @@ from scipy.stats import chi2
 
 from imuarray.diagnosis.fit import Fit, flat_parameters, normal
 from imuarray.diagnosis.parameters import Columns, prior_precision
+from imuarray.diagnosis.settings import SETTINGS
+from imuarray.linear import scaled_eigh, scaled_inverse
 from imuarray.model.effects import EFFECTS, KINDS
-
-SEEN = 1e-5  # of a parameter's own information must survive the projection to count
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ class Information:
             score = score + self.information[:, freed] @ self.values[freed]
         cross = self.information[:, active]
         inner = cross[active] + self.precision[np.ix_(active, active)]
-        gain = cross @ robust_inverse(inner)
+        gain = cross @ scaled_inverse(inner)
         left = self.information - gain @ cross.T
         score = score - gain @ score[active]
         if self.meat is None:
@@ -138,26 +138,18 @@ class Information:
     def test(self, conditional, chosen):
         """(chi-square, degrees of freedom) of the parameters at ``chosen`` places."""
         information, score, meat = conditional
-        scale = self.scale[chosen]
-        block = information[np.ix_(chosen, chosen)] / np.outer(scale, scale)
-        values, vectors = np.linalg.eigh(block)
+        block = information[np.ix_(chosen, chosen)]
+        values, vectors, scale = scaled_eigh(block, self.scale[chosen])
         # a parameter stays within its prior: near a gauge, data alone would take it anywhere
         ridge = vectors.T @ ((self.ridge[chosen] / scale**2)[:, None] * vectors)
-        seen = values > np.maximum(SEEN, np.diag(ridge))
+        seen = values > np.maximum(SETTINGS.seen, np.diag(ridge))
         along, ridge = vectors[:, seen].T @ (score[chosen] / scale), ridge[np.ix_(seen, seen)]
         if meat is information:
             spread = np.diag(values[seen])
         else:
             spread = vectors[:, seen].T @ (meat[np.ix_(chosen, chosen)] / np.outer(scale, scale))
             spread = spread @ vectors[:, seen]
-        return float(along @ robust_inverse(spread + ridge) @ along), int(seen.sum())
-
-
-def robust_inverse(matrix) -> np.ndarray:
-    """Inverse of a symmetric positive matrix, scaled to a unit diagonal, flat directions capped."""
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
-    return (vectors / np.maximum(values, 1e-12)) @ vectors.T / np.outer(scale, scale)
+        return float(along @ scaled_inverse(spread + ridge) @ along), int(seen.sum())
 
 
 def information_at(fit: Fit) -> Information:

@@ -1,4 +1,4 @@
-"""Which effects a recording can tell apart: canonical correlations of their signals."""
+"""Which effects a recording can tell apart: correlations of their signals, and a cause's class."""
 
 from __future__ import annotations
 
@@ -6,14 +6,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from imuarray.diagnosis.elimination import freed_places, need
 from imuarray.diagnosis.fit import Fit
 from imuarray.diagnosis.parameters import POSITION
-from imuarray.diagnosis.scores import Candidate, Information, able, mask_of, robust_inverse
+from imuarray.diagnosis.scores import (
+    Candidate,
+    Information,
+    able,
+    candidates,
+    log_tail,
+    mask_of,
+    score_all,
+)
+from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.special import SPECIAL
+from imuarray.diagnosis.state import Cause, Search
+from imuarray.linear import scaled_eigh, scaled_inverse, scaled_square
 from imuarray.model import EFFECTS
-
-# Share of its own information that a combination of parameters must keep to count. What keeps less
-# is a gauge of motion and positions, and no data tell what else it resembles.
-VISIBLE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -69,17 +78,17 @@ def conditional(given: Information, known) -> np.ndarray:
     """
     cross = given.information[:, known]
     inner = cross[known] + np.diag(given.ridge[known])
-    return given.information - cross @ robust_inverse(inner) @ cross.T
+    return given.information - cross @ scaled_inverse(inner) @ cross.T
 
 
 def orthonormal(information, chosen, scale) -> np.ndarray:
     """(n, d) combinations of the n chosen parameters whose signals are orthonormal.
 
-    Combinations that the projection leaves less than `VISIBLE` of are left out.
+    Combinations that the projection leaves less than `visible` of are left out: they are gauges of
+    motion and positions, and no data determine what else they resemble.
     """
-    block = information[np.ix_(chosen, chosen)] / np.outer(scale, scale)
-    values, vectors = np.linalg.eigh(block)
-    seen = values > VISIBLE
+    values, vectors, _ = scaled_eigh(information[np.ix_(chosen, chosen)], scale)
+    seen = values > SETTINGS.visible
     return vectors[:, seen] / np.sqrt(values[seen]) / scale[:, None]
 
 
@@ -88,3 +97,62 @@ def squared_correlations(information, one, other) -> np.ndarray:
     (rows, left), (columns, right) = one, other
     cross = left.T @ information[np.ix_(rows, columns)] @ right
     return np.clip(np.linalg.svd(cross, compute_uv=False) ** 2, 0.0, 1.0)
+
+
+def rivals(search: Search, cause: Cause) -> list[str]:
+    """Ids of the effects that explain nearly as well as an adopted one.
+
+    Put back to zero, it leaves a signal: rivals explain it nearly as well, or more than `alike`
+    of it.
+    """
+    effect, given, fit_ = cause.effect, search.given, search.fit
+    freed = freed_places(search, effect)
+    whole = len(cause.imus) > len(fit_.readings.exists) / 2
+    tried = [
+        c for c in candidates(fit_.columns, fit_.readings.exists, search.effects)
+        if c.effect != effect and (c.whole if whole else c.imus == cause.imus)
+    ]  # fmt: skip
+    present = {c.effect for c in search.causes}
+    own, _ = need(search, effect)
+    own_log = log_tail(own, len(freed))
+    scores = {s.candidate.effect: s for s in reversed(score_all(given, fit_, tried, freed))}
+    active = np.setdiff1d(given.places(search.active), freed)
+    left, _, _ = given.conditional(active, freed)
+    signal = left[:, freed] @ given.values[freed]
+    power = given.values[freed] @ left[np.ix_(freed, freed)] @ given.values[freed]
+    found = []
+    for candidate in tried:
+        if candidate.effect in present or candidate.effect in found:
+            continue
+        score = scores.get(candidate.effect)
+        close = score is not None and score.log_p - own_log < SETTINGS.rival
+        alike = not nested(effect, candidate.effect) and _shared(
+            given, fit_, candidate, left, signal
+        ) > (SETTINGS.alike * power)
+        if close or alike:
+            found.append(candidate.effect)
+    return list(dict.fromkeys([*found, *wider(search, cause, own)]))
+
+
+def nested(effect: str, other: str) -> bool:
+    """Whether another effect contains an adopted one, or is contained in it or for it."""
+    one = EFFECTS[effect]
+    return other in (*one.contains, *one.resembles) or effect in EFFECTS[other].contains
+
+
+def wider(search: Search, cause: Cause, own: float) -> list[str]:
+    """Effects of which the adopted one may be no more than a part."""
+    found = []
+    for effect, special in SPECIAL.items():
+        parts = (*EFFECTS[effect].contains, *EFFECTS[effect].resembles)
+        possible = special.maybe is not None and effect in search.effects
+        if possible and cause.effect in parts and special.maybe(search, cause, own):
+            found.append(effect)
+    return found
+
+
+def _shared(given, fit_, candidate, left, signal) -> float:
+    """How much of a signal's power a candidate could explain."""
+    chosen = given.places(mask_of(fit_.columns, candidate))
+    block = left[np.ix_(chosen, chosen)]
+    return scaled_square(block, signal[chosen], SETTINGS.seen, given.scale[chosen])[0]

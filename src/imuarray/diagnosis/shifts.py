@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from imuarray.diagnosis.fit import Fit, flat_parameters, from_flat, normal
+from imuarray.diagnosis.heldout import blocks_of
 from imuarray.diagnosis.parameters import POSITION
 from imuarray.diagnosis.scores import (
     Candidate,
@@ -12,35 +13,34 @@ from imuarray.diagnosis.scores import (
     Scanned,
     Score,
     log_tail,
-    robust_inverse,
 )
+from imuarray.diagnosis.settings import SETTINGS
+from imuarray.linear import scaled_inverse
 
 SHIFT = "position_shift"
-CUTS = 24  # instants tried at first
 
 
 def scan_shifts(fit: Fit, given: Information, imus) -> list[Scanned]:
     """A step of each triad's position, at the instant where it gains most."""
     active = given.places(fit.active)
     chosen = fit.columns.of(POSITION)
-    outside = robust_inverse(
+    outside = scaled_inverse(
         given.information[np.ix_(active, active)] + given.precision[np.ix_(active, active)]
     )
-    edges = np.linspace(0, len(fit.residual), CUTS + 1).astype(int)
+    blocks = blocks_of(len(fit.residual), SETTINGS.cuts)
     found = []
     for imu in imus:
         mask = fit.active.copy()
         mask[imu, chosen] = True
-        parts = [normal(fit.residual, fit.whitened, fit.through, mask, slice(a, b))
-                 for a, b in zip(edges[:-1], edges[1:], strict=True)]  # fmt: skip
+        parts = [normal(fit.residual, fit.whitened, fit.through, mask, block) for block in blocks]
         own, rest = _places(mask, fit.active, imu, chosen)
         ridge = np.diag(1.0 / fit.columns.prior_sd[fit.columns.of(SHIFT)[:3]] ** 2)
         best = (0.0, 0, np.zeros(3))
-        for cut in range(1, CUTS):
+        for cut in range(1, SETTINGS.cuts):
             gain, shift = _step_gain(parts[cut:], own, rest, outside, ridge)
-            best = max(best, (gain, edges[cut], shift), key=lambda b: b[0])
+            best = max(best, (gain, blocks[cut].start, shift), key=lambda b: b[0])
         gain, place, shift = best
-        log_p = log_tail(gain, 3) + np.log(2 * len(imus) * CUTS)
+        log_p = log_tail(gain, 3) + np.log(2 * len(imus) * SETTINGS.cuts)
         score = Score(Candidate(SHIFT, (imu,)), gain, 3, min(log_p, 0.0))
         found.append(Scanned(score, {imu: np.append(shift, fit.readings.time[place])}))
     return found
@@ -59,7 +59,7 @@ def _step_gain(parts, own, rest, outside, ridge):
     score = sum(part[1] for part in parts)[own]
     cross = information[np.ix_(own, rest)]
     block = information[np.ix_(own, own)] - cross @ outside @ cross.T + ridge
-    inverse = robust_inverse(block)
+    inverse = scaled_inverse(block)
     shift = inverse @ score
     return float(score @ shift), shift
 

@@ -9,15 +9,13 @@ import numpy as np
 
 from imuarray.diagnosis import clocks, shifts
 from imuarray.diagnosis.elimination import need
+from imuarray.diagnosis.fit import flat_parameters
 from imuarray.diagnosis.residual_checks import Check
 from imuarray.diagnosis.scores import Candidate, log_tail, score_all
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.model.effects import EFFECTS
 
 DRIFT = "bias_drift"
-LIKELY = -4.6  # log p of a drift beside an adopted bias
-CHANGING = 0.05  # of a drift's chi-square that its change must be worth
-STEADY = -50.0  # log p of a drift that does not change: what it names is not what it is
 
 
 class Special(NamedTuple):
@@ -61,7 +59,7 @@ def maybe_drift(search, cause, own) -> bool:
     kind = EFFECTS[cause.effect].sensors
     tried = [Candidate(DRIFT, cause.imus, f"{kind} {form}") for form in ("linear", "cubic")]
     scores = score_all(search.given, search.fit, tried)
-    return any(log_tail(max(s.statistic, 1e-9), s.freedom) < LIKELY for s in scores)
+    return any(log_tail(max(s.statistic, 1e-9), s.freedom) < SETTINGS.likely_drift for s in scores)
 
 
 def drift_check(search, cause) -> list[Check]:
@@ -70,8 +68,10 @@ def drift_check(search, cause) -> list[Check]:
     changing = [c for c in columns.of(DRIFT) if columns.places[c][2] > 0]
     statistic, freedom = need(search, DRIFT, among=changing)
     steady = log_tail(statistic, max(freedom, 1)) > SETTINGS.limit(DRIFT)
-    steady |= statistic < CHANGING * need(search, DRIFT)[0]
-    return [Check(f"change of {DRIFT}", statistic, STEADY if steady else 0.0, cause.imus)]
+    steady |= statistic < SETTINGS.changing * need(search, DRIFT)[0]
+    return [
+        Check(f"change of {DRIFT}", statistic, SETTINGS.steady_drift if steady else 0.0, cause.imus)
+    ]
 
 
 SPECIAL = {
@@ -82,3 +82,32 @@ SPECIAL = {
                           refine=shifts.refine_instants),
     DRIFT: Special(maybe=maybe_drift, check=drift_check),
 }  # fmt: skip
+
+
+def placebo_gain(search, cause) -> tuple[float, float]:
+    """(nats the cause gains, nats it gains with each IMU's numbers given to the next).
+
+    Against the same model with the cause's parameters at zero, all others refitted (quadratic).
+    """
+    special = SPECIAL.get(cause.effect)
+    if special and special.placebo:
+        return special.placebo(search)
+    given, columns = search.given, search.columns
+    every = np.zeros(search.active.shape, bool)
+    every[:, columns.of(cause.effect)] = search.active[:, columns.of(cause.effect)].any(axis=0)
+    every &= columns.owner
+    flat = flat_parameters(columns, search.fit.state)
+    rows = np.flatnonzero(every.any(axis=1))
+    moved = flat.copy()
+    moved[rows] = flat[np.roll(rows, 1)]
+    places = given.places(every)
+    active = np.setdiff1d(given.places(search.active), places)
+    information, score, _ = given.conditional(active)
+    block, slope = information[np.ix_(places, places)], score[places]
+
+    def nats(values):
+        step = values - flat[every]
+        return slope @ step - step @ block @ step / 2
+
+    nothing = nats(np.zeros(len(places)))
+    return float(-nothing), float(nats(moved[every]) - nothing)

@@ -7,9 +7,8 @@ import numpy as np
 from imuarray.diagnosis.linearise import State, no_derivatives, polynomial_derivative
 from imuarray.diagnosis.parameters import Columns
 from imuarray.diagnosis.readings import Readings
+from imuarray.diagnosis.settings import SETTINGS
 from imuarray.model.structure import design, products
-
-SMOOTH = 0.8  # correlation of omega's slope and the accelerometers' omega_dot
 
 
 def start(readings: Readings, columns: Columns) -> State:
@@ -37,6 +36,6 @@ def _linear_motion(readings, positions, rate) -> np.ndarray:
 
 
 def is_smooth(readings: Readings, motion) -> bool:
-    """Whether neighbouring samples tell the motion's derivatives: omega's slope is omega_dot."""
+    """Whether neighbouring samples determine its derivatives: omega's slope is omega_dot."""
     slope = polynomial_derivative(readings.time, readings.run, motion[:, :3], readings.window, 1)
-    return bool(np.corrcoef(slope.ravel(), motion[:, 3:6].ravel())[0, 1] > SMOOTH)
+    return bool(np.corrcoef(slope.ravel(), motion[:, 3:6].ravel())[0, 1] > SETTINGS.smooth)

@@ -29,12 +29,6 @@ from imuarray.diagnosis.scores import Candidate, Information, information_at, ma
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.start import is_smooth, start
 
-TRACE = 2e-5  # of the excess there was at first
-EDGE = 0.03  # of a turn: how near to a clock's jump a reading is left out
-JITTER = 0.04  # the same where clocks were estimated from the gyroscopes
-ROUGH_SHARE = 5.0  # by which the least share of what is left is larger where motion is rough
-STEADY = 0.02  # relative change of a noise sd below which a fit is not repeated
-
 
 @dataclass(frozen=True)
 class Cause:
@@ -120,8 +114,8 @@ class Search:
         The second order of a huge effect leaves something that smaller ones would take up, and
         rough motion leaves more.
         """
-        share = SETTINGS.share * (1.0 if self.smooth else ROUGH_SHARE)
-        return max(share * self.left, TRACE * self.excess)
+        share = SETTINGS.share * (1.0 if self.smooth else SETTINGS.rough_share)
+        return max(share * self.left, SETTINGS.trace * self.excess)
 
     def begun(self, former: State | None = None) -> Search:
         """With the papers' model fitted, or what another search came to (``former``)."""
@@ -149,7 +143,8 @@ class Search:
             judged = noises.judge(readings, seen.residual, seen.basis)
             change = np.max(np.abs(judged.sd / readings.sd - 1)[readings.exists])
             enough = turn > 0 or not search.clocks
-            if (change < STEADY and enough) or (turn + 1 >= turns and change < 5 * STEADY):
+            limit = SETTINGS.steady_noise
+            if (change < limit and enough) or (turn + 1 >= turns and change < 5 * limit):
                 break
             state = clocks.estimated_again(search._with_jumps, search.columns, state, search.clocks)
             search = replace(search, readings=readings.with_sd(judged.sd))
@@ -164,7 +159,7 @@ class Search:
 
     def _without_jumps(self, state: State, turn: int) -> Search:
         """Without the readings near the jumps of the clocks at a state."""
-        width = JITTER if state.gyroscopes_free else EDGE / (1 + turn)
+        width = SETTINGS.jitter if state.gyroscopes_free else SETTINGS.edge / (1 + turn)
         readings, jumps = clocks.without_jumps(
             self._with_jumps, self.columns, state, self.clocks, width
         )

@@ -19,11 +19,11 @@ from imuarray.diagnosis.quantities import (
     symbols,
     unit_shown,
 )
+from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Cause, Search
 from imuarray.model.effects import known_effect
 from imuarray.model.names import component, unit_of
 
-DOUBTFUL = 0.5  # share of a cause's gain that a placebo must not have
 FEW = 3  # parameters that are told one by one
 
 
@@ -74,7 +74,8 @@ def cause_in_words(cause: dict, labels, says: str = "") -> str:
     gain = plus_minus(cause["heldout_gain_nats"], cause["heldout_gain_se"])
     p_value = probability(cause["log10_p_value"])
     text += f". Gain on held-out time {gain} nats, p{NARROW}={NARROW}{p_value}."
-    if 0 < DOUBTFUL * cause.get("gain_in_sample_nats", 0.0) < cause.get("placebo_gain_nats", 0.0):
+    true, placebo = cause.get("gain_in_sample_nats", 0.0), cause.get("placebo_gain_nats", 0.0)
+    if 0 < SETTINGS.doubtful * true < placebo:
         text += (
             " Its placebo, the same numbers at other IMUs, gains too: it is doubtful whose it is."
         )

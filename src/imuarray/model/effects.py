@@ -41,7 +41,7 @@ class Instant(NamedTuple):
     span: object = 1.0  # s, the recording's length
     second: Prediction = Prediction(0.0, 0.0)
     third: Prediction = Prediction(0.0, 0.0)
-    gyroscope_turn: object = None  # omega dot as the gyroscopes see it, where that is free
+    gyroscope_acceleration: object = None  # omega dot as the gyroscopes see it, where that is free
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,8 @@ class Effect:
         What parameters of unit 1 are shown in: %, rad or, by default, bare.
     against : str
         What a diagnosis draws it against: "specific force", "angular rate", "reading" (its own),
-        "lever arm", "time", "turning", "age", "place"; by default what each parameter multiplies.
+        "lever arm", "time", "angular acceleration", "age", "place"; by default what each parameter
+        multiplies.
     contains : tuple of str
         Effects that are a part of it: adopted, it takes their place.
     resembles : tuple of str

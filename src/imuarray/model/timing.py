@@ -33,7 +33,7 @@ def _rate_later(tau, instant, common):
     Where the angular acceleration seen by the gyroscopes is free, a delay against the
     accelerometers (``common``) has the mean of both, any other that one.
     """
-    turn, own = instant.motion.angular_acceleration, instant.gyroscope_turn
+    turn, own = instant.motion.angular_acceleration, instant.gyroscope_acceleration
     if own is not None:
         return tau * (turn + own) / 2 if common else tau * own
     return tau * (
@@ -46,7 +46,7 @@ DELAY = (("delay",),)
 
 @effect(
     "sensor_delay", unit="s", prior_sd=1e-3, shape=lambda a, g: (max(a, g),), derivatives=True,
-    sampling=True, gauge=common_mean, components=DELAY, against="turning",
+    sampling=True, gauge=common_mean, components=DELAY, against="angular acceleration",
     meaning="whole IMUs are read at instants of their own",
 )  # fmt: skip
 def sensor_delay(delay, instant, predicted):
@@ -56,7 +56,7 @@ def sensor_delay(delay, instant, predicted):
 
 @effect(
     "gyroscope_delay", unit="s", prior_sd=2e-3, shape=lambda a, g: (g,), sampling=True,
-    components=DELAY, against="turning",
+    components=DELAY, against="angular acceleration",
     meaning="gyroscopes sample at another instant than accelerometers, later for delays > 0",
 )  # fmt: skip
 def gyroscope_delay(delay, instant, predicted):

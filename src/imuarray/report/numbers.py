@@ -95,6 +95,26 @@ def residual_table(diagnosis: Diagnosis) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def noise_table(diagnosis: Diagnosis) -> pd.DataFrame:
+    """One row a triad: declared and extended noise sds (SI), lag-one correlation, residuals' rms.
+
+    ``before`` and ``after`` are the residuals of the two models in declared sds.
+    """
+    search = diagnosis.found.search
+    readings, units = search.readings, ("m s-2", "rad s-1")
+    sizes = residual_table(diagnosis).query("axis == 'all'").set_index(["model", "kind", "imu"]).rms
+    return pd.DataFrame([
+        {
+            "kind": KINDS[kind], "imu": readings.labels[imu], "unit": units[kind],
+            "declared": readings.declared[imu, kind], "sd": readings.sd[imu, kind],
+            "correlation": search.noise.correlation[imu, kind],
+            "before": sizes["base", KINDS[kind], readings.labels[imu]],
+            "after": sizes["extended", KINDS[kind], readings.labels[imu]],
+        }
+        for kind in range(2) for imu in np.flatnonzero(readings.exists[:, kind])
+    ])  # fmt: skip
+
+
 def gain_table(diagnosis: Diagnosis) -> pd.DataFrame:
     """One row for each cause in the order of adoption, and for the whole model; nats.
 
@@ -156,7 +176,7 @@ def separability_table(diagnosis: Diagnosis) -> pd.DataFrame:
 
 
 def score_table(diagnosis: Diagnosis) -> pd.DataFrame:
-    """The most telling test of each effect at the papers' model, before any cause is adopted.
+    """The most significant test of each effect at the papers' model, before any cause is adopted.
 
     ``log10_p`` allows for its IMUs and forms; ``limit`` is the critical value.
     """

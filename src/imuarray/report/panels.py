@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 
 from imuarray.diagnosis.clocks import age_of, delay_score
+from imuarray.diagnosis.heldout import blocks_of
 from imuarray.diagnosis.parameters import POSITION
-from imuarray.diagnosis.scores import robust_inverse
+from imuarray.linear import scaled_inverse
 from imuarray.model.effects import EFFECTS, KINDS
 from imuarray.model.names import component
 from imuarray.model.timing import clock_turns
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from imuarray.diagnosis.document import Diagnosis
 
 PANELS = 3  # special drawings of a cause
-VAGUE = 12.0  # times the best block's sd, from which a block tells nothing of a position
+VAGUE = 12.0  # times the best block's sd, from which a block determines no position
 BLOCKS = 12  # of time, in which a position is estimated again
 # From SI to what the figures show, and its unit; the smaller unit for small signals.
 FORCE = ((1.0, "m/s²"), (1e3, "mm/s²"))
@@ -205,10 +206,9 @@ def shift_panels(signal: Signal) -> list[pd.DataFrame]:
     """A triad that moved: its position in blocks of time, from the residual without the step."""
     made, panels = signal.made, []
     chosen = made.columns.of(POSITION)
-    edges = np.linspace(0, len(made.residual), BLOCKS + 1).astype(int)
     for imu in signal.imus[:1]:
-        found = [position_of_block(signal, imu, chosen, slice(a, b))
-                 for a, b in zip(edges[:-1], edges[1:], strict=True)]  # fmt: skip
+        blocks = blocks_of(len(made.residual), BLOCKS)
+        found = [position_of_block(signal, imu, chosen, block) for block in blocks]
         for axis in range(3):
             frame = pd.DataFrame(
                 [(t, *(value[axis] for value in values)) for t, *values in found],
@@ -228,7 +228,7 @@ def position_of_block(signal: Signal, imu, chosen, part):
     made = signal.made
     own = made.whitened[part, imu][..., chosen].reshape(-1, 3)
     through = made.through[part, imu][..., chosen].reshape(-1, 3)
-    inverse = robust_inverse(own.T @ own - through.T @ through)
+    inverse = scaled_inverse(own.T @ own - through.T @ through)
     seen, step = (
         inverse @ (own.T @ np.nan_to_num(values[part, imu]).ravel())
         for values in (signal.total, signal.explained)
@@ -237,5 +237,6 @@ def position_of_block(signal: Signal, imu, chosen, part):
 
 
 PANELS_AGAINST = {
-    "age": clock_panels, "place": shift_panels, "turning": delay_panels, "time": time_panels,
+    "age": clock_panels, "place": shift_panels, "time": time_panels,
+    "angular acceleration": delay_panels,
 }  # fmt: skip

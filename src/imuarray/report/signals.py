@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from imuarray.diagnosis.fit import Fit, flat_parameters, normal
-from imuarray.diagnosis.scores import robust_inverse
+from imuarray.linear import scaled_inverse
 
 if TYPE_CHECKING:
     from imuarray.diagnosis.document import Diagnosis
@@ -42,7 +42,7 @@ def signal_of(diagnosis: Diagnosis, cause) -> Signal:
     mask = np.zeros_like(made.active)
     mask[np.ix_(list(cause.imus), columns.of(cause.effect))] = True
     mask &= made.active
-    left = less_motion(made, along(made, np.where(mask, flat, 0.0)))
+    left = made.less_motion(along(made, np.where(mask, flat, 0.0)))
     others = made.active & ~mask
     information, _ = normal(made.residual, made.whitened, made.through, others)
     score = np.array(
@@ -50,13 +50,13 @@ def signal_of(diagnosis: Diagnosis, cause) -> Signal:
     )
     ridge = 1.0 / np.broadcast_to(columns.prior_sd, others.shape)[others] ** 2
     step = np.zeros(mask.shape)
-    step[others] = robust_inverse(information + np.diag(ridge)) @ score
-    explained = left - less_motion(made, along(made, step))
+    step[others] = scaled_inverse(information + np.diag(ridge)) @ score
+    explained = left - made.less_motion(along(made, step))
     total = np.where(made.readings.keep, made.residual + explained, np.nan)
     # neighbours that are alike are worth fewer independent ones
-    memory = np.clip(diagnosis.found.search.noise.correlation, 0.0, 0.99)
-    memory = np.repeat(np.sqrt((1 + memory) / (1 - memory)), 3, axis=1)
-    width = np.sqrt(np.maximum(1.0 - made.leverage, 1e-6)).mean(axis=0) * memory
+    rho = np.clip(diagnosis.found.search.noise.correlation, 0.0, 0.99)
+    inflated = np.repeat(np.sqrt((1 + rho) / (1 - rho)), 3, axis=1)
+    width = np.sqrt(np.maximum(1.0 - made.leverage, 1e-6)).mean(axis=0) * inflated
     return Signal(
         made, cause.effect, tuple(cause.imus), mask, flat, diagnosis.extended.sds, explained,
         total, width,
@@ -68,17 +68,10 @@ def along(made: Fit, step) -> np.ndarray:
     return np.einsum("tkim,km->tki", made.whitened, step, optimize=True)
 
 
-def less_motion(made: Fit, values) -> np.ndarray:
-    """Whitened readings (T, N, 6) without what the motion can explain of them."""
-    flat = values.reshape(len(values), -1)
-    taken = np.einsum("tri,tr->ti", made.basis, flat)
-    return values - np.einsum("tri,ti->tr", made.basis, taken).reshape(values.shape)
-
-
 def binned(x, total, explained, width, bins=BINS) -> pd.DataFrame:
     """Means over bins of x: x, y, se, model; NaN in total left out.
 
-    Bins share the sum of the distances from the median, and so reach where a slope is told.
+    Bins share the sum of the distances from the median, and so reach where a slope is determined.
     """
     kept = np.isfinite(total) & np.isfinite(x)
     x, total, explained = x[kept], total[kept], explained[kept]

@@ -13,17 +13,24 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 import imuarray
-from imuarray.diagnosis.words import sensors_of, whose, words
+from imuarray.diagnosis.quantities import (
+    fixed,
+    number,
+    plus_minus,
+    probability,
+    quantity,
+    symbols,
+    unit_shown,
+)
+from imuarray.diagnosis.words import part_in_words, sensors_of, split_name, whose, words
 from imuarray.figures.style import styled
 from imuarray.model import EFFECTS
 from imuarray.provenance import atomic_write
 from imuarray.report import drawings as drawn
 from imuarray.report import numbers
-from imuarray.report.answers import answers, verdict
-from imuarray.report.drawings_cause import cause_figure
-from imuarray.report.drawings_model import ALIKE, position_figure, separability_figure
+from imuarray.report.answers import USUAL, answers, verdict
+from imuarray.report.drawings_model import ALIKE, cause_figure, position_figure, separability_figure
 from imuarray.report.panels import cause_table
-from imuarray.report.tables import tables
 
 if TYPE_CHECKING:
     from imuarray.diagnosis.document import Diagnosis
@@ -79,8 +86,12 @@ BESIDE = {  # by what it is drawn against
     " of the sawtooth, drawn twice",
     "place": "the triad's position in blocks of time",
     "time": "the axes that it changes most, against time",
-    "turning": "the gyroscope along dω/dt against its size; the slope is the delay",
+    "angular acceleration": "the gyroscope along dω/dt against its size; the slope is the delay",
 }
+
+# What the template's tables call.
+IN_TABLES = (fixed, number, part_in_words, plus_minus, probability, quantity, split_name, symbols,
+             unit_shown, whose, words)  # fmt: skip
 
 
 class Drawing(NamedTuple):
@@ -138,11 +149,11 @@ def draw(diagnosis: Diagnosis) -> list[Drawing]:
     found = [_drawing("discrepancies", diagnosis, footer), _drawing("residual", diagnosis, footer)]
     if document["causes"]:
         found.append(_drawing("gain", diagnosis, footer))
-    for number, cause in enumerate(diagnosis.found.search.causes):
+    for place, cause in enumerate(diagnosis.found.search.causes):
         table = cause_table(diagnosis, cause)
         sensors = sensors_of(numbers.imu_labels(diagnosis), cause.imus)
         found.append(Drawing(
-            f"cause_{number + 1:02d}_{cause.effect}",
+            f"cause_{place + 1:02d}_{cause.effect}",
             f"Cause: {words(cause.effect)}, {whose(sensors)}",
             CAUSE_CAPTION.format(BESIDE.get(EFFECTS[cause.effect].against, PARAMETERS)),
             files(cause_figure(table, footer), table),
@@ -177,27 +188,28 @@ def files(figure: Figure, table: pd.DataFrame) -> dict[str, bytes]:
 
 
 def html(diagnosis: Diagnosis, drawings: list[Drawing]) -> str:
-    """report.html."""
+    """report.html, every text escaped."""
     document = diagnosis.document
-    # every text is escaped
     environment = Environment(
         loader=PackageLoader("imuarray.report", "."), undefined=StrictUndefined, autoescape=True
     )
+    environment.globals |= {function.__name__: function for function in IN_TABLES}
     return environment.get_template("report.html.j2").render(
+        document=document,
         recording=str(document["recording"]) or "a recording",
         facts=facts(diagnosis),
         verdict=verdict(diagnosis),
-        unexplained=document["unexplained"],
         answers=answers(diagnosis),
         figures=drawings,
-        tables=tables(diagnosis),
-        foot=[
-            "A nat is a unit of log likelihood: one nat more makes the readings e times as likely."
-            " Errors after ± are standard errors or posterior sds (one sigma). p-values are not"
-            " probabilities of a cause.",
-            f"imuarray {imuarray.__version__}, seed {document['seed']}. All numbers, in SI units:"
-            " diagnosis.json.",
-        ],
+        usual=USUAL,
+        checks=diagnosis.base.discrepancies,
+        after={item.check: item for item in diagnosis.extended.discrepancies},
+        causes=document["causes"],
+        labels=numbers.imu_labels(diagnosis),
+        positions=numbers.position_table(diagnosis),
+        noise=numbers.noise_table(diagnosis),
+        scores=numbers.score_table(diagnosis),
+        version=imuarray.__version__,
     )
 
 
