@@ -30,7 +30,9 @@ def drifting(tmp_path):
     sds = ("accelerometer", recording.accelerometer_noise_sd), (
         "gyroscope", recording.gyroscope_noise_sd,
     )  # fmt: skip
+    places = recording.relative_positions()
     document = {
+        "extended": {"positions_m": places.tolist(), "positions_sd_m": (0 * places).tolist()},
         "causes": [{"effect": "bias_drift", "parameters": parameters}],
         "noise_sd": {kind: {label: {"sd": sd} for label in labels[0]} for kind, sd in sds},
         "clock": {"origin_s": 100.0, "span_s": float(recording.time[-1] - 100.0)},

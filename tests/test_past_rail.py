@@ -53,7 +53,7 @@ def diagnosis(hidden, tmp_path):
     return path
 
 
-def test_the_right_model_foretells_what_is_hidden(hidden, diagnosis):
+def test_the_right_model_predicts_what_is_withheld(hidden, diagnosis):
     recording, truth = hidden
     found = imuarray.diagnosed(diagnosis, recording)
     assert np.array_equal(found["effect_parameter"], truth["effect_parameter"])

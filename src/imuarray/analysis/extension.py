@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from os import PathLike
 from pathlib import Path
 
@@ -27,10 +26,16 @@ def diagnosed(diagnosis: str | PathLike, recording: Recording) -> xr.Dataset:
     extension = read_extension(Path(diagnosis))
     labels = recording.accelerometer_labels, recording.gyroscope_labels
     model = extended_model(extension, model_of(recording), labels)
-    positions, sds = _positions(Path(diagnosis), recording)
+    positions, sds = extension.positions, extension.positions_sd.copy()
     names = parameter_names(model, labels)
     effect_sds = np.array([_sd(extension, name) for name in names])
     count = len(labels[0])
+    if not positions.shape == sds.shape == (count, 3):
+        raise InputError(
+            f"{diagnosis}: expected positions of {count} accelerometers, as in the recording, found"
+            f" {len(positions)}"
+        )
+    sds[0] = 0.0  # the reference's
     covariance = np.diag(sds.ravel() ** 2).reshape(count, 3, count, 3)
     noise = [
         np.sqrt(np.diag(part)).reshape(-1, 3)
@@ -38,7 +43,7 @@ def diagnosed(diagnosis: str | PathLike, recording: Recording) -> xr.Dataset:
     ]
     place = ("accelerometer", "axis")
     variables = {
-        "position": (place, positions, {"units": "m", "relative_to": labels[0][0]}),
+        "position": (place, positions - positions[0], {"units": "m", "relative_to": labels[0][0]}),
         "nominal_position": (place, recording.relative_positions(), {"units": "m"}),
         "position_covariance": (
             (*place, "accelerometer_other", "axis_other"), covariance, {"units": "m2"},
@@ -63,23 +68,3 @@ def _sd(extension: Extension, name: str) -> float:
     """Of the parameter 'effect component_IMU unit'; 0 where the diagnosis states none."""
     effect, component = name.split(" ")[:2]
     return extension.values[effect].get(component, (0.0, None))[1] or 0.0
-
-
-def _positions(path: Path, recording: Recording) -> tuple[np.ndarray, np.ndarray]:
-    """(positions, sds), each (A, 3) m relative to the first triad, of the extended model."""
-    shape = len(recording.accelerometer_labels), 3
-    try:
-        section = json.loads(path.read_text(encoding="utf-8"))["extended"]
-        fields = [np.array(section[name], float) for name in ("positions_m", "positions_sd_m")]
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(
-            f"{path}: expected the extended model's positions and sds (m), found {error!r}"
-        ) from None
-    if fields[0].shape != shape or fields[1].shape[0] < shape[0] - 1:
-        raise InputError(
-            f"{path}: expected positions of {shape[0]} accelerometers, as in the recording, found"
-            f" {len(fields[0])}"
-        )
-    sds = np.zeros(shape)
-    sds[1:] = fields[1][-(shape[0] - 1) :]  # the reference has none
-    return fields[0] - fields[0][0], sds

@@ -27,7 +27,7 @@ def past_rail(
     recording: Recording, diagnosed: xr.Dataset, base, bins=BINS, per_bin: int = PER_BIN,
     elsewhere=None,
 ) -> pd.DataFrame:  # fmt: skip
-    """Errors of hidden gyroscope readings, as several models foretell them.
+    """Errors of hidden gyroscope readings, as several models predict them.
 
     Parameters
     ----------
@@ -69,10 +69,10 @@ def past_rail(
     if elsewhere is not None:
         ways["transferred"] = elsewhere
     for name, (positions, lead) in ways.items():
-        errors[name] = _foretold(clipped, hidden, positions, lead) - chosen.angular_rate
+        errors[name] = _predicted(clipped, hidden, positions, lead) - chosen.angular_rate
     model, found = extended_motion(diagnosed, clipped, hidden)
-    foretold = _readings(model, diagnosed, found, chosen.time)
-    errors["extended"] = foretold - chosen.angular_rate
+    predicted = _readings(model, diagnosed, found, chosen.time)
+    errors["extended"] = predicted - chosen.angular_rate
     variance = np.einsum("tii->ti", found.covariance)[:, None, :3]
     noise = np.diag(model.noise.gyroscope).reshape(1, -1, 3)
     sds["extended"] = np.sqrt(variance + noise)
@@ -81,7 +81,7 @@ def past_rail(
     return _table(errors, sds, hidden, np.degrees(rates), bins)
 
 
-def _foretold(clipped: Recording, hidden, positions, lead: float) -> np.ndarray:
+def _predicted(clipped: Recording, hidden, positions, lead: float) -> np.ndarray:
     """Gyroscopes' readings (T, 1, 3) rad/s by the papers' model, ``lead`` s after the motion."""
     model = ArrayModel.isotropic(array_of(clipped), ASSUMED, clipped.gyroscope_noise_sd)
     motion = fuse(

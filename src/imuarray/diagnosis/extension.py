@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from imuarray.diagnosis.settings import SETTINGS
 from imuarray.errors import InputError
 from imuarray.model import EFFECTS, ArrayModel
 from imuarray.model.array_model import EffectPrior
@@ -16,15 +17,13 @@ from imuarray.model.effects import DATA_EFFECTS, KINDS
 from imuarray.model.names import component
 from imuarray.model.noise import Noise
 
-PINNED = 1e-9  # of a prior sd: parameters that the diagnosis fixed, or found no need of; so little
-# that misfit does not move a clock's sawtooth past a sample
-
 
 class Extension(NamedTuple):
     """Effects with their parameters, and the noise sds, of a diagnosis.
 
     ``values``: {effect: {parameter's name: (value, sd or None)}}; sds by label, m/s^2 and rad/s;
-    ``before``: effects that are mended in the readings, not in the model.
+    ``before``: effects that are mended in the readings, not in the model; ``positions`` and their
+    ``positions_sd`` (A, 3) m, relative to the first accelerometer.
     """
 
     effects: tuple[str, ...]
@@ -33,6 +32,8 @@ class Extension(NamedTuple):
     gyroscope_sd: dict[str, float]
     before: tuple[str, ...]
     clock: tuple[float, float]  # where the diagnosed recording's time begins (s), and its span (s)
+    positions: np.ndarray
+    positions_sd: np.ndarray
 
 
 def read_extension(path: Path) -> Extension:
@@ -50,6 +51,8 @@ def read_extension(path: Path) -> Extension:
         before = tuple(
             name for name in named if name in DATA_EFFECTS and DATA_EFFECTS[name].kind == "readings"
         )
+        section = document["extended"]
+        places = [np.array(section[f"positions_{name}"], float) for name in ("m", "sd_m")]
         times = float(document["clock"]["origin_s"]), float(document["clock"]["span_s"])
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: expected a diagnosis.json, found no text") from error
@@ -62,7 +65,7 @@ def read_extension(path: Path) -> Extension:
                 f"{path}: expected causes that this installation knows, found {name}; is the"
                 " module that defines it imported?"
             )
-    return Extension(effects, values, *sds, before, times)
+    return Extension(effects, values, *sds, before, times, *places)
 
 
 def extended_model(extension: Extension, model: ArrayModel, labels) -> ArrayModel:
@@ -90,7 +93,9 @@ def extended_model(extension: Extension, model: ArrayModel, labels) -> ArrayMode
             f" parameters {', '.join(sorted(n for _, n in unused)[:3])}"
         )
     sd = named.effect_prior_sd
-    prior = EffectPrior(np.where(pinned, start, 0.0), np.where(pinned, PINNED * sd, sd), start)
+    prior = EffectPrior(
+        np.where(pinned, start, 0.0), np.where(pinned, SETTINGS.pinned * sd, sd), start
+    )
     declared = extension.accelerometer_sd, extension.gyroscope_sd
     sds = [_by_label(part, names) for part, names in zip(declared, labels, strict=True)]
     counts = model.array.accelerometers, model.array.gyroscopes

@@ -70,55 +70,50 @@ class Replicator:
 
 def quantities(fit: Fit, unit) -> dict[str, Quantity]:
     """Test quantities of a standardised residual (T, N, 6), NaN where left out."""
-    readings, motion = fit.readings, fit.state.motion
-    sizes = {
-        "|omega|": motion[:, :3], "|omega dot|": motion[:, 3:6], "|specific force|": motion[:, 6:9],
-        "jerk": fit.state.jerk[1],
-    }  # fmt: skip
-    found = {}
+    readings, found = fit.readings, {}
     for kind, name in enumerate(KINDS):
         there = np.flatnonzero(readings.exists[:, kind])
         labels = tuple(readings.labels[k] for k in there)
-        part = unit[:, there, 3 * kind : 3 * kind + 3]
-        whose = f"the {name}s' residual"
-        rms = np.sqrt(np.nanmean(part**2, axis=0)).ravel()
         axes = tuple(f"{label}{axis}" for label in labels for axis in "xyz")
-        found[f"{name} residual"] = Quantity(rms, axes, f"{whose}, in assumed sds,")
-        for size, values in sizes.items():
-            if np.any(values):
-                growth = _growth(part, np.linalg.norm(values, axis=1))
-                words = f"{whose} where {size} is large over where it is small"
-                found[f"{name} residual against {size}"] = Quantity(growth, labels, words)
-        found[f"{name} residual along omega dot"] = Quantity(
-            _along(part, motion[:, 3:6]), labels, f"the share of {whose} along omega dot"
-        )
-        found[f"{name} whiteness"] = Quantity(
-            _lag_one(part, readings.run),
-            labels,
-            f"the lag-one correlation of {whose}",
-        )
-        found[f"{name} kurtosis"] = Quantity(
-            _kurtosis(part), labels, f"the excess kurtosis of {whose}"
-        )
-        found[f"{name} drift"] = Quantity(
-            _drift(part, readings.time), axes, f"the drift of {whose} from start to end"
-        )
-        found[f"{name} correlation between IMUs"] = Quantity(
-            _between(part), labels, f"the largest correlation of {whose} between two IMUs"
-        )
+        part = unit[:, there, 3 * kind : 3 * kind + 3]
+        for test, (function, _, words, by_axis) in TESTS.items():
+            values = function(part, fit)
+            if values is not None:
+                said = words.format(f"the {name}s' residual")
+                found[f"{name} {test}"] = Quantity(values, axes if by_axis else labels, said)
     return found
 
 
-def _growth(part, size):
-    """rms in the highest quarter of a size over that in the lowest half, by triad."""
-    low, high = np.quantile(size, [0.5, 0.75])
-    square = part**2
-    return np.sqrt(
-        np.nanmean(square[size > high], axis=(0, 2)) / np.nanmean(square[size < low], axis=(0, 2))
-    )
+def motion_sizes(fit: Fit) -> dict[str, np.ndarray]:
+    """What a residual may grow with, (T, 3) each; of the jerk zeros where it is not known."""
+    motion = fit.state.motion
+    return {
+        "omega": motion[:, :3], "omega dot": motion[:, 3:6], "specific force": motion[:, 6:9],
+        "jerk": fit.state.jerk[1],
+    }  # fmt: skip
 
 
-def _along(part, direction):
+def _growth(size):
+    """rms in the highest quarter of a size of the motion over that in the lowest half, by triad."""
+
+    def ratio(part, fit):
+        values = np.linalg.norm(motion_sizes(fit)[size], axis=1)
+        if not np.any(values):
+            return None
+        low, high = np.quantile(values, [0.5, 0.75])
+        square = part**2
+        above, below = (square[chosen] for chosen in (values > high, values < low))
+        return np.sqrt(np.nanmean(above, axis=(0, 2)) / np.nanmean(below, axis=(0, 2)))
+
+    return ratio
+
+
+def _rms(part, fit):
+    return np.sqrt(np.nanmean(part**2, axis=0)).ravel()
+
+
+def _along(part, fit):
+    direction = fit.state.motion[:, 3:6]
     length = np.linalg.norm(direction, axis=1, keepdims=True)
     way = direction / np.where(length > 0, length, 1.0)
     filled = np.nan_to_num(part)
@@ -126,30 +121,58 @@ def _along(part, direction):
     return np.sum(along**2, axis=0) / np.maximum(np.sum(filled**2, axis=(0, 2)), 1e-300)
 
 
-def _lag_one(part, run):
-    together = (np.diff(run) == 0)[:, None, None]
+def _lag_one(part, fit):
+    together = (np.diff(fit.readings.run) == 0)[:, None, None]
     pairs = np.where(together, part[1:] * part[:-1], np.nan)
     return np.nanmean(pairs, axis=(0, 2)) / np.nanmean(part**2, axis=(0, 2))
 
 
-def _kurtosis(part):
+def _kurtosis(part, fit):
     square = part**2  # a fourth power by pow is slow
     return np.nanmean(square * square, axis=(0, 2)) / np.nanmean(square, axis=(0, 2)) ** 2 - 3.0
 
 
-def _drift(part, time):
+def _drift(part, fit):
+    time = fit.readings.time
     x = time - time.mean()
     slope = np.einsum("t,tki->ki", x, np.nan_to_num(part)) / np.sum(x**2)
     return (slope * np.ptp(time)).ravel()
 
 
-def _between(part):
+def _between(part, fit):
     flat = np.nan_to_num(part).reshape(len(part), -1)
     matrix = np.corrcoef(flat.T) if flat.shape[1] > 3 else np.eye(flat.shape[1])
     count = part.shape[1]
     blocks = np.abs(matrix).reshape(count, 3, count, 3).max(axis=(1, 3))
     np.fill_diagonal(blocks, 0.0)
     return blocks.max(axis=1)
+
+
+# Name -> function of (T, n, 3) and the fit, label in figures, words with whose, whether by axis.
+TESTS = {
+    "residual": (_rms, "size", "{}, in assumed sds,", True),
+    **{
+        f"residual against {name}": (
+            _growth(size), label, f"{{}} where {name} is large over where it is small", False,
+        )
+        for size, name, label in (
+            ("omega", "|omega|", "growth with |ω|"),
+            ("omega dot", "|omega dot|", "growth with |dω/dt|"),
+            ("specific force", "|specific force|", "growth with |specific force|"),
+            ("jerk", "jerk", "growth with |ds/dt|"),
+        )
+    },
+    "residual along omega dot": (
+        _along, "share along dω/dt", "the share of {} along omega dot", False,
+    ),
+    "whiteness": (_lag_one, "correlation in time", "the lag-one correlation of {}", False),
+    "drift": (_drift, "drift", "the drift of {} from start to end", True),
+    "kurtosis": (_kurtosis, "tails (kurtosis)", "the excess kurtosis of {}", False),
+    "correlation between IMUs": (
+        _between, "correlation between IMUs", "the largest correlation of {} between two IMUs",
+        False,
+    ),
+}  # fmt: skip
 
 
 def discrepancies(fit: Fit, ridge, rng, replicates=REPLICATES) -> list[Discrepancy]:

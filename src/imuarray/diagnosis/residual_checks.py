@@ -16,6 +16,7 @@ from scipy.stats import chi2, norm
 from imuarray.diagnosis.clocks import delay_score
 from imuarray.diagnosis.fit import Fit, pick
 from imuarray.diagnosis.noise import Noise, standardised, tail_log_p
+from imuarray.diagnosis.replicates import motion_sizes
 from imuarray.diagnosis.scores import Information, log_tail
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.linear import scaled_inverse, scaled_square
@@ -153,15 +154,10 @@ def _worst(name, found) -> Check:
 
 def size_checks(fit: Fit) -> list[Check]:
     """Does the residual's size grow with the motion's? A regression of its square per triad."""
-    motion = fit.state.motion
-    sizes = {
-        "omega": motion[:, :3], "omega dot": motion[:, 3:6], "specific force": motion[:, 6:9],
-        "jerk": fit.state.jerk[1],
-    }  # fmt: skip
     unit = standardised(fit)
     triads = np.argwhere(fit.readings.exists)
     checks = []
-    for name, values in sizes.items():
+    for name, values in motion_sizes(fit).items():
         size = np.sum(values**2, axis=1)
         if not np.any(size):
             continue

@@ -111,6 +111,11 @@ class Settings:
     implausible: float = 10.0  # prior sds of a parameter
     doubtful: float = 0.5  # share of a cause's gain that a placebo must not have
 
+    # The extended model for other commands (`extension`)
+    # of a prior sd: parameters that the diagnosis fixed or found no need of; so little that misfit
+    # does not move a clock's sawtooth past a sample
+    pinned: float = 1e-9
+
     def limit(self, effect: str) -> float:
         """Critical log p of an effect: its own, where its test has another tail."""
         own = known_effect(effect).critical

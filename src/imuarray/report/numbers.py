@@ -9,6 +9,7 @@ import pandas as pd
 from scipy.stats import norm
 
 from imuarray.diagnosis.noise import standardised
+from imuarray.diagnosis.replicates import TESTS
 from imuarray.diagnosis.scores import candidates, information_at, score_all
 from imuarray.diagnosis.separability import separability
 from imuarray.diagnosis.settings import SETTINGS
@@ -19,20 +20,6 @@ if TYPE_CHECKING:
     from imuarray.diagnosis.document import Diagnosis, Fitted
 
 BAND = norm.ppf(0.975)  # sds of a 95 % band
-# A check's name, without its kind, as a figure says it; in the order drawn.
-CHECKS = {
-    "residual": "size",
-    "residual against |omega|": "growth with |ω|",
-    "residual against |omega dot|": "growth with |dω/dt|",
-    "residual against |specific force|": "growth with |specific force|",
-    "residual against jerk": "growth with |d²ω/dt²|",
-    "residual along omega dot": "share along dω/dt",
-    "whiteness": "correlation in time",
-    "drift": "drift",
-    "kurtosis": "tails (kurtosis)",
-    "correlation between IMUs": "correlation between IMUs",
-}
-BY_AXIS = ("residual", "drift")  # checks whose worst place is an axis, not a triad
 
 
 def imu_labels(diagnosis: Diagnosis) -> tuple[str, ...]:
@@ -54,18 +41,18 @@ def discrepancy_table(diagnosis: Diagnosis) -> pd.DataFrame:
             band = item.simulated
             far = item.statistic - band["median"]
             edge = (band["q975"] - band["q025"]) / 2
-            number = exists[:, KINDS.index(kind)].sum() * (3 if name in BY_AXIS else 1)
+            number = exists[:, KINDS.index(kind)].sum() * (3 if TESTS[name][3] else 1)
             rows.append({
-                "model": model, "kind": kind, "check": name, "label": CHECKS.get(name, name),
+                "model": model, "kind": kind, "check": name, "label": TESTS[name][1],
                 "statistic": item.statistic, "q025": band["q025"], "q975": band["q975"],
                 "standardised": BAND * far / max(edge, 1e-300),
                 "limit": norm.isf((1 - 0.95 ** (1 / number)) / 2), "p_value": item.p_value,
             })  # fmt: skip
     table = pd.DataFrame(rows)
-    order = {name: place for place, name in enumerate(CHECKS)}
+    order = {name: place for place, name in enumerate(TESTS)}
     return table.sort_values(
-        "check", key=lambda names: names.map(order).fillna(len(order)), kind="stable"
-    ).reset_index(drop=True)
+        "check", key=lambda names: names.map(order), kind="stable", ignore_index=True
+    )
 
 
 def residual_table(diagnosis: Diagnosis) -> pd.DataFrame:
