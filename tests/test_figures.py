@@ -16,8 +16,7 @@ from imuarray.figures import notes, paper2017, paper2021, paper2021_array, table
 from imuarray.figures.gallery import caption, gallery, title
 from imuarray.figures.style import significant, write_figure
 from imuarray.geometry import mimu4444
-from imuarray.posterior.chains import Chains
-from imuarray.posterior.store import chain_tree
+from imuarray.posterior.chains import Chains, chain_tree
 from imuarray.posterior.target import GaussianPrior
 
 ROOT = Path(__file__).parents[1]

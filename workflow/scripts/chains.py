@@ -1,7 +1,7 @@
 """Shared by the sampling scripts: run two chains with a checkpoint and store them."""
 
+from imuarray.posterior.chains import write_chains
 from imuarray.posterior.pmmh import checkpoint_beside, run_chains, spread_starts
-from imuarray.posterior.store import write_chains
 from imuarray.provenance import code_digest, digest, stamp
 from imuarray.streams import stream
 

@@ -5,6 +5,6 @@ from job import job
 with job(snakemake):
     from imuarray.figures.paper2021 import figure_2021_fig3
     from imuarray.figures.publish import publish
-    from imuarray.posterior.store import read_chains
+    from imuarray.posterior.chains import read_chains
 
     publish(figure_2021_fig3, snakemake, chains=read_chains)

@@ -5,7 +5,7 @@ from job import job
 with job(snakemake):
     from imuarray.figures.paper2021_array import figure_2021_fig5
     from imuarray.figures.publish import publish
-    from imuarray.posterior.store import read_chains
+    from imuarray.posterior.chains import read_chains
     from imuarray.recording import array_of, read_recording
 
     def read_array(path):

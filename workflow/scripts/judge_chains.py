@@ -3,8 +3,8 @@
 from job import job
 
 with job(snakemake) as settings:
-    from imuarray.posterior.store import read_chains
-    from imuarray.posterior.summary import summarise
+    from imuarray.posterior.chains import read_chains
+    from imuarray.posterior.diagnostics import summarise
     from imuarray.provenance import stamp, write_csv, write_json
     from imuarray.recording import has_truth, read_truth
 

@@ -51,7 +51,7 @@ def read_calibration(path: str | PathLike) -> xr.Dataset:
 
 def read_posterior(path: str | PathLike) -> xr.DataTree:
     """What `imuarray sample` has written; InputError for another file."""
-    from imuarray.posterior.store import read_chains
+    from imuarray.posterior.chains import read_chains
     from imuarray.provenance import is_damaged
 
     path = Path(path)

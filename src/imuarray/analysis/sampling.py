@@ -142,16 +142,16 @@ def _off_rails(recording: Recording, say: Say) -> Recording:
 
 def summary(posterior: xr.DataTree) -> pd.DataFrame:
     """One row per coordinate of what `sample` gave: mean, sd and quantiles (m), R-hat, ESS."""
-    from imuarray.posterior.store import chains_of
-    from imuarray.posterior.summary import summarise
+    from imuarray.posterior.chains import chains_of
+    from imuarray.posterior.diagnostics import summarise
 
     labels = [str(label) for label in posterior["posterior"]["accelerometer"].to_numpy()]
     return summarise(chains_of(posterior), labels, RHAT_THRESHOLD)[1]
 
 
 def _tree(recording: Recording, model: ArrayModel, made: Made, seed: int) -> xr.DataTree:
-    from imuarray.posterior.store import chain_tree
-    from imuarray.posterior.summary import summarise
+    from imuarray.posterior.chains import chain_tree
+    from imuarray.posterior.diagnostics import summarise
 
     labels = recording.accelerometer_labels[1:]
     names = parameter_names(model, (recording.accelerometer_labels, recording.gyroscope_labels))

@@ -63,7 +63,7 @@ class Results:
         """Draws (chains, n, A - 1, 3) m of chains/``name``, the burn-in left out."""
 
         def read(place):
-            from imuarray.posterior.store import read_chains
+            from imuarray.posterior.chains import read_chains
 
             return read_chains(place)[0].draws
 

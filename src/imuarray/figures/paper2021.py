@@ -92,7 +92,7 @@ def figure_2021_fig2(variances: list[pd.DataFrame], settings: dict):
 def figure_2021_fig3(chains: list, verdict: list[dict], coordinates: list, settings: dict):
     """(a) whole traces, and at the scale of the posterior beside the histogram; (b) their ACF.
 
-    Of the first coordinate, in micrometres. ``chains`` as `posterior.store.read_chains` gives
+    Of the first coordinate, in micrometres. ``chains`` as `posterior.chains.read_chains` gives
     them, ``verdict`` and ``coordinates`` of `posterior/`: one of each.
     """
     (found, tree), verdict = chains[0], verdict[0]
@@ -232,7 +232,7 @@ def figure_2021_fig4(chains: list, verdicts: list[dict], coordinates: list, sett
     """Posterior of IMU 2's position: as wide as the widest one (left), and with the prior (right).
 
     The right axis is asinh, so that all widths are seen. The peak of each posterior is at 1.
-    ``chains`` as `posterior.store.read_chains` gives them, ``verdicts`` and ``coordinates`` of
+    ``chains`` as `posterior.chains.read_chains` gives them, ``verdicts`` and ``coordinates`` of
     `posterior/`, one for each T.
     """
     draws, verdicts = after_burn_in(chains, verdicts)

@@ -158,7 +158,7 @@ def figure_2021_fig5(
 ):  # fmt: skip
     """Ellipses of the posteriors on (a) topside and (b) underside, at their true size.
 
-    Both seen from above with the y axis downwards. ``chains`` as `posterior.store.read_chains`
+    Both seen from above with the y axis downwards. ``chains`` as `posterior.chains.read_chains`
     gives them, ``verdicts`` and ``coordinates`` of `posterior/`, one for each T; the array is
     the first of those of ``recordings``, if any; ``kind`` (`notes.SOURCES`) is written over it.
     """

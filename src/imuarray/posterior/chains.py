@@ -1,10 +1,13 @@
-"""What a sampler hands back."""
+"""What a sampler hands back, and its file: an `xarray.DataTree` in NetCDF-4."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+import xarray as xr
+
+from imuarray.provenance import write_netcdf
 
 
 @dataclass(frozen=True)
@@ -27,3 +30,67 @@ class Chains:
     def steps(self) -> int:
         """Transitions made by each chain."""
         return self.draws.shape[1] * self.thin
+
+
+def write_chains(path, chains: Chains, labels, prior, attrs: dict, effects=None) -> None:
+    """Write what `chain_tree` makes of the chains."""
+    write_netcdf(chain_tree(chains, labels, prior, attrs, effects), path)
+
+
+def chain_tree(chains: Chains, labels, prior, attrs: dict, effects=None) -> xr.DataTree:
+    """Groups posterior, sample_stats and prior; dims chain, draw, accelerometer, axis.
+
+    ``labels`` of the A - 1 estimated triads; ``prior`` a `GaussianPrior`; ``attrs`` the
+    stamp (config, seed, versions) and whatever else; ``effects`` names of the parameters
+    after the positions.
+    """
+    count = len(labels)
+    coords = {"accelerometer": list(labels), "axis": list("xyz")}
+    dims = ("chain", "draw", "accelerometer", "axis")
+    shape = (*chains.draws.shape[:2], count, 3)
+    position = chains.draws[..., : 3 * count].reshape(shape)
+    posterior = xr.Dataset({"position": (dims, position, {"units": "m"})}, coords)
+    if effects:
+        posterior["effect_parameter"] = (
+            ("chain", "draw", "parameter"),
+            chains.draws[..., 3 * count :],
+        )
+        posterior = posterior.assign_coords(parameter=list(effects))
+    stats = xr.Dataset({"log_target": (dims[:2], chains.log_target)})
+    stats["acceptance"] = (("chain",), chains.acceptance)
+    split = [prior.mean[: 3 * count].reshape(count, 3), prior.sd[: 3 * count].reshape(count, 3)]
+    fields = {
+        name: (dims[2:], value, {"units": "m"})
+        for name, value in zip(("position_mean", "position_sd"), split, strict=True)
+    }
+    groups = {
+        "/": xr.Dataset(attrs={**attrs, "thin": chains.thin, "step_length_m": chains.step}),
+        "/posterior": posterior,
+        "/sample_stats": stats,
+        "/prior": xr.Dataset(fields, coords),
+    }
+    return xr.DataTree.from_dict(groups)
+
+
+def read_chains(path) -> tuple[Chains, xr.DataTree]:
+    """The chains and the whole tree of a file that `write_chains` made."""
+    with xr.open_datatree(path, engine="h5netcdf") as opened:
+        tree = opened.load()
+    return chains_of(tree), tree
+
+
+def chains_of(tree: xr.DataTree) -> Chains:
+    """The chains in a tree that `chain_tree` made."""
+    position = tree["posterior"]["position"].to_numpy()
+    draws = position.reshape(*position.shape[:2], -1)
+    if "effect_parameter" in tree["posterior"]:
+        draws = np.concatenate([draws, tree["posterior"]["effect_parameter"].to_numpy()], axis=2)
+    stats = tree["sample_stats"]
+    return Chains(
+        draws,
+        stats["log_target"].to_numpy(),
+        stats["acceptance"].to_numpy(),
+        int(tree.attrs["thin"]),
+        float(tree.attrs["step_length_m"]),
+        int(tree.attrs.get("divergent", 0)),
+    )
