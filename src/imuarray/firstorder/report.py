@@ -10,6 +10,7 @@ from imuarray.firstorder.correct import FirstOrder
 from imuarray.recording import Recording
 
 MISALIGNMENT = ("xy", "xz", "yz")
+SENSORS = {"specific_force": "accelerometer", "angular_rate": "gyroscope"}
 
 
 def parameter_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
@@ -42,46 +43,44 @@ def residual_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
     })  # fmt: skip
 
 
+def _allan(found: FirstOrder, recording: Recording, sensor: str):
+    """Averaging times (S,) s and Allan deviations (S, K, 3) of the still poses."""
+    step = float(np.median(np.diff(recording.time)))
+    readings = getattr(recording, sensor)
+    return allan_deviation([readings[pose] for pose in found.poses], step)
+
+
 def noise_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
     """Noise of each axis in SI units, beside what the recording declared.
 
     ``sd`` of one reading and ``correlation`` of neighbours; ``allan_1s`` the Allan deviation at
     the averaging time nearest to 1 s; ``floor`` the smallest one and ``floor_tau`` (s) where.
     """
-    step = float(np.median(np.diff(recording.time)))
     parts = []
-    for sensor, declared, sd, correlation in (
-        ("specific_force", recording.accelerometer_noise_sd, found.accelerometer_noise,
-         found.accelerometer_correlation),
-        ("angular_rate", recording.gyroscope_noise_sd, found.gyroscope_noise,
-         found.gyroscope_correlation),
-    ):  # fmt: skip
-        readings = getattr(recording, sensor)
-        taus, deviation = allan_deviation([readings[pose] for pose in found.poses], step)
-        lowest = deviation.argmin(axis=0)
-        labels = recording.accelerometer_labels
-        labels = labels if sensor == "specific_force" else recording.gyroscope_labels
-        table = pd.DataFrame(
-            [(sensor, label, axis) for label in labels for axis in "xyz"],
-            columns=["sensor", "triad", "axis"],
+    for sensor, kind in SENSORS.items():
+        taus, deviation = _allan(found, recording, sensor)
+        declared = getattr(recording, f"{kind}_noise_sd")
+        sd = getattr(found, f"{kind}_noise").ravel()
+        index = pd.MultiIndex.from_product(
+            [[sensor], getattr(recording, f"{kind}_labels"), list("xyz")],
+            names=["sensor", "triad", "axis"],
         )
-        parts.append(table.assign(
-            declared=declared, sd=sd.ravel(), ratio=sd.ravel() / declared,
-            correlation=correlation.ravel(),
-            allan_1s=deviation[np.argmin(np.abs(taus - 1.0))].ravel(),
-            floor=deviation.min(axis=0).ravel(), floor_tau=taus[lowest].ravel(),
-        ))  # fmt: skip
+        columns = {
+            "declared": declared, "sd": sd, "ratio": sd / declared,
+            "correlation": getattr(found, f"{kind}_correlation").ravel(),
+            "allan_1s": deviation[np.argmin(np.abs(taus - 1.0))].ravel(),
+            "floor": deviation.min(axis=0).ravel(),
+            "floor_tau": taus[deviation.argmin(axis=0)].ravel(),
+        }  # fmt: skip
+        parts.append(pd.DataFrame(columns, index).reset_index())
     return pd.concat(parts, ignore_index=True)
 
 
 def allan_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
     """Allan deviations: sensor, triad, axis, tau_s, deviation (SI units)."""
-    step = float(np.median(np.diff(recording.time)))
     parts = []
-    for sensor in ("specific_force", "angular_rate"):
-        readings = getattr(recording, sensor)
-        taus, deviation = allan_deviation([readings[pose] for pose in found.poses], step)
-        kind = "accelerometer" if sensor == "specific_force" else "gyroscope"
+    for sensor, kind in SENSORS.items():
+        taus, deviation = _allan(found, recording, sensor)
         labels = getattr(recording, f"{kind}_labels")
         index = pd.MultiIndex.from_product(
             [[sensor], taus, labels, list("xyz")], names=["sensor", "tau_s", "triad", "axis"]

@@ -11,12 +11,13 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from scipy.linalg import rq
 from scipy.optimize import least_squares
 
 from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.model.jax64 import jax, jnp
 
-UPPER = np.triu_indices(3)
+UPPER, SKEW = np.triu_indices(3), np.triu_indices(3, 1)
 
 OUTLIER = 5.0  # times the median size of a residual
 MOST_OFF = 0.5  # relative, of a pose's mean specific force from gravity
@@ -78,54 +79,43 @@ class TriadFit:
         return {name: np.array(value) for name, value in out.items()}
 
 
-def _triangular_times_rotation(matrix):
-    """matrix = U R, U upper triangular with positive diagonal, R a rotation; from the last row up.
-
-    Closed form, so that its slopes come from automatic differentiation.
-    """
-    zero = jnp.zeros(())
-    u33 = jnp.sqrt(matrix[2] @ matrix[2])
-    r3 = matrix[2] / u33
-    u23 = matrix[1] @ r3
-    left = matrix[1] - u23 * r3
-    u22 = jnp.sqrt(left @ left)
-    r2 = left / u22
-    u13, u12 = matrix[0] @ r3, matrix[0] @ r2
-    left = matrix[0] - u13 * r3 - u12 * r2
-    # signed, so that R stays a rotation
-    r1 = jnp.cross(r2, r3)
-    u11 = left @ r1
-    upper = jnp.stack([u11, u12, u13, zero, u22, u23, zero, zero, u33]).reshape(3, 3)
-    return upper, jnp.stack([r1, r2, r3])
+def _upper_times_rotation(matrix) -> tuple[np.ndarray, np.ndarray]:
+    """matrix = U R, U upper triangular with a positive diagonal but for its first, R a rotation."""
+    upper, rotation = rq(matrix)
+    signs = np.sign(np.diag(upper))
+    signs[0] *= np.sign(np.linalg.det(rotation * signs[:, None]))  # so that R stays a rotation
+    return upper * signs, rotation * signs[:, None]
 
 
-def _named(upper, turn):
-    scale = jnp.diag(upper)
-    skew = jnp.stack([upper[0, 1] / scale[0], upper[0, 2] / scale[0], upper[1, 2] / scale[1]])
-    small = 0.5 * jnp.stack(
-        [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
-    )
-    return {"scale": scale, "misalignment": skew, "orientation": small}
-
-
-def _parts(matrix):
+def _parts(matrix) -> dict[str, np.ndarray]:
+    """Scale, misalignment (xy, xz, yz) and rotation vector of one triad's matrix, (3,) each."""
     from scipy.spatial.transform import Rotation
 
-    upper, rotation = _triangular_times_rotation(jnp.asarray(matrix))
-    values = {name: np.asarray(value) for name, value in _named(upper, rotation).items()}
-    return values | {"orientation": Rotation.from_matrix(np.array(rotation)).as_rotvec()}
+    upper, rotation = _upper_times_rotation(matrix)
+    scale = np.diag(upper)
+    return {
+        "scale": scale,
+        "misalignment": upper[SKEW] / scale[SKEW[0]],
+        "orientation": Rotation.from_matrix(rotation).as_rotvec(),
+    }
 
 
-def _part_slopes(matrix):
-    """Derivatives (3, 9) of each part in the matrix's entries, orientation as a small turn."""
-    _, reference = _triangular_times_rotation(jnp.asarray(matrix))
+def _part_slopes(matrix) -> dict[str, np.ndarray]:
+    """Derivatives (3, 9) of each part in the matrix's entries, orientation as a small turn.
 
-    def parts(flat):
-        upper, rotation = _triangular_times_rotation(flat.reshape(3, 3))
-        return _named(upper, rotation @ reference.T)
-
-    slopes = jax.jacfwd(parts)(jnp.asarray(matrix).ravel())
-    return {name: np.asarray(slope) for name, slope in slopes.items()}
+    U^-1 dM R' = U^-1 dU + dR R', upper triangular and skew-symmetric: the latter follows from what
+    is beneath the diagonal.
+    """
+    upper, rotation = _upper_times_rotation(matrix)
+    both = np.linalg.inv(upper) @ np.eye(9).reshape(9, 3, 3) @ rotation.T
+    below = np.tril(both, -1)
+    turn = below - np.swapaxes(below, 1, 2)
+    change = upper @ (both - turn)
+    scale, diagonal = np.diag(upper), change[:, range(3), range(3)]
+    first = scale[SKEW[0]]
+    skew = change[:, *SKEW] / first - upper[SKEW] / first**2 * diagonal[:, SKEW[0]]
+    small = np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]])
+    return {"scale": diagonal.T, "misalignment": skew.T, "orientation": small}
 
 
 def _unpack(p, triads):
