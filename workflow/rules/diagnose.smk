@@ -1,5 +1,3 @@
-from imuarray.blind.added import ADDED
-
 # What the papers' model gets wrong on each measured recording; its own target, `diagnose`.
 
 
@@ -92,7 +90,7 @@ rule add_effect:
     benchmark:
         "results/measured/benchmarks/added/{name}_{effect}.tsv"
     wildcard_constraints:
-        effect="|".join(ADDED),
+        effect="[a-z_]+",
     params:
         settings=lambda wc: {"seed": config["seed"]},
         code=CODE.digest("add_effect"),
@@ -113,7 +111,7 @@ use rule diagnose_recording as diagnose_added with:
     benchmark:
         "results/measured/benchmarks/added/{name}_{effect}_diagnosis.tsv"
     wildcard_constraints:
-        effect="|".join(ADDED),
+        effect="[a-z_]+",
     threads: 1
     message:
         "diagnosis of {wildcards.name} with {wildcards.effect} added"
@@ -122,8 +120,12 @@ use rule diagnose_recording as diagnose_added with:
 rule table_added:
     input:
         before="results/measured/diagnosis/{name}/diagnosis.json",
-        truths=expand("results/measured/added/{{name}}/{effect}.json", effect=ADDED),
-        after=expand("results/measured/added/{{name}}/{effect}/diagnosis.json", effect=ADDED),
+        truths=lambda wc: expand(
+            "results/measured/added/{{name}}/{effect}.json", effect=added_effects()
+        ),
+        after=lambda wc: expand(
+            "results/measured/added/{{name}}/{effect}/diagnosis.json", effect=added_effects()
+        ),
     output:
         **table("added_{name}", folder="results/measured"),
     log:
