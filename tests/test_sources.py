@@ -5,6 +5,7 @@ import os
 import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -39,7 +40,8 @@ def resting_on(sources, name):
         ("studies/joint.py", {"joint_test"}),
         ("blind/study.py", {"blind_diagnose"}),
         ("report/write.py", {"diagnose_recording"}),
-        ("diagnosis/thresholds.json", {"blind_diagnose", "diagnose_recording"}),
+        ("diagnosis/settings.py", {"blind_diagnose", "diagnose_recording"}),
+        ("report/report.html.j2", {"diagnose_recording"}),
     ],
 )
 def test_what_one_stage_needs_is_that_stages_alone(sources, name, scripts):
@@ -97,9 +99,12 @@ def test_rules_take_the_digest_of_the_script_they_run():
             assert f'CODE.digest("{script[1]}"' in rule, name
 
 
-def test_a_figures_rule_and_script_have_its_name():
-    """A script says by the name of its rule what it makes."""
+def test_a_figures_rule_script_and_function_have_its_name():
     drawing = set(re.findall(r"(?m)^rule ((?:figure|table)_\w+):", RULES))
     assert drawing == {script for script in SCRIPTS if script.startswith(("figure_", "table_"))}
     for name in drawing:
         assert f'script:\n        "../scripts/{name}.py"' in RULES
+        script = ast.parse((WORKFLOW / "scripts" / f"{name}.py").read_text(encoding="utf-8"))
+        imports = [node for node in ast.walk(script) if isinstance(node, ast.ImportFrom)]
+        [module] = [node.module for node in imports if node.names[0].name == name]
+        assert callable(getattr(import_module(module), name))
