@@ -20,8 +20,8 @@ from scipy import stats  # noqa: E402
 from written import publish  # noqa: E402
 
 from imuarray.config import read_config  # noqa: E402
-from imuarray.studies.calibrated import WHOLE, calibrated  # noqa: E402
 from imuarray.studies.joint import independent, scores_of  # noqa: E402
+from imuarray.studies.sbc import WHOLE, pit_values  # noqa: E402
 from imuarray.studies.truths import setting_from  # noqa: E402
 
 ROUNDS = 20_000
@@ -31,10 +31,10 @@ SEEDS = 31, 78  # of the joint test's first run and of the truths, not the confi
 def width(path: Path, truths: int) -> str:
     """A row: maximum likelihood's mean squared score in the paper's setting at T = 50."""
     setting = setting_from({**read_config(path), "seed": SEEDS[1]}, "paper", 50)
-    levels = calibrated(setting, range(truths), methods=["ML"])
-    levels = levels[~levels.quantity.isin(WHOLE)].dropna(subset="level")
-    square = stats.norm.ppf(levels.level) ** 2
-    means = levels.assign(square=square).groupby("replicate").square.mean()
+    values = pit_values(setting, range(truths), methods=["ML"])
+    values = values[~values.quantity.isin(WHOLE)].dropna(subset="pit")
+    square = stats.norm.ppf(values.pit) ** 2
+    means = values.assign(square=square).groupby("replicate").square.mean()
     error = means.std() / np.sqrt(len(means))
     what = f"maximum likelihood, T = 50, {len(means)} truths: mean squared score"
     return f"| {what} | {means.mean():.4f} ± {error:.4f} |"

@@ -6,8 +6,8 @@ import pytest
 
 from imuarray.config import read_config
 from imuarray.studies.batches import share
-from imuarray.studies.calibrated import calibrated
 from imuarray.studies.position_error import joined, realise
+from imuarray.studies.sbc import pit_values
 from imuarray.studies.settings2017 import TABLES, study
 from tests.test_bound import model
 from tests.test_validation import setting
@@ -37,8 +37,8 @@ def test_position_errors(name):
 
 
 @pytest.mark.parametrize("method", ["ML", "PmMH, pCN", "NUTS"])
-def test_levels(method):
-    whole = calibrated(setting(), range(4), methods=[method])
-    parts = [calibrated(setting(), share(range(4), k, 3), methods=[method]) for k in range(3)]
+def test_pit_values(method):
+    whole = pit_values(setting(), range(4), methods=[method])
+    parts = [pit_values(setting(), share(range(4), k, 3), methods=[method]) for k in range(3)]
     joint = pd.concat(parts, ignore_index=True).sort_values(["replicate"], kind="stable")
     pd.testing.assert_frame_equal(whole, joint.reset_index(drop=True))

@@ -9,8 +9,8 @@ from imuarray.estimation.newton import fisher_scoring
 from imuarray.figures import validation
 from imuarray.geometry import positions_of, sub_array
 from imuarray.posterior.likelihood import Likelihood
-from imuarray.studies import calibrated, joint, truths
-from imuarray.studies.calibrated import METHODS, coverage
+from imuarray.studies import joint, sbc, truths
+from imuarray.studies.sbc import METHODS, coverage
 from imuarray.studies.truths import setting_from
 from tests.test_pipeline import ROOT
 
@@ -22,11 +22,11 @@ def setting(name="paper", samples=5, triads=4):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_levels_of_the_truth_are_uniform(method):
+def test_pit_values_of_the_truth_are_uniform(method):
     """30 truths, 9 coordinates: p below 1e-3 in one of a thousand runs of a right sampler."""
-    levels = calibrated.calibrated(setting(), range(30), methods=[method])
-    assert len(levels) == 30 * 11
-    row = coverage(levels).iloc[0]
+    values = sbc.pit_values(setting(), range(30), methods=[method])
+    assert len(values) == 30 * 11
+    row = coverage(values).iloc[0]
     assert row.p > 1e-3
     scores = row[["shift_z", "width_z", "size_z", "misfit_z"]].dropna().astype(float)
     assert len(scores) == (3 if method == "ML" else 4) and np.all(np.abs(scores) < 4)
@@ -44,14 +44,14 @@ def test_widths_that_are_wrong_are_seen(monkeypatch, factor):
         return measure(type(model)(model.array, noise), *arguments)
 
     monkeypatch.setattr(truths, "measure", measured)
-    levels = calibrated.calibrated(setting(), range(100), methods=["PmMH, pCN"])
-    assert np.sign(np.log(factor)) * coverage(levels).width_z[0] > 5
+    values = sbc.pit_values(setting(), range(100), methods=["PmMH, pCN"])
+    assert np.sign(np.log(factor)) * coverage(values).width_z[0] > 5
 
 
-def test_levels_are_uniform_where_data_tell_little():
+def test_pit_values_are_uniform_where_data_tell_little():
     """The hard setting: posteriors a third to two thirds as wide as the prior."""
-    levels = calibrated.calibrated(setting("hard"), range(40), methods=["NUTS"])
-    row = coverage(levels).iloc[0]
+    values = sbc.pit_values(setting("hard"), range(40), methods=["NUTS"])
+    row = coverage(values).iloc[0]
     assert row.p > 1e-3
     scores = row[["shift_z", "width_z", "size_z", "misfit_z"]].astype(float)
     assert np.all(np.abs(scores) < 4)
@@ -61,8 +61,8 @@ def test_samplers_agree_truth_by_truth_where_data_tell_little():
     """Numbers 69 and 138 stuck before the burn-in learnt where the mass is, 4 sds off the mode."""
     numbers = [*range(4), 69, 138]
     methods = ["PmMH, pCN", "NUTS"]
-    levels = calibrated.calibrated(setting("hard"), numbers, methods=methods)
-    table = coverage(levels).set_index("method")
+    values = sbc.pit_values(setting("hard"), numbers, methods=methods)
+    table = coverage(values).set_index("method")
     assert table.apart[methods[0]] < 0.15 and np.isnan(table.apart["NUTS"])
     assert np.all(table.slow == 0)
 
@@ -137,18 +137,18 @@ def test_sub_array_is_spread_over_the_board():
     assert sub_array(array, 32) is array
 
 
-def test_histogram_of_uniform_levels_is_flat():
+def test_histogram_of_uniform_pit_values_is_flat():
     rng = np.random.default_rng(1)
     rows, columns = np.indices((400, 6))
-    levels = pd.DataFrame(
+    values = pd.DataFrame(
         {"setting": "s", "method": "x", "samples": 5, "replicate": rows.ravel(),
-         "quantity": columns.ravel(), "level": rng.random(2400)}
+         "quantity": columns.ravel(), "pit": rng.random(2400)}
     )  # fmt: skip
-    table = validation.histogram(levels)
+    table = validation.histogram(values)
     assert len(table) == validation.BINS
     assert table.density.mean() == pytest.approx(1.0)
     assert np.abs((table.density - 1) / table.se).max() < 4.5
     settings = {"scale": {"name": "quick"}, "seed": 1}
-    figure, same = validation.figure_validation_ranks([levels], settings)
+    figure, same = validation.figure_validation_ranks([values], settings)
     pd.testing.assert_frame_equal(same, table)
     assert [axes.get_title() for axes in figure.axes] == ["x: s, T = 5, n = 400"]

@@ -1,18 +1,18 @@
 # Only `snakemake validate` asks for these: are the uncertainties right?
-LEVELS = [
-    f"results/{{scale}}/validation/levels_{name}_T{samples}_{{part}}.csv"
+PIT_VALUES = [
+    f"results/{{scale}}/validation/pit_{name}_T{samples}_{{part}}.csv"
     for name, chosen in config["validation"]["settings"].items()
     for samples in chosen["samples"]
 ]
 
 
-rule calibrated_levels:
+rule pit_values:
     output:
-        "results/{scale}/validation/levels_{setting}_T{samples}_{part}.csv",
+        "results/{scale}/validation/pit_{setting}_T{samples}_{part}.csv",
     log:
-        "results/{scale}/logs/validation/levels_{setting}_T{samples}_{part}.log",
+        "results/{scale}/logs/validation/pit_{setting}_T{samples}_{part}.log",
     benchmark:
-        "results/{scale}/benchmarks/validation/levels_{setting}_T{samples}_{part}.tsv"
+        "results/{scale}/benchmarks/validation/pit_{setting}_T{samples}_{part}.tsv"
     threads: lambda wc: CORES.threads(wc.scale)
     resources:
         mem_mb=3000,
@@ -22,11 +22,11 @@ rule calibrated_levels:
             config, wc.scale, "paper2021", "validation", own="validation_"
         ),
         parts=lambda wc: CORES.parts(wc.scale),
-        code=CODE.digest("calibrated_levels"),
+        code=CODE.digest("pit_values"),
     message:
         "validation: {wildcards.setting}, T = {wildcards.samples}, part {wildcards.part} ({wildcards.scale})"
     script:
-        "../scripts/calibrated_levels.py"
+        "../scripts/pit_values.py"
 
 
 rule joint_test:
@@ -52,7 +52,7 @@ rule joint_test:
 
 rule figure_validation_ranks:
     input:
-        levels=lambda wc: expand(LEVELS, scale=wc.scale, part=range(CORES.parts(wc.scale))),
+        pit_values=lambda wc: expand(PIT_VALUES, scale=wc.scale, part=range(CORES.parts(wc.scale))),
     output:
         **figure("validation_ranks", "Validation"),
     log:
@@ -74,7 +74,7 @@ rule figure_validation_ranks:
 
 rule table_validation_coverage:
     input:
-        levels=lambda wc: expand(LEVELS, scale=wc.scale, part=range(CORES.parts(wc.scale))),
+        pit_values=lambda wc: expand(PIT_VALUES, scale=wc.scale, part=range(CORES.parts(wc.scale))),
     output:
         **table("validation_coverage"),
     log:

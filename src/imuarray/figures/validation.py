@@ -9,7 +9,7 @@ from scipy import stats
 from imuarray.figures.notes import scale_line
 from imuarray.figures.style import BLACK, PAGE, SKY, look, new_figure, styled
 from imuarray.figures.tables import Column
-from imuarray.studies.calibrated import WHOLE, coverage
+from imuarray.studies.sbc import WHOLE, coverage
 
 BINS = 20
 
@@ -37,11 +37,11 @@ COVERAGE_NOTE = (
     "Truths drawn from the prior, motion from its own, which the samplers know (the paper's limit"
     " of a flat motion prior cannot be simulated; docs/findings.md says what it does to the array's"
     " size). ±: standard errors over replicates."
-    " Scores: normal quantiles of the truth's level; a mean square above 1 (z > 0) means widths too"
-    " small."
+    " Scores: normal quantiles of the truth's PIT value; a mean square above 1 (z > 0) means widths"
+    " too small."
     " p: Kolmogorov and Smirnov's, the smallest of all quantities times their number."
     " Slow: fewer than 50 of 199 kept draws are worth an independent one. Farthest from NUTS: the"
-    " largest rms difference between both methods' levels of one truth; 0.05 is chance."
+    " largest rms difference between both methods' PIT values of one truth; 0.05 is chance."
 )
 JOINT = (
     Column("sampler", "sampler", "sampler"),
@@ -62,9 +62,9 @@ JOINT_NOTE = (
 )
 
 
-def table_validation_coverage(levels: list[pd.DataFrame], settings: dict):
-    """How often intervals hold the truth, by method and T; ``levels``: `studies.calibrated`."""
-    table = coverage(pd.concat(levels))
+def table_validation_coverage(pit_values: list[pd.DataFrame], settings: dict):
+    """How often intervals hold the truth, by method and T; ``pit_values``: `studies.sbc`."""
+    table = coverage(pd.concat(pit_values))
     notes = [COVERAGE_NOTE, scale_line(settings)]
     return table, COVERAGE, "How often intervals hold the truth.", notes
 
@@ -75,18 +75,18 @@ def table_validation_joint(rows: pd.DataFrame, settings: dict):
     return rows, JOINT, caption, [JOINT_NOTE, scale_line(settings)]
 
 
-def histogram(levels: pd.DataFrame) -> pd.DataFrame:
-    """Density of the truths' posterior levels, uniform if right: a row for each bin.
+def histogram(values: pd.DataFrame) -> pd.DataFrame:
+    """Density of the truths' PIT values, uniform if right: a row for each bin.
 
     ``se``: from the spread between replicates, whose parameters are not independent.
     """
     frames = []
     edges = np.linspace(0, 1, BINS + 1)
-    own = levels[~levels.quantity.isin(WHOLE)].dropna(subset="level")
+    own = values[~values.quantity.isin(WHOLE)].dropna(subset="pit")
     for (setting, method, samples), part in own.groupby(
         ["setting", "method", "samples"], sort=False
     ):
-        place = np.clip((part.level * BINS).astype(int), 0, BINS - 1)
+        place = np.clip((part.pit * BINS).astype(int), 0, BINS - 1)
         shares = BINS * pd.crosstab(part.replicate, place, normalize="index")
         shares = shares.reindex(columns=range(BINS), fill_value=0.0)
         frames.append(
@@ -102,12 +102,12 @@ def histogram(levels: pd.DataFrame) -> pd.DataFrame:
 
 
 @styled
-def figure_validation_ranks(levels: list[pd.DataFrame], settings: dict):
+def figure_validation_ranks(pit_values: list[pd.DataFrame], settings: dict):
     """A histogram for each method (row) and T (column); band: all 20 bins of a panel, 95 %.
 
-    ``levels``: `studies.calibrated`, of each setting.
+    ``pit_values``: `studies.sbc`, of each setting.
     """
-    table = histogram(pd.concat(levels))
+    table = histogram(pd.concat(pit_values))
     footer = [
         scale_line(settings, "n: truths from the prior, those without intervals left out"),
         "Histograms of all positions' coordinates; band: 95 % for all bins of a panel together.",

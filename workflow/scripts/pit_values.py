@@ -1,4 +1,4 @@
-"""Posterior levels of a share of the truths drawn from the prior, for each method -> CSV."""
+"""PIT values of a share of the truths drawn from the prior, for each method -> CSV."""
 
 from job import job
 
@@ -7,8 +7,8 @@ with job(snakemake) as settings:
 
     from imuarray.provenance import write_csv
     from imuarray.studies.batches import share
-    from imuarray.studies.calibrated import ML_MORE, calibrated
-    from imuarray.studies.levels import METHODS
+    from imuarray.studies.pit import METHODS
+    from imuarray.studies.sbc import ML_MORE, pit_values
     from imuarray.studies.truths import setting_from
 
     chosen = snakemake.wildcards
@@ -17,7 +17,7 @@ with job(snakemake) as settings:
     place = int(chosen.part), snakemake.params.parts
     samplers = [method for method in METHODS if method != "ML"]
     tables = [
-        calibrated(setting, share(range(ML_MORE * count), *place), snakemake.threads, ["ML"]),
-        calibrated(setting, share(range(count), *place), snakemake.threads, samplers),
+        pit_values(setting, share(range(ML_MORE * count), *place), snakemake.threads, ["ML"]),
+        pit_values(setting, share(range(count), *place), snakemake.threads, samplers),
     ]
     write_csv(pd.concat(tables), snakemake.output[0])

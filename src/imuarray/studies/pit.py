@@ -1,4 +1,4 @@
-"""The quantiles of truths in their posteriors, by each method: uniform if all is right."""
+"""PIT values: quantiles of truths in their posteriors, by each method; uniform if all is right."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ BLOCKS = (1, 2, 5, 10, 20, 50, 100, 200, 500)  # of them, after which that is lo
 ROUNDS, LEARNT = 6, 100  # of a burn-in, draws in each
 FIRST = 100  # transitions between them at least
 TINY = 1e-12
-Found = tuple[np.ndarray, np.ndarray]  # levels (R, P + 2), how many draws are independent (R,)
+Found = tuple[np.ndarray, np.ndarray]  # PIT values (R, P + 2), how many draws are independent (R,)
 WIDER = 1.05  # than the mode's curvature, for preconditioned Crank-Nicolson proposals
 SHORTER = 4.0  # every other stretch of transitions of preconditioned Crank-Nicolson proposals
 
 
 def names_of(setting: Setting) -> list[str]:
-    """The quantities whose levels are looked at: coordinates, then what hangs on all of them."""
+    """The quantities that have PIT values: coordinates, then what hangs on all of them."""
     labels = setting.model.array.labels[1:]
     return [f"{label}_{axis}" for label in labels for axis in "xyz"] + ["size", "misfit"]
 
@@ -42,7 +42,7 @@ def _size(setting: Setting, thetas) -> np.ndarray:
 
 
 def of_draws(setting: Setting, made, draws, name: str) -> np.ndarray:
-    """Levels (R, P + 2) of the truths among draws (R, L, P), uniform between two draws."""
+    """PIT values (R, P + 2) of the truths among draws (R, L, P), uniform between two draws."""
     out = []
     for one, thetas in zip(made, draws, strict=True):
         both = np.vstack([one.truth, thetas])
@@ -150,9 +150,9 @@ def _preconditioned(setting: Setting, pilot: Replicate, rng):
 
 
 def _pmmh(kernel: Callable, name: str):
-    """Levels by PmMH; step and thinning from a pilot data set of its own."""
+    """PIT values by PmMH; step and thinning from a pilot data set of its own."""
 
-    def levels(setting: Setting, made, threads: int = 1) -> Found:
+    def pit_values(setting: Setting, made, threads: int = 1) -> Found:
         rng = stream(setting.seed, "calibrated", name, "pilot", setting.name, setting.samples)
         pilot = replicate(setting, SPARE)
         make, lengths = kernel(setting, pilot, rng)
@@ -174,7 +174,7 @@ def _pmmh(kernel: Callable, name: str):
         draws = run_batches(chain, made, threads, True, name)
         return of_draws(setting, made, draws, name), independent(draws)
 
-    return levels
+    return pit_values
 
 
 def _learnt(target, theta, lengths, spacing: int, rng):
