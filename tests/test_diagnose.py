@@ -18,7 +18,7 @@ from imuarray.recording import write_recording
 from imuarray.streams import stream
 
 SEED = 41
-DURATION = 8.0  # s
+DURATION = 5.0  # s
 REPLICATES = 9
 
 
