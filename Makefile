@@ -3,6 +3,8 @@ PYTHON ?= python3
 CORES ?= 2
 # more options for snakemake, such as SNAKEMAKE_ARGS=--dry-run
 SNAKEMAKE_ARGS ?=
+# more options for pytest, such as PYTEST_ARGS='-m "not slow"'
+PYTEST_ARGS ?=
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -48,7 +50,7 @@ paper: $(READY)
 	$(SNAKEMAKE) --config scale=paper
 
 test: $(READY)
-	$(BIN)/python -m pytest -q -n $(CORES) --dist loadfile
+	$(BIN)/python -m pytest -q -n $(CORES) --dist loadfile --no-loadscope-reorder $(PYTEST_ARGS)
 
 # The executor is not in the lock: who has a cluster installs it as docs/cluster.md says.
 test-slurm: $(READY)

@@ -22,6 +22,8 @@ from imuarray.posterior.nuts import Whitened, run_nuts
 from imuarray.recording import write_recording
 from tests import test_pmmh_targets
 
+pytestmark = pytest.mark.slow
+
 
 @cache
 def chains():

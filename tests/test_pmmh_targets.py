@@ -23,6 +23,8 @@ from imuarray.posterior.target import (
 from tests import oracles
 from tests.cases import SHAPE, simulate
 
+pytestmark = pytest.mark.slow
+
 LEVELS = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
 PRIOR_SD = 2e-3
 DEGREES = 7  # of freedom of the proposal

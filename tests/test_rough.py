@@ -12,6 +12,8 @@ from imuarray.diagnosis.document import diagnose
 from imuarray.geometry import mimu4444_corners
 from imuarray.recording import Recording
 
+pytestmark = pytest.mark.slow
+
 RATE, FINE, SECONDS = 62.5, 8000, 26.0
 PERIOD, BEHIND, LAG = 1e-3, 1.5e-3, 1e-3  # s
 FORCE_SD, RATE_SD = 0.04, 0.002

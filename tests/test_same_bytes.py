@@ -4,6 +4,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 SCRIPT = """
 import hashlib
 import numpy as np
@@ -34,6 +36,7 @@ for part in found:
 """
 
 
+@pytest.mark.slow
 def test_compiled_or_from_the_cache(tmp_path):
     environment = os.environ | {
         "NUMBA_CACHE_DIR": str(tmp_path), "JAX_COMPILATION_CACHE_DIR": str(tmp_path / "xla"),

@@ -14,6 +14,8 @@ from imuarray.studies.sbc import METHODS, coverage
 from imuarray.studies.truths import setting_from
 from tests.test_pipeline import ROOT
 
+pytestmark = pytest.mark.slow
+
 
 def setting(name="paper", samples=5, triads=4):
     config = read_config(ROOT / "config.yaml")
