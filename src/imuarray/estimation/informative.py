@@ -1,4 +1,4 @@
-"""How informative a recording was: what combinations of positions it tells worst, in words."""
+"""How informative a recording was: the worst determined combinations of positions, in words."""
 
 from __future__ import annotations
 
