@@ -89,7 +89,7 @@ GRADES = {
     "wrong": "wrong names only",
     "nothing": "there is something, nothing is named and nothing is unexplained",
     "unexplained": "nothing named, `unexplained` raised",
-    "confident": "named without reserve what can not be told or is not in the catalogue",
+    "confident": "named without reserve what is not identifiable or not in the catalogue",
     "flagged": "named, with `unexplained` raised",
     "class": "named, but only as one of a class",
     "crash": "no answer",

@@ -1,7 +1,7 @@
 """All effects by name: ``EFFECTS[id].draw(scene, rng, sensors, size)`` gives a `Change`.
 
 Ids of the catalogue are those of the project's list; ``outside_`` ones are not in it, ``gauge_``
-ones can not be told from a clean recording.
+ones can not be distinguished from a clean recording.
 """
 
 from imuarray.blind import errors, gauge, noise, outside, timing

@@ -69,7 +69,7 @@ def table_added(before: dict, truths: list[dict], after: list[dict], name: str):
     table["found"] = table.found.map(YES_NO)
     note = (
         f"Recording {name}; each effect alone, of its largest realistic size, added to one IMU's"
-        " readings. Found: named, or among what the named one cannot be told from; other new"
+        " readings. Found: named, or among what the named one is indistinguishable from; other new"
         " names are causes that the recording as it is does not have."
     )
     return table, ADDED, "Effects added to a measured recording.", [note]

@@ -267,7 +267,7 @@ def figure_measured_noise(allan: pd.DataFrame, name: str, settings: dict):
 
 @styled
 def figure_past_rail(table: pd.DataFrame, rail_dps: float, footer=()):
-    """Median error and RMSE of the hidden readings over the angular rate; log-log."""
+    """Median error and RMSE of the withheld readings over the angular rate; log-log."""
     figure = new_figure(footer, PAGE, 2.8)
     panels = figure.subplots(1, 2, sharey=True)
     # a normal error of sd 1 has the median 0.674
@@ -284,7 +284,7 @@ def figure_past_rail(table: pd.DataFrame, rail_dps: float, footer=()):
         axes.plot(rows.rate_dps, factor * rows[claimed], color="0.4", linestyle=(0, (1, 1.5)),
                   linewidth=1, label="extended model, as noise alone claims")  # fmt: skip
         axes.axvline(rail_dps, color="0.6", linewidth=0.8)
-        logarithmic(axes, "angular rate of the hidden axis (deg/s)", None)
+        logarithmic(axes, "angular rate of the withheld axis (deg/s)", None)
         axes.set_xticks([250, 500, 1000, 2000], ["250", "500", "1000", "2000"])
         axes.set_xticks([], minor=True)
         axes.set_title(title)

@@ -18,7 +18,7 @@ FOOTER_SIZE = 6.0  # pt
 # Okabe and Ito's palette without its yellow, which white paper swallows.
 VERMILLION, GREEN, BLUE, SKY = "#D55E00", "#009E73", "#0072B2", "#56B4E9"
 PURPLE, ORANGE, BLACK, GREY = "#CC79A7", "#E69F00", "#000000", "#7F7F7F"
-# Colour, marker and dashes of the first, second, ... series: none is told by colour alone.
+# Colour, marker and dashes of the first, second, ... series: none differs by colour alone.
 LOOKS = (
     {"color": VERMILLION, "marker": "o", "linestyle": (0, (4, 1.2))},
     {"color": GREEN, "marker": "s", "linestyle": (0, (3, 1, 1, 1))},
