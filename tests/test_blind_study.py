@@ -186,7 +186,7 @@ def test_diagnosis_is_told_nothing_of_the_case():
     study.diagnosed(struck, 7, spy(document, told))
     assert told[-1][1]["without"] == (BIAS,)
     outside = Case("x", (("outside_cubic", (2,)),), kind="outside")
-    assert study.struck(outside) == () == study.struck(case)
+    assert outside.struck == () == case.struck
 
 
 def test_a_crash_is_a_row(capsys):

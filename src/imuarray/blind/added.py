@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from imuarray.blind.grade import classes
 from imuarray.blind.inject import EFFECTS
 from imuarray.blind.measured import inject_measured, measured_change
@@ -30,15 +28,8 @@ def add(recording: Recording, effect: str, seed: int) -> tuple[Recording, dict]:
     size = float(EFFECTS[effect].high)
     change = measured_change(recording, effect, (imu,), size, seed)
     changed = inject_measured(recording, effect, (imu,), size, seed)
-    truth = {
-        "effect": effect,
-        "sensor": recording.accelerometer_labels[imu],
-        "amplitude": {"value": size, "unit": EFFECTS[effect].unit},
-        "parameters": {
-            name: {"value": np.asarray(p.value).tolist(), "unit": p.unit}
-            for name, p in change.parameters.items()
-        },
-    }
+    label = recording.accelerometer_labels[imu]
+    truth = {"effect": effect, "sensor": label, **change.described()}
     return changed, truth
 
 

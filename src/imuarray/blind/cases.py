@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass
 
-import numpy as np
-
 from imuarray.blind.change import Change, noisy_readings
 from imuarray.blind.inject import CATALOGUE, EFFECTS
 from imuarray.blind.scene import Scene
@@ -54,6 +52,12 @@ class Case:
         for name, _ in self.effects:
             if name not in EFFECTS:
                 raise ValueError(f"effects: expected ids of the registry, found {name!r}")
+
+    @property
+    def struck(self) -> tuple[str, ...]:
+        """Effects that the diagnosis' catalogue is to do without."""
+        names = (name for name, _ in self.effects if name in CATALOGUE)
+        return tuple(names) if self.kind == "struck" else ()
 
 
 @dataclass(frozen=True)
@@ -133,14 +137,13 @@ def _draw_effect(scene: Scene, case: Case, effect: str, sensors, rng) -> Change:
 def _truth(scene: Scene, case: Case, seed: int, changes, recording: Recording) -> Truth:
     gone = recording.saturated_accelerometers().any(axis=(1, 2))
     gone |= recording.saturated_gyroscopes().any(axis=(1, 2))
-    struck = [change.effect for change in changes if change.effect in CATALOGUE]
     return Truth(
         case=asdict(case),
         seed=int(seed),
         effects=[_described(scene, change) for change in changes],
         sigma=size_of(scene, changes),
         sigma_exact=size_of(scene, changes, EXACT_STEPS),
-        struck=struck if case.kind == "struck" else [],
+        struck=list(case.struck),
         positions_m=scene.positions.tolist(),
         at_rail=float(gone.mean()),
     )
@@ -149,20 +152,10 @@ def _truth(scene: Scene, case: Case, seed: int, changes, recording: Recording) -
 def _described(scene: Scene, change: Change) -> dict:
     """An effect as `Truth` holds it."""
     labels = [scene.array.labels[k] for k in change.sensors]
-    parameters = {
-        name: {"value": _plain(parameter.value), "unit": parameter.unit}
-        for name, parameter in change.parameters.items()
-    }
     return {
         "effect": change.effect,
         "sensors": ["all"] if len(labels) == scene.accelerometers else labels,
-        "amplitude": {"value": change.size, "unit": EFFECTS[change.effect].unit},
-        "parameters": parameters,
+        **change.described(),
         "sigma": size_of(scene, change),
         "sigma_exact": size_of(scene, change, EXACT_STEPS),
     }
-
-
-def _plain(value):
-    """Arrays as lists, numpy's numbers as Python's."""
-    return value if isinstance(value, str | list | bool) else np.asarray(value).tolist()

@@ -71,6 +71,20 @@ class Change:
     stale: bool = False
     divergence: Callable[[int], float] | None = None
 
+    def described(self) -> dict:
+        """Id, amplitude and parameters in plain numbers, texts and lists, with their units."""
+        drawn = {"amplitude": Parameter(self.size, EFFECTS[self.effect].unit)}
+        plain = {
+            name: {"value": _plain(value), "unit": unit}
+            for name, (value, unit) in (drawn | self.parameters).items()
+        }
+        return {"effect": self.effect, "amplitude": plain.pop("amplitude"), "parameters": plain}
+
+
+def _plain(value):
+    """Arrays as lists, numpy's numbers as Python's."""
+    return value if isinstance(value, str | list | bool) else np.asarray(value).tolist()
+
 
 @dataclass(frozen=True)
 class Effect:

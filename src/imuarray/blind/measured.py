@@ -18,15 +18,30 @@ NOT_FROM_READINGS = tuple(name for name, entry in EFFECTS.items() if not entry.f
 
 @dataclass(frozen=True, eq=False)
 class MeasuredScene:
-    """A recording in the place of a `Scene`: its readings stand for the true quantities."""
+    """A recording in the place of a `Scene`: its readings stand for the true quantities.
 
-    recording: Recording
+    Attributes
+    ----------
+    readings : Pair of (T, A, 3) m/s^2 and (T, G, 3) rad/s
+    time : ndarray (T,), seconds
+    noise, limits : tuple of two floats
+        Declared noise and ranges of accelerometers (m/s^2) and gyroscopes (rad/s).
+    """
+
+    readings: Pair
+    time: np.ndarray
+    noise: tuple[float, float]
+    limits: tuple[float, float]
     measured = True  # noise can be added, not taken away
 
-    @property
-    def time(self) -> np.ndarray:
-        """(T,) seconds."""
-        return self.recording.time
+    @classmethod
+    def of(cls, recording: Recording) -> MeasuredScene:
+        """A recording as a scene."""
+        return cls(
+            Pair(recording.specific_force, recording.angular_rate), recording.time,
+            (recording.accelerometer_noise_sd, recording.gyroscope_noise_sd),
+            (recording.accelerometer_range, recording.gyroscope_range),
+        )  # fmt: skip
 
     @property
     def duration(self) -> float:
@@ -41,21 +56,11 @@ class MeasuredScene:
     @property
     def accelerometers(self) -> int:
         """Number of IMUs."""
-        return self.recording.specific_force.shape[1]
-
-    @property
-    def noise(self) -> tuple[float, float]:
-        """Declared noise, m/s^2 and rad/s."""
-        return self.recording.accelerometer_noise_sd, self.recording.gyroscope_noise_sd
-
-    @property
-    def limits(self) -> tuple[float, float]:
-        """Declared ranges, m/s^2 and rad/s."""
-        return self.recording.accelerometer_range, self.recording.gyroscope_range
+        return self.readings.force.shape[1]
 
     def ideal(self) -> Pair:
-        """The readings as they are, (T, A, 3) m/s^2 and (T, G, 3) rad/s."""
-        return Pair(self.recording.specific_force, self.recording.angular_rate)
+        """The readings as they are."""
+        return self.readings
 
     def field(self, ages: Pair) -> MeasuredField:
         """The readings at each sensor's own instants."""
@@ -75,17 +80,17 @@ class MeasuredField:
     @cached_property
     def force(self) -> np.ndarray:
         """(T, A, 3) m/s^2."""
-        return self._at(self.scene.recording.specific_force, self.ages.force)
+        return self._at(self.scene.readings.force, self.ages.force)
 
     @cached_property
     def rate(self) -> np.ndarray:
         """(T, G, 3) rad/s."""
-        return self._at(self.scene.recording.angular_rate, self.ages.rate)
+        return self._at(self.scene.readings.rate, self.ages.rate)
 
     @cached_property
     def force_at_gyroscopes(self) -> np.ndarray:
         """Of each IMU at its gyroscope's instants, (T, G, 3) m/s^2."""
-        return self._at(self.scene.recording.specific_force, self.ages.rate)
+        return self._at(self.scene.readings.force, self.ages.rate)
 
     def _at(self, values: np.ndarray, ages: np.ndarray | None) -> np.ndarray:
         if ages is None:
@@ -115,7 +120,7 @@ def measured_change(
             f"{recording.angular_rate.shape[1]} and {recording.specific_force.shape[1]}"
         )
     rng = stream(seed, "blind", "measured", effect)
-    return EFFECTS[effect].draw(MeasuredScene(recording), rng, sensors, amplitude)
+    return EFFECTS[effect].draw(MeasuredScene.of(recording), rng, sensors, amplitude)
 
 
 def inject_measured(
@@ -128,7 +133,7 @@ def inject_measured(
     `measured_change`.
     """
     change = measured_change(recording, effect, sensors, amplitude, seed)
-    scene = MeasuredScene(recording)
+    scene = MeasuredScene.of(recording)
     readings = _with_noise(scene, change, with_errors(scene.field(change.ages), [change]), seed)
     flags = Pair(recording.saturated_accelerometers(), recording.saturated_gyroscopes())
     found = [

@@ -8,7 +8,6 @@ import traceback
 from collections.abc import Callable, Sequence
 
 from imuarray.blind.cases import Case, make
-from imuarray.blind.inject import CATALOGUE
 
 # What grading reads of `diagnosis.json`; the figures' discrepancies would be most of the file.
 KEPT = ("base", "inflated", "extended", "gain", "causes", "unexplained", "remaining")
@@ -19,12 +18,6 @@ def batch_of(cases: Sequence[Case], batch: int, batches: int) -> list[Case]:
     if not 0 <= batch < batches:
         raise ValueError(f"batch: expected 0 to {batches - 1}, found {batch}")
     return list(cases[batch::batches])
-
-
-def struck(case: Case) -> tuple[str, ...]:
-    """Effects that the catalogue is to do without in this case."""
-    names = (name for name, _ in case.effects if name in CATALOGUE)
-    return tuple(names) if case.kind == "struck" else ()
 
 
 def ask(diagnose: Callable, recording, without, seed: int) -> dict:
@@ -56,7 +49,7 @@ def diagnosed(case: Case, seed: int, diagnose: Callable) -> dict:
     answer, error = None, None
     start, cpu_start = time.perf_counter(), time.process_time()
     try:
-        answer = ask(diagnose, recording, struck(case), seed)
+        answer = ask(diagnose, recording, case.struck, seed)
     except Exception as crash:  # whatever it is, it is a result of the study
         error = f"{type(crash).__name__}: {crash}"
         traceback.print_exc()
