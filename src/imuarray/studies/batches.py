@@ -7,8 +7,6 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from tqdm import tqdm
 
-from imuarray.streams import stream
-
 BATCH = 25  # realisations; part of the streams' definition, so results hang on it
 
 
@@ -30,11 +28,6 @@ def share(jobs, part: int, parts: int) -> list:
     jobs = list(jobs)
     ends = [len(jobs) * number // parts for number in (part, part + 1)]
     return jobs[slice(*ends)]
-
-
-def batch_stream(seed: int, *names):
-    """The random stream of one batch."""
-    return stream(seed, *names)
 
 
 def root_mean_square(squares) -> tuple[float, float]:

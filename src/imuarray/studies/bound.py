@@ -18,7 +18,8 @@ from imuarray.model import ArrayModel
 from imuarray.model.structure import products
 from imuarray.motion import normal_motion, sphere_motion
 from imuarray.simulation import measure
-from imuarray.studies.batches import batch_stream, batches, root_mean_square, run_batches
+from imuarray.streams import stream
+from imuarray.studies.batches import batches, root_mean_square, run_batches
 
 NEAR = 1.01  # times the bound: as good as efficient
 BCD_LIMIT = 20000  # iterations after which ML-BCD is given up
@@ -94,7 +95,7 @@ def efficiency(
 
         def job(batch, samples=samples):
             number, size = batch
-            rng = batch_stream(seed, "bound", samples, str(noise), number)
+            rng = stream(seed, "bound", samples, str(noise), number)
             return [_one(model, rng, samples, motion, options) for _ in range(size)]
 
         parts = run_batches(job, batches(options["realisations"]), threads, quiet, f"N={samples}")
@@ -145,7 +146,7 @@ def convergence(
 
     def job(which):
         number, repeat = which
-        rng = batch_stream(seed, "bound", "convergence", number, repeat)
+        rng = stream(seed, "bound", "convergence", number, repeat)
         return _convergence_row(model, rng, samples, motions[number], options)
 
     jobs = [(number, repeat) for number in range(len(motions)) for repeat in range(count)]
@@ -229,7 +230,7 @@ def against_size(model: ArrayModel, seed, samples, motion, factors, count=20) ->
         larger = ArrayModel(scaled, model.noise)
         widths = []
         for repeat in range(count):
-            rng = batch_stream(seed, "bound", "size", repeat)
+            rng = stream(seed, "bound", "size", repeat)
             moves = sphere_motion(rng, (samples,), *motion)
             widths.append(rms_width(information_at(larger, moves, scaled.relative)))
         extent = float(np.linalg.norm(np.ptp(scaled.relative, axis=0)))
@@ -274,7 +275,7 @@ def rank_cases(model: ArrayModel, seed, sphere, normal) -> list[tuple]:
 
     ``sphere``: magnitudes as in paper 2017; ``normal``: sds as in paper 2021.
     """
-    rng = batch_stream(seed, "bound", "ranks")
+    rng = stream(seed, "bound", "ranks")
     many = normal_motion(rng, (50,), *normal)
     axis, still = np.array([0.0, 0.6, 0.8]), np.zeros((50, 3))
     along = {

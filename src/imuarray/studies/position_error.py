@@ -12,8 +12,8 @@ from imuarray.estimation.collapsed import Collapsed
 from imuarray.model import ArrayModel
 from imuarray.motion import sphere_motion
 from imuarray.simulation import measure
+from imuarray.streams import stream
 from imuarray.studies.batches import (
-    batch_stream,
     batches,
     root_mean_square,
     run_batches,
@@ -74,7 +74,7 @@ def realise(
     def of(case):
         def job(batch):
             number, size = batch
-            rng = batch_stream(seed, *case.names, number)
+            rng = stream(seed, *case.names, number)
             return calibrate_batch(
                 model, rng, size, case.samples, case.motion, options["position_sd"],
                 options["rail"], max(options["marks"]), options["tolerance"], options["marks"],

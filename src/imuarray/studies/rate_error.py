@@ -9,7 +9,8 @@ from imuarray.estimation import estimate_motion
 from imuarray.model import ArrayModel
 from imuarray.motion import sphere_motion
 from imuarray.simulation import measure
-from imuarray.studies.batches import batch_stream, batches, root_mean_square, run_batches
+from imuarray.streams import stream
+from imuarray.studies.batches import batches, root_mean_square, run_batches
 
 
 def _batch(model, rng, count, motion, position_sd, rail):
@@ -47,7 +48,7 @@ def rmse_against_rate(
             motion = (rate, angular_acceleration, specific_force)
 
             def job(batch, names=names, motion=motion, sd=position_sd):
-                rng = batch_stream(seed, *names, batch[0])
+                rng = stream(seed, *names, batch[0])
                 return _batch(model, rng, batch[1], motion, sd, rail)
 
             parts = run_batches(job, batches(realisations), threads, True, "rate")

@@ -8,7 +8,8 @@ import pandas as pd
 from imuarray.estimation import estimate_motion
 from imuarray.motion import sphere_motion
 from imuarray.simulation import measure
-from imuarray.studies.batches import batch_stream, root_mean_square
+from imuarray.streams import stream
+from imuarray.studies.batches import root_mean_square
 
 
 def _squares(model, rng, count, motion_sizes, position_sd):
@@ -33,7 +34,7 @@ def accelerometers_only(
     rows = []
     for position_sd in position_sds:
         for number, rate in enumerate(rates):
-            rng = batch_stream(seed, "accelerometers only", f"{position_sd:g}", number)
+            rng = stream(seed, "accelerometers only", f"{position_sd:g}", number)
             sizes = (rate, angular_acceleration, specific_force)
             squares, acceleration = _squares(model, rng, count, sizes, position_sd)
             rmse, error = root_mean_square(squares)

@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 
 from imuarray.motion import sphere_motion
-from imuarray.studies.batches import batch_stream, root_mean_square
+from imuarray.streams import stream
+from imuarray.studies.batches import root_mean_square
 from imuarray.studies.bound import information_at
 
 REPEATS = 20  # motions averaged over; the bound varies little between them
@@ -27,7 +28,7 @@ def bound_table(model, seed, cases) -> pd.DataFrame:
     """RMSE bound for each (samples, |omega|, |omega_dot|, |s|) in ``cases`` (SI units)."""
     rows = []
     for number, (samples, *sizes) in enumerate(cases):
-        rng = batch_stream(seed, "position bound", number)
+        rng = stream(seed, "position bound", number)
         bound, error = root_mean_square(bound_squares(rng, model, samples, sizes))
         rows.append(
             {
