@@ -147,6 +147,7 @@ def test_a_wrong_file_is_one_line(text, told, tmp_path, capsys):
         assert known == EFFECTS
 
 
+@pytest.mark.slow
 def test_an_effect_with_a_gauge_of_its_own_is_one_place(tmp_path):
     """Simulated, calibrated, sampled and diagnosed; no other file knows of it."""
     path = tmp_path / "gain.py"

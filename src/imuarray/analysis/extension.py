@@ -9,9 +9,9 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis.model import model_of
-from imuarray.diagnosis.extension import Extension, extended_model, read_extension
+from imuarray.diagnosis.extension import extended_model, read_extension
 from imuarray.errors import InputError
-from imuarray.model.names import parameter_names
+from imuarray.model.names import parameter_ids, parameter_names
 from imuarray.recording import Recording
 
 
@@ -28,7 +28,11 @@ def diagnosed(diagnosis: str | PathLike, recording: Recording) -> xr.Dataset:
     model = extended_model(extension, model_of(recording), labels)
     positions, sds = extension.positions, extension.positions_sd.copy()
     names = parameter_names(model, labels)
-    effect_sds = np.array([_sd(extension, name) for name in names])
+    # 0 where the diagnosis states none
+    effect_sds = np.array([
+        extension.values[effect].get(name, (0.0, None))[1] or 0.0
+        for effect, name in parameter_ids(model, labels)
+    ])  # fmt: skip
     count = len(labels[0])
     if not positions.shape == sds.shape == (count, 3):
         raise InputError(
@@ -62,9 +66,3 @@ def diagnosed(diagnosis: str | PathLike, recording: Recording) -> xr.Dataset:
         "span": extension.clock[1],
     }  # fmt: skip
     return xr.Dataset(variables, coords, attrs)
-
-
-def _sd(extension: Extension, name: str) -> float:
-    """Of the parameter 'effect component_IMU unit'; 0 where the diagnosis states none."""
-    effect, component = name.split(" ")[:2]
-    return extension.values[effect].get(component, (0.0, None))[1] or 0.0

@@ -14,7 +14,7 @@ from imuarray.errors import InputError
 from imuarray.model import EFFECTS, ArrayModel
 from imuarray.model.array_model import EffectPrior
 from imuarray.model.effects import DATA_EFFECTS, KINDS
-from imuarray.model.names import component
+from imuarray.model.names import parameter_ids
 from imuarray.model.noise import Noise
 
 
@@ -77,16 +77,12 @@ def extended_model(extension: Extension, model: ArrayModel, labels) -> ArrayMode
     named = replace(model, effects=extension.effects)
     whole = max(labels, key=len)
     start, pinned = named.join({}), np.ones(named.effect_size, bool)
-    place = 0
     unused = {(e, n) for e, found in extension.values.items() for n in found}
-    for item, shape in zip(named.chain, named.shapes, strict=True):
-        for index in np.ndindex(*shape):
-            name = f"{component(item.id, index[1:])}_{whole[index[0]]}"
-            if name in extension.values[item.id]:
-                start[place], sd = extension.values[item.id][name]
-                pinned[place] = sd is None
-                unused.discard((item.id, name))
-            place += 1
+    for place, (effect, name) in enumerate(parameter_ids(named, labels)):
+        if name in extension.values[effect]:
+            start[place], sd = extension.values[effect][name]
+            pinned[place] = sd is None
+            unused.discard((effect, name))
     if unused:
         raise InputError(
             f"--diagnosis: expected IMUs {', '.join(whole)} and components as in the model, found"

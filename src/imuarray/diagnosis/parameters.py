@@ -11,10 +11,12 @@ common part, and the reported sds say what the priors leave open.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.geometry import Array
@@ -73,21 +75,8 @@ def columns_of(array: Array, effects, position_sd: float) -> Columns:
 @cache
 def tangents(model: ArrayModel) -> np.ndarray:
     """(m, 3 A + P): each column's direction, the same for all IMUs at once."""
-    count = 3 * model.array.accelerometers
-    starts = count + np.concatenate([[0], np.cumsum([np.prod(s) for s in model.shapes])])
-    rows = []
-    for axis in range(3):
-        row = np.zeros(count + model.effect_size)
-        row[axis:count:3] = 1.0
-        rows.append(row)
-    for start, shape in zip(starts[:-1].astype(int), model.shapes, strict=True):
-        for place in np.ndindex(*shape[1:]):
-            row = np.zeros(count + model.effect_size)
-            block = np.zeros(shape)
-            block[(slice(None), *place)] = 1.0
-            row[start : start + block.size] = block.ravel()
-            rows.append(row)
-    return np.array(rows)
+    shapes = [(model.array.accelerometers, 3), *model.shapes]
+    return block_diag(*(np.tile(np.eye(math.prod(s[1:])), s[0]) for s in shapes))
 
 
 def catalogue_effects(without=()) -> tuple[str, ...]:

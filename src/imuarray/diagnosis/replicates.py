@@ -6,6 +6,7 @@ fits again: noise of the declared size, the motion and the parameters projected 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,18 @@ class Quantity(NamedTuple):
     sensors: tuple[str, ...]
     words: str  # "the accelerometers' residual"
     unit: str = ""
+
+
+class Test(NamedTuple):
+    """How a quantity is made: ``function`` (residuals (T, n, 3) of a kind, fit) -> values or None.
+
+    ``label`` in figures, ``words`` with a place for whose residual, ``by_axis`` or by triad.
+    """
+
+    function: Callable
+    label: str
+    words: str
+    by_axis: bool = False
 
 
 class Discrepancy(NamedTuple):
@@ -76,11 +89,11 @@ def quantities(fit: Fit, unit) -> dict[str, Quantity]:
         labels = tuple(readings.labels[k] for k in there)
         axes = tuple(f"{label}{axis}" for label in labels for axis in "xyz")
         part = unit[:, there, 3 * kind : 3 * kind + 3]
-        for test, (function, _, words, by_axis) in TESTS.items():
-            values = function(part, fit)
+        for check, test in TESTS.items():
+            values = test.function(part, fit)
             if values is not None:
-                said = words.format(f"the {name}s' residual")
-                found[f"{name} {test}"] = Quantity(values, axes if by_axis else labels, said)
+                said = test.words.format(f"the {name}s' residual")
+                found[f"{name} {check}"] = Quantity(values, axes if test.by_axis else labels, said)
     return found
 
 
@@ -148,31 +161,30 @@ def _between(part, fit):
     return blocks.max(axis=1)
 
 
-# Name -> function of (T, n, 3) and the fit, label in figures, words with whose, whether by axis.
+GROWTH = "{{}} where {} is large over where it is small"
 TESTS = {
-    "residual": (_rms, "size", "{}, in assumed sds,", True),
+    "residual": Test(_rms, "size", "{}, in assumed sds,", by_axis=True),
     **{
-        f"residual against {name}": (
-            _growth(size), label, f"{{}} where {name} is large over where it is small", False,
+        f"residual against {name}": Test(
+            _growth(size), f"growth with {symbol}", GROWTH.format(name)
         )
-        for size, name, label in (
-            ("omega", "|omega|", "growth with |ω|"),
-            ("omega dot", "|omega dot|", "growth with |dω/dt|"),
-            ("specific force", "|specific force|", "growth with |specific force|"),
-            ("jerk", "jerk", "growth with |ds/dt|"),
+        for size, name, symbol in (
+            ("omega", "|omega|", "|ω|"),
+            ("omega dot", "|omega dot|", "|dω/dt|"),
+            ("specific force", "|specific force|", "|specific force|"),
+            ("jerk", "jerk", "|ds/dt|"),
         )
     },
-    "residual along omega dot": (
-        _along, "share along dω/dt", "the share of {} along omega dot", False,
+    "residual along omega dot": Test(
+        _along, "share along dω/dt", "the share of {} along omega dot"
     ),
-    "whiteness": (_lag_one, "correlation in time", "the lag-one correlation of {}", False),
-    "drift": (_drift, "drift", "the drift of {} from start to end", True),
-    "kurtosis": (_kurtosis, "tails (kurtosis)", "the excess kurtosis of {}", False),
-    "correlation between IMUs": (
-        _between, "correlation between IMUs", "the largest correlation of {} between two IMUs",
-        False,
+    "whiteness": Test(_lag_one, "correlation in time", "the lag-one correlation of {}"),
+    "drift": Test(_drift, "drift", "the drift of {} from start to end", by_axis=True),
+    "kurtosis": Test(_kurtosis, "tails (kurtosis)", "the excess kurtosis of {}"),
+    "correlation between IMUs": Test(
+        _between, "correlation between IMUs", "the largest correlation of {} between two IMUs"
     ),
-}  # fmt: skip
+}
 
 
 def discrepancies(fit: Fit, ridge, rng, replicates=REPLICATES) -> list[Discrepancy]:

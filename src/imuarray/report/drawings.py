@@ -6,6 +6,7 @@ import matplotlib.ticker as ticks
 import numpy as np
 import pandas as pd
 
+from imuarray.diagnosis.quantities import power_of_ten
 from imuarray.diagnosis.words import words
 from imuarray.figures.style import (
     BLACK,
@@ -93,24 +94,37 @@ def _wide_scale(axes, values):
         axes.set_xlim(low, edge if values.max() > 3.6 else 4.5)
         return
     axes.set_xscale("symlog", linthresh=5, linscale=1.2)
-    powers = 10.0 ** np.arange(1, np.ceil(np.log10(far)) + 1)
-    powers = powers[:: 1 + (len(powers) > 3)]
-    low = -powers[powers <= 3 * abs(min(values.min(), 0))][::-1]
+    low, powers = _signed_powers(values, 1, 3, 3)
     axes.set_xticks([*low, 0, *powers[powers <= 3 * far]])
     axes.xaxis.set_major_formatter(ticks.FuncFormatter(lambda x, _: f"{x:,.0f}".replace("-", "−")))
     axes.xaxis.set_minor_locator(ticks.NullLocator())
     axes.set_xlim(min(-5, 2 * values.min()), max(5, 2 * values.max()))
 
 
+def _signed_powers(values, first: int, most: int, room: float):
+    """Ticks of a symlog axis: (negative, positive) powers of ten, every other one beyond ``most``.
+
+    From 10^first to the largest size; negative ones down to ``room`` times the least value.
+    """
+    powers = 10.0 ** np.arange(first, np.ceil(np.log10(np.abs(values).max())) + 1)
+    powers = powers[:: 1 + (len(powers) > most)]
+    return -powers[powers <= room * abs(min(values.min(), 0))][::-1], powers
+
+
 def _discrepancy_legend(figure, axes):
-    handles = [
-        axes.plot([], [], linestyle="", markersize=4.5, label=NAMES[model], **style)[0]
-        for model, style in MODELS.items()
-    ]
+    handles = _model_handles(axes, 4.5)
     handles += axes.plot([], [], linestyle="", marker="o", color=BLACK, markerfacecolor="white",
                          markersize=4.5, label=f"open: p > {PLAIN:g}")  # fmt: skip
     handles.append(axes.fill_between([], [], [], color="0.87", lw=0, label="95 % of simulations"))
     legend_above(figure, handles)
+
+
+def _model_handles(axes, size) -> list:
+    """A mark of each model for a legend."""
+    return [
+        axes.plot([], [], linestyle="", markersize=size, label=NAMES[model], **style)[0]
+        for model, style in MODELS.items()
+    ]
 
 
 @styled
@@ -128,10 +142,7 @@ def residual_figure(table: pd.DataFrame, footer=()):
         axes.set_title(f"{kind}s")
     panels[0].set_ylabel("rms residual / declared noise")
     axes = panels[0]
-    handles = [
-        axes.plot([], [], linestyle="", markersize=5, label=NAMES[model], **style)[0]
-        for model, style in MODELS.items()
-    ]
+    handles = _model_handles(axes, 5)
     handles += axes.plot([], [], "_", color=GREY, markersize=5, label="single axes")
     handles += axes.plot([], [], "-", color=BLACK, linewidth=1.5, label="noise, extended model")
     handles.append(axes.fill_between([], [], [], color="0.87", lw=0, label="as simulated, 95 %"))
@@ -215,9 +226,7 @@ def _gain_scale(axes, table):
         axes.margins(x=0.06)
         return
     axes.set_xscale("symlog", linthresh=100, linscale=0.7)
-    powers = 10.0 ** np.arange(2, np.ceil(np.log10(ends.abs().max())) + 1)
-    powers = powers[:: 1 + (len(powers) > 5)]
-    low = -powers[powers <= 1.5 * abs(min(ends.min(), 0))][::-1]
+    low, powers = _signed_powers(ends, 2, 5, 1.5)
     axes.set_xticks([*low, 0, *powers])
     axes.xaxis.set_major_formatter(ticks.FuncFormatter(_power))
     axes.set_xlim(min(2 * ends.min(), -30), 2 * ends.max())
@@ -227,10 +236,7 @@ def _power(value, _) -> str:
     """'−10⁴', and small numbers as they are."""
     if abs(value) < 1000:
         return f"{value:.0f}".replace("-", "−")
-    digits = str(int(round(np.log10(abs(value))))).translate(
-        str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
-    )
-    return f"{'−' if value < 0 else ''}10{digits}"
+    return f"{'−' if value < 0 else ''}{power_of_ten(round(np.log10(abs(value))))}"
 
 
 def _gain_legend(figure, axes, table):

@@ -41,9 +41,9 @@ def discrepancy_table(diagnosis: Diagnosis) -> pd.DataFrame:
             band = item.simulated
             far = item.statistic - band["median"]
             edge = (band["q975"] - band["q025"]) / 2
-            number = exists[:, KINDS.index(kind)].sum() * (3 if TESTS[name][3] else 1)
+            number = exists[:, KINDS.index(kind)].sum() * (3 if TESTS[name].by_axis else 1)
             rows.append({
-                "model": model, "kind": kind, "check": name, "label": TESTS[name][1],
+                "model": model, "kind": kind, "check": name, "label": TESTS[name].label,
                 "statistic": item.statistic, "q025": band["q025"], "q975": band["q975"],
                 "standardised": BAND * far / max(edge, 1e-300),
                 "limit": norm.isf((1 - 0.95 ** (1 / number)) / 2), "p_value": item.p_value,
