@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from imuarray.figures import notes, paper2017, paper2021, paper2021_array, tables
+from imuarray.figures import notes, paper2017, paper2021, paper2021_array, paper2021_tables, tables
 from imuarray.figures.gallery import caption, gallery, title
 from imuarray.figures.style import significant, write_figure
 from imuarray.geometry import mimu4444
@@ -309,7 +309,7 @@ def test_significant():
 DRAW_ALONE = """
 import sys
 import pandas as pd
-from imuarray.figures import gallery, paper2017, paper2021, paper2021_array, tables
+from imuarray.figures import gallery, paper2017, paper2021, paper2021_array, paper2021_tables
 settings = {"array": {"board": "mimu4444"}, "scale": {"name": "test"}, "seed": 1}
 paper2021_array.figure_2021_fig1(settings)
 rows = {"samples": [1, 2], "draws": 1, "variance": 1.0, "variance_se": 0.1, "realisations": 9}
@@ -328,14 +328,14 @@ def two_tables():
     tunings = [
         {"samples": T, "draws": 3, "step_length_m": 4.1e-7, "variance": 0.09} for T in SAMPLES
     ]
-    first = paper2021.table_2021_table1(tunings, [verdict(T) for T in SAMPLES], effective())
+    first = paper2021_tables.table_2021_table1(tunings, [verdict(T) for T in SAMPLES], effective())
     sources = [
         [part for T in SAMPLES for part in (
             pd.DataFrame({"axis": list("xyz"), "sd_m": np.array([1.0, 2.0, 3.0]) * scale}),
             verdict(T, converged=True))]
         for scale in (1e-4, 1.1e-4, 1e-6)
     ]  # fmt: skip
-    return first, paper2021.table_2021_table2(*sources, "standin", "a source", effective())
+    return first, paper2021_tables.table_2021_table2(*sources, "standin", "a source", effective())
 
 
 def test_tables(tmp_path):

@@ -27,6 +27,7 @@ from imuarray.geometry import UNDERSIDE_ROTATION, Array, array_from_config
 # not say in which corner it is; on the axis that the underside is turned around, as here, both
 # sides' markers lie one above the other.
 MARKER = np.array([0.36, -0.36, 0.0])
+ARROW = {"arrowstyle": "<->", "linewidth": 0.7, "shrinkA": 0, "shrinkB": 0}
 
 
 def below(array: Array) -> np.ndarray:
@@ -101,9 +102,7 @@ def _dimension(axes, values, place, along):
         return
     first, second = (centres[0], centres[1]) if along == "x" else (centres[-1], centres[-2])
     ends = [(first, place), (second, place)] if along == "x" else [(place, first), (place, second)]
-    axes.annotate(
-        "", *ends, arrowprops={"arrowstyle": "<->", "linewidth": 0.7, "shrinkA": 0, "shrinkB": 0}
-    )
+    axes.annotate("", *ends, arrowprops=ARROW)
     middle = np.mean(ends, axis=0)
     axes.annotate(
         f"{abs(second - first):.1f} mm", middle, ha="center", va="center", size=7.5,
@@ -139,10 +138,7 @@ def _side_view(axes, table):
 
 def _height(axes, place, edge, low, high):
     """The distance between the sides' centres: an arrow at ``place``, lines to ``edge``."""
-    axes.annotate(
-        "", (place, low), (place, high),
-        arrowprops={"arrowstyle": "<->", "linewidth": 0.7, "shrinkA": 0, "shrinkB": 0},
-    )  # fmt: skip
+    axes.annotate("", (place, low), (place, high), arrowprops=ARROW)
     for z in (low, high):
         axes.plot([place, edge], [z, z], color=BLUE, linewidth=0.4)
     axes.annotate(
