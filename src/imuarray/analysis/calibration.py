@@ -15,6 +15,7 @@ from imuarray.model import ArrayModel
 from imuarray.model.array_model import clock
 from imuarray.model.effects import find_effects
 from imuarray.model.names import parameter_names
+from imuarray.motion.state import UNITS
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording
 
@@ -100,18 +101,17 @@ def calibration_dataset(recording: Recording, model: ArrayModel, found, saturate
     whole = np.zeros((count, 3, count, 3))
     whole[1:, :, 1:, :] = covariance[:size, :size].reshape(count - 1, 3, count - 1, 3)
     labels = list(recording.accelerometer_labels)
-    place, motion = ("accelerometer", "axis"), found.motion.motion
+    place = ("accelerometer", "axis")
     variables = {
         "position": (place, found.positions, {"units": "m", "relative_to": labels[0]}),
         "nominal_position": (place, model.array.relative, {"units": "m"}),
         "position_covariance": (
             (*place, "accelerometer_other", "axis_other"), whole, {"units": "m2"}
         ),
-        "angular_rate": (("time", "axis"), motion.angular_rate, {"units": "rad s-1"}),
-        "angular_acceleration": (
-            ("time", "axis"), motion.angular_acceleration, {"units": "rad s-2"}
-        ),
-        "specific_force": (("time", "axis"), motion.specific_force, {"units": "m s-2"}),
+        **{
+            name: (("time", "axis"), getattr(found.motion.motion, name), {"units": unit})
+            for name, unit in UNITS.items()
+        },
         "motion_converged": (("time",), found.motion.converged),
         "cost": (("iteration",), found.cost),
         "position_step": (("iteration",), found.step, {"units": "m"}),

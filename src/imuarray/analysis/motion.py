@@ -14,10 +14,9 @@ from imuarray.model.effects import EFFECTS
 from imuarray.model.names import parameter_names
 from imuarray.model.noise import Noise
 from imuarray.model.own import own_version
+from imuarray.motion.state import UNITS
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording
-
-UNITS = {"angular_rate": "rad s-1", "angular_acceleration": "rad s-2", "specific_force": "m s-2"}
 
 
 def apply(

@@ -9,10 +9,10 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis.extension import diagnosed
-from imuarray.analysis.motion import UNITS
 from imuarray.analysis.motion import apply as applied
 from imuarray.commands.output import Output
 from imuarray.errors import InputError
+from imuarray.motion.state import UNITS
 from imuarray.provenance import write_netcdf
 from imuarray.recording import Recording, load_dataset, read_recording
 

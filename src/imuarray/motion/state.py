@@ -4,6 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+# Of the fields of `Motion`, in datasets: those that measurements determine, and the higher ones.
+UNITS = {"angular_rate": "rad s-1", "angular_acceleration": "rad s-2", "specific_force": "m s-2"}
+HIGHER_UNITS = {"angular_jerk": "rad s-3", "force_rate": "m s-3"}
+
 
 class Motion(NamedTuple):
     """Motion of the array's reference triad in the array frame (paper 2021, eq. 4).

@@ -16,7 +16,7 @@ from imuarray.posterior.target import CompiledTarget, GaussianPrior, Preconditio
 class Sweeps(NamedTuple):
     """What is tried to choose N and sigma_q, and what is aimed at."""
 
-    steps: Sequence[float]  # m, sigma_q
+    steps: Sequence[float] | np.ndarray  # m, sigma_q
     draws: Sequence[int] = (1, 2, 5, 10, 20, 50, 100)  # N
     realisations: int = 200  # of log p-hat, for each N
     transitions: int = 1000  # for each sigma_q, after as many to settle

@@ -8,6 +8,7 @@ import xarray as xr
 from imuarray.model import ArrayModel
 from imuarray.model.names import parameter_names
 from imuarray.motion import Motion
+from imuarray.motion.state import HIGHER_UNITS, UNITS
 from imuarray.recording import Recording
 from imuarray.simulation.measure import clip, measure
 
@@ -36,12 +37,8 @@ def _truth(model: ArrayModel, motion: Motion, positions, parameters) -> xr.Datas
     data = {name: (axes, getattr(motion, name)) for name in Motion._fields}
     data["position"] = (("accelerometer", "axis"), positions)
     data["effect_parameter"] = (("parameter",), np.asarray(parameters, float))
-    units = {
-        "angular_rate": "rad s-1", "angular_acceleration": "rad s-2", "specific_force": "m s-2",
-        "angular_jerk": "rad s-3", "force_rate": "m s-3", "position": "m",
-    }  # fmt: skip
     truth = xr.Dataset(data, {"parameter": parameter_names(model)} if model.effects else None)
-    for name, unit in units.items():
+    for name, unit in {**UNITS, **HIGHER_UNITS, "position": "m"}.items():
         truth[name].attrs["units"] = unit
     return truth
 
