@@ -127,7 +127,7 @@ def test_a_changed_source_reruns_what_rests_on_it(quick, tmp_path):
     shutil.copytree(ROOT / "src", tmp_path / "src", ignore=shutil.ignore_patterns("__pycache__"))
     assert rerun(quick.parents[1], tmp_path / "src") == set()
     for names, rules in (
-        (("blind/scene.py", "report/write.py", "report/report.html.j2", "studies/calibrated.py"),
+        (("blind/scene.py", "report/write.py", "report/report.html.j2", "studies/joint.py"),
          set()),
         (("studies/rate_error.py",), {"rate_error", "figure_2017_fig3", "claims", "quick"}),
         (("studies/checks/timing.py",), {"claims_timing", "claims", "quick"}),
