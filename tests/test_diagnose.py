@@ -180,7 +180,7 @@ def test_what_is_outside_the_catalogue_shows_as_itself(effect, size, sign):
 )
 def test_another_cause_in_its_clothes_is_no_answer(effect, sign):
     """The effect struck from the catalogue: whatever is named instead, `unexplained` is true."""
-    document, _ = found_in(hidden((effect, (2,)), kind="struck"))
+    document, _ = found_in(hidden((effect, (2,)), kind="struck", duration=8.0))
     assert document["unexplained"] and sign in document["remaining"]
 
 
