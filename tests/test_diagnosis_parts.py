@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 from scipy.sparse import lil_matrix
-from scipy.stats import chi2
+from scipy.stats import chi2, norm, poisson
 
 from imuarray.blind import Case
 from imuarray.blind.cases import make
@@ -19,10 +19,11 @@ from imuarray.diagnosis.linearise import linearise
 from imuarray.diagnosis.parameters import catalogue_effects, columns_of, prior_precision
 from imuarray.diagnosis.readings import arrange, part_of
 from imuarray.diagnosis.replicates import Replicator, discrepancies
-from imuarray.diagnosis.scores import candidates, information_at, log_tail, mask_of, score_all
+from imuarray.diagnosis.scores import candidates, information_at, mask_of, score_all
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.start import start
 from imuarray.diagnosis.state import Search
+from imuarray.diagnosis.tails import QUARTILE, log_chi_square, log_normal, log_poisson
 from imuarray.errors import InputError
 
 SHORT = 4.0  # s
@@ -175,9 +176,17 @@ def test_scores_of_a_clean_recording_are_chi_square(clean):
 def test_log_tail_goes_on_where_the_tail_underflows():
     for freedom in (1, 3, 24):
         x = chi2.isf(1e-200, freedom)
-        assert log_tail(x, freedom) == pytest.approx(np.log(1e-200), rel=1e-6)
-        near, far = log_tail(1290.0 + freedom, freedom), log_tail(1310.0 + freedom, freedom)
+        assert log_chi_square(x, freedom) == pytest.approx(np.log(1e-200), rel=1e-6)
+        near, far = (log_chi_square(x + freedom, freedom) for x in (1290.0, 1310.0))
         assert near - far == pytest.approx(10.0, rel=0.05)
+
+
+def test_tails_are_those_of_scipy_stats():
+    z, counts = np.linspace(-3, 12, 7), np.array([0, 1, 5, 40])
+    np.testing.assert_allclose(log_normal(z), norm.logsf(z), rtol=1e-12)
+    np.testing.assert_allclose(log_poisson(counts, 4.2), poisson.logsf(counts - 1, 4.2), rtol=1e-12)
+    assert log_chi_square(7.0, 3) == pytest.approx(chi2.logsf(7.0, 3), rel=1e-12)
+    assert QUARTILE == pytest.approx(norm.ppf(0.75), rel=1e-15)
 
 
 def test_heldout_scores_are_those_of_refits_without_each_block(clean):

@@ -10,12 +10,12 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import norm
 
 from imuarray.diagnosis.reading_effects import RAILS, Structural, rails_cause, unique
 from imuarray.diagnosis.residual_checks import Check
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Search
+from imuarray.diagnosis.tails import log_normal
 from imuarray.model.effects import KINDS
 
 
@@ -53,13 +53,13 @@ def peaks(search: Search) -> list[Peak]:
 
 def clipped(found: list[Peak], limit: float) -> tuple[list[Peak], float]:
     """Those that fall short far more than anything else does, or all of a kind together."""
-    logs = {id(p): float(norm.logsf(p.inward) + np.log(len(found))) for p in found}
+    logs = {id(p): float(log_normal(p.inward) + np.log(len(found))) for p in found}
     hit = [p for p in found if logs[id(p)] < limit and p.inward > SETTINGS.alone * p.others]
     least = min((logs[id(p)] for p in hit), default=0.0)
     for kind in range(len(KINDS)):
         own = [p for p in found if p.kind == kind]
         pooled = sum(p.apart for p in own) / np.sqrt(max(len(own), 1))
-        log_p = float(norm.logsf(pooled) + np.log(len(KINDS)))
+        log_p = float(log_normal(pooled) + np.log(len(KINDS)))
         if log_p < min(limit, least) and np.median([p.apart for p in own]) > 1.0:
             hit, least = [p for p in hit if p.kind != kind] + own, log_p
     return hit, least
@@ -100,5 +100,5 @@ def lone_checks(search: Search, tailed) -> list[Check]:
         size[:, imu, 3 * kind : 3 * kind + 3] = 0.0
     place = np.unravel_index(int(np.argmax(size)), size.shape)
     farthest = float(size[place])
-    log_p = float(norm.logsf(farthest) + np.log(2 * size.size))
+    log_p = float(log_normal(farthest) + np.log(2 * size.size))
     return [Check("farthest reading", farthest, min(log_p, 0.0), (int(place[1]),))]

@@ -17,8 +17,9 @@ from imuarray.diagnosis.linearise import State, linearise
 from imuarray.diagnosis.noise import few_at_once
 from imuarray.diagnosis.parameters import Columns
 from imuarray.diagnosis.readings import Readings
-from imuarray.diagnosis.scores import Candidate, Scanned, Score, log_tail
+from imuarray.diagnosis.scores import Candidate, Scanned, Score
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.tails import log_chi_square
 from imuarray.model.timing import clock_turns
 
 CLOCK, DELAY = "sensor_clock", "sensor_delay"
@@ -49,7 +50,7 @@ def scan_clocks(fit: Fit, imus, delays: dict) -> list[Scanned]:
     time, each = fit.readings.time, {}
     for imu in imus:
         gain, values = sawtooth(time, score[:, imu], information[:, imu])
-        log_p = log_tail(max(gain, 1e-9), 3) + SETTINGS.many + np.log(len(time) * len(imus))
+        log_p = log_chi_square(max(gain, 1e-9), 3) + SETTINGS.many + np.log(len(time) * len(imus))
         if log_p < SETTINGS.believed and gain > SETTINGS.fair * delays.get((imu,), 0.0):
             each[imu] = (gain, values)
     for imu in list(each):
@@ -76,7 +77,7 @@ def _clock_score(imus, gain, delays, samples, count) -> Score:
     freedom = 4 * len(imus)
     statistic = gain + delays.get(imus, sum(delays.get((imu,), 0.0) for imu in imus))
     tried = len(imus) * (SETTINGS.many + np.log(samples)) + np.log(count)
-    log_p = log_tail(statistic, freedom) + tried
+    log_p = log_chi_square(statistic, freedom) + tried
     return Score(Candidate(CLOCK, imus), float(statistic), freedom, min(log_p, 0.0))
 
 

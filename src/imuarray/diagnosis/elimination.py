@@ -8,9 +8,9 @@ import numpy as np
 
 from imuarray.diagnosis.fit import flat_parameters, from_flat
 from imuarray.diagnosis.heldout import normal_blocks
-from imuarray.diagnosis.scores import log_tail
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Search
+from imuarray.diagnosis.tails import log_chi_square
 
 
 def freed_places(search: Search, effect: str, imus=None, among=None) -> np.ndarray:
@@ -105,7 +105,7 @@ def prune(search: Search, effect: str) -> Search:
 def needed(search: Search, effect: str, limit: float, imus=None) -> bool:
     """Whether an adopted effect is significant beside all else."""
     statistic, freedom = need(search, effect, imus)
-    return bool(freedom) and log_tail(statistic, freedom) < limit
+    return bool(freedom) and log_chi_square(statistic, freedom) < limit
 
 
 def eliminate(search: Search) -> Search:

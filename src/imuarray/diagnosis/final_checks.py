@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import norm
 
 from imuarray.diagnosis import noise_effects
 from imuarray.diagnosis.clipping import lone_checks
@@ -17,6 +16,7 @@ from imuarray.diagnosis.residual_checks import Check, normal_checks
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL
 from imuarray.diagnosis.state import Search
+from imuarray.diagnosis.tails import log_normal
 
 STRICT = ("outliers", "size of", "change of")  # checks that a small remainder does not excuse
 
@@ -64,7 +64,7 @@ def plausibility_checks(search: Search) -> list[Check]:
             imu = int(np.argmax(sizes.max(axis=1)))
             largest = float(sizes.max())
             found.append(
-                Check(f"size of {cause.effect}", largest, float(norm.logsf(largest)), (imu,))
+                Check(f"size of {cause.effect}", largest, float(log_normal(largest)), (imu,))
             )
     return found
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import norm, poisson
 
 from imuarray.diagnosis.fit import Fit, pick
 from imuarray.diagnosis.readings import Readings
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.tails import QUARTILE, log_normal, log_poisson
 
 DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / np.sqrt(70.0)
 HALF = len(DIFFERENCE) // 2
@@ -72,10 +72,10 @@ def judge(readings: Readings, residual, basis) -> Noise:
     fast = fast_part(unit, readings.run)
     values = np.where(readings.exists[..., None], per_triad(fast), 1.0)
     counts = np.maximum(np.sum(np.isfinite(values), axis=-1), 1)
-    core = np.nanmedian(np.abs(values), axis=-1) / norm.ppf(0.75)
+    core = np.nanmedian(np.abs(values), axis=-1) / QUARTILE
     scale = np.sqrt(np.nanmean(values**2, axis=-1))
     far = _outliers(fast, core)
-    expected = 2 * norm.sf(SETTINGS.far) * counts
+    expected = 2 * np.exp(log_normal(SETTINGS.far)) * counts
     slope, correlation = _colour(np.nan_to_num(unit), readings)
     passed = 1 + 2 * sum(echo * correlation ** (lag + 1) for lag, echo in enumerate(ECHO))
     tails = np.nanmean(values**4, axis=-1) / scale**4 - 3.0
@@ -146,7 +146,7 @@ def _ar_ratio(rho, low, high) -> float:
 
 def tail_log_p(noise: Noise) -> np.ndarray:
     """log p of so many outliers in Gaussian noise, (N, 2)."""
-    return poisson.logsf(noise.outliers - 1, noise.expected)
+    return log_poisson(noise.outliers, noise.expected)
 
 
 def coloured_meat(fit: Fit, information, correlation) -> np.ndarray | None:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import norm
 
 from imuarray.diagnosis.fit import Fit
 from imuarray.diagnosis.heldout import blocks_of
 from imuarray.diagnosis.noise import Noise, expected_ratio, standardised
-from imuarray.diagnosis.scores import log_tail
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.tails import QUARTILE, log_chi_square, log_normal
 from imuarray.model.effects import KINDS
 
 TAILS, COLOURED = "heavy_tails", "coloured_noise"
@@ -61,8 +60,8 @@ def held_out(nats) -> tuple[float, float, np.ndarray]:
 def verdict(log_ratio, covariance, limit):
     """(places far from zero, log p of the worst or of all) for normals (n,) of a covariance."""
     number = len(log_ratio)
-    single = norm.logsf(np.abs(log_ratio) / np.sqrt(np.diag(covariance))) + np.log(2)
-    pooled = log_tail(float(log_ratio @ np.linalg.solve(covariance, log_ratio)), number)
+    single = log_normal(np.abs(log_ratio) / np.sqrt(np.diag(covariance))) + np.log(2)
+    pooled = log_chi_square(float(log_ratio @ np.linalg.solve(covariance, log_ratio)), number)
     log_p = min(single.min() + np.log(2 * number), pooled + np.log(2), 0.0)
     return np.flatnonzero(single + np.log(number) < limit), float(log_p)
 
@@ -180,7 +179,7 @@ def mixture(fit: Fit, imu: int, kind: int, steps=60) -> Mixture:
     unit = triad(fit, imu, kind)
     axes, square = np.sum(np.isfinite(unit), axis=1), np.nansum(unit**2, axis=1)
     plain = np.sqrt(np.sum(square) / max(np.sum(axes), 1))
-    share, factor, core = 0.05, 3.0, float(np.nanmedian(np.abs(unit)) / norm.ppf(0.75))
+    share, factor, core = 0.05, 3.0, float(np.nanmedian(np.abs(unit)) / QUARTILE)
     for _ in range(steps):
         odds = np.log(share / (1 - share)) - axes * np.log(factor)
         odds = odds + square / (2 * core**2) * (1 - 1 / factor**2)
@@ -210,14 +209,14 @@ def heavy_tails(fit: Fit, noise: Noise, limit: float):
     triads = np.argwhere(fit.readings.exists)
     tried = [(int(i), int(k), mixture(fit, i, k)) for i, k in triads]
     gains = np.array([_tail_gain(fit, noise, *item) for item in tried])
-    logs = np.array([log_tail(max(gain, 1e-9), 2) for gain in gains]) + np.log(len(triads))
+    logs = np.array([log_chi_square(max(gain, 1e-9), 2) for gain in gains]) + np.log(len(triads))
     if logs.min() > limit:
         return None, [], []
     hits = [item for item, log_p in zip(tried, logs, strict=True) if log_p < limit]
     maybe = logs - np.log(len(triads)) < SETTINGS.maybe
     for kind in {k for _, k, _ in hits}:
         rest = (triads[:, 1] == kind) & (logs >= limit)
-        if rest.any() and log_tail(max(gains[rest].sum(), 1e-9), 2 * rest.sum()) < limit:
+        if rest.any() and log_chi_square(max(gains[rest].sum(), 1e-9), 2 * rest.sum()) < limit:
             hits += [item for item, also in zip(tried, rest & maybe, strict=True) if also]
             maybe |= rest
     there = {item[:2] for item in hits}
@@ -256,7 +255,7 @@ def pooled_autocorrelation(fit: Fit, noise: Noise, lagged) -> float:
     signed = np.sign(rho)
     apart = abs(np.sum(signed * (slopes - implied))) / root
     there = -np.sum(signed * slopes) / root
-    return log_tail(statistic, len(rho)) if apart < SETTINGS.agree < there else 0.0
+    return log_chi_square(statistic, len(rho)) if apart < SETTINGS.agree < there else 0.0
 
 
 def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Named | None:
@@ -274,8 +273,8 @@ def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Named | None
     loudest = max(abs(rho) for rho, _ in lagged)
     for (imu, kind), (rho, pairs) in zip(triads, lagged, strict=True):
         slope = noise.slope[imu, kind]
-        sharp = norm.logsf(abs(slope)) + np.log(2 * number)
-        plain = norm.logsf(abs(rho) * np.sqrt(pairs)) + np.log(2 * number)
+        sharp = log_normal(abs(slope)) + np.log(2 * number)
+        plain = log_normal(abs(rho) * np.sqrt(pairs)) + np.log(2 * number)
         log_p = min(sharp, plain if untied and alike(fit, noise, imu, kind) else 0.0)
         marked = noise.correlation[imu, kind] != 0
         if (log_p > limit and not marked) or (

@@ -7,11 +7,11 @@ from itertools import permutations, product
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import poisson
 
 from imuarray.diagnosis.linearise import polynomial_derivative
 from imuarray.diagnosis.readings import Readings
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.tails import log_poisson
 from imuarray.model.effects import KINDS
 from imuarray.recording.record import AXES
 
@@ -50,7 +50,7 @@ def find_repeats(readings: Readings):
         every = same.all(axis=1)
         chance = np.prod(same.mean(axis=0)) if not every.all() else 1.0
         alone = np.prod((same & ~every[:, None]).mean(axis=0))
-        log_p = poisson.logsf(every.sum() - 1, max(min(chance, alone), 1e-9) * together.sum())
+        log_p = log_poisson(every.sum(), max(min(chance, alone), 1e-9) * together.sum())
         if every.sum() >= SETTINGS.least_repeats and log_p < SETTINGS.rare_repeats:
             lost[1:, imu, 3 * kind : 3 * kind + 3] = every[:, None]
             hit.append(int(imu))

@@ -11,14 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import median_filter
-from scipy.stats import chi2, norm
 
 from imuarray.diagnosis.clocks import delay_score
 from imuarray.diagnosis.fit import Fit, pick
 from imuarray.diagnosis.noise import Noise, standardised, tail_log_p
 from imuarray.diagnosis.replicates import motion_sizes
-from imuarray.diagnosis.scores import Information, log_tail
+from imuarray.diagnosis.scores import Information
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.tails import log_chi_square, log_normal
 from imuarray.linear import scaled_inverse, scaled_square
 
 
@@ -133,7 +133,7 @@ def _pooled(name, found) -> Check:
     total, freedom = sum(f[1] for f in found), max(sum(f[2] for f in found), 1)
     widened = freedom + (total - freedom) / np.sqrt(SETTINGS.crowd)
     worst = max(found, key=lambda f: f[1] - f[2])
-    return Check(name, total / freedom, log_tail(max(widened, 1e-9), freedom), (worst[0],))
+    return Check(name, total / freedom, log_chi_square(max(widened, 1e-9), freedom), (worst[0],))
 
 
 def _either(name, found) -> Check:
@@ -145,7 +145,7 @@ def _either(name, found) -> Check:
 
 def _worst(name, found) -> Check:
     """The worst axis, all of them allowed for."""
-    tested = [(log_tail(max(f[1], 1e-9), max(f[2], 1)), f) for f in found]
+    tested = [(log_chi_square(max(f[1], 1e-9), max(f[2], 1)), f) for f in found]
     log_p, worst = min(tested, key=lambda t: t[0])
     return Check(
         name, worst[1] / max(worst[2], 1), min(log_p + np.log(len(found)), 0.0), (worst[0],)
@@ -176,9 +176,9 @@ def size_checks(fit: Fit) -> list[Check]:
 def normal_checks(name, found, alike=False) -> Check:
     """Worst and pooled of standard normals expected near zero; their mean where all are alike."""
     worst = max(found, key=lambda f: abs(f[1]))
-    single = norm.logsf(abs(worst[1])) + np.log(2 * len(found))
-    pooled = chi2.logsf(sum(z**2 for _, z in found), len(found))
-    mean = norm.logsf(abs(sum(z for _, z in found)) / np.sqrt(len(found))) + np.log(2)
+    single = log_normal(abs(worst[1])) + np.log(2 * len(found))
+    pooled = log_chi_square(sum(z**2 for _, z in found), len(found))
+    mean = log_normal(abs(sum(z for _, z in found)) / np.sqrt(len(found))) + np.log(2)
     log_p = min(single, pooled, mean if alike else 0.0) + np.log(2 + alike)
     return Check(name, worst[1], float(min(log_p, 0.0)), (worst[0],))
 
@@ -243,7 +243,7 @@ def correlation_check(fit: Fit, noise: Noise) -> Check:
     upper = np.triu_indices(len(there), 1)
     values = z[np.ix_(there, there)][upper]
     place = int(np.argmax(np.abs(values)))
-    log_p = norm.logsf(abs(values[place])) + np.log(2 * len(values))
+    log_p = log_normal(abs(values[place])) + np.log(2 * len(values))
     imus = sorted({int(there[i[place]] // 6) for i in upper})
     return Check(
         "correlation between sensors", float(values[place]), float(min(log_p, 0.0)), tuple(imus)

@@ -7,12 +7,11 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import gammaln
-from scipy.stats import chi2
 
 from imuarray.diagnosis.fit import Fit, flat_parameters, normal
 from imuarray.diagnosis.parameters import Columns, prior_precision
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.tails import log_chi_square
 from imuarray.linear import scaled_eigh, scaled_inverse
 from imuarray.model.effects import EFFECTS, KINDS
 
@@ -35,15 +34,6 @@ class Score:
     statistic: float
     freedom: int
     log_p: float
-
-
-def log_tail(statistic, freedom) -> float:
-    """log of the chi-square's tail, also where the tail itself underflows."""
-    tail = chi2.sf(statistic, freedom)
-    if tail > 1e-280:
-        return float(np.log(tail))
-    a, x = freedom / 2, statistic / 2
-    return float((a - 1) * np.log(x) - x - gammaln(a) - np.log1p(-(a - 1) / x))
 
 
 class Scanned(NamedTuple):
@@ -181,6 +171,6 @@ def score_all(given: Information, fit: Fit, tried: list[Candidate], freed=()) ->
                 c.effect == candidate.effect and c.variant == candidate.variant for c in tried
             ) - 1  # fmt: skip
             forms = len(variants(candidate.effect))
-            log_p = log_tail(statistic, freedom) + np.log(2 * max(count, 1) * forms)
+            log_p = log_chi_square(statistic, freedom) + np.log(2 * max(count, 1) * forms)
             found.append(Score(candidate, statistic, freedom, min(log_p, 0.0)))
     return sorted(found, key=lambda item: item.log_p)

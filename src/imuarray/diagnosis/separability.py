@@ -14,13 +14,13 @@ from imuarray.diagnosis.scores import (
     Information,
     able,
     candidates,
-    log_tail,
     mask_of,
     score_all,
 )
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL
 from imuarray.diagnosis.state import Cause, Search
+from imuarray.diagnosis.tails import log_chi_square
 from imuarray.linear import scaled_eigh, scaled_inverse, scaled_square
 from imuarray.model import EFFECTS
 
@@ -114,7 +114,7 @@ def rivals(search: Search, cause: Cause) -> list[str]:
     ]  # fmt: skip
     present = {c.effect for c in search.causes}
     own, _ = need(search, effect)
-    own_log = log_tail(own, len(freed))
+    own_log = log_chi_square(own, len(freed))
     scores = {s.candidate.effect: s for s in reversed(score_all(given, fit_, tried, freed))}
     active = np.setdiff1d(given.places(search.active), freed)
     left, _, _ = given.conditional(active, freed)

@@ -12,9 +12,9 @@ from imuarray.diagnosis.scores import (
     Information,
     Scanned,
     Score,
-    log_tail,
 )
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.tails import log_chi_square
 from imuarray.linear import scaled_inverse
 
 SHIFT = "position_shift"
@@ -40,7 +40,7 @@ def scan_shifts(fit: Fit, given: Information, imus) -> list[Scanned]:
             gain, shift = _step_gain(parts[cut:], own, rest, outside, ridge)
             best = max(best, (gain, blocks[cut].start, shift), key=lambda b: b[0])
         gain, place, shift = best
-        log_p = log_tail(gain, 3) + np.log(2 * len(imus) * SETTINGS.cuts)
+        log_p = log_chi_square(gain, 3) + np.log(2 * len(imus) * SETTINGS.cuts)
         score = Score(Candidate(SHIFT, (imu,)), gain, 3, min(log_p, 0.0))
         found.append(Scanned(score, {imu: np.append(shift, fit.readings.time[place])}))
     return found

@@ -11,8 +11,9 @@ from imuarray.diagnosis import clocks, shifts
 from imuarray.diagnosis.elimination import need
 from imuarray.diagnosis.fit import flat_parameters
 from imuarray.diagnosis.residual_checks import Check
-from imuarray.diagnosis.scores import Candidate, log_tail, score_all
+from imuarray.diagnosis.scores import Candidate, score_all
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.tails import log_chi_square
 from imuarray.model.effects import EFFECTS
 
 DRIFT = "bias_drift"
@@ -59,7 +60,9 @@ def maybe_drift(search, cause, own) -> bool:
     kind = EFFECTS[cause.effect].sensors
     tried = [Candidate(DRIFT, cause.imus, f"{kind} {form}") for form in ("linear", "cubic")]
     scores = score_all(search.given, search.fit, tried)
-    return any(log_tail(max(s.statistic, 1e-9), s.freedom) < SETTINGS.likely_drift for s in scores)
+    return any(
+        log_chi_square(max(s.statistic, 1e-9), s.freedom) < SETTINGS.likely_drift for s in scores
+    )
 
 
 def drift_check(search, cause) -> list[Check]:
@@ -67,7 +70,7 @@ def drift_check(search, cause) -> list[Check]:
     columns = search.columns
     changing = [c for c in columns.of(DRIFT) if columns.places[c][2] > 0]
     statistic, freedom = need(search, DRIFT, among=changing)
-    steady = log_tail(statistic, max(freedom, 1)) > SETTINGS.limit(DRIFT)
+    steady = log_chi_square(statistic, max(freedom, 1)) > SETTINGS.limit(DRIFT)
     steady |= statistic < SETTINGS.changing * need(search, DRIFT)[0]
     return [
         Check(f"change of {DRIFT}", statistic, SETTINGS.steady_drift if steady else 0.0, cause.imus)

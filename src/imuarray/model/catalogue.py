@@ -13,7 +13,7 @@ from imuarray.model.effects import KINDS, common_mean, common_means, data_effect
 from imuarray.model.jax64 import jnp
 
 # Rows and columns of the off-diagonal entries of a 3 x 3 matrix, row by row.
-OFF_ROWS, OFF_COLUMNS = jnp.array([0, 0, 1, 1, 2, 2]), jnp.array([1, 2, 0, 2, 0, 1])
+OFF_ROWS, OFF_COLUMNS = np.array([0, 0, 1, 1, 2, 2]), np.array([1, 2, 0, 2, 0, 1])
 
 FULL_SCALE_FORCE = 157.0  # m/s^2, 16 g: non-linearity is given as a share of it
 FULL_SCALE_RATE = 34.9  # rad/s, 2000 deg/s

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from imuarray.diagnosis.noise import standardised
 from imuarray.diagnosis.replicates import TESTS
@@ -19,7 +19,7 @@ from imuarray.model.effects import KINDS
 if TYPE_CHECKING:
     from imuarray.diagnosis.document import Diagnosis, Fitted
 
-BAND = norm.ppf(0.975)  # sds of a 95 % band
+BAND = ndtri(0.975)  # sds of a 95 % band
 
 
 def imu_labels(diagnosis: Diagnosis) -> tuple[str, ...]:
@@ -46,7 +46,7 @@ def discrepancy_table(diagnosis: Diagnosis) -> pd.DataFrame:
                 "model": model, "kind": kind, "check": name, "label": TESTS[name].label,
                 "statistic": item.statistic, "q025": band["q025"], "q975": band["q975"],
                 "standardised": BAND * far / max(edge, 1e-300),
-                "limit": norm.isf((1 - 0.95 ** (1 / number)) / 2), "p_value": item.p_value,
+                "limit": -ndtri((1 - 0.95 ** (1 / number)) / 2), "p_value": item.p_value,
             })  # fmt: skip
     table = pd.DataFrame(rows)
     order = {name: place for place, name in enumerate(TESTS)}
