@@ -65,7 +65,7 @@ def main():
     given = parser.parse_args()
     lines = ["| what | found |", "|---|---|", width(given.config, given.truths)]
     with ProcessPoolExecutor(2, get_context("spawn")) as pool:
-        lines += [repeated(pool, name, given.runs) for name in ("walk", "autoregressive", "nuts")]
+        lines += [repeated(pool, name, given.runs) for name in ("walk", "pcn", "nuts")]
     publish("\n".join(lines) + "\n", given.out)
 
 

@@ -21,14 +21,14 @@ from scipy.stats import beta
 from imuarray.blind import Case
 from imuarray.blind.cases import make
 from imuarray.diagnosis.adoption import proposals
-from imuarray.diagnosis.procedure import investigate
+from imuarray.diagnosis.procedure import run_procedure
 from imuarray.diagnosis.settings import SETTINGS
 
 
 def one(seed: int) -> dict:
     """The procedure on a clean recording; every fourth has rails."""
     recording, _ = make(Case(f"threshold-{seed}", rails=seed % 4 == 3), seed)
-    found = investigate(recording)
+    found = run_procedure(recording)
     named = [c.effect for c in (*found.structural, *found.search.causes, *found.in_noise)]
     row = {"seed": seed, "named": " ".join(named), "unexplained": found.unexplained}
     if not found.search.causes:

@@ -92,7 +92,7 @@ def test_a_calibration_with_effects_says_them(files, tmp_path, capsys):
 
 
 def test_the_motion_under_effects(files, tmp_path):
-    """Turned axes hidden in a recording: the extended model's motion is right, with its widths,
+    """Turned axes added to a recording: the extended model's motion is right, with its widths,
     past the rail as well; the papers' is far off."""
     array = model().array
     names = ("gyroscope_misalignment", "size_effect")

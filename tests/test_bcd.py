@@ -125,7 +125,7 @@ def test_stops_by_the_largest_step():
     assert len(found.step) == len(found.cost) < len(solution().cost)
 
 
-def test_stops_when_the_cost_settles():
+def test_stops_when_the_cost_converges():
     model, _, force, rate = problem()
     found = calibrate_bcd(model, force, rate, tolerance=0.0, cost_tolerance=1e-4)
     fallen = -np.diff(found.cost) / found.cost[1:]

@@ -1,4 +1,4 @@
-"""The blind study: what the diagnosis is told, the grades, the criteria, tables and figures."""
+"""The blind study: what the diagnosis is given, the grades, the criteria, tables and figures."""
 
 import json
 from pathlib import Path
@@ -156,9 +156,9 @@ def test_accuracy_is_relative_to_the_first_triad():
         grade.accuracy(model(), POSITIONS[:2])
 
 
-def spy(document, told):
+def spy(document, seen):
     def diagnose(recording, **options):
-        told.append((recording, options))
+        seen.append((recording, options))
         if document is None:
             raise ZeroDivisionError("no motion")
         return SimpleNamespace(document=document)
@@ -171,20 +171,20 @@ def words_of(recording) -> str:
     return repr([value for value in vars(recording).values() if not isinstance(value, np.ndarray)])
 
 
-def test_diagnosis_is_told_nothing_of_the_case():
-    told = []
+def test_diagnosis_is_given_nothing_of_the_case():
+    seen = []
     document = answer() | {"discrepancies": ["figures"], "seed": 7}
     case = Case("one-0001-accelerometer_bias", ((BIAS, (2,)),), 20.0, kind="one", **SHORT)
-    entry = study.diagnosed(case, 7, spy(document, told))
-    (recording, options), = told  # fmt: skip
+    entry = study.diagnosed(case, 7, spy(document, seen))
+    (recording, options), = seen  # fmt: skip
     assert options == {"seed": 7, "without": ()}
     assert case.id not in words_of(recording) and BIAS not in words_of(recording)
     assert entry["truth"]["effects"][0]["effect"] == BIAS and entry["case"] == case.id
     assert set(entry["diagnosis"]) == set(study.KEPT) and entry["error"] is None
     assert entry["seconds"] > 0 and entry["cpu_seconds"] >= 0
     struck = Case("struck", ((BIAS, (2,)),), 20.0, kind="struck", **SHORT)
-    study.diagnosed(struck, 7, spy(document, told))
-    assert told[-1][1]["without"] == (BIAS,)
+    study.diagnosed(struck, 7, spy(document, seen))
+    assert seen[-1][1]["without"] == (BIAS,)
     outside = Case("x", (("outside_cubic", (2,)),), kind="outside")
     assert outside.struck == () == case.struck
 
@@ -376,7 +376,7 @@ def test_figures_and_tables(tmp_path):
     paths = {kind: tmp_path / f"bars.{kind}" for kind in ("csv", "tex", "md")}
     write_table(*blind_tables.table_blind_bars(given, settings), **paths)
     lines = [line for line in paths["md"].read_text().splitlines() if line.startswith("|")]
-    assert {line.count("|") for line in lines} == {len(blind_tables.BARS) + 1}
+    assert {line.count("|") for line in lines} == {len(blind_tables.CRITERIA) + 1}
     assert any("short by" in line for line in lines)
     paths["tex"].read_text().encode("latin-1")  # what LaTeX reads as it is
     write_table(*blind_tables.table_blind_gain(given, settings), **paths)

@@ -35,7 +35,7 @@ def test_maximum_likelihood_reaches_the_bound():
     assert table.bound_m[1] < table.bound_m[0]
 
 
-def test_rate_of_bcd_is_foreseen_and_newton_is_quick():
+def test_rate_of_bcd_is_predicted_and_newton_is_quick():
     table = bound.convergence(model(), 3, 50, [MOTION], OPTIONS, count=2)
     np.testing.assert_allclose(np.log(table.observed), np.log(table.contraction), rtol=0.15)
     assert np.all(table.newton_iterations <= 10)
@@ -49,7 +49,7 @@ def test_larger_arrays_have_the_same_sds_relative_to_noise():
 
 
 def test_ranks():
-    """One sample tells too little; two tell all; one axis of rotation never does (Lemma 1)."""
+    """One sample determines too little, two all, one axis of rotation never (Lemma 1)."""
     rng = np.random.default_rng(5)
     one = normal_motion(rng, (1,), 10.0, 300.0, 20.0)
     two = normal_motion(rng, (2,), 10.0, 300.0, 20.0)

@@ -7,7 +7,7 @@ import pytest
 
 from imuarray.blind.cases import Case, make
 from imuarray.diagnosis.clipping import Peak, clipped, together
-from imuarray.diagnosis.procedure import investigate
+from imuarray.diagnosis.procedure import run_procedure
 from imuarray.diagnosis.reading_effects import Structural
 
 LIMIT = -7.5
@@ -72,16 +72,16 @@ def test_a_clipped_reading_is_named(recording):
     place = np.unravel_index(np.argmax(size), size.shape)
     rate[place[0], 2, place[1]] *= 1 - 12 * recording.gyroscope_noise_sd / size[place]
     changed = replace(recording, angular_rate=rate)
-    found = investigate(changed)
+    found = run_procedure(changed)
     assert [(c.effect, c.imus) for c in found.structural] == [("saturation", (2,))]
     assert not found.unexplained and not found.search.causes
-    struck = investigate(changed, without=("saturation", "heavy_tails"))
+    struck = run_procedure(changed, without=("saturation", "heavy_tails"))
     assert struck.unexplained and not struck.structural
 
 
 def test_a_reading_far_off_anywhere_else_is_not_passed_over(recording):
     rate = recording.angular_rate.copy()
     rate[400, 5, 1] += 12 * recording.gyroscope_noise_sd
-    found = investigate(replace(recording, angular_rate=rate))
+    found = run_procedure(replace(recording, angular_rate=rate))
     assert found.unexplained or [c.effect for c in found.in_noise] == ["heavy_tails"]
     assert not found.structural

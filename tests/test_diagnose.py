@@ -1,4 +1,4 @@
-"""Hidden effects must be found: recordings of the independent injector, the truth opened last."""
+"""Injected effects must be found: recordings of the independent injector."""
 
 import json
 from functools import cache
@@ -25,7 +25,7 @@ DURATION = 5.0  # s
 REPLICATES = 9
 
 
-def hidden(*effects, kind="one", realistic=False, **setting):
+def injected(*effects, kind="one", realistic=False, **setting):
     """A case of effects (id, IMUs), its total size drawn between 14 and 30 sigma."""
     label = "test-" + "-".join(name for name, _ in effects)
     # whatever the other tests draw
@@ -46,20 +46,20 @@ def named(document):
 
 ALL = tuple(range(8))
 ONE = [
-    hidden(("gyroscope_scale", (2,))),
-    hidden(("gyroscope_g_sensitivity", (5,))),
-    hidden(("accelerometer_bias", (4,))),
-    hidden(("accelerometer_nonlinearity", ALL)),
-    hidden(("size_effect", ALL)),
-    hidden(("bias_drift", (6,))),
-    hidden(("position_shift", (3,))),
-    hidden(("gyroscope_noise", (1,))),
-    hidden(("coloured_noise", (7,))),
-    hidden(("sensor_clock", (2,)), realistic=True),
-    hidden(("heavy_tails", (0,)), realistic=True),
-    hidden(("stale_samples", (3,)), realistic=True),
-    hidden(("axis_swap", (5,)), realistic=True),
-    hidden(("gyroscope_misalignment", (2,)), rails=True),
+    injected(("gyroscope_scale", (2,))),
+    injected(("gyroscope_g_sensitivity", (5,))),
+    injected(("accelerometer_bias", (4,))),
+    injected(("accelerometer_nonlinearity", ALL)),
+    injected(("size_effect", ALL)),
+    injected(("bias_drift", (6,))),
+    injected(("position_shift", (3,))),
+    injected(("gyroscope_noise", (1,))),
+    injected(("coloured_noise", (7,))),
+    injected(("sensor_clock", (2,)), realistic=True),
+    injected(("heavy_tails", (0,)), realistic=True),
+    injected(("stale_samples", (3,)), realistic=True),
+    injected(("axis_swap", (5,)), realistic=True),
+    injected(("gyroscope_misalignment", (2,)), rails=True),
 ]
 
 
@@ -102,14 +102,14 @@ def test_a_clean_recording_has_no_cause(seed):
 
 
 def test_two_effects_at_once():
-    case = hidden(("gyroscope_bias", (1,)), ("accelerometer_scale", (6,)), kind="pair")
+    case = injected(("gyroscope_bias", (1,)), ("accelerometer_scale", (6,)), kind="pair")
     document, _ = found_in(case)
     assert named(document) == {"gyroscope_bias", "accelerometer_scale"}
     assert not document["unexplained"]
 
 
-def test_a_delay_is_named_with_what_cannot_be_told_from_it():
-    document, _ = found_in(hidden(("sensor_delay", (4,))))
+def test_a_delay_is_named_with_what_cannot_be_distinguished_from_it():
+    document, _ = found_in(injected(("sensor_delay", (4,))))
     cause = document["causes"][0]
     assert len(document["causes"]) == 1
     assert {"sensor_delay", "gyroscope_delay"} <= {
@@ -119,7 +119,7 @@ def test_a_delay_is_named_with_what_cannot_be_told_from_it():
 
 
 def test_a_gauge_is_no_confident_cause():
-    document, _ = found_in(hidden(("gauge_gyroscope_scale", ALL), kind="gauge"))
+    document, _ = found_in(injected(("gauge_gyroscope_scale", ALL), kind="gauge"))
     assert document["unexplained"] or not any(
         not cause["indistinguishable_from"] for cause in document["causes"]
     )
@@ -147,7 +147,7 @@ def test_what_is_outside_the_catalogue_is_unexplained_until_it_is_added():
 
 
 def test_an_effect_struck_from_the_catalogue_leaves_something_unexplained():
-    case = hidden(("gyroscope_g_sensitivity", ALL), kind="struck")
+    case = injected(("gyroscope_g_sensitivity", ALL), kind="struck")
     document, truth = found_in(case)
     assert truth.struck == ["gyroscope_g_sensitivity"]
     assert "gyroscope_g_sensitivity" not in named(document)
@@ -178,9 +178,9 @@ def test_what_is_outside_the_catalogue_shows_as_itself(effect, size, sign):
         ("gyroscope_bias", "change of bias_drift"),
     ],
 )
-def test_another_cause_in_its_clothes_is_no_answer(effect, sign):
+def test_a_confounded_cause_is_no_answer(effect, sign):
     """The effect struck from the catalogue: whatever is named instead, `unexplained` is true."""
-    document, _ = found_in(hidden((effect, (2,)), kind="struck", duration=8.0))
+    document, _ = found_in(injected((effect, (2,)), kind="struck", duration=8.0))
     assert document["unexplained"] and sign in document["remaining"]
 
 
@@ -209,7 +209,9 @@ def test_most_triads_decide_which_axes_are_right():
 )
 def test_readings_count_once(effects):
     """Those left out beside the extended fit's score, exchanged axes in the rivals' alone."""
-    case = hidden(*effects, kind="pair" if len(effects) > 1 else "one", realistic=True, duration=4)
+    case = injected(
+        *effects, kind="pair" if len(effects) > 1 else "one", realistic=True, duration=4
+    )
     made = diagnose(make(case, SEED)[0], SEED, replicates=2)
     parts = {i.effect: structural_gain(made.found, i)[2] for i in made.found.structural}
     assert set(parts) == {name for name, _ in effects}
@@ -296,7 +298,7 @@ def test_a_noise_beside_a_diagnosis_is_refused(diagnosed, capsys, command):
 
 
 @pytest.mark.parametrize("quiet", [True, False])
-def test_effects_of_whole_readings_are_told_unless_quiet(diagnosed, capsys, quiet):
+def test_effects_of_whole_readings_are_said_unless_quiet(diagnosed, capsys, quiet):
     document = json.loads((diagnosed / "out" / "diagnosis.json").read_text())
     document["causes"].append({"effect": "stale_samples", "parameters": {}})
     odd = diagnosed / "stale.json"

@@ -29,26 +29,26 @@ from imuarray.errors import InputError
 SHORT = 4.0  # s
 
 
-def begun(case, seed=1):
+def started(case, seed=1):
     """A search with the papers' model fitted, on a case's recording."""
     recording, truth = make(case, seed)
     readings = arrange(recording)
     effects = catalogue_effects()
     columns = columns_of(readings.array, effects, readings.position_prior_sd)
     search = Search(readings, columns, effects, lambda text: None)
-    return search.begun(), truth
+    return search.fitted(), truth
 
 
 @pytest.fixture(scope="module")
 def clean():
-    return begun(Case("criticism-clean", duration=SHORT))[0]
+    return started(Case("criticism-clean", duration=SHORT))[0]
 
 
 @pytest.fixture(scope="module")
 def scaled():
     """Gyroscope 3 scaled, 12 sigma."""
     case = Case("criticism", (("gyroscope_scale", (2,)),), 12.0, kind="one", duration=SHORT)
-    return begun(case)[0]
+    return started(case)[0]
 
 
 def ridge_of(made: Fit):
@@ -240,7 +240,7 @@ def test_noise_scales_are_unbiased_with_the_errors_they_claim(clean):
 def test_a_noisy_triad_is_found_and_the_others_are_not():
     case = Case("criticism-noise", (("accelerometer_noise", (5,)),), 12.0, kind="one",
                 duration=SHORT)  # fmt: skip
-    search, truth = begun(case)
+    search, truth = started(case)
     named = variance.noise_scale(search.fit, search.noise, 0, -7.5, np.zeros(8))
     assert named.imus == (5,)
     ratio, error, _ = named.parameters["ratio_6"]

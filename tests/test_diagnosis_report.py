@@ -209,9 +209,9 @@ def test_where_readings_count_is_said(found, effect, gain, words):
     assert all(text.startswith(start) for text, start in zip(said, words, strict=True))
 
 
-def test_a_class_is_told_as_one(found):
+def test_a_class_is_stated_as_one(found):
     cause = found.document["causes"][0] | {"indistinguishable_from": ["sensor_delay"]}
-    assert "cannot be told from sensor delay" in cause_in_words(cause, ("1", "2", "3"))
+    assert "cannot be distinguished from sensor delay" in cause_in_words(cause, ("1", "2", "3"))
     assert "gyroscope scale or sensor delay" in verdict(of(found, causes=[cause]))
     doubtful = cause | {"gain_in_sample_nats": 10.0, "placebo_gain_nats": 6.0}
     assert "doubtful" in cause_in_words(doubtful, ("3",))

@@ -79,7 +79,7 @@ def test_burn_in_covers_a_transient(seed):
 
 
 def test_burn_in_sees_the_log_target_alone():
-    """Positions settled, likelihood not: discarded all the same."""
+    """Positions converged, likelihood not: discarded all the same."""
     draws, log_target = with_transient(8, 4000, 100, 20.0)
     still = ar1(np.random.default_rng(8), draws.shape, 0.8)
     assert find_burn_in(still, log_target).draws >= 300
@@ -87,7 +87,7 @@ def test_burn_in_sees_the_log_target_alone():
     assert table.rhat_log_target.iloc[0] == pytest.approx(table.rhat_max.iloc[0])
 
 
-def test_burn_in_of_settled_chains_is_short():
+def test_burn_in_of_converged_chains_is_short():
     """Seed 9; no transient: at most a quarter is thrown away, and R-hat passes."""
     rng = np.random.default_rng(9)
     found = find_burn_in(ar1(rng, (2, 8000, 2), 0.5), ar1(rng, (2, 8000, 1), 0.5)[..., 0])

@@ -217,16 +217,16 @@ def test_the_theory_has_every_equation():
     text = (DOCS / "theory.md").read_text(encoding="utf-8")
     first, second = text.index("## Paper 2017"), text.index("## Paper 2021")
     for part, last in ((text[first:second], 9), (text[second:], 32)):
-        told = set()
+        named = set()
         for line in part.splitlines():
             cell = line.split(" | ")[0]
             for low, high in re.findall(r"\((\d+)[ab]?\)(?: to \((\d+)\))?", cell):
-                told |= set(range(int(low), int(high or low) + 1))
-        assert told == set(range(1, last + 1))
+                named |= set(range(int(low), int(high or low) + 1))
+        assert named == set(range(1, last + 1))
 
 
 def test_the_api_has_every_public_name():
-    told = anchors(DOCS / "api.md")
+    named = anchors(DOCS / "api.md")
     public = {f"imuarray.{name}": getattr(imuarray, name) for name in imuarray.__all__}
     del public["imuarray.plots"]
     for name, member in vars(plots).items():
@@ -235,7 +235,7 @@ def test_the_api_has_every_public_name():
     for name, member in public.items():
         # from its home where a module of the same name stands in a static reader's way
         home = f"{getattr(member, '__module__', '')}.{name.rpartition('.')[2]}"
-        assert told & {name, home}, name
+        assert named & {name, home}, name
 
 
 def test_the_api_has_every_effect():

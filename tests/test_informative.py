@@ -1,4 +1,4 @@
-"""Which combinations of positions a recording tells worst, in words."""
+"""Which combinations of positions a recording determines worst, in words."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def test_a_single_triad_is_named():
 
 
 def test_a_motion_about_one_axis_hardly_tells_the_arms_along_it():
-    """The lever arms along the axis of rotation are what it tells worst."""
+    """The lever arms along the axis of rotation are what it determines worst."""
     model = ArrayModel.isotropic(ARRAY, 0.04, 1e-3)
     motion = normal_motion(np.random.default_rng(1), (50,), 10.0, 200.0, 20.0)
     slow = np.array([1.0, 0.01, 0.01])

@@ -118,7 +118,7 @@ def test_another_text_makes_other_chains(mine):
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "said"),
     [
         ("x = (", "line 1: SyntaxError"),
         ("\nimport no_such_module\n", "line 2: ModuleNotFoundError"),
@@ -131,7 +131,7 @@ def test_another_text_makes_other_chains(mine):
         (CUBIC.format(sd="1.0").replace("curvature * force**3", "1.0"), "left as it is"),
     ],
 )
-def test_a_wrong_file_is_one_line(text, told, tmp_path, capsys):
+def test_a_wrong_file_is_one_line(text, said, tmp_path, capsys):
     path, known = tmp_path / "mine.py", dict(EFFECTS)
     if text is not None:
         path.write_bytes(text if isinstance(text, bytes) else text.encode())
@@ -141,9 +141,9 @@ def test_a_wrong_file_is_one_line(text, told, tmp_path, capsys):
     asked += ["accelerometer_cubic", "--effect-file", str(path), "--out", str(tmp_path / "cal.nc")]
     assert main(asked) == 2
     error = capsys.readouterr().err
-    assert told in error and len(error.splitlines()) == 1
+    assert said in error and len(error.splitlines()) == 1
     assert not (tmp_path / "cal.nc").exists()
-    if told != "left as it is":
+    if said != "left as it is":
         assert known == EFFECTS
 
 
@@ -167,7 +167,7 @@ def test_an_effect_with_a_gauge_of_its_own_is_one_place(tmp_path):
     (cause,) = made.document["causes"]
     assert cause["effect"] == "accelerometer_gain" and cause["sensors"] == ["all"]
     assert "each accelerometer has one gain" in cause["says"] and "%" in cause["says"]
-    # the mean is pinned: single gains are told against it
+    # the mean is pinned: single gains are determined against it
     gains = np.array([item["value"] for item in cause["parameters"].values()])
     assert abs(gains.mean()) < 1e-4
     assert np.abs(gains - (true - true.mean())).max() < 2e-3

@@ -1,4 +1,4 @@
-"""Readings that are hidden from the estimate and kept to judge it by."""
+"""Readings that are withheld from the estimate and compared with it."""
 
 import json
 from dataclasses import replace
@@ -16,7 +16,7 @@ from tests.test_bound import model
 
 
 @pytest.fixture(scope="module")
-def hidden():
+def withheld():
     """(recording with scaled gyroscopes, its truth): 5 triads, 300 samples."""
     effects = ("gyroscope_scale",)
     recording, truth = imuarray.simulate(
@@ -27,9 +27,9 @@ def hidden():
 
 
 @pytest.fixture
-def diagnosis(hidden, tmp_path):
+def diagnosis(withheld, tmp_path):
     """What a diagnosis that found the truth would say."""
-    recording, truth = hidden
+    recording, truth = withheld
     own = replace(model(), effects=("gyroscope_scale",))
     labels = recording.accelerometer_labels, recording.gyroscope_labels
     names = [name.split(" ")[1] for name in parameter_names(own, labels)]
@@ -53,8 +53,8 @@ def diagnosis(hidden, tmp_path):
     return path
 
 
-def test_the_right_model_predicts_what_is_withheld(hidden, diagnosis):
-    recording, truth = hidden
+def test_the_right_model_predicts_what_is_withheld(withheld, diagnosis):
+    recording, truth = withheld
     found = imuarray.diagnosed(diagnosis, recording)
     assert np.array_equal(found["effect_parameter"], truth["effect_parameter"])
     assert np.allclose(found["effect_sd"], 1e-4)
@@ -68,9 +68,9 @@ def test_the_right_model_predicts_what_is_withheld(hidden, diagnosis):
     assert all(len(axes.lines) == 7 for axes in figure.axes)
 
 
-def test_positions_and_delay_of_another_recording(hidden, diagnosis):
+def test_positions_and_delay_of_another_recording(withheld, diagnosis):
     """Where they are the same ones the errors are, too; a delay shows as the acceleration does."""
-    recording, truth = hidden
+    recording, truth = withheld
     found, base = imuarray.diagnosed(diagnosis, recording), truth["position"].to_numpy()
     tables = {
         lead: past_rail(recording, found, base, bins=(300, 800, 2000), elsewhere=(base, lead))
@@ -88,15 +88,15 @@ def test_positions_and_delay_of_another_recording(hidden, diagnosis):
     assert all(len(axes.lines) == 8 for axes in figure_past_rail(tables[0.0], 300, []).axes)
 
 
-def test_a_diagnosis_is_a_calibration_for_the_command(hidden, diagnosis, tmp_path):
-    recording, _ = hidden
+def test_a_diagnosis_is_a_calibration_for_the_command(withheld, diagnosis, tmp_path):
+    recording, _ = withheld
     imuarray.write_recording(recording, tmp_path / "rec.nc")
     out = tmp_path / "motion.nc"
     assert main(["apply", str(diagnosis), str(tmp_path / "rec.nc"), "--out", str(out)]) == 0
 
 
-def test_what_is_never_fast_is_refused(hidden, diagnosis):
-    recording, truth = hidden
+def test_what_is_never_fast_is_refused(withheld, diagnosis):
+    recording, truth = withheld
     found = imuarray.diagnosed(diagnosis, recording)
     with pytest.raises(InputError, match="beyond 9000 deg/s, found none"):
         past_rail(recording, found, truth["position"].to_numpy(), bins=(9000, 9500))

@@ -19,7 +19,7 @@ RAIL = 5.0
 
 
 def lost_rates():
-    """(model, force, rate, saturated, truth): most axes are lost, and forces tell them badly."""
+    """(model, force, rate, saturated, truth): most axes are lost, badly determined by forces."""
     rng, own = np.random.default_rng(8), model()
     own = replace(own, noise=Noise.of(5, 5, 2.0, 0.02))
     motion = normal_motion(rng, (400,), 20.0, 300.0, 10.0)

@@ -28,7 +28,7 @@ def test_efficiency():
 
 
 def test_convergence_shows_other_arrays_and_leaves_out_what_tells_nothing():
-    slow = (0.5, 1.0, 10.0)  # tells less than the nominal positions
+    slow = (0.5, 1.0, 10.0)  # determines less than the nominal positions
     tables = [bound.convergence(model(), 3, 30, [MOTION, slow], {**OPTIONS, "limit": 300}, count=1)]
     others = bound.geometries(model())
     assert set(others) == {"3 triads", "4 triads", "all triads in one plane", "half the size"}

@@ -59,7 +59,7 @@ def test_pit_values_are_uniform_where_data_tell_little():
     assert np.all(np.abs(scores) < 4)
 
 
-def test_samplers_agree_truth_by_truth_where_data_tell_little():
+def test_samplers_agree_truth_by_truth_where_data_determine_little():
     """Numbers 69 and 138 stuck before the burn-in learnt where the mass is, 4 sds off the mode."""
     numbers = [*range(4), 69, 138]
     methods = ["PmMH, pCN", "NUTS"]
@@ -69,7 +69,7 @@ def test_samplers_agree_truth_by_truth_where_data_tell_little():
     assert np.all(table.slow == 0)
 
 
-@pytest.mark.parametrize(("name", "rounds"), [("walk", 4000), ("autoregressive", 4000),
+@pytest.mark.parametrize(("name", "rounds"), [("walk", 4000), ("pcn", 4000),
                                               ("nuts", 2000)])  # fmt: skip
 def test_sampler_and_simulation_by_turns_keep_the_prior(name, rounds):
     row = joint.joint_test(1, rounds, [name]).iloc[0]
@@ -88,7 +88,7 @@ def test_the_printed_determinant_does_not_keep_the_prior(monkeypatch):
     assert joint.joint_test(1, 8000, ["walk"]).p[0] < 1e-3
 
 
-@pytest.mark.parametrize(("name", "rounds"), [("autoregressive", 6000), ("nuts", 3000)])
+@pytest.mark.parametrize(("name", "rounds"), [("pcn", 6000), ("nuts", 3000)])
 def test_noise_that_is_not_the_declared_one_does_not_either(monkeypatch, name, rounds):
     """Half as large again."""
     measure = joint.measure
@@ -102,7 +102,7 @@ def test_noise_that_is_not_the_declared_one_does_not_either(monkeypatch, name, r
 
 
 def test_a_sampler_that_does_not_look_at_the_data_is_seen(monkeypatch):
-    """Draws from the prior keep the prior: the misfit tells."""
+    """Draws from the prior keep the prior: the misfit shows it."""
 
     def blind(target, theta, log_target, step, count, rng):
         theta[:] = target.prior.mean + target.prior.sd * rng.standard_normal(theta.size)

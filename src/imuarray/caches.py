@@ -1,4 +1,4 @@
-"""Folders where compiled code is kept between processes, and JAX told to use one."""
+"""Folders where compiled code is kept between processes, and JAX set to use one."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ def add_code(name: str, place: str, text: str) -> None:
 
 
 def code_version(place: str) -> str:
-    """What `versions` says of the code that `add_code` was told of at ``place``."""
+    """What `versions` says of the code that `add_code` was given at ``place``."""
     return f"sha256 {hashlib.sha256(_ADDED[place][1].encode()).hexdigest()}"
 
 
@@ -79,7 +79,7 @@ def _fingerprint(value: Any) -> Any:
 def code_digest() -> str:
     """SHA-256, in hexadecimal, of the names and the text of the package's Python files.
 
-    And of what `add_code` was told, if anything.
+    And of what `add_code` was given, if anything.
     """
     root = Path(__file__).parent
     sources = sorted((path.relative_to(root).as_posix(), path) for path in root.rglob("*.py"))
@@ -183,7 +183,7 @@ def seal_of(path: str | Path) -> bytes | None:
 
 
 def is_damaged(path: str | Path) -> bool:
-    """Whether a sealed file is not as `write_netcdf` wrote it; without a seal none can tell.
+    """Whether a sealed file is not as `write_netcdf` wrote it; without a seal this is unknown.
 
     To be asked before HDF5 reads the file: wrong bytes make it read wrong numbers, or loop.
     """

@@ -74,9 +74,9 @@ def commands(folder: Path, names: dict[str, Path]) -> list[str]:
 
 def pipeline(where: Path) -> list[str]:
     """What is wrong with the quick pipeline on a disk that is full, read-only, large enough."""
-    calm, here = fresh("undisturbed", where), fresh("disturbed", where)
-    if started(calm, "quick").wait() != 0:
-        raise SystemExit((calm / "log.txt").read_text(encoding="utf-8")[-2000:])
+    undisturbed, here = fresh("undisturbed", where), fresh("disturbed", where)
+    if started(undisturbed, "quick").wait() != 0:
+        raise SystemExit((undisturbed / "log.txt").read_text(encoding="utf-8")[-2000:])
     wrong, results = [], here / "results"
     with mounted(results, ROOM[0]):
         for options in (*(f"size={size}k" for size in ROOM), "ro"):
@@ -91,12 +91,14 @@ def pipeline(where: Path) -> list[str]:
             if status == 0 or not named or "Traceback" in said:
                 wrong.append(f"quick, {options}: status {status}, said\n{said[-3000:]}")
             wrong += [
-                name for name in differences(calm / "results", results) if "only in" not in name
+                name
+                for name in differences(undisturbed / "results", results)
+                if "only in" not in name
             ]
         remount(results, "rw,size=1g")
         if started(here, "quick").wait() != 0:
             wrong.append("quick with room again: did not end")
-        wrong += differences(calm / "results", results)
+        wrong += differences(undisturbed / "results", results)
     return wrong
 
 

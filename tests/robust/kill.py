@@ -114,17 +114,17 @@ def main() -> None:
     parser.add_argument("--target", default="quick")
     given = parser.parse_args()
     rng, killed, found, runs = random.Random(given.seed), 0, [], 0
-    begun = time.monotonic()
+    start = time.monotonic()
     with tempfile.TemporaryDirectory() as temporary:
-        calm = fresh("undisturbed", Path(temporary))
-        if started(calm, given.target).wait() != 0:
-            raise SystemExit((calm / "log.txt").read_text(encoding="utf-8")[-2000:])
+        undisturbed = fresh("undisturbed", Path(temporary))
+        if started(undisturbed, given.target).wait() != 0:
+            raise SystemExit((undisturbed / "log.txt").read_text(encoding="utf-8")[-2000:])
         while killed < given.kills:
             runs += 1
             here = fresh(f"run_{runs}", Path(temporary))
             killed += disturbed(here, given.target, given.kills - killed, rng)
-            found += differences(calm / "results", here / "results")
-    minutes = (time.monotonic() - begun) / 60
+            found += differences(undisturbed / "results", here / "results")
+    minutes = (time.monotonic() - start) / 60
     print(f"{killed} kills in {runs} runs, {minutes:.0f} min; results that differ: {len(found)}")
     print("\n".join(found))
     sys.exit(bool(found))

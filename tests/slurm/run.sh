@@ -15,7 +15,7 @@ done
 common="-s $root/Snakefile --configfile config.yaml --quiet rules"
 # a directory that has been used before is gone on with
 (cd "$where/local" && snakemake $common --workflow-profile none --cores 2 quick)
-# without accounting squeue is what tells of jobs; a node of our own needs no patience, and groups
+# without accounting squeue is what reports jobs; a node of our own needs no patience, and groups
 # of no more jobs side by side than it has cores
 (cd "$where/slurm" && snakemake $common --workflow-profile "$root/profiles/slurm" \
     --jobs 2 --slurm-no-account --slurm-status-command squeue \

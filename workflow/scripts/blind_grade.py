@@ -1,4 +1,4 @@
-"""The grader opens the truth: graded rows of all batches -> JSON, and flat as CSV."""
+"""Diagnoses of all batches compared with the truth: graded rows -> JSON, and flat as CSV."""
 
 from job import job
 

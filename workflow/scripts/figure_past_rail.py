@@ -1,4 +1,4 @@
-"""Hidden gyroscope readings predicted by several models -> table, PDF, PNG, CSV."""
+"""Withheld gyroscope readings predicted by several models -> table, PDF, PNG, CSV."""
 
 from job import job
 

@@ -22,8 +22,8 @@ def job(snakemake):
                 with redirect_stdout(log), redirect_stderr(log):
                     yield snakemake.params.get("settings", {})
             except Exception as error:
-                told = [str(error)] if isinstance(error, InputError) else traceback.format_exc()
-                log.writelines(told)
+                lines = [str(error)] if isinstance(error, InputError) else traceback.format_exc()
+                log.writelines(lines)
                 raise
     except Exception as error:  # of the log, too: its disk may be full
         status = 2 if isinstance(error, InputError) else 1

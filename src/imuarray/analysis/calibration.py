@@ -57,7 +57,7 @@ def calibrate(
     Raises
     ------
     InputError
-        The recording cannot tell the positions, or the options do not go together.
+        The recording does not determine the positions, or the options do not go together.
     """
     from imuarray.estimation import calibrate_bcd, calibrate_gauss_newton
 

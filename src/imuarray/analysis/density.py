@@ -15,7 +15,9 @@ from imuarray.posterior.target import GaussianPrior, GenericTarget
 from imuarray.recording import Recording
 
 GAP = 1e-3  # nats in total
-UNSETTLED = "the search for the posterior's mode did not converge; chains start from where it ended"
+NOT_CONVERGED = (
+    "the search for the posterior's mode did not converge; chains start from where it ended"
+)
 
 
 def density_of(recording: Recording, model: ArrayModel, rates: str = "declared", say: Say = silent):
@@ -97,7 +99,7 @@ def _mode(recording, model, spread: bool, say: Say):
     if spread:
         found = locate(recording, recording.accelerometer_noise_sd)
         if not found.converged:
-            say(UNSETTLED)
+            say(NOT_CONVERGED)
         return found.mean[1:].ravel(), found.covariance
     mode, found = map_estimate(recording, model, say)
     return mode, found.covariance
@@ -118,7 +120,7 @@ def map_estimate(recording: Recording, model: ArrayModel, say: Say = silent):
         time=recording.time,
     )  # fmt: skip
     if not found.converged:
-        say(UNSETTLED)
+        say(NOT_CONVERGED)
     extra = np.empty(0) if found.effect_parameters is None else found.effect_parameters
     return np.concatenate([found.positions[1:].ravel(), extra]), found
 

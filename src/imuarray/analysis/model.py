@@ -44,7 +44,7 @@ def usable(recording: Recording, say: Say = silent) -> Recording:
     if lost.any():
         say(f"left out {lost.sum()} of {lost.size} samples with an accelerometer at its rail")
     if recording.stationary is not None and recording.stationary.any():
-        # they tell nothing of the positions, and cost as much as the others
+        # they say nothing about the positions, and cost as much as the others
         still = recording.stationary & ~lost
         say(f"left out {still.sum()} of {lost.size} samples of still poses")
         lost = lost | still

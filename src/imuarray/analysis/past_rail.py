@@ -1,7 +1,7 @@
-"""How well an array tells an angular rate that its gyroscopes may not see (2017, figure 3).
+"""How well an array measures an angular rate beyond its gyroscopes' rail (2017, figure 3).
 
 On a measured recording nobody knows the rate past the gyroscopes' rail. So a lower rail is made
-up: readings beyond it are hidden from the estimate and kept to judge it by.
+up: readings beyond it are withheld from the estimate and compared with it.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def past_rail(
     recording: Recording, diagnosed: xr.Dataset, base, bins=BINS, per_bin: int = PER_BIN,
     elsewhere=None,
 ) -> pd.DataFrame:  # fmt: skip
-    """Errors of hidden gyroscope readings, as several models predict them.
+    """Errors of withheld gyroscope readings, as several models predict them.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def past_rail(
     base : (A, 3) m
         Positions by the papers' model, relative to the first triad.
     bins
-        Edges in deg/s of the hidden axis' rate; the first is the rail.
+        Edges in deg/s of the withheld axis' rate; the first is the rail.
     elsewhere : ((A, 3) m, s) or None
         Positions as ``base`` and the gyroscopes' lead (`lead_of`) from another recording of the
         board, which has seen nothing of this one.
@@ -48,7 +48,7 @@ def past_rail(
     DataFrame
         A row per model (``clipped``, ``nominal``, ``calibrated``, ``delayed``: the same with the
         gyroscopes' lead, ``transferred``: with both from ``elsewhere``, ``extended``) and bin of
-        the hidden axis' rate: mid ``rate_dps``, ``readings`` (of all gyroscopes, which share an
+        the withheld axis' rate: mid ``rate_dps``, ``readings`` (of all gyroscopes, which share an
         error), ``rmse_dps``, ``median_dps`` of the absolute error, ``above_100`` the share beyond
         100 deg/s, and for ``extended`` what noise alone claims: ``sd_dps`` (median),
         ``rms_sd_dps`` and ``within_95``.
@@ -57,8 +57,8 @@ def past_rail(
     """
     chosen = _choose(recording, np.radians(bins), per_bin)
     lowest = np.radians(bins[0])
-    hidden = (np.abs(chosen.angular_rate) >= lowest).any(axis=1, keepdims=True)
-    hidden = np.broadcast_to(hidden, chosen.angular_rate.shape)
+    withheld = (np.abs(chosen.angular_rate) >= lowest).any(axis=1, keepdims=True)
+    withheld = np.broadcast_to(withheld, chosen.angular_rate.shape)
     clipped = replace(chosen, angular_rate=np.clip(chosen.angular_rate, -lowest, lowest))
     errors, sds = {"clipped": clipped.angular_rate - chosen.angular_rate}, {}
     ways = {
@@ -69,23 +69,23 @@ def past_rail(
     if elsewhere is not None:
         ways["transferred"] = elsewhere
     for name, (positions, lead) in ways.items():
-        errors[name] = _predicted(clipped, hidden, positions, lead) - chosen.angular_rate
-    model, found = extended_motion(diagnosed, clipped, hidden)
+        errors[name] = _predicted(clipped, withheld, positions, lead) - chosen.angular_rate
+    model, found = extended_motion(diagnosed, clipped, withheld)
     predicted = _readings(model, diagnosed, found, chosen.time)
     errors["extended"] = predicted - chosen.angular_rate
     variance = np.einsum("tii->ti", found.covariance)[:, None, :3]
     noise = np.diag(model.noise.gyroscope).reshape(1, -1, 3)
     sds["extended"] = np.sqrt(variance + noise)
     rates = np.abs(chosen.angular_rate.mean(axis=1, keepdims=True))
-    rates = np.broadcast_to(rates, hidden.shape)
-    return _table(errors, sds, hidden, np.degrees(rates), bins)
+    rates = np.broadcast_to(rates, withheld.shape)
+    return _table(errors, sds, withheld, np.degrees(rates), bins)
 
 
-def _predicted(clipped: Recording, hidden, positions, lead: float) -> np.ndarray:
+def _predicted(clipped: Recording, withheld, positions, lead: float) -> np.ndarray:
     """Gyroscopes' readings (T, 1, 3) rad/s by the papers' model, ``lead`` s after the motion."""
     model = ArrayModel.isotropic(array_of(clipped), ASSUMED, clipped.gyroscope_noise_sd)
     motion = fuse(
-        model, clipped.specific_force, clipped.angular_rate, positions, None, hidden
+        model, clipped.specific_force, clipped.angular_rate, positions, None, withheld
     ).estimate.motion
     return (motion.angular_rate + lead * motion.angular_acceleration)[:, None]
 
@@ -124,12 +124,12 @@ def _readings(model: ArrayModel, diagnosed: xr.Dataset, found, time) -> np.ndarr
     return np.asarray(predicted.angular_rate)
 
 
-def _table(errors, sds, hidden, rates, bins) -> pd.DataFrame:
+def _table(errors, sds, withheld, rates, bins) -> pd.DataFrame:
     rows = []
     for name, error in errors.items():
         size = np.degrees(np.abs(error))
         for low, high in zip(bins[:-1], bins[1:], strict=True):
-            here = hidden & (rates >= low) & (rates < high)
+            here = withheld & (rates >= low) & (rates < high)
             if not here.any():
                 continue
             row = {

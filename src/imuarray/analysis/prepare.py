@@ -36,7 +36,7 @@ def simulate(
     seed
         Of motion, positions, effects and noise, each with a stream of its own.
     effects
-        Hidden in the data, parameters drawn from their priors (docs/effects.md).
+        Added to the data, parameters drawn from their priors (docs/effects.md).
     accelerometer_noise
         Sd of one reading, m/s^2.
     gyroscope_noise

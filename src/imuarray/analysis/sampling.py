@@ -100,7 +100,7 @@ def sample(
     Raises
     ------
     InputError
-        The recording cannot tell the positions, or the options do not go together.
+        The recording does not determine the positions, or the options do not go together.
     """
     for name, value, known in (
         ("method", method, methods.SAMPLING),

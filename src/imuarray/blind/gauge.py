@@ -1,4 +1,4 @@
-"""What no recording can tell from a clean one: errors that all sensors share.
+"""What no recording can distinguish from a clean one: errors that all sensors share.
 
 The sensors asked for are ignored; every IMU is affected alike.
 """

@@ -101,7 +101,7 @@ def below_rails(scene: Scene, readings: Pair) -> np.ndarray:
     return good
 
 
-def smallest_remainder(scene: Scene, clean: Pair, perturbed: Pair, steps: int = 1) -> float:
+def smallest_residual(scene: Scene, clean: Pair, perturbed: Pair, steps: int = 1) -> float:
     """Norm of what no motion and no positions absorb, in sigma.
 
     ``clean`` is what the model predicts at the truth, which knows of no rails (`Scene.ideal`);

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from imuarray.blind.change import EFFECTS, Change, noiseless_readings
-from imuarray.blind.projection import below_rails, smallest_remainder
+from imuarray.blind.projection import below_rails, smallest_residual
 from imuarray.blind.scene import Pair, Scene
 
 TOLERANCE = 0.01  # of a size that was asked for
@@ -19,7 +19,7 @@ def total_size(scene: Scene, clean: Pair, perturbed: Pair, steps: int = 1) -> fl
     ``clean`` (`Scene.ideal`, without rails) and ``perturbed`` are without noise, (T, A, 3) m/s^2
     and (T, G, 3) rad/s; a sample with any perturbed reading at a declared rail is left out whole.
     """
-    return smallest_remainder(scene, clean, perturbed, steps)
+    return smallest_residual(scene, clean, perturbed, steps)
 
 
 def size_of(scene: Scene, changes: Change | list[Change], steps: int = 1) -> float:

@@ -1,4 +1,4 @@
-"""Paper 2021, sections IV-B and IV-C: what only measured data can tell."""
+"""Paper 2021, sections IV-B and IV-C: what only measured data can show."""
 
 from __future__ import annotations
 

@@ -85,14 +85,16 @@ def _weakest(dataset: xr.Dataset):
 
 
 def _informative(dataset: xr.Dataset) -> list[str]:
-    """How well the recording tells the positions, and which combinations of them worst."""
+    """How well the recording determines the positions, and which combinations of them worst."""
     worst, prior = _weakest(dataset), dataset.attrs["position_prior_sd"]
     rms = np.sqrt(np.mean(_sds(dataset)[1:] ** 2))
     said = ", ".join(f"{item.words} ({1e6 * item.sd:.2g} um)" for item in worst)
-    lines = [f"positions to {1e6 * rms:.2g} um rms by the Cramer-Rao bound; told worst: {said}"]
+    lines = [
+        f"positions to {1e6 * rms:.2g} um rms by the Cramer-Rao bound; worst determined: {said}"
+    ]
     if worst[0].sd > prior:
         lines.append(
-            f"{worst[0].words}: told worse than the nominal positions' own"
+            f"{worst[0].words}: determined worse than by the nominal positions,"
             f" {1e3 * prior:g} mm; turn the array faster, and about all axes"
         )
     return lines

@@ -14,17 +14,17 @@ from imuarray.report.write import write_report
 
 
 def diagnose(arguments) -> None:
-    """Name what the papers' model gets wrong on a recording; a folder with the evidence."""
+    """Name what the papers' model gets wrong on a recording; a folder with the report."""
     known = {*EFFECTS, *DATA_EFFECTS}
     for name in arguments.without:
         if name not in known:
             raise InputError(f"--without: expected any of {', '.join(sorted(known))}, found {name}")
     recording, output = read_recording(arguments.recording), Output(arguments)
-    begun = time.monotonic()
+    start = time.monotonic()
 
     def progress(text):
         if output.progress:
-            print(f"{time.monotonic() - begun:6.1f} s  {text}", file=sys.stderr, flush=True)
+            print(f"{time.monotonic() - start:6.1f} s  {text}", file=sys.stderr, flush=True)
 
     found = criticise(recording, arguments.seed, arguments.without, arguments.recording, progress)
     write_report(found, arguments.out)

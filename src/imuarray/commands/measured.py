@@ -44,7 +44,7 @@ def first_order(arguments) -> None:
 
 
 def select(arguments) -> None:
-    """Samples worth calibrating with."""
+    """Select moving, unsaturated, informative samples."""
     from imuarray.estimation.selection import select_dynamic
 
     recording, output = read_recording(arguments.recording), Output(arguments)

@@ -1,4 +1,4 @@
-"""Lone readings far from what the model predicts: a rail that clips a single one, or nobody knows.
+"""Single readings far from the prediction: a rail that clips a single one, or another cause.
 
 Where a rail clips several readings they pile up at one value, which needs no model
 (`imuarray.diagnosis.reading_effects`); one alone is seen only beside its prediction.

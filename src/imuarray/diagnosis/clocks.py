@@ -43,7 +43,7 @@ def scan_clocks(fit: Fit, imus, delays: dict) -> list[Scanned]:
     """A sawtooth age for each IMU, and for those together that show one beyond a constant delay.
 
     ``delays`` (imu tuple -> chi-square of a constant delay) is what a clock must go beyond: its
-    sawtooth counts on top, and must be worth a fair share of it (a delay that is large leaves a
+    sawtooth counts on top, and must gain a fair share of it (a delay that is large leaves a
     little that a sawtooth can use, until it is adopted).
     """
     score, information = delay_score(fit)
@@ -126,7 +126,7 @@ def refine_clock(readings: Readings, clock, score, information) -> np.ndarray:
 
     The residual, by its ``score`` and ``information`` of the delay (T,), says how far each age
     is off; phase, frequency and drift are searched around where they are, along polynomials of
-    time that the data tell apart, the grid drawing in.
+    time that the data distinguish, the grid drawing in.
     """
     time, span = readings.time, readings.span
     turns = clock_turns(clock, time, span)
@@ -173,7 +173,7 @@ def estimated_again(readings: Readings, columns: Columns, state: State, imus) ->
 
 
 def without_jumps(readings: Readings, columns: Columns, state: State, imus, width):
-    """(readings, (T, N, 6) bool of those left out): which side of a jump one is on is a gamble.
+    """(readings, (T, N, 6) bool of those left out): the side of a jump that one is on is uncertain.
 
     ``width``: share of a turn within which samples of the clocked ``imus`` are left out.
     """
@@ -218,7 +218,7 @@ def maybe_clock(search, cause, own: float) -> bool:
 def placebo_of_ages(search) -> tuple[float, float]:
     """(nats that all IMUs' ages gain at once, nats with each one's given to the next).
 
-    What they have in common the motion takes up; 0 where a lone clock's have no other to go to.
+    What they have in common the motion takes up; 0 for a single clock, which has no other to go to.
     """
     fit, column = search.fit, search.columns.of(DELAY)[0]
     along, through = fit.whitened[..., column], fit.through[..., column]

@@ -16,7 +16,7 @@ from imuarray.diagnosis.heldout import Scores, gain, log_scores
 from imuarray.diagnosis.noise import coloured_meat, per_triad, standardised
 from imuarray.diagnosis.noise_effects import held_out
 from imuarray.diagnosis.parameters import prior_precision
-from imuarray.diagnosis.procedure import Found, investigate
+from imuarray.diagnosis.procedure import Found, run_procedure
 from imuarray.diagnosis.replicates import Discrepancy, discrepancies
 from imuarray.diagnosis.scores import information_at
 from imuarray.diagnosis.settings import SETTINGS
@@ -79,7 +79,7 @@ def diagnose(
 
     ``without``: effects struck from the catalogue. InputError for too few moving samples.
     """
-    found = investigate(recording, without, say)
+    found = run_procedure(recording, without, say)
     search = found.search
     say("fitting the papers' model to the same readings")
     extended = fitted(search.fit, search.noise.correlation)

@@ -18,7 +18,7 @@ from imuarray.diagnosis.special import SPECIAL
 from imuarray.diagnosis.state import Search
 from imuarray.diagnosis.tails import log_normal
 
-STRICT = ("outliers", "size of", "change of")  # checks that a small remainder does not excuse
+STRICT = ("outliers", "size of", "change of")  # checks that a small residual does not excuse
 
 
 def final_checks(search: Search, tailed) -> list[Check]:

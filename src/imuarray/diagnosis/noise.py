@@ -1,4 +1,4 @@
-"""The noise of each triad: scale, colour and outliers, told apart from smooth misfit.
+"""The noise of each triad: scale, colour and outliers, separated from smooth misfit.
 
 Misfit that the motion causes is smooth in time, noise is not: fourth differences and the upper
 half of the spectrum show the noise whatever the means get wrong.
@@ -18,9 +18,9 @@ from imuarray.diagnosis.tails import QUARTILE, log_normal, log_poisson
 DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / np.sqrt(70.0)
 HALF = len(DIFFERENCE) // 2
 # autocorrelations of differenced white noise at lags 1 ... 4
-ECHO = np.correlate(DIFFERENCE, DIFFERENCE, "full")[len(DIFFERENCE) :]
-# so many differences are worth one independent value in a mean square
-WORTH = float(1 + 2 * np.sum(ECHO**2))
+AUTOCORRELATION = np.correlate(DIFFERENCE, DIFFERENCE, "full")[len(DIFFERENCE) :]
+# differences for one independent value in a mean square
+INFLATION = float(1 + 2 * np.sum(AUTOCORRELATION**2))
 
 
 class Noise(NamedTuple):
@@ -77,9 +77,11 @@ def judge(readings: Readings, residual, basis) -> Noise:
     far = _outliers(fast, core)
     expected = 2 * np.exp(log_normal(SETTINGS.far)) * counts
     slope, correlation = _colour(np.nan_to_num(unit), readings)
-    passed = 1 + 2 * sum(echo * correlation ** (lag + 1) for lag, echo in enumerate(ECHO))
+    passed = 1 + 2 * sum(
+        value * correlation ** (lag + 1) for lag, value in enumerate(AUTOCORRELATION)
+    )
     tails = np.nanmean(values**4, axis=-1) / scale**4 - 3.0
-    error = np.sqrt(np.maximum(2 + tails, 1.0) * WORTH / counts) / 2
+    error = np.sqrt(np.maximum(2 + tails, 1.0) * INFLATION / counts) / 2
     sd = readings.sd * np.where(readings.exists, scale / np.sqrt(passed), 1.0)
     return Noise(sd, error, far.sum(axis=0), expected, slope, correlation, far)
 

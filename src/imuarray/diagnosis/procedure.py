@@ -46,7 +46,7 @@ class Found:
     rivals: dict = field(default_factory=dict)
 
 
-def investigate(
+def run_procedure(
     recording: Recording, without=(), say: Callable[[str], None] = lambda text: None
 ) -> Found:
     """Find what the papers' model gets wrong; effects in ``without`` are struck from the catalogue.
@@ -62,7 +62,7 @@ def investigate(
     # clocks are scanned for by what a delay would gain, whether or not it is a candidate
     described = effects if clocks.DELAY in effects else (*effects, clocks.DELAY)
     columns = columns_of(readings.array, described, readings.position_prior_sd)
-    search = Search(readings, columns, effects, say).begun()
+    search = Search(readings, columns, effects, say).fitted()
     base = search.fit
     base_checks = all_checks(base, search.given, search.noise)
     if not mended:
@@ -81,7 +81,7 @@ def investigate(
     untied = all(c.log_p >= SETTINGS.check for c in checks if c.name.startswith("residual"))
     in_noise += named_noise(search, without, tailed, untied)
     explained, failing = within_tolerance(search, checks, in_noise)
-    say("looking for what cannot be told apart")
+    say("looking for what cannot be distinguished")
     classes = {cause.effect: rivals(search, cause) for cause in search.causes}
     return Found(
         search, base, base_checks, together(structural, clips), in_noise, checks, explained,
@@ -90,18 +90,18 @@ def investigate(
 
 
 def looked_ahead(whole: Search) -> Search:
-    """The whole recording's search, begun with the causes that a part of it shows."""
+    """The whole recording's search, started with the causes that a part of it shows."""
     part = part_of(whole.readings, SETTINGS.long)
-    ahead = adopt(drop_outliers(Search(part, whole.columns, whole.effects, whole.say).begun()))
+    ahead = adopt(drop_outliers(Search(part, whole.columns, whole.effects, whole.say).fitted()))
     search = Search(
         whole.readings, whole.columns, whole.effects, whole.say, causes=ahead.causes,
         refused=ahead.refused,
-    ).begun(ahead.fit.state)  # fmt: skip
+    ).fitted(ahead.fit.state)  # fmt: skip
     return replace(search, excess=whole.excess, trace=ahead.trace)
 
 
 def drop_outliers(search: Search) -> Search:
-    """Leave out lone outliers while means are looked for, whatever their cause is."""
+    """Leave out isolated outliers while means are looked for, whatever their cause is."""
     if np.min(noises.tail_log_p(search.noise)) >= SETTINGS.limit(TAILS):
         return search
     far = np.repeat(search.noise.far, 3, axis=2)

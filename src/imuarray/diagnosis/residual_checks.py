@@ -255,12 +255,12 @@ def noise_checks(noise: Noise, exists) -> list[Check]:
     triads = np.argwhere(exists)
     tails = tail_log_p(noise)
     worst = min(triads, key=lambda t: tails[tuple(t)])
-    lone = Check(
+    outliers = Check(
         "outliers", float(noise.outliers[tuple(worst)]),
         float(min(tails[tuple(worst)] + np.log(len(triads)), 0.0)), (int(worst[0]),),
     )  # fmt: skip
     found = [(int(i), float(noise.slope[i, k])) for i, k in triads]
-    return [lone, normal_checks("whiteness", found)]
+    return [outliers, normal_checks("whiteness", found)]
 
 
 def resolution_check(fit: Fit) -> Check:

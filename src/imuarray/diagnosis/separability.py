@@ -1,4 +1,4 @@
-"""Which effects a recording can tell apart: correlations of their signals, and a cause's class."""
+"""Which effects a recording can distinguish: correlations of their signals, and a cause's class."""
 
 from __future__ import annotations
 

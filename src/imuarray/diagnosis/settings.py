@@ -12,7 +12,7 @@ class Settings:
     """Numbers of a diagnosis, all of one origin or another; `SETTINGS` are those in use.
 
     The critical values come from simulations. The others were set by judgement while the procedure
-    was made: what they lead to together is held by the tests on hidden effects
+    was made: what they lead to together is held by the tests on injected effects
     (tests/test_diagnose.py) and by the blind study.
     """
 
@@ -45,7 +45,7 @@ class Settings:
     least_step: float = 0.02  # nats; a step that promises less is not taken
     rough_gain: float = 1e-4  # of the misfit that a step must gain while causes are looked for
     fine_gain: float = 3e-6  # the same at the end
-    settled: float = 0.02  # of a parameter's own sd: steps below it are rest
+    converged: float = 0.02  # of a parameter's own sd: steps below it end the search
     shortest: float = 0.2  # share of a Gauss-Newton step
     held_sd: float = 1e-8  # s, of a period that is not to move
     wide: float = 10.0  # prior sd of the third derivatives, in sizes of the differences near by
@@ -69,7 +69,7 @@ class Settings:
     rough_share: float = 5.0  # factor of `share` where motion is rough
     blocks: int = 10  # blocks of time that are held out in turn
     likely_drift: float = -4.6  # log p of a drift beside an adopted bias
-    changing: float = 0.05  # of a drift's chi-square that its change must be worth
+    changing: float = 0.05  # of a drift's chi-square that its change must gain
     steady_drift: float = -50.0  # log p of a drift that does not change: it is misattributed
 
     # Clocks and shifts (`clocks`, `clock_from_gyros`, `shifts`)

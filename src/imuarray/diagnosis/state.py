@@ -117,7 +117,7 @@ class Search:
         share = SETTINGS.share * (1.0 if self.smooth else SETTINGS.rough_share)
         return max(share * self.left, SETTINGS.trace * self.excess)
 
-    def begun(self, former: State | None = None) -> Search:
+    def fitted(self, former: State | None = None) -> Search:
         """With the papers' model fitted, or what another search came to (``former``)."""
         first = start(self.readings, self.columns)
         if former is not None:

@@ -1,4 +1,4 @@
-"""Causes in words: what they are, how large, how sure, what cannot be told from them.
+"""Causes in words: what they are, how large, how sure, what cannot be distinguished from them.
 
 The sentences of `diagnosis.json` and of its page alike.
 """
@@ -24,7 +24,7 @@ from imuarray.diagnosis.state import Cause, Search
 from imuarray.model.effects import known_effect
 from imuarray.model.names import component, unit_of
 
-FEW = 3  # parameters that are told one by one
+FEW = 3  # parameters that are stated one by one
 
 
 def parameters_of(search: Search, cause: Cause, sds) -> dict:
@@ -81,7 +81,7 @@ def cause_in_words(cause: dict, labels, says: str = "") -> str:
         )
     if cause["indistinguishable_from"]:
         rivals = joined(words(name) for name in cause["indistinguishable_from"])
-        text += f" On this recording it cannot be told from {rivals}: one class."
+        text += f" On this recording it cannot be distinguished from {rivals}: one class."
     return first_up(text)
 
 

@@ -96,12 +96,12 @@ def block_descent(data, positions, tolerance, cost_tolerance, limit, marks):
         cost[done] = work.cost.sum() + work.reduced.const.sum()
         moved[done] = step
         fallen = cost[max(done - 1, 0)] - cost[done]
-        settled = done > 0 and fallen <= cost_tolerance * abs(cost[done])
+        flat = done > 0 and fallen <= cost_tolerance * abs(cost[done])
         done += 1
         while mark < len(marks) and marks[mark] == done:
             snapshots[mark] = positions
             mark += 1
-        if step <= tolerance or settled:
+        if step <= tolerance or flat:
             status = 1
     snapshots[mark:] = positions
     return status, cost[:done], moved[:done], snapshots
@@ -146,7 +146,7 @@ def calibrate_bcd(
     cost_tolerance : float
         ... or when the cost fell by less than this, relatively.
     limit : int
-        Largest number of iterations; ``converged`` tells whether it was hit.
+        Largest number of iterations; ``converged`` says whether it was hit.
     marks : sequence of int
         Iterations after which positions are kept in ``snapshots``.
 

@@ -43,7 +43,7 @@ def fuse(
     position_covariance : (3 (A - 1), 3 (A - 1)) m^2 of r_2 ... r_A, or None: exactly known
         Its errors are the same at all samples, so they do not average out over time.
     saturated : (T, G, 3) bool or None
-        Gyroscope axes at the rail. Their readings tell the side and the least size of the rate
+        Gyroscope axes at the rail. Their readings give the side and the least size of the rate
         (`imuarray.estimation.samplewise`; not where gyroscopes' noise is correlated), and nothing
         to the covariances.
 
@@ -100,7 +100,7 @@ def _searched(
 
 @partial(jax.jit, static_argnums=0)
 def _information(model, states, positions, precision):
-    """What the accelerometers tell of the motion (T, 9, 9), and of it and r_2 ... r_A at once."""
+    """What the accelerometers say of the motion (T, 9, 9), and of it and r_2 ... r_A at once."""
 
     def predicted(state, relative):
         whole = jnp.concatenate([positions[:1], relative.reshape(-1, 3)])

@@ -18,7 +18,7 @@ from imuarray.model import ArrayModel
 from imuarray.motion import Motion
 
 ENOUGH = 1e-3  # of a parameter's own sd, with effects
-SETTLED, SEARCH = 1e-7, 30  # of a sample's motion: tolerance in its own sds, steps
+TOLERANCE, SEARCH = 1e-7, 30  # of a sample's motion: tolerance in its own sds, steps
 
 
 def eliminate_motion(blocks: Blocks):
@@ -147,7 +147,7 @@ def _iterate(given, x, p, tolerance, limit):
     together would have to be halved for the worst sample's sake, again and again.
     """
     size = 3 * (given.model.array.accelerometers - 1)
-    x, cost = _settled(given, x, p)
+    x, cost = _most_likely_motion(given, x, p)
     costs, steps, converged = [cost], [0.0], False
     for _ in range(limit):
         blocks = normal_equations(given, x, p)
@@ -159,7 +159,7 @@ def _iterate(given, x, p, tolerance, limit):
         length = 1.0
         for _ in range(10):
             trial_p = p + length * step
-            trial_x, cost = _settled(given, x + length * motion_step(step), trial_p)
+            trial_x, cost = _most_likely_motion(given, x + length * motion_step(step), trial_p)
             if cost <= costs[-1] * (1 + 1e-12):
                 break
             length /= 2
@@ -171,9 +171,9 @@ def _iterate(given, x, p, tolerance, limit):
     return x, p, costs, steps, converged, covariance
 
 
-def _settled(given, x, p):
+def _most_likely_motion(given, x, p):
     """(the most likely motion (T, n) from x on at p, the whole cost there, priors included)."""
-    x, *_, cost = samplewise(given, x, p, SETTLED, SEARCH)
+    x, *_, cost = samplewise(given, x, p, TOLERANCE, SEARCH)
     offset = p - given.prior_mean
     return x, float(cost.sum() + np.sum((offset / given.prior_sd) ** 2))
 

@@ -54,7 +54,7 @@ class Online:
     def add(self, specific_force, angular_rate, saturated=None) -> int:
         """Samples (n, A, 3) m/s^2, (n, G, 3) rad/s and saturated axes (n, G, 3) or None.
 
-        A reading at a gyroscope's rail that ``saturated`` does not tell of spoils the positions
+        A reading at a gyroscope's rail that ``saturated`` does not mark spoils the positions
         (`Recording.saturated_gyroscopes` finds them). InputError for other shapes and for NaN.
         Returns how many blocks were learned from; what is left waits for more. Where a block
         raises IdentifiabilityError nothing of it is learned and it waits, with what comes next.

@@ -1,8 +1,9 @@
 """Each sample's whole motion by damped Gauss-Newton, readings at a rail used from one side.
 
 A reading at its rail says that the rate is there or beyond, on that side: its residual counts as
-long as the rate falls short, and not beyond. Specific force tells products of rates only, so there
-may be several minima where gyroscopes are lost; one of them agrees with the readings' sides.
+long as the rate falls short, and not beyond. Specific force determines products of rates
+only, so there may be several minima where gyroscopes are lost; one of them agrees with the
+readings' sides.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Tables of the blind study: the bars; gain, position error and coverage."""
+"""Tables of the blind study: the acceptance criteria; gain, position error and coverage."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from imuarray.figures.tables import Column
 
 YES_NO = {True: "yes", False: "no"}
 
-BARS = (
+CRITERIA = (
     Column("bar", "set and what is counted", "set and what is counted"),
     Column("aim", "bar", "bar"),
     Column("recordings", "recordings", "n"),
@@ -93,7 +93,7 @@ def table_blind_bars(rows: dict, settings: dict):
         _time_line(found),
     ]
     caption = "Blind study: what was asked of the diagnosis, and what was measured."
-    return table, BARS, caption, notes
+    return table, CRITERIA, caption, notes
 
 
 def _time_line(recordings: pd.DataFrame) -> str:

@@ -1,4 +1,4 @@
-"""Measured recordings of one board: positions, honest residuals, agreement between recordings."""
+"""Measured recordings of one board: positions, residuals, agreement between recordings."""
 
 from __future__ import annotations
 

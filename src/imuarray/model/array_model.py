@@ -50,7 +50,7 @@ class ArrayModel:
         Prior sd of omega (rad/s), omega_dot (rad/s^2) and s (m/s^2), infinite as in paper 2021.
         With effects that have a gauge the flat prior is no posterior at all: see `with_motion`.
     effect_prior : EffectPrior or None
-        Instead of the effects' own: zero mean, their prior sds, begun at zero.
+        Instead of the effects' own: zero mean, their prior sds, started at zero.
     clock : (float, float) or None
         Where time begins (s) and its span (s), which drifts, shifts and clocks look at; by
         default those of the times given, which a part of a recording does not share with it.

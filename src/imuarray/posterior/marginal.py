@@ -26,8 +26,8 @@ from imuarray.model.structure import CURVATURES, PAIRS
 from imuarray.posterior.likelihood import DETERMINANTS, Likelihood
 from imuarray.posterior.proposals import proposals
 
-LADDER = (1, 3, 5, 7, 9, 11)  # nodes on each axis of omega
-ENOUGH = 1e-4  # nats in total between one rung and the next: then the former is taken
+NODE_COUNTS = (1, 3, 5, 7, 9, 11)  # nodes on each axis of omega
+ENOUGH = 1e-4  # nats in total between one count and the next: then the former is taken
 NEWTON = 6  # steps to the mode at most, from where it is at the reference positions
 NEAR = 1e-4  # sds: a step as short is the last, the next would be its square
 
@@ -190,9 +190,9 @@ class Marginal:
         Parameters
         ----------
         nodes : int
-            On each axis of omega; 1 is Laplace's method. By default the fewest of `LADDER` that
-            differ by less than 1e-4 nats in total from the next at ``positions``, or the most:
-            ``gap`` tells. Two poor gyroscopes already need more than three (tests).
+            On each axis of omega; 1 is Laplace's method. By default the fewest of `NODE_COUNTS`
+            that differ by less than 1e-4 nats in total from the next at ``positions``, or the most:
+            ``gap`` says. Two poor gyroscopes already need more than three (tests).
         force_sd : float
             Prior sd of s (m/s^2); those of omega and omega_dot are the likelihood's.
         """
@@ -215,15 +215,15 @@ class Marginal:
         data = MarginalData(*map(jnp.asarray, parts))
         if nodes is not None:
             return cls(data, *grid(nodes))
-        rung = cls(data, *grid(LADDER[0]))
-        value = rung(positions)
-        for count in LADDER[1:]:
+        coarser = cls(data, *grid(NODE_COUNTS[0]))
+        value = coarser(positions)
+        for count in NODE_COUNTS[1:]:
             finer = cls(data, *grid(count))
             gap, value = abs(value - finer(positions)), finer(positions)
             if gap < ENOUGH:
-                return replace(rung, gap=gap)
-            rung = finer
-        return replace(rung, gap=gap)
+                return replace(coarser, gap=gap)
+            coarser = finer
+        return replace(coarser, gap=gap)
 
     def __call__(self, positions) -> float:
         """log p(y_a | theta, y_g) at positions (A, 3) m, as `Likelihood.estimate` estimates it."""

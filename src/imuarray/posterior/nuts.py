@@ -56,7 +56,7 @@ def run_nuts(
         About the density's mode and the covariance there: what the sampler sees is then nearly
         a standard normal density.
     warmup, draws : int
-        Transitions to settle in and to choose the step length in, not kept; and those kept.
+        Transitions of the warm-up, in which the step length is chosen, not kept; and those kept.
 
     Raises
     ------

@@ -19,7 +19,7 @@ class Sweeps(NamedTuple):
     steps: Sequence[float] | np.ndarray  # m, sigma_q
     draws: Sequence[int] = (1, 2, 5, 10, 20, 50, 100)  # N
     realisations: int = 200  # of log p-hat, for each N
-    transitions: int = 1000  # for each sigma_q, after as many to settle
+    transitions: int = 1000  # for each sigma_q, after as many of burn-in
     variance: float = 0.1  # of log p-hat
     acceptance: float = 0.18
 
@@ -129,7 +129,7 @@ def choose_draws(draws, variances, target: float = 0.1) -> int:
 
 
 def acceptance(target: Target, start, step: float, count: int, rng) -> float:
-    """Share of accepted proposals over ``count`` transitions, after as many to settle."""
+    """Share of accepted proposals over ``count`` transitions, after as many of burn-in."""
     theta = np.array(start, float)
     value = target.log_target(theta, rng)
     _, value = target.transitions(theta, value, step, count, rng)

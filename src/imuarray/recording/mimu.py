@@ -208,7 +208,7 @@ def _unwrapped(number, stamp, period) -> tuple[np.ndarray, np.ndarray]:
 def _period(steps, passed) -> float:
     """Ticks from one packet to the next: the mean over those that are near the median.
 
-    Neighbours tell; where none has survived, the shortest gaps. The mean, as jitter of the
+    Neighbours decide; where none has survived, the shortest gaps. The mean, as jitter of the
     stamps cancels in it and not in the median.
     """
     near = steps == max(int(steps[steps > 0].min(initial=NUMBERS)), 1)

@@ -30,7 +30,7 @@ from imuarray.recording.record import (
 # 1.6 GB as float64. A file of a few bytes can declare far more than any memory holds.
 MAX_VALUES = 200_000_000
 
-# A pause this many times the usual step is worth a word: estimators that smooth would bridge it.
+# A pause this many times the usual step is reported: estimators that smooth would bridge it.
 GAP_FACTOR = 5.0
 
 # Calibrated values may pass the rail by some per cent; this is to find wrong units (57, 9.8, ...).
@@ -79,7 +79,7 @@ def check_values(recording: Recording, where: str) -> None:
     _check_labels("gyroscope", recording.gyroscope_labels, where)
     for name in UNITS:
         _check_finite(recording, name, where)
-    _check_time(recording.time, where, told=bool(recording.selected))
+    _check_time(recording.time, where, declared=bool(recording.selected))
     require_planar_extent(recording.accelerometer_position, f"{where}: accelerometer_position")
     _check_range(recording, "specific_force", recording.accelerometer_range, where)
     _check_range(recording, "angular_rate", recording.gyroscope_range, where)
@@ -220,8 +220,8 @@ def _place(recording: Recording, name: str, index: tuple[int, ...]) -> str:
     return ", ".join(words)
 
 
-def _check_time(time: np.ndarray, where: str, told: bool = False) -> None:
-    """Strictly increasing, or InputError; even, or a warning, unless the file has ``told`` so."""
+def _check_time(time: np.ndarray, where: str, declared: bool = False) -> None:
+    """Strictly increasing, or InputError; even, or ``declared`` by the file, or a warning."""
     steps = np.diff(time)
     if (steps <= 0).any():
         i = int(np.argmax(steps <= 0))
@@ -229,7 +229,7 @@ def _check_time(time: np.ndarray, where: str, told: bool = False) -> None:
             f"{where}: time: expected strictly increasing values, found {time[i]} s and then "
             f"{time[i + 1]} s at index {i + 1}"
         )
-    if len(steps) == 0 or told:
+    if len(steps) == 0 or declared:
         return
     usual = float(np.median(steps))
     gaps = np.flatnonzero(steps > GAP_FACTOR * usual)

@@ -1,1 +1,1 @@
-"""A diagnosis told to people: its answers, figures and tables on one page."""
+"""The page of a diagnosis: its answers, figures and tables on one page."""

@@ -23,7 +23,7 @@ from imuarray.report.numbers import in_noise_sds, position_table
 if TYPE_CHECKING:
     from imuarray.diagnosis.document import Diagnosis
 
-HIDDEN = 1.1  # times the assumed noise: a residual that looks like noise
+BELOW_NOISE = 1.1  # times the assumed noise: a residual that looks like noise
 USUAL = 0.05  # p-value of a check that is as expected
 FEW = 3  # checks that are quoted, causes that are named with their IMUs
 PAPERS = "specific force ω × (ω × r) + dω/dt × r + s, angular rate ω, and white noise"
@@ -59,7 +59,7 @@ def verdict(diagnosis: Diagnosis) -> str:
             named = [words(c["effect"]) for c in document["causes"]]
         return f"Unexplained: {left} after {counted(named)} ({', '.join(named)})."
     if not named:
-        return "Nothing: the papers' model simulates this recording as far as it can be told."
+        return "Nothing: the papers' model simulates this recording as far as it can show."
     rest = "little else is left" if document["remaining"] else "nothing else is left"
     return f"{counted(named)}: {joined(named)}; {rest}."
 
@@ -101,8 +101,8 @@ def wrong(diagnosis: Diagnosis) -> Answer:
         lead += " These checks describe. The verdict rests on stricter tests of the residual, which"
         lead += " all pass."
         return Answer("What does the simulation get wrong?", lead, [])
-    if document["causes"] and max(in_noise_sds(diagnosis.base).values()) < HIDDEN:
-        lead += " The misfit hides in the noise; its pattern gives it away."
+    if document["causes"] and max(in_noise_sds(diagnosis.base).values()) < BELOW_NOISE:
+        lead += " The misfit is smaller than the noise; its pattern shows it."
     items = [quoted(check) for check in out[:FEW]]
     return Answer("What does the simulation get wrong?", lead, items)
 
@@ -196,7 +196,7 @@ def gained(diagnosis: Diagnosis) -> Answer:
     if clean(document):
         lead = "Nothing, and there was nothing to gain."
         items = [
-            "On held-out time, estimating each triad's noise is worth"
+            "On held-out time, estimating each triad's noise gains"
             f" {over_base} nats per sample over the declared noise, {over_inflated} over noise of"
             " the residual's size."
         ]
@@ -205,7 +205,7 @@ def gained(diagnosis: Diagnosis) -> Answer:
     lead = (
         f"Each of the {samples} samples, predicted from the other stretches of time, is"
         f" {over_base} nats more likely than under the papers' model, and {over_inflated} nats more"
-        f" than under its honest rival, the papers' model with noise inflated to its residual"
+        f" than under its rival, the papers' model with noise inflated to its residual"
         f" ({total} nats in all). Readings that were left out as outliers are in no score."
     )
     items = [residual_in_words(diagnosis), positions_in_words(diagnosis)]

@@ -1,4 +1,4 @@
-"""Each cause, the extended model's positions, and which effects a recording can tell apart."""
+"""Each cause, the extended model's positions, and which effects a recording can distinguish."""
 
 from __future__ import annotations
 

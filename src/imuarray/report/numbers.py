@@ -109,10 +109,10 @@ def gain_table(diagnosis: Diagnosis) -> pd.DataFrame:
     its numbers gain when they are given to other IMUs.
     """
     document = diagnosis.document
-    first = {rung.effect: rung.gain for rung in reversed(diagnosis.found.search.trace)}
+    first = {step.effect: step.gain for step in reversed(diagnosis.found.search.trace)}
     rows = []
     for cause in document["causes"]:
-        # a lone clock's ages have no other to go to: its placebo is exactly 0
+        # a single clock's ages have no other to go to: its placebo is exactly 0
         placebo = cause.get("placebo_gain_nats") or np.nan
         rows.append({
             "what": cause["effect"], "sensors": ", ".join(cause["sensors"]),

@@ -53,7 +53,7 @@ def signal_of(diagnosis: Diagnosis, cause) -> Signal:
     step[others] = scaled_inverse(information + np.diag(ridge)) @ score
     explained = left - made.less_motion(along(made, step))
     total = np.where(made.readings.keep, made.residual + explained, np.nan)
-    # neighbours that are alike are worth fewer independent ones
+    # correlated neighbours are fewer independent ones
     rho = np.clip(diagnosis.found.search.noise.correlation, 0.0, 0.99)
     inflated = np.repeat(np.sqrt((1 + rho) / (1 - rho)), 3, axis=1)
     width = np.sqrt(np.maximum(1.0 - made.leverage, 1e-6)).mean(axis=0) * inflated

@@ -63,7 +63,7 @@ CAPTIONS = {
         " with declared and with inflated noise. A placebo ought to gain nothing.",
     ),
     "separability": (
-        "What this recording can tell apart",
+        "What this recording can distinguish",
         "Squared canonical correlation of the effects' signals, each on all IMUs, motion and"
         f" positions projected out. Framed: above {ALIKE}, one class. Below the diagonal the"
         " two most alike forms of two effects, above it the mean over the forms of the smaller"

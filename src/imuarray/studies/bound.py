@@ -31,7 +31,7 @@ RANK = 1e-10  # of the largest eigenvalue of the scaled information
 def information_at(model: ArrayModel, motion, positions, saturated=None) -> np.ndarray:
     """Fisher information (3 (A - 1),) squared, 1 / m^2, of r_2 ... r_A at a true motion (T, 3).
 
-    The motion is unknown to who estimates; ``saturated`` (T, G, 3) axes tell nothing.
+    The motion is unknown to who estimates; ``saturated`` (T, G, 3) axes say nothing.
     """
     force, rate = model.predict_many(motion, positions)
     data = Collapsed.of(model, force, rate, saturated)
@@ -43,7 +43,7 @@ def information_at(model: ArrayModel, motion, positions, saturated=None) -> np.n
 
 
 def block_information(model: ArrayModel, motion) -> np.ndarray:
-    """The same were the motion known: what a step of ML-BCD believes."""
+    """The same were the motion known: what a step of ML-BCD assumes."""
     state = np.zeros((12, len(motion.angular_rate)))
     state[:6], state[6:9] = (
         products(motion.angular_rate).T,
@@ -53,13 +53,13 @@ def block_information(model: ArrayModel, motion) -> np.ndarray:
     return np.kron(np.diag(model.noise.triad_weights), stacked @ stacked.T)[3:, 3:]
 
 
-def contraction(known, believed) -> float:
+def contraction(known, assumed) -> float:
     """By what factor ML-BCD's slowest error shrinks in an iteration, near the optimum.
 
     The largest squared canonical correlation of positions and motion: one less the smallest
     eigenvalue of the information with the motion unknown against that with it known.
     """
-    values = np.linalg.eigvals(np.linalg.solve(believed, known)).real
+    values = np.linalg.eigvals(np.linalg.solve(assumed, known)).real
     return float(1.0 - values.min())
 
 
@@ -140,7 +140,7 @@ def convergence(
 ) -> pd.DataFrame:
     """Iterations of ML-BCD and of Gauss-Newton to 1.01 times the bound, for each motion.
 
-    A row for each of ``count`` realisations. ``contraction`` is what the information foresees for
+    A row for each of ``count`` realisations. ``contraction`` is what the information predicts for
     ML-BCD, ``observed`` what its steps show; iterations beyond the limits are NaN.
     """
 
@@ -185,7 +185,7 @@ def paths(model: ArrayModel, force, rate, saturated, limit: int = BCD_LIMIT) -> 
     data = Collapsed.of(model, force, rate, saturated)
     best = fisher_scoring(data, model.array.relative)
     bound = np.sqrt(np.trace(best.covariance) / len(best.covariance))
-    if not best.converged:  # data that tell too little: there is no way to go
+    if not best.converged:  # data that determine too little: there is no way to go
         return Paths(bound, np.empty(0, int), np.empty(0), np.nan, np.nan)
     enough = bound * np.sqrt(NEAR**2 - 1)  # distance from the optimum, errors adding in squares
     marks = np.unique(np.geomspace(1, limit, 1000).astype(int))
@@ -271,7 +271,7 @@ def geometries(model: ArrayModel) -> dict[str, ArrayModel]:
 
 
 def rank_cases(model: ArrayModel, seed, sphere, normal) -> list[tuple]:
-    """(name, model, motion) of what may and may not tell the positions.
+    """(name, model, motion) of what may and may not determine the positions.
 
     ``sphere``: magnitudes as in paper 2017; ``normal``: sds as in paper 2021.
     """

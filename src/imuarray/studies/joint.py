@@ -33,8 +33,9 @@ PRIOR_SD = 2e-3  # m
 MOTION_SD = (15.0, 500.0, 20.0)  # rad/s, rad/s^2, m/s^2; the last is flat to the samplers,
 # who see differences between triads only
 SAMPLES, DRAWS = 2, 5
-# Length, transitions a round; the names are also those of the random streams.
-STEPS = {"walk": (1.0e-3, 10), "autoregressive": (0.6, 5)}
+# Length, transitions a round.
+STEPS = {"walk": (1.0e-3, 10), "pcn": (0.6, 5)}
+STREAMS = {"pcn": "autoregressive"}  # names of random streams, where not the sampler's
 LEAPS, LEAP = 2, 0.5  # NUTS: transitions a round, step length in prior sds
 NODES = 5
 
@@ -62,7 +63,7 @@ def simulated(model: ArrayModel, theta, rng) -> Round:
     return Round(likelihood, np.asarray(motion.angular_rate))
 
 
-def begun(target: CompiledTarget, theta, data: Round, rng) -> float:
+def started(target: CompiledTarget, theta, data: Round, rng) -> float:
     """log target at theta with draws of omega as they are, given that theta made the data.
 
     One of N draws a sample is the omega that did: fresh ones alone would be of another law than
@@ -89,19 +90,19 @@ def _preconditioned(likelihood, model, prior) -> CompiledTarget:
     return PreconditionedTarget(centred, prior, DRAWS, prior.mean, np.diag(prior.sd))
 
 
-TARGETS = {"walk": _walk, "autoregressive": _preconditioned}
+TARGETS = {"walk": _walk, "pcn": _preconditioned}
 
 
 def pmmh_rounds(name: str, seed: int, rounds: int) -> Iterator[np.ndarray]:
     """(theta, misfit of the measurements at it) after each round of PmMH."""
     model, prior = problem()
-    rng = stream(seed, "joint", name)
+    rng = stream(seed, "joint", STREAMS.get(name, name))
     step, count = STEPS[name]
     theta = prior.mean + prior.sd * rng.standard_normal(prior.mean.size)
     for _ in range(rounds):
         data = simulated(model, theta, rng)
         target = TARGETS[name](data.likelihood, model, prior)
-        target.transitions(theta, begun(target, theta, data, rng), step, count, rng)
+        target.transitions(theta, started(target, theta, data, rng), step, count, rng)
         yield np.append(theta, misfit(data.likelihood, theta))
 
 
@@ -144,7 +145,7 @@ def nuts_rounds(name: str, seed: int, rounds: int) -> Iterator[np.ndarray]:
 
 SAMPLERS: dict[str, tuple[str, Callable]] = {
     "walk": ("PmMH, (27)", pmmh_rounds),
-    "autoregressive": ("PmMH, pCN, centred", pmmh_rounds),
+    "pcn": ("PmMH, pCN, centred", pmmh_rounds),
     "nuts": ("NUTS", nuts_rounds),
 }
 

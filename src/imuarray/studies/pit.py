@@ -18,7 +18,7 @@ from imuarray.studies.truths import SPARE, Replicate, Setting, misfit, replicate
 
 DRAWS = 199  # kept of each posterior, nearly independent
 APART = 2.0  # posterior sds by which chains start off the mode
-WARMUP, SPACING = 200, 4  # NUTS: transitions to settle in, transitions between kept draws
+WARMUP, SPACING = 200, 4  # NUTS: transitions of warm-up, transitions between kept draws
 PILOT, PILOT_ESS = 20000, 200  # transitions of PmMH at a time, until so many are effective
 BLOCKS = (1, 2, 5, 10, 20, 50, 100, 200, 500)  # of them, after which that is looked at
 ROUNDS, LEARNT = 6, 100  # of a burn-in, draws in each
@@ -55,7 +55,7 @@ def of_draws(setting: Setting, made, draws, name: str) -> np.ndarray:
 
 
 def independent(draws) -> np.ndarray:
-    """How many of the kept draws (R, L, P) are worth an independent one, at worst: (R,)."""
+    """Effective size of the kept draws (R, L, P), of the worst parameter: (R,)."""
     return np.array([ess(one[None]).min() for one in draws])
 
 
@@ -181,7 +181,7 @@ def _learnt(target, theta, lengths, spacing: int, rng):
     """(target, log target) after a burn-in that moves ``theta`` in place.
 
     Preconditioned Crank-Nicolson proposals learn centre and shape in it, and keep them from then
-    on: where data tell little the posterior's mass is some sds from its mode.
+    on: where data determine little the posterior's mass is some sds from its mode.
     """
     value = target.log_target(theta, rng)
     for _ in range(ROUNDS):

@@ -16,7 +16,7 @@ from imuarray.studies.batches import batches, root_mean_square, run_batches
 def _batch(model, rng, count, motion, position_sd, rail):
     """Squared errors of ``count`` realisations, each with its own true positions.
 
-    The estimator believes the nominal positions. Returns (count,) means over axes for the
+    The estimator assumes the nominal positions. Returns (count,) means over axes for the
     array's omega, the gyroscopes' average, the array's omega_dot and s, and convergence.
     """
     array = model.array

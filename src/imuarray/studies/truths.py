@@ -105,7 +105,7 @@ def _descended(data, start, prior: GaussianPrior):
 
 
 def _without_prior(likelihood: Likelihood, start):
-    """(most likely positions (P,), their covariance, converged); NaN where data do not tell."""
+    """(most likely positions (P,), their covariance, converged); NaN where not determined."""
     try:
         found = fisher_scoring(likelihood.collapsed, start)
     except IdentifiabilityError:
@@ -119,7 +119,7 @@ def _most_likely(setting: Setting, likelihood: Likelihood, rng):
 
     Few triads, few samples and a wide prior have local optima: from the nominal positions alone
     the search ends in one in 4 of the first 200 data sets of 4 triads and 5 samples with positions
-    off by 3 mm (`tests/test_validation.py`). Their residuals, far beyond the noise, tell.
+    off by 3 mm (`tests/test_validation.py`). Their residuals, far beyond the noise, show it.
     """
     prior, data = setting.prior, likelihood.collapsed
     enough = GOOD * 3 * setting.model.array.accelerometers * setting.samples

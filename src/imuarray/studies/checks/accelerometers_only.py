@@ -19,7 +19,7 @@ def _squares(model, rng, count, motion_sizes, position_sd):
     truth = array.relative + errors - errors[:, :1]
     motion = sphere_motion(rng, (count, 1), *motion_sizes)
     force, rate, _ = measure(model, motion, truth, rng)
-    # left out they still start the iteration, which settles the sign of omega
+    # left out they still start the iteration, which decides the sign of omega
     lost = np.ones(rate[:, 0].shape, bool)
     found = estimate_motion(model, force[:, 0], rate[:, 0], saturated=lost).motion
     pairs = ((found.angular_rate, motion[0]), (found.angular_acceleration, motion[1]))
