@@ -47,6 +47,7 @@ class Rough:
         return dict(enumerate(off))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_phases_rates_drifts_and_the_period_are_found(seed):
     there = Rough(seed)

@@ -80,6 +80,7 @@ def test_ml_recovers_the_effect_and_its_uncertainty(name):
     assert wrong.cost[-1] > 2 * found.cost[-1]
 
 
+@pytest.mark.slow
 def test_likelihood_prefers_the_true_effect():
     model, force, rate, positions, parameters, motion = simulated(
         ("sensor_delay",), CASES["sensor_delay"], samples=30
@@ -92,6 +93,7 @@ def test_likelihood_prefers_the_true_effect():
     assert likelihood.on(truth, normals) > likelihood.on(nothing, normals) + 100
 
 
+@pytest.mark.slow
 def test_sampler_runs_on_an_extended_model_near_its_mode():
     """The posterior of the delays from PmMH covers the truth (seed 5; 5 sd)."""
     model, force, rate, positions, parameters, _ = simulated(
@@ -133,6 +135,7 @@ def test_generic_likelihood_equals_the_collapsed_one_up_to_a_constant():
     assert np.ptp(offsets) < 5 * np.max(errors) * 2**0.5 + 1e-4
 
 
+@pytest.mark.slow
 def test_no_reward_along_a_gauge_with_a_proper_motion_prior():
     """omega -> omega / (1 + c), r -> r (1 + c)^2 leaves the data alone: log p-hat must be flat.
 

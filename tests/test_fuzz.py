@@ -116,6 +116,7 @@ def test_layouts_of_tables(tmp_path):
     assert read < FILES // 2
 
 
+@pytest.mark.slow
 def test_configurations(tmp_path):
     rng, read = np.random.default_rng(3), 0
     content, path = (ROOT / "config.yaml").read_bytes(), tmp_path / "config.yaml"

@@ -91,7 +91,7 @@ def test_a_start_without_a_density_is_refused():
 
 def test_command(tmp_path):
     """`imuarray sample --method nuts` writes what `--method pmmh` does."""
-    recording, _ = make(Case("nuts", duration=4.0), 1)
+    recording, _ = make(Case("nuts", duration=2.0), 1)
     write_recording(recording, tmp_path / "rec.nc")
     out = tmp_path / "posterior.nc"
     code = main(

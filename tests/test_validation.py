@@ -25,9 +25,9 @@ def setting(name="paper", samples=5, triads=4):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_pit_values_of_the_truth_are_uniform(method):
-    """30 truths, 9 coordinates: p below 1e-3 in one of a thousand runs of a right sampler."""
-    values = sbc.pit_values(setting(), range(30), methods=[method])
-    assert len(values) == 30 * 11
+    """20 truths, 9 coordinates: p below 1e-3 in one of a thousand runs of a right sampler."""
+    values = sbc.pit_values(setting(), range(20), methods=[method])
+    assert len(values) == 20 * 11
     row = coverage(values).iloc[0]
     assert row.p > 1e-3
     scores = row[["shift_z", "width_z", "size_z", "misfit_z"]].dropna().astype(float)
@@ -46,13 +46,13 @@ def test_widths_that_are_wrong_are_seen(monkeypatch, factor):
         return measure(type(model)(model.array, noise), *arguments)
 
     monkeypatch.setattr(truths, "measure", measured)
-    values = sbc.pit_values(setting(), range(100), methods=["PmMH, pCN"])
+    values = sbc.pit_values(setting(), range(60), methods=["PmMH, pCN"])
     assert np.sign(np.log(factor)) * coverage(values).width_z[0] > 5
 
 
 def test_pit_values_are_uniform_where_data_tell_little():
     """The hard setting: posteriors a third to two thirds as wide as the prior."""
-    values = sbc.pit_values(setting("hard"), range(40), methods=["NUTS"])
+    values = sbc.pit_values(setting("hard"), range(24), methods=["NUTS"])
     row = coverage(values).iloc[0]
     assert row.p > 1e-3
     scores = row[["shift_z", "width_z", "size_z", "misfit_z"]].astype(float)
