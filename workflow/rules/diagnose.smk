@@ -9,7 +9,7 @@ rule diagnose_recording:
         report=report(
             "results/measured/diagnosis/{name}/report.html",
             caption="../report/diagnosis.rst",
-            category="Model criticism",
+            category="Diagnosis",
         ),
     log:
         "results/measured/logs/diagnosis/{name}.log",
@@ -35,7 +35,7 @@ rule diagnosis_agreement:
         ),
     output:
         **figure(
-            "diagnosis_{group}", "Model criticism", caption="diagnosis", folder="results/measured"
+            "diagnosis_{group}", "Diagnosis", caption="diagnosis", folder="results/measured"
         ),
         positions="results/measured/tables/diagnosis_positions_{group}.csv",
         parameters="results/measured/tables/diagnosis_parameters_{group}.csv",
@@ -62,7 +62,7 @@ rule figure_past_rail:
         ],
     output:
         **figure(
-            "past_rail_{name}", "Model criticism", caption="past_rail", folder="results/measured"
+            "past_rail_{name}", "Diagnosis", caption="past_rail", folder="results/measured"
         ),
     log:
         "results/measured/logs/past_rail_{name}.log",

@@ -6,7 +6,7 @@ import sys
 import time
 
 from imuarray.commands.output import Output
-from imuarray.diagnosis.document import diagnose as criticise
+from imuarray.diagnosis.document import diagnose as diagnosed
 from imuarray.errors import InputError
 from imuarray.model.effects import DATA_EFFECTS, EFFECTS
 from imuarray.recording import read_recording
@@ -26,7 +26,7 @@ def diagnose(arguments) -> None:
         if output.progress:
             print(f"{time.monotonic() - start:6.1f} s  {text}", file=sys.stderr, flush=True)
 
-    found = criticise(recording, arguments.seed, arguments.without, arguments.recording, progress)
+    found = diagnosed(recording, arguments.seed, arguments.without, arguments.recording, progress)
     write_report(found, arguments.out)
     output.say("\n".join([*report(found.document), f"report: {arguments.out / 'report.html'}"]))
     output.done(found.document | {"out": str(arguments.out)})

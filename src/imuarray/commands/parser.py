@@ -181,7 +181,7 @@ COMMANDS = (
         "corrected.nc --out diagnosis/", "folder to write: diagnosis.json, report.html, figures",
         (
             RECORDING, EFFECT_FILE,
-            _option("--without", "effects to strike from the catalogue, separated by commas"
+            _option("--without", "effects to leave out of the catalogue, separated by commas"
                     " (default: none)", type=effects, default=(), metavar="A,B"),
             SEED,
         ),

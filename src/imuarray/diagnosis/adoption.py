@@ -83,10 +83,10 @@ def attempt(search: Search, score, values) -> Search:
 
 
 def keeps(search: Search, score, gain: float, error: float) -> bool:
-    """Whether a gain on held-out time is clear, and a fair part of what the test promised."""
+    """Whether a gain on held-out time is clear, and a fair part of what the test predicted."""
     least = SETTINGS.least_z if search.smooth else SETTINGS.rough_z
-    promised = score.statistic / 2 - SETTINGS.uncertain
-    return gain > least * error and gain > SETTINGS.kept * promised
+    predicted = score.statistic / 2 - SETTINGS.uncertain
+    return gain > least * error and gain > SETTINGS.kept * predicted
 
 
 def predicted_gain(search: Search, candidate: Candidate, values) -> tuple[float, float]:

@@ -51,7 +51,7 @@ def scan_clocks(fit: Fit, imus, delays: dict) -> list[Scanned]:
     for imu in imus:
         gain, values = sawtooth(time, score[:, imu], information[:, imu])
         log_p = log_chi_square(max(gain, 1e-9), 3) + SETTINGS.many + np.log(len(time) * len(imus))
-        if log_p < SETTINGS.believed and gain > SETTINGS.fair * delays.get((imu,), 0.0):
+        if log_p < SETTINGS.sawtooth and gain > SETTINGS.fair * delays.get((imu,), 0.0):
             each[imu] = (gain, values)
     for imu in list(each):
         if any(_echo(each[imu], other) for other in each.values()):

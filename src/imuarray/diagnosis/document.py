@@ -75,9 +75,9 @@ def diagnose(
     recording: Recording, seed: int = 0, without=(), recording_path: str | Path = "",
     say: Callable[[str], None] = lambda text: None, replicates: int = 99,
 ) -> Diagnosis:  # fmt: skip
-    """Criticise the papers' model on a recording and extend it.
+    """Test the papers' model on a recording and extend it.
 
-    ``without``: effects struck from the catalogue. InputError for too few moving samples.
+    ``without``: effects left out of the catalogue. InputError for too few moving samples.
     """
     found = run_procedure(recording, without, say)
     search = found.search

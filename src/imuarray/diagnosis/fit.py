@@ -128,18 +128,18 @@ def search_optimum(readings, columns, active, state, smooth, rough):
             offset[held] = 0.0
         score = score - precision @ offset
         step, sds = scaled_solve(information + precision, score)
-        moved, astray = np.max(np.abs(step) / sds, initial=0.0), float(np.sum(seen.taken**2))
-        promised = score @ step + astray
-        still = moved < SETTINGS.converged and astray < 0.01 * len(seen.taken)
-        if still or promised < max(SETTINGS.least_step, enough * misfit):
-            # what the last step leaves is of second order in what it promised
+        moved, in_motion = np.max(np.abs(step) / sds, initial=0.0), float(np.sum(seen.taken**2))
+        predicted = score @ step + in_motion
+        still = moved < SETTINGS.converged and in_motion < 0.01 * len(seen.taken)
+        if still or predicted < max(SETTINGS.least_step, enough * misfit):
+            # what the last step leaves is of second order in what it predicted
             state = advance(columns, state, active, step, few, seen, 1.0)
             converged = True
             break
-        cost = misfit + astray + float(offset @ precision @ offset)
+        cost = misfit + in_motion + float(offset @ precision @ offset)
         if number > 3 and abs(cost - last) < 0.3 * enough * last:
-            break  # it wanders around the optimum, by less than anything distinguished here
-        # full steps may leap to and fro across a valley: half of them lead into it
+            break  # it stays around the optimum, by less than anything distinguished here
+        # full steps may alternate across a valley: half of them lead into it
         length = max(length / 2, SETTINGS.shortest) if cost > last else min(1.0, 1.2 * length)
         last = cost
         state = advance(columns, state, active, step, few, seen, length)

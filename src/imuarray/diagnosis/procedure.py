@@ -49,7 +49,7 @@ class Found:
 def run_procedure(
     recording: Recording, without=(), say: Callable[[str], None] = lambda text: None
 ) -> Found:
-    """Find what the papers' model gets wrong; effects in ``without`` are struck from the catalogue.
+    """Find what the papers' model gets wrong; effects in ``without`` are not in the catalogue.
 
     InputError where a recording has too few moving samples.
     """

@@ -42,7 +42,7 @@ class Settings:
 
     # Gauss-Newton over motion and parameters (`fit`, `parameters`)
     steps: int = 15  # Gauss-Newton steps at most
-    least_step: float = 0.02  # nats; a step that promises less is not taken
+    least_step: float = 0.02  # nats; a step predicted to gain less ends the search
     rough_gain: float = 1e-4  # of the misfit that a step must gain while causes are looked for
     fine_gain: float = 3e-6  # the same at the end
     converged: float = 0.02  # of a parameter's own sd: steps below it end the search
@@ -61,8 +61,8 @@ class Settings:
     visible: float = 1e-3  # the same of a combination that is no gauge of motion and positions
     patience: int = 8  # refusals in a row: what is left is none of the catalogue
     most_causes: int = 12  # causes
-    kept: float = 0.05  # of the gain that a test promises must be there on held-out time
-    uncertain: float = 50.0  # nats; smaller promises may break
+    kept: float = 0.05  # of the gain that a test predicts must be there on held-out time
+    uncertain: float = 50.0  # nats; smaller predicted gains need not be confirmed
     least_z: float = 1.5  # standard errors that a gain on held-out time must have
     rough_z: float = 2.0  # the same where the motion is rough, and few stretches decide
     trace: float = 2e-5  # of the excess there was at first: least chi-square of a cause
@@ -73,7 +73,7 @@ class Settings:
     steady_drift: float = -50.0  # log p of a drift that does not change: it is misattributed
 
     # Clocks and shifts (`clocks`, `clock_from_gyros`, `shifts`)
-    believed: float = -10.0  # log p of a sawtooth beyond a constant delay
+    sawtooth: float = -10.0  # log p of a sawtooth beyond a constant delay
     many: float = 2.6  # log of the independent sawtooths per sample, from simulated white scores
     fair: float = 0.05  # of the constant delay's chi-square that a sawtooth must add
     least_turns: int = 3  # of a clock against the host's; fewer are a drift of the delay
