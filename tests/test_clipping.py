@@ -66,6 +66,7 @@ def recording():
     return make(Case("lone", duration=8.0), 3)[0]
 
 
+@pytest.mark.slow
 def test_a_clipped_reading_is_named(recording):
     rate = recording.angular_rate.copy()
     size = np.abs(rate[:, 2])
@@ -79,6 +80,7 @@ def test_a_clipped_reading_is_named(recording):
     assert struck.unexplained and not struck.structural
 
 
+@pytest.mark.slow
 def test_a_reading_far_off_anywhere_else_is_not_passed_over(recording):
     rate = recording.angular_rate.copy()
     rate[400, 5, 1] += 12 * recording.gyroscope_noise_sd

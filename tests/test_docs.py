@@ -22,7 +22,7 @@ from imuarray.model import EFFECTS
 from tests.doc_pages import FENCE, PAGES, ROOT, Block, blocks, commands, compare
 
 DOCS = ROOT / "docs"
-SLOW = ("README.md", "tutorial_recording.md", "tutorial_simulated.md")
+SLOW = ("README.md", "effects.md", "tutorial_recording.md", "tutorial_simulated.md")
 COMMAND = re.compile(r"`(imuarray [^`]+)`")
 CODE = re.compile(r"`([^`]+)`")
 

@@ -63,6 +63,7 @@ def test_effect_changes_the_simulation_as_its_equation_says(name):
             assert np.abs(error).max() <= 0.1 * np.abs(change).max() + 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_ml_recovers_the_effect_and_its_uncertainty(name):
     """Seed 5; all |errors| below 4.5 sd: false alarm below 1e-3 over some 45 parameters."""
@@ -117,6 +118,7 @@ def test_sampler_runs_on_an_extended_model_near_its_mode():
     assert np.all(np.abs(chains.draws.mean(axis=(0, 1)) - truth) < 6 * sds)
 
 
+@pytest.mark.slow
 def test_generic_likelihood_equals_the_collapsed_one_up_to_a_constant():
     """Differences between thetas agree within Monte Carlo error (seed 3, 5 sd)."""
     model, force, rate, positions, _, motion = simulated((), lambda rng: {}, samples=20)

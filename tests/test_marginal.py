@@ -143,6 +143,7 @@ def test_proper_motion_prior_of_the_estimator():
     assert error < 0.01
 
 
+@pytest.mark.slow
 def test_laplace_of_the_generic_likelihood():
     """With effects: against its own estimate by importance sampling, and its own differences."""
     rng = np.random.default_rng(7)

@@ -36,6 +36,7 @@ def test_position_errors(name):
     assert np.all(table.realisations == 80) and np.all(table.rmse_m > 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["ML", "PmMH, pCN", "NUTS"])
 def test_pit_values(method):
     whole = pit_values(setting(), range(4), methods=[method])
