@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
+from scipy.signal import savgol_coeffs
 from scipy.sparse import lil_matrix
 from scipy.stats import chi2, norm, poisson
 
@@ -15,7 +16,7 @@ from imuarray.diagnosis import noise_effects as variance
 from imuarray.diagnosis.clocks import sawtooth
 from imuarray.diagnosis.fit import Fit, fit, flat_parameters, from_flat, normal
 from imuarray.diagnosis.heldout import blocks_of, log_scores
-from imuarray.diagnosis.linearise import linearise
+from imuarray.diagnosis.linearise import linearise, quartic_taps
 from imuarray.diagnosis.parameters import catalogue_effects, columns_of, prior_precision
 from imuarray.diagnosis.readings import arrange, part_of
 from imuarray.diagnosis.replicates import Replicator, discrepancies
@@ -179,6 +180,13 @@ def test_log_tail_goes_on_where_the_tail_underflows():
         assert log_chi_square(x, freedom) == pytest.approx(np.log(1e-200), rel=1e-6)
         near, far = (log_chi_square(x + freedom, freedom) for x in (1290.0, 1310.0))
         assert near - far == pytest.approx(10.0, rel=0.05)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("place", [0, 3, 8])
+def test_taps_are_those_of_scipy_signal(order, place):
+    expected = savgol_coeffs(9, 4, deriv=order, pos=place, use="dot")
+    np.testing.assert_allclose(quartic_taps(9, place, order), expected, atol=1e-12)
 
 
 def test_tails_are_those_of_scipy_stats():

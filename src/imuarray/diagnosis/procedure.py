@@ -62,6 +62,7 @@ def run_procedure(
     # clocks are scanned for by what a delay would gain, whether or not it is a candidate
     described = effects if clocks.DELAY in effects else (*effects, clocks.DELAY)
     columns = columns_of(readings.array, described, readings.position_prior_sd)
+    say("fitting the papers' model, then looking for causes")
     search = Search(readings, columns, effects, say).fitted()
     base = search.fit
     base_checks = all_checks(base, search.given, search.noise)
