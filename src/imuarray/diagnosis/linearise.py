@@ -246,7 +246,7 @@ def polynomial_derivative(time, run, values, window, order) -> np.ndarray:
 def quartic_taps(window, place, order) -> np.ndarray:
     """(window,) weights that give a least-squares quartic's derivative at a place, by unit steps.
 
-    Savitzky and Golay's; scipy.signal has them, and takes a third of a second to import.
+    Savitzky and Golay's; scipy.signal has them, and is slow to import.
     """
     powers = np.vander(np.arange(window) - place, 5, increasing=True)
     return factorial(order) * np.linalg.pinv(powers)[order]

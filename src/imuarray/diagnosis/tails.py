@@ -1,4 +1,4 @@
-"""Logarithms of tail probabilities by scipy.special: scipy.stats takes half a second to import."""
+"""Logarithms of tail probabilities by scipy.special: scipy.stats is slow to import."""
 
 from __future__ import annotations
 
