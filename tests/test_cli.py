@@ -1,5 +1,6 @@
 """The command line: exit status, one line on standard error, nothing written, no traceback."""
 
+import json
 import os
 import subprocess
 import sys
@@ -10,6 +11,7 @@ import pytest
 
 import imuarray
 from imuarray.cli import main
+from imuarray.commands.output import Output
 from imuarray.errors import IdentifiabilityError, InputError
 
 
@@ -77,8 +79,9 @@ BAD = {
     "calibrate --out new.nc": "required: recording",
     "calibrate no.nc --out new.nc": "no.nc: expected a file to read, found none",
     "calibrate folder --out new.nc": "folder: expected a file to read, found a folder",
-    "calibrate rec.nc --out no/new.nc": "expected an existing folder, found no no",
-    "calibrate rec.nc --out rec.nc/new.nc": "expected an existing folder, found no rec.nc",
+    "calibrate rec.nc --out rec.nc/new.nc": "rec.nc/new.nc: expected a folder",
+    "calibrate rec.nc --out rec.nc/a/new.nc": "rec.nc/a/new.nc: expected a folder",
+    "calibrate rec.nc --out /dev/null": "expected a file to write, found a device",
     "calibrate rec.nc --out folder": "expected a file to write, found a folder",
     "calibrate rec.nc --out rec.nc": "expected another file than the input",
     "calibrate rec.nc --out new.nc --method magic": "invalid choice: 'magic'",
@@ -124,10 +127,56 @@ def test_interruption(calls, capsys, monkeypatch):
     assert error_line(capsys) == "imuarray: interrupted\n"
 
 
-def test_defects_are_not_hidden(calls, monkeypatch):
-    fail_with(monkeypatch, ZeroDivisionError("a defect"))
-    with pytest.raises(ZeroDivisionError):
-        main("calibrate rec.nc --out cal.nc".split())
+def test_what_was_not_foreseen_is_one_line(calls, capsys, monkeypatch):
+    fail_with(monkeypatch, ZeroDivisionError("a defect\nof two lines"))
+    assert main("calibrate rec.nc --out cal.nc".split()) == 1
+    line = "imuarray: unforeseen: ZeroDivisionError: a defect of two lines"
+    assert error_line(capsys) == f"{line} (--debug shows where)\n"
+    assert main("calibrate rec.nc --out cal.nc --debug".split()) == 1
+    err = capsys.readouterr().err
+    assert err.startswith("Traceback") and err.splitlines()[-1] == line
+
+
+def test_an_answer_not_to_be_trusted(calls, capsys, monkeypatch):
+    reasons = ["positions off\x1b[31m", "residual 7 times"]
+
+    def command(arguments):
+        Output(arguments).done({"x": 1.0}, reasons)
+
+    monkeypatch.setattr(sys.modules["imuarray.commands.calibrate"], "calibrate", command)
+    assert main("calibrate rec.nc --out cal.nc --json".split()) == 3
+    out, err = capsys.readouterr()
+    said = ["positions off\\x1b[31m", "residual 7 times"]
+    assert json.loads(out) == {"x": 1.0, "trusted": False, "reasons": said}
+    assert err == f"imuarray: not to be trusted: {'; '.join(said)}\n"
+    reasons.clear()
+    assert main("calibrate rec.nc --out cal.nc --json".split()) == 0
+    assert json.loads(capsys.readouterr().out) == {"x": 1.0, "trusted": True, "reasons": []}
+
+
+def test_termination_leaves_nothing_half_written(tmp_path):
+    code = (
+        "import os, signal, sys, types; from imuarray.cli import main\n"
+        "from imuarray.provenance import atomic_write\n"
+        "def command(arguments):\n"
+        "    with atomic_write(arguments.out) as temporary:\n"
+        "        temporary.write_text('half')\n"
+        "        os.kill(os.getpid(), signal.SIGTERM)\n"
+        "        signal.pause()\n"
+        "m = sys.modules['imuarray.commands.calibrate'] = types.ModuleType('m')\n"
+        "m.calibrate = command\n"
+        "sys.exit(main(['calibrate', sys.executable, '--out', 'cal.nc']))"
+    )
+    call = [sys.executable, "-c", code]
+    run = subprocess.run(call, capture_output=True, text=True, cwd=tmp_path)
+    assert (run.returncode, run.stderr) == (130, "imuarray: interrupted (SIGTERM)\n")
+    assert not list(tmp_path.iterdir())
+
+
+def test_no_message_reaches_the_terminal_as_a_command(calls, capsys, monkeypatch):
+    fail_with(monkeypatch, InputError("found a column 'a\x1b[2J\x07\x9b\udc80'"))
+    assert main("calibrate rec.nc --out cal.nc".split()) == 2
+    assert "'a\\x1b[2J\\x07\\x9b\\udc80'" in error_line(capsys)
 
 
 def test_a_warning_is_one_line():

@@ -296,7 +296,7 @@ def test_residuals_on_the_command_line(files, tmp_path, capsys):
         (["first-order", "{0}", "--gravity", "-9"], "expected a positive number"),
         (["residuals", "nothing.nc"], "expected a file to read"),
         (["residuals", "{0}", "--figure", "figure.jpg"], "expected .png or .pdf"),
-        (["residuals", "{0}", "--figure", "nowhere/figure.png"], "expected an existing folder"),
+        (["residuals", "{0}", "--figure", "{0}/figure.png"], "expected a folder, found the file"),
     ],
 )
 def test_bad_input_is_one_line_and_status_2(files, tmp_path, capsys, arguments, words):

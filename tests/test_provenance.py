@@ -1,9 +1,13 @@
 """Stamps, digests, streams and writing whole or not at all."""
 
 import json
+import os
+import socket
+import stat
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -148,12 +152,46 @@ def test_a_failed_write_leaves_the_old_file(tmp_path):
     assert path.read_text() == "new" and list(tmp_path.iterdir()) == [path]
 
 
-def test_a_missing_folder_is_named(tmp_path):
-    with (
-        pytest.raises(FileNotFoundError, match="folder does not exist"),
-        atomic_write(tmp_path / "no" / "a.csv"),
-    ):
-        pass
+def test_missing_folders_are_made_and_links_followed(tmp_path):
+    (tmp_path / "link.csv").symlink_to("far/away/target.csv")
+    for text in ("first", "second"):
+        with atomic_write(tmp_path / "link.csv") as temporary:
+            temporary.write_text(text)
+    assert (tmp_path / "far/away/target.csv").read_text() == "second"
+    assert (tmp_path / "link.csv").is_symlink()
+    assert [path.name for path in (tmp_path / "far/away").iterdir()] == ["target.csv"]
+
+
+def special(path, kind):
+    if kind == "a pipe":
+        os.mkfifo(path)
+    elif kind == "a socket":
+        with socket.socket(socket.AF_UNIX) as made:
+            made.bind(str(path))
+    elif kind == "a device":
+        path.symlink_to(os.devnull)
+    else:
+        path.mkdir()
+
+
+@pytest.mark.parametrize("kind", ["a pipe", "a socket", "a device", "a folder"])
+def test_what_is_no_file_is_left_alone(tmp_path, monkeypatch, kind):
+    monkeypatch.chdir(tmp_path)  # a socket's path may not be long
+    path = Path("out.nc")
+    special(path, kind)
+    before = path.lstat()
+    said = f"expected a file to write, found {kind}"
+    with pytest.raises(OSError, match=said), atomic_write(path):
+        pytest.fail("the block is not entered")
+    assert os.path.samestat(path.lstat(), before) and os.listdir() == ["out.nc"]
+    assert stat.S_ISCHR(os.stat(os.devnull).st_mode)
+
+
+def test_links_in_a_circle(tmp_path):
+    (tmp_path / "a").symlink_to(tmp_path / "b")
+    (tmp_path / "b").symlink_to(tmp_path / "a")
+    with pytest.raises(OSError, match="symbolic links"), atomic_write(tmp_path / "a"):
+        pytest.fail("the block is not entered")
 
 
 def test_errors_are_one_line():

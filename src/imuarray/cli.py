@@ -2,50 +2,68 @@
 
 import argparse
 import os
+import signal
 import sys
+import threading
+import traceback
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NoReturn
 
 from imuarray.commands.argument_types import InputFile
 from imuarray.commands.parser import make_parser
-from imuarray.errors import InputError
+from imuarray.errors import InputError, one_line
 
 NETCDF = (".nc", ".nc4", ".h5")
 FIGURES = (".png", ".pdf")
-OK, BAD_INPUT, INTERRUPTED, CLOSED = 0, 2, 130, 141
+OK, UNFORESEEN, BAD_INPUT, UNTRUSTED, INTERRUPTED, CLOSED = 0, 1, 2, 3, 130, 141
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit status: 0, 2 for bad input, 130 when interrupted,
-    141 when nobody reads its output any more.
+    """Run one command; returns the exit status.
+
+    0; 2 for bad input, nothing written; 3 where what was written is not to be trusted (the last
+    line says why); 130 when interrupted or terminated; 141 when nobody reads its output any more;
+    1 for what was not foreseen, whose traceback ``--debug`` shows.
 
     `argv` are the arguments without the program's name, by default the process's own.
     """
+    arguments = argparse.Namespace()
     try:
-        with _warnings_in_one_line():
-            arguments = make_parser().parse_args(argv)
+        with _warnings_in_one_line(), _termination_interrupts():
+            make_parser().parse_args(argv, arguments)
             _check_output(arguments)
             _read_effects(arguments)
             arguments.run(arguments)
     except InputError as error:
-        return _fail(str(error))
+        return _fail(error)
     except BrokenPipeError:
         # `| head` has read enough; the rest, and what is flushed at the end, goes nowhere
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return CLOSED
     except OSError as error:
         return _fail(_describe(error))
-    except KeyboardInterrupt:
-        print("imuarray: interrupted", file=sys.stderr)
-        return INTERRUPTED
+    except KeyboardInterrupt as error:
+        return _fail(" ".join(["interrupted", *map(str, error.args)]), INTERRUPTED)
+    except Exception as error:
+        return _unforeseen(error, getattr(arguments, "debug", False))
+    if arguments.reasons:
+        return _fail(f"not to be trusted: {'; '.join(arguments.reasons)}", UNTRUSTED)
     return OK
 
 
-def _fail(message: str) -> int:
-    print(f"imuarray: {' '.join(message.split())}", file=sys.stderr)
-    return BAD_INPUT
+def _fail(message: object, status: int = BAD_INPUT) -> int:
+    print(f"imuarray: {one_line(message)}", file=sys.stderr)
+    return status
+
+
+def _unforeseen(error: Exception, debug: bool) -> int:
+    if debug:
+        traceback.print_exception(error)
+    hint = "" if debug else " (--debug shows where)"
+    return _fail(f"unforeseen: {type(error).__name__}: {error}{hint}", UNFORESEEN)
 
 
 def _describe(error: OSError) -> str:
@@ -59,15 +77,32 @@ def _describe(error: OSError) -> str:
 def _warnings_in_one_line() -> Iterator[None]:
     """A warning is for the user of the command, who did not write the line it comes from."""
 
-    def one_line(message: Warning | str, *_where: object, **__: object) -> str:
-        return f"imuarray: warning: {' '.join(str(message).split())}\n"
+    def formatted(message: Warning | str, *_where: object, **__: object) -> str:
+        return f"imuarray: warning: {one_line(message)}\n"
 
     before = warnings.formatwarning
-    warnings.formatwarning = one_line
+    warnings.formatwarning = formatted
     try:
         yield
     finally:
         warnings.formatwarning = before
+
+
+@contextmanager
+def _termination_interrupts() -> Iterator[None]:
+    """SIGTERM ends a command as Ctrl-C does: what it has begun to write is removed."""
+
+    def interrupt(*_: object) -> NoReturn:
+        raise KeyboardInterrupt("(SIGTERM)")
+
+    if threading.current_thread() is not threading.main_thread():  # signals are not for it
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _check_output(arguments: argparse.Namespace) -> None:
@@ -96,16 +131,23 @@ def _check_output(arguments: argparse.Namespace) -> None:
 
 def _require_writable(option: str, path: Path, folder: bool = False) -> None:
     """InputError unless a file, or a folder, can be written there."""
-    if folder:
-        if path.exists() and not path.is_dir():
-            raise InputError(f"{option} {path}: expected a folder, found a file")
-    elif path.is_dir():
-        raise InputError(f"{option} {path}: expected a file to write, found a folder")
-    parent = path.parent
+    # folders that are missing are made, in the first that is there
+    parent = next(p for p in Path(os.path.realpath(path)).parents if os.path.lexists(p))
     if not parent.is_dir():
-        raise InputError(f"{option} {path}: expected an existing folder, found no {parent}")
+        raise InputError(f"{option} {path}: expected a folder, found the file {parent}")
     if not os.access(parent, os.W_OK | os.X_OK):
         raise InputError(f"{option} {path}: expected a folder one may write to, found {parent}")
+    if folder:
+        if os.path.lexists(path) and not path.is_dir():
+            found = "a file" if path.exists() else "a link to nothing"
+            raise InputError(f"{option} {path}: expected a folder, found {found}")
+        return
+    from imuarray.provenance import target_of
+
+    try:
+        target_of(path)
+    except OSError as error:
+        raise InputError(f"{option} {path}: {error.strerror}") from None
 
 
 def _read_effects(arguments: argparse.Namespace) -> None:

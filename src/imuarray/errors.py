@@ -3,6 +3,18 @@
 from numbers import Integral
 
 
+def printable(text: str) -> str:
+    """The text with what would control a terminal escaped; line breaks stay."""
+    return "".join(
+        c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text
+    )
+
+
+def one_line(text: object) -> str:
+    """Any text as one printable line."""
+    return printable(" ".join(str(text).split()))
+
+
 class InputError(ValueError):
     """The user's input cannot be used.
 
@@ -11,8 +23,8 @@ class InputError(ValueError):
     """
 
     def __init__(self, message: str) -> None:
-        # a message built from a library's own error may hold line breaks
-        super().__init__(" ".join(str(message).split()))
+        # what it quotes of a file or of a library's own error may hold line breaks, and worse
+        super().__init__(one_line(message))
 
 
 class IdentifiabilityError(InputError):

@@ -11,9 +11,10 @@ import io
 import json
 import os
 import platform
+import stat
 import tempfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -101,6 +102,11 @@ def stamp(config: Mapping[str, Any], seed: int) -> dict[str, str | int]:
     }
 
 
+def trust(reasons: Sequence[str] = ()) -> dict[str, str | int]:
+    """Attributes of every answer: `trusted` 0 or 1, and `reasons` why not, a JSON list."""
+    return {"trusted": int(not reasons), "reasons": _json(list(reasons))}
+
+
 def _plain(value: Any) -> Any:
     """Numpy's numbers and arrays, and paths, as JSON knows them."""
     if isinstance(value, np.ndarray | np.generic):
@@ -119,24 +125,46 @@ def _json(value: Any, **options: Any) -> str:
 def atomic_write(path: str | Path) -> Iterator[Path]:
     """Give a temporary path, which becomes `path` if the block ends without an error.
 
-    It is in a folder beside `path`. A reader sees the old file or the new one, never a part; a
-    failure leaves nothing behind, a process that is killed the hidden folder.
+    It is in a folder beside `path`, or beside what a symbolic link there leads to; folders that
+    are missing are made. A reader sees the old file or the new one, never a part; a failure leaves
+    nothing behind, a process that is killed the hidden folder.
 
-    Raises FileNotFoundError if the folder does not exist; an OSError in the block, such as that
-    of a full disk, names ``path``.
+    Raises OSError as `target_of`; an OSError in the block, such as that of a full disk, names
+    ``path``.
     """
-    path = Path(path)
-    if not path.parent.is_dir():
-        raise FileNotFoundError(errno.ENOENT, "the output's folder does not exist", str(path))
+    target = target_of(path)
     try:
-        with tempfile.TemporaryDirectory(prefix=f".{path.stem}.", dir=path.parent) as folder:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=f".{target.stem}.", dir=target.parent) as folder:
             # the same name: some writers choose the format by its ending
-            yield Path(folder, path.name)
-            os.replace(Path(folder, path.name), path)
+            temporary = Path(folder, Path(path).name)
+            yield temporary
+            os.replace(temporary, target)
     except OSError as error:
         if error.errno is None:
             raise
         raise OSError(error.errno, os.strerror(error.errno), str(path)) from error
+
+
+def target_of(path: str | Path) -> Path:
+    """What is written for ``path``: links are followed, and only a file is ever replaced.
+
+    Raises OSError for a folder, a device, a pipe, a socket, and where standard output goes.
+    """
+    target = Path(os.path.realpath(path))
+    try:
+        found = target.stat()
+    except FileNotFoundError:
+        return target
+    kinds = {stat.S_IFREG: None, stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe",
+             stat.S_IFSOCK: "a socket"}  # fmt: skip
+    kind = kinds.get(stat.S_IFMT(found.st_mode), "a device")
+    with suppress(OSError):  # a process may have closed it
+        if os.path.samestat(found, os.fstat(1)):
+            kind = "standard output"
+    if kind is not None:
+        raise OSError(errno.EINVAL, f"expected a file to write, found {kind}", str(path))
+    return target
 
 
 def write_json(value: Any, path: str | Path) -> None:

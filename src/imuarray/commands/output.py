@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from typing import Any
+
+from imuarray.errors import one_line, printable
 
 
 class Output:
@@ -14,6 +17,7 @@ class Output:
     """
 
     def __init__(self, arguments):
+        self._arguments = arguments
         self.json = bool(getattr(arguments, "json", False))
         self.progress = not arguments.quiet
         self.text = self.progress and not self.json
@@ -21,12 +25,19 @@ class Output:
     def say(self, text: str) -> None:
         """One remark, at once."""
         if self.text:
-            print(text, flush=True)
+            print(printable(text), flush=True)
 
-    def done(self, document: dict[str, Any]) -> None:
-        """The numbers of the result; SI units, named in the keys."""
+    def done(self, document: dict[str, Any], reasons: Sequence[str] = ()) -> None:
+        """The numbers of the result; SI units, named in the keys.
+
+        ``reasons``: sentences why it is not to be trusted (`imuarray.provenance.trust` puts them
+        into the file); with any, `imuarray.cli.main` prints them as its last line and returns 3.
+        """
+        said = [one_line(reason) for reason in reasons]
         if self.json:
-            print(json.dumps(finite(document), allow_nan=False))
+            verdict = {"trusted": not said, "reasons": said}
+            print(json.dumps(finite(document) | verdict, allow_nan=False), flush=True)
+        self._arguments.reasons = said
 
 
 def finite(value: Any) -> Any:

@@ -243,9 +243,12 @@ def _add(commands, name: str, command: Command) -> None:
     parser.add_argument(
         "--json", action="store_true", help="the summary as one JSON object (SI units)"
     )
+    parser.add_argument(
+        "--debug", action="store_true", help="the traceback of an error that was not foreseen"
+    )
     for option in command.options:
         parser.add_argument(option.name, **option.given)
-    parser.set_defaults(run=_later(*command.run.split(".")), folder=command.folder)
+    parser.set_defaults(run=_later(*command.run.split(".")), folder=command.folder, reasons=())
 
 
 def _later(module: str, name: str) -> Callable[[argparse.Namespace], None]:
