@@ -11,8 +11,8 @@ from imuarray.blind.cases import make
 from imuarray.cli import main
 from imuarray.diagnosis.document import diagnose, precision_of, structural_gain
 from imuarray.diagnosis.extension import extended_model, read_extension
-from imuarray.diagnosis.heldout import gain, log_scores
 from imuarray.diagnosis.reading_effects import find_structural
+from imuarray.engine.heldout import gain, log_scores
 from imuarray.model import EFFECTS, ArrayModel
 from imuarray.model.effects import effect, known_effect
 from imuarray.recording import write_recording
@@ -185,7 +185,7 @@ def test_a_confounded_cause_is_no_answer(effect, sign):
 
 
 def test_most_triads_decide_which_axes_are_right():
-    from imuarray.diagnosis.readings import arrange
+    from imuarray.engine.readings import arrange
 
     recording, _ = make(Case("test-axes", (("axis_swap", (0, 1, 2)),), None, kind="one",
                              duration=DURATION), SEED)  # fmt: skip

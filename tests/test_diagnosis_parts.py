@@ -14,17 +14,17 @@ from imuarray.blind.cases import make
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects as variance
 from imuarray.diagnosis.clocks import sawtooth
-from imuarray.diagnosis.fit import Fit, fit, flat_parameters, from_flat, normal
-from imuarray.diagnosis.heldout import blocks_of, log_scores
-from imuarray.diagnosis.linearise import linearise, quartic_taps
-from imuarray.diagnosis.parameters import catalogue_effects, columns_of, prior_precision
-from imuarray.diagnosis.readings import arrange, part_of
 from imuarray.diagnosis.replicates import Replicator, discrepancies
 from imuarray.diagnosis.scores import candidates, information_at, mask_of, score_all
-from imuarray.diagnosis.settings import SETTINGS
-from imuarray.diagnosis.start import start
 from imuarray.diagnosis.state import Search
 from imuarray.diagnosis.tails import QUARTILE, log_chi_square, log_normal, log_poisson
+from imuarray.engine.fit import Fit, fit, flat_parameters, from_flat, normal
+from imuarray.engine.heldout import blocks_of, log_scores
+from imuarray.engine.linearise import linearise, quartic_taps
+from imuarray.engine.parameters import catalogue_effects, columns_of, prior_precision
+from imuarray.engine.readings import arrange, part_of
+from imuarray.engine.settings import SETTINGS
+from imuarray.engine.start import start
 from imuarray.errors import InputError
 
 SHORT = 4.0  # s

@@ -12,7 +12,7 @@ PACKAGE = Path(imuarray.__file__).parent
 LAYERS = (
     ("errors", "caches", "linear"), ("compiled",), ("streams", "provenance", "geometry"),
     ("motion",), ("model", "config"),
-    ("recording",), ("simulation", "firstorder", "estimation"), ("posterior",),
+    ("recording",), ("simulation", "firstorder", "estimation"), ("engine",), ("posterior",),
     ("studies", "measured"), ("blind", "diagnosis"), ("claims", "figures"), ("report",),
     ("analysis",), ("plots",), ("commands",), ("cli",),
 )  # fmt: skip

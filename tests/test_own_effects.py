@@ -10,7 +10,7 @@ import xarray as xr
 import imuarray
 from imuarray import provenance
 from imuarray.cli import main
-from imuarray.diagnosis.parameters import prior_precision
+from imuarray.engine.parameters import prior_precision
 from imuarray.model import DATA_EFFECTS, EFFECTS, own
 from tests.test_bound import model
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from imuarray.diagnosis.elimination import heldout_gain, prune
-from imuarray.diagnosis.fit import at
 from imuarray.diagnosis.scores import Candidate, candidates, score_all
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL, scans
 from imuarray.diagnosis.state import Adoption, Cause, Search
+from imuarray.engine.fit import at
 from imuarray.model.effects import EFFECTS
 
 

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis.readings import Readings
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray.engine.readings import Readings
 from imuarray.model.timing import clock_turns
 
 UNIT = 1e-3  # s, of the ages until their size is known

@@ -11,17 +11,18 @@ import numpy as np
 
 import imuarray
 from imuarray.diagnosis.elimination import heldout_gain, need
-from imuarray.diagnosis.fit import Fit, at, fit
-from imuarray.diagnosis.heldout import Scores, gain, log_scores
 from imuarray.diagnosis.noise import coloured_meat, per_triad, standardised
 from imuarray.diagnosis.noise_effects import held_out
-from imuarray.diagnosis.parameters import prior_precision
 from imuarray.diagnosis.procedure import Found, run_procedure
 from imuarray.diagnosis.replicates import Discrepancy, discrepancies
 from imuarray.diagnosis.scores import information_at
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import placebo_gain
 from imuarray.diagnosis.words import cause_in_words, parameters_of, sensors_of
+from imuarray.engine.fit import Fit, at, fit
+from imuarray.engine.heldout import Scores, gain, log_scores
+from imuarray.engine.parameters import prior_precision
+from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.linear import scaled_inverse
 from imuarray.model.effects import DATA_EFFECTS, KINDS
 from imuarray.recording import Recording
@@ -124,7 +125,7 @@ def nats_beside(found: Found) -> np.ndarray:
     # which take the readings as they are
     left_out = [item for item in found.structural if DATA_EFFECTS[item.effect].left_out]
     beside += [structural_gain(found, item)[2] for item in left_out]
-    return sum((blocks for blocks in beside if np.sum(blocks) > 0), np.zeros(SETTINGS.blocks))
+    return sum((blocks for blocks in beside if np.sum(blocks) > 0), np.zeros(ENGINE.blocks))
 
 
 def precision_of(made: Fit) -> np.ndarray:

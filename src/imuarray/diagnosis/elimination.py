@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from imuarray.diagnosis.fit import flat_parameters, from_flat
-from imuarray.diagnosis.heldout import normal_blocks
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Search
 from imuarray.diagnosis.tails import log_chi_square
+from imuarray.engine.fit import flat_parameters, from_flat
+from imuarray.engine.heldout import normal_blocks
 
 
 def freed_places(search: Search, effect: str, imus=None, among=None) -> np.ndarray:

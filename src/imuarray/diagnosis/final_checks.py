@@ -9,14 +9,14 @@ import numpy as np
 from imuarray.diagnosis import noise_effects
 from imuarray.diagnosis.clipping import lone_checks
 from imuarray.diagnosis.elimination import need
-from imuarray.diagnosis.fit import flat_parameters
-from imuarray.diagnosis.linearise import linearise
-from imuarray.diagnosis.parameters import POSITION
 from imuarray.diagnosis.residual_checks import Check, normal_checks
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL
 from imuarray.diagnosis.state import Search
 from imuarray.diagnosis.tails import log_normal
+from imuarray.engine.fit import flat_parameters
+from imuarray.engine.linearise import linearise
+from imuarray.engine.parameters import POSITION
 
 STRICT = ("outliers", "size of", "change of")  # checks that a small residual does not excuse
 

@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis.fit import Fit, pick
-from imuarray.diagnosis.readings import Readings
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.tails import QUARTILE, log_normal, log_poisson
+from imuarray.engine.fit import Fit, pick
+from imuarray.engine.readings import Readings
 
 DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / np.sqrt(70.0)
 HALF = len(DIFFERENCE) // 2

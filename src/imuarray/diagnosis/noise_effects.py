@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis.fit import Fit
-from imuarray.diagnosis.heldout import blocks_of
 from imuarray.diagnosis.noise import Noise, expected_ratio, standardised
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.tails import QUARTILE, log_chi_square, log_normal
+from imuarray.engine.fit import Fit
+from imuarray.engine.heldout import blocks_of
 from imuarray.model.effects import KINDS
 
 TAILS, COLOURED = "heavy_tails", "coloured_noise"

@@ -13,15 +13,15 @@ from imuarray.diagnosis.adoption import adopt
 from imuarray.diagnosis.clipping import leave_out_clips, together
 from imuarray.diagnosis.elimination import eliminate
 from imuarray.diagnosis.final_checks import final_checks, within_tolerance
-from imuarray.diagnosis.fit import Fit, fit
 from imuarray.diagnosis.noise_effects import COLOURED, SCALES, TAILS
-from imuarray.diagnosis.parameters import catalogue_effects, columns_of
 from imuarray.diagnosis.reading_effects import Structural, find_structural
-from imuarray.diagnosis.readings import Readings, arrange, determined, part_of
 from imuarray.diagnosis.residual_checks import Check, all_checks
 from imuarray.diagnosis.separability import rivals
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Search
+from imuarray.engine.fit import Fit, fit
+from imuarray.engine.parameters import catalogue_effects, columns_of
+from imuarray.engine.readings import Readings, arrange, determined, part_of
 from imuarray.model.effects import EFFECTS
 from imuarray.recording import Recording
 

@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis.linearise import polynomial_derivative
-from imuarray.diagnosis.readings import Readings
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.tails import log_poisson
+from imuarray.engine.linearise import polynomial_derivative
+from imuarray.engine.readings import Readings
 from imuarray.model.effects import KINDS
 from imuarray.recording.record import AXES
 

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis.fit import Fit, normal
 from imuarray.diagnosis.noise import standardised
 from imuarray.diagnosis.quantities import first_up
+from imuarray.engine.fit import Fit, normal
 from imuarray.model.effects import KINDS
 
 REPLICATES = 99

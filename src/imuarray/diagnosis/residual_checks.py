@@ -13,12 +13,12 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from imuarray.diagnosis.clocks import delay_score
-from imuarray.diagnosis.fit import Fit, pick
 from imuarray.diagnosis.noise import Noise, standardised, tail_log_p
 from imuarray.diagnosis.replicates import motion_sizes
 from imuarray.diagnosis.scores import Information
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.tails import log_chi_square, log_normal
+from imuarray.engine.fit import Fit, pick
 from imuarray.linear import scaled_inverse, scaled_square
 
 

@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis.fit import Fit, flat_parameters, normal
-from imuarray.diagnosis.parameters import Columns, prior_precision
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.tails import log_chi_square
+from imuarray.engine.fit import Fit, flat_parameters, normal
+from imuarray.engine.parameters import Columns, prior_precision
 from imuarray.linear import scaled_eigh, scaled_inverse
 from imuarray.model.effects import EFFECTS, KINDS
 

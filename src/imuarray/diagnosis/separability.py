@@ -7,8 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from imuarray.diagnosis.elimination import freed_places, need
-from imuarray.diagnosis.fit import Fit
-from imuarray.diagnosis.parameters import POSITION
 from imuarray.diagnosis.scores import (
     Candidate,
     Information,
@@ -21,6 +19,8 @@ from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL
 from imuarray.diagnosis.state import Cause, Search
 from imuarray.diagnosis.tails import log_chi_square
+from imuarray.engine.fit import Fit
+from imuarray.engine.parameters import POSITION
 from imuarray.linear import scaled_eigh, scaled_inverse, scaled_square
 from imuarray.model import EFFECTS
 

@@ -25,36 +25,14 @@ class Settings:
     rival: float = 3.0  # log p by which another effect may be worse and be listed beside a cause
     alike: float = 0.64  # share of an adopted effect's signal from which another is of its class
 
-    # Readings (`readings`, `reading_effects`, `clipping`)
-    # least information of a sample on omega_dot and s, in shares of all readings'
-    weakest: float = 1e-2
-    least_samples: int = 200  # samples; fewer determine next to nothing of any effect
-    stretch: int = 128  # samples, of the stretches in which a long recording is looked at first
-    window: float = 0.04  # s, length of the polynomials that give time derivatives
+    # Readings (`reading_effects`, `clipping`, `procedure`)
     long: int = 3500  # samples; longer recordings are looked at in part first
-    smooth: float = 0.8  # correlation of omega's slope and omega_dot from which motion is smooth
     least_repeats: int = 1  # samples that a triad repeats
     least_clipped: int = 3  # readings at one value that make a rail
     rare_repeats: float = -12.0  # log p from which repeats are no chance of a coarse converter
     near_turn: float = 0.5  # norm by which a triad's matrix may miss a signed permutation
     alone: float = 1.5  # times farther than any other reading of its triad
     next_largest: int = 30  # readings after the largest that show its usual shortfall
-
-    # Gauss-Newton over motion and parameters (`fit`, `parameters`)
-    steps: int = 15  # Gauss-Newton steps at most
-    least_step: float = 0.02  # nats; a step predicted to gain less ends the search
-    rough_gain: float = 1e-4  # of the misfit that a step must gain while causes are looked for
-    fine_gain: float = 3e-6  # the same at the end
-    converged: float = 0.02  # of a parameter's own sd: steps below it end the search
-    shortest: float = 0.2  # share of a Gauss-Newton step
-    held_sd: float = 1e-8  # s, of a period that is not to move
-    wide: float = 10.0  # prior sd of the third derivatives, in sizes of the differences near by
-    # prior sd of what the gyroscopes alone see of omega_dot, in its steps
-    gyroscopes_own: float = 2.0
-    tied: float = 1e-5  # of that sd, as long as it is not free
-    near: int = 9  # samples that give the size of the motion's third derivatives
-    stiff: float = 1e-3  # of a parameter's prior sd: the sd that a pinned mean keeps
-    steady_noise: float = 0.02  # relative change of a noise sd below which a fit is not repeated
 
     # Score tests and adoption (`scores`, `adoption`, `state`, `special`, `heldout`)
     seen: float = 1e-5  # of a parameter's own information must survive the projection to count
@@ -67,7 +45,7 @@ class Settings:
     rough_z: float = 2.0  # the same where the motion is rough, and few stretches decide
     trace: float = 2e-5  # of the excess there was at first: least chi-square of a cause
     rough_share: float = 5.0  # factor of `share` where motion is rough
-    blocks: int = 10  # blocks of time that are held out in turn
+    steady_noise: float = 0.02  # relative change of a noise sd below which a fit is not repeated
     likely_drift: float = -4.6  # log p of a drift beside an adopted bias
     changing: float = 0.05  # of a drift's chi-square that its change must gain
     steady_drift: float = -50.0  # log p of a drift that does not change: it is misattributed

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from imuarray.diagnosis.fit import Fit, flat_parameters, from_flat, normal
-from imuarray.diagnosis.heldout import blocks_of
-from imuarray.diagnosis.parameters import POSITION
 from imuarray.diagnosis.scores import (
     Candidate,
     Information,
@@ -15,6 +12,9 @@ from imuarray.diagnosis.scores import (
 )
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.tails import log_chi_square
+from imuarray.engine.fit import Fit, flat_parameters, from_flat, normal
+from imuarray.engine.heldout import blocks_of
+from imuarray.engine.parameters import POSITION
 from imuarray.linear import scaled_inverse
 
 SHIFT = "position_shift"

@@ -9,11 +9,11 @@ import numpy as np
 
 from imuarray.diagnosis import clocks, shifts
 from imuarray.diagnosis.elimination import need
-from imuarray.diagnosis.fit import flat_parameters
 from imuarray.diagnosis.residual_checks import Check
 from imuarray.diagnosis.scores import Candidate, score_all
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.tails import log_chi_square
+from imuarray.engine.fit import flat_parameters
 from imuarray.model.effects import EFFECTS
 
 DRIFT = "bias_drift"

@@ -14,7 +14,9 @@ import numpy as np
 
 from imuarray.diagnosis import clocks
 from imuarray.diagnosis import noise as noises
-from imuarray.diagnosis.fit import (
+from imuarray.diagnosis.scores import Candidate, Information, information_at, mask_of
+from imuarray.diagnosis.settings import SETTINGS
+from imuarray.engine.fit import (
     Fit,
     at,
     flat_parameters,
@@ -22,12 +24,10 @@ from imuarray.diagnosis.fit import (
     search_optimum,
     with_rough_prior,
 )
-from imuarray.diagnosis.linearise import State
-from imuarray.diagnosis.parameters import POSITION, Columns
-from imuarray.diagnosis.readings import Readings
-from imuarray.diagnosis.scores import Candidate, Information, information_at, mask_of
-from imuarray.diagnosis.settings import SETTINGS
-from imuarray.diagnosis.start import is_smooth, start
+from imuarray.engine.linearise import State
+from imuarray.engine.parameters import POSITION, Columns
+from imuarray.engine.readings import Readings
+from imuarray.engine.start import is_smooth, start
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from imuarray.diagnosis.fit import flat_parameters
 from imuarray.diagnosis.quantities import (
     NARROW,
     first_up,
@@ -21,6 +20,7 @@ from imuarray.diagnosis.quantities import (
 )
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Cause, Search
+from imuarray.engine.fit import flat_parameters
 from imuarray.model.effects import known_effect
 from imuarray.model.names import component, unit_of
 

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 
 from imuarray.diagnosis.clocks import age_of, delay_score
-from imuarray.diagnosis.heldout import blocks_of
-from imuarray.diagnosis.parameters import POSITION
+from imuarray.engine.heldout import blocks_of
+from imuarray.engine.parameters import POSITION
 from imuarray.linear import scaled_inverse
 from imuarray.model.effects import EFFECTS, KINDS
 from imuarray.model.names import component

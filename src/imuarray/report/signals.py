@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pandas as pd
 
-from imuarray.diagnosis.fit import Fit, flat_parameters, normal
+from imuarray.engine.fit import Fit, flat_parameters, normal
 from imuarray.linear import scaled_inverse
 
 if TYPE_CHECKING:

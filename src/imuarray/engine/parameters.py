@@ -18,7 +18,7 @@ from functools import cache
 import numpy as np
 from scipy.linalg import block_diag
 
-from imuarray.diagnosis.settings import SETTINGS
+from imuarray.engine.settings import SETTINGS
 from imuarray.geometry import Array
 from imuarray.model import EFFECTS, ArrayModel
 from imuarray.model.noise import Noise

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from imuarray.diagnosis.linearise import (
+from imuarray.engine.linearise import (
     Eliminated,
     RoughPrior,
     State,
@@ -15,9 +15,9 @@ from imuarray.diagnosis.linearise import (
     linearise,
     no_derivatives,
 )
-from imuarray.diagnosis.parameters import POSITION, Columns, prior_precision
-from imuarray.diagnosis.readings import Readings
-from imuarray.diagnosis.settings import SETTINGS
+from imuarray.engine.parameters import POSITION, Columns, prior_precision
+from imuarray.engine.readings import Readings
+from imuarray.engine.settings import SETTINGS
 from imuarray.linear import scaled_eigh
 
 

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis.parameters import Columns, tangents
-from imuarray.diagnosis.readings import Readings
+from imuarray.engine.parameters import Columns, tangents
+from imuarray.engine.readings import Readings
 from imuarray.model.effects import Prediction
 from imuarray.model.jax64 import jax, jnp
 from imuarray.motion.state import Motion

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis.fit import Fit, normal
-from imuarray.diagnosis.settings import SETTINGS
+from imuarray.engine.fit import Fit, normal
+from imuarray.engine.settings import SETTINGS
 
 
 class Scores(NamedTuple):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from imuarray.diagnosis.linearise import State, no_derivatives, polynomial_derivative
-from imuarray.diagnosis.parameters import Columns
-from imuarray.diagnosis.readings import Readings
-from imuarray.diagnosis.settings import SETTINGS
+from imuarray.engine.linearise import State, no_derivatives, polynomial_derivative
+from imuarray.engine.parameters import Columns
+from imuarray.engine.readings import Readings
+from imuarray.engine.settings import SETTINGS
 from imuarray.model.structure import design, products
 
 

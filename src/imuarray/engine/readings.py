@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from imuarray.diagnosis.settings import SETTINGS
+from imuarray.engine.settings import SETTINGS
 from imuarray.errors import InputError
 from imuarray.estimation.selection import neighbours
 from imuarray.geometry import Array

@@ -1,0 +1,1 @@
+"""Least squares for any model: the motion eliminated sample by sample, effects, priors."""

@@ -1,0 +1,42 @@
+"""Every number that the engine rests on and that no equation gives: value, unit, origin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Numbers of the least squares, set by judgement; `SETTINGS` are those in use.
+
+    What they lead to is held by the tests on injected effects and by the blind study.
+    """
+
+    # Readings (`readings`)
+    # least information of a sample on omega_dot and s, in shares of all readings'
+    weakest: float = 1e-2
+    least_samples: int = 200  # samples; fewer determine next to nothing of any effect
+    stretch: int = 128  # samples, of the stretches in which a long recording is looked at first
+    window: float = 0.04  # s, length of the polynomials that give time derivatives
+    smooth: float = 0.8  # correlation of omega's slope and omega_dot from which motion is smooth
+
+    # Gauss-Newton over motion and parameters (`fit`, `parameters`)
+    steps: int = 15  # Gauss-Newton steps at most
+    least_step: float = 0.02  # nats; a step predicted to gain less ends the search
+    rough_gain: float = 1e-4  # of the misfit that a step must gain while causes are looked for
+    fine_gain: float = 3e-6  # the same at the end
+    converged: float = 0.02  # of a parameter's own sd: steps below it end the search
+    shortest: float = 0.2  # share of a Gauss-Newton step
+    held_sd: float = 1e-8  # s, of a period that is not to move
+    wide: float = 10.0  # prior sd of the third derivatives, in sizes of the differences near by
+    # prior sd of what the gyroscopes alone see of omega_dot, in its steps
+    gyroscopes_own: float = 2.0
+    tied: float = 1e-5  # of that sd, as long as it is not free
+    near: int = 9  # samples that give the size of the motion's third derivatives
+    stiff: float = 1e-3  # of a parameter's prior sd: the sd that a pinned mean keeps
+
+    # Held-out time (`heldout`)
+    blocks: int = 10  # blocks of time that are held out in turn
+
+
+SETTINGS = Settings()
