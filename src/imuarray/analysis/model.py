@@ -10,6 +10,7 @@ from pathlib import Path
 from imuarray.errors import InputError
 from imuarray.model import DATA_EFFECTS, ArrayModel
 from imuarray.recording import Recording, array_of
+from imuarray.recording.channels import require_live
 
 Say = Callable[[str], None]
 
@@ -37,7 +38,11 @@ def assumed(recording: Recording, accelerometer_noise: float | None) -> Recordin
 
 
 def usable(recording: Recording, say: Say = silent) -> Recording:
-    """The recording without still poses and samples with an accelerometer at its rail."""
+    """The recording without still poses and samples with an accelerometer at its rail.
+
+    InputError where that leaves none, and for constant or copied channels.
+    """
+    require_live(recording)
     lost = recording.saturated_accelerometers().any(axis=(1, 2))
     if lost.all():
         raise InputError("recording: expected samples off the rail, found every one at a rail")

@@ -26,6 +26,7 @@ from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.linear import scaled_inverse
 from imuarray.model.effects import DATA_EFFECTS, KINDS
 from imuarray.recording import Recording
+from imuarray.recording.channels import require_live
 from imuarray.streams import stream
 
 LEAST = -1e6  # log p; JSON has no infinity
@@ -78,8 +79,10 @@ def diagnose(
 ) -> Diagnosis:  # fmt: skip
     """Test the papers' model on a recording and extend it.
 
-    ``without``: effects left out of the catalogue. InputError for too few moving samples.
+    ``without``: effects left out of the catalogue. InputError for too few moving samples, for
+    constant and for copied channels.
     """
+    require_live(recording)
     found = run_procedure(recording, without, say)
     search = found.search
     say("fitting the papers' model to the same readings")

@@ -10,6 +10,7 @@ from imuarray.firstorder.allan import lag_correlation, white_noise_sd
 from imuarray.firstorder.still import still_poses
 from imuarray.firstorder.triads import TriadFit, fit_triads
 from imuarray.recording import Recording
+from imuarray.recording.channels import require_live
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
 
@@ -46,8 +47,10 @@ class FirstOrder:
 def calibrate_first_order(recording: Recording, gravity: float = STANDARD_GRAVITY) -> FirstOrder:
     """First-order model of every triad from the recording's still poses.
 
-    InputError or IdentifiabilityError where there are none, too few or too similar ones.
+    InputError or IdentifiabilityError where there are none, too few or too similar ones, and for
+    constant or copied channels.
     """
+    require_live(recording)
     poses = still_poses(recording)
     force = [recording.specific_force[pose] for pose in poses]
     rate = [recording.angular_rate[pose] for pose in poses]
