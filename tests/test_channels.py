@@ -71,6 +71,8 @@ def test_live_channels_are_not_named(recording):
     assert dead(recording) == [] and repeated(recording) == []
     at_rail = changed(recording, "angular_rate", assign((ALL, 1, 1), recording.gyroscope_range))
     assert dead(at_rail) == []
+    sides = np.where(recording.angular_rate[:, :1] > 0, 1.0, -1.0) * recording.gyroscope_range
+    assert dead(changed(recording, "angular_rate", assign(ALL, sides))) == []
     require_live(recording)
 
 

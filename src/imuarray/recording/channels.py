@@ -66,10 +66,11 @@ def _constant(recording: Recording, kind: str) -> list[str]:
 
 def _copied(recording: Recording, kind: str) -> list[str]:
     """Equal columns up to their sign, as axes that are named anew have; whole triads first."""
-    values, labels, _ = _readings(recording, kind)
+    values, labels, railed = _readings(recording, kind)
     columns = values.reshape(len(values), -1).T
     marks = _marks(columns * np.where(columns[:, :1] < 0, -1.0, 1.0) + 0.0)
-    marks[np.ptp(columns, axis=1) == 0] = np.arange(1, 1 + np.sum(np.ptp(columns, axis=1) == 0))
+    other = (np.ptp(columns, axis=1) == 0) | ((~railed).sum(axis=0).ravel() < LEAST)
+    marks[other] = np.arange(1, 1 + other.sum())  # alike for another reason
     first: dict[int, int] = {}
     of = [first.setdefault(int(mark), place) for place, mark in enumerate(marks)]
     found = []
