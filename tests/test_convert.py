@@ -67,7 +67,7 @@ def set_key(layout, path, value):
         ("times", 3, "unknown key 'times'"),
         ("time/unit", "minutes", "unit of s, ms, us, ns, found 'minutes'"),
         ("time/column", "stamp", "expected a column 'stamp', found t, ax1"),
-        ("accelerometers/unit", "G", "expected a unit of m/s.2, g, mg, found 'G'"),
+        ("accelerometers/unit", "G", "unit of m s-2, m/s.2, m/s2, g, mg, found 'G'"),
         ("accelerometers/noise", -1, "positive number, found -1"),
         ("accelerometers/noise", True, "positive number, found True"),
         ("accelerometers/triads", [], "triads by label"),

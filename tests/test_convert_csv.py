@@ -152,3 +152,69 @@ def test_yaml_that_a_loader_stumbles_over(tmp_path, extra, words):
     with pytest.raises(InputError, match=words) as caught:
         read(tmp_path, table(), yaml.safe_dump(layout()) + extra)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("label", ["010", "yes", "1e3", "~", "2001-01-01", "0x10"])
+def test_labels_and_columns_are_text_as_it_stands(tmp_path, label):
+    """YAML reads 010 as 8 and yes as true."""
+    rows = table()
+    rows[0] = [label if name == "az2" else name for name in HEADER]
+    text = yaml.safe_dump(layout()).replace("- az2", f"- {label}").replace("'2':", f"{label}:")
+    found = read(tmp_path, rows, text)
+    assert found.accelerometer_labels == found.gyroscope_labels == ("1", label, "3")
+    np.testing.assert_array_equal(found.specific_force, read(tmp_path, table()).specific_force)
+
+
+def blank(rows, columns, which):
+    """The cells of ``columns`` empty in data rows ``which``."""
+    places = [HEADER.index(name) for name in columns]
+    return [
+        ["" if i in which and place in places else cell for place, cell in enumerate(row)]
+        for i, row in enumerate(rows)
+    ]
+
+
+@pytest.mark.parametrize("time", [{"rate": 100.0}, {"column": "t", "unit": "ms"}])
+def test_a_sensor_slower_than_the_log(tmp_path, time):
+    slow = [f"a{axis}2" for axis in "xyz"]
+    rows = blank(table(8), slow, (2, 4, 6, 8))
+    columns = layout() | {"time": time}
+    with pytest.raises(InputError, match="NaN in data row 2 .*`incomplete_rows: leave out`"):
+        read(tmp_path, rows, columns)
+    found = read(tmp_path, rows, columns | {"incomplete_rows": "leave out"})
+    whole = read(tmp_path, table(8), columns)
+    np.testing.assert_array_equal(found.time, whole.time[::2])
+    np.testing.assert_array_equal(found.specific_force, whole.specific_force[::2])
+    assert (found.selected, whole.selected) == ("4 of 8 samples", "")
+    rows[7][1] = "x"  # in the fourth of the rows that are left
+    with pytest.raises(InputError, match="'ax1': expected numbers, found 'x' in data row 7"):
+        read(tmp_path, rows, columns | {"incomplete_rows": "leave out"})
+
+
+@pytest.mark.parametrize("rule", ["keep", True, None, []])
+def test_what_may_be_done_with_incomplete_rows(tmp_path, rule):
+    with pytest.raises(InputError, match="incomplete_rows: expected 'leave out', found"):
+        read(tmp_path, table(), layout() | {"incomplete_rows": rule})
+
+
+def test_a_forgotten_unit_of_positions(tmp_path):
+    columns = layout()
+    columns.pop("position_unit")
+    with pytest.raises(InputError, match="within 2 m .*, found 10: name the position_unit"):
+        read(tmp_path, table(), columns)
+    found = read(tmp_path, table(), columns | {"position_unit": "m"})  # a vehicle
+    assert found.accelerometer_position.max() == 10
+
+
+@pytest.mark.parametrize(
+    ("kind", "unit", "known"),
+    [("accelerometers", "m s-2", "m/s^2"), ("gyroscopes", "deg s-1", "deg/s")],
+)
+def test_units_are_spelled_as_in_recordings(tmp_path, kind, unit, known):
+    columns = layout()
+    columns[kind]["unit"] = known
+    expected = read(tmp_path, table(), columns)
+    columns[kind]["unit"] = unit
+    found = read(tmp_path, table(), columns)
+    np.testing.assert_array_equal(found.specific_force, expected.specific_force)
+    np.testing.assert_array_equal(found.angular_rate, expected.angular_rate)

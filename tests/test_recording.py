@@ -103,11 +103,21 @@ def test_no_truth_is_an_input_error(tmp_path):
         read_truth(tmp_path / "rec.nc")
 
 
-def test_degrees_per_second_are_converted(tmp_path):
-    dataset = make().to_dataset()
-    dataset["angular_rate"] = np.rad2deg(dataset["angular_rate"]).assign_attrs(units="deg s-1")
-    read = read_recording(save(dataset, tmp_path / "rec.nc"))
-    np.testing.assert_allclose(read.angular_rate, make().angular_rate, rtol=1e-14)
+SPELLINGS = {
+    "angular_rate": {"rad/s": 1, "deg s-1": 180 / np.pi, "deg/s": 180 / np.pi},
+    "specific_force": {"m/s^2": 1, "g": 1 / 9.80665},
+    "accelerometer_position": {"mm": 1e3},
+    "time": {"ms": 1e3},
+}
+
+
+@pytest.mark.parametrize("name", SPELLINGS)
+def test_units_are_obeyed(tmp_path, name):
+    for unit, factor in SPELLINGS[name].items():
+        dataset = make().to_dataset()
+        dataset = dataset.assign({name: (factor * dataset[name]).assign_attrs(units=unit)})
+        read = read_recording(save(dataset, tmp_path / "rec.nc"))
+        np.testing.assert_allclose(getattr(read, name), getattr(make(), name), rtol=1e-14)
 
 
 def test_a_file_of_another_program_reads(tmp_path):

@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 
 from imuarray.errors import IdentifiabilityError, InputError
+from imuarray.geometry.array import MAX_TRIADS
 from imuarray.recording import read_recording, write_recording
 from tests.test_recording import make, one_line, save
 
@@ -71,10 +72,13 @@ BAD = {
         lambda d: d.assign_coords(axis=["u", "v", "w"]),
         r"axis: expected .* found \['u', 'v', 'w'\]",
     ),
-    "no units": (with_units("angular_rate", None), "angular_rate: .* 'deg s-1', found none"),
+    "no units": (with_units("angular_rate", None), "angular_rate: units: .* deg s-1, .*found none"),
     "unknown units": (with_units("angular_rate", "rpm"), "angular_rate: .* found 'rpm'"),
-    "force in g": (with_units("specific_force", "g"), "'m s-2', found 'g'"),
-    "units not text": (with_units("time", 3), "time: expected the attribute units .* found"),
+    "force in another quantity's unit": (
+        with_units("specific_force", "deg/s"),
+        r"a unit of m s-2, m/s\^2, .*found 'deg/s'",
+    ),
+    "units not text": (with_units("time", 3), "time: units: .* found "),
     "NaN": (
         with_value("specific_force", (7, 2, 1), np.nan),
         r"specific_force: expected finite numbers, found nan at time index 7, "
@@ -134,7 +138,10 @@ BAD = {
 }
 
 UNIDENTIFIABLE = {
-    "two accelerometers": (lambda d: d.isel(accelerometer=[0, 1]), "at least 3 .* found 2"),
+    "two accelerometers": (
+        lambda d: d.isel(accelerometer=[0, 1]),
+        "at least 3 .* found 2: .* angular acceleration .* about the line through them",
+    ),
     "collinear": (collinear, "span a plane, found them collinear"),
     "no gyroscope": (lambda d: d.isel(gyroscope=[]), "at least 1 gyroscope triad, found 0"),
 }
@@ -156,6 +163,17 @@ def test_recordings_that_determine_nothing_are_refused(tmp_path, case):
     with pytest.raises(IdentifiabilityError, match=message) as info:
         read_recording(path)
     one_line(info)
+
+
+@pytest.mark.parametrize("kind", ["accelerometer", "gyroscope"])
+def test_more_triads_than_the_limit(tmp_path, kind):
+    dataset = make().to_dataset()
+    count = MAX_TRIADS + 1
+    dataset = dataset.isel({kind: np.arange(count) % dataset.sizes[kind]})
+    dataset = dataset.assign_coords({kind: [str(k) for k in range(count)]})
+    path = save(dataset, tmp_path / "rec.nc")
+    with pytest.raises(InputError, match=f"at most {MAX_TRIADS} {kind} triads, found {count}"):
+        read_recording(path)
 
 
 def text_file(path):

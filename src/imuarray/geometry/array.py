@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from imuarray.errors import IdentifiabilityError
+from imuarray.errors import IdentifiabilityError, InputError
 
 
 @dataclass(frozen=True)
@@ -60,11 +60,22 @@ def positions_of(theta) -> np.ndarray:
     return np.vstack([np.zeros(3), np.reshape(theta, (-1, 3))])
 
 
+MAX_TRIADS = 256  # of a kind; the slowest estimator takes half a minute and 5 GB for as many
+
+
+def require_count(count: int, where: str, kind: str) -> None:
+    """InputError for more triads than `MAX_TRIADS`."""
+    if count > MAX_TRIADS:
+        raise InputError(f"{where}: expected at most {MAX_TRIADS} {kind} triads, found {count}")
+
+
 def require_planar_extent(positions: np.ndarray, where: str = "array") -> None:
     """Raise IdentifiabilityError for fewer than three or collinear triads (2017, section II)."""
     if len(positions) < 3:
         raise IdentifiabilityError(
-            f"{where}: expected at least 3 accelerometer triads, found {len(positions)}"
+            f"{where}: expected at least 3 accelerometer triads, found {len(positions)}: they"
+            " measure the angular acceleration of each sample, which two leave open about the line"
+            " through them"
         )
     spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
     if spread[1] <= 1e-9 * max(spread[0], 1e-300) or spread[0] == 0.0:

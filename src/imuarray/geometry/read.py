@@ -7,7 +7,7 @@ import csv
 import numpy as np
 
 from imuarray.errors import IdentifiabilityError, InputError
-from imuarray.geometry.array import Array, require_planar_extent
+from imuarray.geometry.array import Array, require_count, require_planar_extent
 from imuarray.geometry.mimu4444 import mimu4444, mimu4444_corners
 
 
@@ -77,6 +77,8 @@ def _checked(values, labels, gyroscopes, where) -> Array:
         raise InputError(f"{where}: expected {len(values)} different labels, found {list(labels)}")
     require_planar_extent(values, where)
     count = len(values) if gyroscopes is None else int(gyroscopes)
+    require_count(len(values), where, "accelerometer")
+    require_count(count, where, "gyroscope")
     if count < 1:
         raise IdentifiabilityError(f"{where}: expected at least 1 gyroscope triad, found {count}")
     return Array(values, tuple(str(x) for x in labels), count, name=str(where))

@@ -13,13 +13,14 @@ import xarray as xr
 from imuarray.errors import InputError
 from imuarray.provenance import is_damaged, write_netcdf
 from imuarray.recording import validate
-from imuarray.recording.record import FLAGS, NUMBERS, TEXTS, TRUTH, UNITS, Recording
+from imuarray.recording.record import FLAGS, NUMBERS, QUANTITIES, TEXTS, TRUTH, Recording
+from imuarray.recording.units import factor
 
 
 def from_dataset(dataset: xr.Dataset, where: str = "recording") -> Recording:
     """Turn the file's dataset into a recording; InputError, naming `where`, if it is not one."""
     validate.check_structure(dataset, where)
-    arrays = {name: _in_si_units(dataset[name]) for name in UNITS}
+    arrays = {name: _in_si_units(dataset[name], where) for name in QUANTITIES}
     flags = {name: dataset[name].values.astype(bool) for name in FLAGS if name in dataset}
     recording = Recording(
         **arrays,
@@ -33,10 +34,11 @@ def from_dataset(dataset: xr.Dataset, where: str = "recording") -> Recording:
     return recording
 
 
-def _in_si_units(variable: xr.DataArray) -> np.ndarray:
-    """Values as float64; rates in rad/s whatever the file has."""
-    values = np.asarray(variable.values, dtype=float)
-    return np.deg2rad(values) if variable.attrs["units"] == "deg s-1" else values
+def _in_si_units(variable: xr.DataArray, where: str) -> np.ndarray:
+    """Values as float64, by the attribute `units`; InputError for an unknown one."""
+    place = f"{where}: {variable.name}: units"
+    scale = factor(QUANTITIES[str(variable.name)], variable.attrs.get("units"), place)
+    return scale * np.asarray(variable.values, dtype=float)
 
 
 def _labels(coordinate: xr.DataArray) -> tuple[str, ...]:

@@ -11,8 +11,8 @@ from imuarray.errors import InputError
 from imuarray.geometry.mimu4444 import UNDERSIDE_ROTATION
 from imuarray.recording.mimu import Account, MimuStream, read_mimu
 from imuarray.recording.record import Recording
+from imuarray.recording.units import GRAVITY
 
-GRAVITY = 9.80665  # m/s^2, the unit g of the data sheet
 COUNTS_PER_G = 2048.0
 COUNTS_PER_DPS = 16.4
 RAIL = 32767

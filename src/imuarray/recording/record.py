@@ -10,6 +10,7 @@ import xarray as xr
 
 from imuarray.errors import InputError
 from imuarray.geometry import Array
+from imuarray.recording.units import UNITS
 
 AXES = ("x", "y", "z")
 
@@ -32,13 +33,15 @@ DIMENSIONS = {
 # Optional variables that are true or false.
 FLAGS = ("stationary", "specific_force_saturated", "angular_rate_saturated")
 
-# Accepted values of the attribute `units`; the first is written, and is SI.
-UNITS = {
-    "time": ("s",),
-    "specific_force": ("m s-2",),
-    "angular_rate": ("rad s-1", "deg s-1"),
-    "accelerometer_position": ("m",),
+# What each number is, by name in `units.UNITS`.
+QUANTITIES = {
+    "time": "time",
+    "specific_force": "force",
+    "angular_rate": "rate",
+    "accelerometer_position": "length",
 }
+
+SI = {name: next(iter(UNITS[quantity])) for name, quantity in QUANTITIES.items()}
 
 LABELS = ("accelerometer", "gyroscope")
 
@@ -109,8 +112,8 @@ class Recording:
     def to_dataset(self) -> xr.Dataset:
         """The recording as the file holds it, rates in rad/s; InputError for shapes at odds."""
         variables = {
-            name: (DIMENSIONS[name], np.asarray(getattr(self, name), float), {"units": units[0]})
-            for name, units in UNITS.items()
+            name: (DIMENSIONS[name], np.asarray(getattr(self, name), float), {"units": unit})
+            for name, unit in SI.items()
         }
         for name in FLAGS:
             if getattr(self, name) is not None:

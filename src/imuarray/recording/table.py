@@ -11,29 +11,40 @@ import pandas as pd
 import yaml
 
 from imuarray.errors import InputError
-from imuarray.recording.mimu_recording import GRAVITY
 from imuarray.recording.record import Recording
+from imuarray.recording.units import factor
 
-UNITS = {
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
-    "length": {"m": 1.0, "mm": 1e-3},
-    "force": {"m/s^2": 1.0, "g": GRAVITY, "mg": 1e-3 * GRAVITY},
-    "rate": {"rad/s": 1.0, "deg/s": np.pi / 180, "mdeg/s": np.pi / 180e3},
-}
+LEAVE_OUT = "leave out"  # what `incomplete_rows` may be
+OFTEN = 0.1  # share of blank cells from which a sensor is slower than the log
+BLANK = (
+    "; is this sensor slower than the log? `incomplete_rows: leave out` keeps the rows that are"
+    " whole; where there are none, bring the sensors to common instants first"
+)
+LARGEST = 2.0  # m; beyond this, positions without a declared unit are taken to be in another
 WHITESPACE = r"\s+"  # the one delimiter longer than a character
 KEYS = {
-    "delimiter": False, "comment": False, "time": True, "position_unit": False,
-    "position_prior": False, "accelerometers": True, "gyroscopes": True,
+    "delimiter": False, "comment": False, "time": True, "incomplete_rows": False,
+    "position_unit": False, "position_prior": False, "accelerometers": True, "gyroscopes": True,
 }  # fmt: skip
+KINDS = "accelerometers", "gyroscopes"
 SENSOR_KEYS = {"unit": True, "scale": False, "noise": True, "range": True, "triads": True}
 TRIAD_KEYS = {"columns": True, "position": False, "axes": False}
 
 
 class _Loader(yaml.SafeLoader):
-    """Safe YAML that refuses a key given twice: the second would silently replace the first."""
+    """Safe YAML that refuses a key given twice: the second would silently replace the first.
+
+    Keys (labels among them) and the names of columns are text as it stands: 010 and yes, too.
+    """
 
     def construct_mapping(self, node, deep=False):
-        keys = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
+        scalars = [pair for pair in node.value if isinstance(pair[0], yaml.ScalarNode)]
+        keys = [key.value for key, _ in scalars]
+        for key, value in scalars:
+            names = value.value if isinstance(value, yaml.SequenceNode) else [value]
+            for name in [key] + names * (key.value in ("column", "columns")):
+                if isinstance(name, yaml.ScalarNode) and not name.tag.endswith(":merge"):
+                    name.tag = "tag:yaml.org,2002:str"
         twice = next((key for i, key in enumerate(keys) if key in keys[:i]), None)
         if twice is not None:
             line = node.start_mark.line + 1
@@ -52,7 +63,7 @@ def read_columns(path: str | Path) -> dict[str, Any]:
         # ValueError: bytes that are no UTF-8, a date with a 13th month
         raise InputError(f"{path}: expected YAML, found {' '.join(str(error).split())}") from None
     _require_keys(layout, KEYS, str(path))
-    for kind in ("accelerometers", "gyroscopes"):
+    for kind in KINDS:
         _require_keys(layout[kind], SENSOR_KEYS, f"{path}: {kind}")
         triads = layout[kind]["triads"]
         if not isinstance(triads, dict) or not triads:
@@ -69,22 +80,27 @@ def read_table(path: str | Path, columns: str | Path) -> Recording:
     InputError, with the row or the key, for anything that does not fit.
     """
     layout, where = read_columns(columns), str(path)
-    table = _load(path, layout, columns)
-    unit = UNITS["length"]
-    length = _factor(unit, layout.get("position_unit", "m"), f"{columns}: position_unit")
+    table, account = _whole(_load(path, layout, columns), layout, str(columns))
+    length = factor("length", layout.get("position_unit", "m"), f"{columns}: position_unit")
     force, labels = _sensors(table, layout, "accelerometers", "force", where, str(columns))
     rate, rate_labels = _sensors(table, layout, "gyroscopes", "rate", where, str(columns))
     places = [
         _three(triad["position"], f"{columns}: accelerometers {label!r}: position")
         for label, triad in layout["accelerometers"]["triads"].items()
     ]
+    size = float(np.ptp(places, axis=0).max())
+    if "position_unit" not in layout and size > LARGEST:
+        raise InputError(
+            f"{columns}: expected positions within {LARGEST:g} m of each other, found {size:g}:"
+            " name the position_unit, mm or m"
+        )
     numbers = _numbers(layout, str(columns))
     prior = _positive(layout.get("position_prior", 3e-3 / length), f"{columns}: position_prior")
     return Recording(
         time=_time(table, layout["time"], where, str(columns)), specific_force=force,
         angular_rate=rate, accelerometer_position=length * np.array(places),
         accelerometer_labels=labels, gyroscope_labels=rate_labels,
-        position_prior_sd=length * prior, source=Path(path).name, **numbers,
+        position_prior_sd=length * prior, source=Path(path).name, selected=account, **numbers,
     )  # fmt: skip
 
 
@@ -118,6 +134,22 @@ def _load(path, layout, columns) -> pd.DataFrame:
     return table
 
 
+def _whole(table, layout, columns: str) -> tuple[pd.DataFrame, str]:
+    """The rows to be used, numbered as in the file, and how many of how many."""
+    if "incomplete_rows" not in layout:
+        return table, ""
+    rule = layout["incomplete_rows"]
+    if rule != LEAVE_OUT:
+        raise InputError(f"{columns}: incomplete_rows: expected '{LEAVE_OUT}', found {rule!r}")
+    triads = [triad for kind in KINDS for triad in layout[kind]["triads"].values()]
+    used = [triad["columns"] for triad in triads if isinstance(triad["columns"], list)]
+    used = table.columns.isin([str(name) for names in used for name in names])
+    whole = table.loc[:, used].notna().all(axis=1)
+    if whole.all():
+        return table, ""
+    return table[whole], f"{whole.sum()} of {len(table)} samples"
+
+
 def _column(table, name, where) -> np.ndarray:
     if name not in table.columns:
         have = ", ".join(map(str, table.columns))
@@ -130,16 +162,12 @@ def _column(table, name, where) -> np.ndarray:
         cell = table[name].iloc[bad[0]]
         shown = repr(cell) if isinstance(cell, str) else "inf" if np.isinf(cell) else "none or NaN"
         raise InputError(
-            f"{where}: column {name!r}: expected numbers, found {shown} in data row {bad[0] + 1}"
+            f"{where}: column {name!r}: expected numbers, found {shown} in data row"
+            f" {table.index[bad[0]] + 1}"
             f" ({bad.size} of {values.size} rows)"
+            + (BLANK if table[name].isna().mean() > OFTEN else "")
         )
     return values
-
-
-def _factor(units: dict[str, float], name, where: str) -> float:
-    if not isinstance(name, str) or name not in units:
-        raise InputError(f"{where}: expected a unit of {', '.join(units)}, found {name!r}")
-    return units[name]
 
 
 def _is_number(value) -> bool:
@@ -167,17 +195,17 @@ def _numbers(layout, where: str) -> dict[str, float]:
     out = {}
     for kind, units in (("accelerometers", "force"), ("gyroscopes", "rate")):
         section, name = layout[kind], kind.removesuffix("s")
-        factor = _factor(UNITS[units], section["unit"], f"{where}: {kind}: unit")
+        unit = factor(units, section["unit"], f"{where}: {kind}: unit")
         for key, attribute in (("noise", "noise_sd"), ("range", "range")):
             value = _positive(section[key], f"{where}: {kind}: {key}")
-            out[f"{name}_{attribute}"] = factor * value
+            out[f"{name}_{attribute}"] = unit * value
     return out
 
 
 def _sensors(table, layout, kind, units, where, layout_name):
     """Readings (T, K, 3) in SI units in the array frame, and the labels."""
     section = layout[kind]
-    factor = _factor(UNITS[units], section["unit"], f"{layout_name}: {kind}: unit")
+    unit = factor(units, section["unit"], f"{layout_name}: {kind}: unit")
     scale = _positive(section.get("scale", 1.0), f"{layout_name}: {kind}: scale")
     parts = []
     for label, triad in section["triads"].items():
@@ -186,7 +214,7 @@ def _sensors(table, layout, kind, units, where, layout_name):
         if not isinstance(names, list) or len(set(map(str, names))) != 3 or len(names) != 3:
             raise InputError(f"{place}: expected three columns, found {names!r}")
         own = np.stack([_column(table, str(name), where) for name in names], axis=1)
-        parts.append(factor * scale * own @ _turn(triad.get("axes", ["x", "y", "z"]), place).T)
+        parts.append(unit * scale * own @ _turn(triad.get("axes", ["x", "y", "z"]), place).T)
     return np.stack(parts, axis=1), tuple(str(label) for label in section["triads"])
 
 
@@ -214,20 +242,20 @@ def _turn(axes, where: str) -> np.ndarray:
 
 def _time(table, section, where, layout_name) -> np.ndarray:
     if isinstance(section, dict) and set(section) == {"rate"}:
-        return np.arange(len(table)) / _positive(section["rate"], f"{layout_name}: time: rate")
+        return table.index.to_numpy() / _positive(section["rate"], f"{layout_name}: time: rate")
     if not isinstance(section, dict) or set(section) != {"column", "unit"}:
         raise InputError(
             f"{layout_name}: time: expected 'column' and 'unit', or 'rate' in Hz, found {section!r}"
         )
-    factor = _factor(UNITS["time"], section["unit"], f"{layout_name}: time: unit")
+    unit = factor("time", section["unit"], f"{layout_name}: time: unit")
     values = _column(table, str(section["column"]), where)
     back = np.flatnonzero(np.diff(values) <= 0)
     if back.size:
         i = back[0]
         raise InputError(
             f"{where}: column {section['column']!r}: expected a time that increases, found"
-            f" {values[i + 1]:.15g} after {values[i]:.15g} in data row {i + 2}"
+            f" {values[i + 1]:.15g} after {values[i]:.15g} in data row {table.index[i] + 2}"
             f" ({back.size} such steps)"
         )
     # from the first sample: microseconds since 1970 would cost the last digits
-    return factor * (values - values[0]) if values.size else values
+    return unit * (values - values[0]) if values.size else values

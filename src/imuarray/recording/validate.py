@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.errors import IdentifiabilityError, InputError
-from imuarray.geometry.array import require_planar_extent
+from imuarray.geometry.array import require_count, require_planar_extent
 from imuarray.recording.record import (
     AXES,
     DIMENSIONS,
@@ -23,7 +23,8 @@ from imuarray.recording.record import (
     LABELS,
     MAY_BE_INFINITE,
     NUMBERS,
-    UNITS,
+    QUANTITIES,
+    SI,
     Recording,
 )
 
@@ -56,12 +57,11 @@ def check_sizes(file: h5py.File, where: str) -> None:
 
 
 def check_structure(dataset: xr.Dataset, where: str) -> None:
-    """Variables, dimensions, units, labels' type and attributes; the values are for later."""
-    for name in (*UNITS, *LABELS, "axis"):
+    """Variables, dimensions, labels' type and attributes; units and values are for later."""
+    for name in (*QUANTITIES, *LABELS, "axis"):
         _check_present(dataset, name, where)
-    for name in UNITS:
+    for name in QUANTITIES:
         _check_numeric(dataset[name], where)
-        _check_units(dataset[name], where)
     for name in LABELS:
         _check_text(dataset[name], where)
     _check_axis(dataset["axis"], where)
@@ -77,7 +77,7 @@ def check_values(recording: Recording, where: str) -> None:
     _check_counts(recording, where)
     _check_labels("accelerometer", recording.accelerometer_labels, where)
     _check_labels("gyroscope", recording.gyroscope_labels, where)
-    for name in UNITS:
+    for name in QUANTITIES:
         _check_finite(recording, name, where)
     _check_time(recording.time, where, declared=bool(recording.selected))
     require_planar_extent(recording.accelerometer_position, f"{where}: accelerometer_position")
@@ -106,17 +106,6 @@ def _check_numeric(variable: xr.DataArray, where: str) -> None:
     if variable.dtype.kind not in "fiu":
         raise InputError(
             f"{where}: {variable.name}: expected real numbers, found type {variable.dtype}"
-        )
-
-
-def _check_units(variable: xr.DataArray, where: str) -> None:
-    known = UNITS[variable.name]
-    found = variable.attrs.get("units")
-    if not (isinstance(found, str) and found in known):
-        what = "none" if found is None else repr(found)
-        expected = " or ".join(repr(unit) for unit in known)
-        raise InputError(
-            f"{where}: {variable.name}: expected the attribute units to be {expected}, found {what}"
         )
 
 
@@ -169,6 +158,8 @@ def _check_counts(recording: Recording, where: str) -> None:
         raise InputError(f"{where}: time: expected at least 1 sample, found 0")
     if len(recording.gyroscope_labels) == 0:
         raise IdentifiabilityError(f"{where}: expected at least 1 gyroscope triad, found 0")
+    require_count(len(recording.accelerometer_labels), where, "accelerometer")
+    require_count(len(recording.gyroscope_labels), where, "gyroscope")
 
 
 def _check_labels(kind: str, labels: tuple[str, ...], where: str) -> None:
@@ -198,7 +189,7 @@ def _check_range(recording: Recording, name: str, limit: float, where: str) -> N
         index = _first(beyond)
         raise InputError(
             f"{where}: {name}: expected values within the declared range of {limit:g} "
-            f"{UNITS[name][0]}, found {values[index]:g} at {_place(recording, name, index)}; "
+            f"{SI[name]}, found {values[index]:g} at {_place(recording, name, index)}; "
             "is the units attribute right?"
         )
 
