@@ -4,6 +4,7 @@ A page is one program: its blocks run in their order, in one namespace and one f
 
 - ``python`` is run. ``sh`` is run where each command is an `imuarray` one, so other commands must
   be marked.
+  `# status 3` in it says that what they give is not to be trusted, and why the page shows it.
 - A block under a line that is a file's name alone, as code, is that file.
 - ``text`` right below a block that has run is what it printed, numbers to within a fifth;
   elsewhere it is a drawing.
@@ -32,6 +33,7 @@ PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 
 FENCE = re.compile(r"^(?P<indent> *)(?P<ticks>```+|~~~+) *(?P<language>[^\s`]*)(?P<rest>.*)$")
 MARK = re.compile(r"^<!-- (?P<kind>not run|source): (?P<text>.+) -->$")
+UNTRUSTED = "# status 3"  # what a command of such a block gives is not to be trusted
 FILE = re.compile(r"^`([\w.-]+)`$")
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
@@ -130,8 +132,11 @@ def _run_shell(block: Block, namespace: dict) -> None:
         program, *arguments = shlex.split(command)
         if program != "imuarray":
             raise ValueError(f"{block.where}: expected imuarray commands, found {command}")
-        if status := main(arguments):
-            raise ValueError(f"{block.where}: expected status 0, found {status}: {command}")
+        expected = 3 if UNTRUSTED in block.text else 0
+        if (status := main(arguments)) != expected:
+            raise ValueError(
+                f"{block.where}: expected status {expected}, found {status}: {command}"
+            )
 
 
 def compare(block: Block, printed: str) -> None:

@@ -2,15 +2,12 @@
 
 from numbers import Integral
 
-# Sizes that a quantity in SI units may have: what is squared and summed stays a number, and
-# seconds since 1970 fit in.
-SMALLEST, LARGEST = 1e-15, 1e11
-
 
 def printable(text: str) -> str:
     """The text with what would control a terminal escaped; line breaks stay."""
     return "".join(
-        c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text
+        c if c.isprintable() or c in "\n\N{NO-BREAK SPACE}" else c.encode("unicode_escape").decode()
+        for c in text
     )
 
 

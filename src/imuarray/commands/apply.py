@@ -9,11 +9,13 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis.extension import diagnosed
+from imuarray.analysis.model import assumed
 from imuarray.analysis.motion import apply as applied
+from imuarray.analysis.trust import reasons_of_motion
 from imuarray.commands.output import Output
 from imuarray.errors import InputError
 from imuarray.motion.state import UNITS
-from imuarray.provenance import write_netcdf
+from imuarray.provenance import trust, write_netcdf
 from imuarray.recording import Recording, load_dataset, read_recording
 
 
@@ -26,12 +28,14 @@ def apply(arguments) -> None:
         dataset = applied(calibration, recording, arguments.accelerometer_noise)
     except InputError as error:
         raise InputError(f"{arguments.calibration}: {error}") from None
-    write_netcdf(dataset, arguments.out)
+    reasons = reasons_of_motion(assumed(recording, arguments.accelerometer_noise), calibration)
+    write_netcdf(dataset.assign_attrs(trust(reasons)), arguments.out)
     gyroscopes = recording.angular_rate.shape[1]
     average = recording.gyroscope_noise_sd / np.sqrt(gyroscopes)
     found = document(dataset)
     output.say("\n".join(report(found, average)))
-    output.done(found | {"gyroscopes_averaged_sd_rad_s": average, "out": str(arguments.out)})
+    found |= {"gyroscopes_averaged_sd_rad_s": average, "out": str(arguments.out)}
+    output.done(found, reasons)
 
 
 def _calibration(path: Path, recording: Recording) -> xr.Dataset:

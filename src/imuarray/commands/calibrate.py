@@ -6,9 +6,11 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis.calibration import calibrate as calibrated
+from imuarray.analysis.model import assumed
+from imuarray.analysis.trust import reasons_of_calibration
 from imuarray.commands.output import Output
 from imuarray.estimation.informative import weak_directions
-from imuarray.provenance import write_netcdf
+from imuarray.provenance import trust, write_netcdf
 from imuarray.recording import read_recording
 
 MISFIT = 1.5  # residual over declared noise from which the claimed widths are called too small
@@ -17,13 +19,14 @@ MISFIT = 1.5  # residual over declared noise from which the claimed widths are c
 def calibrate(arguments) -> None:
     """Positions and motion by maximum likelihood; see `imuarray.calibrate` for the output."""
     output = Output(arguments)
+    recording, noise = read_recording(arguments.recording), arguments.accelerometer_noise
     dataset = calibrated(
-        read_recording(arguments.recording), arguments.method, arguments.effects,
-        arguments.diagnosis, arguments.accelerometer_noise, output.say,
-    )  # fmt: skip
-    write_netcdf(dataset, arguments.out)
+        recording, arguments.method, arguments.effects, arguments.diagnosis, noise, output.say
+    )
+    reasons = reasons_of_calibration(assumed(recording, noise), dataset)
+    write_netcdf(dataset.assign_attrs(trust(reasons)), arguments.out)
     output.say(report(dataset))
-    output.done(document(dataset) | {"out": str(arguments.out)})
+    output.done(document(dataset) | {"out": str(arguments.out)}, reasons)
 
 
 def document(dataset: xr.Dataset) -> dict:

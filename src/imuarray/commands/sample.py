@@ -7,10 +7,12 @@ from pathlib import Path
 import pandas as pd
 import xarray as xr
 
+from imuarray.analysis.model import assumed
 from imuarray.analysis.sampling import sample as sampled
 from imuarray.analysis.sampling import summary
+from imuarray.analysis.trust import reasons_of_posterior
 from imuarray.commands.output import Output
-from imuarray.provenance import write_netcdf
+from imuarray.provenance import trust, write_netcdf
 from imuarray.recording import read_recording
 
 VERDICT = "converged", "rhat_max", "ess_min", "burn_in_steps", "steps", "divergent", "on_a_line"
@@ -19,18 +21,22 @@ VERDICT = "converged", "rhat_max", "ess_min", "burn_in_steps", "steps", "diverge
 def sample(arguments) -> None:
     """Two chains of the positions' posterior, by PmMH or NUTS; see `imuarray.sample`."""
     output = Output(arguments)
+    recording = read_recording(arguments.recording)
     posterior = sampled(
-        read_recording(arguments.recording), arguments.method, arguments.steps, arguments.seed,
+        recording, arguments.method, arguments.steps, arguments.seed,
         arguments.rates, arguments.effects, arguments.diagnosis, arguments.accelerometer_noise,
         output.progress, output.say, beside=arguments.out,
     )  # fmt: skip
     checkpoint = posterior.attrs.pop("checkpoint", None)
+    recording = assumed(recording, arguments.accelerometer_noise)
+    reasons = reasons_of_posterior(recording, posterior, arguments.rates)
+    posterior.attrs |= trust(reasons)
     write_netcdf(posterior, arguments.out)
     if checkpoint is not None:  # the chains are safe
         Path(checkpoint).unlink(missing_ok=True)
     table = summary(posterior)
     output.say(report(posterior, table))
-    output.done(document(posterior, table) | {"out": str(arguments.out)})
+    output.done(document(posterior, table) | {"out": str(arguments.out)}, reasons)
 
 
 def document(posterior: xr.DataTree, table: pd.DataFrame) -> dict:

@@ -1,0 +1,224 @@
+"""Estimated positions against the drawing: by how much they depart, and what would explain it.
+
+The drawing says where each triad is, to within a declared sd. What departs from it by more than
+chance allows is compared with what a known mistake would make of the drawing: another size, a
+turned, inverted or mirrored array, two IMUs exchanged.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+from scipy.special import chdtrc
+
+ALARM = 1e-6  # p value from which a departure is no chance: 4.9 sds
+SIZES = 0.5, 2.0  # beyond these the size is the first thing to be said
+FAR = 5.0  # sds
+ALIKE = 0.3  # of the drawing's own size: shapes that agree to this are one shape
+LEFT = 0.1  # of chi-square may an explanation leave
+AS_GOOD = 10.0  # chi-square by which another explanation may be worse and still be named
+G = 9.80665
+DEGREE = np.degrees(1.0)
+MISTAKES = (
+    (DEGREE**-2, "gyroscopes in deg/s declared rad/s?", "57.3^2"),
+    (DEGREE**2, "gyroscopes in rad/s declared deg/s, or degrees turned to radians twice?",
+     "57.3^2"),
+    (DEGREE**4, "degrees turned to radians three times?", "57.3^4"),
+    (1 / G, "specific force in g declared m/s^2?", "9.81"),
+    (G, "specific force in m/s^2 declared g?", "9.81"),
+    (1e-3, "nominal positions in mm declared m?", "1000"),
+    (1e-2, "nominal positions in cm declared m?", "100"),
+    (0.0254, "nominal positions in inches declared m?", "39.4"),
+    (1e3, "nominal positions in m declared mm?", "1000"),
+)  # fmt: skip
+
+
+class Places(NamedTuple):
+    """Found and nominal positions (A, 3) m, with the found ones' covariance (3 A, 3 A) m^2.
+
+    ``prior_sd`` (m): each coordinate of each triad of the drawing, the reference's too. ``hand``:
+    1 or -1 where rates and forces are known to turn in the same sense or not, 0 where not known.
+    """
+
+    labels: tuple[str, ...]
+    found: np.ndarray
+    nominal: np.ndarray
+    covariance: np.ndarray
+    prior_sd: float
+    hand: int = 0
+
+    def size(self) -> float:
+        """Extent found over the nominal one."""
+        return float(np.linalg.norm(centred(self.found)) / np.linalg.norm(centred(self.nominal)))
+
+
+class Explanation(NamedTuple):
+    """What a mistake would make of the drawing, (A, 3) m, in words; ``unknowns`` fitted."""
+
+    words: str
+    places: np.ndarray
+    unknowns: int
+
+
+def centred(places) -> np.ndarray:
+    """Relative to the triads' centre."""
+    return places - places.mean(axis=0)
+
+
+def precision(places: Places, prior_sd: float | None = None) -> np.ndarray:
+    """Of found less nominal positions, (3 A, 3 A) 1/m^2, whatever the place of the origin."""
+    sd = places.prior_sd if prior_sd is None else prior_sd
+    inverse = np.linalg.inv(places.covariance + sd**2 * np.eye(len(places.covariance)))
+    moved = np.tile(np.eye(3), (len(places.found), 1))
+    pull = inverse @ moved
+    return inverse - pull @ np.linalg.solve(moved.T @ pull, pull.T)
+
+
+def chi_square(weight, off) -> float:
+    """Squared distance of ``off`` (A, 3) m."""
+    return float(off.ravel() @ weight @ off.ravel())
+
+
+def size_of(places: Places) -> tuple[float, float]:
+    """Size of the array against the drawing, and its sd (the drawing's own error included)."""
+    weight, shape = precision(places), places.nominal.ravel()
+    known = float(shape @ weight @ shape)
+    return float(shape @ weight @ places.found.ravel()) / known, known**-0.5
+
+
+def departures(places: Places) -> str | None:
+    """One sentence where the array found is not the array drawn, or None.
+
+    Tests of all coordinates jointly, of the size, the orientation and of each triad, at `ALARM`
+    among them all.
+    """
+    weight, off = precision(places), places.found - places.nominal
+    count = len(places.found)
+    size, sd = size_of(places)
+    turns = np.stack([np.cross(e, places.nominal).ravel() for e in np.eye(3)], axis=1)
+    pull = turns.T @ weight @ off.ravel()
+    known = turns.T @ weight @ turns
+    turned = float(pull @ np.linalg.lstsq(known, pull, rcond=1e-9)[0])
+    alone = _each(weight, off)
+    tests = [chdtrc(3 * (count - 1), chi_square(weight, off)), chdtrc(1, ((size - 1) / sd) ** 2),
+             chdtrc(3, turned), *chdtrc(3, alone)]  # fmt: skip
+    if len(tests) * min(tests) >= ALARM:
+        return None
+    return another_size(places) or _explained(places) or _unnamed(places, alone, tests[0])
+
+
+def _each(weight, off) -> np.ndarray:
+    """Chi-square (A,) that a free place of each triad alone would take away."""
+    count, pull = len(off), (weight @ off.ravel()).reshape(-1, 3)
+    blocks = weight.reshape(count, 3, count, 3)
+    return np.array([pull[k] @ np.linalg.solve(blocks[k, :, k], pull[k]) for k in range(count)])
+
+
+def another_size(places: Places) -> str | None:
+    """One sentence where the array is the drawn one at quite another size, or None."""
+    size, drawn = places.size(), centred(places.nominal)
+    off = np.linalg.norm(centred(places.found) / size - drawn) / np.linalg.norm(drawn)
+    far = abs(size_of(places)[0] - 1) > FAR * size_of(places)[1]
+    return size_words(size) if far and off < ALIKE and not SIZES[0] < size < SIZES[1] else None
+
+
+def size_words(size: float) -> str:
+    """How far off a size is, and which mistake would make it so."""
+    small = size < 1
+    said = f"the array comes out {(1 / size if small else size):.4g} times too "
+    said += "small" if small else "large"
+    for factor, cause, power in MISTAKES:
+        if abs(np.log(size / factor)) < 0.2:
+            return f"{said} ({power}): {cause}"
+    return f"{said}: a unit of the rates, of the specific force or of the nominal positions?"
+
+
+def _explained(places: Places) -> str | None:
+    """The explanations that fit the drawing's sd, or far better than the drawing itself."""
+    weight = precision(places)
+    before = chi_square(weight, places.found - places.nominal)
+    freedom = 3 * (len(places.found) - 1)
+    fits = [
+        (chi_square(weight, places.found - item.places) + AS_GOOD * item.unknowns, item)
+        for item in _explanations(places)
+    ]
+    # each further unknown has to pay for itself
+    score, best = min(fits, key=lambda fit: fit[0])
+    left = score - AS_GOOD * best.unknowns
+    explained = before - left > 0.5 * (before - freedom)
+    if not explained or (chdtrc(freedom, left) < ALARM and left > LEFT * before):
+        return None
+    words = [item.words for fit, item in fits if item is not best and fit < score + AS_GOOD]
+    return ", or ".join([best.words, *words[:2]])
+
+
+def _explanations(places: Places) -> list[Explanation]:
+    nominal, labels = places.nominal, places.labels
+    size, _ = size_of(places)
+    turn, _ = Rotation.align_vectors(centred(places.found), centred(nominal))
+    found = [
+        Explanation("the array comes out inverted: specific force of the wrong sign (gravity's"
+                    " instead of minus gravity's)?", -nominal, 1),
+        Explanation(f"the array comes out turned by {angle_words(turn)}:"
+                    " are the sensors in the drawing's frame?", turn.apply(nominal), 3),
+    ]  # fmt: skip
+    if size > 0:
+        found.append(Explanation(small_words(size), size * nominal, 1))
+    if places.hand <= 0:
+        found += [
+            Explanation(f"the array comes out mirrored in {axis}: left-handed axes?",
+                        nominal * (1 - 2 * np.eye(3)[i]), 1)
+            for i, axis in enumerate("xyz")
+        ]  # fmt: skip
+    for i, j in combinations(range(len(nominal)), 2):
+        order = np.arange(len(nominal))
+        order[[i, j]] = j, i
+        found.append(
+            Explanation(f"IMUs {labels[i]} and {labels[j]} come out at each other's place: were"
+                        " they exchanged?", nominal[order], 1)
+        )  # fmt: skip
+    for k, label in enumerate(labels):
+        moved = nominal.copy()
+        moved[k] += _apart(places, k)
+        distance = 1e3 * np.linalg.norm(moved[k] - nominal[k])
+        said = f"IMU {label} comes out {distance:.3g} mm from its place: is it the one drawn there?"
+        found.append(Explanation(said, moved, 3))
+    return found
+
+
+def _apart(places: Places, k: int) -> np.ndarray:
+    """By how much triad ``k`` is off, the others' mean being where it is drawn."""
+    off = places.found - places.nominal
+    return off[k] - np.delete(off, k, axis=0).mean(axis=0)
+
+
+def angle_words(rotation: Rotation) -> str:
+    """The angle of a rotation for a person."""
+    angle = np.degrees(rotation.magnitude())
+    return f"{angle:.0f} degrees" if angle >= 10 else f"{angle:.2g} degrees"
+
+
+def small_words(size: float) -> str:
+    """A size that is off by some per cent, and the scales that would make it so."""
+    off, rate = 100 * abs(size - 1), 100 * abs(size**-0.5 - 1)
+    grown, shrunk = ("large", "small") if size > 1 else ("small", "large")
+    return (
+        f"the array comes out {off:.2g} % too {grown}: gyroscopes {rate:.2g} % too {shrunk}, or"
+        f" accelerometers {off:.2g} % too {grown}?"
+    )
+
+
+def _unnamed(places: Places, alone, p: float) -> str:
+    """Which triad departs most, and by how much."""
+    off = centred(places.found) - centred(places.nominal)
+    worst = int(np.argmax(alone))
+    distance = float(np.linalg.norm(_apart(places, worst)))
+    rms = float(np.sqrt(np.mean(off**2)))
+    return (
+        f"the positions are {1e3 * rms:.3g} mm rms from the drawing, {rms / places.prior_sd:.2g} of"
+        f" its sds (p = {max(p, 1e-300):.1g}); most of all IMU {places.labels[worst]},"
+        f" {1e3 * distance:.3g} mm"
+    )

@@ -1,0 +1,126 @@
+"""Motion of a rigid array from its raw readings by plain least squares, to hold readings against.
+
+Quick and without a model of errors: what does not agree here to some per cent is no matter of
+noise. Sensors that are known to be wrong can be left out.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from imuarray.recording import Recording
+
+KNOWN = 0.03  # of the array's largest moment: turning about an axis with less is not seen
+STEP = 0.1  # share of the usual step by which stamps of neighbours may differ from it
+MOST, STRETCH = 20_000, 500  # samples that are looked at, in a row
+FEWEST = 60  # pairs of neighbouring samples
+COHERENT = 0.9  # correlation below which the samples are no course of one smooth motion
+SLOPE = 0.015  # gyroscopes' filters and scales make less
+# of the integral over the middle one of three intervals: exact for cubics
+WEIGHTS = np.array([-1.0, 13.0, 13.0, -1.0]) / 24
+
+
+class Turning(NamedTuple):
+    """Angular rate by the gyroscopes, the rest by the accelerometers, all (T, 3)."""
+
+    rate: np.ndarray  # rad/s
+    acceleration: np.ndarray  # rad/s^2, in the directions that are seen
+    force: np.ndarray  # m/s^2, at the origin of the positions
+    seen: np.ndarray  # (3, 3), onto those directions
+
+    def at(self, positions) -> np.ndarray:
+        """Specific force of triads at ``positions`` (A, 3) m, (T, A, 3) m/s^2."""
+        rate = self.rate[:, None]
+        euler = np.cross(self.acceleration[:, None], positions)
+        return np.cross(rate, np.cross(rate, positions)) + euler + self.force[:, None]
+
+
+def turning(force, rate, positions) -> Turning:
+    """Motion from ``force`` (T, A, 3) and the rate (T, 3), triads at ``positions`` (A, 3) m."""
+    middle = positions.mean(axis=0)
+    arms = positions - middle
+    left = force - np.cross(rate[:, None], np.cross(rate[:, None], arms))
+    mean = left.mean(axis=1)
+    moment = np.sum(arms**2) * np.eye(3) - arms.T @ arms
+    sizes, axes = np.linalg.eigh(moment)
+    seen = axes[:, sizes > KNOWN * sizes[-1]]
+    inverse = seen @ np.diag(1 / sizes[sizes > KNOWN * sizes[-1]]) @ seen.T
+    turn = np.cross(arms, left - mean[:, None]).sum(axis=1) @ inverse
+    at_origin = mean - np.cross(rate, np.cross(rate, middle)) - np.cross(turn, middle)
+    return Turning(rate, turn, at_origin, seen @ seen.T)
+
+
+def runs(time) -> np.ndarray:
+    """First indices (n,) of four samples each that follow each other at the usual step."""
+    if len(time) < 4:
+        return np.empty(0, int)
+    steps = np.diff(time)
+    usual = np.quantile(steps, 0.1)  # of a selection, many steps are longer
+    even = np.abs(steps - usual) < STEP * usual
+    return np.flatnonzero(even[:-2] & even[1:-1] & even[2:])
+
+
+class Slope(NamedTuple):
+    """Turning by the gyroscopes over that by the accelerometers: between two bounds, 1 if sound.
+
+    The bounds are those of errors in either; ``sd`` is the statistical one.
+    """
+
+    low: float
+    high: float
+    sd: float
+    correlation: float
+
+    @property
+    def off(self) -> bool:
+        """Whether no errors of measurement explain that it is not 1."""
+        if self.correlation < COHERENT:
+            return self.correlation < -COHERENT
+        margin = SLOPE + 5 * self.sd
+        return self.high < 1 - margin or self.low > 1 + margin
+
+
+def slope(time, motion: Turning) -> Slope | None:
+    """Change of the rate between neighbours against the integral of the acceleration.
+
+    Of the half of the pairs where the acceleration changes least: fast changes are for the sensors'
+    filters. None where there are too few pairs.
+    """
+    first = runs(time)
+    if len(first) < FEWEST:
+        return None
+    four = first[:, None] + np.arange(4)
+    turn = motion.acceleration[four]
+    steps = (time[first + 2] - time[first + 1])[:, None]
+    change = (motion.rate[first + 2] - motion.rate[first + 1]) @ motion.seen
+    whole = np.einsum("k,tkc->tc", WEIGHTS, turn) * steps
+    # the instants of the two kinds may differ
+    late = turn[:, 2] - turn[:, 1]
+    jerk = np.linalg.norm(late, axis=1)
+    calm = jerk <= np.median(jerk)
+    x, y, lag = (part[calm].ravel() for part in (whole, change, late))
+    if lag @ lag > 0:
+        x, y = (part - lag * (lag @ part) / (lag @ lag) for part in (x, y))
+    xx, yy, xy = x @ x, y @ y, x @ y
+    if not (xx > 0 and yy > 0) or xy == 0:
+        return None
+    forward, reverse = xy / xx, yy / xy
+    correlation = xy / np.sqrt(xx * yy)
+    sd = np.sqrt(np.sum((y - forward * x) ** 2) / xx / calm.sum())
+    low, high = sorted((float(forward), float(reverse)))
+    return Slope(low, high, float(sd), float(correlation))
+
+
+def kept(recording: Recording) -> Recording:
+    """Moving samples off the rails; of a long recording, stretches spread over it."""
+    lost = recording.saturated_accelerometers().any(axis=(1, 2))
+    lost |= recording.saturated_gyroscopes().any(axis=(1, 2))
+    if recording.stationary is not None:
+        lost |= recording.stationary
+    index = np.flatnonzero(~lost)
+    if len(index) > MOST:
+        stretches = np.array_split(index, len(index) // STRETCH)
+        index = np.concatenate(stretches[:: -(-len(index) // MOST)])
+    return recording.select(index) if len(index) < lost.size else recording

@@ -1,0 +1,198 @@
+"""Sensors whose readings do not go with those of the others, and what would make them go.
+
+All triads of a rigid array see the same motion: the gyroscopes the same rate, each accelerometer
+what the others say of its place. A triad that is far off is turned, delayed or scaled to fit; what
+takes most of its error away is named.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.transform import Rotation
+
+from imuarray.analysis.drawing import angle_words
+from imuarray.analysis.rigid import COHERENT, runs, slope, turning
+from imuarray.recording import Recording
+
+FAR = 4.0  # times the median triad's error, and the declared noise
+TAKEN = 0.35  # of the error must be left at most
+LAGS = range(-3, 4)  # samples
+LEAST_LAG = 0.3  # samples
+
+
+class Suspect(NamedTuple):
+    """A triad, and what would make it agree with the others (empty if nothing known does)."""
+
+    kind: str
+    label: str
+    words: str
+
+
+def suspects(recording: Recording) -> list[Suspect]:
+    """The triads that are off, in words; none where all agree, or where half of them do not.
+
+    ``recording`` without still poses and readings at a rail.
+    """
+    return _accelerometers(recording) + _gyroscopes(recording)
+
+
+def told(found: list[Suspect]) -> list[str]:
+    """One phrase for each; a whole IMU where both its triads say the same."""
+    words: dict[tuple[str, str], list[str]] = {}
+    for item in found:
+        words.setdefault((item.label, item.words), []).append(item.kind)
+    return [
+        f"{'IMU' if len(kinds) == 2 else kinds[0]} {label} {said or 'does not fit the others'}"
+        for (label, said), kinds in words.items()
+    ]
+
+
+def _gyroscopes(recording: Recording) -> list[Suspect]:
+    rates = recording.angular_rate
+
+    def others(left):
+        """What each gyroscope should read by the others that are left (T, G, 3)."""
+        parts = [np.setdiff1d(left, [k]) for k in range(rates.shape[1])]
+        return np.stack([np.median(rates[:, part], axis=1) for part in parts], axis=1)
+
+    sd = recording.gyroscope_noise_sd
+    return _search(recording, "gyroscope", rates, others, sd, recording.gyroscope_labels)
+
+
+def _accelerometers(recording: Recording) -> list[Suspect]:
+    force, places = recording.specific_force, recording.relative_positions()
+    rate = np.median(recording.angular_rate, axis=1)
+
+    def others(left):
+        """What each accelerometer should read by the others that are left (T, A, 3)."""
+        found = np.empty(force.shape)
+        for k in range(force.shape[1]):
+            part = np.setdiff1d(left, [k])
+            found[:, k] = turning(force[:, part], rate, places[part]).at(places[k : k + 1])[:, 0]
+        return found
+
+    sd = recording.accelerometer_noise_sd
+    return _search(recording, "accelerometer", force, others, sd, recording.accelerometer_labels)
+
+
+def _search(recording, kind, readings, others, sd, labels) -> list[Suspect]:
+    """One triad after the other: the worst is named and left out, until the rest agree."""
+    count = readings.shape[1]
+    left = np.arange(count)
+    found: list[Suspect] = []
+    if count < 3:
+        return []
+    chain = runs(recording.time)
+    while len(left) > max(2, count / 2):
+        expected = others(left)
+        error = np.sqrt(np.mean((readings - expected) ** 2, axis=(0, 2)))
+        worst = left[np.argmax(error[left])]
+        rest = np.setdiff1d(left, [worst])
+        without = np.sqrt(np.mean((readings - others(rest)) ** 2, axis=(0, 2)))[rest]
+        if error[worst] < FAR * max(np.median(without), sd):
+            return found
+        words = explain(readings[:, worst], expected[:, worst], chain)
+        found.append(Suspect(kind, labels[worst], words))
+        left = rest
+    return [] if len(found) == count - 2 else found
+
+
+def explain(readings, expected, chain) -> str:
+    """What would make ``readings`` (T, 3) of ``expected`` ones; empty if nothing here does.
+
+    ``chain``: first indices of four samples in a row.
+    """
+    before = np.sqrt(np.mean((readings - expected) ** 2))
+    tries = [_axes(readings, expected), _turned(readings, expected), *_scaled(readings, expected)]
+    if len(chain):
+        tries.append(_late(readings, expected, chain))
+    left, words = min(tries)
+    return words if left < TAKEN * before else ""
+
+
+def _rms(values) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _axes(readings, expected) -> tuple[float, str]:
+    """Axes with the wrong sign or name."""
+    cross = readings.T @ expected
+    cross /= np.linalg.norm(readings, axis=0)[:, None] * np.linalg.norm(expected, axis=0) + 1e-300
+    order = linear_sum_assignment(-np.abs(cross))[1]
+    signs = np.sign(cross[range(3), order])
+    left = _rms(readings - expected[:, order] * signs)
+    if (order == range(3)).all():
+        wrong = [name for name, sign in zip("xyz", signs, strict=True) if sign < 0]
+        return (left, f"has {_axes_named(wrong)} of the wrong sign") if wrong else (np.inf, "")
+    names = [f"{'-' if s < 0 else ''}{'xyz'[k]}" for k, s in zip(order, signs, strict=True)]
+    return left, f"reads {', '.join(names)} in place of x, y, z"
+
+
+def _turned(readings, expected) -> tuple[float, str]:
+    rotation, _ = Rotation.align_vectors(readings, expected)
+    left = _rms(readings - rotation.apply(expected))
+    # one axis of the wrong sign is no rotation; a rotation by 90 degrees is both
+    return 0.999 * left, f"is turned by {angle_words(rotation)}"
+
+
+def _scaled(readings, expected) -> list[tuple[float, str]]:
+    factor = np.sum(readings * expected) / np.sum(expected**2)
+    offset = (readings - expected).mean(axis=0)
+    return [
+        (_rms(readings - factor * expected), f"reads {factor:.4g} times what it should"),
+        (_rms(readings - expected - offset), f"is off by a constant {_rms(offset):.3g}"),
+    ]
+
+
+def _late(readings, expected, chain) -> tuple[float, str]:
+    """A delay of whole samples, refined by the slope between neighbours."""
+    best = (np.inf, "")
+    middle = chain[(chain >= 3) & (chain < len(readings) - 6)] + 1
+    for lag in LAGS:
+        if not len(middle):
+            break
+        then = middle - lag
+        rise = (expected[then + 1] - expected[then - 1]) / 2
+        off = readings[middle] - expected[then]
+        part = -np.sum(off * rise) / max(np.sum(rise**2), 1e-300)
+        samples = lag + part
+        if abs(part) > 0.6 or abs(samples) < LEAST_LAG:
+            continue
+        size, word = round(abs(samples), 1), "late" if samples > 0 else "early"
+        said = f"is {size:g} sample{'' if size == 1 else 's'} {word}"
+        best = min(best, (_rms(off + part * rise), said))
+    return best
+
+
+# the gyroscopes' axes as the accelerometers' turning has them: signs that make no other sense
+SIGNS = [np.array(signs) for signs in product((1, -1), repeat=3)][1:]
+
+
+def frame(recording: Recording) -> list[str]:
+    """Gyroscopes that all have the same axes of the wrong sign against the accelerometers.
+
+    By the course of the angular acceleration at the nominal positions: mirrored axes make none.
+    """
+    force, places = recording.specific_force, recording.relative_positions()
+    rate = np.median(recording.angular_rate, axis=1)
+
+    def fit(signs) -> float:
+        found = slope(recording.time, turning(force, rate * signs, places))
+        return 0.0 if found is None else found.correlation
+
+    best = max(SIGNS, key=fit)
+    if fit(best) < COHERENT or fit(np.ones(3)) > COHERENT:
+        return []
+    wrong, right = ([name for name, s in zip("xyz", best, strict=True) if s == w] for w in (-1, 1))
+    said = f"all gyroscopes have {_axes_named(wrong)} of the wrong sign"
+    if len(wrong) == 2:  # a turn by half apart, the same as
+        said += f", or all accelerometers {_axes_named(right)}"
+    return [said]
+
+
+def _axes_named(names) -> str:
+    return f"{'axis' if len(names) == 1 else 'axes'} {' and '.join(names)}"

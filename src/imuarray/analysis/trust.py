@@ -1,0 +1,253 @@
+"""Is an answer to be trusted? Sentences why not; none for a sound one (exit status 3, docs).
+
+An answer that fits its own noise can still be wrong: units, signs, exchanged sensors and clocks
+leave no residual. What is known besides is the drawing, that rates and forces are of one motion,
+and that still poses show gravity.
+"""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import xarray as xr
+
+from imuarray.analysis.drawing import FAR, G, Places, another_size, departures, size_of
+from imuarray.analysis.rigid import SLOPE, Slope, Turning, kept, slope, turning
+from imuarray.analysis.suspects import frame, suspects, told
+from imuarray.recording import Recording
+from imuarray.recording.channels import repeated
+
+RESIDUAL = 3.0  # times the declared noise: widths are too small, or scaled by what is no noise
+TRIAD = 10.0  # the same of one triad where the noise of each is estimated
+LEARNT = 0.5  # of the drawing's sd: positions known worse are hardly known from the recording
+STILL = 0.05  # of gravity; raw accelerometers are off by some per cent
+ENDS, NEXT = 10, 5  # readings at a channel's end, and times those at the values next to it
+FEW = 20  # samples
+
+
+def reasons_of_calibration(recording: Recording, calibration: xr.Dataset) -> list[str]:
+    """Why `imuarray.calibrate`'s answer for this recording is not to be trusted."""
+    places = _places(recording, calibration["position"].to_numpy(), _covariance(calibration))
+    residual = _residuals(recording, calibration, places)
+    limit = TRIAD if "effect_parameter" in calibration else RESIDUAL
+    return _judged(recording, places, residual, limit) + _not_converged(calibration.attrs)
+
+
+def reasons_of_posterior(
+    recording: Recording, posterior: xr.DataTree, rates: str = "declared"
+) -> list[str]:
+    """Why `imuarray.sample`'s answer for this recording is not to be trusted.
+
+    With ``rates="spread"`` the gyroscopes' disagreement is allowed for.
+    """
+    draws = posterior["posterior"]["position"].to_numpy().reshape(-1, _size(recording))
+    covariance = np.zeros((_size(recording) + 3,) * 2)
+    covariance[3:, 3:] = np.cov(draws, rowvar=False)
+    places = _places(recording, np.vstack([np.zeros(3), draws.mean(0).reshape(-1, 3)]), covariance)
+    plain = "effect_parameter" not in posterior["posterior"]
+    residual = _rigid(recording, places, rates == "spread") if plain else {}
+    return _judged(recording, places, residual) + _not_converged(posterior.attrs)
+
+
+def reasons_of_motion(recording: Recording, calibration: xr.Dataset) -> list[str]:
+    """Why the motion that `imuarray.apply` gives for this recording is not to be trusted.
+
+    A calibration that is not, or that this recording does not fit, as one of another board.
+    """
+    said = json.loads(calibration.attrs.get("reasons", "[]"))
+    places = _places(recording, calibration["position"].to_numpy(), _covariance(calibration))
+    residual = {} if "effect_parameter" in calibration else _rigid(recording, places)
+    found = _judged(recording, places, residual)
+    return [f"the calibration is not to be trusted: {reason}" for reason in said] + [
+        reason for reason in found if reason not in said
+    ]
+
+
+def _size(recording: Recording) -> int:
+    return 3 * (len(recording.accelerometer_labels) - 1)
+
+
+def _covariance(calibration: xr.Dataset) -> np.ndarray:
+    size = 3 * calibration.sizes["accelerometer"]
+    return calibration["position_covariance"].to_numpy().reshape(size, size)
+
+
+def _places(recording: Recording, found, covariance) -> Places:
+    labels, prior = recording.accelerometer_labels, recording.position_prior_sd
+    return Places(labels, found, recording.relative_positions(), covariance, prior)
+
+
+def _not_converged(attrs) -> list[str]:
+    return [] if attrs.get("converged", 1) else ["the search or the chains have not converged"]
+
+
+def _judged(
+    recording: Recording, places: Places, residual: dict[str, float], limit: float = RESIDUAL
+) -> list[str]:
+    """All tests; where a sensor does not fit the others, its place is no matter.
+
+    ``limit``: of the residual of one triad.
+    """
+    moving = kept(recording)
+    found = repeated(recording) + gravity(recording)
+    if len(moving.time) < FEW:
+        return found + _drawn(places, None)
+    found += clipped(moving)
+    size = another_size(places)
+    if size is not None:
+        return [*found, size]
+    bad, named = _unfitting(residual, moving, limit)
+    if named:
+        return found + bad
+    rate = np.median(moving.angular_rate, axis=1)
+    course = slope(moving.time, turning(moving.specific_force, rate, places.found))
+    return found + bad + _drawn(places, course)
+
+
+def _drawn(places: Places, course: Slope | None) -> list[str]:
+    """Positions against the drawing, rates against accelerometers, and what was learnt."""
+    hand = 0 if course is None or abs(course.correlation) < 0.9 else np.sign(course.correlation)
+    off = departures(places._replace(hand=int(hand)))
+    found = [off] if off else []
+    if course is not None and course.off:
+        found.append(_turning_words(course, places))
+    size = 3 * (len(places.found) - 1)
+    rms = np.sqrt(np.trace(places.covariance) / size)
+    if rms > LEARNT * places.prior_sd:
+        found.append(
+            f"the recording says little of the positions: sd {1e3 * rms:.3g} mm, the drawing's"
+            f" {1e3 * places.prior_sd:.3g}; turn the array faster, and about all axes"
+        )
+    return found
+
+
+def _turning_words(course: Slope, places: Places) -> str:
+    """A slope that is not 1 is the clock's or the gyroscopes'; the array's size may tell them."""
+    if course.correlation < 0:
+        return (
+            "the gyroscopes turn the other way round than the accelerometers: left-handed axes"
+            " (one axis of both kinds flipped), or all rates of the wrong sign?"
+        )
+    value = course.low if course.low > 1 else course.high
+    size, sd = size_of(places)
+    causes = []
+    if abs(size - value**2) < FAR * sd:
+        causes.append(f"gyroscopes {_times(1 / value)}")
+    if abs(1000 * value - 1) < FAR * SLOPE:
+        causes.append("time in ms declared s")
+    elif abs(size - 1) < FAR * sd or not causes:
+        causes.append(f"steps of time {_times(1 / value)}")
+    return (
+        f"the rates change {value:.4g} times as fast as the accelerometers' angular acceleration"
+        f" says: {' or '.join(causes)}?"
+    )
+
+
+def _times(factor: float) -> str:
+    """A factor as a user thinks of it."""
+    word = "large" if factor > 1 else "small"
+    if 0.5 < factor < 2:
+        return f"{100 * abs(factor - 1):.2g} % too {word}"
+    return f"{max(factor, 1 / factor):.4g} times too {word}"
+
+
+def _unfitting(
+    residual: dict[str, float], moving: Recording, limit: float
+) -> tuple[list[str], bool]:
+    """The residual where it is too large, and whose it is; and whether that is known.
+
+    ``limit``: of a single triad's.
+    """
+    whole = residual.get("", 0.0)
+    triads = {name: ratio for name, ratio in residual.items() if name}
+    worst = max(triads, key=triads.__getitem__, default="")
+    if not (whole > RESIDUAL or triads.get(worst, 0.0) > limit):
+        return [], False
+    named = told(suspects(moving)) or frame(moving)
+    cause = f"{', '.join(named)}?" if named else f"most at {worst}, {triads[worst]:.3g} times"
+    return [f"the residual is {whole:.3g} times the declared noise: {cause}"], bool(named)
+
+
+def _residuals(recording: Recording, calibration: xr.Dataset, places: Places) -> dict[str, float]:
+    """Residual over declared noise, of the whole (the key is empty) and of each triad."""
+    found = {"": float(calibration.attrs["residual_ratio"])}
+    if "effect_parameter" not in calibration:
+        return _rigid(recording, places) | found
+    kinds = (("accelerometer", recording.accelerometer_noise_sd),
+             ("gyroscope", recording.gyroscope_noise_sd))  # fmt: skip
+    for kind, declared in kinds:
+        for label, sds in zip(calibration[kind].values, calibration[f"{kind}_sd"], strict=True):
+            found[f"{kind} {label}"] = float(np.sqrt(np.mean(sds**2))) / declared
+    return found
+
+
+def _rigid(recording: Recording, places: Places, spread: bool = False) -> dict[str, float]:
+    """The same for a rigid array without any errors, by plain least squares.
+
+    ``spread``: of the accelerometers alone.
+    """
+    moving = kept(recording)
+    count, gyroscopes = places.found.shape[0], moving.angular_rate.shape[1]
+    if len(moving.time) < FEW:
+        return {}
+    rate = moving.angular_rate.mean(axis=1)
+    motion: Turning = turning(moving.specific_force, rate, places.found)
+    off = (moving.specific_force - motion.at(places.found)) / recording.accelerometer_noise_sd
+    squares = dict(zip(_names("accelerometer", recording), _mean_squares(off), strict=True))
+    free = {name: max(3 * count - 6, 1) / (3 * count) for name in squares}
+    if gyroscopes > 1 and not spread:
+        off = (moving.angular_rate - rate[:, None]) / recording.gyroscope_noise_sd
+        own = dict(zip(_names("gyroscope", recording), _mean_squares(off), strict=True))
+        squares |= own
+        free |= dict.fromkeys(own, 1 - 1 / gyroscopes)
+    whole = sum(squares.values()) / sum(free.values())
+    return {"": float(np.sqrt(whole))} | {
+        name: float(np.sqrt(value / free[name])) for name, value in squares.items()
+    }
+
+
+def _mean_squares(values) -> np.ndarray:
+    return np.mean(values**2, axis=(0, 2))
+
+
+def _names(kind: str, recording: Recording) -> list[str]:
+    return [f"{kind} {label}" for label in getattr(recording, f"{kind}_labels")]
+
+
+def gravity(recording: Recording) -> list[str]:
+    """Still poses that do not show gravity: a unit."""
+    still = recording.stationary
+    if still is None or not still.any():
+        return []
+    size = float(np.median(np.linalg.norm(recording.specific_force[still], axis=2)))
+    if abs(size / G - 1) < STILL:
+        return []
+    unit = ": in g declared m/s^2?" if abs(size - 1) < STILL else ""
+    return [f"specific force in the still poses is {size:.4g} m/s^2, gravity {G:.4g}{unit}"]
+
+
+def clipped(recording: Recording) -> list[str]:
+    """A sentence for each channel that ends abruptly within its declared range."""
+    found = []
+    for kind, name in (("accelerometer", "specific_force"), ("gyroscope", "angular_rate")):
+        values = getattr(recording, name)
+        for k, axis in np.ndindex(values.shape[1:]):
+            ends = _ends(values[:, k, axis])
+            if ends:
+                label = getattr(recording, f"{kind}_labels")[k]
+                found.append(f"{kind} {label}, axis {'xyz'[axis]}, is clipped at"
+                             f" {' and '.join(f'{end:.4g}' for end in ends)}, within its declared"
+                             " range")  # fmt: skip
+    return found
+
+
+def _ends(channel) -> list[float]:
+    """Extreme values at which far more readings are than at the values next to them."""
+    values, counts = np.unique(channel, return_counts=True)
+    if len(values) < 4 * NEXT:
+        return []
+    sides = (values[0], counts[: NEXT + 1]), (values[-1], counts[::-1][: NEXT + 1])
+    return [
+        float(end) for end, near in sides if near[0] >= max(ENDS, NEXT * near[1:].max())
+    ]  # fmt: skip

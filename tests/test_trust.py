@@ -1,0 +1,295 @@
+"""Mistakes that leave no residual, and those that do: status 3 or 2, and the suspect by name."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.spatial.transform import Rotation
+
+import imuarray
+from imuarray.analysis import trust
+from imuarray.analysis.drawing import Places, departures
+from imuarray.analysis.rigid import turning
+from imuarray.analysis.suspects import suspects, told
+from imuarray.blind import Case, make
+from imuarray.cli import main
+from imuarray.geometry import mimu4444, mimu4444_corners
+
+CASE = Case("trust", duration=8.0)
+FLIP = np.array([1.0, 1.0, -1.0])
+DEGREE = np.pi / 180
+
+
+@pytest.fixture(scope="module")
+def sound():
+    return make(CASE, 1)[0]
+
+
+def swapped(values, i, j):
+    """Columns ``i`` and ``j`` of (T, K, 3) readings exchanged."""
+    order = np.arange(values.shape[1])
+    order[[i, j]] = j, i
+    return values[:, order]
+
+
+def one(recording, imu, change, kinds=("specific_force", "angular_rate")):
+    """The recording with ``change`` of an IMU's readings (T, 3)."""
+    fields = {name: getattr(recording, name).copy() for name in kinds}
+    for values in fields.values():
+        values[:, imu] = change(values[:, imu])
+    return replace(recording, **fields)
+
+
+def times(recording, force=1.0, rate=1.0):
+    """Readings times factors."""
+    return replace(
+        recording, specific_force=recording.specific_force * force,
+        angular_rate=recording.angular_rate * rate,
+    )  # fmt: skip
+
+
+def turned(degrees):
+    """IMU 3 turned about an axis that is none of its own."""
+    rotation = Rotation.from_rotvec(degrees * DEGREE * np.array([0.36, 0.48, 0.8]))
+    return lambda recording: one(recording, 2, rotation.apply)
+
+
+def late(values):
+    """By one sample."""
+    return np.vstack([values[:1], values[:-1]])
+
+
+def doubled(recording):
+    half = len(recording.time) // 2
+    whole = np.r_[np.arange(2 * half), np.arange(half)]
+    found = recording.select(whole)
+    return replace(found, time=np.arange(len(whole)) * recording.time[1])
+
+
+def with_poses(recording):
+    """A still pose at the end, in units of g as the rest."""
+    count, rng = 200, np.random.default_rng(0)
+    shape = recording.specific_force.shape[1:]
+    force = [0, 0, 9.81] + 0.04 * rng.standard_normal((count, *shape))
+    rate = 1e-3 * rng.standard_normal((count, *recording.angular_rate.shape[1:]))
+    samples = len(recording.time)
+    found = replace(
+        recording, time=np.arange(samples + count) * recording.time[1],
+        specific_force=np.concatenate([recording.specific_force, force]),
+        angular_rate=np.concatenate([recording.angular_rate, rate]),
+        stationary=np.arange(samples + count) >= samples,
+    )  # fmt: skip
+    return times(found, force=1 / 9.81)
+
+
+GYROSCOPE, ACCELEROMETER = ("angular_rate",), ("specific_force",)
+MISTAKES = {
+    "two IMUs exchanged": (
+        lambda r: replace(r, specific_force=swapped(r.specific_force, 2, 5)),
+        "IMUs 3 and 6 come out at each other's place",
+    ),
+    "the reference exchanged": (
+        lambda r: replace(r, specific_force=swapped(r.specific_force, 0, 3)),
+        "IMUs 1 and 4 come out at each other's place",
+    ),
+    "specific force of the wrong sign": (
+        lambda r: times(r, force=-1.0), "inverted: specific force of the wrong sign"
+    ),
+    "z of both sensors flipped": (lambda r: times(r, FLIP, FLIP), "left-handed axes"),
+    "all rates of the wrong sign": (lambda r: times(r, rate=-1.0), "all rates of the wrong sign"),
+    "z of the gyroscopes flipped": (
+        lambda r: times(r, rate=FLIP), "all gyroscopes have axis z of the wrong sign"
+    ),
+    "g declared as m/s^2": (
+        lambda r: times(r, force=1 / 9.81), "specific force in g declared m/s^2"
+    ),
+    "g declared as m/s^2, with still poses": (
+        with_poses, "in the still poses is 1 m/s^2, gravity 9.807: in g declared"
+    ),
+    "gyroscopes in deg/s declared rad/s": (
+        lambda r: times(r, rate=1 / DEGREE), r"too small (57.3^2): gyroscopes in deg/s declared"
+    ),
+    "degrees to radians twice": (
+        lambda r: times(r, rate=DEGREE), r"too large (57.3^2): gyroscopes in rad/s declared"
+    ),
+    "gyroscopes 2.4 % too large": (
+        lambda r: times(r, rate=1.024), "angular acceleration says: gyroscopes 2."
+    ),
+    "nominal positions in mm declared m": (
+        lambda r: replace(r, accelerometer_position=1e3 * r.accelerometer_position),
+        "nominal positions in mm declared m",
+    ),
+    "stamps in ms declared s": (
+        lambda r: replace(r, time=1e3 * r.time), "time in ms declared s"
+    ),
+    "half of the recording twice": (doubled, "500 of 1500 samples are copies"),
+    "an IMU at 37 degrees": (turned(37), "IMU 3 is turned by 37 degrees"),
+    "an IMU at 90 degrees": (turned(90), "IMU 3 is turned by 90 degrees"),
+    "an IMU at 2 degrees": (turned(2), "gyroscope 3 is turned by 2 degrees"),
+    "a gyroscope's axis of the wrong sign": (
+        lambda r: one(r, 2, lambda x: x * [1, -1, 1], GYROSCOPE),
+        "gyroscope 3 has axis y of the wrong sign",
+    ),
+    "an accelerometer's axes exchanged": (
+        lambda r: one(r, 2, lambda x: x[:, [1, 0, 2]], ACCELEROMETER),
+        "accelerometer 3 reads y, x, z in place of x, y, z",
+    ),
+    "an IMU one sample late": (lambda r: one(r, 2, late), "IMU 3 is 1 sample late"),
+    "a clipped accelerometer": (
+        lambda r: one(r, 2, lambda x: np.clip(x, -12, 12), ACCELEROMETER),
+        "accelerometer 3, axis x, is clipped at -12 and 12",
+    ),
+    "the array turned against the drawing": (
+        lambda r: replace(
+            r, accelerometer_position=r.accelerometer_position @ Rotation.from_rotvec(
+                [0, 0, 37 * DEGREE]
+            ).as_matrix()
+        ), "turned by 37 degrees: are the sensors in the drawing's frame?",
+    ),
+}  # fmt: skip
+REFUSED = {
+    "a constant channel": (
+        lambda r: one(r, 2, lambda x: x * [0, 1, 1], GYROSCOPE), "gyroscope '3', axis x"
+    ),
+    "an IMU given twice": (
+        lambda r: replace(r, specific_force=r.specific_force[:, [0, 1, 2, 2, 4, 5, 6, 7]]),
+        "accelerometer '4' reads what '3' reads",
+    ),
+    "hardly any motion": (
+        lambda r: replace(
+            r, angular_rate=np.random.default_rng(0).normal(0, 1e-3, r.angular_rate.shape),
+            specific_force=np.random.default_rng(1).normal(0, 0.04, r.specific_force.shape),
+        ), "expected rotation",
+    ),
+}  # fmt: skip
+
+
+def calibrated(recording, folder, capsys) -> tuple[int, str, dict]:
+    """Status, last line and JSON of `imuarray calibrate`."""
+    imuarray.write_recording(recording, folder / "rec.nc")
+    asked = ["calibrate", str(folder / "rec.nc"), "--method", "gauss-newton", "--json"]
+    capsys.readouterr()
+    status = main([*asked, "--out", str(folder / "cal.nc")])
+    said = capsys.readouterr()
+    return status, said.err, json.loads(said.out) if status in (0, 3) else {}
+
+
+@pytest.mark.filterwarnings("ignore:.*gap")
+@pytest.mark.parametrize("mistake", [*MISTAKES, *REFUSED])
+def test_a_mistake_is_named(sound, mistake, tmp_path, capsys):
+    change, words = (MISTAKES | REFUSED)[mistake]
+    status, said, document = calibrated(change(sound), tmp_path, capsys)
+    assert words in said and said.count("\n") == 1
+    if mistake in REFUSED:
+        assert status == 2 and not (tmp_path / "cal.nc").exists()
+        return
+    assert status == 3 and document["trusted"] is False
+    with xr.open_dataset(tmp_path / "cal.nc") as written:
+        assert written.attrs["trusted"] == 0
+        assert json.loads(written.attrs["reasons"]) == document["reasons"]
+
+
+SOUND = [
+    Case("sound", duration=4.0), Case("sound", duration=8.0, rails=True),
+    Case("sound", imus=32, duration=4.0), Case("sound", sampling_rate=62.5, duration=8.0),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("case", SOUND, ids=["8", "rails", "32", "62.5 Hz"])
+def test_a_sound_recording_gives_none(case):
+    """101 of 101 others did not either; at p = 1e-6 none should."""
+    for seed in range(3):
+        recording, _ = make(case, seed)
+        found = imuarray.calibrate(recording, "gauss-newton")
+        assert trust.reasons_of_calibration(recording, found) == []
+
+
+def test_samples_that_are_no_course_give_none():
+    """The papers' motion, drawn anew for each sample, has no angular acceleration in time."""
+    recording, _ = imuarray.simulate(mimu4444_corners(), 4.0, 100.0, seed=1)
+    shuffled = recording.select(np.random.default_rng(0).permutation(len(recording.time)))
+    recording = replace(shuffled, time=recording.time)
+    found = imuarray.calibrate(recording, "gauss-newton")
+    assert trust.reasons_of_calibration(recording, found) == []
+
+
+def test_a_drawing_wrong_by_its_declared_amount_gives_none():
+    """And one wrong by eight times as much gives a sentence, whichever triad it is."""
+    nominal, rng = mimu4444().relative, np.random.default_rng(0)
+    labels, prior = mimu4444().labels, 1e-3
+
+    def said(off):
+        found = nominal + off - off[0]
+        return departures(Places(labels, found, nominal, np.zeros((96, 96)), prior))
+
+    assert not any(said(prior * rng.standard_normal(nominal.shape)) for _ in range(200))
+    for k in (0, 7):
+        off = prior * rng.standard_normal(nominal.shape)
+        off[k] += [0, 0, 8 * prior]
+        assert said(off).startswith(f"IMU {labels[k]} comes out")
+    assert "too large" in said(0.15 * nominal)  # 8.5 sds of the size
+
+
+def test_the_motion_of_a_rigid_array():
+    places, rng = mimu4444_corners().relative, np.random.default_rng(0)
+    rate, turn, force = rng.standard_normal((3, 20, 3))
+    w, a = rate[:, None], turn[:, None]
+    readings = np.cross(w, np.cross(w, places)) + np.cross(a, places) + force[:, None]
+    found = turning(readings, rate, places)
+    np.testing.assert_allclose(found.acceleration, turn, atol=1e-12)
+    np.testing.assert_allclose(found.force, force, atol=1e-12)
+    np.testing.assert_allclose(found.at(places), readings, atol=1e-12)
+    # two triads do not see the turning about the line through them
+    two = turning(readings[:, :2], rate, places[:2])
+    along = (places[1] - places[0]) / np.linalg.norm(places[1] - places[0])
+    np.testing.assert_allclose(two.acceleration @ along, 0.0, atol=1e-12)
+    np.testing.assert_allclose(two.acceleration, turn - np.outer(turn @ along, along), atol=1e-12)
+
+
+def test_two_suspects_are_both_named(sound):
+    recording = one(turned(20)(sound), 5, late)
+    assert told(suspects(recording)) == ["IMU 3 is turned by 20 degrees", "IMU 6 is 1 sample late"]
+
+
+def posterior_of(found, scale=1.0):
+    """A posterior as of `sample`, its draws from a calibration's normal approximation."""
+    covariance = found["position_covariance"].to_numpy().reshape((24, 24))[3:, 3:]
+    rng, mean = np.random.default_rng(0), scale * found["position"].to_numpy()[1:].ravel()
+    draws = rng.multivariate_normal(mean, covariance, size=200).reshape(2, 100, 7, 3)
+    part = xr.Dataset({"position": (("chain", "draw", "accelerometer", "axis"), draws)})
+    tree = xr.DataTree.from_dict({"posterior": part})
+    tree.attrs["converged"] = 1
+    return tree
+
+
+def test_a_posterior(sound):
+    found = imuarray.calibrate(sound, "gauss-newton")
+    assert trust.reasons_of_posterior(sound, posterior_of(found)) == []
+    wrong = times(sound, force=-1.0)
+    (said,) = trust.reasons_of_posterior(wrong, posterior_of(found, -1.0))
+    assert "inverted" in said
+    noisy = one(sound, 2, lambda x: x + 0.1 * np.sin(np.arange(len(x)))[:, None], GYROSCOPE)
+    (said,) = trust.reasons_of_posterior(noisy, posterior_of(found))
+    assert "gyroscope 3 does not fit the others" in said
+    assert trust.reasons_of_posterior(noisy, posterior_of(found), rates="spread") == []
+    tree = posterior_of(found)
+    tree.attrs["converged"] = 0
+    assert trust.reasons_of_posterior(sound, tree) == [
+        "the search or the chains have not converged"
+    ]
+
+
+def test_a_motion_of_another_board_s_calibration(sound, tmp_path, capsys):
+    other, _ = make(CASE, 2)
+    assert calibrated(other, tmp_path, capsys)[0] == 0
+    imuarray.write_recording(sound, tmp_path / "rec.nc")
+    files = [str(tmp_path / name) for name in ("cal.nc", "rec.nc")]
+    status = main(["apply", *files, "--out", str(tmp_path / "motion.nc"), "--quiet"])
+    assert status == 3 and "times the declared noise" in capsys.readouterr().err
+    # a calibration that is not to be trusted makes no motion that is
+    calibrated(times(sound, rate=1.024), tmp_path, capsys)
+    imuarray.write_recording(sound, tmp_path / "rec.nc")
+    status = main(["apply", *files, "--out", str(tmp_path / "motion.nc"), "--quiet"])
+    assert status == 3 and "the calibration is not to be trusted" in capsys.readouterr().err
