@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
+from imuarray.analysis.checked import require_fit
 from imuarray.analysis.model import assumed, model_of
 from imuarray.errors import InputError
-from imuarray.model.effects import EFFECTS
 from imuarray.model.names import parameter_names
 from imuarray.model.noise import Noise
-from imuarray.model.own import own_version
 from imuarray.motion.state import UNITS
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording
@@ -40,11 +38,16 @@ def apply(
     recording = assumed(recording, accelerometer_noise)
     require_fit(calibration, recording)
     saturated = recording.saturated_gyroscopes()
-    if "effect_parameter" in calibration:
-        _, found = extended_motion(calibration, recording, saturated, accelerometer_noise)
-    else:
-        found = _papers(calibration, recording)
+    try:
+        if "effect_parameter" in calibration:
+            _, found = extended_motion(calibration, recording, saturated, accelerometer_noise)
+        else:
+            found = _papers(calibration, recording)
+    except np.linalg.LinAlgError as error:
+        raise InputError(f"expected a calibration that determines the motion: {error}") from None
     lost = recording.saturated_accelerometers().any(axis=(1, 2))
+    if not (np.einsum("tii->ti", found.covariance)[~lost] > 0).all():  # NaN, too
+        raise InputError("expected a calibration that gives the motion variances, found none")
     dataset = motion_dataset(recording, found, lost)
     if "effect_parameter" in calibration and "whole_covariance" not in calibration:
         for name in UNITS:
@@ -80,7 +83,6 @@ def extended_motion(
     """
     from imuarray.estimation.extended import fuse_extended
 
-    _require_effects(calibration)
     positions = calibration["position"].to_numpy()
     sds = [calibration[f"{kind}_sd"].to_numpy()[:, 0] for kind in ("accelerometer", "gyroscope")]
     if accelerometer_noise is not None:
@@ -106,43 +108,6 @@ def extended_motion(
         covariance, saturated,
         recording.time - calibration.attrs["time_origin"], calibration.attrs["span"],
     )  # fmt: skip
-
-
-def _require_effects(calibration: xr.Dataset) -> None:
-    """InputError unless the calibration's effects are here, a user's own with the same text."""
-    missing = [name for name in calibration.attrs["effects"].split(",") if name not in EFFECTS]
-    if missing:
-        raise InputError(
-            f"expected the effects of the calibration, found no {', '.join(missing)}: name the file"
-            " that defines them (--effect-file, imuarray.read_effects)"
-        )
-    known = " ".join(map(str, json.loads(calibration.attrs.get("versions", "{}")).values()))
-    for name in calibration.attrs["effects"].split(","):
-        text = own_version(name)
-        if text is not None and text not in known:
-            raise InputError(
-                f"expected the effect {name} as it was at the calibration, found another text"
-            )
-
-
-def require_fit(calibration: xr.Dataset, recording: Recording) -> None:
-    """InputError unless this is a calibration of the recording's IMUs."""
-    for name in ("position", "position_covariance"):
-        if name not in calibration:
-            raise InputError(f"expected a calibration (imuarray calibrate), found no {name}")
-    for kind in ("accelerometer", "gyroscope"):
-        if kind not in calibration.coords:  # gyroscopes matter to effects only
-            continue
-        labels = tuple(map(str, calibration[kind].to_numpy()))
-        expected = getattr(recording, f"{kind}_labels")
-        if labels != expected:
-            raise InputError(
-                f"expected {kind}s {', '.join(expected)}, as in the recording, found"
-                f" {', '.join(labels)}"
-            )
-    fields = [calibration[name].to_numpy() for name in ("position", "position_covariance")]
-    if not all(np.all(np.isfinite(field)) for field in fields):
-        raise InputError("expected finite positions and covariances, found others")
 
 
 def motion_dataset(recording: Recording, found, lost) -> xr.Dataset:

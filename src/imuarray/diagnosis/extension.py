@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.errors import InputError
+from imuarray.errors import LARGEST, SMALLEST, InputError
 from imuarray.model import EFFECTS, ArrayModel
 from imuarray.model.array_model import EffectPrior
 from imuarray.model.effects import DATA_EFFECTS, KINDS
@@ -39,24 +39,26 @@ class Extension(NamedTuple):
 def read_extension(path: Path) -> Extension:
     """From `diagnosis.json`; InputError says what is missing."""
     try:
-        document = json.loads(Path(path).read_text(encoding="utf-8"))
+        document = json.loads(Path(path).read_text(encoding="utf-8"), parse_constant=_no_number)
         causes, noise = document["causes"], document["noise_sd"]
         named = [c["effect"] for c in causes]
         effects = tuple(name for name in named if name in EFFECTS)
         values = {
-            c["effect"]: {n: (float(p["value"]), p["sd"]) for n, p in c["parameters"].items()}
+            c["effect"]: {n: _value(p) for n, p in c["parameters"].items()}
             for c in causes if c["effect"] in EFFECTS
         }  # fmt: skip
-        sds = [{label: float(item["sd"]) for label, item in noise[kind].items()} for kind in KINDS]
+        sds = [{label: _sized(item["sd"]) for label, item in noise[kind].items()} for kind in KINDS]
         before = tuple(
             name for name in named if name in DATA_EFFECTS and DATA_EFFECTS[name].kind == "readings"
         )
         section = document["extended"]
-        places = [np.array(section[f"positions_{name}"], float) for name in ("m", "sd_m")]
-        times = float(document["clock"]["origin_s"]), float(document["clock"]["span_s"])
+        places = [_places(section[f"positions_{name}"]) for name in ("m", "sd_m")]
+        if places[0].shape != places[1].shape or np.any(places[1] < 0):
+            raise ValueError("no sd, of 0 or more, for each position")
+        times = _sized(document["clock"]["origin_s"], -LARGEST), _sized(document["clock"]["span_s"])
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: expected a diagnosis.json, found no text") from error
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except _WRONG as error:
         what = f"no {error}" if isinstance(error, KeyError) else str(error)[:80]
         raise InputError(f"{path}: expected a diagnosis.json, found {what}") from error
     for name in named:
@@ -66,6 +68,37 @@ def read_extension(path: Path) -> Extension:
                 " module that defines it imported?"
             )
     return Extension(effects, values, *sds, before, times, *places)
+
+
+# what a JSON of another shape makes the reading raise
+_WRONG = (
+    ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError,
+)  # fmt: skip
+
+
+def _no_number(text: str):
+    raise ValueError(f"{text}, which is no number")
+
+
+def _sized(value, least: float = SMALLEST) -> float:
+    """A number from ``least`` to `LARGEST`, or ValueError."""
+    if isinstance(value, str | bool) or not least <= float(value) <= LARGEST:
+        raise ValueError(f"{value!r} for a number from {least:g} to {LARGEST:g}")
+    return float(value)
+
+
+def _value(parameter: dict) -> tuple[float, float | None]:
+    """A parameter's value and sd; None for one that is fixed."""
+    sd = parameter["sd"]
+    return _sized(parameter["value"], -LARGEST), None if sd is None else _sized(sd, 0.0)
+
+
+def _places(rows) -> np.ndarray:
+    """(A, 3) m."""
+    found = np.array([[_sized(value, -LARGEST) for value in row] for row in rows])
+    if found.ndim != 2 or found.shape[1] != 3:
+        raise ValueError(f"positions of shape {found.shape}")
+    return found
 
 
 def extended_model(extension: Extension, model: ArrayModel, labels) -> ArrayModel:

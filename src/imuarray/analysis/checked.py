@@ -1,0 +1,146 @@
+"""Whether a calibration is whole, and one of the recording's IMUs, before it is used.
+
+A file may have been cut, edited, or belong to another board; what is computed with it would be
+numbers all the same.
+"""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import xarray as xr
+
+from imuarray.errors import LARGEST, SMALLEST, InputError
+from imuarray.model.effects import EFFECTS
+from imuarray.model.own import own_version
+from imuarray.recording import Recording
+
+_PLACE = ("accelerometer", "axis")
+# Variables by whether they are needed: always, with effects, or not at all.
+_ALWAYS = {
+    "position": _PLACE, "position_covariance": (*_PLACE, "accelerometer_other", "axis_other"),
+}  # fmt: skip
+_WITH_EFFECTS = {
+    "effect_parameter": ("parameter",), "accelerometer_sd": _PLACE,
+    "gyroscope_sd": ("gyroscope", "axis"),
+}  # fmt: skip
+_PERHAPS = {"nominal_position": _PLACE, "whole_covariance": ("unknown", "unknown_other")}
+SAME_BOARD = 5.0  # prior sds by which two drawings of one board may differ
+INDEFINITE = 1e-3  # of a correlation matrix' least eigenvalue; rounding leaves less
+
+
+def require_fit(calibration: xr.Dataset, recording: Recording) -> None:
+    """InputError unless this is a whole calibration of the recording's IMUs."""
+    needed = _ALWAYS | (_WITH_EFFECTS if "effect_parameter" in calibration else {})
+    for name, dimensions in (needed | _PERHAPS).items():
+        if name in calibration.variables:
+            _require_numbers(calibration[name], dimensions)
+        elif name in needed:
+            raise InputError(f"expected a calibration (imuarray calibrate), found no {name}")
+    _require_labels(calibration, recording)
+    if "effect_parameter" in calibration:
+        _require_effects(calibration)
+    _require_sizes(calibration)
+    for name in ("position_covariance", "whole_covariance"):
+        if name in calibration:
+            _require_covariance(calibration[name])
+    _require_board(calibration, recording)
+
+
+def _require_numbers(variable: xr.DataArray, dimensions: tuple[str, ...]) -> None:
+    if variable.dims != dimensions or variable.dtype.kind not in "fiu":
+        raise InputError(
+            f"{variable.name}: expected numbers by {', '.join(dimensions)}, found"
+            f" {variable.dtype} by {', '.join(map(str, variable.dims)) or 'nothing'}"
+        )
+    values = np.asarray(variable.to_numpy(), float)
+    least = SMALLEST if str(variable.name) in ("accelerometer_sd", "gyroscope_sd") else -LARGEST
+    wrong = ~((values >= least) & (values <= LARGEST))  # NaN, too
+    if wrong.any():
+        raise InputError(
+            f"{variable.name}: expected finite numbers from {least:g} to {LARGEST:g}, found"
+            f" {values[wrong][0]}"
+        )
+
+
+def _require_labels(calibration: xr.Dataset, recording: Recording) -> None:
+    gyroscopes = ("gyroscope",) if "effect_parameter" in calibration else ()  # else of no matter
+    for kind in ("accelerometer", *gyroscopes):
+        expected = getattr(recording, f"{kind}_labels")
+        coordinate = calibration.coords.get(kind)
+        labels = () if coordinate is None else tuple(map(str, coordinate.to_numpy().ravel()))
+        if labels != expected:
+            raise InputError(
+                f"expected {kind}s {', '.join(expected)}, as in the recording, found"
+                f" {', '.join(labels) or 'none'}"
+            )
+
+
+def _require_sizes(calibration: xr.Dataset) -> None:
+    count = calibration.sizes["accelerometer"]
+    unknown = 3 * (count - 1) + calibration.sizes.get("parameter", 0)
+    expected = {
+        "axis": 3, "axis_other": 3, "accelerometer_other": count, "unknown": unknown,
+        "unknown_other": unknown,
+    }  # fmt: skip
+    for name, size in expected.items():
+        if calibration.sizes.get(name, size) != size:
+            raise InputError(f"expected {size} of {name}, found {calibration.sizes[name]}")
+
+
+def _require_covariance(variable: xr.DataArray) -> None:
+    values = variable.to_numpy().astype(float)
+    matrix = values.reshape((int(round(values.size**0.5)),) * 2)
+    variances = np.diag(matrix)
+    scale = np.sqrt(np.where(variances > 0, variances, 1.0))
+    correlation = matrix / np.outer(scale, scale)
+    proper = np.allclose(correlation, correlation.T, atol=INDEFINITE)
+    proper &= not np.any(matrix[variances <= 0])  # what is known, such as the reference's place
+    if not proper or np.linalg.eigvalsh(correlation)[0] < -INDEFINITE:
+        raise InputError(f"{variable.name}: expected a covariance, found a matrix that is none")
+
+
+def _require_board(calibration: xr.Dataset, recording: Recording) -> None:
+    """Labels are numbers on most boards; the drawing tells one board from another."""
+    if "nominal_position" not in calibration:
+        return
+    drawn = calibration["nominal_position"].to_numpy()
+    apart = np.abs(drawn - drawn[0] - recording.relative_positions()).max(axis=1)
+    prior = max(recording.position_prior_sd, _number(calibration, "position_prior_sd", 0.0))
+    k = int(np.argmax(apart))
+    if apart[k] > SAME_BOARD * prior:
+        raise InputError(
+            f"expected a calibration of the recording's board, found one of another: accelerometer"
+            f" {recording.accelerometer_labels[k]} is {1e3 * apart[k]:.3g} mm off in its drawing"
+        )
+
+
+def _require_effects(calibration: xr.Dataset) -> None:
+    """InputError unless the calibration's effects are here, a user's own with the same text."""
+    for name, least in (("time_origin", -LARGEST), ("span", SMALLEST)):
+        if not least <= _number(calibration, name, np.nan) <= LARGEST:
+            raise InputError(f"expected the attribute {name} in s, found none or no such number")
+    effects = str(calibration.attrs.get("effects", "")).split(",")
+    missing = [name for name in effects if name not in EFFECTS]
+    if missing:
+        raise InputError(
+            f"expected the effects of the calibration, found no {', '.join(missing)}: name the file"
+            " that defines them (--effect-file, imuarray.read_effects)"
+        )
+    try:
+        known = " ".join(map(str, json.loads(calibration.attrs.get("versions", "{}")).values()))
+    except (ValueError, TypeError, AttributeError):
+        raise InputError("expected the attribute versions as JSON, found another text") from None
+    for name in effects:
+        text = own_version(name)
+        if text is not None and text not in known:
+            raise InputError(
+                f"expected the effect {name} as it was at the calibration, found another text"
+            )
+
+
+def _number(calibration: xr.Dataset, name: str, default: float) -> float:
+    """An attribute as a number, NaN where it is none."""
+    value = np.asarray(calibration.attrs.get(name, default))
+    return float(value.item()) if value.dtype.kind in "fiu" and value.size == 1 else np.nan

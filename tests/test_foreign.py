@@ -1,0 +1,173 @@
+"""Calibrations and diagnoses that were damaged, edited or are another board's: one line, status 2.
+
+Where `apply` takes one all the same, what it writes are numbers.
+"""
+
+import copy
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import imuarray
+from imuarray.cli import main
+from imuarray.errors import InputError
+from imuarray.provenance import write_netcdf
+from imuarray.recording import read_recording, write_recording
+from tests.test_bound import model
+from tests.test_fuzz import damaged
+
+ALTERED = 20  # files of each kind
+VALUES = [np.nan, np.inf, -np.inf, 0.0, -1.0, 1e300, -1e300, 1e-300, 1e11, 5.0]
+
+
+@pytest.fixture(scope="module")
+def board(tmp_path_factory):
+    """(folder with rec.nc, calibration with effects, one without, diagnosis as plain data)."""
+    folder, own = tmp_path_factory.mktemp("foreign"), model()
+    recording, truth = imuarray.simulate(own.array, 0.3, 100.0, seed=3, angular_rate=15.0)
+    write_recording(recording, folder / "rec.nc")
+    plain = imuarray.calibrate(recording, "gauss-newton")
+    extended = imuarray.calibrate(recording, "gauss-newton", ("gyroscope_bias",))
+    labels = recording.gyroscope_labels
+    sds = {"accelerometer": 0.04, "gyroscope": 0.001}
+    places = recording.relative_positions()
+    parameters = {
+        f"{axis}_{label}": {"value": 1e-3, "sd": 1e-4, "unit": "rad s-1"}
+        for label in labels for axis in "xyz"
+    }  # fmt: skip
+    document = {
+        "extended": {"positions_m": places.tolist(), "positions_sd_m": (0 * places).tolist()},
+        "causes": [{"effect": "gyroscope_bias", "parameters": parameters}],
+        "noise_sd": {kind: {label: {"sd": sd} for label in labels} for kind, sd in sds.items()},
+        "clock": {"origin_s": 0.0, "span_s": 0.3},
+    }
+    return folder, extended, plain, document
+
+
+def applied(folder, calibration, capsys):
+    """The exit status of `apply`; the line it ends with, and the numbers it writes, are checked."""
+    out = folder / "motion.nc"
+    out.unlink(missing_ok=True)
+    status = main(["apply", str(calibration), str(folder / "rec.nc"), "--out", str(out), "--quiet"])
+    err = capsys.readouterr().err
+    if status == 0:
+        with xr.open_dataset(out) as found:
+            for name in ("angular_rate", "angular_acceleration", "specific_force"):
+                assert np.isfinite(found[name]).all() and (found[f"{name}_sd"] > 0).all()
+    else:
+        assert status in (2, 3) and err.count("\n") == 1, (status, err)
+        assert status == 3 or not out.exists()
+    return status, err
+
+
+def altered(rng, dataset: xr.Dataset) -> xr.Dataset:
+    """A variable gone, cut, turned, of another type, or with a wrong value; an attribute gone."""
+    found = dataset.copy(deep=True)
+    name = str(rng.choice(list(found.variables)))
+    kind = rng.integers(6)
+    if kind == 0:
+        return found.drop_vars(name)
+    if kind == 1 and found[name].dims:
+        return found.isel({found[name].dims[0]: slice(1, None)})
+    if kind == 2 and name in found.data_vars:
+        return found.assign({name: found[name].rename({found[name].dims[0]: "other"})})
+    if kind == 3 and found.attrs:
+        attribute = str(rng.choice(list(found.attrs)))
+        value = [None, "text", np.nan, [1, 2], -1.0, 1e300, "{}", "[]", "{"][rng.integers(9)]
+        found.attrs.pop(attribute)
+        return found if value is None else found.assign_attrs({attribute: value})
+    if kind == 4 and name in found.data_vars:
+        return found.assign({name: found[name].astype(str)})
+    if found[name].dtype.kind == "f":
+        values = found[name].to_numpy().copy()
+        place = tuple(int(rng.integers(n)) for n in values.shape)
+        values[place] = -values[place] if rng.integers(3) == 0 else rng.choice(VALUES)
+        found = found.assign({name: found[name].copy(data=values)})
+    return found
+
+
+def test_altered_calibrations(board, capsys):
+    folder, *calibrations, _ = board
+    rng, statuses = np.random.default_rng(7), []
+    for number in range(ALTERED):
+        path = folder / "cal.nc"
+        write_netcdf(altered(rng, calibrations[number % 2]), path)
+        statuses.append(applied(folder, path, capsys)[0])
+    assert {0, 2} <= set(statuses)
+
+
+def mutated(rng, document):
+    """A part of plain data gone, or in its place something else."""
+    found = copy.deepcopy(document)
+    place = found
+    while True:
+        keys = list(place) if isinstance(place, dict) else list(range(len(place)))
+        key = keys[rng.integers(len(keys))]
+        if not isinstance(place[key], dict | list) or not place[key] or rng.integers(4) == 0:
+            break
+        place = place[key]
+    wrong = [None, "text", [], {}, True, 10**400, -1, 0, *VALUES]
+    if rng.integers(4) == 0:
+        del place[key]
+    else:
+        place[key] = wrong[rng.integers(len(wrong))]
+    return found
+
+
+def test_altered_diagnoses(board, capsys):
+    folder, _, _, document = board
+    rng, statuses, path = np.random.default_rng(8), [], folder / "diagnosis.json"
+    path.write_text(json.dumps(document))
+    assert applied(folder, path, capsys) == (0, "")
+    for number in range(ALTERED):
+        text = json.dumps(mutated(rng, document) if number % 2 else document)
+        path.write_bytes(text.encode() if number % 2 else damaged(rng, text.encode()))
+        statuses.append(applied(folder, path, capsys)[0])
+    assert statuses.count(2) > ALTERED // 3
+
+
+def with_value(calibration, name, value):
+    return calibration.assign({name: calibration[name].copy(data=value)})
+
+
+def test_a_matrix_that_is_no_covariance(board):
+    folder, extended, plain, _ = board
+    recording = read_recording(folder / "rec.nc")
+    for calibration, name in ((plain, "position_covariance"), (extended, "whole_covariance")):
+        wrong = with_value(calibration, name, -calibration[name].to_numpy())
+        with pytest.raises(InputError, match=f"{name}: expected a covariance"):
+            imuarray.apply(wrong, recording)
+
+
+def test_another_boards_calibration(board, capsys):
+    """The same labels, another drawing."""
+    folder, _, plain, _ = board
+    recording = read_recording(folder / "rec.nc")
+    places = recording.accelerometer_position.copy()
+    places[2, 1] += 0.02
+    with pytest.raises(InputError, match="of another: accelerometer 3 is 20 mm off in its drawing"):
+        imuarray.apply(plain, replace(recording, accelerometer_position=places))
+    places[2, 1] -= 0.02 - recording.position_prior_sd  # the drawing mended
+    imuarray.apply(plain, replace(recording, accelerometer_position=places))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda d: d["clock"].update(span_s=float("nan")), "found NaN, which is no number"),
+        (lambda d: d["noise_sd"]["gyroscope"]["1"].update(sd=float("inf")), "found Infinity"),
+        (lambda d: d["noise_sd"]["gyroscope"]["1"].update(sd=0.0), "found 0.0 for a number from"),
+        (lambda d: d["extended"]["positions_m"].pop(), "no sd, of 0 or more, for each position"),
+        (lambda d: d.pop("causes"), "found no 'causes'"),
+    ],
+)
+def test_what_is_wrong_in_a_diagnosis_is_said(board, capsys, change, words):
+    folder, _, _, document = board
+    wrong = copy.deepcopy(document)
+    change(wrong)
+    (folder / "diagnosis.json").write_text(json.dumps(wrong))
+    status, line = applied(folder, folder / "diagnosis.json", capsys)
+    assert status == 2 and words in line
