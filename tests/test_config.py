@@ -8,6 +8,7 @@ import yaml
 
 from imuarray.config import check_config, describe_schema, model_from, read_config
 from imuarray.errors import InputError
+from imuarray.studies.bayes import simulate_twisting
 
 ROOT = Path(__file__).parents[1]
 
@@ -44,6 +45,21 @@ def test_schema_gives_each_key_a_description():
         (("papers",), {}, "papers"),
         (("paper2021", "samples"), [5, 7], "expected an entry T7"),
         (("scales", "quick", "draws"), 10**9, "transitions"),
+        (("noise", "accelerometer_sd"), float("nan"), "noise.accelerometer_sd: .* found nan"),
+        (("noise", "accelerometer_sd"), float("inf"), "found inf"),
+        (("noise", "gyroscope_sd_dps"), 1e200, "between 1e-15 and 1e.11, or 0, found 1e.200"),
+        (("noise", "accelerometer_sd"), 1e-200, "found 1e-200"),
+        (("experiment", "sampling_rate"), 10**400, "found an integer of 1329 bits"),
+        (("experiment", "sigmas"), [0.1, float("nan")], "experiment.sigmas.1: .* found nan"),
+        (("array",), {"board": "mimu4444", "gyroscopes": 300000}, "maximum of 256"),
+        (("paper2021", "samples"), [10**9], "maximum of 10000000"),
+        (("scales", "quick", "parts"), 10**9, "maximum of 10000"),
+        (("recordings",), {"a\n": {"file": "x.nc"}}, "recordings: 'a.n' does not match"),
+        (("recordings",), {"a": {"file": "x.nc", "group": "my board"}}, "a.group: .* not match"),
+        (("recordings",), {"a": {"file": "x.nc", "group": "../.."}}, "a.group: .* not match"),
+        (("recordings",), {"a": {"file": "x.nc", "group": "b\n"}}, "a.group: .* not match"),
+        (("recordings",), {1: {"file": "x.nc"}}, "recordings: 1 is not of type 'string'"),
+        (("validation", "settings"), {"a b": {"triads": 3, "samples": [5]}}, "does not match"),
     ],
 )
 def test_mistakes_are_named(config, path, value, message):
@@ -57,7 +73,25 @@ def test_mistakes_are_named(config, path, value, message):
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("text", ["", "[1, 2", "a: [", "- 1", "\x00"])
+def test_a_configuration_that_holds_itself(tmp_path):
+    path = tmp_path / "c.yaml"
+    path.write_text((ROOT / "config.yaml").read_text() + "\nextra: &a [*a]\n")
+    with pytest.raises(InputError, match="expected at most 8 levels"):
+        read_config(path)
+
+
+@pytest.mark.parametrize(
+    ("duration", "rate", "message"),
+    [(1e10, 100.0, "expected 1 to 8333333 samples of 8 triads, found"), (1e-9, 1.0, "expected 1")],
+)
+def test_a_simulation_of_any_length(config, duration, rate, message):
+    config["array"] = {"board": "mimu4444_corners"}
+    config["experiment"] |= {"duration": duration, "sampling_rate": rate}
+    with pytest.raises(InputError, match=message):
+        simulate_twisting(check_config(config), 0.04)
+
+
+@pytest.mark.parametrize("text", ["", "[1, 2", "a: [", "- 1", "\x00", "9" * 5000, "a: 2001-99-99"])
 def test_files_that_are_no_configuration(tmp_path, text):
     path = tmp_path / "c.yaml"
     path.write_text(text)

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import yaml
 
-from imuarray.errors import InputError
+from imuarray.errors import LARGEST, SMALLEST, InputError
 
+DEEPEST = 8  # levels; the schema has six
 SCHEMA = Path(__file__).parent / "schemas" / "config.schema.yaml"
 
 
@@ -16,7 +17,8 @@ def read_config(path) -> dict:
     try:
         with open(path, encoding="utf-8") as handle:
             config = yaml.safe_load(handle)
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
+        # ValueError: bytes that are no UTF-8, a date with a 13th month, thousands of digits
         raise InputError(f"{path}: expected a readable YAML file: {error}") from None
     return check_config(config, str(path))
 
@@ -25,6 +27,7 @@ def check_config(config, where: str = "config") -> dict:
     """The same configuration, after the schema and what the schema cannot say."""
     import jsonschema
 
+    _check_numbers(config, where)
     with open(SCHEMA, encoding="utf-8") as handle:
         validator = jsonschema.Draft202012Validator(yaml.safe_load(handle))
     fault = jsonschema.exceptions.best_match(validator.iter_errors(config))
@@ -40,6 +43,23 @@ def check_config(config, where: str = "config") -> dict:
                            f"{where}: scales.{name}.{key}")  # fmt: skip
     _check_recordings(config, where)
     return config
+
+
+def _check_numbers(value, where: str, place: tuple = ()) -> None:
+    """YAML has .nan, .inf, integers of any length, and lists that hold themselves."""
+    if len(place) > DEEPEST:
+        raise InputError(f"{where}: expected at most {DEEPEST} levels of sections, found more")
+    if isinstance(value, dict | list):
+        for key, item in value.items() if isinstance(value, dict) else enumerate(value):
+            _check_numbers(item, where, (*place, key))
+    if not isinstance(value, int | float) or place == ("seed",):
+        return
+    if value != 0 and not SMALLEST <= abs(value) <= LARGEST:
+        found = value if isinstance(value, float) else f"an integer of {value.bit_length()} bits"
+        raise InputError(
+            f"{where}: {'.'.join(map(str, place))}: expected a size between {SMALLEST:g} and"
+            f" {LARGEST:g}, or 0, found {found}"
+        )
 
 
 def _check_recordings(config, where) -> None:

@@ -2,6 +2,10 @@
 
 from numbers import Integral
 
+# Sizes that a quantity in SI units may have: what is squared and summed stays a number, and
+# seconds since 1970 fit in.
+SMALLEST, LARGEST = 1e-15, 1e11
+
 
 def printable(text: str) -> str:
     """The text with what would control a terminal escaped; line breaks stay."""

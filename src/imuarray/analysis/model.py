@@ -7,7 +7,7 @@ from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
-from imuarray.errors import InputError
+from imuarray.errors import LARGEST, SMALLEST, InputError
 from imuarray.model import DATA_EFFECTS, ArrayModel
 from imuarray.recording import Recording, array_of
 from imuarray.recording.channels import require_live
@@ -30,7 +30,7 @@ def assumed(recording: Recording, accelerometer_noise: float | None) -> Recordin
     """The recording with another accelerometer noise (m/s^2) than it declares, if one is given."""
     if accelerometer_noise is None:
         return recording
-    if not 0 < accelerometer_noise < float("inf"):
+    if not SMALLEST <= accelerometer_noise <= LARGEST:
         raise InputError(
             f"accelerometer_noise: expected a positive number, found {accelerometer_noise!r}"
         )

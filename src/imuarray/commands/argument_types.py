@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from imuarray.errors import LARGEST, SMALLEST
+
 
 class InputFile(type(Path())):  # type: ignore[misc]
     """A file that a command reads."""
@@ -20,20 +22,21 @@ def _at_least(least: int, text: str) -> int:
     try:
         value = int(text)
     except ValueError:
-        value = None
-    if value is None or value < least:
+        value = -1
+    if not least <= value < 2**63:
         raise argparse.ArgumentTypeError(f"expected an integer of at least {least}, found {text!r}")
     return value
 
 
 def positive(text: str) -> float:
-    """A finite number above 0."""
+    """A number above 0, of a size that can be computed with."""
     try:
         value = float(text)
     except ValueError:
         value = -1.0
-    if not 0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"expected a positive number, found {text!r}")
+    if not SMALLEST <= value <= LARGEST:
+        bounds = f"between {SMALLEST:g} and {LARGEST:g}"
+        raise argparse.ArgumentTypeError(f"expected a positive number, {bounds}, found {text!r}")
     return value
 
 

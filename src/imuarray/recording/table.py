@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 import pandas as pd
 import yaml
 
-from imuarray.errors import InputError
+from imuarray.errors import LARGEST, SMALLEST, InputError
 from imuarray.recording.record import Recording
 from imuarray.recording.units import factor
 
@@ -20,7 +19,7 @@ BLANK = (
     "; is this sensor slower than the log? `incomplete_rows: leave out` keeps the rows that are"
     " whole; where there are none, bring the sensors to common instants first"
 )
-LARGEST = 2.0  # m; beyond this, positions without a declared unit are taken to be in another
+WIDEST = 2.0  # m; beyond this, positions without a declared unit are taken to be in another
 WHITESPACE = r"\s+"  # the one delimiter longer than a character
 KEYS = {
     "delimiter": False, "comment": False, "time": True, "incomplete_rows": False,
@@ -89,9 +88,9 @@ def read_table(path: str | Path, columns: str | Path) -> Recording:
         for label, triad in layout["accelerometers"]["triads"].items()
     ]
     size = float(np.ptp(places, axis=0).max())
-    if "position_unit" not in layout and size > LARGEST:
+    if "position_unit" not in layout and size > WIDEST:
         raise InputError(
-            f"{columns}: expected positions within {LARGEST:g} m of each other, found {size:g}:"
+            f"{columns}: expected positions within {WIDEST:g} m of each other, found {size:g}:"
             " name the position_unit, mm or m"
         )
     numbers = _numbers(layout, str(columns))
@@ -171,14 +170,14 @@ def _column(table, name, where) -> np.ndarray:
 
 
 def _is_number(value) -> bool:
-    """Finite, as a float as well: YAML has integers of any length."""
+    """Of a size that can be computed with: YAML has .nan, .inf, integers of any length."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
-    return abs(value) <= sys.float_info.max
+    return abs(value) <= LARGEST
 
 
 def _positive(value, where: str) -> float:
-    if not _is_number(value) or value <= 0:
+    if not _is_number(value) or value < SMALLEST:
         raise InputError(f"{where}: expected a positive number, found {value!r}")
     return float(value)
 

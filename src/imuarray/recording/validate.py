@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 import xarray as xr
 
-from imuarray.errors import IdentifiabilityError, InputError
+from imuarray.errors import LARGEST, SMALLEST, IdentifiabilityError, InputError
 from imuarray.geometry.array import require_count, require_planar_extent
 from imuarray.recording.record import (
     AXES,
@@ -140,16 +140,18 @@ def _check_boolean(variable: xr.DataArray, where: str) -> None:
 
 
 def _check_number(attributes: dict, name: str, where: str) -> None:
-    bounds = "positive" if name in MAY_BE_INFINITE else "positive finite"
-    expected = f"expected the attribute '{name}' to be a {bounds} number in {NUMBERS[name]}"
+    bounds = f"between {SMALLEST:g} and {LARGEST:g}"
+    expected = f"expected the attribute '{name}' to be a number {bounds} in {NUMBERS[name]}"
     if name not in attributes:
         raise InputError(f"{where}: {expected}, found none")
     value = np.asarray(attributes[name])
     if value.dtype.kind not in "fiu" or value.size != 1:
         raise InputError(f"{where}: {expected}, found {attributes[name]!r}")
     number = float(value.item())
+    if np.isinf(number) and number > 0 and name in MAY_BE_INFINITE:
+        return
     # written so that NaN fails
-    if not number > 0 or (np.isinf(number) and name not in MAY_BE_INFINITE):
+    if not SMALLEST <= number <= LARGEST:
         raise InputError(f"{where}: {expected}, found {number}")
 
 
@@ -173,12 +175,12 @@ def _check_labels(kind: str, labels: tuple[str, ...], where: str) -> None:
 
 def _check_finite(recording: Recording, name: str, where: str) -> None:
     values = getattr(recording, name)
-    bad = ~np.isfinite(values)
+    bad = ~(np.abs(values) <= LARGEST)  # NaN, too
     if bad.any():
         index = _first(bad)
         raise InputError(
-            f"{where}: {name}: expected finite numbers, found {values[index]} at "
-            f"{_place(recording, name, index)} ({bad.sum()} of {bad.size} values)"
+            f"{where}: {name}: expected finite numbers, at most {LARGEST:g}, found {values[index]}"
+            f" at {_place(recording, name, index)} ({bad.sum()} of {bad.size} values)"
         )
 
 

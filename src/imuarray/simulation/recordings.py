@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from imuarray.errors import InputError
 from imuarray.model import ArrayModel
 from imuarray.model.names import parameter_names
 from imuarray.motion import Motion
 from imuarray.motion.state import HIGHER_UNITS, UNITS
 from imuarray.recording import Recording
+from imuarray.recording.validate import MAX_VALUES
 from imuarray.simulation.measure import clip, measure
 
 
@@ -68,9 +70,18 @@ def simulate_recording(
 ):  # fmt: skip
     """A recording of a `SmoothMotion` at ``sampling_rate`` Hz for ``duration`` seconds.
 
-    Its time begins at zero, or where the model's clock does.
+    Its time begins at zero, or where the model's clock does. InputError for no sample, or for more
+    values than a recording may have.
     """
-    time = np.arange(int(round(sampling_rate * duration))) / sampling_rate
+    sensors = max(model.array.accelerometers, model.array.gyroscopes)
+    most = MAX_VALUES // (3 * sensors)
+    samples = sampling_rate * duration
+    if not 0.5 < samples <= most:
+        raise InputError(
+            f"simulate: expected 1 to {most} samples of {sensors} triads, found {duration:g} s at"
+            f" {sampling_rate:g} Hz"
+        )
+    time = np.arange(int(round(samples))) / sampling_rate
     begin = 0.0 if model.clock is None else model.clock[0]
     return simulate_samples(
         model, motion.at(time), positions, nominal, rng, time=begin + time, **options
