@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import imuarray
 from imuarray.analysis import trust
 from imuarray.analysis.drawing import Places, departures
-from imuarray.analysis.rigid import turning
+from imuarray.analysis.rigid import slope, turning
 from imuarray.analysis.suspects import suspects, told
 from imuarray.blind import Case, make
 from imuarray.cli import main
@@ -251,6 +251,20 @@ def test_the_motion_of_a_rigid_array():
 def test_two_suspects_are_both_named(sound):
     recording = one(turned(20)(sound), 5, late)
     assert told(suspects(recording)) == ["IMU 3 is turned by 20 degrees", "IMU 6 is 1 sample late"]
+
+
+def test_a_delay_among_samples_that_are_no_course(sound):
+    few = one(sound, 2, late, GYROSCOPE).select(slice(0, None, 7))
+    shaken = np.sort(np.random.default_rng(0).uniform(0, 8, len(few.time)))
+    assert told(suspects(replace(few, time=shaken))) == ["gyroscope 3 is 8 ms late"]
+
+
+def test_samples_too_far_apart_for_an_integral_give_none(sound):
+    """Of motion at some 4 Hz every fourth sample, 31 a second, leaves 4 % out."""
+    few = sound.select(slice(0, None, 4))
+    found = slope(few.time, turning(few.specific_force, np.median(few.angular_rate, axis=1),
+                                    sound.relative_positions()))  # fmt: skip
+    assert found.low > 1.01 and not found.off
 
 
 def posterior_of(found, scale=1.0):

@@ -18,6 +18,7 @@ MOST, STRETCH = 20_000, 500  # samples that are looked at, in a row
 FEWEST = 60  # pairs of neighbouring samples
 COHERENT = 0.9  # correlation below which the samples are no course of one smooth motion
 SLOPE = 0.015  # gyroscopes' filters and scales make less
+COARSE = 3 * 11 / 720 * 144  # three times a single wave's: several have more of the fast ones
 # of the integral over the middle one of three intervals: exact for cubics
 WEIGHTS = np.array([-1.0, 13.0, 13.0, -1.0]) / 24
 
@@ -65,20 +66,22 @@ def runs(time) -> np.ndarray:
 class Slope(NamedTuple):
     """Turning by the gyroscopes over that by the accelerometers: between two bounds, 1 if sound.
 
-    The bounds are those of errors in either; ``sd`` is the statistical one.
+    The bounds are those of errors in either; ``sd`` is the statistical one, ``coarse`` the share
+    that samples too far apart may leave out of the integral.
     """
 
     low: float
     high: float
     sd: float
     correlation: float
+    coarse: float
 
     @property
     def off(self) -> bool:
         """Whether no errors of measurement explain that it is not 1."""
         if self.correlation < COHERENT:
             return self.correlation < -COHERENT
-        margin = SLOPE + 5 * self.sd
+        margin = SLOPE + 5 * self.sd + self.coarse
         return self.high < 1 - margin or self.low > 1 + margin
 
 
@@ -103,6 +106,9 @@ def slope(time, motion: Turning) -> Slope | None:
     x, y, lag = (part[calm].ravel() for part in (whole, change, late))
     if lag @ lag > 0:
         x, y = (part - lag * (lag @ part) / (lag @ lag) for part in (x, y))
+    # the trapezium's error is (w dt)^2 / 12 of a wave, this rule's 11 / 720 (w dt)^4
+    trapezium = (turn[:, 1] + turn[:, 2]) / 2 * steps
+    rough = np.sum((whole - trapezium)[calm] ** 2) / max(np.sum(whole[calm] ** 2), 1e-300)
     xx, yy, xy = x @ x, y @ y, x @ y
     if not (xx > 0 and yy > 0) or xy == 0:
         return None
@@ -110,7 +116,7 @@ def slope(time, motion: Turning) -> Slope | None:
     correlation = xy / np.sqrt(xx * yy)
     sd = np.sqrt(np.sum((y - forward * x) ** 2) / xx / calm.sum())
     low, high = sorted((float(forward), float(reverse)))
-    return Slope(low, high, float(sd), float(correlation))
+    return Slope(low, high, float(sd), float(correlation), float(COARSE * rough))
 
 
 def kept(recording: Recording) -> Recording:

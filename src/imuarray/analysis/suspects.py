@@ -15,7 +15,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
 from imuarray.analysis.drawing import angle_words
-from imuarray.analysis.rigid import COHERENT, runs, slope, turning
+from imuarray.analysis.rigid import COHERENT, FEWEST, runs, slope, turning
 from imuarray.recording import Recording
 
 FAR = 4.0  # times the median triad's error, and the declared noise
@@ -59,8 +59,9 @@ def _gyroscopes(recording: Recording) -> list[Suspect]:
         parts = [np.setdiff1d(left, [k]) for k in range(rates.shape[1])]
         return np.stack([np.median(rates[:, part], axis=1) for part in parts], axis=1)
 
-    sd = recording.gyroscope_noise_sd
-    return _search(recording, "gyroscope", rates, others, sd, recording.gyroscope_labels)
+    places, rate = recording.relative_positions(), np.median(rates, axis=1)
+    rise = turning(recording.specific_force, rate, places).acceleration
+    return _search(recording, "gyroscope", rates, others, recording.gyroscope_noise_sd, rise)
 
 
 def _accelerometers(recording: Recording) -> list[Suspect]:
@@ -75,13 +76,12 @@ def _accelerometers(recording: Recording) -> list[Suspect]:
             found[:, k] = turning(force[:, part], rate, places[part]).at(places[k : k + 1])[:, 0]
         return found
 
-    sd = recording.accelerometer_noise_sd
-    return _search(recording, "accelerometer", force, others, sd, recording.accelerometer_labels)
+    return _search(recording, "accelerometer", force, others, recording.accelerometer_noise_sd)
 
 
-def _search(recording, kind, readings, others, sd, labels) -> list[Suspect]:
+def _search(recording, kind, readings, others, sd, rise=None) -> list[Suspect]:
     """One triad after the other: the worst is named and left out, until the rest agree."""
-    count = readings.shape[1]
+    count, labels = readings.shape[1], getattr(recording, f"{kind}_labels")
     left = np.arange(count)
     found: list[Suspect] = []
     if count < 3:
@@ -95,21 +95,28 @@ def _search(recording, kind, readings, others, sd, labels) -> list[Suspect]:
         without = np.sqrt(np.mean((readings - others(rest)) ** 2, axis=(0, 2)))[rest]
         if error[worst] < FAR * max(np.median(without), sd):
             return found
-        words = explain(readings[:, worst], expected[:, worst], chain)
+        words = explain(readings[:, worst], expected[:, worst], chain, rise)
         found.append(Suspect(kind, labels[worst], words))
         left = rest
     return [] if len(found) == count - 2 else found
 
 
-def explain(readings, expected, chain) -> str:
+def explain(readings, expected, chain, rise=None) -> str:
     """What would make ``readings`` (T, 3) of ``expected`` ones; empty if nothing here does.
 
-    ``chain``: first indices of four samples in a row.
+    ``chain``: first indices of four samples in a row; ``rise`` (T, 3): the expected ones' change
+    per second, where it is known without neighbours.
     """
     before = np.sqrt(np.mean((readings - expected) ** 2))
     tries = [_axes(readings, expected), _turned(readings, expected), *_scaled(readings, expected)]
-    if len(chain):
-        tries.append(_late(readings, expected, chain))
+    # four samples on either side
+    middle = chain[np.isin(chain - 4, chain) & np.isin(chain + 1, chain)]
+    if len(middle) > FEWEST:
+        tries.append(_late(readings, expected, middle))
+    if rise is not None:
+        seconds = -np.sum((readings - expected) * rise) / max(np.sum(rise**2), 1e-300)
+        said = f"is {1e3 * abs(seconds):.2g} ms {'late' if seconds > 0 else 'early'}"
+        tries.append((_rms(readings - expected + seconds * rise), said))
     left, words = min(tries)
     return words if left < TAKEN * before else ""
 
@@ -148,13 +155,10 @@ def _scaled(readings, expected) -> list[tuple[float, str]]:
     ]
 
 
-def _late(readings, expected, chain) -> tuple[float, str]:
+def _late(readings, expected, middle) -> tuple[float, str]:
     """A delay of whole samples, refined by the slope between neighbours."""
     best = (np.inf, "")
-    middle = chain[(chain >= 3) & (chain < len(readings) - 6)] + 1
     for lag in LAGS:
-        if not len(middle):
-            break
         then = middle - lag
         rise = (expected[then + 1] - expected[then - 1]) / 2
         off = readings[middle] - expected[then]
@@ -168,6 +172,10 @@ def _late(readings, expected, chain) -> tuple[float, str]:
     return best
 
 
+MIRRORED = (
+    "the gyroscopes turn the other way round than the accelerometers: left-handed axes (one axis of"
+    " both kinds flipped), or all rates of the wrong sign"
+)
 # the gyroscopes' axes as the accelerometers' turning has them: signs that make no other sense
 SIGNS = [np.array(signs) for signs in product((1, -1), repeat=3)][1:]
 
@@ -187,6 +195,8 @@ def frame(recording: Recording) -> list[str]:
     best = max(SIGNS, key=fit)
     if fit(best) < COHERENT or fit(np.ones(3)) > COHERENT:
         return []
+    if (best < 0).all():
+        return [MIRRORED]
     wrong, right = ([name for name, s in zip("xyz", best, strict=True) if s == w] for w in (-1, 1))
     said = f"all gyroscopes have {_axes_named(wrong)} of the wrong sign"
     if len(wrong) == 2:  # a turn by half apart, the same as

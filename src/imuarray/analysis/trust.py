@@ -14,7 +14,7 @@ import xarray as xr
 
 from imuarray.analysis.drawing import FAR, G, Places, another_size, departures, size_of
 from imuarray.analysis.rigid import SLOPE, Slope, Turning, kept, slope, turning
-from imuarray.analysis.suspects import frame, suspects, told
+from imuarray.analysis.suspects import MIRRORED, frame, suspects, told
 from imuarray.recording import Recording
 from imuarray.recording.channels import repeated
 
@@ -125,10 +125,7 @@ def _drawn(places: Places, course: Slope | None) -> list[str]:
 def _turning_words(course: Slope, places: Places) -> str:
     """A slope that is not 1 is the clock's or the gyroscopes'; the array's size may tell them."""
     if course.correlation < 0:
-        return (
-            "the gyroscopes turn the other way round than the accelerometers: left-handed axes"
-            " (one axis of both kinds flipped), or all rates of the wrong sign?"
-        )
+        return f"{MIRRORED}?"
     value = course.low if course.low > 1 else course.high
     size, sd = size_of(places)
     causes = []
