@@ -295,6 +295,26 @@ def test_a_posterior(sound):
     ]
 
 
+def test_a_diagnosis(sound):
+    """Its extended model's positions against the drawing, as every answer's."""
+    found = imuarray.calibrate(sound, "gauss-newton")
+    sds = np.sqrt(np.einsum("kaka->ka", found["position_covariance"].to_numpy()))
+    places = found["position"].to_numpy()
+
+    def reasons(recording, positions):
+        section = {"positions_m": positions.tolist(), "positions_sd_m": sds.tolist()}
+        return trust.reasons_of_diagnosis(recording, {"extended": section})
+
+    assert reasons(sound, places) == []
+    (said,) = reasons(times(sound, force=-1.0), -places)
+    assert "inverted" in said
+
+
+def test_a_selection_that_finds_no_motion_names_the_unit(sound):
+    with pytest.raises(imuarray.InputError, match="rates in rad/s declared deg/s"):
+        imuarray.select(times(sound, rate=DEGREE), 20)
+
+
 def test_a_motion_of_another_board_s_calibration(sound, tmp_path, capsys):
     other, _ = make(CASE, 2)
     assert calibrated(other, tmp_path, capsys)[0] == 0

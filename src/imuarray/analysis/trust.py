@@ -64,6 +64,15 @@ def reasons_of_motion(recording: Recording, calibration: xr.Dataset) -> list[str
     ]
 
 
+def reasons_of_diagnosis(recording: Recording, document: dict) -> list[str]:
+    """Why the extended model of a ``diagnosis.json``'s document is not to be trusted.
+
+    What its residual leaves unexplained the diagnosis says itself.
+    """
+    found, sds = (np.array(document["extended"][f"positions_{name}"]) for name in ("m", "sd_m"))
+    return _judged(recording, _places(recording, found, np.diag(sds.ravel() ** 2)), {})
+
+
 def _size(recording: Recording) -> int:
     return 3 * (len(recording.accelerometer_labels) - 1)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 
+from imuarray.analysis.trust import reasons_of_diagnosis
 from imuarray.commands.output import Output
 from imuarray.diagnosis.document import diagnose as diagnosed
 from imuarray.errors import InputError
@@ -27,9 +28,11 @@ def diagnose(arguments) -> None:
             print(f"{time.monotonic() - start:6.1f} s  {text}", file=sys.stderr, flush=True)
 
     found = diagnosed(recording, arguments.seed, arguments.without, arguments.recording, progress)
+    reasons = reasons_of_diagnosis(recording, found.document)
+    found.document.update(trusted=not reasons, reasons=reasons)
     write_report(found, arguments.out)
     output.say("\n".join([*report(found.document), f"report: {arguments.out / 'report.html'}"]))
-    output.done(found.document | {"out": str(arguments.out)})
+    output.done(found.document | {"out": str(arguments.out)}, reasons)
 
 
 def report(document: dict) -> list[str]:

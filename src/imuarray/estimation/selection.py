@@ -13,6 +13,7 @@ from imuarray.model import ArrayModel
 from imuarray.recording import Recording, array_of
 
 SLOWEST = np.radians(100.0)  # rad/s; slower samples say nearly nothing of the positions
+SHAKEN = 3.0  # m/s^2, sd; a board in a hand that does not turn it has less
 INFORMATIVE = 0.5  # the share of the moving, unsaturated samples that is kept
 
 
@@ -108,8 +109,20 @@ def select_dynamic(
         raise InputError(
             "recording: expected moving samples off the rails, found none ("
             + ", ".join(f"{count} {words}" for words, count in removed.items()) + ")"
+            + _shaken(recording, still, speed)
         )  # fmt: skip
     size = information(recording.select(usable))
     keep = size >= np.quantile(size, 1 - share)
     removed["less informative half" if share == 0.5 else "less informative"] = int((~keep).sum())
     return Selection(usable[keep], usable, removed)
+
+
+def _shaken(recording: Recording, still, speed) -> str:
+    """A hint where the forces say that the array turns and no rate does."""
+    moving = recording.specific_force[~still]
+    if speed.max() > SLOWEST or not len(moving) or moving.std(axis=0).max() < SHAKEN:
+        return ""
+    return (
+        f"; the specific force varies by {moving.std(axis=0).max():.2g} m/s^2 at rates of at most"
+        f" {np.degrees(speed.max()):.2g} deg/s: rates in rad/s declared deg/s?"
+    )
