@@ -1,5 +1,6 @@
 """Ways to calibrate and to sample; nothing heavy loads here, so that the command line can look."""
 
-CALIBRATION = ("bcd", "gauss-newton")
+CALIBRATION = ("bcd", "gauss-newton")  # of the papers' model
+MODELS = ("sensors", "papers")  # or a diagnosis.json
 SAMPLING = ("pmmh", "nuts")
 RATES = ("declared", "spread")  # what p(omega | y_g) is made from

@@ -42,7 +42,7 @@ def apply(
         if "effect_parameter" in calibration:
             _, found = extended_motion(calibration, recording, saturated, accelerometer_noise)
         else:
-            found = _papers(calibration, recording)
+            found = _papers(calibration, recording, accelerometer_noise)
     except np.linalg.LinAlgError as error:
         raise InputError(f"expected a calibration that determines the motion: {error}") from None
     lost = recording.saturated_accelerometers().any(axis=(1, 2))
@@ -60,15 +60,26 @@ def apply(
     return dataset
 
 
-def _papers(calibration: xr.Dataset, recording: Recording):
+def _noise(calibration: xr.Dataset, accelerometer_noise: float | None) -> Noise:
+    """That of the calibration, unless another is assumed."""
+    sds = [calibration[f"{kind}_sd"].to_numpy()[:, 0] for kind in ("accelerometer", "gyroscope")]
+    if accelerometer_noise is not None:
+        sds[0] = np.full(len(sds[0]), accelerometer_noise)
+    return Noise.of(len(sds[0]), len(sds[1]), *sds)
+
+
+def _papers(
+    calibration: xr.Dataset, recording: Recording, accelerometer_noise: float | None = None
+):  # fmt: skip
     """The papers' model: in closed blocks, fast."""
     from imuarray.estimation.fusion import fuse
 
     size = 3 * (calibration.sizes["accelerometer"] - 1)
     covariance = calibration["position_covariance"].to_numpy()[1:, :, 1:, :].reshape(size, size)
     positions = calibration["position"].to_numpy()
+    model = replace(model_of(recording), noise=_noise(calibration, accelerometer_noise))
     return fuse(
-        model_of(recording), recording.specific_force, recording.angular_rate,
+        model, recording.specific_force, recording.angular_rate,
         positions - positions[0], covariance, recording.saturated_gyroscopes(),
     )  # fmt: skip
 
@@ -84,9 +95,6 @@ def extended_motion(
     from imuarray.estimation.extended import fuse_extended
 
     positions = calibration["position"].to_numpy()
-    sds = [calibration[f"{kind}_sd"].to_numpy()[:, 0] for kind in ("accelerometer", "gyroscope")]
-    if accelerometer_noise is not None:
-        sds[0] = np.full(len(positions), accelerometer_noise)
     model = model_of(recording, calibration.attrs["effects"].split(","))
     expected = parameter_names(model, (recording.accelerometer_labels, recording.gyroscope_labels))
     found = [str(name) for name in calibration["parameter"].to_numpy()]
@@ -95,8 +103,7 @@ def extended_motion(
             f"expected {len(expected)} parameters of {', '.join(model.effects)}, found"
             f" {len(found)}, or others: the effects are not those of the calibration"
         )
-    noise = Noise.of(model.array.accelerometers, model.array.gyroscopes, *sds)
-    model = replace(model, noise=noise)
+    model = replace(model, noise=_noise(calibration, accelerometer_noise))
     parameters = np.concatenate(
         [(positions - positions[0])[1:].ravel(), calibration["effect_parameter"].to_numpy()]
     )

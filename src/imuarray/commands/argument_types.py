@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from imuarray.analysis import methods
 from imuarray.errors import LARGEST, SMALLEST
 
 
@@ -16,6 +17,16 @@ def effects(text: str) -> tuple[str, ...]:
     if len(set(names)) != len(names):
         raise argparse.ArgumentTypeError(f"expected each effect once, found {text!r}")
     return names
+
+
+def model(text: str) -> str | InputFile:
+    """A model's name, or the diagnosis.json that has one."""
+    if text in methods.MODELS:
+        return text
+    if not text.endswith(".json"):
+        known = ", ".join(methods.MODELS)
+        raise argparse.ArgumentTypeError(f"expected any of {known}, or a .json, found {text!r}")
+    return InputFile(text)
 
 
 def _at_least(least: int, text: str) -> int:

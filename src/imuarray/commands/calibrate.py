@@ -19,11 +19,12 @@ MISFIT = 1.5  # residual over declared noise from which the claimed widths are c
 def calibrate(arguments) -> None:
     """Positions and motion by maximum likelihood; see `imuarray.calibrate` for the output."""
     output = Output(arguments)
-    recording, noise = read_recording(arguments.recording), arguments.accelerometer_noise
+    recordings = [read_recording(path) for path in arguments.recordings]
+    noise = arguments.accelerometer_noise
     dataset = calibrated(
-        recording, arguments.method, arguments.effects, arguments.diagnosis, noise, output.say
+        recordings, arguments.model, arguments.method, arguments.effects, noise, output.say
     )
-    reasons = reasons_of_calibration(assumed(recording, noise), dataset)
+    reasons = reasons_of_calibration(assumed(recordings[0], noise), dataset)
     write_netcdf(dataset.assign_attrs(trust(reasons)), arguments.out)
     output.say(report(dataset))
     output.done(document(dataset) | {"out": str(arguments.out)}, reasons)
@@ -35,7 +36,7 @@ def document(dataset: xr.Dataset) -> dict:
     found = {
         "converged": bool(dataset.attrs["converged"]),
         "iterations": dataset.sizes["iteration"],
-        "samples": dataset.sizes["time"],
+        "samples": dataset.attrs["samples"],
         "residual_ratio": dataset.attrs["residual_ratio"],
         "accelerometers": labels,
         "position_m": dataset["position"].to_numpy(),
@@ -54,8 +55,9 @@ def document(dataset: xr.Dataset) -> dict:
 def report(dataset: xr.Dataset) -> str:
     """The same for a person."""
     state = "converged" if dataset.attrs["converged"] else "NOT converged"
+    count, samples = dataset.sizes["iteration"], dataset.attrs["samples"]
     lines = [
-        f"{state} after {dataset.sizes['iteration']} iterations, {dataset.sizes['time']} samples",
+        f"{state} after {count} iterations, {samples} samples",
         "triad   x mm      y mm      z mm    (sd um)",
     ]
     rows = dataset["accelerometer"].to_numpy(), dataset["position"].to_numpy(), _sds(dataset)
@@ -92,9 +94,8 @@ def _informative(dataset: xr.Dataset) -> list[str]:
     worst, prior = _weakest(dataset), dataset.attrs["position_prior_sd"]
     rms = np.sqrt(np.mean(_sds(dataset)[1:] ** 2))
     said = ", ".join(f"{item.words} ({1e6 * item.sd:.2g} um)" for item in worst)
-    lines = [
-        f"positions to {1e6 * rms:.2g} um rms by the Cramer-Rao bound; worst determined: {said}"
-    ]
+    bound = " by the Cramer-Rao bound" if dataset.attrs["model"] == "papers" else ""
+    lines = [f"positions to {1e6 * rms:.2g} um rms{bound}; worst determined: {said}"]
     if worst[0].sd > prior:
         lines.append(
             f"{worst[0].words}: determined worse than by the nominal positions,"

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, NoReturn
 
 import imuarray
 from imuarray.analysis import methods
-from imuarray.commands.argument_types import InputFile, count, effects, positive, seed
+from imuarray.commands.argument_types import InputFile, count, effects, model, positive, seed
 from imuarray.errors import InputError
 
 
@@ -120,12 +120,21 @@ COMMANDS = (
     ),
     Command(
         "calibrate", "calibrate.calibrate",
-        "Estimate the accelerometer positions and the motion by maximum likelihood.",
-        "rec.nc --method bcd --out cal.nc", "estimates to write (NetCDF-4)",
+        "Estimate the accelerometer positions, the sensors' parameters and the motion.",
+        "corrected.nc --out cal.nc", "estimates to write (NetCDF-4)",
         (
-            RECORDING, NOISE, *EFFECTS,
-            _option("--method", "bcd: block coordinate descent (default); gauss-newton: any"
-                    " effects, fewer iterations", choices=methods.CALIBRATION, default="bcd"),
+            _option("recordings", "recording to read (NetCDF-4), or several of one board",
+                    type=InputFile, nargs="+", metavar="recording"),
+            _option("--model", "sensors: what a standard sensor model needs, noise estimated"
+                    " (default); papers: that of paper 2017, with the declared noise; or the"
+                    " diagnosis.json of `imuarray diagnose`", default="sensors",
+                    metavar="{sensors,papers,FILE.json}", type=model),
+            EFFECT_FILE,
+            _option("--effects", "effects to have in the model instead, separated by commas",
+                    type=effects, default=(), metavar="A,B"),
+            _option("--method", "of the papers' model. bcd: block coordinate descent (default);"
+                    " gauss-newton: the same in fewer iterations", choices=methods.CALIBRATION),
+            NOISE,
         ),
     ),
     Command(
@@ -209,7 +218,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="imuarray",
         description="Calibrate the geometry of inertial sensor arrays.",
-        epilog="example: imuarray calibrate rec.nc --method gauss-newton --out cal.nc;"
+        epilog="example: imuarray calibrate corrected.nc --out cal.nc;"
         " every command has its own: imuarray calibrate --help",
     )
     parser.add_argument("--version", action="version", version=f"imuarray {imuarray.__version__}")

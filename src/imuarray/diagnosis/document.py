@@ -11,14 +11,16 @@ import numpy as np
 
 import imuarray
 from imuarray.diagnosis.elimination import heldout_gain, need
+from imuarray.diagnosis.extension import extended_estimate
 from imuarray.diagnosis.noise import coloured_meat, per_triad, standardised
 from imuarray.diagnosis.noise_effects import held_out
-from imuarray.diagnosis.procedure import Found, run_procedure
+from imuarray.diagnosis.procedure import Found, prepared, run_procedure
 from imuarray.diagnosis.replicates import Discrepancy, discrepancies
 from imuarray.diagnosis.scores import information_at
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import placebo_gain
 from imuarray.diagnosis.words import cause_in_words, parameters_of, sensors_of
+from imuarray.engine.estimate import Estimate
 from imuarray.engine.fit import Fit, at, fit
 from imuarray.engine.heldout import Scores, gain, log_scores
 from imuarray.engine.parameters import prior_precision
@@ -40,12 +42,22 @@ class Fitted:
     scores: Scores
     sds: np.ndarray  # (N, m) of the parameters
     discrepancies: tuple[Discrepancy, ...] = ()
+    robust: Estimate | None = None  # of the same model, which the positions are taken from
+
+    @property
+    def positions(self) -> tuple[np.ndarray, np.ndarray]:
+        """(A, 3) m relative to the first triad, and their sds."""
+        found, place = self.fit.state.positions, self.fit.columns.of("position")
+        if self.robust is None:
+            return found, self.sds[: len(found), place]
+        sds = np.sqrt(np.diag(self.robust.widths()[0]))
+        whole = np.zeros(self.fit.active.shape)
+        whole[self.fit.active] = sds[self.robust.places[0]]
+        return self.robust.positions, whole[: len(found), place]
 
     def section(self) -> dict:
         """As `diagnosis.json` has it."""
-        positions = self.fit.state.positions
-        place = self.fit.columns.of("position")
-        sds = self.sds[: len(positions), place]
+        positions, sds = self.positions
         return {
             "heldout_log_score_per_sample": self.scores.per_sample,
             "residual_sd": residual_sd(self.fit),
@@ -88,7 +100,10 @@ def diagnose(
     say("fitting the papers' model to the same readings")
     extended = fitted(search.fit, search.noise.correlation)
     nats = extended.scores.nats + nats_beside(found)
-    extended = replace(extended, scores=extended.scores._replace(nats=nats))
+    say("estimating the extended model's positions")
+    readings = prepared(recording, without)[2]
+    robust = extended_estimate(readings, search.columns, search.active, search.fit.state)
+    extended = replace(extended, scores=extended.scores._replace(nats=nats), robust=robust)
     base, inflated = rivals_of(found)
     rng = stream(seed, "diagnose", "replicates")
     say("replicating the recording")
@@ -213,7 +228,7 @@ def gains(base: Fitted, inflated: Fitted, extended: Fitted) -> dict:
     before, after = residual_sd(base.fit), residual_sd(extended.fit)
     place = base.fit.columns.of("position")
     owner = base.fit.active[:, place][: len(base.fit.state.positions)]
-    change = (extended.fit.state.positions - base.fit.state.positions)[owner]
+    change = (extended.positions[0] - base.fit.state.positions)[owner]
     sds = base.sds[: len(base.fit.state.positions), place][owner]
     return {
         "heldout_log_score_nats_per_sample": over_base[0],

@@ -10,7 +10,7 @@ from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Search
 from imuarray.diagnosis.tails import log_chi_square
 from imuarray.engine.fit import flat_parameters, from_flat
-from imuarray.engine.heldout import normal_blocks
+from imuarray.engine.heldout import gain_of, normal_blocks
 
 
 def freed_places(search: Search, effect: str, imus=None, among=None) -> np.ndarray:
@@ -33,53 +33,12 @@ def need(search: Search, effect: str, imus=None, among=None) -> tuple[float, int
 
 
 def heldout_gain(search: Search, effect: str) -> tuple[float, float]:
-    """Nats gained on held-out blocks of time by an adopted effect, with standard error.
-
-    Both rivals are trained without the block, the effect's parameters shrunk as their score
-    in the training blocks deserves (positive-part James-Stein).
-    """
+    """Nats gained on held-out blocks of time by an adopted effect, with standard error."""
     given, mask = search.given, search.active
     places = given.places(mask)
     freed = np.isin(places, freed_places(search, effect))
     ridge, values = given.precision[np.ix_(places, places)], given.values[places]
-    parts = normal_blocks(search.fit, mask)
-    information, score = sum(p[0] for p in parts), sum(p[1] for p in parts)
-    gains = []
-    for block, slope in parts:
-        trained = information - block + ridge, score - slope
-        without = _solve(*trained, values, freed, 0.0)
-        full = _solve(*trained, values, freed, None)
-        found = (full + values)[freed]
-        effective = _schur(trained[0], freed)
-        statistic = found @ effective @ found
-        shrink = max(0.0, 1 - freed.sum() / max(statistic, 1e-300))
-        kept = _solve(*trained, values, freed, shrink * found)
-        gains.append(_predicted(kept, block, slope) - _predicted(without, block, slope))
-    return float(np.sum(gains)), float(np.std(gains, ddof=1) * np.sqrt(len(gains)))
-
-
-def _schur(information, chosen):
-    """Information of the chosen given the rest."""
-    rest = ~chosen
-    inner = np.linalg.solve(information[np.ix_(rest, rest)], information[np.ix_(rest, chosen)])
-    return information[np.ix_(chosen, chosen)] - information[np.ix_(chosen, rest)] @ inner
-
-
-def _solve(information, score, values, freed, target):
-    """Steps of all parameters where the freed ones go to ``target``, or anywhere if None."""
-    if target is None:
-        return np.linalg.solve(information, score)
-    step = np.zeros(len(score))
-    step[freed] = target - values[freed]
-    rest = ~freed
-    right = score[rest] - information[np.ix_(rest, freed)] @ step[freed]
-    step[rest] = np.linalg.solve(information[np.ix_(rest, rest)], right)
-    return step
-
-
-def _predicted(step, block, slope) -> float:
-    """Log likelihood of a block after a step, against before, quadratic."""
-    return float(slope @ step - step @ block @ step / 2)
+    return gain_of(normal_blocks(search.fit, mask), ridge, values, freed)
 
 
 def prune(search: Search, effect: str) -> Search:

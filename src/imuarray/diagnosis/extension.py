@@ -9,13 +9,22 @@ from typing import NamedTuple
 
 import numpy as np
 
+from imuarray.diagnosis.clocks import CLOCK, without_jumps
+from imuarray.diagnosis.procedure import prepared
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray.engine.estimate import Estimate, Recorded, estimate
+from imuarray.engine.fit import flat_parameters
+from imuarray.engine.linearise import State
+from imuarray.engine.parameters import POSITION, Columns, columns_of
+from imuarray.engine.readings import Readings, most_informative
+from imuarray.engine.start import start
 from imuarray.errors import LARGEST, SMALLEST, InputError
 from imuarray.model import EFFECTS, ArrayModel
 from imuarray.model.array_model import EffectPrior
 from imuarray.model.effects import DATA_EFFECTS, KINDS
 from imuarray.model.names import parameter_ids
 from imuarray.model.noise import Noise
+from imuarray.recording import Recording
 
 
 class Extension(NamedTuple):
@@ -139,3 +148,43 @@ def _by_label(sds: dict, labels) -> np.ndarray:
             f"--diagnosis: expected the noise of IMU {missing[0]}, found {', '.join(sds)}"
         )
     return np.array([sds[label] for label in labels])
+
+
+def diagnosed_estimate(path: str | Path, recording: Recording) -> Estimate:
+    """The positions and parameters of a diagnosis' extended model, from its recording.
+
+    What `diagnosis.json` itself reports, estimated again. InputError for another file, or IMUs.
+    """
+    extension = read_extension(Path(path))
+    _, _, readings, _ = prepared(recording)
+    columns = columns_of(readings.array, extension.effects, readings.position_prior_sd)
+    labels = recording.accelerometer_labels, recording.gyroscope_labels
+    model = extended_model(extension, columns.model, labels)
+    positions = extension.positions
+    if positions.shape != readings.array.positions.shape:
+        raise InputError(
+            f"{path}: expected positions of {readings.array.accelerometers} accelerometers, as in"
+            f" the recording, found {len(positions)}"
+        )
+    first = start(readings, columns)
+    state = first._replace(positions=positions - positions[0], parameters=model.effect_start)
+    free = model.effect_prior_sd > SETTINGS.pinned * columns.model.effect_prior_sd
+    active = flat_parameters(columns, state._replace(parameters=free.astype(float))) > 0
+    active[:, columns.of(POSITION)] = True
+    return extended_estimate(readings, columns, active & columns.owner, state)
+
+
+def extended_estimate(readings: Readings, columns: Columns, active, state: State) -> Estimate:
+    """The robust estimate of a diagnosis' extended model from where its search ended."""
+    readings = most_informative(readings, lambda text: None)
+    recorded = Recorded.of(readings, columns, state)
+    imus = [k for k in range(len(active)) if CLOCK in columns.names and np.any(
+        active[k, columns.of(CLOCK)])]  # fmt: skip
+    if imus:
+        first = recorded.state
+        if first.rough_prior is not None:
+            first = first._replace(rough_prior=first.rough_prior.freed())
+        width = SETTINGS.jitter if first.gyroscopes_free else SETTINGS.edge
+        readings, _ = without_jumps(readings, columns, first, imus, width)
+        recorded = replace(recorded, readings=readings, state=first)
+    return estimate([recorded], columns, active)

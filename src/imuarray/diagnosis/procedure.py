@@ -53,11 +53,7 @@ def run_procedure(
 
     InputError where a recording has too few moving samples.
     """
-    raw = arrange(recording)
-    structural, readings, mended = find_structural(raw, without)
-    used = determined(readings)
-    if not used.all():
-        raw, readings = raw.select(used), readings.select(used)
+    raw, structural, readings, mended = prepared(recording, without)
     effects = catalogue_effects(without)
     # clocks are scanned for by what a delay would gain, whether or not it is a candidate
     described = effects if clocks.DELAY in effects else (*effects, clocks.DELAY)
@@ -88,6 +84,19 @@ def run_procedure(
         search, base, base_checks, together(structural, clips), in_noise, checks, explained,
         failing, raw, classes,
     )  # fmt: skip
+
+
+def prepared(recording: Recording, without=()):
+    """(readings as recorded, causes in them, readings put right, whether they could be).
+
+    InputError where a recording has too few moving samples.
+    """
+    raw = arrange(recording)
+    structural, readings, mended = find_structural(raw, without)
+    used = determined(readings)
+    if not used.all():
+        raw, readings = raw.select(used), readings.select(used)
+    return raw, structural, readings, mended
 
 
 def looked_ahead(whole: Search) -> Search:

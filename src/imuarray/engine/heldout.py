@@ -67,3 +67,49 @@ def gain(one: Scores, other: Scores) -> tuple[float, float]:
     difference, samples = other.nats - one.nats, one.samples.sum()
     error = np.std(difference, ddof=1) * np.sqrt(len(difference))
     return float(difference.sum() / samples), float(error / samples)
+
+
+def gain_of(parts, ridge, values, freed) -> tuple[float, float]:
+    """Nats that ``freed`` (n,) bool parameters gain on held-out blocks over zero, and their error.
+
+    ``parts`` [(information (n, n), score (n,))] of the blocks at ``values`` (n,), ``ridge`` (n, n)
+    the prior's precision. Both rivals are trained without the block, the freed parameters shrunk
+    as their score in the training blocks deserves (positive-part James-Stein).
+    """
+    information, score = sum(p[0] for p in parts), sum(p[1] for p in parts)
+    gains = []
+    for block, slope in parts:
+        trained = information - block + ridge, score - slope
+        without = _solve(*trained, values, freed, 0.0)
+        full = _solve(*trained, values, freed, None)
+        found = (full + values)[freed]
+        effective = _schur(trained[0], freed)
+        statistic = found @ effective @ found
+        shrink = max(0.0, 1 - freed.sum() / max(statistic, 1e-300))
+        kept = _solve(*trained, values, freed, shrink * found)
+        gains.append(_predicted(kept, block, slope) - _predicted(without, block, slope))
+    return float(np.sum(gains)), float(np.std(gains, ddof=1) * np.sqrt(len(gains)))
+
+
+def _schur(information, chosen):
+    """Information of the chosen given the rest."""
+    rest = ~chosen
+    inner = np.linalg.solve(information[np.ix_(rest, rest)], information[np.ix_(rest, chosen)])
+    return information[np.ix_(chosen, chosen)] - information[np.ix_(chosen, rest)] @ inner
+
+
+def _solve(information, score, values, freed, target):
+    """Steps of all parameters where the freed ones go to ``target``, or anywhere if None."""
+    if target is None:
+        return np.linalg.solve(information, score)
+    step = np.zeros(len(score))
+    step[freed] = target - values[freed]
+    rest = ~freed
+    right = score[rest] - information[np.ix_(rest, freed)] @ step[freed]
+    step[rest] = np.linalg.solve(information[np.ix_(rest, rest)], right)
+    return step
+
+
+def _predicted(step, block, slope) -> float:
+    """Log likelihood of a block after a step, against before, quadratic."""
+    return float(slope @ step - step @ block @ step / 2)

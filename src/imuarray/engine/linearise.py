@@ -162,25 +162,75 @@ def linearise(
     ``spare`` : a former answer whose memory may be used again. LinAlgError where the readings do
     not determine the motion.
     """
-    samples, count = readings.values.shape[:2]
-    directions = tangents(columns.model)
-    if wanted is not None:
-        number, whole = len(wanted), len(directions)
-        room = min([size for size in BUCKETS if size >= number], default=whole)
-        directions = np.vstack([directions[wanted], np.zeros((room - number, directions.shape[1]))])
-    nothing = np.zeros((samples, 0))
-    prior = (nothing, nothing) if state.rough_prior is None else state.rough_prior
-    shared, weights = (state.positions, state.parameters, directions), readings.weights
+    directions = directions_of(columns, wanted)
 
     def one(start):
-        index = np.minimum(np.arange(start, start + CHUNK), samples - 1)
-        extra = jax.tree.map(lambda field: field[index], state.derivatives)
-        return _eliminated(
-            columns.model, count, state.motion[index], extra, readings.time[index], readings.span,
-            shared, (readings.values[index], weights[index]), (prior[0][index], prior[1][index]),
-        )  # fmt: skip
+        return chunk_at(readings, columns, state, directions, start)
 
-    return _joined(one, samples, spare)
+    return _joined(one, len(readings.values), spare)
+
+
+def directions_of(columns: Columns, wanted=None) -> np.ndarray:
+    """The directions (m, 3 A + P) of some columns, all if None, zeros after them to a bucket."""
+    directions = tangents(columns.model)
+    if wanted is None:
+        return directions
+    number, whole = len(wanted), len(directions)
+    room = min([size for size in BUCKETS if size >= number], default=whole)
+    return np.vstack([directions[wanted], np.zeros((room - number, directions.shape[1]))])
+
+
+def chunk_at(readings: Readings, columns: Columns, state: State, directions, start) -> Eliminated:
+    """The `CHUNK` samples from ``start`` on, the last one repeated where there are fewer."""
+    index, x, extra, prior = _chunk_of(readings, state, start)
+    shared = state.positions, state.parameters, directions
+    return _eliminated(
+        columns.model, readings.values.shape[1], x, extra, readings.time[index], readings.span,
+        shared, (readings.values[index], readings.weights_of(index)), prior,
+    )  # fmt: skip
+
+
+def _chunk_of(readings: Readings, state: State, start):
+    """(indices (CHUNK,), motion, derivatives, the motion's prior) of a chunk."""
+    index = np.minimum(np.arange(start, start + CHUNK), len(readings.values) - 1)
+    extra = jax.tree.map(lambda field: field[index], state.derivatives)
+    nothing = np.zeros((CHUNK, 0))
+    prior = (nothing, nothing)
+    if state.rough_prior is not None:
+        prior = state.rough_prior.mean[index], state.rough_prior.sd[index]
+    return index, state.motion[index], extra, prior
+
+
+def motion_step(readings: Readings, columns: Columns, state: State, start) -> np.ndarray:
+    """(CHUNK, D) the Gauss-Newton step of each sample's motion, the shared parameters as they are.
+
+    LinAlgError where the readings do not determine it.
+    """
+    index, x, extra, (mean, sd) = _chunk_of(readings, state, start)
+    gram, slope = _motion(
+        columns.model, readings.values.shape[1], x, extra, readings.time[index], readings.span,
+        state.positions, state.parameters, (readings.values[index], readings.weights_of(index)),
+    )  # fmt: skip
+    gram, slope = np.array(gram), np.array(slope)
+    free = np.arange(KNOWN, gram.shape[1])
+    gram[:, free, free] += sd**-2.0
+    slope[:, free] += (mean - x[:, KNOWN:]) / sd**2
+    return np.linalg.solve(gram, slope[..., None])[..., 0]
+
+
+@partial(jax.jit, static_argnums=(0, 1))
+def _motion(model, count, x, extra, time, span, positions, parameters, data):
+    def one(x, extra, time):
+        def flat(x):
+            return _reading(model, count, x, positions, parameters, extra, time, span)
+
+        return flat(x), jax.jacfwd(flat)(x)
+
+    predicted, motion = jax.vmap(one)(x, extra, time)
+    values, weights = data
+    motion = (weights[..., None] * motion).reshape(len(x), 6 * count, -1)
+    residual = (weights * (values - predicted)).reshape(len(x), -1)
+    return (jnp.einsum("tri,trj->tij", motion, motion), jnp.einsum("tri,tr->ti", motion, residual))
 
 
 def _joined(one, samples, spare) -> Eliminated:

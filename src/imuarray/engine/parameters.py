@@ -21,6 +21,7 @@ from scipy.linalg import block_diag
 from imuarray.engine.settings import SETTINGS
 from imuarray.geometry import Array
 from imuarray.model import EFFECTS, ArrayModel
+from imuarray.model.effects import Effect
 from imuarray.model.noise import Noise
 
 POSITION = "position"
@@ -84,23 +85,28 @@ def catalogue_effects(without=()) -> tuple[str, ...]:
     return tuple(name for name in EFFECTS if name not in without)
 
 
-def prior_precision(columns: Columns, active) -> np.ndarray:
-    """(n, n) precision of the active parameters (N, m): their priors, and the pinned gauges."""
+def prior_precision(columns: Columns, active, resized: bool = True) -> np.ndarray:
+    """(n, n) precision of the active parameters (N, m): their priors, and the pinned gauges.
+
+    ``resized``: whether those that the array's size takes up are pinned, too.
+    """
     sds = np.broadcast_to(columns.prior_sd, active.shape)[active]
     precision = np.diag(1.0 / sds**2)
-    for mask in gauge_masks(columns, active):
+    for effect, mask in gauge_masks(columns, active):
+        if effect.resizes and not resized:
+            continue
         along = mask[active].astype(float)
         along /= along.sum() * SETTINGS.stiff * sds[along > 0].mean()
         precision += np.outer(along, along)
     return precision
 
 
-def gauge_masks(columns: Columns, active) -> list[np.ndarray]:
-    """(N, m) bool of the parameters whose mean is a gauge, where all of them are active."""
+def gauge_masks(columns: Columns, active) -> list[tuple[Effect, np.ndarray]]:
+    """Effects, and (N, m) bool of parameters whose mean is a gauge, where all are active."""
     found, model = [], columns.model
     for item, shape in zip(model.chain, model.shapes, strict=True):
         for own in item.gauge(shape) if item.gauge else ():
             mask = np.zeros_like(active)
             mask[: shape[0], columns.of(item.id)] = np.reshape(own, (shape[0], -1))
-            found.append(mask & columns.owner)
-    return [mask for mask in found if mask.any() and active[mask].all()]
+            found.append((item, mask & columns.owner))
+    return [(item, mask) for item, mask in found if mask.any() and active[mask].all()]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +28,8 @@ class Readings:
     declared : (N, 2) declared noise sd, m/s^2 and rad/s
     sd : (N, 2) the noise sd in use
     run : (T,) number of the gapless run a sample is in
+    gapless : bool, whether samples have neighbours that say something of time derivatives
+    trust : (T, N, 2) square roots of a robust loss' weights, or None for all one
     labels : N str
     """
 
@@ -41,11 +44,18 @@ class Readings:
     run: np.ndarray
     labels: tuple[str, ...]
     position_prior_sd: float
+    gapless: bool = True
+    trust: np.ndarray | None = None
 
     @property
     def weights(self) -> np.ndarray:
         """Square roots of the readings' weights, (T, N, 6): 1 / sd, 0 where left out."""
-        return self.keep / np.repeat(self.sd, 3, axis=1)
+        return self.weights_of(slice(None))
+
+    def weights_of(self, index) -> np.ndarray:
+        """The same of some samples."""
+        found = self.keep[index] / np.repeat(self.sd, 3, axis=1)
+        return found if self.trust is None else found * np.repeat(self.trust[index], 3, axis=2)
 
     @property
     def window(self) -> int:
@@ -56,6 +66,10 @@ class Readings:
         """The same with another noise sd (N, 2)."""
         return replace(self, sd=np.asarray(sd, float))
 
+    def with_noise(self, sd, trust) -> Readings:
+        """The same with another noise sd (N, 2), and a robust loss' weights (T, N, 2) or None."""
+        return replace(self, sd=np.asarray(sd, float), trust=trust)
+
     def without(self, lost) -> Readings:
         """The same without the readings in ``lost`` (T, N, 6) bool."""
         return replace(self, keep=self.keep & ~lost)
@@ -63,9 +77,11 @@ class Readings:
     def select(self, used) -> Readings:
         """The samples in ``used`` (T,) bool, in new runs."""
         time = self.time[used]
+        trust = None if self.trust is None else self.trust[used]
         return replace(
-            self, time=time, values=self.values[used], keep=self.keep[used], run=runs(time)
-        )
+            self, time=time, values=self.values[used], keep=self.keep[used], run=runs(time),
+            trust=trust,
+        )  # fmt: skip
 
 
 def determined(readings: Readings) -> np.ndarray:
@@ -95,15 +111,36 @@ def determined(readings: Readings) -> np.ndarray:
 
 def part_of(readings: Readings, most: int) -> Readings:
     """Stretches of a recording, spread evenly, of some ``most`` samples in all."""
+    every = -(-len(readings.time) // most)
+    stretch = np.arange(len(readings.time)) // SETTINGS.stretch
+    return _stretches(readings, stretch, stretch % every == 0)
+
+
+def most_informative(readings: Readings, say: Callable[[str], None]) -> Readings:
+    """Of a long recording the stretches that say most of the positions, by their rates' squares."""
     samples = len(readings.time)
-    every = -(-samples // most)
-    stretch = np.arange(samples) // SETTINGS.stretch
-    used = stretch % every == 0
+    if samples <= SETTINGS.most:
+        return readings
+    used = np.where(readings.keep[..., 3:], readings.values[..., 3:], np.nan)
+    size = np.sum(np.nanmedian(used, axis=1) ** 2, axis=1) ** 2
+    stretch = np.arange(samples) // (SETTINGS.stretch if readings.gapless else 1)
+    mean = np.bincount(stretch, size) / np.bincount(stretch)
+    best = np.zeros(len(mean), bool)
+    best[np.argsort(mean)[-int(SETTINGS.most / samples * len(mean)) :]] = True
+    say(f"using the most informative {SETTINGS.most} of {samples} samples")
+    return _stretches(readings, stretch, best[stretch])
+
+
+def _stretches(readings: Readings, stretch, used) -> Readings:
+    """The samples ``used`` (T,) bool, each ``stretch`` (T,) of a run a run of its own."""
     both = readings.run[used] * (stretch[-1] + 1) + stretch[used]
+    if readings.gapless:
+        run = np.unique(both, return_inverse=True)[1]
+        long = np.bincount(run)[run] >= readings.window
+        used = used.copy()
+        used[used] = long
+        both = both[long]
     run = np.unique(both, return_inverse=True)[1]
-    long = np.bincount(run)[run] >= readings.window
-    used[used] = long
-    run = np.unique(both[long], return_inverse=True)[1]
     return replace(
         readings, time=readings.time[used], values=readings.values[used],
         keep=readings.keep[used], run=run,
@@ -130,11 +167,12 @@ def by_imu(force, rate) -> np.ndarray:
     return out
 
 
-def arrange(recording: Recording) -> Readings:
+def arrange(recording: Recording, sparse: bool = False) -> Readings:
     """`Readings` of the moving samples whose motion is seen; InputError where too few are left.
 
     Samples where some axis has no gyroscope off its rail are left out, as are their neighbours,
-    still poses, and runs too short for a time derivative.
+    still poses, and runs too short for a time derivative; where few samples are in runs, these
+    are kept too if ``sparse``.
     """
     array = array_of(recording)
     force, rate = recording.saturated_accelerometers(), recording.saturated_gyroscopes()
@@ -142,8 +180,13 @@ def arrange(recording: Recording) -> Readings:
     bad = neighbours(blind)
     if recording.stationary is not None:
         bad |= recording.stationary
-    used = _long_runs(recording.time, ~bad)
-    if used.sum() < SETTINGS.least_samples:
+    used, gapless = _long_runs(recording.time, ~bad), True
+    step = np.median(np.diff(recording.time)) if len(bad) > 1 else np.inf
+    if sparse and (used.sum() < SETTINGS.dense * np.sum(~bad) or step > SETTINGS.longest_step):
+        used, gapless = ~bad, False
+        if not used.any():
+            raise InputError("recording: expected moving samples off the rails, found none")
+    elif used.sum() < SETTINGS.least_samples:
         raise InputError(
             f"recording: expected at least {SETTINGS.least_samples} moving samples off the rails"
             f" in gapless runs, found {used.sum()} of {used.size}"
@@ -160,6 +203,7 @@ def arrange(recording: Recording) -> Readings:
         by_imu(recording.specific_force, recording.angular_rate)[used],
         ~lost & np.repeat(exists, 3, axis=1), exists, np.tile(noise, (count, 1)),
         np.tile(noise, (count, 1)), runs(time[used]), tuple(longer), recording.position_prior_sd,
+        gapless,
     )  # fmt: skip
 
 

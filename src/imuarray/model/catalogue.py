@@ -27,7 +27,7 @@ def _off_diagonal(entries):
 
 @effect(
     "accelerometer_bias", unit="m s-2", prior_sd=0.05, shape=lambda a, g: (a, 3),
-    meaning="the accelerometers have an offset", against="time",
+    meaning="the accelerometers have an offset", against="time", own=True,
 )  # fmt: skip
 def accelerometer_bias(bias, instant, predicted):
     """u + b."""
@@ -37,6 +37,7 @@ def accelerometer_bias(bias, instant, predicted):
 @effect(
     "accelerometer_scale", unit="1", prior_sd=0.01, shape=lambda a, g: (a, 3), gauge=common_mean,
     meaning="the accelerometers' axes are scaled", shown="%", against="specific force",
+    resizes=True,
 )  # fmt: skip
 def accelerometer_scale(scale, instant, predicted):
     """(1 + c_i) u_i at each axis."""
@@ -94,7 +95,7 @@ def size_effect(offset, instant, predicted):
 
 @effect(
     "gyroscope_bias", unit="rad s-1", prior_sd=0.005, shape=lambda a, g: (g, 3),
-    meaning="the gyroscopes have an offset", against="time",
+    meaning="the gyroscopes have an offset", against="time", own=True,
 )  # fmt: skip
 def gyroscope_bias(bias, instant, predicted):
     """omega + b."""

@@ -97,6 +97,10 @@ class Effect:
         What the extended model does about it, if it is no part of the mean.
     left_out : bool
         Whether that is leaving readings out.
+    resizes : bool
+        Whether the array's size takes its gauge up: then it matters what the mean is.
+    own : bool
+        Whether it is a recording's own, not the board's: recordings fitted jointly each have it.
     """
 
     id: str
@@ -122,11 +126,18 @@ class Effect:
     kind: str = "mean"
     remedy: str = ""
     left_out: bool = False
+    resizes: bool = False
+    own: bool = False
 
     @property
     def shifts_time(self) -> bool:
         """Whether it says when a triad samples: its first parameter is a time."""
         return self.sampling and self.unit.split(",")[0] == "s"
+
+    @property
+    def kinds(self) -> list[int]:
+        """Which of `KINDS` it changes the readings of."""
+        return [0, 1] if self.sensors == "imu" else [KINDS.index(self.sensors)]
 
 
 EFFECTS: dict[str, Effect] = {}  # of the mean: a model can have them
@@ -189,7 +200,7 @@ def find_effects(ids) -> tuple[Effect, ...]:
 
 @effect(
     "gyroscope_scale", unit="1", prior_sd=0.02, shape=lambda a, g: (g, 3), gauge=common_mean,
-    meaning="the gyroscopes' axes are scaled", shown="%", against="angular rate",
+    meaning="the gyroscopes' axes are scaled", shown="%", against="angular rate", resizes=True,
 )  # fmt: skip
 def gyroscope_scale(scale, instant, predicted):
     """(1 + c_i) omega_i at each gyroscope axis."""

@@ -79,7 +79,7 @@ def _common_offset(shape):
     "sensor_clock", unit="s, Hz, 1, s, Hz/s", prior_sd=(1e-3, 50.0, 1.0, 1e-3, 1e-3),
     shape=lambda a, g: (max(a, g), 5), derivatives=True, sampling=True, scanned=True,
     held=(1, 2, 4), held_rough=(0,), critical=-12.0, gauge=_common_offset, components=(CLOCK,),
-    contains=("sensor_delay",), resembles=("gyroscope_delay",), against="age",
+    contains=("sensor_delay",), resembles=("gyroscope_delay",), against="age", own=True,
     meaning="the IMUs sample on clocks of their own, so that a reading's age is a sawtooth",
 )  # fmt: skip
 def sensor_clock(clock, instant, predicted):
@@ -115,7 +115,7 @@ def _drift_form(kind, highest):
         (f"{name} {form}", _drift_form(kind, highest))
         for kind, name in enumerate(KINDS) for form, highest in (("linear", 1), ("cubic", 3))
     ),
-    meaning="an offset changes through the recording", against="time",
+    meaning="an offset changes through the recording", against="time", own=True,
 )  # fmt: skip
 def bias_drift(drift, instant, predicted):
     """Biases that are cubic polynomials of time: (accelerometer | gyroscope, axis, degree)."""
@@ -132,7 +132,7 @@ def bias_drift(drift, instant, predicted):
     "position_shift", unit="m, m, m, s", prior_sd=(1e-3, 1e-3, 1e-3, 1e3),
     shape=lambda a, g: (a, 4), sensors="accelerometer", sampling=True, scanned=True, held=(3,),
     components=(("x", "y", "z", "time"),), against="place",
-    meaning="a triad moved on the board during the recording",
+    meaning="a triad moved on the board during the recording", own=True,
 )  # fmt: skip
 def position_shift(shift, instant, predicted):
     """Triad k sits at r_k + d_k from the instant t_k on: d_k, t_k."""

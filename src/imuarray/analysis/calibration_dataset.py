@@ -1,0 +1,184 @@
+"""A calibration as a labelled dataset, of the papers' estimators and of the engine."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from imuarray.engine.estimate import Estimate
+from imuarray.engine.parameters import POSITION
+from imuarray.model import ArrayModel
+from imuarray.model.names import parameter_names
+from imuarray.motion.state import UNITS
+from imuarray.recording import Recording
+
+PLACE = ("accelerometer", "axis")
+
+
+def positions_dataset(recording: Recording, positions, covariance) -> xr.Dataset:
+    """Positions (A, 3) m and the covariance (3 (A - 1),) squared m^2 of r_2 ... r_A."""
+    count = len(positions)
+    labels = list(recording.accelerometer_labels)
+    whole = np.zeros((count, 3, count, 3))
+    whole[1:, :, 1:, :] = covariance.reshape(count - 1, 3, count - 1, 3)
+    variables = {
+        "position": (PLACE, positions, {"units": "m", "relative_to": labels[0]}),
+        "nominal_position": (PLACE, recording.relative_positions(), {"units": "m"}),
+        "position_covariance": (
+            (*PLACE, "accelerometer_other", "axis_other"), whole, {"units": "m2"}
+        ),
+    }  # fmt: skip
+    coords = {
+        "accelerometer": labels, "axis": list("xyz"), "accelerometer_other": labels,
+        "axis_other": list("xyz"), "gyroscope": list(recording.gyroscope_labels),
+    }  # fmt: skip
+    return xr.Dataset(variables, coords, {"position_prior_sd": recording.position_prior_sd})
+
+
+def _noise(sds) -> dict:
+    """Sds (A,) m/s^2 and (G,) rad/s as variables of triads and axes."""
+    force, rate = (np.repeat(np.asarray(part)[:, None], 3, axis=1) for part in sds)
+    return {
+        "accelerometer_sd": (PLACE, force, {"units": "m s-2"}),
+        "gyroscope_sd": (("gyroscope", "axis"), rate, {"units": "rad s-1"}),
+    }
+
+
+def _motion(fields) -> dict:
+    """angular rate, angular acceleration and specific force, (T, 3) each, as variables."""
+    return {
+        name: (("time", "axis"), field, {"units": unit})
+        for (name, unit), field in zip(UNITS.items(), fields, strict=True)
+    }
+
+
+def papers_dataset(recording: Recording, model: ArrayModel, found, saturated) -> xr.Dataset:
+    """Of an estimator of the papers' model."""
+    from imuarray.estimation.gauss_newton import parameter_covariance
+
+    covariance = found.covariance
+    if covariance is None:
+        covariance = parameter_covariance(
+            model, recording.specific_force, recording.angular_rate, found, saturated
+        )
+    dataset = positions_dataset(recording, found.positions, covariance)
+    sds = [
+        np.sqrt(np.diag(part)).reshape(-1, 3)[:, 0]
+        for part in (model.noise.accelerometer, model.noise.gyroscope)
+    ]
+    variables = _motion(found.motion.motion[:3]) | _noise(sds)
+    variables |= {
+        "motion_converged": (("time",), found.motion.converged),
+        "cost": (("iteration",), found.cost),
+        "position_step": (("iteration",), found.step, {"units": "m"}),
+    }
+    dataset = dataset.assign(variables).assign_coords(time=recording.time)
+    dataset.attrs |= {"converged": int(found.converged), "samples": len(recording.time)}
+    dataset.attrs["residual_ratio"] = residual_ratio(recording, model, found, saturated)
+    return dataset
+
+
+def residual_ratio(recording: Recording, model: ArrayModel, found, saturated) -> float:
+    """Rms residual over the declared noise, degrees of freedom allowed for; NaN without any."""
+    samples, count = recording.specific_force.shape[:2]
+    values = 3 * samples * (count + recording.angular_rate.shape[1]) - int(saturated.sum())
+    freedom = values - 9 * samples - 3 * (count - 1)
+    if freedom <= 0:
+        return float("nan")
+    force, rate = model.predict_many(found.motion.motion, found.positions)
+    misfit = model.noise.misfit(
+        recording.specific_force - force, recording.angular_rate - rate, saturated
+    )
+    return float(np.sqrt(misfit / freedom))
+
+
+def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
+    """Of the engine's estimate."""
+    first, readings = recordings[0], found.recorded[0].readings
+    covariance, *sds = found.widths()
+    effects = _effects_of(found)
+    place, size = _places(found, effects)
+    count = 3 * (readings.array.accelerometers - 1)
+    whole = np.zeros((size, size))
+    used = np.flatnonzero(place >= 0)
+    whole[np.ix_(place[used], place[used])] = covariance[np.ix_(used, used)]
+    dataset = positions_dataset(first, found.positions, whole[:count, :count])
+    variables = {
+        f"position_sd_{name}": (PLACE, _by_triad(place, sd, count), {"units": "m"})
+        for name, sd in zip(("formal", "jackknife"), sds, strict=True)
+    }
+    kinds = readings.array.accelerometers, readings.array.gyroscopes
+    noise = found.noise_sd()
+    variables |= _noise([noise[: kinds[0], 0], noise[: kinds[1], 1]])
+    variables["step"] = (("iteration",), np.array(found.steps))
+    coords = {}
+    if len(recordings) == 1:
+        motion = found.recorded[0].state.motion[:, :9]
+        variables |= _motion(np.split(motion, 3, axis=1))
+        coords["time"] = readings.time + first.time[0]
+    if effects:
+        model = ArrayModel(readings.array, None, effects)
+        labels = first.accelerometer_labels, first.gyroscope_labels
+        sd = np.sqrt(np.diag(whole))[count:]
+        variables |= {
+            "effect_parameter": (("parameter",), _parameters(found, model)),
+            "effect_sd": (("parameter",), sd),
+            # of r_2 ... r_A, then the effects' parameters
+            "whole_covariance": (("unknown", "unknown_other"), whole),
+        }
+        coords["parameter"] = parameter_names(model, labels)
+    dataset = dataset.assign(variables).assign_coords(coords)
+    dataset.attrs |= {
+        "converged": int(found.converged), "residual_ratio": found.residual_ratio(),
+        "student_t": [float(nu) for nu in found.freedoms], "effects": ",".join(effects),
+        "time_origin": float(first.time[0]), "span": readings.span,
+        "samples": sum(len(one.readings.time) for one in found.recorded),
+    }  # fmt: skip
+    return dataset
+
+
+def _effects_of(found: Estimate) -> tuple[str, ...]:
+    """The effects with free parameters, or with values, in the model's order."""
+    values = found.columns.model.split(found.recorded[0].state.parameters)
+    free = set(np.array(found.columns.names)[found.active.any(axis=0)])
+    return tuple(
+        item.id for item in found.columns.model.chain
+        if item.id in free or np.any(values[item.id])
+    )  # fmt: skip
+
+
+def _parameters(found: Estimate, model: ArrayModel) -> np.ndarray:
+    """Flat, in a model's order; a recording's own ones are the first recording's."""
+    values = found.columns.model.split(found.recorded[0].state.parameters)
+    return model.join({item.id: values[item.id] for item in model.chain})
+
+
+def _places(found: Estimate, effects) -> tuple[np.ndarray, int]:
+    """Of each of the n parameters its place among r_2 ... r_A and the effects'; -1 for none.
+
+    Another recording's own ones have none. Also the number of places.
+    """
+    array, columns = found.recorded[0].readings.array, found.columns
+    offset, shapes = 3 * (array.accelerometers - 1), {}
+    for item, shape in zip(columns.model.chain, columns.model.shapes, strict=True):
+        if item.id in effects:
+            shapes[item.id] = offset, shape
+            offset += int(np.prod(shape))
+    out = np.full(len(found.values), -1)
+    for number, (imu, column) in enumerate(np.argwhere(found.active)):
+        name, inner = columns.names[column], columns.places[column]
+        if name == POSITION:
+            place = 3 * (imu - 1) + inner[0]
+        else:
+            first, shape = shapes[name]
+            place = first + np.ravel_multi_index((imu, *inner), shape)
+        out[found.places[0][number]] = place
+    return out, offset
+
+
+def _by_triad(place, values, count) -> np.ndarray:
+    """(A, 3) of the positions' values among all; zero for the reference."""
+    out = np.zeros(count + 3)
+    mine = (place >= 0) & (place < count)
+    out[3 + place[mine]] = values[mine]
+    return out.reshape(-1, 3)

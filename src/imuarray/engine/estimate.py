@@ -1,0 +1,290 @@
+"""Positions and effects of a board from one recording or several, jointly and robustly.
+
+Gauss-Newton over the shared parameters, each sample's motion eliminated; noise of each triad by
+restricted maximum likelihood and Student's t (`imuarray.engine.robust`), all re-estimated in turn.
+Effects that a recording has of its own (biases, clocks) have parameters in each of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from imuarray.engine.fit import (
+    flat_parameters,
+    from_flat,
+    held_where_rough,
+    prior_means,
+    scaled_solve,
+    with_derivatives,
+    with_rough_prior,
+)
+from imuarray.engine.linearise import State
+from imuarray.engine.parameters import Columns, gauge_masks, prior_precision
+from imuarray.engine.passes import Pass, normal_pass
+from imuarray.engine.readings import Readings
+from imuarray.engine.robust import distances, freedoms, judged
+from imuarray.engine.settings import SETTINGS
+from imuarray.engine.start import is_smooth, start
+from imuarray.linear import scaled_inverse
+from imuarray.model.effects import EFFECTS
+
+NORMAL = np.array([np.inf, np.inf])
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A recording of the board: its readings with the noise in use, and where they are fitted."""
+
+    readings: Readings
+    state: State
+    smooth: bool
+
+    @classmethod
+    def of(cls, readings: Readings, columns: Columns, former: State | None = None) -> Recorded:
+        """At the nominal positions and no effect, or at another fit's (``former``)."""
+        first = start(readings, columns)
+        if former is not None:
+            first = first._replace(positions=former.positions, parameters=former.parameters)
+        smooth = readings.gapless and is_smooth(readings, first.motion)
+        if readings.gapless and not smooth:
+            first = with_rough_prior(readings, first)
+        return cls(readings, first, smooth)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What `estimate` came to; n parameters: those shared, then each recording's own.
+
+    Attributes
+    ----------
+    recorded, passes : of each recording, the last pass at its state
+    active : (N, m) bool, the parameters fitted
+    places : for each recording, where its active parameters are among the n
+    information, precision : (n, n) of the readings; of the priors, gauges pinned
+    blocks : [(information, score)] of each block of time of each recording
+    freedoms : (2,) degrees of freedom of Student's t, of accelerometers and gyroscopes
+    steps : largest step of each iteration, in sds
+    """
+
+    recorded: tuple[Recorded, ...]
+    passes: tuple[Pass, ...]
+    columns: Columns
+    active: np.ndarray
+    places: tuple[np.ndarray, ...]
+    information: np.ndarray
+    precision: np.ndarray
+    blocks: list[tuple[np.ndarray, np.ndarray]]
+    freedoms: np.ndarray
+    steps: tuple[float, ...]
+    converged: bool
+
+    @property
+    def positions(self) -> np.ndarray:
+        """(A, 3) m, relative to the first triad."""
+        return self.recorded[0].state.positions
+
+    @property
+    def values(self) -> np.ndarray:
+        """The parameters (n,)."""
+        return _values(self.recorded, self.columns, self.active, self.places)
+
+    def widths(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Covariance (n, n); formal sds (n,), and a jackknife's: the covariance has the larger."""
+        formal = self._formal()
+        sds, resampled = np.sqrt(np.diag(formal)), self._jackknife()
+        wider = np.maximum(resampled / sds, 1.0)
+        return formal * np.outer(wider, wider), sds, resampled
+
+    def _formal(self) -> np.ndarray:
+        """Gauges that the array's size takes up not pinned, but as large as they may well be."""
+        prior = _pinned(self.recorded, self.columns, self.active, self.places, resized=False)
+        for effect, mask in gauge_masks(self.columns, self.active):
+            if not effect.resizes:
+                continue
+            chosen = self.places[0][mask[self.active]]
+            mean = np.zeros(len(prior))
+            mean[chosen] = 1.0 / len(chosen)
+            # the mean of so many that differ by so much
+            prior += np.outer(mean, mean) * len(chosen) / np.var(self.values[chosen], ddof=1)
+        # Student's t: what a reading far out loses in weight others do not gain
+        lost = max((nu + 5) / (nu + 3) if np.isfinite(nu) else 1.0 for nu in self.freedoms)
+        return lost * scaled_inverse(self.information + prior)
+
+    def residual_ratio(self) -> float:
+        """Rms residual over the declared noise, degrees of freedom allowed for."""
+        squares, number = 0.0, 0.0
+        for one, seen in zip(self.recorded, self.passes, strict=True):
+            scale = (one.readings.sd / one.readings.declared) ** 2
+            squares += np.sum(distances(one.readings, seen) * scale)
+            number += one.readings.keep.sum()
+        return float(np.sqrt(squares / number))
+
+    def noise_sd(self) -> np.ndarray:
+        """Sds (N, 2), m/s^2 and rad/s, that Student's t has; rms over the recordings."""
+        share = np.where(np.isfinite(self.freedoms), self.freedoms, 1.0)
+        wide = np.where(np.isfinite(self.freedoms), share / (share - 2.0), 1.0)
+        squares = [one.readings.sd**2 for one in self.recorded]
+        return np.sqrt(wide * np.mean(squares, axis=0))
+
+    def _jackknife(self) -> np.ndarray:
+        """Sds (n,) from leaving out a block of time after the other."""
+        moved = np.array([
+            -np.linalg.solve(self.information - inner + self.precision, score)
+            for inner, score in self.blocks
+        ])  # fmt: skip
+        count = len(moved)
+        return np.sqrt((count - 1) / count * np.sum((moved - moved.mean(axis=0)) ** 2, axis=0))
+
+
+def estimate(
+    recorded: Sequence[Recorded], columns: Columns, active, robust: bool = True
+) -> Estimate:
+    """The most likely parameters from where the recordings stand.
+
+    ``active`` (N, m) bool. ``robust``: Student's t with estimated degrees of freedom instead of
+    normal noise. LinAlgError where the readings do not determine the motion.
+    """
+    places = places_of(columns, active, len(recorded))
+    precision = _pinned(recorded, columns, active, places)
+    recorded, nu, length, last, steps = tuple(recorded), NORMAL, 1.0, np.inf, []
+    for number in range(SETTINGS.iterations):
+        recorded, passes = _passed(recorded, columns, active)
+        information, score, blocks = _summed(passes, places)
+        values = _values(recorded, columns, active, places)
+        slope = score - precision @ (values - _means(recorded, columns, active, places))
+        step, sds = scaled_solve(information + precision, slope)
+        steps.append(float(np.max(np.abs(step) / sds, initial=0.0)))
+        if robust and number >= SETTINGS.normal_first:
+            nu = _freedoms(recorded, passes)
+        noisy = _judged(recorded, passes, columns, active, nu)
+        change = _noise_change(recorded, noisy)
+        if steps[-1] < SETTINGS.converged and change < SETTINGS.same_noise and number > 3:
+            break
+        length = max(length / 2, SETTINGS.shortest) if steps[-1] > last else min(1.0, 1.5 * length)
+        last = steps[-1]
+        recorded = tuple(
+            replace(one, state=_moved(one.state, columns, active, length * step[place]))
+            for one, place in zip(noisy, places, strict=True)
+        )
+    return Estimate(
+        recorded, passes, columns, active, places, information, precision, blocks, nu,
+        tuple(steps), steps[-1] < SETTINGS.converged,
+    )  # fmt: skip
+
+
+def places_of(columns: Columns, active, recordings: int) -> tuple[np.ndarray, ...]:
+    """Of each recording's active parameters (n_a,): where they are among all n."""
+    own = np.array([name in EFFECTS and EFFECTS[name].own for name in columns.names])
+    mine = np.broadcast_to(own, active.shape)[active]
+    shared = int(np.sum(~mine))
+    found = []
+    for number in range(recordings):
+        place = np.empty(len(mine), int)
+        place[~mine] = np.arange(shared)
+        place[mine] = shared + number * mine.sum() + np.arange(mine.sum())
+        found.append(place)
+    return tuple(found)
+
+
+def _passed(recorded, columns, active):
+    """Each recording linearised, its motion improved."""
+    seen, moved = [], []
+    for one in recorded:
+        state = with_derivatives(one.readings, one.state, one.smooth)
+        seen.append(normal_pass(one.readings, columns, state, active))
+        moved.append(replace(one, state=state._replace(motion=seen[-1].motion)))
+    return tuple(moved), tuple(seen)
+
+
+def _summed(passes, places):
+    """(information (n, n), score (n,), [(information, score)] of all blocks)."""
+    size = 1 + max((int(place.max()) for place in places if len(place)), default=-1)
+    blocks = []
+    for seen, place in zip(passes, places, strict=True):
+        for inner, slope in zip(seen.information, seen.score, strict=True):
+            whole, score = np.zeros((size, size)), np.zeros(size)
+            whole[np.ix_(place, place)], score[place] = inner, slope
+            blocks.append((whole, score))
+    return sum(b[0] for b in blocks), sum(b[1] for b in blocks), blocks
+
+
+def _spread(parts, places) -> np.ndarray:
+    """(n,) from each recording's (n_a,)."""
+    out = np.empty(1 + max((int(place.max()) for place in places if len(place)), default=-1))
+    for part, place in zip(parts, places, strict=True):
+        out[place] = part
+    return out
+
+
+def _values(recorded, columns, active, places) -> np.ndarray:
+    return _spread([flat_parameters(columns, one.state)[active] for one in recorded], places)
+
+
+def _means(recorded, columns, active, places) -> np.ndarray:
+    return _spread([prior_means(one.readings, columns)[active] for one in recorded], places)
+
+
+def _pinned(recorded, columns, active, places, resized=True) -> np.ndarray:
+    """Precision (n, n) of the priors, gauges pinned, and what does not move in rough motion."""
+    inner = prior_precision(columns, active, resized)
+    parts = []
+    for one in recorded:
+        held = held_where_rough(columns, active) * one.state.gyroscopes_free
+        parts.append(inner + np.diag(held / SETTINGS.held_sd**2))
+    return _assembled(parts, places)
+
+
+def _assembled(parts, places) -> np.ndarray:
+    """(n, n): what several recordings share is written by each of them."""
+    size = 1 + max((int(place.max()) for place in places if len(place)), default=-1)
+    out = np.zeros((size, size))
+    for part, place in zip(parts, places, strict=True):
+        out[np.ix_(place, place)] = part
+    return out
+
+
+def _freedoms(recorded, passes) -> np.ndarray:
+    """The least of all recordings'."""
+    return np.min(
+        [freedoms(one.readings, seen) for one, seen in zip(recorded, passes, strict=True)], axis=0
+    )
+
+
+def _judged(recorded, passes, columns, active, nu) -> tuple[Recorded, ...]:
+    """Noise and weights anew; a triad has paid for its share of the parameters."""
+    paid = np.zeros((len(active), 2))
+    for column, name in enumerate(columns.names):
+        kinds = EFFECTS[name].kinds if name in EFFECTS else [0]  # positions
+        paid[:, kinds] += active[:, [column]] / len(kinds)
+    return tuple(
+        replace(one, readings=judged(one.readings, seen, paid / len(recorded), nu))
+        for one, seen in zip(recorded, passes, strict=True)
+    )
+
+
+def _noise_change(before, after) -> float:
+    return max(
+        float(np.max(np.abs(new.readings.sd / old.readings.sd - 1)[old.readings.exists]))
+        for old, new in zip(before, after, strict=True)
+    )
+
+
+def _moved(state: State, columns, active, step) -> State:
+    whole = flat_parameters(columns, state)
+    whole[active] += step
+    return from_flat(columns, state, whole)
+
+
+def tested(found: Estimate, active):
+    """([(information, score)] of blocks, prior precision, values) with more parameters ``active``.
+
+    At an estimate's state, noise and weights.
+    """
+    places = places_of(found.columns, active, len(found.recorded))
+    recorded, passes = _passed(found.recorded, found.columns, active)
+    blocks = _summed(passes, places)[2]
+    values = _values(recorded, found.columns, active, places)
+    return blocks, _pinned(recorded, found.columns, active, places), values

@@ -1,0 +1,97 @@
+"""One pass over a recording: normal equations by blocks of time, the motion improved on the way.
+
+What a sample's derivatives need is freed with its chunk, so memory does not grow with the number of
+parameters times samples (`linearise` keeps all of it, for score tests).
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
+
+import numpy as np
+
+from imuarray.engine.fit import normal, padded
+from imuarray.engine.heldout import blocks_of
+from imuarray.engine.linearise import CHUNK, THREADS, State, chunk_at, directions_of, motion_step
+from imuarray.engine.parameters import Columns
+from imuarray.engine.readings import Readings
+
+LEAST_FREE = 1e-3  # of a reading's variance that the motion leaves, or its size says nothing
+
+
+class Pass(NamedTuple):
+    """What a recording says of n parameters (N, m) bool, in blocks of time; whitened units."""
+
+    information: np.ndarray  # (B, n, n)
+    score: np.ndarray  # (B, n)
+    motion: np.ndarray  # (T, D), improved
+    misfit: float  # squared residuals, the motion's prior included
+    taken: float  # of them what the motion's last step took out
+    squares: np.ndarray  # (T, N, 2) squared residuals of each triad
+    freedom: np.ndarray  # (T, N, 2) their expectation where noise is as assumed
+    unit: np.ndarray  # (T, N, 2) the same squares, each reading's of unit expectation
+
+
+def normal_pass(
+    readings: Readings, columns: Columns, state: State, active, improved: int = 1
+) -> Pass:
+    """The normal equations at a state, after ``improved`` Gauss-Newton steps of the motion.
+
+    LinAlgError where the readings do not determine the motion.
+    """
+    samples, count = readings.values.shape[:2]
+    wanted = np.flatnonzero(active.any(axis=0))
+    directions = directions_of(columns, wanted)
+    few = padded(active[:, wanted], len(directions))
+    blocks = blocks_of(samples)
+    motion = state.motion.copy()
+    squares, freedom, unit = (np.empty((samples, count, 2)) for _ in range(3))
+
+    def one(start):
+        part = slice(start, min(start + CHUNK, samples))
+        here = state._replace(motion=motion)
+        for _ in range(improved):
+            motion[part] += motion_step(readings, columns, here, start)[: samples - start]
+        seen = chunk_at(readings, columns, here, directions, start)
+        used = part.stop - part.start
+        residual, leverage = seen.residual[:used], _leverage(seen.basis[:used], count)
+        left = np.where(readings.keep[part], 1.0 - leverage, 0.0)
+        squares[part], freedom[part] = _by_triad(residual**2), _by_triad(left)
+        unit[part] = _by_triad(residual**2 / np.maximum(1.0 - leverage, LEAST_FREE))
+        known = [
+            (block, *normal(seen.residual, seen.whitened, seen.through, few, rows))
+            for block, rows in _inside(blocks, part)
+        ]
+        return known, float(np.sum(seen.misfit[:used])), float(np.sum(seen.taken[:used] ** 2))
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        found = list(pool.map(one, range(0, samples, CHUNK)))
+    size = int(active.sum())
+    information, score = np.zeros((len(blocks), size, size)), np.zeros((len(blocks), size))
+    for block, inner, slope in (item for known, *_ in found for item in known):
+        # in order, whichever thread was first
+        information[block] += inner
+        score[block] += slope
+    misfit, taken = sum(f[1] for f in found), sum(f[2] for f in found)
+    return Pass(information, score, motion, misfit, taken, squares, freedom, unit)
+
+
+def _inside(blocks, part: slice) -> list[tuple[int, slice]]:
+    """(number, its rows of a chunk) of each block that meets the chunk."""
+    found = []
+    for number, block in enumerate(blocks):
+        first, last = max(block.start, part.start), min(block.stop, part.stop)
+        if first < last:
+            found.append((number, slice(first - part.start, last - part.start)))
+    return found
+
+
+def _leverage(basis, count) -> np.ndarray:
+    """Share of each reading's variance that the motion takes up, (T, N, 6)."""
+    return np.einsum("tij,tij->ti", basis, basis).reshape(len(basis), count, 6)
+
+
+def _by_triad(values) -> np.ndarray:
+    """(T, N, 2) sums over the axes of (T, N, 6)."""
+    return values.reshape(*values.shape[:2], 2, 3).sum(axis=-1)
