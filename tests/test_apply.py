@@ -32,7 +32,7 @@ def files(tmp_path_factory):
     )  # fmt: skip
     write_recording(recording, folder / "rec.nc")
     given = [str(folder / "rec.nc"), "--out", str(folder / "cal.nc"), "--quiet"]
-    assert main(["calibrate", *given, "--method", "gauss-newton"]) == 0
+    assert main(["calibrate", *given, "--model", "papers", "--method", "gauss-newton"]) == 0
     return folder / "cal.nc", folder / "rec.nc", motion
 
 
@@ -85,7 +85,7 @@ def test_what_does_not_fit_is_refused(files, tmp_path, capsys):
 def test_a_calibration_with_effects_says_them(files, tmp_path, capsys):
     _, recording, _ = files
     cal, out = tmp_path / "cal.nc", tmp_path / "motion.nc"
-    command = f"calibrate {recording} --method gauss-newton --effects gyroscope_bias --out {cal}"
+    command = f"calibrate {recording} --effects gyroscope_bias --out {cal}"
     assert main(command.split()) == 0
     assert "effect parameter: value (sd)\ngyroscope_bias" in capsys.readouterr().out
     assert main(["apply", str(cal), str(recording), "--out", str(out)]) == 0
@@ -102,7 +102,7 @@ def test_the_motion_under_effects(files, tmp_path):
     )  # fmt: skip
     z = {}
     for effects in (names, ()):
-        found = imuarray.calibrate(recording, "gauss-newton", effects)
+        found = imuarray.calibrate(recording, "sensors" if effects else "papers", effects=effects)
         motion = imuarray.apply(found, recording)
         railed = motion.gyroscope_at_rail.to_numpy()
         assert 20 < railed.sum() < 200 and motion.converged.all()

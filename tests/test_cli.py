@@ -225,7 +225,7 @@ def test_a_wrong_recording_end_to_end(tmp_path):
         "import sys, types; from imuarray.cli import main\n"
         "from imuarray.recording import read_recording\n"
         "m = sys.modules['imuarray.commands.calibrate'] = types.ModuleType('m')\n"
-        "m.calibrate = lambda arguments: read_recording(arguments.recording)\n"
+        "m.calibrate = lambda arguments: read_recording(arguments.recordings[0])\n"
         "sys.exit(main(sys.argv[1:]))"
     )
     recording, out = tmp_path / "rec.nc", tmp_path / "cal.nc"

@@ -44,7 +44,7 @@ def drifting(tmp_path):
 
 def ratio(recording, path):
     """Residual over noise under the diagnosis, positions free."""
-    found = imuarray.calibrate(recording, method="gauss-newton", diagnosis=path)
+    found = imuarray.calibrate(recording, model=path)
     return found.attrs["residual_ratio"], found.attrs["time_origin"], found.attrs["span"]
 
 

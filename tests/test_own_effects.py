@@ -68,7 +68,7 @@ def mine(tmp_path):
 def test_commands_know_the_effect(mine, tmp_path, capsys):
     recording, _ = imuarray.simulate(model().array, 1.0, 50.0, seed=1)
     imuarray.write_recording(recording, tmp_path / "rec.nc")
-    asked = ["calibrate", str(tmp_path / "rec.nc"), "--method", "gauss-newton", "--effects"]
+    asked = ["calibrate", str(tmp_path / "rec.nc"), "--effects"]
     asked += ["accelerometer_cubic", "--out", str(tmp_path / "cal.nc"), "--json"]
     assert main(asked) == 2
     assert "found accelerometer_cubic" in capsys.readouterr().err
@@ -137,7 +137,7 @@ def test_a_wrong_file_is_one_line(text, said, tmp_path, capsys):
         path.write_bytes(text if isinstance(text, bytes) else text.encode())
     recording, _ = imuarray.simulate(model().array, 1.0, 50.0, seed=1)
     imuarray.write_recording(recording, tmp_path / "rec.nc")
-    asked = ["calibrate", str(tmp_path / "rec.nc"), "--method", "gauss-newton", "--effects"]
+    asked = ["calibrate", str(tmp_path / "rec.nc"), "--effects"]
     asked += ["accelerometer_cubic", "--effect-file", str(path), "--out", str(tmp_path / "cal.nc")]
     assert main(asked) == 2
     error = capsys.readouterr().err
@@ -156,7 +156,7 @@ def test_an_effect_with_a_gauge_of_its_own_is_one_place(tmp_path):
     recording, truth = imuarray.simulate(model().array, 2.5, 100.0, seed=3, effects=effects)
     true = truth["effect_parameter"].to_numpy()
     assert list(truth.parameter.values) == [f"accelerometer_gain gain_{k + 1} 1" for k in range(5)]
-    found = imuarray.calibrate(recording, method="gauss-newton", effects=effects)
+    found = imuarray.calibrate(recording, effects=effects)
     off = (found["effect_parameter"].to_numpy() - true) / found["effect_sd"].to_numpy()
     assert np.abs(off).max() < 4
     few = imuarray.select(recording, 5)

@@ -5,7 +5,7 @@ In a notebook::
     import imuarray
 
     recording = imuarray.read_recording("rec.nc")
-    calibration = imuarray.calibrate(recording, method="gauss-newton")
+    calibration = imuarray.calibrate(recording)
     posterior = imuarray.sample(recording, method="nuts")
     diagnosis = imuarray.diagnose(recording)
     imuarray.plots.positions(calibration)

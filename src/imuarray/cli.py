@@ -158,7 +158,12 @@ def _read_effects(arguments: argparse.Namespace) -> None:
     from imuarray.model import read_effects
 
     new = [name for path in files for name in read_effects(path)]
-    if hasattr(arguments, "effects") and not (arguments.effects or arguments.diagnosis):
+    named = [getattr(arguments, name, None) for name in ("diagnosis", "model")]
+    if (
+        hasattr(arguments, "effects")
+        and not arguments.effects
+        and not any(isinstance(item, InputFile) for item in named)
+    ):
         raise InputError(
             f"--effect-file: expected --effects that names what to use of {', '.join(new)}, found"
             " none"

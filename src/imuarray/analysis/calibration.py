@@ -20,8 +20,8 @@ from imuarray.recording import Recording
 
 def calibrate(
     recording: Recording | Sequence[Recording], model: str | PathLike = "sensors",
-    method: str | None = None, effects: Sequence[str] = (), accelerometer_noise: float | None = None,
-    say: Say = silent,
+    method: str | None = None, effects: Sequence[str] = (),
+    accelerometer_noise: float | None = None, say: Say = silent,
 ) -> xr.Dataset:  # fmt: skip
     """Accelerometer positions, sensor parameters and motion (docs/models.md).
 
@@ -123,7 +123,7 @@ def _engine(recordings, model: str, effects, say: Say) -> xr.Dataset:
     from imuarray.engine.ladder import climb, with_effects
     from imuarray.engine.readings import arrange, most_informative
 
-    rungs = []
+    rungs: list = []
     if model.endswith(".json"):
         from imuarray.diagnosis.extension import diagnosed_estimate
 

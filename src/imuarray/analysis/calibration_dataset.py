@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from imuarray.analysis.model import model_of
 from imuarray.engine.estimate import Estimate
 from imuarray.engine.parameters import POSITION
 from imuarray.model import ArrayModel
@@ -103,7 +104,7 @@ def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
     used = np.flatnonzero(place >= 0)
     whole[np.ix_(place[used], place[used])] = covariance[np.ix_(used, used)]
     dataset = positions_dataset(first, found.positions, whole[:count, :count])
-    variables = {
+    variables: dict[str, tuple] = {
         f"position_sd_{name}": (PLACE, _by_triad(place, sd, count), {"units": "m"})
         for name, sd in zip(("formal", "jackknife"), sds, strict=True)
     }
@@ -111,13 +112,13 @@ def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
     noise = found.noise_sd()
     variables |= _noise([noise[: kinds[0], 0], noise[: kinds[1], 1]])
     variables["step"] = (("iteration",), np.array(found.steps))
-    coords = {}
+    coords: dict[str, object] = {}
     if len(recordings) == 1:
         motion = found.recorded[0].state.motion[:, :9]
         variables |= _motion(np.split(motion, 3, axis=1))
-        coords["time"] = readings.time + first.time[0]
+        coords["time"] = readings.time + readings.origin
     if effects:
-        model = ArrayModel(readings.array, None, effects)
+        model = model_of(first, effects)
         labels = first.accelerometer_labels, first.gyroscope_labels
         sd = np.sqrt(np.diag(whole))[count:]
         variables |= {
@@ -131,7 +132,7 @@ def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
     dataset.attrs |= {
         "converged": int(found.converged), "residual_ratio": found.residual_ratio(),
         "student_t": [float(nu) for nu in found.freedoms], "effects": ",".join(effects),
-        "time_origin": float(first.time[0]), "span": readings.span,
+        "time_origin": readings.origin, "span": readings.span,
         "samples": sum(len(one.readings.time) for one in found.recorded),
     }  # fmt: skip
     return dataset
@@ -143,7 +144,7 @@ def _effects_of(found: Estimate) -> tuple[str, ...]:
     free = set(np.array(found.columns.names)[found.active.any(axis=0)])
     return tuple(
         item.id for item in found.columns.model.chain
-        if item.id in free or np.any(values[item.id])
+        if item.id in free or np.asarray(values[item.id]).any()
     )  # fmt: skip
 
 

@@ -156,7 +156,10 @@ def diagnosed_estimate(path: str | Path, recording: Recording) -> Estimate:
     What `diagnosis.json` itself reports, estimated again. InputError for another file, or IMUs.
     """
     extension = read_extension(Path(path))
-    _, _, readings, _ = prepared(recording)
+    _, _, readings, _ = prepared(recording, sparse=True)
+    origin, span = extension.clock
+    since = readings.time + readings.origin - origin
+    readings = replace(readings, time=since, span=span, origin=origin)
     columns = columns_of(readings.array, extension.effects, readings.position_prior_sd)
     labels = recording.accelerometer_labels, recording.gyroscope_labels
     model = extended_model(extension, columns.model, labels)

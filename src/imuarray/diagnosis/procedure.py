@@ -86,12 +86,12 @@ def run_procedure(
     )  # fmt: skip
 
 
-def prepared(recording: Recording, without=()):
+def prepared(recording: Recording, without=(), sparse=False):
     """(readings as recorded, causes in them, readings put right, whether they could be).
 
     InputError where a recording has too few moving samples.
     """
-    raw = arrange(recording)
+    raw = arrange(recording, sparse)
     structural, readings, mended = find_structural(raw, without)
     used = determined(readings)
     if not used.all():

@@ -28,6 +28,7 @@ class Readings:
     declared : (N, 2) declared noise sd, m/s^2 and rad/s
     sd : (N, 2) the noise sd in use
     run : (T,) number of the gapless run a sample is in
+    origin : s, where time begins in the recording's own
     gapless : bool, whether samples have neighbours that say something of time derivatives
     trust : (T, N, 2) square roots of a robust loss' weights, or None for all one
     labels : N str
@@ -45,6 +46,7 @@ class Readings:
     labels: tuple[str, ...]
     position_prior_sd: float
     gapless: bool = True
+    origin: float = 0.0
     trust: np.ndarray | None = None
 
     @property
@@ -180,16 +182,16 @@ def arrange(recording: Recording, sparse: bool = False) -> Readings:
     bad = neighbours(blind)
     if recording.stationary is not None:
         bad |= recording.stationary
-    used, gapless = _long_runs(recording.time, ~bad), True
+    used = _long_runs(recording.time, ~bad)
     step = np.median(np.diff(recording.time)) if len(bad) > 1 else np.inf
-    if sparse and (used.sum() < SETTINGS.dense * np.sum(~bad) or step > SETTINGS.longest_step):
-        used, gapless = ~bad, False
-        if not used.any():
-            raise InputError("recording: expected moving samples off the rails, found none")
-    elif used.sum() < SETTINGS.least_samples:
+    dense = used.sum() > SETTINGS.dense * np.sum(~bad) and step < SETTINGS.longest_step
+    gapless = dense or not sparse
+    used = used if gapless else ~bad
+    least = 1 if sparse else SETTINGS.least_samples
+    if used.sum() < least:
         raise InputError(
-            f"recording: expected at least {SETTINGS.least_samples} moving samples off the rails"
-            f" in gapless runs, found {used.sum()} of {used.size}"
+            f"recording: expected at least {least} moving samples off the rails"
+            f"{' in gapless runs' * gapless}, found {used.sum()} of {used.size}"
         )
     count = max(recording.specific_force.shape[1], recording.angular_rate.shape[1])
     kinds = recording.specific_force.shape[1], recording.angular_rate.shape[1]
@@ -203,7 +205,7 @@ def arrange(recording: Recording, sparse: bool = False) -> Readings:
         by_imu(recording.specific_force, recording.angular_rate)[used],
         ~lost & np.repeat(exists, 3, axis=1), exists, np.tile(noise, (count, 1)),
         np.tile(noise, (count, 1)), runs(time[used]), tuple(longer), recording.position_prior_sd,
-        gapless,
+        gapless, float(recording.time[0]),
     )  # fmt: skip
 
 
