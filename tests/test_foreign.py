@@ -29,8 +29,8 @@ def board(tmp_path_factory):
     folder, own = tmp_path_factory.mktemp("foreign"), model()
     recording, truth = imuarray.simulate(own.array, 0.3, 100.0, seed=3, angular_rate=15.0)
     write_recording(recording, folder / "rec.nc")
-    plain = imuarray.calibrate(recording, "gauss-newton")
-    extended = imuarray.calibrate(recording, "gauss-newton", ("gyroscope_bias",))
+    plain = imuarray.calibrate(recording, "papers", "gauss-newton")
+    extended = imuarray.calibrate(recording, effects=("gyroscope_bias",))
     labels = recording.gyroscope_labels
     sds = {"accelerometer": 0.04, "gyroscope": 0.001}
     places = recording.relative_positions()

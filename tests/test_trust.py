@@ -169,7 +169,8 @@ REFUSED = {
 def calibrated(recording, folder, capsys) -> tuple[int, str, dict]:
     """Status, last line and JSON of `imuarray calibrate`."""
     imuarray.write_recording(recording, folder / "rec.nc")
-    asked = ["calibrate", str(folder / "rec.nc"), "--method", "gauss-newton", "--json"]
+    asked = ["calibrate", str(folder / "rec.nc"), "--model", "papers", "--method"]
+    asked += ["gauss-newton", "--json"]
     capsys.readouterr()
     status = main([*asked, "--out", str(folder / "cal.nc")])
     said = capsys.readouterr()
@@ -202,7 +203,7 @@ def test_a_sound_recording_gives_none(case):
     """101 of 101 others did not either; at p = 1e-6 none should."""
     for seed in range(3):
         recording, _ = make(case, seed)
-        found = imuarray.calibrate(recording, "gauss-newton")
+        found = imuarray.calibrate(recording, "papers", "gauss-newton")
         assert trust.reasons_of_calibration(recording, found) == []
 
 
@@ -211,7 +212,7 @@ def test_samples_that_are_no_course_give_none():
     recording, _ = imuarray.simulate(mimu4444_corners(), 4.0, 100.0, seed=1)
     shuffled = recording.select(np.random.default_rng(0).permutation(len(recording.time)))
     recording = replace(shuffled, time=recording.time)
-    found = imuarray.calibrate(recording, "gauss-newton")
+    found = imuarray.calibrate(recording, "papers", "gauss-newton")
     assert trust.reasons_of_calibration(recording, found) == []
 
 
@@ -279,7 +280,7 @@ def posterior_of(found, scale=1.0):
 
 
 def test_a_posterior(sound):
-    found = imuarray.calibrate(sound, "gauss-newton")
+    found = imuarray.calibrate(sound, "papers", "gauss-newton")
     assert trust.reasons_of_posterior(sound, posterior_of(found)) == []
     wrong = times(sound, force=-1.0)
     (said,) = trust.reasons_of_posterior(wrong, posterior_of(found, -1.0))

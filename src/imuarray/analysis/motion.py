@@ -10,6 +10,7 @@ import xarray as xr
 from imuarray.analysis.checked import require_fit
 from imuarray.analysis.model import assumed, model_of
 from imuarray.errors import InputError
+from imuarray.geometry import Array
 from imuarray.model.names import parameter_names
 from imuarray.model.noise import Noise
 from imuarray.motion.state import UNITS
@@ -60,12 +61,12 @@ def apply(
     return dataset
 
 
-def _noise(calibration: xr.Dataset, accelerometer_noise: float | None) -> Noise:
+def _noise(calibration: xr.Dataset, array: Array, accelerometer_noise: float | None) -> Noise:
     """That of the calibration, unless another is assumed."""
     sds = [calibration[f"{kind}_sd"].to_numpy()[:, 0] for kind in ("accelerometer", "gyroscope")]
     if accelerometer_noise is not None:
         sds[0] = np.full(len(sds[0]), accelerometer_noise)
-    return Noise.of(len(sds[0]), len(sds[1]), *sds)
+    return Noise.of(array.accelerometers, array.gyroscopes, *sds)
 
 
 def _papers(
@@ -77,7 +78,8 @@ def _papers(
     size = 3 * (calibration.sizes["accelerometer"] - 1)
     covariance = calibration["position_covariance"].to_numpy()[1:, :, 1:, :].reshape(size, size)
     positions = calibration["position"].to_numpy()
-    model = replace(model_of(recording), noise=_noise(calibration, accelerometer_noise))
+    model = model_of(recording)
+    model = replace(model, noise=_noise(calibration, model.array, accelerometer_noise))
     return fuse(
         model, recording.specific_force, recording.angular_rate,
         positions - positions[0], covariance, recording.saturated_gyroscopes(),
@@ -103,7 +105,7 @@ def extended_motion(
             f"expected {len(expected)} parameters of {', '.join(model.effects)}, found"
             f" {len(found)}, or others: the effects are not those of the calibration"
         )
-    model = replace(model, noise=_noise(calibration, accelerometer_noise))
+    model = replace(model, noise=_noise(calibration, model.array, accelerometer_noise))
     parameters = np.concatenate(
         [(positions - positions[0])[1:].ravel(), calibration["effect_parameter"].to_numpy()]
     )
