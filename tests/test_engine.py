@@ -1,0 +1,162 @@
+"""The engine's least squares against a dense one, its noise, its robustness, joint recordings."""
+
+from dataclasses import replace
+
+import jax
+import numpy as np
+import pytest
+
+import imuarray
+from imuarray.engine.estimate import Recorded, estimate
+from imuarray.engine.fit import flat_parameters, prior_means
+from imuarray.engine.ladder import climb, mask_of
+from imuarray.engine.parameters import POSITION, columns_of
+from imuarray.engine.passes import normal_pass
+from imuarray.engine.readings import arrange, most_informative
+from imuarray.geometry import sub_array
+from imuarray.motion.state import Motion
+
+EFFECTS = ("gyroscope_bias", "accelerometer_scale")
+TWISTING = {"angular_rate": 15.0, "sampling_rate": 100.0}
+
+
+def simulated(duration=3.0, seed=1, effects=(), **more):
+    array = sub_array(imuarray.mimu4444(), 4)
+    return imuarray.simulate(
+        array, duration=duration, seed=seed, effects=effects, **TWISTING, **more
+    )
+
+
+def errors(found, truth):
+    return (found.positions - truth["position"].to_numpy())[1:]
+
+
+def widths(found):
+    place = found.places[0][np.argwhere(found.active)[:, 1] < 3]
+    return np.sqrt(np.diag(found.widths()[0]))[place].reshape(-1, 3)
+
+
+def fitted(recording, effects=(), **options):
+    readings = arrange(recording, sparse=True)
+    columns = columns_of(readings.array, effects, readings.position_prior_sd)
+    active = mask_of(columns, [POSITION, *effects])
+    return estimate([Recorded.of(readings, columns)], columns, active, **options)
+
+
+def test_normal_equations_are_the_dense_ones():
+    """Motion eliminated sample by sample = the Schur complement of all unknowns' information."""
+    recording, _ = simulated(0.12, effects=EFFECTS)
+    readings = replace(arrange(recording, sparse=True), gapless=False)
+    columns = columns_of(readings.array, EFFECTS, readings.position_prior_sd)
+    active = mask_of(columns, [POSITION, *EFFECTS])
+    state = Recorded.of(readings, columns).state
+    seen = normal_pass(readings, columns, state, active, improved=2)
+    model, pairs = columns.model, np.argwhere(active)
+    base = flat_parameters(columns, state)
+
+    def residual(unknowns):
+        motion, p = unknowns[: seen.motion.size].reshape(seen.motion.shape), unknowns[-len(pairs) :]
+        whole = jax.numpy.array(base).at[pairs[:, 0], pairs[:, 1]].set(p)
+        values = [whole[:, columns.of(name)].ravel() for name in EFFECTS]
+        values = {name: value for name, value in zip(EFFECTS, values, strict=True)}
+        flat = jax.numpy.concatenate([values[item.id] for item in model.chain])
+
+        def one(x):
+            at = Motion(x[:3], x[3:6], x[6:9], jax.numpy.zeros(3), jax.numpy.zeros(3))
+            both = model.predict(at, whole[:, :3], flat)
+            return jax.numpy.concatenate([both.specific_force, both.angular_rate], axis=1)
+
+        return (readings.weights * (readings.values - jax.vmap(one)(motion))).ravel()
+
+    at = np.concatenate([seen.motion.ravel(), base[active]])
+    jacobian, left = np.asarray(jax.jacfwd(residual)(at)), np.asarray(residual(at))
+    cut = seen.motion.size
+    inner, cross, outer = (
+        jacobian[:, :cut].T @ jacobian[:, :cut], jacobian[:, :cut].T @ jacobian[:, cut:],
+        jacobian[:, cut:].T @ jacobian[:, cut:],
+    )  # fmt: skip
+    schur = outer - cross.T @ np.linalg.solve(inner, cross)
+    slope = -jacobian.T @ left
+    slope = slope[cut:] - cross.T @ np.linalg.solve(inner, slope[:cut])
+    scale = np.sqrt(np.diag(outer))
+    information, score = seen.information.sum(axis=0), seen.score.sum(axis=0)
+    close = {"rtol": 0, "atol": 1e-9}
+    np.testing.assert_allclose(
+        information / np.outer(scale, scale), schur / np.outer(scale, scale), **close
+    )
+    np.testing.assert_allclose(score / scale, slope / scale, rtol=0, atol=1e-6)
+    freedom = seen.freedom.sum()
+    assert freedom == pytest.approx(readings.keep.sum() - cut)
+
+
+def test_positions_sds_and_noise_are_right():
+    """Noise twice and half the declared one: found, and the sds follow."""
+    z, noise = [], []
+    for seed in range(4):
+        recording, truth = simulated(2.0, seed, accelerometer_noise=0.08, gyroscope_noise=2e-3)
+        declared = replace(recording, accelerometer_noise_sd=0.04, gyroscope_noise_sd=4e-3)
+        found = fitted(declared)
+        assert found.converged and found.freedoms.min() >= 10
+        z.append(errors(found, truth) / widths(found))
+        noise.append(found.noise_sd())
+    assert 0.6 < np.sqrt(np.mean(np.square(z))) < 1.4
+    np.testing.assert_allclose(np.mean(noise, axis=0), [[0.08, 2e-3]] * 4, rtol=0.06)
+
+
+def test_readings_far_out_lose_their_say():
+    recording, truth = simulated(3.0)
+    rng = np.random.default_rng(5)
+    force = recording.specific_force.copy()
+    hit = rng.random(force.shape[:2]) < 0.04
+    force[hit] += 40 * recording.accelerometer_noise_sd * rng.standard_normal((hit.sum(), 3))
+    struck = replace(recording, specific_force=force)
+    clean, robust, plain = fitted(recording), fitted(struck), fitted(struck, robust=False)
+    size = [np.sqrt(np.mean(errors(f, truth) ** 2)) for f in (clean, robust, plain)]
+    assert size[1] < 2.5 * size[0] < size[2]
+    assert robust.freedoms[0] < 5 and robust.freedoms[1] >= 20
+
+
+def test_recordings_of_a_board_are_fitted_jointly():
+    """Positions are the board's, biases each recording's own."""
+    recordings = []
+    for offset in (0.3, -0.2):
+        recording, truth = simulated(2.0, 1)
+        shifted = recording.specific_force + offset * np.eye(4)[2][:, None] * np.eye(3)[0]
+        recordings.append(replace(recording, specific_force=shifted))
+    effects = ("accelerometer_bias",)
+    alone = [fitted(one, effects) for one in recordings]
+    readings = [arrange(one, sparse=True) for one in recordings]
+    columns = columns_of(readings[0].array, effects, readings[0].position_prior_sd)
+    active = mask_of(columns, [POSITION, *effects])
+    both = estimate([Recorded.of(one, columns) for one in readings], columns, active)
+    assert len(both.values) == len(alone[0].values) + 4 * 3
+    for one, other in zip(both.recorded, alone, strict=True):
+        bias = [flat_parameters(columns, r.state)[2, 3] for r in (one, other.recorded[0])]
+        assert abs(bias[0]) > 0.05 and bias[0] == pytest.approx(bias[1], abs=2e-3)
+    np.testing.assert_array_equal(*(one.state.positions for one in both.recorded))
+    # the same readings twice say twice as much
+    assert np.mean(widths(both) / widths(alone[0])) == pytest.approx(np.sqrt(0.5), abs=0.12)
+
+
+def test_the_ladder_keeps_what_gains():
+    recording, truth = simulated(3.0, effects=("gyroscope_delay",))
+    found, rungs = climb([arrange(recording, sparse=True)])
+    assert {rung.name for rung in rungs if rung.kept} == {"lag of the gyroscopes"}
+    assert np.sqrt(np.mean((errors(found, truth) / widths(found)) ** 2)) < 2
+    few = imuarray.select(simulated(3.0)[0], 60)
+    found, rungs = climb([arrange(few, sparse=True)])
+    assert not any(rung.kept for rung in rungs)
+    # samples without neighbours say nothing of delays
+    assert "delay of each IMU" not in {rung.name for rung in rungs}
+
+
+def test_a_long_recording_keeps_its_most_informative_stretches(monkeypatch):
+    from imuarray.engine import readings as module
+
+    monkeypatch.setattr(module, "SETTINGS", replace(module.SETTINGS, most=128, stretch=32))
+    whole = arrange(simulated(3.0)[0])
+    part = most_informative(whole, lambda text: None)
+    assert len(part.time) == 128
+    size = [np.mean(np.sum(r.values[:, 0, 3:] ** 2, axis=1) ** 2) for r in (part, whole)]
+    assert size[0] > size[1]
+    assert prior_means(part, columns_of(part.array, (), 1e-3)).shape == (4, 3)
