@@ -244,7 +244,7 @@ def test_tables_have_a_row_for_each_number():
     recording, *_ = board(np.random.default_rng(13))
     found = calibrate_first_order(recording, GRAVITY)
     table = parameter_table(found, recording)
-    assert len(table) == 4 * 12 + 4 * 3 and np.isfinite(table[["value", "sd"]]).all(axis=None)
+    assert len(table) == 4 * 12 + 4 * 12 and np.isfinite(table[["value", "sd"]]).all(axis=None)
     assert residual_table(found, recording).left_out.sum() == 0
     noise = noise_table(found, recording)
     np.testing.assert_allclose(noise.ratio, 1.0, atol=0.05)

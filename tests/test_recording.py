@@ -43,7 +43,7 @@ def assert_same(one, other):
             np.testing.assert_array_equal(a, b)
             assert a.dtype == b.dtype
         else:
-            assert a == b, field.name
+            np.testing.assert_equal(a, b, field.name)
 
 
 def save(dataset, path):

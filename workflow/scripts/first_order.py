@@ -5,13 +5,19 @@ from job import job
 with job(snakemake):
     from imuarray.firstorder import calibrate_first_order, report
     from imuarray.firstorder.correct import STANDARD_GRAVITY
+    from imuarray.firstorder.still import SHORTEST
     from imuarray.firstorder.store import write_corrected
     from imuarray.provenance import write_csv
     from imuarray.recording import read_recording
 
     entry, made = snakemake.params.entry, snakemake.output
     recording = read_recording(snakemake.input.recording)
-    found = calibrate_first_order(recording, entry.get("gravity", STANDARD_GRAVITY))
+    found = calibrate_first_order(
+        recording,
+        entry.get("gravity", STANDARD_GRAVITY),
+        entry.get("gyroscopes", "calibrate"),
+        entry.get("shortest_pose", SHORTEST),
+    )
     write_csv(report.parameter_table(found, recording), made.parameters)
     write_csv(report.residual_table(found, recording), made.residuals)
     write_csv(report.noise_table(found, recording), made.noise)

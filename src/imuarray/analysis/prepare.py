@@ -72,14 +72,30 @@ def simulate(
     )  # fmt: skip
 
 
-def first_order(recording: Recording, gravity: float = STANDARD_GRAVITY) -> Recording:
-    """The recording with each triad's offset, scale and misalignment corrected, from still poses.
+def first_order(
+    recording: Recording, gravity: float = STANDARD_GRAVITY, gyroscopes: str = "calibrate",
+    shortest_pose: float = 3.0,
+) -> Recording:  # fmt: skip
+    """The recording with each triad's offset, scale, misalignment and turn corrected.
 
-    ``gravity`` in m/s^2. InputError without enough still poses.
+    Accelerometers from still poses, gyroscopes from the moves between them.
+
+    Parameters
+    ----------
+    recording
+        With still poses before, between or after motion.
+    gravity
+        In m/s^2.
+    gyroscopes
+        "calibrate", or "offset" for no more than their offsets, as paper 2021.
+    shortest_pose
+        That a still pose lasts at least, s.
+
+    InputError without enough still poses, and for mirrored axes.
     """
     from imuarray.firstorder import calibrate_first_order, correct
 
-    return correct(recording, calibrate_first_order(recording, gravity))
+    return correct(recording, calibrate_first_order(recording, gravity, gyroscopes, shortest_pose))
 
 
 def select(recording: Recording, samples: int | None = None) -> Recording:

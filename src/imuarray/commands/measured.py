@@ -12,13 +12,20 @@ from imuarray.recording import read_recording, write_recording
 
 
 def first_order(arguments) -> None:
-    """Per-triad calibration from still poses; the corrected recording carries it."""
+    """Calibration of each triad from poses and moves; the corrected recording carries it."""
     from imuarray.firstorder import calibrate_first_order
-    from imuarray.firstorder.report import noise_table, residual_table
+    from imuarray.firstorder.report import (
+        gyroscope_lines,
+        noise_table,
+        residual_table,
+        turned_lines,
+    )
     from imuarray.firstorder.store import write_corrected
 
     recording, output = read_recording(arguments.recording), Output(arguments)
-    found = calibrate_first_order(recording, arguments.gravity)
+    found = calibrate_first_order(
+        recording, arguments.gravity, arguments.gyroscopes, arguments.shortest_pose
+    )
     write_corrected(recording, found, arguments.out)
     length = sum(pose.stop - pose.start for pose in found.poses)
     table, offsets = residual_table(found, recording), found.triads.offset
@@ -30,6 +37,7 @@ def first_order(arguments) -> None:
     for row, offset in zip(table.itertuples(), offsets, strict=True):
         shown = ", ".join(f"{1e3 * value:.0f}" for value in offset)
         lines.append(f"{row.triad:>5}  {1e3 * row.residual_rms:15.2f}  {row.left_out:14d}  {shown}")
+    lines += turned_lines(found, recording) + gyroscope_lines(found.gyroscopes, recording)
     lines += [
         f"noise of {sensor}: {ratio:.2f} times the declared one (median over axes)"
         for sensor, ratio in ratios.items()
@@ -39,7 +47,9 @@ def first_order(arguments) -> None:
         "out": str(arguments.out), "poses": len(found.poses), "still_samples": length,
         "gravity_m_s2": found.gravity, "triads": list(table.triad),
         "residual_m_s2": table.residual_rms.to_numpy(), "offset_m_s2": offsets,
-        "noise_over_declared": ratios.to_dict(),
+        "noise_over_declared": ratios.to_dict(), "gyroscopes": arguments.gyroscopes,
+        "gyroscope_matrix": found.gyroscope_matrix,
+        "gyroscope_common_scale_sd": found.common_scale_sd,
     })  # fmt: skip
 
 

@@ -99,13 +99,18 @@ COMMANDS = (
     ),
     Command(
         "first-order", "measured.first_order",
-        "Calibrate each triad by itself from the recording's still poses, and correct it.",
+        "Calibrate accelerometers from still poses, gyroscopes from the moves between them.",
         "rec.nc --gravity 9.818 --out corrected.nc",
         "corrected recording to write (NetCDF-4), with the calibration in group 'first_order'",
         (
             RECORDING,
             _number("--gravity", "G", "magnitude of gravity where it was recorded, m/s^2 (default:"
                     " 9.80665)", 9.80665),
+            _option("--gyroscopes", "calibrate: their scales, misalignments and turns, from moves"
+                    " between poses (default); offset: only their offsets, as paper 2021",
+                    choices=("calibrate", "offset"), default="calibrate"),
+            _number("--shortest-pose", "S", "that a still pose lasts at least, s (default: 3)",
+                    3.0),
         ),
     ),
     Command(

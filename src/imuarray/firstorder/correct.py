@@ -6,13 +6,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from imuarray.errors import InputError
 from imuarray.firstorder.allan import lag_correlation, white_noise_sd
-from imuarray.firstorder.still import still_poses
+from imuarray.firstorder.gyroscopes import Gyroscopes, calibrate_gyroscopes
+from imuarray.firstorder.still import SHORTEST, still_poses
 from imuarray.firstorder.triads import TriadFit, fit_triads
 from imuarray.recording import Recording
 from imuarray.recording.channels import require_live
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
+GYROSCOPES = ("calibrate", "offset")
+COUPLED = 0.1  # a rail of one axis shows in another that the correction mixes it into by this much
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,7 @@ class FirstOrder:
     accelerometer_correlation, gyroscope_correlation : (A, 3), (G, 3)
         Correlation of neighbouring readings.
     gravity : float, m/s^2, the assumed magnitude
+    gyroscopes : Gyroscopes, their maps; None where only their offsets were asked for
     """
 
     poses: list[slice]
@@ -42,16 +47,40 @@ class FirstOrder:
     accelerometer_correlation: np.ndarray
     gyroscope_correlation: np.ndarray
     gravity: float
+    gyroscopes: Gyroscopes | None = None
+
+    @property
+    def gyroscope_matrix(self) -> np.ndarray:
+        """Reading = matrix @ angular rate + offset, (G, 3, 3); identities where only offsets."""
+        if self.gyroscopes is not None:
+            return self.gyroscopes.matrix
+        return np.broadcast_to(np.eye(3), (len(self.gyroscope_offset), 3, 3))
+
+    @property
+    def common_scale_sd(self) -> float:
+        """Sd of the scale that all gyroscopes share; NaN where it was not determined."""
+        return np.nan if self.gyroscopes is None else self.gyroscopes.common_scale_sd
 
 
-def calibrate_first_order(recording: Recording, gravity: float = STANDARD_GRAVITY) -> FirstOrder:
-    """First-order model of every triad from the recording's still poses.
+def calibrate_first_order(
+    recording: Recording, gravity: float = STANDARD_GRAVITY, gyroscopes: str = GYROSCOPES[0],
+    shortest_pose: float = SHORTEST,
+) -> FirstOrder:  # fmt: skip
+    """First-order model of every triad from still poses and the moves between them.
 
-    InputError or IdentifiabilityError where there are none, too few or too similar ones, and for
-    constant or copied channels.
+    Parameters
+    ----------
+    gravity : m/s^2
+    gyroscopes : "calibrate" for their maps, "offset" for no more than their offsets (paper 2021)
+    shortest_pose : s, that a still pose lasts at least
+
+    InputError or IdentifiabilityError where there are no poses, too few or too similar ones, and
+    where axes are mirrored, rates have another unit, or channels are constant or copied.
     """
+    if gyroscopes not in GYROSCOPES:
+        raise InputError(f"gyroscopes: expected {' or '.join(GYROSCOPES)}, found {gyroscopes!r}")
     require_live(recording)
-    poses = still_poses(recording)
+    poses = still_poses(recording, shortest=shortest_pose)
     force = [recording.specific_force[pose] for pose in poses]
     rate = [recording.angular_rate[pose] for pose in poses]
     noise = white_noise_sd(force)
@@ -62,37 +91,65 @@ def calibrate_first_order(recording: Recording, gravity: float = STANDARD_GRAVIT
     sd = noise / np.sqrt(counts)[:, None, None]
     offsets = np.array([piece.mean(axis=0) for piece in rate])
     spread = offsets.std(axis=0, ddof=1) if len(poses) > 1 else np.full(offsets.shape[1:], np.nan)
+    triads = fit_triads(mean, sd, gravity, recording.accelerometer_labels)
+    rate_noise, maps = white_noise_sd(rate), None
+    if gyroscopes == "calibrate":
+        maps = calibrate_gyroscopes(recording, poses, triads, offsets, rate_noise)
     return FirstOrder(
-        poses, fit_triads(mean, sd, gravity), np.average(offsets, axis=0, weights=counts),
-        spread / np.sqrt(len(poses)), noise, white_noise_sd(rate), lag_correlation(force),
-        lag_correlation(rate), gravity,
+        poses, triads, np.average(offsets, axis=0, weights=counts),
+        spread / np.sqrt(len(poses)), noise, rate_noise, lag_correlation(force),
+        lag_correlation(rate), gravity, maps,
     )  # fmt: skip
 
 
 def correct(recording: Recording, found: FirstOrder) -> Recording:
-    """The recording with offsets, scales, misalignments and orientations taken out.
+    """The recording with offsets and maps, of gyroscopes as far as they are known, taken out.
 
     Which readings were at a rail is kept as masks, as the corrected values no longer show it;
     the declared noise becomes the pooled noise found, the still poses become ``stationary``.
     """
-    back = np.linalg.inv(found.triads.matrix)
-    force = np.einsum("kij,tkj->tki", back, recording.specific_force - found.triads.offset)
+    force, force_rails = _corrected(
+        found.triads.matrix, recording.specific_force - found.triads.offset,
+        recording.saturated_accelerometers(),
+    )  # fmt: skip
+    maps = found.gyroscope_matrix
+    rate, rate_rails = _corrected(
+        maps, recording.angular_rate - found.gyroscope_offset, recording.saturated_gyroscopes()
+    )
     still = np.zeros(len(recording.time), bool)
     for pose in found.poses:
         still[pose] = True
-    noise = np.einsum("kij,kj->ki", back**2, found.accelerometer_noise**2)
-    # the rail after correction, at its nearest
-    gain = np.abs(np.einsum("kii->ki", found.triads.matrix)).max()
-    shift = np.abs(found.triads.offset).max()
     return replace(
         recording,
         specific_force=force,
-        angular_rate=recording.angular_rate - found.gyroscope_offset,
-        accelerometer_noise_sd=float(np.sqrt(noise.mean())),
-        gyroscope_noise_sd=float(np.sqrt(np.mean(found.gyroscope_noise**2))),
-        accelerometer_range=float((recording.accelerometer_range - shift) / gain),
-        gyroscope_range=float(recording.gyroscope_range - np.abs(found.gyroscope_offset).max()),
+        angular_rate=rate,
+        accelerometer_noise_sd=_noise(found.triads.matrix, found.accelerometer_noise),
+        gyroscope_noise_sd=_noise(maps, found.gyroscope_noise),
+        accelerometer_range=_nearest_rail(
+            recording.accelerometer_range, found.triads.matrix, found.triads.offset
+        ),
+        gyroscope_range=_nearest_rail(recording.gyroscope_range, maps, found.gyroscope_offset),
+        gyroscope_common_scale_sd=found.common_scale_sd,
         stationary=still,
-        specific_force_saturated=recording.saturated_accelerometers(),
-        angular_rate_saturated=recording.saturated_gyroscopes(),
+        specific_force_saturated=force_rails,
+        angular_rate_saturated=rate_rails,
     )
+
+
+def _corrected(matrix, readings, rails) -> tuple[np.ndarray, np.ndarray]:
+    """Readings (T, K, 3) with matrices (K, 3, 3) taken out, and where rails (T, K, 3) show then."""
+    back = np.linalg.inv(matrix)
+    near = np.abs(back) > COUPLED
+    shown = np.einsum("kij,tkj->tki", near.astype(np.int8), rails.astype(np.int8)) > 0
+    return np.einsum("kij,tkj->tki", back, readings), shown
+
+
+def _noise(matrix, noise) -> float:
+    """Pooled sd of a corrected reading."""
+    squares = np.einsum("kij,kj->ki", np.linalg.inv(matrix) ** 2, noise**2)
+    return float(np.sqrt(squares.mean()))
+
+
+def _nearest_rail(limit: float, matrix, offset) -> float:
+    """The rail after correction, at its nearest."""
+    return float((limit - np.abs(offset).max()) / np.abs(matrix).max())

@@ -4,33 +4,93 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+from scipy.spatial.transform import Rotation
 
 from imuarray.firstorder.allan import allan_deviation
 from imuarray.firstorder.correct import FirstOrder
+from imuarray.firstorder.gyroscopes import Gyroscopes
+from imuarray.firstorder.triads import parts_of, parts_sd_of
+from imuarray.firstorder.turns import angle_of, nearest_orthogonal
 from imuarray.recording import Recording
 
 MISALIGNMENT = ("xy", "xz", "yz")
 SENSORS = {"specific_force": "accelerometer", "angular_rate": "gyroscope"}
 
 
+UNITS = {"scale": "1", "misalignment": "1", "orientation": "rad"}
+TURNED = np.radians(5.0)  # more than a mount is off by accident
+
+
 def parameter_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
     """One row a parameter: sensor, triad, parameter, component, value, sd, unit."""
     parts, sds = found.triads.parts(), found.triads.parts_sd()
     parts["offset"] = found.triads.offset
-    units = {"scale": "1", "misalignment": "1", "orientation": "rad", "offset": "m s-2"}
-    rows = []
-    for k, label in enumerate(recording.accelerometer_labels):
-        for name, unit in units.items():
-            components = MISALIGNMENT if name == "misalignment" else "xyz"
-            for i, component in enumerate(components):
-                value, sd = parts[name][k, i], sds[name][k, i]
-                rows.append(("accelerometer", label, name, component, value, sd, unit))
-    for k, label in enumerate(recording.gyroscope_labels):
-        for i, axis in enumerate("xyz"):
-            value, sd = found.gyroscope_offset[k, i], found.gyroscope_offset_sd[k, i]
-            rows.append(("gyroscope", label, "offset", axis, value, sd, "rad s-1"))
+    rows = _rows("accelerometer", recording.accelerometer_labels, parts, sds, "m s-2")
+    parts, sds = {}, {}
+    if found.gyroscopes is not None:
+        maps = found.gyroscopes
+        parts, sds = parts_of(maps.matrix), parts_sd_of(maps.matrix, maps.covariance)
+    parts["offset"], sds["offset"] = found.gyroscope_offset, found.gyroscope_offset_sd
+    rows += _rows("gyroscope", recording.gyroscope_labels, parts, sds, "rad s-1")
     names = ["sensor", "triad", "parameter", "component", "value", "sd", "unit"]
     return pd.DataFrame(rows, columns=names)
+
+
+def _rows(sensor: str, labels, parts, sds, offset_unit: str) -> list[tuple]:
+    rows = []
+    for k, label in enumerate(labels):
+        for name, unit in (UNITS | {"offset": offset_unit}).items():
+            components = MISALIGNMENT if name == "misalignment" else "xyz"
+            if name in parts:
+                for i, component in enumerate(components):
+                    value, sd = parts[name][k, i], sds[name][k, i]
+                    rows.append((sensor, label, name, component, value, sd, unit))
+    return rows
+
+
+def gyroscope_lines(maps: Gyroscopes | None, recording: Recording) -> list[str]:
+    """For a person: what was done with the gyroscopes, and how each was turned and scaled."""
+    if maps is None:
+        return ["gyroscopes: offsets only"]
+    relative, common = maps.relative, maps.common
+    if isinstance(relative, str):
+        lines = [f"gyroscopes: not compared with each other: {relative}"]
+    else:
+        lines = [f"gyroscopes: compared with each other in {relative.samples} moving samples"]
+    if isinstance(common, str):
+        lines.append(f"gyroscopes: no map common to all: {common}")
+    else:
+        before, after = np.degrees([common.before, np.median(common.error)])
+        lines.append(
+            f"gyroscopes: {len(common.first)} moves carry gravity from pose to pose to"
+            f" {after:.2g} degrees ({before:.2g} before); together they read"
+            f" {100 * (1 / common.scale - 1):+.3f} +- {100 * common.scale_sd:.3f} % of the rate"
+        )
+        if not np.allclose(common.turn, np.eye(3)):
+            axes = Rotation.from_matrix(common.turn).as_rotvec(degrees=True).round()
+            lines.append(f"gyroscopes: all turned against the accelerometers by {axes} degrees")
+    parts = parts_of(maps.matrix)
+    lines.append("triad  turned deg           scale %                misalignment %")
+    for k, label in enumerate(recording.gyroscope_labels):
+        shown = (
+            np.degrees(parts["orientation"][k]),
+            100 * (parts["scale"][k] - 1),
+            (100 * parts["misalignment"][k]),
+        )
+        text = [", ".join(f"{value:+.2f}" for value in row) for row in shown]
+        lines.append(f"{label:>5}  {text[0]:19}  {text[1]:21}  {text[2]}")
+    return lines
+
+
+def turned_lines(found: FirstOrder, recording: Recording) -> list[str]:
+    """One line for each IMU that is turned against the first by more than a mount's error."""
+    angles = angle_of(nearest_orthogonal(found.triads.matrix))
+    return [
+        f"IMU {label} is turned against IMU {recording.accelerometer_labels[0]} by"
+        f" {np.degrees(angle):.1f} degrees"
+        for label, angle in zip(recording.accelerometer_labels, angles, strict=True)
+        if angle > TURNED
+    ]
 
 
 def residual_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:

@@ -8,11 +8,14 @@ from imuarray.errors import InputError
 from imuarray.recording import Recording
 
 WINDOW = 1.0  # s, over which a reading's spread is judged
-SHORTEST = 3.0  # s, of a pose after its ends are cut
+SHORTEST = 3.0  # s, of a pose by default, its ends included
+KEPT = 2.0  # s, of a pose after its ends are cut, that no margin is taken from
 THRESHOLD = 3.0  # times the noise floor
 FLOOR = 0.02  # quantile of the windows' spreads taken as the noise floor
 # A floor this many times the declared noise is motion, not noise: nothing was still.
 MOVING = 10.0
+STEP_TIME = 0.25  # s, before and after an instant, whose means are compared
+STEP = 0.3  # m/s^2 between them: another pose, with nothing recorded on the way
 
 
 def window_spread(readings: np.ndarray, window: int) -> np.ndarray:
@@ -38,14 +41,17 @@ def still_poses(recording: Recording, window=WINDOW, shortest=SHORTEST) -> list[
     """Index ranges in which the array does not move, in the order of time.
 
     The spread of the array-averaged specific force and angular rate in a sliding window is
-    compared with its floor, the recording's own quietest windows; half a window is cut from
-    both ends of a pose, and a gap in time ends it. A declared mask ``stationary`` is used
-    instead where the recording has one.
+    compared with its floor, the recording's own quietest windows. A window that touches a motion
+    is not quiet, so half a window at each end of a pose is left out; up to as much again is cut as
+    a margin, from what is longer than KEPT. ``shortest`` (s) is a pose with all of its ends. A
+    declared mask ``stationary`` is used instead, as it is, where the recording has one. A gap in
+    time or a step of the specific force ends a pose.
 
     Raises
     ------
     InputError
-        Where nothing is still: no run long enough, or a floor far above the declared noise.
+        Where nothing is still: no run long enough (with the longest found), or a floor far above
+        the declared noise.
     """
     step = float(np.median(np.diff(recording.time))) if len(recording.time) > 1 else np.inf
     width = max(int(round(window / step)), 2)
@@ -55,20 +61,43 @@ def still_poses(recording: Recording, window=WINDOW, shortest=SHORTEST) -> list[
             f" found {len(recording.time)} samples"
         )
     if recording.stationary is not None:
-        still, cut = recording.stationary.copy(), 0
+        still, half = (recording.stationary & ~_steps(recording, step)), 0
     else:
-        still, cut = _quiet(recording, width), width // 2
+        still, half = _quiet(recording, width), width // 2
     # a gap ends a pose: what happened meanwhile is not known
     breaks = np.flatnonzero(np.diff(recording.time) > 1.5 * step) + 1
     still[breaks] = False
-    least = int(round(shortest / step))
-    poses = [slice(a + cut, b - cut) for a, b in runs(still) if b - a - 2 * cut >= least]
+    found, least = runs(still), int(round(shortest / step)) - 2 * half
+    poses = [
+        _cut(a, b, half, int(round(KEPT / step))) for a, b in found if b - a >= max(least, 2)
+    ]  # fmt: skip
     if not poses:
+        longest = max((b - a + 2 * half for a, b in found), default=0) * step
         raise InputError(
             f"recording: expected still poses of at least {shortest:g} s for the first-order"
-            " calibration, found none"
+            f" calibration, found none; the longest lasts {longest:.2g} s"
         )
     return poses
+
+
+def _cut(start: int, stop: int, margin: int, kept: int) -> slice:
+    """A pose without a margin at its ends, as far as ``kept`` samples are left."""
+    margin = min(margin, max(stop - start - kept, 0) // 2)
+    return slice(start + margin, stop - margin)
+
+
+def _steps(recording: Recording, step: float) -> np.ndarray:
+    """Near where the specific force of a declared pose jumps to another level, (T,) bool."""
+    width = max(int(round(STEP_TIME / step)), 1)
+    levels = np.column_stack([recording.specific_force.mean(axis=1), recording.stationary])
+    sums = np.cumsum(np.vstack([np.zeros(4), levels]), axis=0)
+    means = (sums[width:] - sums[:-width]) / width
+    before, after = means[:-width], means[width:]
+    within = np.minimum(before[:, 3], after[:, 3]) > 1 - 1e-9
+    found = np.zeros(len(recording.time), bool)
+    change = np.linalg.norm(after[:, :3] - before[:, :3], axis=1)
+    found[width : width + len(change)] = (within & (change > STEP))[: len(found) - width]
+    return found
 
 
 def _quiet(recording: Recording, width: int) -> np.ndarray:

@@ -6,6 +6,8 @@ import numpy as np
 import xarray as xr
 
 from imuarray.firstorder.correct import FirstOrder, correct
+from imuarray.firstorder.gyroscopes import Gyroscopes
+from imuarray.firstorder.turns import nearest_orthogonal
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording, write_recording
 from imuarray.recording.record import FIRST_ORDER
@@ -46,4 +48,43 @@ def _first_order_dataset(recording: Recording, found) -> xr.Dataset:
         "axis_other": list("xyz"),
     }  # fmt: skip
     attrs = {"gravity": found.gravity, "residual_ratio": fit.residual_ratio}
+    if found.gyroscopes is not None:
+        more, told = _gyroscopes(found.gyroscopes, np.array(limits))
+        variables |= more
+        attrs |= told
     return xr.Dataset(variables, coords, attrs)
+
+
+def _gyroscopes(maps: Gyroscopes, limits) -> tuple[dict, dict]:
+    """Variables and attributes: maps of all and common, the moves; why one of them is not there."""
+    square, rows = ("gyroscope", "axis", "axis_other"), {"long_name": "of a matrix row by row"}
+    variables = {
+        "gyroscope_matrix": (square, maps.matrix, {"units": "1"}),
+        "gyroscope_covariance": (("gyroscope", "entry", "entry_other"), maps.covariance, rows),
+        "gyroscope_turn": (square, nearest_orthogonal(maps.matrix), {"units": "1"}),
+    }
+    attrs = {}
+    if isinstance(maps.relative, str):
+        attrs["gyroscope_relative"] = maps.relative
+    else:
+        own = maps.relative
+        variables |= {
+            "gyroscope_relative": (square, own.map, {"units": "1"}),
+            "gyroscope_relative_covariance": (
+                ("gyroscope", "entry", "entry_other"), own.covariance, rows,
+            ),
+        }  # fmt: skip
+    if isinstance(maps.common, str):
+        attrs["gyroscope_common"] = maps.common
+    else:
+        common = maps.common
+        times = np.stack([limits[common.first, 1], limits[common.first + 1, 0]], axis=1)
+        variables |= {
+            "gyroscope_common": (("axis", "axis_other"), common.map, {"units": "1"}),
+            "gyroscope_common_covariance": (("entry", "entry_other"), common.covariance, rows),
+            "move_time": (("move", "edge"), times, {"units": "s"}),
+            "move_error": ("move", common.error, {"units": "rad"}),
+            "move_weight": ("move", common.weight, {"units": "1"}),
+        }
+        attrs["gyroscope_common_scale_sd"] = common.scale_sd
+    return variables, attrs

@@ -15,6 +15,7 @@ from scipy.linalg import rq
 from scipy.optimize import least_squares
 
 from imuarray.errors import IdentifiabilityError, InputError
+from imuarray.firstorder.turns import procrustes, require_rotations
 from imuarray.model.jax64 import jax, jnp
 
 UPPER, SKEW = np.triu_indices(3), np.triu_indices(3, 1)
@@ -22,6 +23,7 @@ UPPER, SKEW = np.triu_indices(3), np.triu_indices(3, 1)
 OUTLIER = 5.0  # times the median size of a residual
 MOST_OFF = 0.5  # relative, of a pose's mean specific force from gravity
 MOST_LEFT_OUT = 0.2  # of a triad's poses
+SMALL = np.radians(20.0)  # a triad turned by less starts from the drawing
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,7 @@ class TriadFit:
         Residual over what the noise of the poses' averages explains; 1 if nothing else is there.
     used : (P, A) bool
         False where a triad's reading in a pose was left out as an outlier.
+    direction_covariance : (3 P, 3 P), scaled like the other; along a direction it says nothing
     """
 
     matrix: np.ndarray
@@ -49,6 +52,7 @@ class TriadFit:
     covariance: np.ndarray
     residual_ratio: float
     used: np.ndarray
+    direction_covariance: np.ndarray
 
     @property
     def residual_rms(self) -> np.ndarray:
@@ -63,20 +67,29 @@ class TriadFit:
 
     def parts(self) -> dict[str, np.ndarray]:
         """Scale (A, 3), misalignment (A, 3: xy, xz, yz) and orientation (A, 3: rotation vector)."""
-        values = [_parts(matrix) for matrix in self.matrix]
-        return {name: np.array([value[name] for value in values]) for name in values[0]}
+        return parts_of(self.matrix)
 
     def parts_sd(self) -> dict[str, np.ndarray]:
         """Standard deviations of `parts`, and of the offset."""
         count = len(self.matrix)
-        blocks = self.covariance.reshape(count, 12, count, 12)
-        out = {name: [] for name in ("scale", "misalignment", "orientation", "offset")}
-        for k, matrix in enumerate(self.matrix):
-            covariance = blocks[k, :9, k, :9]
-            for name, slope in _part_slopes(matrix).items():
-                out[name].append(np.sqrt(np.diag(slope @ covariance @ slope.T)))
-            out["offset"].append(np.sqrt(np.diag(blocks[k, 9:, k, 9:])))
-        return {name: np.array(value) for name, value in out.items()}
+        blocks = self.covariance.reshape(count, 12, count, 12)[range(count), :, range(count)]
+        offset = np.sqrt(np.einsum("kii->ki", blocks[:, 9:, 9:]))
+        return parts_sd_of(self.matrix, blocks[:, :9, :9]) | {"offset": offset}
+
+
+def parts_of(matrices) -> dict[str, np.ndarray]:
+    """Scale, misalignment (xy, xz, yz) and orientation (rotation vector) of (K, 3, 3), (K, 3)."""
+    values = [_parts(matrix) for matrix in matrices]
+    return {name: np.array([value[name] for value in values]) for name in values[0]}
+
+
+def parts_sd_of(matrices, covariances) -> dict[str, np.ndarray]:
+    """Their sds, (K, 3) each, with the covariances (K, 9, 9) of the matrices row by row."""
+    out: dict[str, list] = {}
+    for matrix, covariance in zip(matrices, covariances, strict=True):
+        for name, slope in _part_slopes(matrix).items():
+            out.setdefault(name, []).append(np.sqrt(np.diag(slope @ covariance @ slope.T)))
+    return {name: np.array(value) for name, value in out.items()}
 
 
 def _upper_times_rotation(matrix) -> tuple[np.ndarray, np.ndarray]:
@@ -134,28 +147,32 @@ def _predict(p, triads, magnitude):
     return jnp.einsum("kij,pj->pki", matrices, force) + offsets
 
 
-def fit_triads(mean, sd, magnitude: float) -> TriadFit:
+def fit_triads(mean, sd, magnitude: float, labels=None) -> TriadFit:
     """ML estimate from the poses' averages, without the readings that stand far out.
 
     A triad whose offset has jumped or drifts (sensors settling after power-on do) spoils the
     directions for all others. One reading of one triad in one pose is left out at a time, the
     one whose absence helps most, as long as that is more than OUTLIER squared times the usual;
-    never more than a fifth of a triad's.
+    never more than a fifth of a triad's. A triad may be turned by any angle against the first.
 
     Parameters
     ----------
     mean : (P, A, 3) m/s^2, average reading in each pose
     sd : (P, A, 3) m/s^2, standard deviation of that average
     magnitude : float, m/s^2, gravity where the recording was made
+    labels : of the triads, for messages; by default their numbers
 
     Raises
     ------
     InputError
-        Where the mean over triads is nowhere near ``magnitude``.
+        Where the mean over triads is nowhere near ``magnitude``, or a triad is mirrored.
     IdentifiabilityError
         Where the poses are too few or too alike to determine all parameters.
     """
-    size = np.linalg.norm(mean.mean(axis=1), axis=1) / magnitude
+    turns = _turns(mean, labels or [str(k + 1) for k in range(mean.shape[1])])
+    # all triads' mean in the frame of the first
+    unit = np.einsum("kji,pkj->pki", turns, mean).mean(axis=1) / magnitude
+    size = np.linalg.norm(unit, axis=1)
     wild = np.flatnonzero(~(np.abs(size - 1) < MOST_OFF))
     if wild.size:
         raise InputError(
@@ -164,13 +181,22 @@ def fit_triads(mean, sd, magnitude: float) -> TriadFit:
         )
     used = np.ones(mean.shape[:2], bool)
     while True:
-        found, gain = _fit(mean, sd, magnitude, used)
+        found, gain = _fit(mean, sd, magnitude, used, (turns, unit))
         spare = (~used).sum(axis=0) < MOST_LEFT_OUT * len(mean)
         candidates = np.where(used & spare, gain, 0.0)
         worst = np.unravel_index(np.argmax(candidates), gain.shape)
         if not candidates[worst] > OUTLIER**2 * np.median(gain[used]):
             return found
         used[worst] = False
+
+
+def _turns(mean, labels) -> np.ndarray:
+    """How far each triad is turned against the first, (A, 3, 3); small turns are the fit's own."""
+    turns = np.array([procrustes(own, mean[:, 0]) for own in np.moveaxis(mean, 1, 0)])
+    require_rotations(turns, labels, "accelerometer")
+    small = (np.einsum("kii->k", turns) - 1) / 2 > np.cos(SMALL)
+    turns[small] = np.eye(3)
+    return turns
 
 
 @partial(jax.jit, static_argnums=1)
@@ -184,19 +210,19 @@ def _residual(p, triads, mean, weight, magnitude):
 _slopes = jax.jit(jax.jacfwd(_residual), static_argnums=1)
 
 
-def _fit(mean, sd, magnitude, used) -> tuple[TriadFit, np.ndarray]:
+def _fit(mean, sd, magnitude, used, start) -> tuple[TriadFit, np.ndarray]:
     """Least squares over the readings ``used``; also what leaving each one out would gain.
 
     The gain (P, A) is how much the sum of squares would fall (by linear theory), so that a
-    reading which bends the fit to itself is seen for what it is.
+    reading which bends the fit to itself is seen for what it is. ``start``: turns (A, 3, 3) and
+    directions (P, 3).
     """
     poses, triads = mean.shape[:2]
     given = mean, used[..., None] / sd, magnitude
-    unit = mean.mean(axis=1) / magnitude
+    turns, unit = start
     start = np.concatenate(
-        [np.eye(3)[UPPER], np.tile(np.eye(3).ravel(), triads - 1), np.zeros(3 * triads),
-         unit.ravel()]
-    )  # fmt: skip
+        [np.eye(3)[UPPER], turns[1:].ravel(), np.zeros(3 * triads), unit.ravel()]
+    )
     found = least_squares(
         lambda p: np.asarray(_residual(p, triads, *given)), start,
         jac=lambda p: np.asarray(_slopes(p, triads, *given)),
@@ -230,14 +256,17 @@ def _result(found, mean, used, magnitude) -> TriadFit:
     norm = np.linalg.norm(found.jac, axis=0)
     scaled = found.jac / norm
     small = np.linalg.inv(scaled.T @ scaled) / np.outer(norm, norm)
-    small = scale**2 * small[:shape, :shape]
+    small *= scale**2
     place = np.concatenate(
         [3 * UPPER[0] + UPPER[1]]
         + [12 * k + np.arange(9) for k in range(1, triads)]
         + [12 * k + 9 + np.arange(3) for k in range(triads)]
     )
     covariance = np.zeros((12 * triads, 12 * triads))
-    covariance[np.ix_(place, place)] = small
+    covariance[np.ix_(place, place)] = small[:shape, :shape]
     direction = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     residual = mean - np.asarray(_predict(found.x, triads, magnitude))
-    return TriadFit(matrices, offsets, direction, residual, covariance, float(ratio), used)
+    return TriadFit(
+        matrices, offsets, direction, residual, covariance, float(ratio), used,
+        small[shape:, shape:],
+    )  # fmt: skip

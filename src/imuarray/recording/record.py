@@ -54,6 +54,9 @@ NUMBERS = {
     "position_prior_sd": "m",
 }
 
+# Optional attributes that are positive numbers, NaN where they are not known, and their units.
+OPTIONAL_NUMBERS = {"gyroscope_common_scale_sd": "1"}
+
 # A simulated sensor need not have a rail.
 MAY_BE_INFINITE = ("accelerometer_range", "gyroscope_range")
 
@@ -85,6 +88,8 @@ class Recording:
         Still poses.
     specific_force_saturated, angular_rate_saturated : ndarray (T, A or G, 3) bool, or None
         Readings at a rail, where a correction moved them off the range (first-order calibration).
+    gyroscope_common_scale_sd : float
+        Of the scale error that all gyroscopes share, no unit; NaN if not known.
     title, source, license : str, empty if not known
     selected : str
         How many samples of how many, where these are not all that were recorded; else empty.
@@ -104,6 +109,7 @@ class Recording:
     stationary: np.ndarray | None = None
     specific_force_saturated: np.ndarray | None = None
     angular_rate_saturated: np.ndarray | None = None
+    gyroscope_common_scale_sd: float = np.nan
     title: str = ""
     source: str = ""
     license: str = ""
@@ -125,6 +131,8 @@ class Recording:
             "axis": ("axis", np.array(AXES, object)),
         }
         attributes = {name: float(getattr(self, name)) for name in NUMBERS}
+        optional = {name: float(getattr(self, name)) for name in OPTIONAL_NUMBERS}
+        attributes |= {name: value for name, value in optional.items() if not np.isnan(value)}
         attributes |= {name: getattr(self, name) for name in TEXTS if getattr(self, name)}
         try:
             return xr.Dataset(variables, coordinates, attributes)

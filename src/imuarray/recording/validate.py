@@ -23,6 +23,7 @@ from imuarray.recording.record import (
     LABELS,
     MAY_BE_INFINITE,
     NUMBERS,
+    OPTIONAL_NUMBERS,
     QUANTITIES,
     SI,
     Recording,
@@ -34,8 +35,9 @@ MAX_VALUES = 200_000_000
 # A pause this many times the usual step is reported: estimators that smooth would bridge it.
 GAP_FACTOR = 5.0
 
-# Calibrated values may pass the rail by some per cent; this is to find wrong units (57, 9.8, ...).
-BEYOND_RANGE = 1.5
+# Calibrated values may pass the rail by some per cent, those of a triad that was turned by up to
+# sqrt 3; this is to find wrong units (57, 9.8, ...).
+BEYOND_RANGE = 1.8
 
 
 def check_sizes(file: h5py.File, where: str) -> None:
@@ -68,7 +70,7 @@ def check_structure(dataset: xr.Dataset, where: str) -> None:
     for name in FLAGS:
         if name in dataset:
             _check_boolean(dataset[name], where)
-    for name in NUMBERS:
+    for name in (*NUMBERS, *(name for name in OPTIONAL_NUMBERS if name in dataset.attrs)):
         _check_number(dataset.attrs, name, where)
 
 
@@ -140,8 +142,9 @@ def _check_boolean(variable: xr.DataArray, where: str) -> None:
 
 
 def _check_number(attributes: dict, name: str, where: str) -> None:
+    unit = (NUMBERS | OPTIONAL_NUMBERS)[name]
     bounds = f"between {SMALLEST:g} and {LARGEST:g}"
-    expected = f"expected the attribute '{name}' to be a number {bounds} in {NUMBERS[name]}"
+    expected = f"expected the attribute '{name}' to be a number {bounds} in {unit}"
     if name not in attributes:
         raise InputError(f"{where}: {expected}, found none")
     value = np.asarray(attributes[name])

@@ -1,0 +1,272 @@
+"""The map common to all gyroscopes: the one by which rates carry gravity from pose to pose.
+
+No residual between gyroscopes shows it, but the rotation between two still poses does: integrated
+rates have to turn gravity's direction in the first pose into that in the next one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.linalg import block_diag
+from scipy.spatial.transform import Rotation
+
+from imuarray.errors import InputError
+
+FEWEST = 4  # moves
+LONGEST, FARTHEST = 30.0, 30.0  # s and rad of a move; drift and other errors are too large beyond
+PRIOR, PRIOR_TURN = 0.01, 0.1  # sds about the identity: scales and skews, and (rad) a turn
+FREEDOM = 4.0  # of the t distribution of a move's error
+LOST = np.radians(10.0)  # median error of a move from which the rates are not what they say
+NODE = np.sqrt(3) / 6
+STEPS, CLOSE = 30, 1e-8  # of Gauss-Newton, in the map's entries
+
+
+class Move(NamedTuple):
+    """From pose ``first`` to the next: times (n,) s, rates (n, 3) rad/s, and its sd (rad)."""
+
+    first: int
+    time: np.ndarray
+    rate: np.ndarray
+    sd: np.ndarray
+
+    @property
+    def angle(self) -> float:
+        """Length of the way, rad."""
+        speed = np.linalg.norm(self.rate, axis=1)
+        return float(np.sum(np.diff(self.time) * (speed[1:] + speed[:-1]) / 2))
+
+
+@dataclass(frozen=True)
+class CommonMap:
+    """The angular rate is ``map @ turn @ mean`` of the gyroscopes.
+
+    Attributes
+    ----------
+    map : (3, 3), near the identity
+    covariance : (9, 9) of it, row by row
+    turn : (3, 3), one of the 24 that map axes onto axes; the identity but for foreign axes
+    first : (n,) index of the pose before each move that was used
+    error : (n,) rad, between gravity carried and found, after the fit
+    before : float, rad, the same before it, median
+    weight : (n,) between 0 and 1
+    """
+
+    map: np.ndarray
+    covariance: np.ndarray
+    turn: np.ndarray
+    first: np.ndarray
+    error: np.ndarray
+    before: float
+    weight: np.ndarray
+
+    @property
+    def scale(self) -> float:
+        """Mean of the map's diagonal."""
+        return float(np.trace(self.map)) / 3
+
+    @property
+    def scale_sd(self) -> float:
+        """Its standard deviation."""
+        diagonal = np.eye(3).ravel() / 3
+        return float(np.sqrt(diagonal @ self.covariance @ diagonal))
+
+
+def gather(rate, time, poses, offsets, good, noise_sd: float) -> list[Move]:
+    """The moves between successive poses that can be integrated.
+
+    Parameters
+    ----------
+    rate : (T, 3) rad/s, the gyroscopes' mean, ``offsets`` (P, 3) its mean in each pose
+    time : (T,) s
+    poses : slices
+    good : (T,) bool, off the rails
+    noise_sd : rad/s, of one reading of the mean
+    """
+    usual = np.median(np.diff(time))
+    # how far an offset strays between poses, beside what its line between them follows
+    stray = np.sqrt(np.mean(np.diff(offsets, axis=0) ** 2, axis=0)) / 2 if len(poses) > 1 else 0.0
+    moves = []
+    for p, (one, two) in enumerate(zip(poses[:-1], poses[1:], strict=True)):
+        part = slice(one.stop - 1, two.start + 1)
+        own, length = time[part], time[two.start] - time[one.stop - 1]
+        whole = np.diff(own).max() < 1.5 * usual and good[part].all()
+        if not whole or length > LONGEST or len(own) < 4:
+            continue
+        middles = [(time[pose.start] + time[pose.stop - 1]) / 2 for pose in (one, two)]
+        share = ((own - middles[0]) / (middles[1] - middles[0]))[:, None]
+        bias = (1 - share) * offsets[p] + share * offsets[p + 1]
+        sd = np.sqrt((stray * length) ** 2 + len(own) * (noise_sd * usual) ** 2)
+        move = Move(p, own, rate[part] - bias, sd)
+        if move.angle < FARTHEST:
+            moves.append(move)
+    return moves
+
+
+def common_map(moves: list[Move], direction, covariance) -> CommonMap | str:
+    """The map by robust least squares under a prior about the identity, or why there is none.
+
+    Parameters
+    ----------
+    moves : of the mean rate in about the array's frame
+    direction : (P, 3) unit vectors of specific force in all poses, ``covariance`` (3 P, 3 P)
+
+    InputError where the rates carry gravity only if their sign or unit is another.
+    """
+    if len(moves) < FEWEST:
+        return f"{len(moves)} moves between still poses off the rails, {FEWEST} are needed"
+    turn = np.eye(3)
+    before = _typical(moves, direction, turn)
+    if before > LOST:
+        found = _other_axes(moves, direction)
+        if found is None:
+            return f"rates do not carry gravity from pose to pose ({np.degrees(before):.0f} deg)"
+        turn = found
+    moves = [move._replace(rate=move.rate @ turn.T) for move in moves]
+    # along a direction its covariance says nothing
+    across = block_diag(*(np.eye(3) - direction[..., None] * direction[:, None]))
+    covariance = across @ covariance @ across
+    return _fit(moves, direction, covariance, turn, before)
+
+
+def _typical(moves, direction, change) -> float:
+    """Median angle (rad) between gravity carried and found, rates times ``change``."""
+    errors = []
+    for move in moves:
+        carried = _to_end(move, change)[0].T @ direction[move.first]
+        found = direction[move.first + 1]
+        errors.append(np.arctan2(np.linalg.norm(np.cross(carried, found)), carried @ found))
+    return float(np.median(errors))
+
+
+def _other_axes(moves, direction) -> np.ndarray | None:
+    """A turn that maps axes onto axes and does what the identity did not; else the mistake."""
+    degree = np.pi / 180
+    for factor, words in (
+        (1 / degree, "as large; are they in rad/s, declared deg/s?"),
+        (degree, "smaller; are they in deg/s, declared rad/s?"),
+    ):
+        if _typical(moves, direction, factor * np.eye(3)) < LOST / 2:
+            raise InputError(
+                "gyroscopes: expected rates that carry gravity from pose to pose, found that they"
+                f" had to be 57.3 times {words}"
+            )
+    turns = Rotation.create_group("O").as_matrix()
+    errors = [_typical(moves, direction, turn) for turn in (*turns, *-turns)]
+    best = int(np.argmin(errors))
+    if errors[best] > LOST:
+        return None
+    if best < len(turns):
+        return turns[best]
+    axes = [name for name, sign in zip("xyz", np.diag(turns[best - 24]), strict=True) if sign > 0.5]
+    asked = "is the board's frame left-handed, or are the rates of the opposite sign"
+    if len(axes) == 1:
+        asked = f"is the sign of {axes[0]} wrong in all of them"
+    raise InputError(
+        "gyroscopes: expected right-handed axes, found rates that carry gravity from pose to pose"
+        f" only in a mirror image; {asked}?"
+    )
+
+
+def _steps(move: Move, change) -> np.ndarray:
+    """Rotations (n - 1, 3, 3) within the steps, to fourth order: a spline, Magnus' two nodes."""
+    step = np.diff(move.time)
+    spline = CubicSpline(move.time, move.rate @ change.T)
+    one, two = (spline(move.time[:-1] + (0.5 + s) * step) for s in (-NODE, NODE))
+    step = step[:, None]
+    vector = step / 2 * (one + two) + step**2 * NODE / 2 * np.cross(one, two)
+    return Rotation.from_rotvec(vector).as_matrix()
+
+
+def _to_end(move: Move, change) -> np.ndarray:
+    """Rotations (n, 3, 3) of the array from each sample of the move to its end."""
+    steps, width = _steps(move, change), 1
+    while width < len(steps):  # products of 1, 2, 4, ... steps
+        steps[:-width] = steps[:-width] @ steps[width:]
+        width *= 2
+    return np.concatenate([steps, np.eye(3)[None]])
+
+
+def _carried(move: Move, change) -> tuple[np.ndarray, np.ndarray]:
+    """The whole rotation, and derivatives (3, 9) of a small turn at its end in a map's entries."""
+    turned = _to_end(move, change)
+    middle, angle = (turned[1:] + turned[:-1]) / 2, move.rate[1:] + move.rate[:-1]
+    angle = angle / 2 * np.diff(move.time)[:, None]
+    return turned[0], np.einsum("tji,tk->jik", middle, angle).swapaxes(0, 1).reshape(3, 9)
+
+
+def _tangent(unit) -> np.ndarray:
+    """Two directions across a unit vector, (2, 3)."""
+    return np.linalg.svd(unit[None])[2][1:]
+
+
+def _skew(v) -> np.ndarray:
+    return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+
+
+def _linear(moves, direction, change):
+    """Errors (2 n,), slopes in the map (2 n, 9) and in directions (2 n, 3 P), own (n, 2, 2)."""
+    errors, slopes, own = [], [], []
+    along = np.zeros((2 * len(moves), direction.size))
+    for i, move in enumerate(moves):
+        turned, slope = _carried(move, change)
+        carried = turned.T @ direction[move.first]
+        across = _tangent(carried)
+        errors.append(across @ (direction[move.first + 1] - carried))
+        by_turn = across @ _skew(carried)
+        slopes.append(by_turn @ slope)
+        own.append(by_turn @ np.diag(move.sd**2) @ by_turn.T)
+        rows, place = slice(2 * i, 2 * i + 2), 3 * move.first
+        along[rows, place : place + 3] = -across @ turned.T
+        along[rows, place + 3 : place + 6] = across
+    return np.concatenate(errors), np.vstack(slopes), along, np.array(own)
+
+
+def prior_precision() -> np.ndarray:
+    """Precision (9, 9) of a map's entries, row by row, about the identity."""
+    other = np.eye(9).reshape(3, 3, 3, 3).swapaxes(2, 3).reshape(9, 9)
+    return (np.eye(9) + other) / (2 * PRIOR**2) + (np.eye(9) - other) / (2 * PRIOR_TURN**2)
+
+
+def _fit(moves, direction, covariance, turn, before) -> CommonMap:
+    """Gauss-Newton; a move that a shock has spoilt counts less, by a t distribution's weights."""
+    change, prior = np.eye(3), prior_precision()
+    inflation, size = np.ones(len(moves)), 1.0
+    for _ in range(STEPS):
+        errors, slopes, along, own = _linear(moves, direction, change)
+        given = along @ covariance @ along.T
+        total = given + block_diag(*(size * inflation[:, None, None] * own))
+        normal = slopes.T @ np.linalg.solve(total, slopes) + prior
+        gradient = slopes.T @ np.linalg.solve(total, errors)
+        gradient -= prior @ (change - np.eye(3)).ravel()
+        delta = np.linalg.solve(normal, gradient)
+        change = change + delta.reshape(3, 3)
+        inflation, size = _weights(errors - slopes @ delta, given, own, size)
+        if np.abs(delta).max() < CLOSE:
+            break
+    left = (errors - slopes @ delta).reshape(-1, 2)
+    return CommonMap(
+        change, np.linalg.inv(normal), turn, np.array([move.first for move in moves]),
+        np.linalg.norm(left, axis=1), before, 1 / inflation,
+    )  # fmt: skip
+
+
+def _weights(left, given, own, size):
+    """Inflation of each move's variance by its own error, and of all by the typical one."""
+    count = len(own)
+    left = left.reshape(count, 2)
+    blocks = given.reshape(count, 2, count, 2)[range(count), :, range(count)]
+    # nine unknowns have taken their share of the errors
+    free = max(1 - 9 / (2 * count), 0.2)
+
+    def squares(size):
+        solved = np.linalg.solve(blocks + size * own, left[..., None])[..., 0]
+        return np.sum(left * solved, axis=1) / free
+
+    for _ in range(5):
+        # 1.386 is the median of a chi-squared variable with two degrees of freedom
+        size = max(1.0, size * np.median(squares(size)) / 1.386)
+    return np.maximum((FREEDOM + squares(size)) / (FREEDOM + 2), 1.0), size

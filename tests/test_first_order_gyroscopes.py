@@ -1,0 +1,252 @@
+"""Gyroscopes from still poses and moves: known maps, mistakes by name, what is skipped and said."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.board import GRAVITY, Options, draw_board, draw_hand
+from imuarray.cli import main
+from imuarray.errors import InputError
+from imuarray.firstorder import calibrate_first_order, correct, still_poses
+from imuarray.firstorder.moves import Move, _carried, _to_end, common_map
+from imuarray.firstorder.report import gyroscope_lines, parameter_table
+from imuarray.recording import read_recording, write_recording
+from imuarray.recording.format import load_dataset
+
+SHORT = Options(sampling_rate=100.0, still=3.2, move=1.5, twisting=4.0)
+
+
+def calibrated(seed=0, **different):
+    """(board, first-order calibration) of a short recording."""
+    board = draw_board(seed, replace(SHORT, **different))
+    return board, calibrate_first_order(board.recording(), GRAVITY)
+
+
+def rms(x):
+    return float(np.sqrt(np.mean(np.square(x))))
+
+
+@pytest.mark.parametrize(
+    "different",
+    [{}, {"turned": 37.0}, {"turned": 180.0}, {"mount": 2.0, "late": 0.003}, {"imus": 2}],
+    ids=str,
+)
+def test_known_maps_are_found_whatever_the_mounts(different):
+    """Entries are 5e-3 (scales) and 3e-3 (skews) off, a late IMU's, ignored, would be 1e-3 more."""
+    board, found = calibrated(1, **different)
+    maps = found.gyroscopes
+    error = maps.matrix - board.truth.gyroscopes
+    sds = np.sqrt(np.einsum("kii->ki", maps.covariance)).reshape(error.shape)
+    assert rms(error) < 4e-4 and rms(error / sds) < 2.0
+    assert rms(found.triads.matrix - board.truth.accelerometers) < 6e-4
+    rates = correct(board.recording(), found).angular_rate
+    assert rms(rates[:, 0] - board.truth.rate) < 2.5e-3  # noise of 1e-3, offsets
+
+
+def moves_of(hand, options, change, rng=None, sd=1e-3):
+    """Moves whose rates have to be multiplied by ``change``, directions, and their covariance."""
+    pace, ups, moves = options.still + options.move, [], []
+    for p in range(options.poses):
+        middle = p * pace + options.still / 2
+        ups.append(hand.attitude(np.array([middle]))[0].inv().apply([0.0, 0.0, 1.0]))
+        if p + 1 < options.poses:
+            time = middle + np.arange(round(pace * options.sampling_rate) + 1) / 100.0
+            noise = 0.0 if rng is None else sd * rng.standard_normal((len(time), 3))
+            rate = hand.rates(time)[0] @ np.linalg.inv(change).T + noise
+            moves.append(Move(p, time, rate, np.full(3, sd * 0.01 * np.sqrt(len(time)))))
+    return moves, np.array(ups), 1e-10 * np.eye(3 * len(ups))
+
+
+@pytest.fixture(scope="module")
+def hand():
+    return draw_hand(np.random.default_rng(2), SHORT)
+
+
+CHANGE = np.eye(3) + 0.01 * np.random.default_rng(3).standard_normal((3, 3))
+
+
+def test_rates_are_integrated_to_fourth_order(hand):
+    """At 100 Hz; the rule of the middle is off by 2e-5."""
+    moves, ups, _ = moves_of(hand, SHORT, np.eye(3))
+    for move in moves[:4]:
+        ends = hand.attitude(move.time[[0, -1]])
+        exact = (ends[0].inv() * ends[1]).as_matrix()
+        np.testing.assert_allclose(_to_end(move, np.eye(3))[0], exact, atol=2e-6)
+
+
+def test_slopes_of_the_carried_direction_are_its_derivatives(hand):
+    move = moves_of(hand, SHORT, np.eye(3))[0][1]
+    total, slopes = _carried(move, np.eye(3))
+    up = np.array([0.6, 0.0, 0.8])
+    for entry in range(9):
+        small = np.zeros(9)
+        small[entry] = 1e-6
+        moved = _to_end(move, np.eye(3) + small.reshape(3, 3))[0]
+        expected = (moved.T - total.T) @ up / 1e-6
+        np.testing.assert_allclose(np.cross(total.T @ up, slopes[:, entry]), expected, atol=2e-3)
+
+
+def test_the_common_map_is_within_its_sds(hand):
+    """Seed 4, 30 draws: nine entries' and the scale's squared z; 5 sds of the law, 1e-6."""
+    rng, squares, scales = np.random.default_rng(4), [], []
+    for _ in range(30):
+        found = common_map(*moves_of(hand, SHORT, CHANGE, rng))
+        error = (found.map - CHANGE).ravel()
+        squares.append(error @ np.linalg.solve(found.covariance, error) / 9)
+        scales.append((found.scale - np.trace(CHANGE) / 3) / found.scale_sd)
+    # robust weights cost some 10 % of the information, and claim it
+    assert np.mean(squares) == pytest.approx(0.9, abs=5 * np.sqrt(2 / 9 / 30))
+    assert np.mean(np.square(scales)) == pytest.approx(0.9, abs=5 * np.sqrt(2 / 30))
+    assert found.scale_sd < 2e-4
+
+
+def test_a_shock_in_a_move_counts_little(hand):
+    moves, *given = moves_of(hand, SHORT, CHANGE, np.random.default_rng(5))
+    plain = common_map(moves, *given)
+    for k in (2, 7):
+        rate = moves[k].rate.copy()
+        rate[300] += 2.0  # 0.02 rad about each axis
+        moves[k] = moves[k]._replace(rate=rate)
+    found = common_map(moves, *given)
+    assert found.weight[[2, 7]].max() < 0.01 and np.delete(found.weight, [2, 7]).min() > 0.1
+    assert np.abs(found.map - CHANGE).max() < 4 * np.abs(plain.map - CHANGE).max()
+    np.testing.assert_allclose(np.flatnonzero(found.error > 0.01), [2, 7])
+
+
+def test_what_the_moves_do_not_tell_stays_with_the_priors_sd():
+    """All moves about one axis: the others' scales are not seen."""
+    time = np.arange(200) / 100.0
+    rate = np.array([0.0, 0.0, 1.0]) * (1 - np.cos(np.pi * time))[:, None]
+    angles = (1.99 - np.sin(1.99 * np.pi) / np.pi) * np.arange(8)[:, None]
+    ups = np.hstack([np.cos(angles), -np.sin(angles), 0 * angles])
+    moves = [Move(p, time, rate, np.full(3, 1e-4)) for p in range(7)]
+    found = common_map(moves, ups, 1e-10 * np.eye(24))
+    sds = np.sqrt(np.diag(found.covariance)).reshape(3, 3)
+    assert sds[2, 2] < 1e-4 and found.map[2, 2] == pytest.approx(1.0, abs=3e-4)
+    assert sds[0, 0] == pytest.approx(0.01) and found.map[0, 0] == 1.0
+
+
+MISTAKES = {
+    "one gyroscope's axis": (
+        lambda r: r.angular_rate * np.where(np.arange(12).reshape(4, 3) == 7, -1, 1), None,
+        "gyroscope '3': expected right-handed axes.*sign of its y axis",
+    ),
+    "the same in all": (
+        lambda r: r.angular_rate * [1, 1, -1], None, "sign of z wrong in all of them",
+    ),
+    "one accelerometer's axis": (
+        None, lambda r: r.specific_force * np.where(np.arange(12).reshape(4, 3) == 0, -1, 1),
+        "accelerometer '1': expected right-handed axes.*sign of its x axis",
+    ),
+    "left-handed": (
+        lambda r: r.angular_rate * [1, 1, -1], lambda r: r.specific_force * [1, 1, -1],
+        "is the board's frame left-handed",
+    ),
+    "rad/s declared deg/s": (
+        lambda r: r.angular_rate * np.pi / 180, None, "57.3 times as large; are they in rad/s",
+    ),
+    "a dead axis": (
+        lambda r: np.where(np.arange(12).reshape(4, 3) == 4, 0.0, r.angular_rate), None,
+        "gyroscope '2': expected angular rates like the others', found its y axis to read 0 times",
+    ),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return draw_board(6, SHORT).recording()
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_mistakes_are_refused_by_name(recording, name):
+    rate, force, words = MISTAKES[name]
+    if rate is not None:
+        recording = replace(recording, angular_rate=rate(recording))
+    if force is not None:
+        recording = replace(recording, specific_force=force(recording))
+    with pytest.raises(InputError, match=words):
+        calibrate_first_order(recording, GRAVITY)
+
+
+def test_gyroscopes_on_other_axes_than_the_accelerometers_are_turned(recording):
+    """All of them: x and y exchanged and z reversed, a half turn about the diagonal."""
+    turned = recording.angular_rate[..., [1, 0, 2]] * [1, 1, -1]
+    found = calibrate_first_order(replace(recording, angular_rate=turned), GRAVITY)
+    plain = calibrate_first_order(recording, GRAVITY).gyroscopes.matrix
+    expected = plain[:, [1, 0, 2]] * np.array([1, 1, -1])[:, None]
+    np.testing.assert_allclose(found.gyroscopes.matrix, expected, atol=2e-4)
+    assert any("all turned" in x for x in gyroscope_lines(found.gyroscopes, recording))
+
+
+def test_without_moves_accelerometers_are_as_before_and_it_is_said(recording):
+    poses = still_poses(recording)
+    between = np.ones(len(recording.time), bool)
+    for one, two in zip(poses[:-1], poses[1:], strict=True):
+        between[one.stop + 60 : two.start - 60] = False
+    gaps = recording.select(between)
+    found, plain = (calibrate_first_order(gaps, GRAVITY, kind) for kind in ("calibrate", "offset"))
+    np.testing.assert_array_equal(found.triads.matrix, plain.triads.matrix)
+    np.testing.assert_array_equal(found.gyroscope_offset, plain.gyroscope_offset)
+    assert "0 moves between still poses off the rails" in found.gyroscopes.common
+    assert np.isnan(found.common_scale_sd) and plain.gyroscopes is None
+    said = "\n".join(gyroscope_lines(found.gyroscopes, gaps))
+    assert "no map common to all: 0 moves" in said and "compared with each other in" in said
+    # what nothing is known of has the prior's width
+    table = parameter_table(found, gaps).set_index(["sensor", "parameter"])
+    assert table.loc[("gyroscope", "scale"), "sd"].to_numpy() == pytest.approx(0.01, rel=0.05)
+
+
+def test_a_turned_triads_rails_show_in_all_its_axes(recording):
+    found = calibrate_first_order(draw_board(6, replace(SHORT, turned=37.0)).recording(), GRAVITY)
+    recording = replace(recording, angular_rate=recording.angular_rate.copy())
+    recording.angular_rate[50, [0, 3], 0] = recording.gyroscope_range
+    rails = correct(recording, found).saturated_gyroscopes()
+    assert rails[50].sum(axis=1).tolist() == [1, 0, 0, 3] and rails.sum() == 4
+
+
+@pytest.mark.parametrize(("still", "count"), [(3.1, 12), (2.3, 0)])
+def test_poses_of_three_seconds_are_found_and_the_longest_is_said(still, count):
+    recording = draw_board(7, replace(SHORT, still=still, twisting=2.0)).recording()
+    if count:
+        assert len(still_poses(recording)) == count
+        return
+    with pytest.raises(InputError, match=r"at least 3 s .* the longest lasts 2\.[3-9] s"):
+        still_poses(recording)
+    assert len(still_poses(recording, shortest=2.0)) == 12
+
+
+def test_poses_that_follow_each_other_are_not_one(recording):
+    """The moves are left out, and what is left is declared still as a whole."""
+    poses = still_poses(recording)
+    parts = [recording.select(pose) for pose in poses]
+    count = sum(len(part.time) for part in parts)
+    joined = replace(
+        parts[0], time=np.arange(count) / 100.0,
+        specific_force=np.concatenate([part.specific_force for part in parts]),
+        angular_rate=np.concatenate([part.angular_rate for part in parts]),
+        stationary=np.ones(count, bool),
+    )  # fmt: skip
+    found = still_poses(joined, shortest=1.0)
+    assert len(found) == len(poses)
+    ends = np.cumsum([len(part.time) for part in parts])
+    assert [int(np.searchsorted(ends, (p.start + p.stop) / 2)) for p in found] == list(range(12))
+
+
+def test_the_file_and_the_report_carry_it(tmp_path, recording, capsys):
+    write_recording(recording, tmp_path / "rec.nc")
+    given = ["first-order", str(tmp_path / "rec.nc"), "--gravity", str(GRAVITY), "--out"]
+    assert main([*given, str(tmp_path / "a.nc")]) == 0
+    said = capsys.readouterr().out
+    assert "11 moves carry gravity from pose to pose to 0.0" in said and "turned deg" in said
+    assert main([*given, str(tmp_path / "b.nc"), "--gyroscopes", "offset"]) == 0
+    assert "gyroscopes: offsets only" in capsys.readouterr().out
+    with_maps, without = (load_dataset(tmp_path / f"{x}.nc", "first_order") for x in "ab")
+    sd = with_maps.attrs["gyroscope_common_scale_sd"]
+    diagonal = with_maps.gyroscope_common_covariance.to_numpy()[::4, ::4]
+    assert sd == pytest.approx(np.sqrt(diagonal.sum()) / 3)
+    assert "gyroscope_matrix" not in without and "gyroscope_common_scale_sd" not in without.attrs
+    # what later steps read
+    assert main(["select", str(tmp_path / "a.nc"), "--out", str(tmp_path / "c.nc")]) == 0
+    assert read_recording(tmp_path / "c.nc").gyroscope_common_scale_sd == sd
+    assert np.isnan(read_recording(tmp_path / "b.nc").gyroscope_common_scale_sd)
