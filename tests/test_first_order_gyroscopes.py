@@ -146,9 +146,9 @@ MISTAKES = {
     "rad/s declared deg/s": (
         lambda r: r.angular_rate * np.pi / 180, None, "57.3 times as large; are they in rad/s",
     ),
-    "a dead axis": (
-        lambda r: np.where(np.arange(12).reshape(4, 3) == 4, 0.0, r.angular_rate), None,
-        "gyroscope '2': expected angular rates like the others', found its y axis to read 0 times",
+    "an axis in another unit": (
+        lambda r: np.where(np.arange(12).reshape(4, 3) == 4, 0.1, 1.0) * r.angular_rate, None,
+        r"gyroscope '2': expected angular rates like the others', found its y axis to read 0\.1 ",
     ),
 }  # fmt: skip
 
