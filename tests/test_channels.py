@@ -98,6 +98,16 @@ def test_a_log_that_is_there_twice(recording):
     assert said.startswith("160 of 400 samples are copies of others, the first at 2.4 s of that at")
 
 
+def test_a_recording_given_twice(recording):
+    with pytest.raises(InputError, match="found 160 samples of number 1 in number 2, too"):
+        imuarray.calibrate([recording, recording])
+    half = recording.select(slice(0, 120)), recording.select(slice(80, 200))
+    with pytest.raises(InputError, match="found 40 samples of number 1"):
+        imuarray.calibrate(half)
+    with pytest.raises(InputError, match="expected at least one, found none"):
+        imuarray.calibrate([])
+
+
 def test_every_analysis_refuses_dead_channels(recording, tmp_path, capsys):
     wrong = changed(recording, *DEAD["a triad twice"][:2])
     said = "live sensors; accelerometer '4' reads what '1' reads"

@@ -16,6 +16,7 @@ from imuarray.errors import InputError
 from imuarray.model.effects import find_effects
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording
+from imuarray.recording.channels import require_apart, require_live
 
 
 def calibrate(
@@ -59,9 +60,13 @@ def calibrate(
     Raises
     ------
     InputError
-        The recording does not determine the positions, or the options do not go together.
+        The recording does not determine the positions, has constant or copied channels, or is
+        given twice, or the options do not go together.
     """
     recordings = [recording] if isinstance(recording, Recording) else list(recording)
+    for one in recordings:
+        require_live(one)
+    require_apart(recordings)
     if method not in (None, *methods.CALIBRATION):
         known = ", ".join(methods.CALIBRATION)
         raise InputError(f"method: expected any of {known}, found {method!r}")

@@ -5,6 +5,8 @@ Exact equality tells: while an array turns, noise does not repeat a reading of t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from imuarray.errors import InputError
@@ -24,6 +26,23 @@ def require_live(recording: Recording, where: str = "recording") -> None:
         raise InputError(f"{where}: expected readings of live sensors; {'; '.join(found[:3])}")
 
 
+def require_apart(recordings: Sequence[Recording]) -> None:
+    """InputError for no recording, and for turning samples that two of them share."""
+    if not recordings:
+        raise InputError("recordings: expected at least one, found none")
+    before: list[np.ndarray] = []
+    for number, recording in enumerate(recordings, 1):
+        marks = np.unique(_marks(_rows(recording)[_turning(recording)]))
+        for other, known in enumerate(before, 1):
+            shared = len(np.intersect1d(marks, known, assume_unique=True))
+            if shared >= LEAST:
+                raise InputError(
+                    f"recordings: expected different ones, found {shared} samples of number {other}"
+                    f" in number {number}, too"
+                )
+        before.append(marks)
+
+
 def dead(recording: Recording) -> list[str]:
     """A sentence for each axis that never changes, and for each triad or axis that is a copy."""
     if len(recording.time) < LEAST:
@@ -40,7 +59,7 @@ def repeated(recording: Recording) -> list[str]:
 
     Both leave an answer, with intervals that are too narrow. Only turning samples count.
     """
-    turning = np.sqrt(np.mean(np.sum(recording.angular_rate**2, axis=2), axis=1)) > TURNING
+    turning = _turning(recording)
     if turning.sum() < LEAST:
         return []
     held = [sentence for kind in _KINDS for sentence in _held(recording, kind, turning)]
@@ -111,9 +130,7 @@ def _held(recording: Recording, kind: str, turning) -> list[str]:
 
 def _twice(recording: Recording, turning) -> list[str]:
     """Whole samples that came before, other than just before."""
-    samples = len(recording.time)
-    rows = [getattr(recording, name).reshape(samples, -1) for name in _KINDS.values()]
-    marks = _marks(np.concatenate(rows, axis=1))
+    samples, marks = len(recording.time), _marks(_rows(recording))
     _, first, inverse = np.unique(marks, return_index=True, return_inverse=True)
     source = first[inverse]
     again = turning & (source < np.arange(samples))
@@ -126,6 +143,17 @@ def _twice(recording: Recording, turning) -> list[str]:
         f" {recording.time[place]:g} s of that at {recording.time[source[place]]:g} s: a part of"
         " the log is there twice"
     ]
+
+
+def _turning(recording: Recording) -> np.ndarray:
+    """(T,) bool"""
+    return np.sqrt(np.mean(np.sum(recording.angular_rate**2, axis=2), axis=1)) > TURNING
+
+
+def _rows(recording: Recording) -> np.ndarray:
+    """(T, 3 (A + G)) all readings of each sample."""
+    parts = [getattr(recording, name) for name in _KINDS.values()]
+    return np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1)
 
 
 def _longest(mask) -> tuple[int, int]:
