@@ -122,7 +122,7 @@ MISTAKES = {
         "nominal positions in mm declared m",
     ),
     "stamps in ms declared s": (
-        lambda r: replace(r, time=1e3 * r.time), "time in ms declared s"
+        lambda r: replace(r, time=1e3 * r.time), "in ms declared s"
     ),
     "half of the recording twice": (doubled, "500 of 1500 samples are copies"),
     "an IMU at 37 degrees": (turned(37), "IMU 3 is turned by 37 degrees"),
@@ -166,11 +166,13 @@ REFUSED = {
 }  # fmt: skip
 
 
-def calibrated(recording, folder, capsys) -> tuple[int, str, dict]:
+PAPERS = ("--model", "papers", "--method", "gauss-newton")
+
+
+def calibrated(recording, folder, capsys, options=PAPERS) -> tuple[int, str, dict]:
     """Status, last line and JSON of `imuarray calibrate`."""
     imuarray.write_recording(recording, folder / "rec.nc")
-    asked = ["calibrate", str(folder / "rec.nc"), "--model", "papers", "--method"]
-    asked += ["gauss-newton", "--json"]
+    asked = ["calibrate", str(folder / "rec.nc"), "--json", *options]
     capsys.readouterr()
     status = main([*asked, "--out", str(folder / "cal.nc")])
     said = capsys.readouterr()
@@ -190,6 +192,15 @@ def test_a_mistake_is_named(sound, mistake, tmp_path, capsys):
     with xr.open_dataset(tmp_path / "cal.nc") as written:
         assert written.attrs["trusted"] == 0
         assert json.loads(written.attrs["reasons"]) == document["reasons"]
+
+
+@pytest.mark.parametrize("mistake", ["", "two IMUs exchanged", "an IMU at 90 degrees"])
+def test_a_mistake_under_the_default_model(sound, mistake, tmp_path, capsys):
+    """Which estimates noise, and so makes its sds as large as a wrong sensor wants them."""
+    change, words = MISTAKES.get(mistake, (lambda recording: recording, ""))
+    recording = change(sound).select(slice(0, 500))
+    status, said, _ = calibrated(recording, tmp_path, capsys, ())
+    assert status == (3 if mistake else 0) and words in said
 
 
 SOUND = [
@@ -298,7 +309,7 @@ def test_a_posterior(sound):
 
 def test_a_diagnosis(sound):
     """Its extended model's positions against the drawing, as every answer's."""
-    found = imuarray.calibrate(sound, "gauss-newton")
+    found = imuarray.calibrate(sound, "papers", "gauss-newton")
     sds = np.sqrt(np.einsum("kaka->ka", found["position_covariance"].to_numpy()))
     places = found["position"].to_numpy()
 
@@ -309,6 +320,23 @@ def test_a_diagnosis(sound):
     assert reasons(sound, places) == []
     (said,) = reasons(times(sound, force=-1.0), -places)
     assert "inverted" in said
+
+
+def test_a_recording_that_says_little(sound):
+    """Whatever sds are claimed of it; slow enough for its motion to be good for an application."""
+    found = imuarray.calibrate(sound, "papers", "gauss-newton")
+    slow = replace(times(sound, 1e-4, 1e-2), time=100 * sound.time)
+    (said,) = trust.reasons_of_calibration(slow, found)
+    assert "says little of the positions" in said
+    assert trust.reasons_of_motion(slow, found) == []
+
+
+def test_several_recordings_of_a_board(sound):
+    found = imuarray.calibrate(sound, "papers", "gauss-newton")
+    assert trust.reasons_of_calibration([sound, sound], found) == []
+    wrong = times(sound, rate=-1.0)
+    (said,) = trust.reasons_of_calibration([sound, wrong], found)
+    assert said.startswith("recording 2: the gyroscopes turn the other way round")
 
 
 def test_a_selection_that_finds_no_motion_names_the_unit(sound):

@@ -203,6 +203,8 @@ def angle_words(rotation: Rotation) -> str:
 
 def small_words(size: float) -> str:
     """A size that is off by some per cent, and the scales that would make it so."""
+    if not SIZES[0] < size < SIZES[1]:
+        return size_words(size)
     off, rate = 100 * abs(size - 1), 100 * abs(size**-0.5 - 1)
     grown, shrunk = ("large", "small") if size > 1 else ("small", "large")
     return (

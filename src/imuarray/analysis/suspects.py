@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
-from imuarray.analysis.drawing import angle_words
+from imuarray.analysis.drawing import DEGREE, G, angle_words
 from imuarray.analysis.rigid import COHERENT, FEWEST, runs, slope, turning
 from imuarray.recording import Recording
 
@@ -176,28 +176,50 @@ MIRRORED = (
     "the gyroscopes turn the other way round than the accelerometers: left-handed axes (one axis of"
     " both kinds flipped), or all rates of the wrong sign"
 )
-# the gyroscopes' axes as the accelerometers' turning has them: signs that make no other sense
+LIKE = 0.1  # of one: a slope that a factor makes so is right
+FACTORS = (  # of time, force, rates, positions, to undo a mistake
+    ((1, 1, DEGREE, 1), "all rates are 57.3 times too small: in rad/s declared deg/s"),
+    ((1, 1, 1 / DEGREE, 1), "all rates are 57.3 times too large: in deg/s declared rad/s"),
+    ((1, G, 1, 1), "specific force is 9.81 times too small: in g declared m/s^2"),
+    ((1, 1, 1, 1e-3), "nominal positions are 1000 times too large: in mm declared m"),
+    ((1, 1, 1, 1e3), "nominal positions are 1000 times too small: in m declared mm"),
+    ((1e-3, 1, 1, 1), "time is 1000 times too long: in ms declared s"),
+)
 SIGNS = [np.array(signs) for signs in product((1, -1), repeat=3)][1:]
 
 
-def frame(recording: Recording) -> list[str]:
-    """Gyroscopes that all have the same axes of the wrong sign against the accelerometers.
+def common(recording: Recording) -> list[str]:
+    """A mistake in all sensors alike, by the course of the angular acceleration; or nothing.
 
-    By the course of the angular acceleration at the nominal positions: mirrored axes make none.
+    With nominal positions the gyroscopes' and the accelerometers' turning is the same once it is
+    undone, and before is not.
     """
-    force, places = recording.specific_force, recording.relative_positions()
     rate = np.median(recording.angular_rate, axis=1)
 
-    def fit(signs) -> float:
-        found = slope(recording.time, turning(force, rate * signs, places))
-        return 0.0 if found is None else found.correlation
+    def fits(time, force, rates, places) -> bool:
+        motion = turning(
+            force * recording.specific_force, rate * rates, places * recording.relative_positions()
+        )
+        found = slope(time * recording.time, motion)
+        if found is None or found.correlation < COHERENT:
+            return False
+        return max(abs(found.low - 1), abs(found.high - 1)) < LIKE + found.coarse
 
-    best = max(SIGNS, key=fit)
-    if fit(best) < COHERENT or fit(np.ones(3)) > COHERENT:
+    if fits(1, 1, 1, 1):
         return []
-    if (best < 0).all():
+    for factors, words in FACTORS:
+        if fits(*factors):
+            return [words]
+    return next((_wrong_signs(signs) for signs in SIGNS if fits(1, 1, signs, 1)), [])
+
+
+def _wrong_signs(signs) -> list[str]:
+    """Of all gyroscopes' axes against the accelerometers'."""
+    wrong, right = (
+        [name for name, s in zip("xyz", signs, strict=True) if s == which] for which in (-1, 1)
+    )
+    if not right:
         return [MIRRORED]
-    wrong, right = ([name for name, s in zip("xyz", best, strict=True) if s == w] for w in (-1, 1))
     said = f"all gyroscopes have {_axes_named(wrong)} of the wrong sign"
     if len(wrong) == 2:  # a turn by half apart, the same as
         said += f", or all accelerometers {_axes_named(right)}"

@@ -8,13 +8,14 @@ and that still poses show gravity.
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
 
 from imuarray.analysis.drawing import FAR, G, Places, another_size, departures, size_of
 from imuarray.analysis.rigid import SLOPE, Slope, Turning, kept, slope, turning
-from imuarray.analysis.suspects import MIRRORED, frame, suspects, told
+from imuarray.analysis.suspects import MIRRORED, common, suspects, told
 from imuarray.recording import Recording
 from imuarray.recording.channels import repeated
 
@@ -26,12 +27,23 @@ ENDS, NEXT = 10, 5  # readings at a channel's end, and times those at the values
 FEW = 20  # samples
 
 
-def reasons_of_calibration(recording: Recording, calibration: xr.Dataset) -> list[str]:
-    """Why `imuarray.calibrate`'s answer for this recording is not to be trusted."""
-    places = _places(recording, calibration["position"].to_numpy(), _covariance(calibration))
-    residual = _residuals(recording, calibration, places)
-    limit = TRIAD if "effect_parameter" in calibration else RESIDUAL
-    return _judged(recording, places, residual, limit) + _not_converged(calibration.attrs)
+def reasons_of_calibration(
+    recordings: Recording | Sequence[Recording], calibration: xr.Dataset
+) -> list[str]:
+    """Why `imuarray.calibrate`'s answer for these recordings is not to be trusted."""
+    several = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    found: dict[str, list[str]] = {}
+    limit = RESIDUAL if _is_papers(calibration) else TRIAD
+    for number, recording in enumerate(several, 1):
+        places = _places(recording, calibration["position"].to_numpy(), _covariance(calibration))
+        residual = _residuals(recording, calibration, places)
+        reasons = _judged(recording, places, residual, limit)
+        for reason in reasons + (_little(recording, places) if len(several) == 1 else []):
+            found.setdefault(reason, []).append(str(number))
+    return [
+        reason if len(whose) == len(several) else f"recording {', '.join(whose)}: {reason}"
+        for reason, whose in found.items()
+    ] + _not_converged(calibration.attrs)
 
 
 def reasons_of_posterior(
@@ -47,7 +59,8 @@ def reasons_of_posterior(
     places = _places(recording, np.vstack([np.zeros(3), draws.mean(0).reshape(-1, 3)]), covariance)
     plain = "effect_parameter" not in posterior["posterior"]
     residual = _rigid(recording, places, rates == "spread") if plain else {}
-    return _judged(recording, places, residual) + _not_converged(posterior.attrs)
+    found = _judged(recording, places, residual) + _little(recording, places)
+    return found + _not_converged(posterior.attrs)
 
 
 def reasons_of_motion(recording: Recording, calibration: xr.Dataset) -> list[str]:
@@ -57,7 +70,7 @@ def reasons_of_motion(recording: Recording, calibration: xr.Dataset) -> list[str
     """
     said = json.loads(calibration.attrs.get("reasons", "[]"))
     places = _places(recording, calibration["position"].to_numpy(), _covariance(calibration))
-    residual = {} if "effect_parameter" in calibration else _rigid(recording, places)
+    residual = _rigid(recording, places) if _is_papers(calibration) else {}
     found = _judged(recording, places, residual)
     return [f"the calibration is not to be trusted: {reason}" for reason in said] + [
         reason for reason in found if reason not in said
@@ -70,7 +83,13 @@ def reasons_of_diagnosis(recording: Recording, document: dict) -> list[str]:
     What its residual leaves unexplained the diagnosis says itself.
     """
     found, sds = (np.array(document["extended"][f"positions_{name}"]) for name in ("m", "sd_m"))
-    return _judged(recording, _places(recording, found, np.diag(sds.ravel() ** 2)), {})
+    places = _places(recording, found, np.diag(sds.ravel() ** 2))
+    return _judged(recording, places, {}) + _little(recording, places)
+
+
+def _is_papers(calibration: xr.Dataset) -> bool:
+    """Whether it is of the papers' model, in which nothing but noise is between the triads."""
+    return calibration.attrs.get("model") == "papers"
 
 
 def _size(recording: Recording) -> int:
@@ -104,8 +123,9 @@ def _judged(
         return found + _drawn(places, None)
     found += clipped(moving)
     size = another_size(places)
-    if size is not None:
-        return [*found, size]
+    alike = [size] if size else [f"{said}?" for said in common(moving)]
+    if alike:
+        return found + alike
     bad, named = _unfitting(residual, moving, limit)
     if named:
         return found + bad
@@ -115,20 +135,31 @@ def _judged(
 
 
 def _drawn(places: Places, course: Slope | None) -> list[str]:
-    """Positions against the drawing, rates against accelerometers, and what was learnt."""
+    """Positions against the drawing, rates against accelerometers."""
     hand = 0 if course is None or abs(course.correlation) < 0.9 else np.sign(course.correlation)
     off = departures(places._replace(hand=int(hand)))
     found = [off] if off else []
     if course is not None and course.off:
         found.append(_turning_words(course, places))
-    size = 3 * (len(places.found) - 1)
-    rms = np.sqrt(np.trace(places.covariance) / size)
-    if rms > LEARNT * places.prior_sd:
-        found.append(
-            f"the recording says little of the positions: sd {1e3 * rms:.3g} mm, the drawing's"
-            f" {1e3 * places.prior_sd:.3g}; turn the array faster, and about all axes"
-        )
     return found
+
+
+def _little(recording: Recording, places: Places) -> list[str]:
+    """One sentence where the positions are hardly known from the recording.
+
+    By their sds, and by what centrifugal forces alone could tell: what noise is taken for
+    angular acceleration makes sds that are too small.
+    """
+    speed = np.linalg.norm(np.median(recording.angular_rate, axis=1), axis=1)
+    bound = recording.accelerometer_noise_sd / np.sqrt(max(np.sum(speed**4), 1e-300))
+    size, prior = 3 * (len(places.found) - 1), places.prior_sd
+    rms = max(np.sqrt(np.trace(places.covariance) / size), bound)
+    if rms < LEARNT * prior:
+        return []
+    return [
+        f"the recording says little of the positions: they are known to {1e3 * rms:.2g} mm by it,"
+        f" to {1e3 * prior:.2g} mm by the drawing; turn the array faster, and about all axes"
+    ]
 
 
 def _turning_words(course: Slope, places: Places) -> str:
@@ -170,7 +201,7 @@ def _unfitting(
     worst = max(triads, key=triads.__getitem__, default="")
     if not (whole > RESIDUAL or triads.get(worst, 0.0) > limit):
         return [], False
-    named = told(suspects(moving)) or frame(moving)
+    named = told(suspects(moving))
     cause = f"{', '.join(named)}?" if named else f"most at {worst}, {triads[worst]:.3g} times"
     return [f"the residual is {whole:.3g} times the declared noise: {cause}"], bool(named)
 
@@ -178,7 +209,7 @@ def _unfitting(
 def _residuals(recording: Recording, calibration: xr.Dataset, places: Places) -> dict[str, float]:
     """Residual over declared noise, of the whole (the key is empty) and of each triad."""
     found = {"": float(calibration.attrs["residual_ratio"])}
-    if "effect_parameter" not in calibration:
+    if _is_papers(calibration):
         return _rigid(recording, places) | found
     kinds = (("accelerometer", recording.accelerometer_noise_sd),
              ("gyroscope", recording.gyroscope_noise_sd))  # fmt: skip

@@ -24,7 +24,7 @@ def calibrate(arguments) -> None:
     dataset = calibrated(
         recordings, arguments.model, arguments.method, arguments.effects, noise, output.say
     )
-    reasons = reasons_of_calibration(assumed(recordings[0], noise), dataset)
+    reasons = reasons_of_calibration([assumed(one, noise) for one in recordings], dataset)
     write_netcdf(dataset.assign_attrs(trust(reasons)), arguments.out)
     output.say(report(dataset))
     output.done(document(dataset) | {"out": str(arguments.out)}, reasons)
