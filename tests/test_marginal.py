@@ -2,13 +2,16 @@
 
 import numpy as np
 import pytest
+from scipy import stats
+from scipy.special import logsumexp
 
 from imuarray.errors import InputError
+from imuarray.estimation.reference import linear_part, nonlinear_part
 from imuarray.model import ArrayModel
-from imuarray.model.jax64 import jax
+from imuarray.model.jax64 import jax, jnp
 from imuarray.posterior.generic import GenericLikelihood
 from imuarray.posterior.likelihood import Likelihood
-from imuarray.posterior.marginal import Marginal
+from imuarray.posterior.marginal import Marginal, grid, log_marginal, scaled
 from tests import oracles, test_pmmh_targets
 from tests.cases import noises, simulate, small_array
 
@@ -113,21 +116,71 @@ def test_gradient(nodes):
         assert slope[place] == pytest.approx((ends[0] - ends[1]) / 2e-6, rel=1e-4, abs=1.0)
 
 
-def test_proper_motion_prior_is_that_of_the_generic_likelihood():
-    """Two forms of one posterior: their differences in theta agree."""
-    likelihood, force, rate, model, positions = case(gyroscope_sd=0.05)
-    rng = np.random.default_rng(6)
-    motion_sd = (8.0, 200.0, 15.0)
-    likelihood = Likelihood.of(model, force, rate, motion_sd=motion_sd[:2])
-    marginal = Marginal.of(likelihood, positions, 5, motion_sd[2])
-    proper = ArrayModel(model.array, model.noise, (), motion_sd=motion_sd)
+MOTION_SD = (8.0, 200.0)  # rad/s, rad/s^2
+
+
+def dense(force, rate, positions, sds):
+    """log p(y_a, y_g | theta, sds) up to a constant: dense normals of the differences between
+    triads, which s does not touch, and of rates, at nodes of a wide Gauss-Hermite rule in omega."""
+    accelerometer, gyroscope, omega, acceleration = sds
+    apart = np.kron(np.linalg.svd(np.ones((1, len(positions))))[2][1:], np.eye(3))
+    H, total = apart @ linear_part(positions)[:, :3], 0.0
+    covariance = accelerometer**2 * np.eye(len(H)) + acceleration**2 * H @ H.T
+    for y_a, y_g in zip(force, rate, strict=True):
+        information = len(y_g) / gyroscope**2 + omega**-2
+        mean = y_g.sum(axis=0) / gyroscope**2 / information
+        nodes, logs = oracles.gauss_hermite(mean[None], np.eye(3) / information, 15)
+        off = (y_a.ravel() - nonlinear_part(nodes[0], positions)) @ apart.T
+        inside = stats.multivariate_normal(np.zeros(len(H)), covariance).logpdf(off)
+        seen = stats.norm.logpdf(y_g, mean, gyroscope).sum()
+        seen += stats.norm.logpdf(mean, 0, omega).sum() - 1.5 * np.log(information)
+        total += logsumexp(inside + logs) + seen
+    return total
+
+
+def proper(seed=1, gyroscope_sd=0.05):
+    """(`Marginal` under a proper motion prior, force, rate, model, positions)."""
+    _, force, rate, model, positions = case(seed, gyroscope_sd=gyroscope_sd)
+    likelihood = Likelihood.of(model, force, rate, motion_sd=MOTION_SD)
+    off = rate - rate.mean(axis=1, keepdims=True)
+    apart = model.noise.misfit(np.zeros((len(force), 15)), off)
+    return Marginal.of(likelihood, positions, 7, (apart, rate.size)), force, rate, model, positions
+
+
+def test_unknown_noise_and_motion_against_dense_normals():
+    """Places, noise and the size of the motion's prior all move: one constant is left."""
+    marginal, force, rate, model, positions = proper()
+    sds = np.array([np.sqrt(model.noise.accelerometer[0, 0]), 0.05, *MOTION_SD])
+    rng, differences = np.random.default_rng(6), []
+    for logs in (np.zeros(4), *np.diag([0.3, 0.2, -0.4, 0.5]), 0.2 * rng.standard_normal(4)):
+        moved = positions + 1e-4 * rng.standard_normal(positions.shape)
+        moved -= moved[0]
+        data, evidence = scaled(marginal.data, logs)
+        found = log_marginal(moved, data, marginal.nodes, marginal.log_weights) + evidence
+        differences.append(float(found) - dense(force, rate, moved, sds * np.exp(logs)))
+    np.testing.assert_allclose(differences, differences[0], atol=1e-5)
+
+
+def test_unknown_noise_and_motion_of_the_generic_likelihood():
+    """Two forms of one posterior: their differences agree, and so do their slopes."""
+    marginal, force, rate, model, positions = proper(gyroscope_sd=0.02)
+    same = ArrayModel(model.array, model.noise, (), motion_sd=(*MOTION_SD, np.inf))
     start = np.hstack([rate.mean(axis=1), np.zeros((len(rate), 3)), force.mean(axis=1)])
-    generic = GenericLikelihood(proper, force, rate, start, steps=8)
-    thetas = positions[1:].ravel() + 1e-4 * rng.standard_normal((3, 12))
-    one, other = jax.jit(marginal.log_density), jax.jit(generic.log_density)
-    both = [(float(one(t)), float(other(t))) for t in thetas]
-    difference = np.subtract(*np.array(both).T)
-    np.testing.assert_allclose(difference, difference[0], atol=1e-3)
+    generic = GenericLikelihood(same, force, rate, start, steps=8, logs=np.eye(5)[:, :4])
+
+    def one(theta):
+        data, evidence = scaled(marginal.data, theta[12:])
+        places = jnp.concatenate([jnp.zeros((1, 3)), theta[:12].reshape(-1, 3)])
+        return log_marginal(places, data, *grid(3)) + evidence
+
+    rng = np.random.default_rng(6)
+    middle = np.append(positions[1:].ravel(), np.zeros(4))
+    wide = np.append(np.full(12, 1e-4), np.full(4, 0.2))
+    thetas = middle + wide * rng.standard_normal((4, 16))
+    both = [jax.jit(jax.vmap(jax.value_and_grad(f)))(thetas) for f in (one, generic.log_density)]
+    difference = both[0][0] - both[1][0]
+    np.testing.assert_allclose(difference, difference[0], atol=2e-3)
+    np.testing.assert_allclose(both[0][1] * wide, both[1][1] * wide, atol=5e-3, rtol=1e-3)
 
 
 def test_proper_motion_prior_of_the_estimator():

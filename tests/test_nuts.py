@@ -18,7 +18,7 @@ from imuarray.model.jax64 import jnp
 from imuarray.posterior.diagnostics import ess, rhat
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.marginal import Marginal
-from imuarray.posterior.nuts import Whitened, run_nuts
+from imuarray.posterior.nuts import White, run_nuts
 from imuarray.recording import write_recording
 from tests import test_pmmh_targets
 
@@ -64,7 +64,7 @@ def test_same_posterior_as_pmmh():
 def test_whitening_goes_both_ways():
     rng = np.random.default_rng(1)
     factor = np.tril(rng.standard_normal((4, 4))) + 4 * np.eye(4)
-    white = Whitened(None, rng.standard_normal(4), factor)
+    white = White(rng.standard_normal(4), factor, ())
     theta = rng.standard_normal((2, 3, 4))
     np.testing.assert_allclose(white.theta(white.white(theta)), theta, rtol=1e-12)
 

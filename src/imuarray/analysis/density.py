@@ -1,52 +1,140 @@
-"""The posterior density of a recording's positions: prior, likelihood, mode."""
+"""The posterior density of a recording's positions: noise, motion's prior, likelihood, mode."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from functools import cache
+from typing import NamedTuple
+
 import numpy as np
+from scipy.linalg import block_diag
 
 from imuarray.analysis.model import Say, silent
+from imuarray.analysis.noise import estimated_noise
+from imuarray.errors import IdentifiabilityError
+from imuarray.estimation.blocks import pack_motion
 from imuarray.geometry import positions_of
 from imuarray.model import ArrayModel
 from imuarray.posterior import tuning
-from imuarray.posterior.generic import GenericLikelihood
+from imuarray.posterior.generic import SCALES, GenericLikelihood, log_laplace
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.rate_density import sample_covariance
 from imuarray.posterior.target import GaussianPrior, GenericTarget
 from imuarray.recording import Recording
+from imuarray.streams import stream
 
 GAP = 1e-3  # nats in total
 NOT_CONVERGED = (
     "the search for the posterior's mode did not converge; chains start from where it ended"
 )
+WIDE = 3.0  # prior sd of the log of a noise's sd, and of the motion's: a factor of twenty
+FEW, STARTS = 50, 8  # samples; searches for the mode where there are no more
+WIDER = 1.05  # than the mode's curvature, for preconditioned Crank-Nicolson proposals
+LENGTHS = np.geomspace(0.02, 0.99, 10)  # of those that are tried
 
 
-def density_of(recording: Recording, model: ArrayModel, rates: str = "declared", say: Say = silent):
-    """(log density, prior, mode (P,), covariance (P, P)) of a recording's posterior.
+class Posterior(NamedTuple):
+    """What a sampler needs of a recording, by `posterior_of`."""
 
-    The log density is a function of p (P,) = (r_2 ... r_A, effect parameters), to be traced and
-    differentiated by JAX. ``rates`` as `imuarray sample --rates` has it.
+    recording: Recording
+    model: ArrayModel  # with the noise, and the motion's prior, that belong to ``scales`` = 0
+    prior: GaussianPrior  # of r_2 ... r_A (m), the effects' parameters, then the scales
+    mode: np.ndarray  # (P,)
+    covariance: np.ndarray  # (P, P) about the mode's
+    scales: tuple[str, ...]  # of `SCALES`, those whose logs are unknown
+    motion: np.ndarray  # (T, 9 or 15) at the mode
+
+    @property
+    def spread(self) -> np.ndarray:
+        """(5, K) from the unknown logs to those of `SCALES`."""
+        return np.eye(len(SCALES))[:, [SCALES.index(name) for name in self.scales]]
+
+    @property
+    def flat(self) -> bool:
+        """Whether the motion's prior is the papers'."""
+        return not np.isfinite(self.model.motion_sd[0])
+
+    def likelihood(self, rates: str = "declared") -> Likelihood:
+        """(26a) for the papers' model."""
+        recording = self.recording
+        return Likelihood.of(
+            self.model, recording.specific_force, recording.angular_rate,
+            recording.saturated_gyroscopes(), motion_sd=self.model.motion_sd[:2],
+            rate_distribution=sample_covariance(recording.angular_rate)
+            if rates == "spread" else None,
+        )  # fmt: skip
+
+    def generic(self, draws: int = 2) -> GenericLikelihood:
+        """The likelihood of a model with effects."""
+        recording = self.recording
+        return GenericLikelihood(
+            self.model, recording.specific_force, recording.angular_rate, self.motion,
+            draws=draws, saturated=recording.saturated_gyroscopes(), time=recording.time,
+            logs=self.spread,
+        )  # fmt: skip
+
+
+def posterior_of(
+    recording: Recording, model: ArrayModel, flat: bool = False, rates: str = "declared",
+    known: tuple[bool, bool] = (False, False), say: Say = silent,
+) -> Posterior:  # fmt: skip
+    """The posterior of a recording under a model, around its mode.
+
+    Parameters
+    ----------
+    flat
+        Whether omega and omega_dot have the papers' prior, and the noise is at its estimate. By
+        default they, and with effects s, are normal of the recording's own size; that and the
+        noise are unknown, with log-normal priors a factor of twenty wide.
+    rates
+        As `imuarray.sample` has it; the noise is the model's where it is ``"spread"``.
+    known
+        Whether the accelerometers' noise, the gyroscopes', is the model's own.
     """
-    from imuarray.posterior.marginal import Marginal
+    if rates == "spread":
+        return _spread(recording, model, say)
+    fitted = estimated_noise(recording, model, _fit(recording), known, say)
+    found, chosen = fitted.calibration, fitted.model
+    if not found.converged:
+        say(NOT_CONVERGED)
+    sizes = np.array(fitted.motion_sd)
+    if model.effects:  # a compiled function has them: powers of two serve other recordings, too
+        chosen = replace(chosen, motion_sd=tuple(2.0 ** np.round(np.log2(sizes))))
+    elif not flat:  # s is flat: differences between triads do not show it
+        chosen = replace(chosen, motion_sd=(*sizes[:2], np.inf))
+    free = [not flat and not fixed for fixed in known] + [not flat] * 2 + [bool(model.effects)]
+    declared = [np.trace(part) for part in (model.noise.accelerometer, model.noise.gyroscope)]
+    shown = [np.trace(part) for part in (chosen.noise.accelerometer, chosen.noise.gyroscope)]
+    before = 0.5 * np.log(np.divide(declared, shown))
+    with np.errstate(divide="ignore"):
+        own = np.log(sizes / chosen.motion_sd)
+    freedom = np.append(fitted.freedom, np.full(3, 3.0 * len(recording.time)))
+    extra = np.empty(0) if found.effect_parameters is None else found.effect_parameters
+    prior = prior_of(recording, chosen)
+    return Posterior(
+        recording, chosen,
+        GaussianPrior(
+            np.concatenate([prior.mean, np.append(before, own)[free]]),
+            np.concatenate([prior.sd, np.full(sum(free), WIDE)]),
+        ),
+        np.concatenate([found.positions[1:].ravel(), extra, np.append([0.0, 0.0], own)[free]]),
+        block_diag(found.covariance, np.diag(0.5 / np.maximum(freedom[free], 1.0))),
+        tuple(name for name, one in zip(SCALES, free, strict=True) if one),
+        pack_motion(chosen, found.motion.motion),
+    )  # fmt: skip
 
-    prior = prior_of(recording, model)
-    likelihood: GenericLikelihood | Marginal
-    if model.effects:
-        mode, found = map_estimate(recording, model, say)
-        likelihood = _generic(recording, model, found)
-        covariance = found.covariance
-    else:
-        estimator = _likelihood(recording, model, rates == "spread")
-        mode, covariance = _mode(recording, model, rates == "spread", say)
-        likelihood = marginal = Marginal.of(estimator, positions_of(mode))
-        if marginal.gap > GAP:
-            say("gyroscopes that see little of the motion: the likelihood is good to"
-                f" {marginal.gap:.1g} nats only")  # fmt: skip
 
-    def log_density(p):
-        # traced: no call out of it
-        return likelihood.log_density(p) - 0.5 * (((p - prior.mean) / prior.sd) ** 2).sum()
+def _spread(recording: Recording, model: ArrayModel, say: Say) -> Posterior:
+    """The papers' experiment: the noise is the model's, omega's density the gyroscopes' spread."""
+    from imuarray.measured.positions import locate
 
-    return log_density, prior, mode, covariance
+    found = locate(recording, recording.accelerometer_noise_sd)
+    if not found.converged:
+        say(NOT_CONVERGED)
+    prior, mode = prior_of(recording, model), found.mean[1:].ravel()
+    return Posterior(recording, model, prior, mode, found.covariance, (), np.empty((0, 9)))
 
 
 def prior_of(recording: Recording, model: ArrayModel) -> GaussianPrior:
@@ -57,81 +145,128 @@ def prior_of(recording: Recording, model: ArrayModel) -> GaussianPrior:
     return GaussianPrior.of(mean, sd)
 
 
-def tuned_target(recording: Recording, model: ArrayModel, rates: str, rng, say: Say = silent):
-    """(target, start near the mode, step length, N) for PmMH, tuned as in section III-C."""
-    if model.effects:
-        return _tuned_generic(recording, model, rng, say)
-    spread = rates == "spread"
-    sweeps = tuning.Sweeps(recording.position_prior_sd * np.geomspace(1e-6, 0.3, 16))
-    found = tuning.tune(
-        _likelihood(recording, model, spread), prior_of(recording, model), model.array.relative,
-        lambda centred: _mode(recording, model, spread, say)[0], sweeps, lambda name: rng,
-    )  # fmt: skip
-    if found.centred:
-        say(f"variance of log p-hat {found.variances[-1]:.3g} at N = {sweeps.draws[-1]}: omega is"
-            " drawn around the integrand's mode instead")  # fmt: skip
-    return found.target, found.start, found.step, found.target.draws
+def _fit(recording: Recording) -> Callable:
+    """A function of the model that searches the posterior's mode, from where it was last found.
 
-
-def _tuned_generic(recording, model, rng, say):
-    """The same for a model with effects: Laplace-centred importance sampling of omega."""
-    mode, found = map_estimate(recording, model, say)
-    estimate = _generic(recording, model, found)
-    target = GenericTarget(
-        estimate, prior_of(recording, model), np.linalg.cholesky(found.covariance)
-    )
-    step = tuning.tune_step(target, mode, np.geomspace(1e-3, 1.0, 8), 200, rng)
-    return target, mode, step, estimate.draws
-
-
-def _likelihood(recording, model, spread: bool) -> Likelihood:
-    """(26a) for the papers' model."""
-    return Likelihood.of(
-        model, recording.specific_force, recording.angular_rate, recording.saturated_gyroscopes(),
-        rate_distribution=sample_covariance(recording.angular_rate) if spread else None,
-    )  # fmt: skip
-
-
-def _mode(recording, model, spread: bool, say: Say):
-    """MAP (r_2 ... r_A) and the covariance there: the chains' starts spread around it."""
-    from imuarray.measured.positions import locate
-
-    if spread:
-        found = locate(recording, recording.accelerometer_noise_sd)
-        if not found.converged:
-            say(NOT_CONVERGED)
-        return found.mean[1:].ravel(), found.covariance
-    mode, found = map_estimate(recording, model, say)
-    return mode, found.covariance
-
-
-def map_estimate(recording: Recording, model: ArrayModel, say: Say = silent):
-    """(p (P,) at the posterior's mode, the estimator's whole result).
-
-    Says so where the search did not converge. Chains start from where it ended; with effects the
-    motion's prior takes its size from there, too.
+    The first time from elsewhere, too, where few samples leave local optima.
     """
     from imuarray.estimation import calibrate_gauss_newton
 
-    found = calibrate_gauss_newton(
-        model, recording.specific_force, recording.angular_rate,
-        saturated=recording.saturated_gyroscopes(),
-        position_prior=(model.array.parameters, recording.position_prior_sd),
-        time=recording.time,
+    last = []
+
+    def search(model, start):
+        return calibrate_gauss_newton(
+            model, recording.specific_force, recording.angular_rate, start,
+            saturated=recording.saturated_gyroscopes(), time=recording.time,
+            position_prior=(model.array.parameters, recording.position_prior_sd),
+        )  # fmt: skip
+
+    def fit(model):
+        found = search(model, last[0] if last else None)
+        if not last and not model.effects and len(recording.time) <= FEW:
+            rng = stream(0, "sample", "mode")
+            for _ in range(STARTS):
+                off = recording.position_prior_sd * rng.standard_normal(found.positions.shape)
+                with suppress(IdentifiabilityError):  # it ran to triads on one line
+                    other = search(model, model.array.relative + off)
+                    found = min(found, other, key=lambda one: one.cost[-1])
+        last[:] = [found.positions]
+        return found
+
+    return fit
+
+
+def log_papers(theta, data, nodes, weights, spread, mean, sd):
+    """Log posterior density under the papers' model, to be traced by JAX; data of `traced`."""
+    from imuarray.model.jax64 import jnp
+    from imuarray.posterior.marginal import log_marginal, scaled
+
+    count = data.weighted.shape[1] - 3
+    evidence = -0.5 * jnp.sum(((theta - mean) / sd) ** 2)
+    if theta.size > count:
+        data, more = scaled(data, (spread @ theta[count:])[:4])
+        evidence += more
+    positions = jnp.concatenate([jnp.zeros((1, 3)), theta[:count].reshape(-1, 3)])
+    return log_marginal(positions, data, nodes, weights) + evidence
+
+
+@cache
+def log_extended(model: ArrayModel, steps: int) -> Callable:
+    """The same under a model with effects; one function for models that predict the same."""
+
+    def log_density(theta, data, mean, sd):
+        prior = -0.5 * (((theta - mean) / sd) ** 2).sum()
+        return log_laplace(model, steps, theta, data) + prior
+
+    return log_density
+
+
+def traced(posterior: Posterior, rates: str = "declared", say: Say = silent):
+    """(log density, data): a function of theta (P,) and of arrays, to be compiled by JAX."""
+    prior = posterior.prior
+    if posterior.model.effects:
+        likelihood = posterior.generic()
+        function = log_extended(posterior.model, likelihood.steps)
+        return function, (likelihood.data, prior.mean, prior.sd)
+    from imuarray.posterior.marginal import Marginal
+
+    recording = posterior.recording
+    likelihood = posterior.likelihood(rates)
+    saturated = recording.saturated_gyroscopes()
+    own = likelihood.collapsed.mean.T[:, None]
+    nothing = np.zeros((len(own), 3 * posterior.model.array.accelerometers))
+    apart = posterior.model.noise.misfit(nothing, recording.angular_rate - own, saturated)
+    size = 3 * (posterior.model.array.accelerometers - 1)
+    found = Marginal.of(
+        likelihood, positions_of(posterior.mode[:size]),
+        spread=(apart, saturated.size - saturated.sum()),
     )  # fmt: skip
-    if not found.converged:
-        say(NOT_CONVERGED)
-    extra = np.empty(0) if found.effect_parameters is None else found.effect_parameters
-    return np.concatenate([found.positions[1:].ravel(), extra]), found
-
-
-def _generic(recording, model, found, draws: int = 2) -> GenericLikelihood:
-    """The likelihood of a model with effects, with the recording's own motion prior."""
-    from imuarray.estimation.blocks import pack_motion
-
-    start = pack_motion(model, found.motion.motion)
-    return GenericLikelihood(
-        model.with_motion(found.motion.motion), recording.specific_force,
-        recording.angular_rate, start, draws=draws, saturated=recording.saturated_gyroscopes(),
-        time=recording.time,
+    if found.gap > GAP:
+        say("gyroscopes that see little of the motion: the likelihood is good to"
+            f" {found.gap:.1g} nats only")  # fmt: skip
+    return log_papers, (
+        found.data, found.nodes, found.log_weights, posterior.spread, prior.mean, prior.sd
     )  # fmt: skip
+
+
+def at_estimate(posterior: Posterior) -> Posterior:
+    """The same with noise and motion's size at their estimates, for the compiled likelihood."""
+    if posterior.model.effects or not posterior.scales:
+        return posterior
+    size, prior = len(posterior.mode) - len(posterior.scales), posterior.prior
+    return posterior._replace(
+        prior=GaussianPrior(prior.mean[:size], prior.sd[:size]), mode=posterior.mode[:size],
+        covariance=posterior.covariance[:size, :size], scales=(),
+    )  # fmt: skip
+
+
+def tuned_target(posterior: Posterior, method: str, rates: str, rng, say: Say = silent):
+    """(target, step length, N) of the paper's walk, or with ``"pcn"`` of proposals shaped by it.
+
+    N and the walk's length as in section III-C; where not even the largest N brings the variance of
+    log p-hat near what is aimed at, omega is drawn around the integrand's mode.
+    """
+    prior, mode, pcn = posterior.prior, posterior.mode, method == "pcn"
+    shape = np.linalg.cholesky(posterior.covariance)
+    if posterior.model.effects:
+        estimate = posterior.generic()
+        target = GenericTarget(estimate, prior, shape, mode if pcn else None)
+        tuned, steps = (
+            (tuning.longest_jump, LENGTHS) if pcn
+            else (tuning.tune_step, np.geomspace(1e-3, 1.0, 8))
+        )  # fmt: skip
+        return target, tuned(target, mode, steps, 200, rng), estimate.draws
+    likelihood = posterior.likelihood(rates)
+    if pcn:
+        target, step = tuning.tune_preconditioned(
+            likelihood, prior, mode, WIDER * shape, LENGTHS, rng, may_centre=True
+        )
+        return target, step, target.draws
+    sweeps = tuning.Sweeps(posterior.recording.position_prior_sd * np.geomspace(1e-6, 0.3, 16))
+    found = tuning.tune(
+        likelihood, prior, posterior.model.array.relative, lambda _: mode, sweeps, lambda _: rng
+    )
+    if found.centred:
+        say(f"variance of log p-hat {found.variances[-1]:.3g} at N = {sweeps.draws[-1]}: omega is"
+            " drawn around the integrand's mode instead")  # fmt: skip
+    return found.target, found.step, found.target.draws

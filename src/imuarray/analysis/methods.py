@@ -2,5 +2,6 @@
 
 CALIBRATION = ("bcd", "gauss-newton")  # of the papers' model
 MODELS = ("sensors", "papers")  # or a diagnosis.json
-SAMPLING = ("pmmh", "nuts")
+SAMPLING = ("auto", "nuts", "pmmh", "pcn")
+MOTION_PRIORS = ("proper", "flat")
 RATES = ("declared", "spread")  # what p(omega | y_g) is made from

@@ -12,21 +12,27 @@ import pandas as pd
 import xarray as xr
 
 from imuarray.analysis import methods
-from imuarray.analysis.density import density_of, tuned_target
+from imuarray.analysis.density import (
+    Posterior,
+    at_estimate,
+    posterior_of,
+    traced,
+    tuned_target,
+)
 from imuarray.analysis.model import Say, chosen_model, silent, usable
 from imuarray.errors import InputError, require_integer
 from imuarray.model import ArrayModel
 from imuarray.model.names import parameter_names
 from imuarray.posterior.chains import Chains
+from imuarray.posterior.generic import SCALES
 from imuarray.posterior.pmmh import checkpoint_beside, run_chains, spread_starts
-from imuarray.posterior.target import GaussianPrior
 from imuarray.provenance import code_digest, digest, stamp
 from imuarray.recording import Recording
 from imuarray.streams import stream
 
-PMMH_STEPS = {True: 200_000, False: 10_000}  # compiled, any effects
+STEPS = {"pmmh": (200_000, 10_000), "pcn": (40_000, 4_000)}  # compiled, any effects
 NUTS_STEPS, NUTS_WARMUP = 1250, 300  # 1000 left the worst of 93 R-hats above 1.01 now and then
-APART = 2.0  # posterior sds by which the starts differ where effects are free
+APART = 2.0  # posterior sds by which the starts differ
 STORED = 2000
 RHAT_THRESHOLD = 1.05
 FLAT = 0.03  # of the mode's distance from a line: nearer the flat prior has its hole
@@ -36,6 +42,7 @@ class Asked(NamedTuple):
     """How to sample; ``beside`` is the file beside which a checkpoint is kept, if any."""
 
     method: str
+    motion_prior: str
     steps: int | None
     seed: int
     rates: str
@@ -48,40 +55,49 @@ class Made(NamedTuple):
     """Chains, and what made them."""
 
     chains: Chains
-    prior: GaussianPrior
+    posterior: Posterior
     key: str  # digest of everything that they depend on
     settings: dict
     checkpoint: Path | None = None
 
 
 def sample(
-    recording: Recording, method: str = "pmmh", steps: int | None = None, seed: int = 0,
+    recording: Recording, method: str = "auto", steps: int | None = None, seed: int = 0,
     rates: str = "declared", effects: Sequence[str] = (),
     diagnosis: str | PathLike | None = None, accelerometer_noise: float | None = None,
-    progress: bool = False, say: Say = silent, beside: str | PathLike | None = None,
+    motion_prior: str = "proper", progress: bool = False, say: Say = silent,
+    beside: str | PathLike | None = None,
 ) -> xr.DataTree:  # fmt: skip
-    """Two chains of the posterior of the accelerometers' positions (paper 2021).
+    """Two chains of the posterior of the accelerometers' positions.
 
     Parameters
     ----------
     recording
         Moving samples; still poses and samples with an accelerometer at its rail are left out.
     method
+        ``"nuts"``, what ``"auto"`` takes: the no-U-turn sampler on the exact marginal likelihood;
         ``"pmmh"``: pseudo-marginal Metropolis-Hastings (paper 2021), N and the step length tuned
-        as in section III-C; ``"nuts"``: the no-U-turn sampler on the exact marginal likelihood.
+        as in section III-C; ``"pcn"``: the same with preconditioned Crank-Nicolson proposals
+        shaped by the mode. The latter two take noise and the motion's size at their estimates
+        unless there are effects.
     steps
         Transitions of each chain, after the warm-up in NUTS' case.
     seed
         Of the random numbers.
     rates
-        p(omega | y_g) from the ``"declared"`` gyroscope noise, or from the ``"spread"`` among the
-        gyroscopes of each sample (equation (30)).
+        p(omega | y_g) from the ``"declared"`` gyroscopes, or from the ``"spread"`` among those
+        of each sample (equation (30)), with the papers' flat prior and the declared noise.
     effects
         As in `imuarray.calibrate`.
     diagnosis
-        As in `imuarray.calibrate`.
+        As in `imuarray.calibrate`; the noise is then the diagnosis'.
     accelerometer_noise
-        As in `imuarray.calibrate`.
+        Sd (m/s^2) that is taken for known; by default the noise of both kinds is unknown, as
+        log-normal about what restricted maximum likelihood gives.
+    motion_prior
+        ``"proper"``: angular rate and acceleration are normal of the recording's own size;
+        ``"flat"``: paper 2021's, which shrinks the array (docs/findings.md), and the noise at its
+        estimate.
     progress
         Whether to show a bar.
     say
@@ -94,8 +110,9 @@ def sample(
     -------
     xarray.DataTree
         ``posterior/position`` (chain, draw, accelerometer, axis) m, with effects
-        ``posterior/effect_parameter``; ``sample_stats``, ``prior``. Attributes: the chains'
-        verdict (``converged``, ``rhat_max``, ``ess_min``, burn-in) and the origin.
+        ``posterior/effect_parameter``, and ``posterior/sd`` of noise and motion where unknown
+        (SI); ``sample_stats``, ``prior``. Attributes: the chains' verdict (``converged``,
+        ``rhat_max``, ``ess_min``, burn-in), ``shrunk_by_sds`` and the origin.
 
     Raises
     ------
@@ -105,6 +122,7 @@ def sample(
     for name, value, known in (
         ("method", method, methods.SAMPLING),
         ("rates", rates, methods.RATES),
+        ("motion_prior", motion_prior, methods.MOTION_PRIORS),
     ):
         if value not in known:
             raise InputError(f"{name}: expected any of {', '.join(known)}, found {value!r}")
@@ -114,18 +132,38 @@ def sample(
     recording, model = chosen_model(
         usable(recording, say), effects, diagnosis, accelerometer_noise, say
     )
+    flat = motion_prior == "flat"
+    if flat and model.effects:
+        raise InputError("--motion-prior flat: expected no --effects with it, found some")
     if rates == "spread":
-        if model.effects:
-            raise InputError("--rates spread: expected no --effects with it, found some")
+        if not flat:
+            raise InputError("--rates spread: expected --motion-prior flat with it, found proper")
         recording = _off_rails(recording, say)
+    known = accelerometer_noise is not None or diagnosis is not None, diagnosis is not None
+    posterior = posterior_of(recording, model, flat, rates, known, say)
+    pull = shrinkage(posterior) if flat else 0.0
+    if flat:
+        say(f"the flat motion prior makes the array {pull:.1f} posterior sds smaller than it is"
+            " (docs/findings.md)")  # fmt: skip
     beside = None if beside is None else Path(beside)
-    asked = Asked(method, steps, seed, rates, progress, beside, say)
-    made = (_nuts if method == "nuts" else _pmmh)(recording, model, asked)
-    tree = _tree(recording, model, made, seed)
+    asked = Asked(method, motion_prior, steps, seed, rates, progress, beside, say)
+    made = (_pmmh if method in STEPS else _nuts)(posterior, asked)
+    tree = _tree(made, seed, pull)
     if tree.attrs["on_a_line"]:
         say("a chain went to where the triads lie on one line: the flat motion prior has no bound"
             " there, and these triads are not far enough from it (docs/findings.md)")  # fmt: skip
     return tree
+
+
+def shrinkage(posterior: Posterior) -> float:
+    """By how many posterior sds the flat motion prior shrinks the array, to first order.
+
+    Its determinant pulls the log of the size by 3 T, against the information on it at the mode.
+    """
+    size = np.linalg.norm(posterior.mode)
+    along = posterior.mode / size
+    relative = np.sqrt(along @ posterior.covariance @ along) / size
+    return float(3 * len(posterior.recording.time) * relative)
 
 
 def _off_rails(recording: Recording, say: Say) -> Recording:
@@ -149,22 +187,33 @@ def summary(posterior: xr.DataTree) -> pd.DataFrame:
     return summarise(chains_of(posterior), labels, RHAT_THRESHOLD)[1]
 
 
-def _tree(recording: Recording, model: ArrayModel, made: Made, seed: int) -> xr.DataTree:
+def _tree(made: Made, seed: int, pull: float) -> xr.DataTree:
     from imuarray.posterior.chains import chain_tree
     from imuarray.posterior.diagnostics import summarise
 
+    recording, model = made.posterior.recording, made.posterior.model
     labels = recording.accelerometer_labels[1:]
     names = parameter_names(model, (recording.accelerometer_labels, recording.gyroscope_labels))
     verdict, _, _ = summarise(made.chains, labels, RHAT_THRESHOLD)
     attrs: dict[str, Any] = {**stamp({"recording": made.key, **made.settings}, seed)}
     kept = "burn_in_draws", "burn_in_steps", "steps", "rhat_max", "ess_min"
     attrs |= {name: verdict[name] for name in kept}
-    fallen = not model.effects and flattest(made.chains.draws, recording) < FLAT
+    fallen = made.posterior.flat and flattest(made.chains.draws, recording) < FLAT
     attrs["converged"] = int(verdict["converged"] and not fallen)
     attrs |= {"divergent": made.chains.divergent, "on_a_line": int(fallen)}
+    attrs |= {"shrunk_by_sds": pull, **_noise(model)}
     if made.checkpoint is not None:
         attrs["checkpoint"] = str(made.checkpoint)
-    return chain_tree(made.chains, labels, made.prior, attrs, names)
+    unit = dict(zip(SCALES, [*_noise(model).values(), *model.motion_sd], strict=True))
+    sds = {name: unit[name] for name in made.posterior.scales}
+    return chain_tree(made.chains, labels, made.posterior.prior, attrs, names, sds)
+
+
+def _noise(model: ArrayModel) -> dict[str, float]:
+    """Rms noise over the triads of each kind (m/s^2, rad/s)."""
+    kinds = "accelerometer", "gyroscope"
+    variances = [np.diag(getattr(model.noise, kind)).mean() for kind in kinds]
+    return {f"{kind}_noise_sd": float(v**0.5) for kind, v in zip(kinds, variances, strict=True)}
 
 
 def flattest(draws, recording: Recording) -> float:
@@ -185,31 +234,43 @@ def flattest(draws, recording: Recording) -> float:
     return float(distance[0].min() / distance[1][0])
 
 
-def _key(recording, model, prior, asked: Asked, *rest) -> str:
+def _key(posterior: Posterior, asked: Asked, *rest) -> str:
+    recording, model, prior = posterior.recording, posterior.model, posterior.prior
     return digest(
         recording.time, recording.specific_force, recording.angular_rate,
         recording.saturated_gyroscopes(), recording.accelerometer_position, model.effect_start,
         model.effect_prior_mean, model.effect_prior_sd, list(model.clock or ()),
-        model.noise.accelerometer, model.noise.gyroscope, prior.mean, prior.sd,
-        *rest, asked.seed, list(model.effects), asked.rates, code_digest(),
+        model.noise.accelerometer, model.noise.gyroscope, list(model.motion_sd), prior.mean,
+        prior.sd, *rest, asked.seed, list(model.effects), asked.rates, asked.motion_prior,
+        asked.method, code_digest(),
     )  # fmt: skip
 
 
-def _pmmh(recording, model, asked: Asked) -> Made:
-    """PmMH tuned as in section III-C of paper 2021; continues a checkpoint."""
+def _pmmh(posterior: Posterior, asked: Asked) -> Made:
+    """PmMH, tuned; continues a checkpoint."""
     asked.say("tuning N and the step length ...")
-    rng = _stream(asked, "tuning")
-    target, mode, step, draws = tuned_target(recording, model, asked.rates, rng, asked.say)
-    steps = asked.steps or PMMH_STEPS[not model.effects]
+    posterior = at_estimate(posterior)
+    mode, prior = posterior.mode, posterior.prior
+    target, step, draws = tuned_target(
+        posterior, asked.method, asked.rates, _stream(asked, "tuning"), asked.say
+    )
+    steps = asked.steps or STEPS[asked.method][bool(posterior.model.effects)]
     thin = max(1, steps // STORED)
-    key = _key(recording, model, target.prior, asked, draws, step, steps)
+    key = _key(posterior, asked, draws, step, steps)
     checkpoint = _checkpoint(asked, key)
     rng = _stream(asked, "starts")
+    wide = asked.method == "pmmh" and not posterior.model.effects
+    starts = spread_starts(mode, prior.sd / 3, rng) if wide else _apart(posterior, rng)
     chains = run_chains(
-        target, spread_starts(mode, target.prior.sd / 3, rng), step, max(4, steps // thin), thin,
-        asked.seed, checkpoint=checkpoint, key=key, quiet=not asked.progress,
+        target, starts, step, max(4, steps // thin), thin, asked.seed, checkpoint=checkpoint,
+        key=key, quiet=not asked.progress,
     )  # fmt: skip
-    return Made(chains, target.prior, key, {"draws_per_sample": draws}, checkpoint)
+    return Made(chains, posterior, key, {"draws_per_sample": draws}, checkpoint)
+
+
+def _apart(posterior: Posterior, rng) -> np.ndarray:
+    """Two starts some posterior sds from the mode: far away there are modes of others' own."""
+    return rng.multivariate_normal(posterior.mode, APART**2 * posterior.covariance, size=2)
 
 
 def _checkpoint(asked: Asked, key: str) -> Path | None:
@@ -224,24 +285,21 @@ def _checkpoint(asked: Asked, key: str) -> Path | None:
     return checkpoint
 
 
-def _nuts(recording, model, asked: Asked) -> Made:
+def _nuts(posterior: Posterior, asked: Asked) -> Made:
     """NUTS on the marginal likelihood, whitened at the mode."""
     from imuarray.posterior.nuts import run_nuts
 
-    asked.say("finding the mode ...")
-    log_density, prior, mode, covariance = density_of(recording, model, asked.rates, asked.say)
-    rng = _stream(asked, "starts")
-    if model.effects:  # clocks and shifts have modes of their own far away
-        starts = rng.multivariate_normal(mode, APART**2 * covariance, size=2)
-    else:
-        starts = spread_starts(prior.mean, prior.sd, rng)
+    log_density, data = traced(posterior, asked.rates, asked.say)
+    rng, prior = _stream(asked, "starts"), posterior.prior
+    wide = posterior.flat and not posterior.model.effects
+    starts = spread_starts(prior.mean, prior.sd, rng) if wide else _apart(posterior, rng)
     steps = asked.steps or NUTS_STEPS
     found = run_nuts(
-        log_density, mode, covariance, starts, NUTS_WARMUP, steps, asked.seed,
-        quiet=not asked.progress,
+        log_density, posterior.mode, posterior.covariance, starts, NUTS_WARMUP, steps, asked.seed,
+        quiet=not asked.progress, data=data,
     )  # fmt: skip
-    key = _key(recording, model, prior, asked, steps, "nuts")
-    return Made(found, prior, key, {"divergent": found.divergent})
+    key = _key(posterior, asked, steps)
+    return Made(found, posterior, key, {"divergent": found.divergent})
 
 
 def _stream(asked: Asked, name: str):

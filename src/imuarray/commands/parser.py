@@ -156,16 +156,21 @@ COMMANDS = (
     Command(
         "sample", "sample.sample",
         "Sample the posterior distribution of the accelerometer positions.",
-        "rec.nc --method pmmh --steps 5000 --seed 1 --out posterior.nc",
+        "rec.nc --seed 1 --out posterior.nc",
         "posterior to write (NetCDF-4)",
         (
             RECORDING, NOISE, *EFFECTS,
-            _option("--method", "pmmh: pseudo-marginal Metropolis-Hastings, as paper 2021"
-                    " (default); nuts: the no-U-turn sampler on the exact marginal likelihood, in"
-                    " seconds", choices=methods.SAMPLING, default="pmmh"),
-            _option("--rates", "p(omega | y_g) from the declared gyroscope noise (default), or"
+            _option("--method", "nuts, which auto takes (default): the no-U-turn sampler on the"
+                    " exact marginal likelihood; pmmh: pseudo-marginal Metropolis-Hastings, as"
+                    " paper 2021; pcn: the same with preconditioned Crank-Nicolson proposals",
+                    choices=methods.SAMPLING, default="auto"),
+            _option("--motion-prior", "proper (default): angular rate and acceleration are normal,"
+                    " of the recording's own size; flat: as paper 2021, which shrinks the array",
+                    choices=methods.MOTION_PRIORS, default="proper"),
+            _option("--rates", "p(omega | y_g) from the gyroscopes' noise (default: declared), or"
                     " from the spread among the gyroscopes of each sample, as paper 2021 does with"
-                    " measured data (30)", choices=methods.RATES, default="declared"),
+                    " measured data (30), with --motion-prior flat",
+                    choices=methods.RATES, default="declared"),
             _number("--steps", "N", "steps of each chain", type=count),
             SEED,
         ),

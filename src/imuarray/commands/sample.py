@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import xarray as xr
 
@@ -15,17 +16,20 @@ from imuarray.commands.output import Output
 from imuarray.provenance import trust, write_netcdf
 from imuarray.recording import read_recording
 
-VERDICT = "converged", "rhat_max", "ess_min", "burn_in_steps", "steps", "divergent", "on_a_line"
+VERDICT = (
+    "converged", "rhat_max", "ess_min", "burn_in_steps", "steps", "divergent", "on_a_line",
+    "shrunk_by_sds", "accelerometer_noise_sd", "gyroscope_noise_sd",
+)  # fmt: skip
 
 
 def sample(arguments) -> None:
-    """Two chains of the positions' posterior, by PmMH or NUTS; see `imuarray.sample`."""
+    """Two chains of the positions' posterior; see `imuarray.sample`."""
     output = Output(arguments)
     recording = read_recording(arguments.recording)
     posterior = sampled(
         recording, arguments.method, arguments.steps, arguments.seed,
         arguments.rates, arguments.effects, arguments.diagnosis, arguments.accelerometer_noise,
-        output.progress, output.say, beside=arguments.out,
+        arguments.motion_prior, output.progress, output.say, beside=arguments.out,
     )  # fmt: skip
     checkpoint = posterior.attrs.pop("checkpoint", None)
     recording = assumed(recording, arguments.accelerometer_noise)
@@ -54,6 +58,10 @@ def report(posterior: xr.DataTree, table: pd.DataFrame) -> str:
     for row in table.itertuples():
         numbers = f"{1e3 * row.mean_m:9.4f} {1e6 * row.sd_m:7.2g}"
         lines.append(f"{row.accelerometer:>5} {row.axis:>4} {numbers}")
+    lines.append(
+        f"noise: accelerometers {attrs['accelerometer_noise_sd']:.3g} m/s^2, gyroscopes"
+        f" {np.degrees(attrs['gyroscope_noise_sd']):.3g} deg/s"
+    )
     state = "converged" if attrs["converged"] else "NOT converged: take more --steps"
     if attrs["on_a_line"]:
         state = "NOT converged: a chain is where the triads lie on one line (docs/findings.md)"

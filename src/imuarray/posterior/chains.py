@@ -32,17 +32,17 @@ class Chains:
         return self.draws.shape[1] * self.thin
 
 
-def write_chains(path, chains: Chains, labels, prior, attrs: dict, effects=None) -> None:
+def write_chains(path, chains: Chains, labels, prior, attrs: dict) -> None:
     """Write what `chain_tree` makes of the chains."""
-    write_netcdf(chain_tree(chains, labels, prior, attrs, effects), path)
+    write_netcdf(chain_tree(chains, labels, prior, attrs), path)
 
 
-def chain_tree(chains: Chains, labels, prior, attrs: dict, effects=None) -> xr.DataTree:
+def chain_tree(chains: Chains, labels, prior, attrs: dict, effects=(), sds=None) -> xr.DataTree:
     """Groups posterior, sample_stats and prior; dims chain, draw, accelerometer, axis.
 
     ``labels`` of the A - 1 estimated triads; ``prior`` a `GaussianPrior`; ``attrs`` the
     stamp (config, seed, versions) and whatever else; ``effects`` names of the parameters
-    after the positions.
+    after the positions; ``sds`` names of those after them, logs of factors on these sds.
     """
     count = len(labels)
     coords = {"accelerometer": list(labels), "axis": list("xyz")}
@@ -50,12 +50,15 @@ def chain_tree(chains: Chains, labels, prior, attrs: dict, effects=None) -> xr.D
     shape = (*chains.draws.shape[:2], count, 3)
     position = chains.draws[..., : 3 * count].reshape(shape)
     posterior = xr.Dataset({"position": (dims, position, {"units": "m"})}, coords)
+    last = 3 * count + len(effects)
     if effects:
-        posterior["effect_parameter"] = (
-            ("chain", "draw", "parameter"),
-            chains.draws[..., 3 * count :],
-        )
+        values = chains.draws[..., 3 * count : last]
+        posterior["effect_parameter"] = ("chain", "draw", "parameter"), values
         posterior = posterior.assign_coords(parameter=list(effects))
+    if sds:
+        values = np.array(list(sds.values())) * np.exp(chains.draws[..., last:])
+        posterior["sd"] = ("chain", "draw", "quantity"), values, {"units": "SI"}
+        posterior = posterior.assign_coords(quantity=list(sds))
     stats = xr.Dataset({"log_target": (dims[:2], chains.log_target)})
     stats["acceptance"] = (("chain",), chains.acceptance)
     split = [prior.mean[: 3 * count].reshape(count, 3), prior.sd[: 3 * count].reshape(count, 3)]
@@ -83,8 +86,9 @@ def chains_of(tree: xr.DataTree) -> Chains:
     """The chains in a tree that `chain_tree` made."""
     position = tree["posterior"]["position"].to_numpy()
     draws = position.reshape(*position.shape[:2], -1)
-    if "effect_parameter" in tree["posterior"]:
-        draws = np.concatenate([draws, tree["posterior"]["effect_parameter"].to_numpy()], axis=2)
+    for name in ("effect_parameter", "sd"):
+        if name in tree["posterior"]:
+            draws = np.concatenate([draws, tree["posterior"][name].to_numpy()], axis=2)
     stats = tree["sample_stats"]
     return Chains(
         draws,

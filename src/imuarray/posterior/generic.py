@@ -7,19 +7,29 @@ estimate of p(y | theta) is unbiased for models linear in that rest given omega,
 variance falls as 1/N as in (26a). For the papers' model with its flat motion prior it equals
 (26a) in expectation, up to a constant. Effects that have a gauge need a proper motion prior
 (`ArrayModel.with_motion`): flat, each sample would carry a power of the gauge's scale.
+
+Parameters may end in logs of factors on the sds of the noise and of the motion's prior, as
+`Unknown` says which: those sds are then unknown, too.
 """
 
 from __future__ import annotations
 
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from imuarray.errors import InputError
-from imuarray.estimation.blocks import Problem, problem, residual
+from imuarray.estimation.blocks import problem, residual
 from imuarray.model import ArrayModel
 from imuarray.model.jax64 import jax, jnp
 from imuarray.model.small_linear import cholesky, log_determinant, solve_lower, solve_upper
+
+# Of noise and of the motion's prior; `posterior.marginal.scaled` has all but the last.
+SCALES = (
+    "accelerometer_noise", "gyroscope_noise", "angular_rate", "angular_acceleration",
+    "specific_force",
+)  # fmt: skip
 
 
 def _mode(flat, x, steps):
@@ -48,11 +58,43 @@ def _log_weight(flat, x, scale, draw):
     return inside - log_q
 
 
+class Unknown(NamedTuple):
+    """A recording as the compiled likelihood wants it, and the sds that are unknown (K)."""
+
+    start: np.ndarray  # (T, 9 or 15)
+    readings: tuple  # force, rate, keep, time
+    span: float
+    whiten_force: np.ndarray
+    whiten_rate: np.ndarray
+    logs: np.ndarray  # (5, K) from the last K parameters to the logs of `SCALES`
+
+
+def _whitened(model, parameters, given: Unknown):
+    """(function of a sample's motion and readings that gives its residuals, of p and of readings
+    alone; what each sample's likelihood is divided by, (T,) of logs)."""
+    size = parameters.size - given.logs.shape[1]
+    logs = given.logs @ parameters[size:]
+    counts = [3 * model.array.accelerometers, 3 * model.array.gyroscopes]
+    counts += [3 * int(np.isfinite(sd)) for sd in model.motion_sd]
+    wide = [jnp.full(n, jnp.exp(-log)) for n, log in zip(counts, logs, strict=True)]
+    wide = jnp.concatenate([*wide, jnp.ones(6 * model.needs_derivatives)])
+
+    def flat(x, data):
+        p = parameters[:size]
+        whiten = given.whiten_force, given.whiten_rate
+        return wide * residual(model, x, p, *data, given.span, *whiten)
+
+    fixed = sum(n * logs[place] for place, n in enumerate(counts) if place != 1)
+    return flat, fixed + logs[1] * jnp.sum(given.readings[2] > 0, axis=1)
+
+
 @partial(jax.jit, static_argnums=(0, 1))
-def _estimate(model, steps, start, p, data, span, whiten_force, whiten_rate, draws):
+def _estimate(model, steps, parameters, given: Unknown, draws):
+    residuals, volume = _whitened(model, parameters, given)
+
     def one(x, data, draws):
         def flat(x):
-            return residual(model, x, p, *data, span, whiten_force, whiten_rate)
+            return residuals(x, data)
 
         x, factor = _mode(flat, x, steps)
         whole = solve_lower(factor, jnp.eye(x.size)[:, :3])
@@ -60,89 +102,76 @@ def _estimate(model, steps, start, p, data, span, whiten_force, whiten_rate, dra
         weights = jax.vmap(lambda draw: _log_weight(flat, x, scale, draw))(draws)
         return jax.scipy.special.logsumexp(weights) - jnp.log(len(draws))
 
-    return jax.vmap(one)(start, data, draws).sum()
+    return jnp.sum(jax.vmap(one)(given.start, given.readings, draws) - volume)
 
 
-def _log_laplace(model, steps, start, p, data, span, whiten_force, whiten_rate):
+def log_laplace(model, steps, parameters, given: Unknown):
     """log p(y | theta) by Laplace's method over each sample's whole motion, to be differentiated.
 
     The search for the mode carries no derivative; one step of Newton's method from the mode,
     its curvature fixed, has the mode's own. The derivative leaves out that of the residual's
     second derivatives, which is far below what a sampler's steps would notice.
     """
+    residuals, volume = _whitened(model, parameters, given)
+    still = jax.lax.stop_gradient
+    fixed, _ = _whitened(model, still(parameters), given)
 
     def one(x, data):
-        def flat(x, p=p):
-            return residual(model, x, p, *data, span, whiten_force, whiten_rate)
-
-        fixed = jax.lax.stop_gradient(p)
-        mode, factor = _mode(lambda x: flat(x, fixed), jax.lax.stop_gradient(x), steps)
-        mode, factor = jax.lax.stop_gradient((mode, factor))
-        slope = jax.grad(lambda x: 0.5 * jnp.sum(flat(x) ** 2))(mode)[:, None]
+        mode, factor = still(_mode(lambda x: fixed(x, data), still(x), steps))
+        slope = jax.grad(lambda x: 0.5 * jnp.sum(residuals(x, data) ** 2))(mode)[:, None]
         x = mode - solve_upper(factor, solve_lower(factor, slope))[:, 0]
-        value, jac = flat(x), jax.jacfwd(flat)(x)
+        value, jac = residuals(x, data), jax.jacfwd(lambda x: residuals(x, data))(x)
         factor = cholesky(jac.T @ jac)
         # the rest of the second derivative, to first order: it need not be positive far away;
         # so small a term needs no derivative of its own
-        still = jax.lax.stop_gradient
-        bend = jax.hessian(lambda z: flat(z, fixed) @ still(value))(still(x))
+        bend = jax.hessian(lambda z: fixed(z, data) @ still(value))(still(x))
         inner = solve_upper(still(factor), solve_lower(still(factor), bend))
         return -0.5 * (value @ value + log_determinant(factor) + jnp.trace(inner))
 
-    return jax.vmap(one)(start, data).sum()
+    return jnp.sum(jax.vmap(one)(given.start, given.readings) - volume)
 
 
 class GenericLikelihood:
     """log p-hat(y | theta, effect parameters) for a model with any effects.
 
     ``start`` (T, 9 or 15) is where each sample's Gauss-Newton begins (the motion at the
-    calibrated parameters, say); ``draws`` is N, ``steps`` the Gauss-Newton steps.
+    calibrated parameters, say); ``draws`` is N, ``steps`` the Gauss-Newton steps. ``logs`` (5, K)
+    maps the last K parameters to logs of factors on the sds that `SCALES` names; none by default.
     """
 
     def __init__(
         self, model: ArrayModel, specific_force, angular_rate, start, draws=4, steps=3,
-        saturated=None, time=None,
+        saturated=None, time=None, logs=None,
     ):  # fmt: skip
-        self.given: Problem = problem(model, specific_force, angular_rate, saturated, time=time)
-        seen = self.given.keep.reshape(len(self.given.keep), -1, 3).any(axis=1).all(axis=1)
+        given = problem(model, specific_force, angular_rate, saturated, time=time)
+        seen = given.keep.reshape(len(given.keep), -1, 3).any(axis=1).all(axis=1)
         if not seen.all():
             raise InputError(
                 "gyroscopes: expected one unsaturated per axis in every sample, found none in"
                 f" sample {np.flatnonzero(~seen)[0]} (and {np.sum(~seen) - 1} more)"
             )
-        self.start, self.draws, self.steps = np.asarray(start), draws, steps
+        self.model, self.draws, self.steps = model, draws, steps
+
+        self.data = Unknown(
+            np.asarray(start),
+            (given.specific_force, given.angular_rate, given.keep, given.time), given.span,
+            # the declared noise, the same in every sample
+            given.whiten_force, given.whiten_rate[0], np.zeros((5, 0)) if logs is None else logs,
+        )  # fmt: skip
 
     def on(self, parameters, normals) -> float:
-        """The estimate at p (P,) = (r_2 ... r_A, effects) on given normals (T, N, 3)."""
-        given = self.given
-        return float(
-            _estimate(
-                given.model,
-                self.steps,
-                self.start,
-                np.asarray(parameters),
-                (given.specific_force, given.angular_rate, given.keep, given.time),
-                given.span,
-                given.whiten_force,
-                given.whiten_rate[0],  # the declared noise, the same in every sample
-                normals,
-            )  # fmt: skip
-        )
+        """The estimate at p (P,) = (r_2 ... r_A, effects[, logs]) on given normals (T, N, 3)."""
+        return float(_estimate(self.model, self.steps, np.asarray(parameters), self.data, normals))
 
     def log_density(self, parameters):
         """log p(y | p) by Laplace's method, to be traced and differentiated by JAX.
 
         Its constant is that of `on`; it is exact where residuals are linear in the motion.
         """
-        given = self.given
-        return _log_laplace(
-            given.model, self.steps, self.start, parameters,
-            (given.specific_force, given.angular_rate, given.keep, given.time),
-            given.span, given.whiten_force, given.whiten_rate[0],
-        )  # fmt: skip
+        return log_laplace(self.model, self.steps, parameters, self.data)
 
     def __call__(self, parameters, rng) -> float:
         """The estimate with fresh draws; -inf where it is not a number."""
-        normals = rng.standard_normal((len(self.start), self.draws, 3))
+        normals = rng.standard_normal((len(self.data.start), self.draws, 3))
         value = self.on(parameters, normals)
         return value if np.isfinite(value) else -np.inf

@@ -23,7 +23,8 @@ class Likelihood:
     """p-hat(y_a | theta) for one recording under the papers' model.
 
     Build it with `Likelihood.of`. ``power`` is the power of 1 / |H' Lambda H| a sample;
-    ``rate_mean`` (T, 3) rad/s and ``rate_covariance`` (T, 3, 3) are those of p(omega_t | y_g).
+    ``rate_mean`` (T, 3) rad/s and ``rate_covariance`` (T, 3, 3) are those of p(omega_t | y_g),
+    ``rate_sd`` (rad/s) omega's prior in it.
     """
 
     data: kernels.LikelihoodData
@@ -31,6 +32,7 @@ class Likelihood:
     collapsed: Collapsed
     rate_mean: np.ndarray
     rate_covariance: np.ndarray
+    rate_sd: float = np.inf
 
     @classmethod
     def of(
@@ -75,7 +77,9 @@ class Likelihood:
             if np.isfinite(motion_sd[0]):
                 raise InputError("motion_sd: expected none of omega beside rate_distribution")
         data = _arrange(collapsed, mean, covariance, np.full(3, float(motion_sd[1]) ** -2.0))
-        return cls(data, DETERMINANTS[determinant], collapsed, mean.T, covariance)
+        return cls(
+            data, DETERMINANTS[determinant], collapsed, mean.T, covariance, float(motion_sd[0])
+        )
 
     def centred(self, positions, widening: float = WIDENING) -> Likelihood:
         """The same likelihood, estimated with draws from where its integrand is.

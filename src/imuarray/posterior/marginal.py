@@ -40,10 +40,12 @@ class MarginalData(NamedTuple):
     precision: jnp.ndarray  # (D, D) Lambda
     mean: jnp.ndarray  # (T, 3) rad/s, of p(omega | y_g)
     information: jnp.ndarray  # (T, 3, 3), its inverse covariance
-    pull: jnp.ndarray  # (T, 6) the prior's part of H' Lambda y for omega_dot and s
-    ridge: jnp.ndarray  # (6,) its part of H' Lambda H's diagonal, zero where flat
+    seen: jnp.ndarray  # (T, 3) rad/s, the gyroscopes' own mean
+    prior: jnp.ndarray  # s^2/rad^2, what of ``information`` is omega's prior: zero where flat
+    ridge: jnp.ndarray  # (6,) the prior's part of H' Lambda H's diagonal, zero where flat
     start: jnp.ndarray  # (T, 3) rad/s, where the search for each mode begins
     volume: jnp.ndarray  # half the log determinants of ``information``, summed over samples
+    spread: jnp.ndarray  # chi-square of the gyroscopes about their mean, and their readings
 
 
 def grid(nodes: int) -> tuple[np.ndarray, np.ndarray]:
@@ -71,10 +73,34 @@ def collapse(positions, data: MarginalData):
     factor = cholesky(known[6:, 6:] + jnp.diag(data.ridge))
     half = solve_lower(factor, known[6:, :6])
     seen = data.weighted @ design
-    inner = solve_lower(factor, (seen[:, 6:] + data.pull).T)
+    inner = solve_lower(factor, seen[:, 6:].T)
     b = seen[:, :6] - inner.T @ half
     constant = data.energy - jnp.sum(inner**2, axis=0)
     return known[:6, :6] - half.T @ half, b, constant, log_determinant(factor)
+
+
+def scaled(data: MarginalData, logs):
+    """(data, log evidence) with noise and motion's prior so many times as wide.
+
+    ``logs`` (4,) of the factors on the sds of accelerometers, gyroscopes, omega and omega_dot.
+    The evidence is what `log_marginal` leaves out because it does not hang on positions:
+    log p(y_g) and the normalisers, up to a constant.
+    """
+    force, gyroscopes, rate, acceleration = jnp.exp(-2 * logs)
+    own = gyroscopes * (data.information - data.prior * jnp.eye(3))
+    prior = rate * data.prior
+    factor = jax.vmap(cholesky)(own + prior * jnp.eye(3))
+    pulled = jnp.einsum("tij,tj->ti", own, data.seen)
+    mean = jax.vmap(lambda f, h: solve_upper(f, solve_lower(f, h[:, None]))[:, 0])(factor, pulled)
+    volume = jnp.sum(jnp.log(jnp.diagonal(factor, axis1=1, axis2=2)))
+    apart = gyroscopes * data.spread[0] + prior * jnp.sum(mean * data.seen)
+    evidence = -0.5 * apart - volume - 3 * len(mean) * jnp.sum(logs[2:])
+    evidence -= data.weighted.size * logs[0] + data.spread[1] * logs[1]
+    return data._replace(
+        weighted=force * data.weighted, energy=force * data.energy,
+        precision=force * data.precision, mean=mean, information=own + prior * jnp.eye(3),
+        volume=volume, ridge=acceleration * data.ridge,
+    ), evidence  # fmt: skip
 
 
 def _curvature(rate, C, b, information):
@@ -121,7 +147,7 @@ def log_marginal(positions, data: MarginalData, nodes, log_weights):
     One node is Laplace's method.
     """
     C, b, constant, logdet = collapse(positions, data)
-    rate, factor = _modes_at(*jax.lax.stop_gradient((C, b)), data)
+    rate, factor = _modes_at(*jax.lax.stop_gradient((C, b, data)))
     if len(nodes) == 1:
         inside, volume = _laplace(rate, C, b, constant, data)
     else:
@@ -183,7 +209,7 @@ class Marginal:
 
     @classmethod
     def of(
-        cls, likelihood: Likelihood, positions, nodes: int | None = None, force_sd: float = np.inf
+        cls, likelihood: Likelihood, positions, nodes: int | None = None, spread=(0.0, 0)
     ) -> Marginal:
         """Of the same recording as a `Likelihood`; modes are searched from those at ``positions``.
 
@@ -193,24 +219,22 @@ class Marginal:
             On each axis of omega; 1 is Laplace's method. By default the fewest of `NODE_COUNTS`
             that differ by less than 1e-4 nats in total from the next at ``positions``, or the most:
             ``gap`` says. Two poor gyroscopes already need more than three (tests).
-        force_sd : float
-            Prior sd of s (m/s^2); those of omega and omega_dot are the likelihood's.
+        spread : (float, int)
+            Chi-square of the gyroscopes about their mean and the number of their readings, which
+            `scaled` needs.
         """
         if likelihood.power != DETERMINANTS["derived"]:
             raise InputError("marginal: expected the derived determinant, found the printed one")
         collapsed = likelihood.collapsed
         start = _modes(collapsed, likelihood, positions)
         weighted = collapsed.weighted.reshape(-1, collapsed.samples).T
-        weight = float(force_sd) ** -2.0
         information = np.linalg.inv(likelihood.rate_covariance)
-        # measurements are less their mean over triads, and so is s
-        offset = collapsed.offset.T
-        pull = np.hstack([np.zeros_like(offset), -weight * offset])
-        energy = collapsed.energy + weight * np.sum(offset**2, axis=1)
+        prior = float(likelihood.rate_sd) ** -2.0
+        seen = collapsed.mean.T if prior else likelihood.rate_mean
         parts = (
-            weighted, energy, _precision(collapsed), likelihood.rate_mean, information, pull,
-            np.append(likelihood.data.ridge, np.full(3, weight)), start,
-            0.5 * np.sum(np.linalg.slogdet(information)[1]),
+            weighted, collapsed.energy, _precision(collapsed), likelihood.rate_mean, information,
+            seen, prior, np.append(likelihood.data.ridge, np.zeros(3)), start,
+            0.5 * np.sum(np.linalg.slogdet(information)[1]), np.array(spread, float),
         )  # fmt: skip
         data = MarginalData(*map(jnp.asarray, parts))
         if nodes is not None:

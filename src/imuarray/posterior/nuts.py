@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from tqdm import tqdm
 
 from imuarray.errors import InputError
-from imuarray.model.jax64 import jax, jnp
+from imuarray.model.jax64 import jax
 from imuarray.posterior.chains import Chains
 from imuarray.streams import stream
 
@@ -21,37 +22,58 @@ WHITE = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Whitened:
-    """theta = centre + factor z, and the density that z has."""
+class White(NamedTuple):
+    """theta = centre + factor z, and what the density of theta hangs on besides."""
 
-    log_density: object  # theta (size,) -> log density, traceable by JAX
     centre: np.ndarray
     factor: np.ndarray  # lower (size, size)
+    data: tuple
 
     def theta(self, z) -> np.ndarray:
         """theta (..., size) of z (..., size)."""
-        return self.centre + np.asarray(z) @ self.factor.T
+        return self.centre + z @ self.factor.T
 
     def white(self, theta) -> np.ndarray:
         """z (..., size) of theta (..., size)."""
         away = np.asarray(theta) - self.centre
         return np.linalg.solve(self.factor, away[..., None])[..., 0]
 
-    def potential(self, z):
-        """Minus the log density of z."""
-        return -self.log_density(jnp.asarray(self.centre) + jnp.asarray(self.factor) @ z)
+
+def _kernel(log_density, white: White):
+    """numpyro's (beginning, transition) on the density of z."""
+    from numpyro.infer.hmc import hmc
+
+    return hmc(lambda z: -log_density(white.theta(z), *white.data), algo="NUTS")
+
+
+@partial(jax.jit, static_argnums=(0, 1))
+def _begin(log_density, warmup, white, z, key):
+    return _kernel(log_density, white)[0](z, num_warmup=warmup, rng_key=key, **WHITE)
+
+
+@partial(jax.jit, static_argnums=(0, 1, 2))
+def _advance(log_density, warmup, block, white, state):
+    """A block of transitions; compiled once for each density, whatever its data."""
+    begin, advance = _kernel(log_density, white)
+    begin(state.z, num_warmup=warmup, rng_key=state.rng_key, **WHITE)  # tells it the warm-up
+
+    def one(state, _):
+        state = advance(state)
+        return state, (state.z, -state.potential_energy, state.accept_prob, state.diverging)
+
+    return jax.lax.scan(one, state, None, block)
 
 
 def run_nuts(
     log_density, centre, covariance, starts, warmup: int, draws: int, seed: int,
-    names=("nuts",), block: int = 100, quiet: bool = False,
+    names=("nuts",), block: int = 100, quiet: bool = False, data: tuple = (), threads: int = 2,
 ) -> Chains:  # fmt: skip
     """One chain from each of ``starts`` (chains, size), side by side.
 
     Parameters
     ----------
-    log_density : callable theta (size,) -> log density, traceable by JAX
+    log_density : callable (theta (size,), *data) -> log density, traceable by JAX
+        Compiled once for each such function and shapes of ``data``, pytrees of arrays.
     centre, covariance : (size,), (size, size)
         About the density's mode and the covariance there: what the sampler sees is then nearly
         a standard normal density.
@@ -63,38 +85,25 @@ def run_nuts(
     InputError
         A start where the density or its gradient is not finite.
     """
-    from numpyro.infer.hmc import hmc
-
-    white = Whitened(log_density, np.asarray(centre), np.linalg.cholesky(covariance))
+    white = White(np.asarray(centre), np.linalg.cholesky(covariance), data)
     starts = np.atleast_2d(np.asarray(starts, float))
-    values = jax.jit(jax.vmap(jax.value_and_grad(log_density)))(starts)
+    values = _values(log_density, starts, data)
     if not all(np.all(np.isfinite(part)) for part in values):
         raise InputError("nuts: expected a finite log density at every start, found none")
-    begin, advance = hmc(white.potential, algo="NUTS")
     keys = [
         jax.random.key_data(jax.random.key(int(stream(seed, *names, chain).integers(2**31))))
         for chain in range(len(starts))
     ]
-
-    @jax.jit
-    def first(z, key):
-        return begin(z, num_warmup=warmup, rng_key=key, **WHITE)
-
-    states = [first(jnp.asarray(z), key) for z, key in zip(white.white(starts), keys, strict=True)]
-
-    @jax.jit
-    def run(state):
-        def one(state, _):
-            state = advance(state)
-            return state, (state.z, -state.potential_energy, state.accept_prob, state.diverging)
-
-        return jax.lax.scan(one, state, None, block)
-
+    states = [
+        _begin(log_density, warmup, white, z, key)
+        for z, key in zip(white.white(starts), keys, strict=True)
+    ]
     kept = [[] for _ in starts]
     seldom = 0.2 if sys.stderr.isatty() else 15.0
     blocks = -(-(warmup + draws) // block)
+    run = partial(_advance, log_density, warmup, block, white)
     with (
-        ThreadPoolExecutor(len(starts)) as pool,
+        ThreadPoolExecutor(threads) as pool,
         tqdm(total=blocks * block, disable=quiet, unit="draw", mininterval=seldom) as bar,
     ):
         for _ in range(blocks):
@@ -106,39 +115,10 @@ def run_nuts(
     cut = slice(warmup, warmup + draws)
     z, log_target, accepted, lost = (np.stack(part)[:, cut] for part in zip(*joined, strict=True))
     step = float(np.mean([state.adapt_state.step_size for state in states]))
-    draws = white.theta(z)
-    return Chains(draws, log_target, accepted.mean(axis=1), 1, step, int(lost.sum()))
+    theta = np.asarray(white.theta(z))
+    return Chains(theta, log_target, accepted.mean(axis=1), 1, step, int(lost.sum()))
 
 
-def run_many(log_density, data, centres, factors, starts, warmup: int, draws: int, keys,
-             threads: int = 1) -> np.ndarray:  # fmt: skip
-    """One chain on each of many data sets of one shape, (sets, draws, size), compiled once.
-
-    ``log_density(theta, data)``; ``data``, a list of pytrees, ``centres`` and ``starts``
-    (sets, size), lower ``factors`` (sets, size, size) and ``keys``, one integer each, as
-    `run_nuts` has them for one.
-    """
-    from numpyro.infer.hmc import hmc
-
-    @jax.jit
-    def one(data, centre, factor, z, seed):
-        key = jax.random.key_data(jax.random.key(seed))
-        begin, advance = hmc(lambda z: -log_density(centre + factor @ z, data), algo="NUTS")
-        state = begin(z, num_warmup=warmup, rng_key=key, **WHITE)
-
-        def step(state, _):
-            state = advance(state)
-            return state, state.z
-
-        _, z = jax.lax.scan(step, state, None, warmup + draws)
-        return z[warmup:] @ factor.T + centre
-
-    whites = [
-        np.linalg.solve(factor, start - centre)
-        for start, centre, factor in zip(starts, centres, factors, strict=True)
-    ]
-    with ThreadPoolExecutor(threads) as pool:
-        made = pool.map(lambda job: np.asarray(one(*job)), zip(
-            data, centres, factors, whites, keys, strict=True
-        ))  # fmt: skip
-        return np.stack(list(made))
+@partial(jax.jit, static_argnums=0)
+def _values(log_density, starts, data):
+    return jax.vmap(jax.value_and_grad(lambda theta: log_density(theta, *data)))(starts)

@@ -102,12 +102,14 @@ class GenericTarget:
     """Any model: ``estimate(theta, rng)`` returns log p-hat; one Python step at a time.
 
     ``scale``, (size,) or a lower factor (size, size), turns the walk's one step length into a
-    step per parameter: effects have units of their own, and gauges that tie them together.
+    step per parameter: effects have units of their own, and gauges that tie them together. With
+    a ``centre`` (size,) proposals are those of `PreconditionedTarget`, ``scale`` their factor.
     """
 
     estimate: object
     prior: GaussianPrior
     scale: np.ndarray
+    centre: np.ndarray | None = None
 
     @property
     def size(self) -> int:
@@ -121,13 +123,21 @@ class GenericTarget:
     def _shaped(self, normals):
         return self.scale @ normals if self.scale.ndim == 2 else self.scale * normals
 
+    def _energy(self, theta) -> float:
+        """Minus the log of the normal density that proposals leave as it is."""
+        if self.centre is None:
+            return 0.0
+        return 0.5 * float(np.sum(np.linalg.solve(self.scale, theta - self.centre) ** 2))
+
     def transitions(self, theta, log_target, step, count, rng) -> tuple[int, float]:
         """`Target.transitions` in plain Python."""
-        accepted = 0
+        accepted, energy = 0, self._energy(theta)
         for _ in range(count):
             proposal = theta + step * self._shaped(rng.standard_normal(self.size))
-            value = self.log_target(proposal, rng)
-            if np.log(rng.random()) < value - log_target:
-                theta[:], log_target = proposal, value
+            if self.centre is not None:
+                proposal += (np.sqrt(1 - step**2) - 1) * (theta - self.centre)
+            value, moved = self.log_target(proposal, rng), self._energy(proposal)
+            if np.log(rng.random()) < value - log_target + moved - energy:
+                theta[:], log_target, energy = proposal, value, moved
                 accepted += 1
         return accepted, log_target

@@ -80,19 +80,33 @@ def tune_step(target: Target, start, steps, transitions: int, rng, aim=0.18, thr
 
 
 def tune_preconditioned(
-    likelihood: Likelihood, prior: GaussianPrior, centre, factor, lengths, rng
-) -> tuple[PreconditionedTarget, float]:
+    likelihood: Likelihood, prior: GaussianPrior, centre, factor, lengths, rng,
+    may_centre: bool = False,
+) -> tuple[PreconditionedTarget, float]:  # fmt: skip
     """(target, step) of preconditioned Crank-Nicolson proposals: N at the mode, the longest jumps.
 
     ``centre`` (P,) and ``factor`` (P, P) as in `PreconditionedTarget`; of the ``lengths`` that
-    with the largest expected squared jump.
+    with the largest expected squared jump. ``may_centre``: omega is drawn around the integrand's
+    mode where `tune` would do so.
     """
-    tried = Sweeps(lengths)
-    found = variance_sweep(likelihood, positions_of(centre), tried.draws, tried.realisations, rng)
+    tried, positions = Sweeps(lengths), positions_of(centre)
+
+    def variances(likelihood):
+        return variance_sweep(likelihood, positions, tried.draws, tried.realisations, rng)
+
+    found = variances(likelihood)
+    if may_centre and found.min() > 2 * tried.variance:
+        likelihood = likelihood.centred(positions)
+        found = variances(likelihood)
     draws = choose_draws(tried.draws, found, tried.variance)
     target = PreconditionedTarget(likelihood, prior, draws, centre, factor)
-    rates = acceptance_sweep(target, centre, lengths, tried.transitions, rng)
-    return target, float(lengths[np.argmax(rates * lengths**2)])
+    return target, longest_jump(target, centre, lengths, tried.transitions, rng)
+
+
+def longest_jump(target: Target, start, lengths, transitions: int, rng) -> float:
+    """Of the ``lengths`` that with the largest expected squared jump, from ``start`` (P,)."""
+    rates = acceptance_sweep(target, start, lengths, transitions, rng)
+    return float(lengths[np.argmax(rates * np.square(lengths))])
 
 
 def _each(function, jobs, threads: int) -> np.ndarray:

@@ -78,34 +78,36 @@ def _start(setting: Setting, one: Replicate, name: str) -> np.ndarray:
     return rng.multivariate_normal(one.mode, APART**2 * one.covariance)
 
 
+def _log_posterior(theta, data, nodes, weights, mean, sd):
+    """Of positions under the papers' model, to be traced by JAX."""
+    from imuarray.model.jax64 import jnp
+    from imuarray.posterior.marginal import log_marginal
+
+    positions = jnp.concatenate([jnp.zeros((1, 3)), theta.reshape(-1, 3)])
+    return log_marginal(positions, data, nodes, weights) - 0.5 * jnp.sum(((theta - mean) / sd) ** 2)
+
+
 def nuts(setting: Setting, made, threads: int = 1) -> Found:
     """By NUTS on the exact marginal likelihood."""
-    from imuarray.model.jax64 import jnp
-    from imuarray.posterior.marginal import Marginal, log_marginal
-    from imuarray.posterior.nuts import run_many
+    from imuarray.posterior.marginal import Marginal
+    from imuarray.posterior.nuts import run_nuts
 
     prior, name = setting.prior, "nuts"
-
-    def marginal(one, count=None):
-        return Marginal.of(one.likelihood, positions_of(one.mode), count)
-
-    first = marginal(replicate(setting, SPARE))
-    nodes, weights = first.nodes, first.log_weights
-    count = round(len(nodes) ** (1 / 3))
-    marginals = [marginal(one, count) for one in made]
-
-    def log_density(theta, data):
-        positions = jnp.concatenate([jnp.zeros((1, 3)), theta.reshape(-1, 3)])
-        off = (theta - prior.mean) / prior.sd
-        return log_marginal(positions, data, nodes, weights) - 0.5 * jnp.sum(off**2)
-
     where = setting.seed, "calibrated", name, setting.name, setting.samples
-    draws = run_many(
-        log_density, [m.data for m in marginals], [m.mode for m in made],
-        [np.linalg.cholesky(m.covariance) for m in made],
-        [_start(setting, one, name) for one in made], WARMUP, DRAWS * SPACING,
-        [int(stream(*where, one.number).integers(2**31)) for one in made], threads,
-    )  # fmt: skip
+
+    def chain(one):
+        found = Marginal.of(one.likelihood, positions_of(one.mode), count)
+        start = _start(setting, one, name)[None]
+        return run_nuts(
+            _log_posterior, one.mode, one.covariance, start, WARMUP, DRAWS * SPACING, setting.seed,
+            (*where[1:], one.number), WARMUP + DRAWS * SPACING, True,
+            (found.data, found.nodes, found.log_weights, prior.mean, prior.sd), 1,
+        ).draws[0]  # fmt: skip
+
+    pilot = replicate(setting, SPARE)
+    first = Marginal.of(pilot.likelihood, positions_of(pilot.mode))
+    count = round(len(first.nodes) ** (1 / 3))
+    draws = np.array(run_batches(chain, made, threads, True, name))
     kept = draws[:, SPACING - 1 :: SPACING]
     return of_draws(setting, made, kept, name), independent(kept)
 
