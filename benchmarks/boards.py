@@ -33,7 +33,7 @@ LINES = {
     "select": "select corrected.nc --samples 500 --out subset.nc",
     "calibrate": "calibrate subset.nc --out cal.nc",
     "whole": "calibrate corrected.nc --out cal.nc",
-    "sample": "sample subset.nc --method nuts --out posterior.nc",
+    "sample": "sample subset.nc --out posterior.nc",
     "apply": "apply cal.nc corrected.nc --out motion.nc",
     "diagnose": "diagnose corrected.nc --out diagnosis",
 }
@@ -72,8 +72,11 @@ def _calibrated(folder: Path, board: Board) -> dict[str, float]:
 
 def _sampled(folder: Path, board: Board) -> dict[str, float]:
     with xr.open_datatree(folder / "posterior.nc") as tree:
-        draws = tree["posterior"]["position"].to_numpy().reshape(-1, *board.truth.positions.shape)
-    return grade(draws.mean(axis=0), draws.std(axis=0), board.truth.positions)
+        draws = tree["posterior"]["position"].to_numpy()
+    draws = draws.reshape(-1, *draws.shape[2:])
+    first = np.zeros((1, 3))
+    mean, sds = (np.vstack([first, part]) for part in (draws.mean(axis=0), draws.std(axis=0)))
+    return grade(mean, sds, board.truth.positions)
 
 
 def _diagnosed(folder: Path, board: Board) -> dict[str, float]:

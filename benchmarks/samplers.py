@@ -22,7 +22,7 @@ import numpy as np
 from samplers_figure import CONVERGED, statistics
 from written import publish
 
-from imuarray.analysis.density import density_of
+from imuarray.analysis.density import posterior_of, traced
 from imuarray.analysis.model import model_of
 from imuarray.config import read_config
 from imuarray.geometry import positions_of
@@ -66,9 +66,9 @@ class Problem:
         self.samples = samples
         self.recording, _ = simulate_dataset(config, samples)
         self.model = model_of(self.recording)
-        self.log_density, self.prior, self.mode, self.covariance = density_of(
-            self.recording, self.model
-        )
+        found = posterior_of(self.recording, self.model, flat=True, known=(True, True))
+        self.log_density, self.data = traced(found)
+        self.prior, self.mode, self.covariance = found.prior, found.mode, found.covariance
         self.likelihood = Likelihood.of(
             self.model, self.recording.specific_force, self.recording.angular_rate
         )
@@ -155,7 +155,7 @@ def nuts_row(problem, rng) -> Row:
     chains, spent = timed(
         lambda: run_nuts(
             problem.log_density, problem.mode, problem.covariance, problem.starts(rng), 300, 1000,
-            1, quiet=True,
+            1, quiet=True, data=problem.data,
         )
     )  # fmt: skip
     return judged("NUTS, exact marginal, compilation included", problem, chains, spent, 0.0)
@@ -166,7 +166,7 @@ def emcee_row(problem, seconds, rng) -> Row:
     from imuarray.model.jax64 import jax
 
     size = problem.mode.size
-    density = jax.jit(jax.vmap(problem.log_density))
+    density = jax.jit(jax.vmap(lambda theta: problem.log_density(theta, *problem.data)))
     count = 4 * size
     density(np.tile(problem.mode, (count // 2, 1)))
     made, spent = timed(

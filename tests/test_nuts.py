@@ -8,7 +8,7 @@ import xarray as xr
 
 import imuarray
 import imuarray.estimation
-from imuarray.analysis.density import density_of
+from imuarray.analysis.density import posterior_of, traced
 from imuarray.analysis.model import model_of
 from imuarray.blind.cases import Case, make
 from imuarray.cli import main
@@ -90,18 +90,20 @@ def test_a_start_without_a_density_is_refused():
 
 
 def test_command(tmp_path):
-    """`imuarray sample --method nuts` writes what `--method pmmh` does."""
-    recording, _ = make(Case("nuts", duration=2.0), 1)
+    """`imuarray sample` as it is: the truth within the claimed widths, noise as it was made."""
+    recording, truth = make(Case("nuts", duration=2.0), 1)
     write_recording(recording, tmp_path / "rec.nc")
     out = tmp_path / "posterior.nc"
     code = main(
-        ["sample", str(tmp_path / "rec.nc"), "--method", "nuts", "--steps", "300", "--seed", "2",
-         "--quiet", "--out", str(out)]
+        ["sample", str(tmp_path / "rec.nc"), "--steps", "300", "--seed", "2", "--quiet",
+         "--out", str(out)]
     )  # fmt: skip
     assert code == 0
     with xr.open_datatree(out, engine="h5netcdf") as tree:
         assert tree.attrs["rhat_max"] < 1.05
         assert tree["posterior"]["position"].sizes["chain"] == 2
+        sd = tree["posterior"]["sd"].mean(("chain", "draw")).sel(quantity="accelerometer_noise")
+    assert float(sd) == pytest.approx(recording.accelerometer_noise_sd, rel=0.1)
 
 
 def test_a_chain_that_falls_into_the_flat_priors_hole_is_told():
@@ -113,7 +115,12 @@ def test_a_chain_that_falls_into_the_flat_priors_hole_is_told():
     recording, _ = imuarray.simulate(array, duration=5.0, sampling_rate=50.0, seed=1)
     said = []
     found = imuarray.sample(
-        imuarray.select(recording, 20), method="nuts", steps=100, seed=1, say=said.append
+        imuarray.select(recording, 20),
+        steps=100,
+        seed=1,
+        motion_prior="flat",
+        accelerometer_noise=0.04,
+        say=said.append,
     )
     assert found.attrs["on_a_line"] and not found.attrs["converged"]
     assert any("no bound" in text for text in said)
@@ -122,11 +129,11 @@ def test_a_chain_that_falls_into_the_flat_priors_hole_is_told():
 def test_a_mode_that_was_not_reached_is_told(monkeypatch):
     recording, _ = imuarray.simulate(imuarray.mimu4444(), duration=2.0, sampling_rate=50.0, seed=1)
     said: list[str] = []
-    density_of(recording, model_of(recording), say=said.append)
+    posterior_of(recording, model_of(recording), say=said.append)
     assert not said
     stopped = partial(imuarray.estimation.calibrate_gauss_newton, limit=1)
     monkeypatch.setattr(imuarray.estimation, "calibrate_gauss_newton", stopped)
-    density_of(recording, model_of(recording), say=said.append)
+    posterior_of(recording, model_of(recording), say=said.append)
     (text,) = said
     assert "did not converge" in text
 
@@ -136,13 +143,14 @@ def test_the_density_has_no_bound_towards_triads_on_one_line():
     array = sub_array(imuarray.mimu4444(), 4)
     recording, _ = imuarray.simulate(array, duration=5.0, sampling_rate=50.0, seed=1)
     recording = imuarray.select(recording, 20)
-    log_density, _, mode, _ = density_of(recording, model_of(recording))
-    positions = positions_of(mode)
+    posterior = posterior_of(recording, model_of(recording), flat=True)
+    log_density, data = traced(posterior)
+    positions = positions_of(posterior.mode)
     centred = positions - positions.mean(axis=0)
     along = np.linalg.svd(centred)[2][0]
     line = centred @ np.outer(along, along)
     values = [
-        float(log_density((d * positions + (1 - d) * (line - line[0]))[1:].ravel()))
+        float(log_density((d * positions + (1 - d) * (line - line[0]))[1:].ravel(), *data))
         for d in (1e-3, 1e-4)
     ]
     assert values[1] - values[0] == pytest.approx(20 * np.log(10), abs=1.0)

@@ -209,16 +209,17 @@ class Marginal:
 
     @classmethod
     def of(
-        cls, likelihood: Likelihood, positions, nodes: int | None = None, spread=(0.0, 0)
-    ) -> Marginal:
+        cls, likelihood: Likelihood, positions, nodes: int | None = None, spread=(0.0, 0),
+        enough: float = ENOUGH,
+    ) -> Marginal:  # fmt: skip
         """Of the same recording as a `Likelihood`; modes are searched from those at ``positions``.
 
         Parameters
         ----------
         nodes : int
             On each axis of omega; 1 is Laplace's method. By default the fewest of `NODE_COUNTS`
-            that differ by less than 1e-4 nats in total from the next at ``positions``, or the most:
-            ``gap`` says. Two poor gyroscopes already need more than three (tests).
+            that differ by less than ``enough`` nats in total from the next at ``positions``, or
+            the most: ``gap`` says. Two poor gyroscopes already need more than three (tests).
         spread : (float, int)
             Chi-square of the gyroscopes about their mean and the number of their readings, which
             `scaled` needs.
@@ -244,7 +245,7 @@ class Marginal:
         for count in NODE_COUNTS[1:]:
             finer = cls(data, *grid(count))
             gap, value = abs(value - finer(positions)), finer(positions)
-            if gap < ENOUGH:
+            if gap < enough:
                 return replace(coarser, gap=gap)
             coarser = finer
         return replace(coarser, gap=gap)
