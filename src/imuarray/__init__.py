@@ -6,7 +6,7 @@ In a notebook::
 
     recording = imuarray.read_recording("rec.nc")
     calibration = imuarray.calibrate(recording)
-    posterior = imuarray.sample(recording, method="nuts")
+    posterior = imuarray.sample(recording)
     diagnosis = imuarray.diagnose(recording)
     imuarray.plots.positions(calibration)
 

@@ -34,7 +34,10 @@ def _file(name: str, help: str, type=InputFile, **given: Any) -> Option:
 RECORDING = _option("recording", "NetCDF-4 recording to read", type=InputFile)
 SEED = _number("--seed", "S", "of the random numbers (default: 0)", 0, seed)
 NOISE = _number(
-    "--accelerometer-noise", "SD", "assumed sd, m/s^2 (default: as the recording declares)"
+    "--accelerometer-noise",
+    "SD",
+    "assumed sd, m/s^2 (default: estimated, under the papers' model"
+    " of calibrate as the recording declares)",
 )
 EFFECT_FILE = _file(
     "--effect-file", "Python file with effects of your own, which is run: they join the catalogue;"
