@@ -152,7 +152,7 @@ def _fit(recording: Recording) -> Callable:
     """
     from imuarray.estimation import calibrate_gauss_newton
 
-    last = []
+    last: list[np.ndarray] = []
 
     def search(model, start):
         return calibrate_gauss_newton(
@@ -205,9 +205,9 @@ def traced(posterior: Posterior, rates: str = "declared", say: Say = silent):
     """(log density, data): a function of theta (P,) and of arrays, to be compiled by JAX."""
     prior = posterior.prior
     if posterior.model.effects:
-        likelihood = posterior.generic()
-        function = log_extended(posterior.model, likelihood.steps)
-        return function, (likelihood.data, prior.mean, prior.sd)
+        generic = posterior.generic()
+        function = log_extended(posterior.model, generic.steps)
+        return function, (generic.data, prior.mean, prior.sd)
     from imuarray.posterior.marginal import Marginal
 
     recording = posterior.recording
@@ -246,20 +246,13 @@ def tuned_target(posterior: Posterior, method: str, rates: str, rng, say: Say = 
     N and the walk's length as in section III-C; where not even the largest N brings the variance of
     log p-hat near what is aimed at, omega is drawn around the integrand's mode.
     """
-    prior, mode, pcn = posterior.prior, posterior.mode, method == "pcn"
-    shape = np.linalg.cholesky(posterior.covariance)
     if posterior.model.effects:
-        estimate = posterior.generic()
-        target = GenericTarget(estimate, prior, shape, mode if pcn else None)
-        tuned, steps = (
-            (tuning.longest_jump, LENGTHS) if pcn
-            else (tuning.tune_step, np.geomspace(1e-3, 1.0, 8))
-        )  # fmt: skip
-        return target, tuned(target, mode, steps, 200, rng), estimate.draws
-    likelihood = posterior.likelihood(rates)
-    if pcn:
+        return _tuned_generic(posterior, method == "pcn", rng)
+    prior, mode, likelihood = posterior.prior, posterior.mode, posterior.likelihood(rates)
+    if method == "pcn":
+        factor = WIDER * np.linalg.cholesky(posterior.covariance)
         target, step = tuning.tune_preconditioned(
-            likelihood, prior, mode, WIDER * shape, LENGTHS, rng, may_centre=True
+            likelihood, prior, mode, factor, LENGTHS, rng, may_centre=True
         )
         return target, step, target.draws
     sweeps = tuning.Sweeps(posterior.recording.position_prior_sd * np.geomspace(1e-6, 0.3, 16))
@@ -270,3 +263,14 @@ def tuned_target(posterior: Posterior, method: str, rates: str, rng, say: Say = 
         say(f"variance of log p-hat {found.variances[-1]:.3g} at N = {sweeps.draws[-1]}: omega is"
             " drawn around the integrand's mode instead")  # fmt: skip
     return found.target, found.step, found.target.draws
+
+
+def _tuned_generic(posterior: Posterior, pcn: bool, rng):
+    """The same for a model with effects: Laplace-centred importance sampling of omega."""
+    estimate, mode = posterior.generic(), posterior.mode
+    shape = np.linalg.cholesky(posterior.covariance)
+    target = GenericTarget(estimate, posterior.prior, shape, mode if pcn else None)
+    if pcn:
+        return target, tuning.longest_jump(target, mode, LENGTHS, 200, rng), estimate.draws
+    steps = np.geomspace(1e-3, 1.0, 8)
+    return target, tuning.tune_step(target, mode, steps, 200, rng), estimate.draws

@@ -10,6 +10,7 @@ import numpy as np
 
 from imuarray.analysis.model import Say, silent
 from imuarray.estimation import blocks
+from imuarray.estimation.bcd import Calibration
 from imuarray.model import ArrayModel, Noise
 from imuarray.model.jax64 import jax, jnp
 from imuarray.model.small_linear import cholesky, solve_lower
@@ -24,7 +25,7 @@ class Fitted(NamedTuple):
     """A fit at the noise that it shows."""
 
     model: ArrayModel  # with that noise
-    calibration: object  # `Calibration`
+    calibration: Calibration
     motion_sd: np.ndarray  # (3,) of omega, omega_dot, s: what is not noise of their estimates
     freedom: np.ndarray  # (2,) degrees that the two kinds of noise rest on
 

@@ -139,8 +139,10 @@ def sample(
         if not flat:
             raise InputError("--rates spread: expected --motion-prior flat with it, found proper")
         recording = _off_rails(recording, say)
-    known = accelerometer_noise is not None or diagnosis is not None, diagnosis is not None
-    posterior = posterior_of(recording, model, flat, rates, known, say)
+    given = diagnosis is not None
+    posterior = posterior_of(
+        recording, model, flat, rates, (given or accelerometer_noise is not None, given), say
+    )
     pull = shrinkage(posterior) if flat else 0.0
     if flat:
         say(f"the flat motion prior makes the array {pull:.1f} posterior sds smaller than it is"
