@@ -67,6 +67,14 @@ def test_dead_channels_are_named(recording, case):
     assert dead(changed(recording, name, change)) == expected
 
 
+def test_a_channel_that_is_dead_while_the_array_turns(recording):
+    """At rest a coarse reading may well be constant: `apply` takes such recordings."""
+    name, change, expected = DEAD["an axis of zeros"]
+    assert repeated(changed(recording, name, change)) == expected
+    at_rest = recording.select(slice(0, 40))
+    assert repeated(at_rest) == [] and dead(at_rest)
+
+
 def test_live_channels_are_not_named(recording):
     assert dead(recording) == [] and repeated(recording) == []
     at_rail = changed(recording, "angular_rate", assign((ALL, 1, 1), recording.gyroscope_range))

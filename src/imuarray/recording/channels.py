@@ -55,15 +55,16 @@ def dead(recording: Recording) -> list[str]:
 
 
 def repeated(recording: Recording) -> list[str]:
-    """A sentence for each triad that repeats its readings, and for a log that is there twice.
+    """A sentence for each channel that is dead or held while the array turns, and for a log that
+    is there twice.
 
-    Both leave an answer, with intervals that are too narrow. Only turning samples count.
+    They leave an answer, off or with intervals that are too narrow.
     """
     turning = _turning(recording)
     if turning.sum() < LEAST:
         return []
     held = [sentence for kind in _KINDS for sentence in _held(recording, kind, turning)]
-    return held + _twice(recording, turning)
+    return dead(recording.select(turning)) + held + _twice(recording, turning)
 
 
 def _readings(recording: Recording, kind: str):
