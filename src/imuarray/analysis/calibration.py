@@ -78,6 +78,8 @@ def calibrate(
         dataset = _papers(recordings[0], method or "bcd", accelerometer_noise, say)
     else:
         dataset = _engine(recordings, str(model), tuple(effects), say)
+    if not all(np.isfinite(dataset[f"position{name}"]).all() for name in ("", "_covariance")):
+        raise InputError("recording: expected one that determines the positions, found no solution")
     data = [part for one in recordings for part in (one.specific_force, one.angular_rate)]
     dataset.attrs |= {"model": str(model), **stamp({"recording": digest(*data)}, 0)}
     return dataset
