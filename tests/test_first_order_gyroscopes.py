@@ -1,16 +1,18 @@
 """Gyroscopes from still poses and moves: known maps, mistakes by name, what is skipped and said."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import rq
 
 from benchmarks.board import GRAVITY, Options, draw_board, draw_hand
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.firstorder import calibrate_first_order, correct, still_poses
 from imuarray.firstorder.moves import Move, _carried, _to_end, common_map
-from imuarray.firstorder.report import gyroscope_lines, parameter_table
+from imuarray.firstorder.report import gyroscope_lines, parameter_table, turned_lines
 from imuarray.recording import read_recording, write_recording
 from imuarray.recording.format import load_dataset
 
@@ -203,6 +205,29 @@ def test_a_turned_triads_rails_show_in_all_its_axes(recording):
     recording.angular_rate[50, [0, 3], 0] = recording.gyroscope_range
     rails = correct(recording, found).saturated_gyroscopes()
     assert rails[50].sum(axis=1).tolist() == [1, 0, 0, 3] and rails.sum() == 4
+
+
+@pytest.mark.parametrize("first", [False, True])
+def test_a_turned_imu_is_named_and_the_drawing_follows_the_first(first):
+    """The turned one is the last, or the same recording's first."""
+    board = draw_board(6, replace(SHORT, turned=37.0))
+    order, recording = ([3, 0, 1, 2] if first else range(4)), board.recording()
+    labels = tuple(recording.accelerometer_labels[k] for k in order)
+    recording = replace(
+        recording, specific_force=recording.specific_force[:, order],
+        angular_rate=recording.angular_rate[:, order], accelerometer_labels=labels,
+        accelerometer_position=recording.accelerometer_position[order], gyroscope_labels=labels,
+    )  # fmt: skip
+    found = calibrate_first_order(recording, GRAVITY)
+    said = turned_lines(found, recording)
+    # mounts and skews are off by some half a degree themselves
+    assert re.fullmatch(r"IMU 4 is turned by 3[678]\.\d degrees", said[0])
+    assert said[1:] == (["the drawing was turned into the axes of IMU 4"] if first else [])
+    upper, rotation = rq(board.truth.accelerometers[3])
+    turn = np.sign(np.diag(upper))[:, None] * rotation if first else np.eye(3)
+    expected = board.drawing[order] @ turn.T
+    drawing = correct(recording, found).accelerometer_position
+    np.testing.assert_allclose(drawing, expected, atol=6e-4)  # two degrees of 20 mm
 
 
 @pytest.mark.parametrize(("still", "count"), [(3.1, 12), (2.3, 0)])

@@ -11,6 +11,7 @@ from imuarray.firstorder.allan import lag_correlation, white_noise_sd
 from imuarray.firstorder.gyroscopes import Gyroscopes, calibrate_gyroscopes
 from imuarray.firstorder.still import SHORTEST, still_poses
 from imuarray.firstorder.triads import TriadFit, fit_triads
+from imuarray.firstorder.turns import nearest_orthogonal, shared_turn
 from imuarray.recording import Recording
 from imuarray.recording.channels import require_live
 
@@ -55,6 +56,14 @@ class FirstOrder:
         if self.gyroscopes is not None:
             return self.gyroscopes.matrix
         return np.broadcast_to(np.eye(3), (len(self.gyroscope_offset), 3, 3))
+
+    @property
+    def drawing_turn(self) -> np.ndarray:
+        """From the first IMU's axes to those that most of the others share, (3, 3).
+
+        The identity but where it is the first that is turned, by more than a mount is off.
+        """
+        return shared_turn(nearest_orthogonal(self.triads.matrix))
 
     @property
     def common_scale_sd(self) -> float:
@@ -106,7 +115,8 @@ def correct(recording: Recording, found: FirstOrder) -> Recording:
     """The recording with offsets and maps, of gyroscopes as far as they are known, taken out.
 
     Which readings were at a rail is kept as masks, as the corrected values no longer show it;
-    the declared noise becomes the pooled noise found, the still poses become ``stationary``.
+    the declared noise becomes the pooled noise found, the still poses become ``stationary``. All
+    is in the axes of the first accelerometer, the drawing too.
     """
     force, force_rails = _corrected(
         found.triads.matrix, recording.specific_force - found.triads.offset,
@@ -123,6 +133,7 @@ def correct(recording: Recording, found: FirstOrder) -> Recording:
         recording,
         specific_force=force,
         angular_rate=rate,
+        accelerometer_position=recording.accelerometer_position @ found.drawing_turn,
         accelerometer_noise_sd=_noise(found.triads.matrix, found.accelerometer_noise),
         gyroscope_noise_sd=_noise(maps, found.gyroscope_noise),
         accelerometer_range=_nearest_rail(

@@ -10,7 +10,7 @@ from imuarray.firstorder.allan import allan_deviation
 from imuarray.firstorder.correct import FirstOrder
 from imuarray.firstorder.gyroscopes import Gyroscopes
 from imuarray.firstorder.triads import parts_of, parts_sd_of
-from imuarray.firstorder.turns import angle_of, nearest_orthogonal
+from imuarray.firstorder.turns import TURNED, angle_of, nearest_orthogonal
 from imuarray.recording import Recording
 
 MISALIGNMENT = ("xy", "xz", "yz")
@@ -18,7 +18,6 @@ SENSORS = {"specific_force": "accelerometer", "angular_rate": "gyroscope"}
 
 
 UNITS = {"scale": "1", "misalignment": "1", "orientation": "rad"}
-TURNED = np.radians(5.0)  # more than a mount is off by accident
 
 
 def parameter_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
@@ -83,14 +82,17 @@ def gyroscope_lines(maps: Gyroscopes | None, recording: Recording) -> list[str]:
 
 
 def turned_lines(found: FirstOrder, recording: Recording) -> list[str]:
-    """One line for each IMU that is turned against the first by more than a mount's error."""
-    angles = angle_of(nearest_orthogonal(found.triads.matrix))
-    return [
-        f"IMU {label} is turned against IMU {recording.accelerometer_labels[0]} by"
-        f" {np.degrees(angle):.1f} degrees"
-        for label, angle in zip(recording.accelerometer_labels, angles, strict=True)
+    """One line for each IMU that is turned against the others by more than a mount's error."""
+    against, labels = found.drawing_turn, recording.accelerometer_labels
+    angles = angle_of(nearest_orthogonal(found.triads.matrix) @ against.T)
+    lines = [
+        f"IMU {label} is turned by {np.degrees(angle):.1f} degrees"
+        for label, angle in zip(labels, angles, strict=True)
         if angle > TURNED
     ]
+    if angle_of(against) > TURNED:
+        lines.append(f"the drawing was turned into the axes of IMU {labels[0]}")
+    return lines
 
 
 def residual_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:

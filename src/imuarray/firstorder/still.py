@@ -115,7 +115,7 @@ def _quiet(recording: Recording, width: int) -> np.ndarray:
             raise InputError(
                 f"recording: expected still poses for the first-order calibration, found {name}"
                 f" to vary by {floor:.3g} in its quietest second, more than {MOVING:g} times the"
-                f" declared noise of {declared:.3g}"
+                f" declared noise of {declared:.3g}; was it never still, or is the unit wrong?"
             )
         still &= spread <= THRESHOLD * max(floor, 0.1 * declared / np.sqrt(readings.shape[1]))
     return still

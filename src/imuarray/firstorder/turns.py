@@ -6,6 +6,8 @@ import numpy as np
 
 from imuarray.errors import InputError
 
+TURNED = np.radians(5.0)  # more than a mount is off by accident
+
 
 def nearest_orthogonal(matrix) -> np.ndarray:
     """Polar factors of matrices (..., 3, 3): rotations, or reflections where det < 0."""
@@ -44,6 +46,15 @@ def require_rotations(maps, labels, kind: str) -> None:
         f"{kind} {labels[k]!r}: expected right-handed axes, found those of a mirror image; is the"
         f" sign of its {axis} axis wrong?"
     )
+
+
+def shared_turn(rotations) -> np.ndarray:
+    """The one of rotations (K, 3, 3) that more than half of them agree with, or the identity."""
+    apart = angle_of(np.swapaxes(rotations, 1, 2)[:, None] @ rotations)
+    agree = (apart < TURNED).sum(axis=1)
+    most = int(np.argmax(agree))
+    common = 2 * agree[most] > len(rotations) and angle_of(rotations[most]) > TURNED
+    return rotations[most] if common else np.eye(3)
 
 
 def angle_of(rotations) -> np.ndarray:
