@@ -176,6 +176,10 @@ MIRRORED = (
     "the gyroscopes turn the other way round than the accelerometers: left-handed axes (one axis of"
     " both kinds flipped), or all rates of the wrong sign"
 )
+WRONG_SIGN = (
+    "specific force of the wrong sign (gravity's instead of minus gravity's), or a flat board's"
+    " axes turned by 180 degrees"
+)
 LIKE = 0.1  # of one: a slope that a factor makes so is right
 FACTORS = (  # of time, force, rates, positions, to undo a mistake
     ((1, 1, DEGREE, 1), "all rates are 57.3 times too small: in rad/s declared deg/s"),
@@ -183,6 +187,7 @@ FACTORS = (  # of time, force, rates, positions, to undo a mistake
     ((1, G, 1, 1), "specific force is 9.81 times too small: in g declared m/s^2"),
     ((1, 1, 1, 1e-3), "nominal positions are 1000 times too large: in mm declared m"),
     ((1, 1, 1, 1e3), "nominal positions are 1000 times too small: in m declared mm"),
+    ((1, -1, 1, 1), WRONG_SIGN),
     ((1e-3, 1, 1, 1), "time is 1000 times too long: in ms declared s"),
 )
 SIGNS = [np.array(signs) for signs in product((1, -1), repeat=3)][1:]
@@ -196,21 +201,21 @@ def common(recording: Recording) -> list[str]:
     """
     rate = np.median(recording.angular_rate, axis=1)
 
-    def fits(time, force, rates, places) -> bool:
+    def misfit(time, force, rates, places) -> float:
         motion = turning(
             force * recording.specific_force, rate * rates, places * recording.relative_positions()
         )
         found = slope(time * recording.time, motion)
         if found is None or found.correlation < COHERENT:
-            return False
-        return max(abs(found.low - 1), abs(found.high - 1)) < LIKE + found.coarse
+            return np.inf
+        return max(abs(found.low - 1), abs(found.high - 1)) - found.coarse
 
-    if fits(1, 1, 1, 1):
+    if misfit(1, 1, 1, 1) < LIKE:
         return []
-    for factors, words in FACTORS:
-        if fits(*factors):
-            return [words]
-    return next((_wrong_signs(signs) for signs in SIGNS if fits(1, 1, signs, 1)), [])
+    tried = [(misfit(*factors), [words]) for factors, words in FACTORS]
+    tried += [(misfit(1, 1, signs, 1), _wrong_signs(signs)) for signs in SIGNS]
+    least, words = min(tried)
+    return words if least < LIKE else []
 
 
 def _wrong_signs(signs) -> list[str]:
