@@ -38,6 +38,7 @@ def assign(index, value):
 
 
 ALL = slice(None)
+TURN = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
 DEAD = {
     "a constant axis": (
         "specific_force", assign((ALL, 1, 2), 9.8),
@@ -53,6 +54,14 @@ DEAD = {
     "a triad twice, its axes named anew": (
         "specific_force", assign((ALL, 3), lambda x: x[:, 0][:, [1, 0, 2]] * [-1, -1, -1]),
         ["accelerometer '4' reads what '1' reads"],
+    ),
+    "a triad twice, turned and scaled": (
+        "angular_rate", assign((ALL, 3), lambda x: x[:, 1] @ TURN * 1.01 + 0.1),
+        ["gyroscope 'g3' reads what 'g1' reads"],
+    ),
+    "an axis with noise in its last digit only": (
+        "angular_rate", assign((ALL, 2, 1), np.arange(200) % 3 * 0.01),
+        ["gyroscope 'g2', axis y: 3 values in all samples"],
     ),
     "an axis twice": (
         "angular_rate", assign((ALL, 2, 1), lambda x: x[:, 0, 2]),

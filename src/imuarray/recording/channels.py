@@ -1,6 +1,6 @@
 """Channels that cannot be what a live sensor reads: constant, copied, held, recorded twice.
 
-Exact equality tells: while an array turns, noise does not repeat a reading of three axes for long.
+Equality tells: while an array turns, noise does not repeat a reading of three axes for long.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ LEAST = 10  # samples below which equal readings may be chance
 TURNING = 0.2  # rad/s; at rest, coarse readings do repeat
 HELD = 0.3  # share of repeated readings; a sensor of half the rate, filled up, has 0.5
 FROZEN = 20  # readings in a row
+COARSE, MANY = 3, 100  # values of a dead axis that flickers, in at least so many samples
+ALIKE = 1e-6  # share of a triad's readings that is its own; noise is 2e-5 of a MEMS sensor's range
 _KINDS = {"accelerometer": "specific_force", "gyroscope": "angular_rate"}
 
 
@@ -44,7 +46,7 @@ def require_apart(recordings: Sequence[Recording]) -> None:
 
 
 def dead(recording: Recording) -> list[str]:
-    """A sentence for each axis that never changes, and for each triad or axis that is a copy."""
+    """A sentence for each axis that hardly changes, and for each triad or axis that is a copy."""
     if len(recording.time) < LEAST:
         return []
     return [
@@ -77,35 +79,67 @@ def _readings(recording: Recording, kind: str):
 
 def _constant(recording: Recording, kind: str) -> list[str]:
     values, labels, railed = _readings(recording, kind)
-    still = (np.ptp(values, axis=0) == 0) & ~railed.all(axis=0)
+    count = _different(values)
+    least = np.where(len(values) < MANY, 1, COARSE)
     return [
-        f"{kind} {labels[k]!r}, axis {AXES[axis]}: {values[0, k, axis]:g} in all samples"
-        for k, axis in np.argwhere(still)
+        f"{kind} {labels[k]!r}, axis {AXES[axis]}: "
+        + (f"{values[0, k, axis]:g}" if count[k, axis] == 1 else f"{count[k, axis]} values")
+        + " in all samples"
+        for k, axis in np.argwhere((count <= least) & ~railed.all(axis=0))
     ]
 
 
+def _different(values) -> np.ndarray:
+    """(K, 3) how many different values each axis has, at most one more than `COARSE`."""
+    count, left = np.zeros(values.shape[1:], int), np.ones(values.shape, bool)
+    for _ in range(COARSE + 1):
+        count += left.any(axis=0)
+        first = np.take_along_axis(values, left.argmax(axis=0)[None], axis=0)
+        left &= values != first
+    return count
+
+
 def _copied(recording: Recording, kind: str) -> list[str]:
-    """Equal columns up to their sign, as axes that are named anew have; whole triads first."""
+    """Triads that are another's up to turn and scale, and single axes up to their sign."""
     values, labels, railed = _readings(recording, kind)
+    live = (~railed).sum(axis=0) >= LEAST
+    source = _source(values, live.all(axis=1))
+    found = [
+        f"{kind} {label!r} reads what {labels[source[k]]!r} reads"
+        for k, label in enumerate(labels) if source[k] >= 0
+    ]  # fmt: skip
     columns = values.reshape(len(values), -1).T
     marks = _marks(columns * np.where(columns[:, :1] < 0, -1.0, 1.0) + 0.0)
-    other = (np.ptp(columns, axis=1) == 0) | ((~railed).sum(axis=0).ravel() < LEAST)
-    marks[other] = np.arange(1, 1 + other.sum())  # alike for another reason
+    other = (np.ptp(columns, axis=1) == 0) | ~live.ravel() | np.repeat(source >= 0, 3)
+    marks[other] = np.arange(1, 1 + other.sum())  # named already, or alike for another reason
     first: dict[int, int] = {}
     of = [first.setdefault(int(mark), place) for place, mark in enumerate(marks)]
-    found = []
-    for k, label in enumerate(labels):
-        own = [(axis, of[3 * k + axis]) for axis in range(3) if of[3 * k + axis] != 3 * k + axis]
-        others = {place // 3 for _, place in own}
-        if len(own) == 3 and len(others) == 1 and others != {k}:
-            found.append(f"{kind} {label!r} reads what {labels[others.pop()]!r} reads")
+    return found + [
+        f"{kind} {labels[place // 3]!r}, axis {AXES[place % 3]}, reads what"
+        f" {labels[same // 3]!r}, axis {AXES[same % 3]}, reads"
+        for place, same in enumerate(of)
+        if same != place
+    ]
+
+
+def _source(values, live) -> np.ndarray:
+    """(K,) the first triad of which each is a linear copy, or -1; only of ``live`` (K,) ones."""
+    count, source = values.shape[1], np.full(values.shape[1], -1)
+    columns = values.reshape(len(values), -1)
+    columns = columns - columns.mean(axis=0)
+    size = np.sqrt(np.mean(columns**2, axis=0))
+    columns = columns / np.where(size > 0, size, 1.0)
+    gram = (columns.T @ columns / len(columns)).reshape(count, 3, count, 3).swapaxes(1, 2)
+    live = live & (size.reshape(count, 3) > 0).all(axis=1)
+    for i in range(count):
+        later = np.flatnonzero(live & (source < 0))
+        later = later[later > i]
+        if not live[i] or source[i] >= 0 or not later.size or np.linalg.cond(gram[i, i]) > 1e6:
             continue
-        found += [
-            f"{kind} {label!r}, axis {AXES[axis]}, reads what {labels[place // 3]!r}, axis"
-            f" {AXES[place % 3]}, reads"
-            for axis, place in own
-        ]
-    return found
+        told = gram[later, i] @ np.linalg.solve(gram[i, i], gram[i, later])
+        left = 1.0 - np.einsum("jaa->ja", told)
+        source[later[(left < ALIKE**2).all(axis=1)]] = i
+    return source
 
 
 def _held(recording: Recording, kind: str, turning) -> list[str]:
