@@ -5,7 +5,9 @@ from job import job
 with job(snakemake) as settings:
     import pandas as pd
 
+    import imuarray
     from imuarray.provenance import write_csv
+    from imuarray.studies import by_default
     from imuarray.studies.batches import share
     from imuarray.studies.pit import METHODS
     from imuarray.studies.sbc import ML_MORE, pit_values
@@ -14,10 +16,18 @@ with job(snakemake) as settings:
     chosen = snakemake.wildcards
     setting = setting_from(settings, chosen.setting, int(chosen.samples))
     count = settings["scale"]["validation_replicates"]
-    place = int(chosen.part), snakemake.params.parts
-    samplers = [method for method in METHODS if method != "ML"]
-    tables = [
-        pit_values(setting, share(range(ML_MORE * count), *place), snakemake.threads, ["ML"]),
-        pit_values(setting, share(range(count), *place), snakemake.threads, samplers),
-    ]
-    write_csv(pd.concat(tables), snakemake.output[0])
+    place, threads = (int(chosen.part), snakemake.params.parts), snakemake.threads
+    asked = settings["validation"]["settings"][chosen.setting]
+    few = share(range(max(2, round(count * asked.get("share", 1.0)))), *place)
+    if asked.get("command", False):
+        table = by_default.pit_values(setting, few, imuarray.sample, threads)
+    else:
+        samplers = [method for method in METHODS if method != "ML"]
+        many = share(range(ML_MORE * count), *place)
+        table = pd.concat(
+            [
+                pit_values(setting, many, threads, ["ML"]),
+                pit_values(setting, few, threads, samplers),
+            ]
+        )
+    write_csv(table, snakemake.output[0])

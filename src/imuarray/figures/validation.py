@@ -34,7 +34,8 @@ COVERAGE = (
     Column("apart", "farthest from NUTS", "from NUTS", "{:.2f}"),
 )
 COVERAGE_NOTE = (
-    "Truths drawn from the prior, motion from its own, which the samplers know (the paper's limit"
+    "Truths drawn from the prior, motion from its own, which the samplers know, but 'sample', which"
+    " is the command as it is: to it the noise and the motion's size are unknown (the paper's limit"
     " of a flat motion prior cannot be simulated; docs/findings.md says what it does to the array's"
     " size). ±: standard errors over replicates."
     " Scores: normal quantiles of the truth's PIT value; a mean square above 1 (z > 0) means widths"

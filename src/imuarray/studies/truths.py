@@ -46,8 +46,9 @@ def setting_from(settings: dict, name: str, samples: int) -> Setting:
     noise = {**settings["noise"], **chosen}
     array = sub_array(model_from(settings).array, chosen["triads"])
     model = ArrayModel.isotropic(
-        array, noise["accelerometer_sd"], np.radians(noise["gyroscope_sd_dps"])
-    )
+        array, noise["accelerometer_sd"], np.radians(noise["gyroscope_sd_dps"]),
+        chosen.get("effects", ()),
+    )  # fmt: skip
     motion = (
         np.radians(paper["angular_rate_sd_dps"]), np.radians(paper["angular_acceleration_sd_dps2"]),
         paper["specific_force_sd"],
