@@ -1,15 +1,18 @@
 """Are the uncertainties right? `snakemake validate`, small, and proof that it can fail."""
 
+from functools import partial
+
 import numpy as np
 import pandas as pd
 import pytest
 
+import imuarray
 from imuarray.config import read_config
 from imuarray.estimation.newton import fisher_scoring
 from imuarray.figures import validation
 from imuarray.geometry import positions_of, sub_array
 from imuarray.posterior.likelihood import Likelihood
-from imuarray.studies import joint, sbc, truths
+from imuarray.studies import by_default, joint, sbc, truths
 from imuarray.studies.sbc import METHODS, coverage
 from imuarray.studies.truths import setting_from
 from tests.test_pipeline import ROOT
@@ -48,6 +51,18 @@ def test_widths_that_are_wrong_are_seen(monkeypatch, factor):
     monkeypatch.setattr(truths, "measure", measured)
     values = sbc.pit_values(setting(), range(60), methods=["PmMH, pCN"])
     assert np.sign(np.log(factor)) * coverage(values).width_z[0] > 5
+
+
+def test_the_command_as_it_is_needs_neither_the_noise_nor_the_motions_size():
+    """20 truths; told half of the noise, its intervals are too narrow, and that is seen."""
+    values = by_default.pit_values(setting("default"), range(20), imuarray.sample)
+    assert len(values) == 20 * 10
+    row = coverage(values).iloc[0]
+    assert row.p > 1e-3 and row.none == row.slow == 0
+    assert np.all(np.abs(row[["shift_z", "width_z", "size_z"]].astype(float)) < 4)
+    told = partial(imuarray.sample, accelerometer_noise=0.02)
+    narrow = by_default.pit_values(setting("default"), range(20), told)
+    assert coverage(narrow).width_z[0] > 3
 
 
 def test_pit_values_are_uniform_where_data_tell_little():
