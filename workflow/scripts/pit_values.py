@@ -5,7 +5,7 @@ from job import job
 with job(snakemake) as settings:
     import pandas as pd
 
-    import imuarray
+    from imuarray.analysis.sampling import sample
     from imuarray.provenance import write_csv
     from imuarray.studies import by_default
     from imuarray.studies.batches import share
@@ -20,7 +20,7 @@ with job(snakemake) as settings:
     asked = settings["validation"]["settings"][chosen.setting]
     few = share(range(max(2, round(count * asked.get("share", 1.0)))), *place)
     if asked.get("command", False):
-        table = by_default.pit_values(setting, few, imuarray.sample, threads)
+        table = by_default.pit_values(setting, few, sample, threads)
     else:
         samplers = [method for method in METHODS if method != "ML"]
         many = share(range(ML_MORE * count), *place)
