@@ -301,6 +301,10 @@ def test_a_posterior(sound):
     assert "gyroscope 3 does not fit the others" in said
     assert trust.reasons_of_posterior(noisy, posterior_of(found), rates="spread") == []
     tree = posterior_of(found)
+    tree.attrs["shrunk_by_sds"] = 4.2
+    (said,) = trust.reasons_of_posterior(sound, tree)
+    assert "the array 4.2 posterior sds smaller than it is" in said
+    tree = posterior_of(found)
     tree.attrs["converged"] = 0
     assert trust.reasons_of_posterior(sound, tree) == [
         "the search or the chains have not converged"
@@ -350,7 +354,8 @@ def test_a_motion_of_another_board_s_calibration(sound, tmp_path, capsys):
     imuarray.write_recording(sound, tmp_path / "rec.nc")
     files = [str(tmp_path / name) for name in ("cal.nc", "rec.nc")]
     status = main(["apply", *files, "--out", str(tmp_path / "motion.nc"), "--quiet"])
-    assert status == 3 and "times the declared noise" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert status == 3 and "times the declared noise" in said and "of another board?" in said
     # a calibration that is not to be trusted makes no motion that is
     calibrated(times(sound, rate=1.024), tmp_path, capsys)
     imuarray.write_recording(sound, tmp_path / "rec.nc")

@@ -14,6 +14,7 @@ from imuarray.recording import Recording
 
 KNOWN = 0.03  # of the array's largest moment: turning about an axis with less is not seen
 STEP = 0.1  # share of the usual step by which stamps of neighbours may differ from it
+MOVES = 9
 MOST, STRETCH = 20_000, 500  # samples that are looked at, in a row
 FEWEST = 60  # pairs of neighbouring samples
 COHERENT = 0.9  # correlation below which the samples are no course of one smooth motion
@@ -117,6 +118,25 @@ def slope(time, motion: Turning) -> Slope | None:
     sd = np.sqrt(np.sum((y - forward * x) ** 2) / xx / calm.sum())
     low, high = sorted((float(forward), float(reverse)))
     return Slope(low, high, float(sd), float(correlation), float(COARSE * rough))
+
+
+def elsewhere(recording: Recording, positions) -> tuple[float, float]:
+    """How much better accelerometers (A, 3) m off ``positions`` fit: ratio of residuals, rms move.
+
+    By moving each in turn with the motion; what other errors leave is left in both residuals.
+    """
+    force, places = recording.specific_force, np.array(positions)
+    rate = np.median(recording.angular_rate, axis=1)
+    left = []
+    for _ in range(MOVES):
+        motion = turning(force, rate, places)
+        off = force - motion.at(places)
+        left.append(np.sqrt(np.mean(off**2)))
+        arms = np.moveaxis(motion.at(np.eye(3)) - motion.at(np.zeros((1, 3))), 1, 2)  # (T, 3, 3)
+        known = np.einsum("tia,tib->ab", arms, arms)
+        places += np.linalg.lstsq(known, np.einsum("tia,tki->ak", arms, off), rcond=1e-9)[0].T
+    moved = places - places[0] - (positions - positions[0])
+    return float(left[0] / max(left[-1], 1e-300)), float(np.sqrt(np.mean(moved**2)))
 
 
 def kept(recording: Recording) -> Recording:

@@ -22,6 +22,8 @@ FAR = 4.0  # times the median triad's error, and the declared noise
 TAKEN = 0.35  # of the error must be left at most
 LAGS = range(-3, 4)  # samples
 LEAST_LAG = 0.3  # samples
+STILL = 0.05  # of gravity; raw accelerometers are off by some per cent
+ENDS, NEXT = 10, 5  # readings at a channel's end, and times those at the values next to it
 
 
 class Suspect(NamedTuple):
@@ -233,3 +235,41 @@ def _wrong_signs(signs) -> list[str]:
 
 def _axes_named(names) -> str:
     return f"{'axis' if len(names) == 1 else 'axes'} {' and '.join(names)}"
+
+
+def gravity(recording: Recording) -> list[str]:
+    """Still poses that do not show gravity: a unit."""
+    still = recording.stationary
+    if still is None or not still.any():
+        return []
+    size = float(np.median(np.linalg.norm(recording.specific_force[still], axis=2)))
+    if abs(size / G - 1) < STILL:
+        return []
+    unit = ": in g declared m/s^2?" if abs(size - 1) < STILL else ""
+    return [f"specific force in the still poses is {size:.4g} m/s^2, gravity {G:.4g}{unit}"]
+
+
+def clipped(recording: Recording) -> list[str]:
+    """A sentence for each channel that ends abruptly within its declared range."""
+    found = []
+    for kind, name in (("accelerometer", "specific_force"), ("gyroscope", "angular_rate")):
+        values = getattr(recording, name)
+        for k, axis in np.ndindex(values.shape[1:]):
+            ends = _ends(values[:, k, axis])
+            if ends:
+                label = getattr(recording, f"{kind}_labels")[k]
+                found.append(f"{kind} {label}, axis {'xyz'[axis]}, is clipped at"
+                             f" {' and '.join(f'{end:.4g}' for end in ends)}, within its declared"
+                             " range")  # fmt: skip
+    return found
+
+
+def _ends(channel) -> list[float]:
+    """Extreme values at which far more readings are than at the values next to them."""
+    values, counts = np.unique(channel, return_counts=True)
+    if len(values) < 4 * NEXT:
+        return []
+    sides = (values[0], counts[: NEXT + 1]), (values[-1], counts[::-1][: NEXT + 1])
+    return [
+        float(end) for end, near in sides if near[0] >= max(ENDS, NEXT * near[1:].max())
+    ]  # fmt: skip

@@ -13,17 +13,17 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from imuarray.analysis.drawing import FAR, G, Places, another_size, departures, size_of
-from imuarray.analysis.rigid import SLOPE, Slope, Turning, kept, slope, turning
-from imuarray.analysis.suspects import MIRRORED, common, suspects, told
+from imuarray.analysis.drawing import FAR, Places, another_size, departures, size_of
+from imuarray.analysis.rigid import SLOPE, Slope, Turning, elsewhere, kept, slope, turning
+from imuarray.analysis.suspects import MIRRORED, clipped, common, gravity, suspects, told
 from imuarray.recording import Recording
 from imuarray.recording.channels import repeated
 
 RESIDUAL = 3.0  # times the declared noise: widths are too small, or scaled by what is no noise
 TRIAD = 10.0  # the same of one triad where the noise of each is estimated
 LEARNT = 0.5  # of the drawing's sd: positions known worse are hardly known from the recording
-STILL = 0.05  # of gravity; raw accelerometers are off by some per cent
-ENDS, NEXT = 10, 5  # readings at a channel's end, and times those at the values next to it
+OTHER = 1.2  # times less residual elsewhere; 1.003 at most for the right board, 2 for another
+SHRUNK = 1.0  # sds: 95 % intervals then cover 83 %
 FEW = 20  # samples
 
 
@@ -60,6 +60,12 @@ def reasons_of_posterior(
     plain = "effect_parameter" not in posterior["posterior"]
     residual = _rigid(recording, places, rates == "spread") if plain else {}
     found = _judged(recording, places, residual) + _little(recording, places)
+    shrunk = posterior.attrs.get("shrunk_by_sds", 0.0)
+    if shrunk > SHRUNK:
+        found.append(
+            f"the flat motion prior makes the array {shrunk:.2g} posterior sds smaller than it is:"
+            " take --motion-prior proper"
+        )
     return found + _not_converged(posterior.attrs)
 
 
@@ -71,7 +77,7 @@ def reasons_of_motion(recording: Recording, calibration: xr.Dataset) -> list[str
     said = json.loads(calibration.attrs.get("reasons", "[]"))
     places = _places(recording, calibration["position"].to_numpy(), _covariance(calibration))
     residual = _rigid(recording, places) if _is_papers(calibration) else {}
-    found = _judged(recording, places, residual)
+    found = _judged(recording, places, residual) + _elsewhere(kept(recording), places)
     return [f"the calibration is not to be trusted: {reason}" for reason in said] + [
         reason for reason in found if reason not in said
     ]
@@ -159,6 +165,19 @@ def _little(recording: Recording, places: Places) -> list[str]:
     return [
         f"the recording says little of the positions: they are known to {1e3 * rms:.2g} mm by it,"
         f" to {1e3 * prior:.2g} mm by the drawing; turn the array faster, and about all axes"
+    ]
+
+
+def _elsewhere(moving: Recording, places: Places) -> list[str]:
+    """One sentence where a recording that is not calibrated anew fits other positions better."""
+    if len(moving.time) < FEW:
+        return []
+    ratio, distance = elsewhere(moving, places.found)
+    if ratio < OTHER:
+        return []
+    return [
+        f"this recording fits positions {1e3 * distance:.2g} mm rms from the calibration's better,"
+        f" with {ratio:.2g} times less residual: is it the calibration of another board?"
     ]
 
 
@@ -250,41 +269,3 @@ def _mean_squares(values) -> np.ndarray:
 
 def _names(kind: str, recording: Recording) -> list[str]:
     return [f"{kind} {label}" for label in getattr(recording, f"{kind}_labels")]
-
-
-def gravity(recording: Recording) -> list[str]:
-    """Still poses that do not show gravity: a unit."""
-    still = recording.stationary
-    if still is None or not still.any():
-        return []
-    size = float(np.median(np.linalg.norm(recording.specific_force[still], axis=2)))
-    if abs(size / G - 1) < STILL:
-        return []
-    unit = ": in g declared m/s^2?" if abs(size - 1) < STILL else ""
-    return [f"specific force in the still poses is {size:.4g} m/s^2, gravity {G:.4g}{unit}"]
-
-
-def clipped(recording: Recording) -> list[str]:
-    """A sentence for each channel that ends abruptly within its declared range."""
-    found = []
-    for kind, name in (("accelerometer", "specific_force"), ("gyroscope", "angular_rate")):
-        values = getattr(recording, name)
-        for k, axis in np.ndindex(values.shape[1:]):
-            ends = _ends(values[:, k, axis])
-            if ends:
-                label = getattr(recording, f"{kind}_labels")[k]
-                found.append(f"{kind} {label}, axis {'xyz'[axis]}, is clipped at"
-                             f" {' and '.join(f'{end:.4g}' for end in ends)}, within its declared"
-                             " range")  # fmt: skip
-    return found
-
-
-def _ends(channel) -> list[float]:
-    """Extreme values at which far more readings are than at the values next to them."""
-    values, counts = np.unique(channel, return_counts=True)
-    if len(values) < 4 * NEXT:
-        return []
-    sides = (values[0], counts[: NEXT + 1]), (values[-1], counts[::-1][: NEXT + 1])
-    return [
-        float(end) for end, near in sides if near[0] >= max(ENDS, NEXT * near[1:].max())
-    ]  # fmt: skip
