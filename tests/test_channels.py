@@ -60,8 +60,8 @@ DEAD = {
         ["gyroscope 'g3' reads what 'g1' reads"],
     ),
     "an axis with noise in its last digit only": (
-        "angular_rate", assign((ALL, 2, 1), np.arange(200) % 3 * 0.01),
-        ["gyroscope 'g2', axis y: 3 values in all samples"],
+        "angular_rate", assign((ALL, 2, 1), np.arange(200) % 5 * 0.01),
+        ["gyroscope 'g2', axis y: 5 values in all samples"],
     ),
     "an axis twice": (
         "angular_rate", assign((ALL, 2, 1), lambda x: x[:, 0, 2]),

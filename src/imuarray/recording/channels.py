@@ -16,7 +16,7 @@ LEAST = 10  # samples below which equal readings may be chance
 TURNING = 0.2  # rad/s; at rest, coarse readings do repeat
 HELD = 0.3  # share of repeated readings; a sensor of half the rate, filled up, has 0.5
 FROZEN = 20  # readings in a row
-COARSE, MANY = 3, 100  # values of a dead axis that flickers, in at least so many samples
+COARSE, MANY = 5, 100  # values of a dead axis that flickers, in at least so many samples
 ALIKE = 1e-6  # share of a triad's readings that is its own; noise is 2e-5 of a MEMS sensor's range
 _KINDS = {"accelerometer": "specific_force", "gyroscope": "angular_rate"}
 
