@@ -171,3 +171,16 @@ def test_what_is_wrong_in_a_diagnosis_is_said(board, capsys, change, words):
     (folder / "diagnosis.json").write_text(json.dumps(wrong))
     status, line = applied(folder, folder / "diagnosis.json", capsys)
     assert status == 2 and words in line
+
+
+def test_samples_in_which_every_accelerometer_is_at_its_rail(board):
+    """A knock: they say nothing, and the others still do."""
+    recording = read_recording(board[0] / "rec.nc")
+    force, limit = recording.specific_force.copy(), 1.1 * np.abs(recording.specific_force).max()
+    force[20:22] = np.where(force[20:22] > 0, limit, -limit)
+    knocked = replace(recording, specific_force=force, accelerometer_range=limit)
+    found = imuarray.calibrate(knocked, effects=("gyroscope_bias",))
+    assert np.isin(recording.time[20:22], found["time"]).sum() == 0 and found.sizes["time"] > 15
+    force[:] = limit * np.sign(force)
+    with pytest.raises(InputError, match="at least 1 .* whose readings determine the motion"):
+        imuarray.calibrate(replace(knocked, specific_force=force), effects=("gyroscope_bias",))

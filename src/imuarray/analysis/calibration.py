@@ -128,7 +128,7 @@ def _papers(recording: Recording, method: str, accelerometer_noise, say: Say) ->
 def _engine(recordings, model: str, effects, say: Say) -> xr.Dataset:
     """Robust least squares (`imuarray.engine`): a ladder, given effects, or a diagnosis'."""
     from imuarray.engine.ladder import climb, with_effects
-    from imuarray.engine.readings import arrange, most_informative
+    from imuarray.engine.readings import arrange, determined, most_informative
 
     rungs: list = []
     if model.endswith(".json"):
@@ -137,7 +137,8 @@ def _engine(recordings, model: str, effects, say: Say) -> xr.Dataset:
         found = diagnosed_estimate(model, recordings[0])
     else:
         arranged = [arrange(one, sparse=True) for one in recordings]
-        readings = [most_informative(one, say) for one in arranged]
+        whole = [one.select(determined(one, 1)) for one in arranged]
+        readings = [most_informative(one, say) for one in whole]
         if effects:
             found = with_effects(readings, effects)
         else:

@@ -86,11 +86,12 @@ class Readings:
         )  # fmt: skip
 
 
-def determined(readings: Readings) -> np.ndarray:
-    """(T,) bool: samples whose readings determine the motion, in runs that do its derivatives.
+def determined(readings: Readings, fewest: int = SETTINGS.least_samples) -> np.ndarray:
+    """(T,) bool: samples whose readings determine the motion, if gapless in runs that do its
+    derivatives.
 
     Each axis has a gyroscope, and the accelerometers determine omega_dot and s. InputError where
-    too few are left.
+    fewer than ``fewest`` are left.
     """
     positions = readings.array.relative
     rows = design(positions)[:, 6:]
@@ -102,11 +103,11 @@ def determined(readings: Readings) -> np.ndarray:
     good = (least > SETTINGS.weakest * whole) & readings.keep[..., 3:].any(axis=1).all(axis=1)
     if good.all():
         return good
-    used = _long_runs(readings.time, good)
-    if used.sum() < SETTINGS.least_samples:
+    used = _long_runs(readings.time, good) if readings.gapless else good
+    if used.sum() < fewest:
         raise InputError(
-            f"recording: expected at least {SETTINGS.least_samples} samples whose readings"
-            f" determine the motion, found {used.sum()} of {used.size}"
+            f"recording: expected at least {fewest} sample(s) whose readings determine the motion,"
+            f" found {used.sum()} of {used.size}"
         )
     return used
 
