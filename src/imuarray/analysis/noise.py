@@ -17,7 +17,7 @@ from imuarray.model.small_linear import cholesky, solve_lower
 from imuarray.recording import Recording
 
 ROUNDS, ENOUGH = 6, 0.02  # of fit and noise by turns; change of all sds that ends them
-FREEDOM = 30.0  # degrees that a triad's own noise takes; with fewer triads of a kind share one
+FREEDOM = 200.0  # degrees that a triad's own noise takes, 5 % of its sd; with fewer they share one
 APART = (4, 3)  # accelerometers, gyroscopes: fewer cannot be told apart, either
 
 

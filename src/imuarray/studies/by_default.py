@@ -22,7 +22,7 @@ from imuarray.streams import stream
 from imuarray.studies.batches import run_batches
 from imuarray.studies.truths import Setting
 
-METHOD, STEPS = "sample", 200  # name in tables; transitions of each of the two chains
+METHOD, STEPS = "sample", 100  # name in tables; transitions of each of the two chains
 RATE = 1e9  # samples a second: instants tell the model nothing
 BEYOND = 1e6  # m/s^2, rad/s: a rail that nothing reaches
 
