@@ -140,38 +140,39 @@ class Estimate:
 
 
 def estimate(
-    recorded: Sequence[Recorded], columns: Columns, active, robust: bool = True
-) -> Estimate:
+    recorded: Sequence[Recorded], columns: Columns, active, robust: bool = True,
+    steps: int = SETTINGS.iterations,
+) -> Estimate:  # fmt: skip
     """The most likely parameters from where the recordings stand.
 
     ``active`` (N, m) bool. ``robust``: Student's t with estimated degrees of freedom instead of
-    normal noise. LinAlgError where the readings do not determine the motion.
+    normal noise. ``steps``: at most. LinAlgError where the readings do not determine the motion.
     """
     places = places_of(columns, active, len(recorded))
     precision = _pinned(recorded, columns, active, places)
-    recorded, nu, length, last, steps = tuple(recorded), NORMAL, 1.0, np.inf, []
-    for number in range(SETTINGS.iterations):
+    recorded, nu, length, last, moved = tuple(recorded), NORMAL, 1.0, np.inf, []
+    for number in range(steps):
         recorded, passes = _passed(recorded, columns, active)
         information, score, blocks = _summed(passes, places)
         values = _values(recorded, columns, active, places)
         slope = score - precision @ (values - _means(recorded, columns, active, places))
         step, sds = scaled_solve(information + precision, slope)
-        steps.append(float(np.max(np.abs(step) / sds, initial=0.0)))
+        moved.append(float(np.max(np.abs(step) / sds, initial=0.0)))
         if robust and number >= SETTINGS.normal_first:
             nu = _freedoms(recorded, passes)
         noisy = _judged(recorded, passes, columns, active, nu)
         change = _noise_change(recorded, noisy)
-        if steps[-1] < SETTINGS.converged and change < SETTINGS.same_noise and number > 3:
+        if moved[-1] < SETTINGS.converged and change < SETTINGS.same_noise and number > 3:
             break
-        length = max(length / 2, SETTINGS.shortest) if steps[-1] > last else min(1.0, 1.5 * length)
-        last = steps[-1]
+        length = max(length / 2, SETTINGS.shortest) if moved[-1] > last else min(1.0, 1.5 * length)
+        last = moved[-1]
         recorded = tuple(
-            replace(one, state=_moved(one.state, columns, active, length * step[place]))
+            replace(one, state=_stepped(one.state, columns, active, length * step[place]))
             for one, place in zip(noisy, places, strict=True)
         )
     return Estimate(
         recorded, passes, columns, active, places, information, precision, blocks, nu,
-        tuple(steps), steps[-1] < SETTINGS.converged,
+        tuple(moved), moved[-1] < SETTINGS.converged,
     )  # fmt: skip
 
 
@@ -272,7 +273,7 @@ def _noise_change(before, after) -> float:
     )
 
 
-def _moved(state: State, columns, active, step) -> State:
+def _stepped(state: State, columns, active, step) -> State:
     whole = flat_parameters(columns, state)
     whole[active] += step
     return from_flat(columns, state, whole)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from imuarray.engine.estimate import Estimate, Recorded, estimate, places_of, tested
+from imuarray.engine.fit import flat_parameters, from_flat
 from imuarray.engine.heldout import gain_of
 from imuarray.engine.parameters import POSITION, Columns, columns_of
 from imuarray.engine.readings import Readings
+from imuarray.engine.settings import SETTINGS
 from imuarray.errors import InputError
 from imuarray.model.effects import EFFECTS
 
@@ -48,27 +51,44 @@ def with_effects(readings: Sequence[Readings], effects) -> Estimate:
 def climb(readings: Sequence[Readings]) -> tuple[Estimate, list[Rung]]:
     """The sensor model of a board from its recordings, rung by rung.
 
+    Each sweep tests the rungs in order, beside those that it has kept before; what is kept is
+    fitted, then the others are tested again. At last each must still gain beside all others.
     InputError or LinAlgError where the readings do not determine positions or motion.
     """
     smooth = all(one.gapless for one in readings)
     names = [n for n, ids in RUNGS.items() if smooth or not any(map(_needs_neighbours, ids))]
     effects = [effect for name in names for effect in RUNGS[name]]
     columns = columns_of(readings[0].array, effects, readings[0].position_prior_sd)
-    active = mask_of(columns, [POSITION])
-    found = estimate([Recorded.of(one, columns) for one in readings], columns, active)
-    rungs: dict[str, Rung] = {}
-    while True:
-        left = [name for name in names if name not in rungs or not rungs[name].kept]
-        for rung in gains(found, {name: RUNGS[name] for name in left}):
-            rungs[rung.name] = rung
-        best = next((rungs[name] for name in left if rungs[name].kept), None)
-        for name in left:
-            if best is None or name != best.name:
-                rungs[name] = rungs[name]._replace(kept=False)
-        if best is None:
-            return found, [rungs[name] for name in names]
-        active = active | mask_of(columns, RUNGS[best.name])
-        found = estimate(found.recorded, columns, active)
+    bare = mask_of(columns, [POSITION])
+    found = estimate(
+        [Recorded.of(one, columns) for one in readings], columns, bare, steps=SETTINGS.rung_steps
+    )
+    kept: dict[str, Rung] = {}
+    for _ in range(len(names)):
+        rungs = gains(found, [name for name in names if name not in kept], kept)
+        new = {rung.name: rung for rung in rungs if rung.kept}
+        if not new:
+            break
+        kept |= new
+        active = bare | mask_of(columns, [e for name in kept for e in RUNGS[name]])
+        found = estimate(found.recorded, columns, active, steps=SETTINGS.rung_steps)
+    for rung in [again for name in kept for again in gains(found, [name], kept)]:
+        if not rung.kept:
+            del kept[rung.name]
+    active = bare | mask_of(columns, [e for name in kept for e in RUNGS[name]])
+    tested = {rung.name: rung for rung in gains(found, names, kept)}
+    return estimate(without(found, active), columns, active), [tested[name] for name in names]
+
+
+def without(found: Estimate, active) -> list[Recorded]:
+    """The recordings of an estimate, what is not ``active`` back at zero."""
+    out = []
+    for one in found.recorded:
+        whole = flat_parameters(found.columns, one.state)
+        dropped = found.active & ~active
+        whole[dropped] = 0.0
+        out.append(replace(one, state=from_flat(found.columns, one.state, whole)))
+    return out
 
 
 def _needs_neighbours(effect: str) -> bool:
@@ -80,19 +100,26 @@ def mask_of(columns: Columns, effects) -> np.ndarray:
     return np.isin(columns.names, list(effects)) & columns.owner
 
 
-def gains(found: Estimate, rungs: dict[str, tuple[str, ...]]) -> list[Rung]:
-    """What each rung would gain on held-out time, by one linearisation with all of them."""
-    active = found.active | mask_of(found.columns, [e for ids in rungs.values() for e in ids])
+def gains(found: Estimate, names: Sequence[str], kept: Container[str] = ()) -> list[Rung]:
+    """What each rung gains on held-out time beside those kept, and those before it that gain.
+
+    By one linearisation with all of them.
+    """
+    every = [name for name in RUNGS if name in names or name in kept]
+    masks = {name: mask_of(found.columns, RUNGS[name]) for name in every}
+    active = found.active | np.any(list(masks.values()), axis=0)
     blocks, precision, values = tested(found, active)
     places, out = places_of(found.columns, active, len(found.recorded)), []
-    for name, effects in rungs.items():
-        free = [mask_of(found.columns, effects)[active], found.active[active]]
+    beside = found.active | np.any([masks[n] for n in every if n in kept] or [False], axis=0)
+    for name in names:
         freed, used = (np.zeros(len(values), bool) for _ in range(2))
         for place in places:
-            freed[place] |= free[0]
-            used[place] |= free[0] | free[1]
+            freed[place] |= masks[name][active]
+            used[place] |= (beside | masks[name])[active]
         chosen = np.ix_(used, used)
         parts = [(inner[chosen], slope[used]) for inner, slope in blocks]
         nats, error = gain_of(parts, precision[chosen], values[used], freed[used])
-        out.append(Rung(name, nats, error, bool(nats > LEAST_Z * error and nats > 0)))
+        good = bool(nats > max(LEAST_Z * error, 0.0))
+        beside = beside | (masks[name] & good)
+        out.append(Rung(name, nats, error, good))
     return out

@@ -38,6 +38,7 @@ class Settings:
 
     # Robust estimation of several recordings (`estimate`)
     iterations: int = 40  # Gauss-Newton steps at most
+    rung_steps: int = 8  # the same while rungs of the sensor model are tried
     normal_first: int = 2  # of them with normal noise, until readings far out are seen
     same_noise: float = 0.005  # relative change of a noise sd below which it is the same
     dense: float = 0.5  # share of samples in gapless runs from which neighbours are looked at
