@@ -153,7 +153,7 @@ def test_the_ladder_keeps_what_gains():
 def test_a_long_recording_keeps_its_most_informative_stretches(monkeypatch):
     from imuarray.engine import readings as module
 
-    monkeypatch.setattr(module, "SETTINGS", replace(module.SETTINGS, most=128, stretch=32))
+    monkeypatch.setattr(module, "SETTINGS", replace(module.SETTINGS, most=4 * 128, stretch=32))
     whole = arrange(simulated(3.0)[0])
     part = most_informative(whole, lambda text: None)
     assert len(part.time) == 128

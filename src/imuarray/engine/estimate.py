@@ -94,7 +94,10 @@ class Estimate:
     def widths(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Covariance (n, n); formal sds (n,), and a jackknife's: the covariance has the larger."""
         formal = self._formal()
-        sds, resampled = np.sqrt(np.diag(formal)), self._jackknife()
+        sds, resampled = (
+            np.sqrt(np.diag(formal)),
+            _jackknifed(self.information + self.precision, self.blocks),
+        )
         wider = np.maximum(resampled / sds, 1.0)
         return formal * np.outer(wider, wider), sds, resampled
 
@@ -109,9 +112,7 @@ class Estimate:
             mean[chosen] = 1.0 / len(chosen)
             # the mean of so many that differ by so much
             prior += np.outer(mean, mean) * len(chosen) / np.var(self.values[chosen], ddof=1)
-        # Student's t: what a reading far out loses in weight others do not gain
-        lost = max((nu + 5) / (nu + 3) if np.isfinite(nu) else 1.0 for nu in self.freedoms)
-        return lost * scaled_inverse(self.information + prior)
+        return _lost(self.freedoms) * scaled_inverse(self.information + prior)
 
     def residual_ratio(self) -> float:
         """Rms residual over the declared noise, degrees of freedom allowed for."""
@@ -129,14 +130,17 @@ class Estimate:
         squares = [one.readings.sd**2 for one in self.recorded]
         return np.sqrt(wide * np.mean(squares, axis=0))
 
-    def _jackknife(self) -> np.ndarray:
-        """Sds (n,) from leaving out a block of time after the other."""
-        moved = np.array([
-            -np.linalg.solve(self.information - inner + self.precision, score)
-            for inner, score in self.blocks
-        ])  # fmt: skip
-        count = len(moved)
-        return np.sqrt((count - 1) / count * np.sum((moved - moved.mean(axis=0)) ** 2, axis=0))
+
+def _lost(freedoms) -> float:
+    """Normal noise's information over Student's t's: weights fall as readings move away."""
+    return max((nu + 5) / (nu + 3) if np.isfinite(nu) else 1.0 for nu in freedoms)
+
+
+def _jackknifed(information, blocks) -> np.ndarray:
+    """Sds (n,) from leaving out a block of time after the other, priors in the information."""
+    moved = np.array([-np.linalg.solve(information - inner, score) for inner, score in blocks])
+    count = len(moved)
+    return np.sqrt((count - 1) / count * np.sum((moved - moved.mean(axis=0)) ** 2, axis=0))
 
 
 def estimate(
@@ -157,12 +161,13 @@ def estimate(
         values = _values(recorded, columns, active, places)
         slope = score - precision @ (values - _means(recorded, columns, active, places))
         step, sds = scaled_solve(information + precision, slope)
+        sds = np.maximum(sds, _jackknifed(information + precision, blocks))
         moved.append(float(np.max(np.abs(step) / sds, initial=0.0)))
         if robust and number >= SETTINGS.normal_first:
             nu = _freedoms(recorded, passes)
         noisy = _judged(recorded, passes, columns, active, nu)
         change = _noise_change(recorded, noisy)
-        if moved[-1] < SETTINGS.converged and change < SETTINGS.same_noise and number > 3:
+        if moved[-1] < SETTINGS.settled and change < SETTINGS.same_noise and number > 3:
             break
         length = max(length / 2, SETTINGS.shortest) if moved[-1] > last else min(1.0, 1.5 * length)
         last = moved[-1]
@@ -172,7 +177,7 @@ def estimate(
         )
     return Estimate(
         recorded, passes, columns, active, places, information, precision, blocks, nu,
-        tuple(moved), moved[-1] < SETTINGS.converged,
+        tuple(moved), moved[-1] < SETTINGS.settled,
     )  # fmt: skip
 
 

@@ -63,21 +63,18 @@ def climb(readings: Sequence[Readings]) -> tuple[Estimate, list[Rung]]:
     found = estimate(
         [Recorded.of(one, columns) for one in readings], columns, bare, steps=SETTINGS.rung_steps
     )
-    kept: dict[str, Rung] = {}
-    for _ in range(len(names)):
-        rungs = gains(found, [name for name in names if name not in kept], kept)
-        new = {rung.name: rung for rung in rungs if rung.kept}
+    kept: set[str] = set()
+    for _ in names:
+        rungs = gains(found, names, kept)
+        new = {rung.name for rung in rungs if rung.kept} - kept
         if not new:
             break
         kept |= new
         active = bare | mask_of(columns, [e for name in kept for e in RUNGS[name]])
         found = estimate(found.recorded, columns, active, steps=SETTINGS.rung_steps)
-    for rung in [again for name in kept for again in gains(found, [name], kept)]:
-        if not rung.kept:
-            del kept[rung.name]
+    kept = {rung.name for rung in rungs if rung.kept}
     active = bare | mask_of(columns, [e for name in kept for e in RUNGS[name]])
-    tested = {rung.name: rung for rung in gains(found, names, kept)}
-    return estimate(without(found, active), columns, active), [tested[name] for name in names]
+    return estimate(without(found, active), columns, active), rungs
 
 
 def without(found: Estimate, active) -> list[Recorded]:

@@ -121,16 +121,16 @@ def part_of(readings: Readings, most: int) -> Readings:
 
 def most_informative(readings: Readings, say: Callable[[str], None]) -> Readings:
     """Of a long recording the stretches that say most of the positions, by their rates' squares."""
-    samples = len(readings.time)
-    if samples <= SETTINGS.most:
+    samples, most = len(readings.time), max(SETTINGS.most // len(readings.labels), 1)
+    if samples <= most:
         return readings
     used = np.where(readings.keep[..., 3:], readings.values[..., 3:], np.nan)
     size = np.sum(np.nanmedian(used, axis=1) ** 2, axis=1) ** 2
     stretch = np.arange(samples) // (SETTINGS.stretch if readings.gapless else 1)
     mean = np.bincount(stretch, size) / np.bincount(stretch)
     best = np.zeros(len(mean), bool)
-    best[np.argsort(mean)[-int(SETTINGS.most / samples * len(mean)) :]] = True
-    say(f"using the most informative {SETTINGS.most} of {samples} samples")
+    best[np.argsort(mean)[-int(most / samples * len(mean)) :]] = True
+    say(f"using the most informative {most} of {samples} samples")
     return _stretches(readings, stretch, best[stretch])
 
 

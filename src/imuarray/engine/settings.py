@@ -17,7 +17,7 @@ class Settings:
     weakest: float = 1e-2
     least_samples: int = 200  # samples; fewer determine next to nothing of any effect
     stretch: int = 128  # samples, of the stretches in which a long recording is looked at first
-    most: int = 6000  # samples that positions are estimated from; more say little more
+    most: int = 32000  # of IMUs, samples that positions are estimated from; more say little more
     window: float = 0.04  # s, length of the polynomials that give time derivatives
     smooth: float = 0.8  # correlation of omega's slope and omega_dot from which motion is smooth
 
@@ -38,8 +38,9 @@ class Settings:
 
     # Robust estimation of several recordings (`estimate`)
     iterations: int = 40  # Gauss-Newton steps at most
-    rung_steps: int = 8  # the same while rungs of the sensor model are tried
+    rung_steps: int = 6  # the same while rungs of the sensor model are tried
     normal_first: int = 2  # of them with normal noise, until readings far out are seen
+    settled: float = 0.05  # of a parameter's sd, a jackknife's where larger: shorter steps end it
     same_noise: float = 0.005  # relative change of a noise sd below which it is the same
     dense: float = 0.5  # share of samples in gapless runs from which neighbours are looked at
     longest_step: float = 0.025  # s, between neighbours: longer ones say nothing of derivatives
