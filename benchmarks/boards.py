@@ -91,7 +91,7 @@ def _applied(folder: Path, board: Board) -> dict[str, float]:
     with xr.open_dataset(folder / "motion.nc", decode_times=False) as found:
         times = found["time"].to_numpy()
         rate = found["angular_rate"].to_numpy()
-        sds = np.sqrt(np.einsum("tii->ti", found["angular_rate_covariance"].to_numpy()))
+        sds = found["angular_rate_sd"].to_numpy()
     twisted = times > board.time[-1] - board.options.twisting + 1
     index = np.searchsorted(board.time, times[twisted] - 1e-6)
     error, sds = rate[twisted] - board.truth.rate[index], sds[twisted]

@@ -132,7 +132,8 @@ def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
     dataset.attrs |= {
         "converged": int(found.converged), "residual_ratio": found.residual_ratio(),
         "student_t": [float(nu) for nu in found.freedoms], "effects": ",".join(effects),
-        "time_origin": readings.origin, "span": readings.span,
+        "gyroscope_common_scale_sd": found.scale_sd, "time_origin": readings.origin,
+        "span": readings.span,
         "samples": sum(len(one.readings.time) for one in found.recorded),
     }  # fmt: skip
     return dataset

@@ -46,6 +46,7 @@ def apply(
             found = _papers(calibration, recording, accelerometer_noise)
     except np.linalg.LinAlgError as error:
         raise InputError(f"expected a calibration that determines the motion: {error}") from None
+    found = _with_common_map(found, calibration.attrs.get("gyroscope_common_scale_sd", np.nan))
     lost = recording.saturated_accelerometers().any(axis=(1, 2))
     if not (np.einsum("tii->ti", found.covariance)[~lost] > 0).all():  # NaN, too
         raise InputError("expected a calibration that gives the motion variances, found none")
@@ -59,6 +60,22 @@ def apply(
     data = digest(recording.specific_force, recording.angular_rate, *used)
     dataset.attrs |= stamp({"recording and calibration": data}, 0)
     return dataset
+
+
+def _with_common_map(found, scale_sd: float):
+    """The angular rate as uncertain as the map common to all gyroscopes leaves it.
+
+    ``scale_sd`` is that of the mean of its diagonal; each of its nine entries is as well known.
+    """
+    if not np.isfinite(scale_sd):
+        return found
+    rate = np.asarray(found.estimate.motion.angular_rate)
+    more = np.zeros((len(rate), 9, 9))
+    axes = np.arange(3)
+    more[:, axes, axes] = 3.0 * scale_sd**2 * np.sum(rate**2, axis=1, keepdims=True)
+    return found._replace(
+        covariance=found.covariance + more, from_calibration=found.from_calibration + more
+    )
 
 
 def _noise(calibration: xr.Dataset, array: Array, accelerometer_noise: float | None) -> Noise:

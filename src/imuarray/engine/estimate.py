@@ -31,6 +31,7 @@ from imuarray.engine.start import is_smooth, start
 from imuarray.linear import scaled_inverse
 from imuarray.model.effects import EFFECTS
 
+CORRECTED = "accelerometer_scale", "accelerometer_misalignment"  # what first order leaves of them
 NORMAL = np.array([np.inf, np.inf])
 
 
@@ -93,7 +94,7 @@ class Estimate:
 
     def widths(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Covariance (n, n); formal sds (n,), and a jackknife's: the covariance has the larger."""
-        formal = self._formal()
+        formal = self._formal() + self._corrected()
         sds, resampled = (
             np.sqrt(np.diag(formal)),
             _jackknifed(self.information + self.precision, self.blocks),
@@ -101,9 +102,41 @@ class Estimate:
         wider = np.maximum(resampled / sds, 1.0)
         return formal * np.outer(wider, wider), sds, resampled
 
+    def _corrected(self) -> np.ndarray:
+        """What errors left by the accelerometers' first-order correction add, (n, n).
+
+        They are not estimated: by so much would they move what is.
+        """
+        sd = np.fmin.reduce([one.readings.matrix_sd for one in self.recorded])
+        matrix = np.isin(self.columns.names, CORRECTED) & self.columns.owner & ~self.active
+        if not (np.isfinite(sd) and matrix.any()):
+            return np.zeros_like(self.information)
+        blocks, _, _ = tested(self, self.active | matrix)
+        places = places_of(self.columns, self.active | matrix, len(self.recorded))
+        mine = matrix[self.active | matrix]
+        added = np.unique(np.concatenate([place[mine] for place in places]))
+        kept = np.setdiff1d(np.arange(len(blocks[0][1])), added)
+        cross = sum(inner[np.ix_(kept, added)] for inner, _ in blocks)
+        moved = scaled_inverse(self.information + self.precision) @ cross
+        return sd**2 * moved @ moved.T
+
+    @property
+    def scale_sd(self) -> float:
+        """Of the scale common to all gyroscopes: the least that a recording knows, or NaN."""
+        return float(np.fmin.reduce([one.readings.scale_sd for one in self.recorded]))
+
     def _formal(self) -> np.ndarray:
         """Gauges that the array's size takes up not pinned, but as large as they may well be."""
-        prior = _pinned(self.recorded, self.columns, self.active, self.places, resized=False)
+        known = np.isfinite(self.scale_sd)
+        prior = _pinned(self.recorded, self.columns, self.active, self.places, resized=known)
+        if known:
+            # r goes with the rate's scale to the power of -2
+            size = np.zeros(len(prior))
+            pairs = np.argwhere(self.active)
+            mine = pairs[:, 1] < 3
+            size[self.places[0][mine]] = 2.0 * self.positions[pairs[mine, 0], pairs[mine, 1]]
+            inverse = scaled_inverse(self.information + prior)
+            return _lost(self.freedoms) * inverse + self.scale_sd**2 * np.outer(size, size)
         for effect, mask in gauge_masks(self.columns, self.active):
             if not effect.resizes:
                 continue

@@ -29,6 +29,8 @@ class Readings:
     sd : (N, 2) the noise sd in use
     run : (T,) number of the gapless run a sample is in
     origin : s, where time begins in the recording's own
+    scale_sd : of a scale common to all gyroscopes, NaN where nothing is known of it
+    matrix_sd : of an entry of a correction of the accelerometers, NaN where there was none
     gapless : bool, whether samples have neighbours that say something of time derivatives
     trust : (T, N, 2) square roots of a robust loss' weights, or None for all one
     labels : N str
@@ -47,6 +49,8 @@ class Readings:
     position_prior_sd: float
     gapless: bool = True
     origin: float = 0.0
+    scale_sd: float = np.nan
+    matrix_sd: float = np.nan
     trust: np.ndarray | None = None
 
     @property
@@ -206,7 +210,8 @@ def arrange(recording: Recording, sparse: bool = False) -> Readings:
         by_imu(recording.specific_force, recording.angular_rate)[used],
         ~lost & np.repeat(exists, 3, axis=1), exists, np.tile(noise, (count, 1)),
         np.tile(noise, (count, 1)), runs(time[used]), tuple(longer), recording.position_prior_sd,
-        gapless, float(recording.time[0]),
+        gapless, float(recording.time[0]), recording.gyroscope_common_scale_sd,
+        recording.accelerometer_matrix_sd,
     )  # fmt: skip
 
 

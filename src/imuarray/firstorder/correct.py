@@ -141,6 +141,7 @@ def correct(recording: Recording, found: FirstOrder) -> Recording:
         ),
         gyroscope_range=_nearest_rail(recording.gyroscope_range, maps, found.gyroscope_offset),
         gyroscope_common_scale_sd=found.common_scale_sd,
+        accelerometer_matrix_sd=found.triads.matrix_sd,
         stationary=still,
         specific_force_saturated=force_rails,
         angular_rate_saturated=rate_rails,

@@ -55,7 +55,7 @@ NUMBERS = {
 }
 
 # Optional attributes that are positive numbers, NaN where they are not known, and their units.
-OPTIONAL_NUMBERS = {"gyroscope_common_scale_sd": "1"}
+OPTIONAL_NUMBERS = {"gyroscope_common_scale_sd": "1", "accelerometer_matrix_sd": "1"}
 
 # A simulated sensor need not have a rail.
 MAY_BE_INFINITE = ("accelerometer_range", "gyroscope_range")
@@ -90,6 +90,8 @@ class Recording:
         Readings at a rail, where a correction moved them off the range (first-order calibration).
     gyroscope_common_scale_sd : float
         Of the scale error that all gyroscopes share, no unit; NaN if not known.
+    accelerometer_matrix_sd : float
+        Of an entry of the 3 x 3 matrix by which an accelerometer was corrected; NaN if not known.
     title, source, license : str, empty if not known
     selected : str
         How many samples of how many, where these are not all that were recorded; else empty.
@@ -110,6 +112,7 @@ class Recording:
     specific_force_saturated: np.ndarray | None = None
     angular_rate_saturated: np.ndarray | None = None
     gyroscope_common_scale_sd: float = np.nan
+    accelerometer_matrix_sd: float = np.nan
     title: str = ""
     source: str = ""
     license: str = ""
