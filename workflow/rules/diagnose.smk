@@ -34,9 +34,7 @@ rule diagnosis_agreement:
             "results/measured/diagnosis/{name}/diagnosis.json", name=MEASURED.groups()[wc.group]
         ),
     output:
-        **figure(
-            "diagnosis_{group}", "Diagnosis", caption="diagnosis", folder="results/measured"
-        ),
+        **figure("diagnosis_{group}", "Diagnosis", caption="diagnosis", folder="results/measured"),
         positions="results/measured/tables/diagnosis_positions_{group}.csv",
         parameters="results/measured/tables/diagnosis_parameters_{group}.csv",
         recordings="results/measured/tables/diagnosis_recordings_{group}.csv",
@@ -61,9 +59,7 @@ rule figure_past_rail:
             for other in MEASURED.others(wc.name)[:1]
         ],
     output:
-        **figure(
-            "past_rail_{name}", "Diagnosis", caption="past_rail", folder="results/measured"
-        ),
+        **figure("past_rail_{name}", "Diagnosis", caption="past_rail", folder="results/measured"),
     log:
         "results/measured/logs/past_rail_{name}.log",
     benchmark:
