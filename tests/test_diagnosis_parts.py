@@ -16,6 +16,7 @@ from imuarray.diagnosis import noise_effects as variance
 from imuarray.diagnosis.clocks import sawtooth
 from imuarray.diagnosis.replicates import Replicator, discrepancies
 from imuarray.diagnosis.scores import candidates, information_at, mask_of, score_all
+from imuarray.diagnosis.settings import SETTINGS as CRITICAL
 from imuarray.diagnosis.state import Search
 from imuarray.diagnosis.tails import QUARTILE, log_chi_square, log_normal, log_poisson
 from imuarray.engine.fit import Fit, fit, flat_parameters, from_flat, normal
@@ -171,7 +172,7 @@ def test_scores_of_a_clean_recording_are_chi_square(clean):
     p = np.array([chi2.sf(s.statistic, s.freedom) for s in scores])
     assert len(p) > 80
     assert 0.3 < p.mean() < 0.7
-    assert min(s.log_p for s in scores) > SETTINGS.effect
+    assert min(s.log_p for s in scores) > CRITICAL.effect
 
 
 def test_log_tail_goes_on_where_the_tail_underflows():

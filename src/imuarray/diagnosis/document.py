@@ -102,7 +102,9 @@ def diagnose(
     nats = extended.scores.nats + nats_beside(found)
     say("estimating the extended model's positions")
     readings = prepared(recording, without)[2]
-    robust = extended_estimate(readings, search.columns, search.active, search.fit.state)
+    robust = None
+    if search.smooth:  # where motion is rough the robust search ends elsewhere, and worse
+        robust = extended_estimate(readings, search.columns, search.active, search.fit.state)
     extended = replace(extended, scores=extended.scores._replace(nats=nats), robust=robust)
     base, inflated = rivals_of(found)
     rng = stream(seed, "diagnose", "replicates")

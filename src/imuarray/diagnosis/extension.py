@@ -190,4 +190,9 @@ def extended_estimate(readings: Readings, columns: Columns, active, state: State
         width = SETTINGS.jitter if first.gyroscopes_free else SETTINGS.edge
         readings, _ = without_jumps(readings, columns, first, imus, width)
         recorded = replace(recorded, readings=readings, state=first)
+        if first.gyroscopes_free:
+            raise InputError(
+                "recording: expected motion that is smooth at its sampling rate beside clocks,"
+                " found rough motion; take the positions that diagnosis.json has"
+            )
     return estimate([recorded], columns, active)

@@ -190,7 +190,7 @@ def arrange(recording: Recording, sparse: bool = False) -> Readings:
     used = _long_runs(recording.time, ~bad)
     step = np.median(np.diff(recording.time)) if len(bad) > 1 else np.inf
     dense = used.sum() > SETTINGS.dense * np.sum(~bad) and step < SETTINGS.longest_step
-    gapless = dense or not sparse
+    gapless = bool(dense or not sparse)
     used = used if gapless else ~bad
     least = 1 if sparse else SETTINGS.least_samples
     if used.sum() < least:
