@@ -8,7 +8,7 @@ import pytest
 
 import imuarray
 from imuarray.engine.estimate import Recorded, estimate
-from imuarray.engine.fit import flat_parameters, prior_means
+from imuarray.engine.fit import flat_parameters
 from imuarray.engine.ladder import climb, mask_of
 from imuarray.engine.parameters import POSITION, columns_of
 from imuarray.engine.passes import normal_pass
@@ -161,4 +161,3 @@ def test_a_long_recording_keeps_its_most_informative_stretches(monkeypatch):
     assert len(part.time) == 128
     size = [np.mean(np.sum(r.values[:, 0, 3:] ** 2, axis=1) ** 2) for r in (part, whole)]
     assert size[0] > size[1]
-    assert prior_means(part, columns_of(part.array, (), 1e-3)).shape == (4, 3)

@@ -13,7 +13,7 @@ from imuarray.estimation.informative import weak_directions
 from imuarray.provenance import trust, write_netcdf
 from imuarray.recording import read_recording
 
-MISFIT = 1.5  # residual over declared noise from which the claimed widths are called too small
+MISFIT = 1.5  # residual over declared noise from which it is spoken of
 
 
 def calibrate(arguments) -> None:
@@ -109,7 +109,9 @@ def _misfit(dataset: xr.Dataset) -> list[str]:
     ratio = dataset.attrs["residual_ratio"]
     if not ratio > MISFIT:
         return []
+    papers = dataset.attrs["model"] == "papers"
+    allowed = "are too small, by that or more" if papers else "take it for noise"
     return [
         f"residual {ratio:.3g} times the declared noise: the model misses something, and the"
-        " sds above are too small, by that or more"
+        f" sds above {allowed}"
     ]

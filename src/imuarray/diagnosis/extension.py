@@ -178,21 +178,20 @@ def diagnosed_estimate(path: str | Path, recording: Recording) -> Estimate:
 
 
 def extended_estimate(readings: Readings, columns: Columns, active, state: State) -> Estimate:
-    """The robust estimate of a diagnosis' extended model from where its search ended."""
+    """The robust estimate of a diagnosis' extended model from where its search ended.
+
+    InputError for clocks where motion is rough: the search's own positions are better there.
+    """
     readings = most_informative(readings, lambda text: None)
     recorded = Recorded.of(readings, columns, state)
     imus = [k for k in range(len(active)) if CLOCK in columns.names and np.any(
         active[k, columns.of(CLOCK)])]  # fmt: skip
     if imus:
-        first = recorded.state
-        if first.rough_prior is not None:
-            first = first._replace(rough_prior=first.rough_prior.freed())
-        width = SETTINGS.jitter if first.gyroscopes_free else SETTINGS.edge
-        readings, _ = without_jumps(readings, columns, first, imus, width)
-        recorded = replace(recorded, readings=readings, state=first)
-        if first.gyroscopes_free:
+        if not recorded.smooth:
             raise InputError(
                 "recording: expected motion that is smooth at its sampling rate beside clocks,"
                 " found rough motion; take the positions that diagnosis.json has"
             )
+        readings, _ = without_jumps(readings, columns, recorded.state, imus, SETTINGS.edge)
+        recorded = replace(recorded, readings=readings)
     return estimate([recorded], columns, active)
