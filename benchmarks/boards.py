@@ -1,7 +1,7 @@
 """README's commands on simulated small boards (`board`), beside the truth.
 
-`python -m benchmarks.boards walk --boards 20` draws boards and runs convert, first-order, select
-and calibrate on each, and further commands by `--commands`; `mounts` does so at growing angles of
+`python -m benchmarks.boards walk --boards 20` draws boards and runs convert, first-order and
+calibrate on each, and further commands by `--commands`; `mounts` does so at growing angles of
 the mounts, `mistakes` (`board_mistakes`) on logs that are wrong. From the project's root.
 """
 
@@ -31,8 +31,8 @@ LINES = {
     "convert": "convert csv log.csv --columns columns.yaml --out rec.nc",
     "first-order": f"first-order rec.nc --gravity {GRAVITY} --out corrected.nc",
     "select": "select corrected.nc --samples 500 --out subset.nc",
-    "calibrate": "calibrate subset.nc --out cal.nc",
-    "whole": "calibrate corrected.nc --out cal.nc",
+    "calibrate": "calibrate corrected.nc --out cal.nc",
+    "subset": "calibrate subset.nc --out cal.nc",
     "sample": "sample subset.nc --out posterior.nc",
     "apply": "apply cal.nc corrected.nc --out motion.nc",
     "diagnose": "diagnose corrected.nc --out diagnosis",
@@ -103,7 +103,7 @@ def _applied(folder: Path, board: Board) -> dict[str, float]:
 
 
 GRADES = {
-    "calibrate": _calibrated, "whole": _calibrated, "sample": _sampled, "apply": _applied,
+    "calibrate": _calibrated, "subset": _calibrated, "sample": _sampled, "apply": _applied,
     "diagnose": _diagnosed,
 }  # fmt: skip
 
@@ -167,7 +167,7 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("what", choices=["make", "walk", "mounts", "mistakes"])
     found.add_argument("--boards", type=int, default=3)
     found.add_argument("--first", type=int, default=1, help="seed of the first board")
-    commands = "convert,first-order,select,calibrate"
+    commands = "convert,first-order,calibrate"
     found.add_argument("--commands", default=commands, help=f"of {', '.join(LINES)}")
     found.add_argument("--out", type=Path, help="folder to keep logs and results in")
     for item in fields(Options):
