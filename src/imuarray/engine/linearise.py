@@ -9,10 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.engine.parameters import Columns, tangents
+from imuarray.engine.parameters import POSITION, Columns
 from imuarray.engine.readings import Readings
-from imuarray.model.effects import Prediction
+from imuarray.model.effects import Instant, Prediction
 from imuarray.model.jax64 import jax, jnp
+from imuarray.model.slopes import by_effects, stacked
 from imuarray.motion.state import Motion
 
 KNOWN = 9  # the motion that the papers' model knows: omega, omega_dot, s
@@ -78,37 +79,42 @@ class Eliminated(NamedTuple):
     misfit: np.ndarray  # (T,) squared residuals, the prior's included
 
 
-def _reading(model, count, x, positions, parameters, extra, time, span):
-    """(N, 6) predicted readings of one sample."""
+def _instant(x, positions, extra, time, span) -> Instant:
+    """What effects may look at, at one sample."""
     jerk, force_rate, second, third = extra
     turn = None
     if len(x) > KNOWN:
         jerk, force_rate, turn = x[9:12], x[12:15], x[3:6] + x[15:18]
     motion = Motion(x[:3], x[3:6], x[6:9], jerk, force_rate)
-    out = model.predict(
-        motion, positions, parameters, time=time, span=span, second=second, third=third,
-        gyroscope_acceleration=turn,
-    )  # fmt: skip
-    force = jnp.zeros((count, 3)).at[: len(out.specific_force)].set(out.specific_force)
-    rate = jnp.zeros((count, 3)).at[: len(out.angular_rate)].set(out.angular_rate)
-    return jnp.concatenate([force, rate], axis=1)
+    return Instant(motion, positions, time, span, second, third, turn)
 
 
-@partial(jax.jit, static_argnums=(0, 1))
-def _chunk(model, count, x, extra, time, span, positions, parameters, directions, data):
-    split = positions.size
+def _reading(model, count, x, positions, parameters, extra, time, span):
+    """(N, 6) predicted readings of one sample."""
+    when = _instant(x, positions, extra, time, span)._asdict()
+    return stacked(count, model.predict(parameters=parameters, **when))
+
+
+@partial(jax.jit, static_argnums=(0, 1, 2))
+def _chunk(model, count, placed, x, extra, time, span, positions, parameters, data):
+    """Whitened residual, its derivatives by the motion and by all columns, the motion's gram.
+
+    ``placed``: by the positions alone.
+    """
+    each = np.broadcast_to(np.eye(3)[:, None], (3, *positions.shape))
 
     def one(x, extra, time):
-        def flat(x, shared):
-            return _reading(
-                model, count, x, shared[:split].reshape(-1, 3), shared[split:], extra, time, span
-            )
+        def flat(x, positions):
+            return _reading(model, count, x, positions, parameters, extra, time, span)
 
-        shared = jnp.concatenate([positions.ravel(), parameters])
-        along = jax.vmap(lambda d: jax.jvp(lambda p: flat(x, p), (shared,), (d,))[1], out_axes=-1)(
-            directions
-        )
-        return flat(x, shared), jax.jacfwd(flat)(x, shared), along
+        def moved(direction):
+            return jax.jvp(lambda r: flat(x, r), (positions,), (direction,))[1]
+
+        along = jax.vmap(moved, out_axes=-1)(each)
+        if not placed:
+            when = _instant(x, positions, extra, time, span)
+            along = jnp.concatenate([along, by_effects(model, count, when, parameters)], axis=-1)
+        return flat(x, positions), jax.jacfwd(flat)(x, positions), along
 
     predicted, motion, shared = jax.vmap(one)(x, extra, time)
     values, weights = data
@@ -117,39 +123,26 @@ def _chunk(model, count, x, extra, time, span, positions, parameters, directions
     return weights * (values - predicted), motion, weights[..., None] * shared, gram
 
 
-@jax.jit
-def _projected(residual, motion, whitened, inverse, bare, sd):
+def _eliminated(residual, motion, whitened, gram, bare, sd) -> Eliminated:
+    """A chunk, the motion projected out; ``bare`` (T, D - 9) is what its prior expects, in sds."""
     samples, count = residual.shape[:2]
-    flat = residual.reshape(samples, -1)
-    basis = jnp.einsum("trj,tij->tri", motion, inverse)
-    expected = inverse[:, :, KNOWN:] / sd[:, None]
-    taken = jnp.einsum("tri,tr->ti", basis, flat) + jnp.einsum("tij,tj->ti", expected, bare)
-    left = flat - jnp.einsum("tri,ti->tr", basis, taken)
-    unexpected = bare - jnp.einsum("tij,ti->tj", expected, taken)
-    through = jnp.einsum("tkid,tkim->tkdm", basis.reshape(samples, count, 6, -1), whitened)
-    misfit = jnp.sum(left**2, axis=1) + jnp.sum(unexpected**2, axis=1)
-    return left.reshape(residual.shape), basis, through, taken, misfit
-
-
-def _eliminated(model, count, x, extra, time, span, shared, data, prior) -> Eliminated:
-    """A chunk; its factorisations are LAPACK's, called from here (see `jax64`)."""
-    positions, parameters, directions = shared
-    residual, motion, whitened, gram = _chunk(
-        model, count, x, extra, time, span, positions, parameters, directions, data
-    )
-    mean, sd = prior
-    gram = np.array(gram)
     free = np.arange(KNOWN, gram.shape[1])
     gram[:, free, free] += sd**-2.0
     factor = np.linalg.cholesky(gram)
     inverse = np.linalg.inv(factor)
-    bare = (mean - x[:, KNOWN:]) / sd
-    left, basis, through, taken, misfit = _projected(residual, motion, whitened, inverse, bare, sd)
+    basis = motion @ np.swapaxes(inverse, 1, 2)
+    expected = inverse[:, :, KNOWN:] / sd[:, None]
+    flat = residual.reshape(samples, -1, 1)
+    taken = np.swapaxes(basis, 1, 2) @ flat + expected @ bare[..., None]
+    left = (flat - basis @ taken)[..., 0]
+    unexpected = (bare[..., None] - np.swapaxes(expected, 1, 2) @ taken)[..., 0]
+    through = np.swapaxes(basis.reshape(samples, count, 6, -1), 2, 3) @ whitened
+    misfit = np.sum(left**2, axis=1) + np.sum(unexpected**2, axis=1)
     volume = 2 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
-    return Eliminated(left, whitened, basis, through, inverse, taken, volume, misfit)
+    left = left.reshape(residual.shape)
+    return Eliminated(left, whitened, basis, through, inverse, taken[..., 0], volume, misfit)
 
 
-BUCKETS = (4, 16, 32)  # numbers of columns a compiled derivative is made for
 THREADS = 2
 
 
@@ -158,7 +151,7 @@ def linearise(
 ) -> Eliminated:
     """Residual and derivatives at a state, the motion eliminated.
 
-    ``wanted`` : indices of the columns to differentiate by, all if None; zeros may follow them.
+    ``wanted`` : indices of the columns to differentiate by, all if None.
     ``spare`` : a former answer whose memory may be used again. LinAlgError where the readings do
     not determine the motion.
     """
@@ -171,22 +164,24 @@ def linearise(
 
 
 def directions_of(columns: Columns, wanted=None) -> np.ndarray:
-    """The directions (m, 3 A + P) of some columns, all if None, zeros after them to a bucket."""
-    directions = tangents(columns.model)
-    if wanted is None:
-        return directions
-    number, whole = len(wanted), len(directions)
-    room = min([size for size in BUCKETS if size >= number], default=whole)
-    return np.vstack([directions[wanted], np.zeros((room - number, directions.shape[1]))])
+    """The columns (m,) to differentiate by, all if None."""
+    return np.arange(columns.size) if wanted is None else np.asarray(wanted, int)
 
 
 def chunk_at(readings: Readings, columns: Columns, state: State, directions, start) -> Eliminated:
     """The `CHUNK` samples from ``start`` on, the last one repeated where there are fewer."""
-    index, x, extra, prior = _chunk_of(readings, state, start)
-    shared = state.positions, state.parameters, directions
+    index, x, extra, (mean, sd) = _chunk_of(readings, state, start)
+    placed = bool(np.all(directions < columns.of(POSITION).size)) or not columns.model.chain
+    residual, motion, whitened, gram = _chunk(
+        columns.model, readings.values.shape[1], placed, x, extra, readings.time[index],
+        readings.span, state.positions, state.parameters,
+        (readings.values[index], readings.weights_of(index)),
+    )  # fmt: skip
+    bare = (mean - x[:, KNOWN:]) / sd
+    # factorisations are LAPACK's, called from here (see `jax64`)
     return _eliminated(
-        columns.model, readings.values.shape[1], x, extra, readings.time[index], readings.span,
-        shared, (readings.values[index], readings.weights_of(index)), prior,
+        np.asarray(residual), np.asarray(motion), np.asarray(whitened)[..., directions],
+        np.array(gram), bare, sd,
     )  # fmt: skip
 
 

@@ -11,12 +11,9 @@ common part, and the reported sds say what the priors leave open.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from imuarray.engine.settings import SETTINGS
 from imuarray.geometry import Array
@@ -71,13 +68,6 @@ def columns_of(array: Array, effects, position_sd: float) -> Columns:
             owner.append((np.arange(count) < shape[0]) & free)
             sds.append(float(spread[place]))
     return Columns(model, tuple(names), tuple(places), np.array(owner).T, np.array(sds))
-
-
-@cache
-def tangents(model: ArrayModel) -> np.ndarray:
-    """(m, 3 A + P): each column's direction, the same for all IMUs at once."""
-    shapes = [(model.array.accelerometers, 3), *model.shapes]
-    return block_diag(*(np.tile(np.eye(math.prod(s[1:])), s[0]) for s in shapes))
 
 
 def catalogue_effects(without=()) -> tuple[str, ...]:

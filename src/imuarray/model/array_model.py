@@ -155,13 +155,16 @@ class ArrayModel:
         triad, ``parameters`` (P,) flat effect parameters; ``when`` is what else an `Instant`
         holds: time (s), span (s), second and third derivatives.
         """
-        rate = jnp.broadcast_to(motion.angular_rate, (self.array.gyroscopes, 3))
-        predicted = Prediction(kinematics.specific_force(motion, positions), rate)
-        instant = Instant(motion, positions, **when)
+        predicted, instant = self.ideal(motion, positions), Instant(motion, positions, **when)
         values = self.split(jnp.asarray(parameters)) if self.effects else {}
         for item in self.chain:
             predicted = item.apply(values[item.id], instant, predicted)
         return predicted
+
+    def ideal(self, motion: Motion, positions) -> Prediction:
+        """The same without effects: what they are applied to."""
+        rate = jnp.broadcast_to(motion.angular_rate, (self.array.gyroscopes, 3))
+        return Prediction(kinematics.specific_force(motion, positions), rate)
 
     def predict_many(
         self, motion: Motion, positions, parameters=(), time=None, span: float | None = None
