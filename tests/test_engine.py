@@ -13,6 +13,7 @@ from imuarray.engine.ladder import climb, mask_of
 from imuarray.engine.parameters import POSITION, columns_of
 from imuarray.engine.passes import normal_pass
 from imuarray.engine.readings import arrange, most_informative
+from imuarray.engine.widths import widths
 from imuarray.geometry import sub_array
 from imuarray.motion.state import Motion
 
@@ -31,9 +32,9 @@ def errors(found, truth):
     return (found.positions - truth["position"].to_numpy())[1:]
 
 
-def widths(found):
+def position_sds(found):
     place = found.places[0][np.argwhere(found.active)[:, 1] < 3]
-    return np.sqrt(np.diag(found.widths()[0]))[place].reshape(-1, 3)
+    return np.sqrt(np.diag(widths(found)[0]))[place].reshape(-1, 3)
 
 
 def fitted(recording, effects=(), **options):
@@ -97,10 +98,28 @@ def test_positions_sds_and_noise_are_right():
         declared = replace(recording, accelerometer_noise_sd=0.04, gyroscope_noise_sd=4e-3)
         found = fitted(declared)
         assert found.converged and found.freedoms.min() >= 10
-        z.append(errors(found, truth) / widths(found))
+        z.append(errors(found, truth) / position_sds(found))
         noise.append(found.noise_sd())
     assert 0.6 < np.sqrt(np.mean(np.square(z))) < 1.4
     np.testing.assert_allclose(np.mean(noise, axis=0), [[0.08, 2e-3]] * 4, rtol=0.06)
+
+
+def test_what_a_correction_left_widens_by_as_much_as_it_moves():
+    """Maps of which one direction is uncertain, against readings that are changed along it."""
+    recording, _ = simulated(2.0)
+    recording = replace(recording, angular_rate_saturated=recording.saturated_gyroscopes())
+    bare, rng = fitted(recording, robust=False), np.random.default_rng(2)
+    for kind, name in (("accelerometer", "specific_force"), ("gyroscope", "angular_rate")):
+        values = getattr(recording, name)
+        change = 1e-4 * rng.standard_normal((values.shape[1], 3, 3))
+        change += 1e-3 * np.diag(rng.standard_normal(3)) * (kind == "gyroscope")  # they share it
+        other = replace(recording, **{name: values + np.einsum("kij,tkj->tki", change, values)})
+        size = np.abs(fitted(other, robust=False).positions - bare.positions)[1:].ravel()
+        spread = np.outer(change, change)
+        left = replace(recording, **{f"{kind}_map_covariance": spread})
+        added = widths(fitted(left, robust=False))[1] ** 2 - widths(bare)[1] ** 2
+        assert size.max() > 5e-6
+        np.testing.assert_allclose(np.sqrt(added), size, atol=0.15 * size.max())
 
 
 def test_readings_far_out_lose_their_say():
@@ -135,7 +154,9 @@ def test_recordings_of_a_board_are_fitted_jointly():
         assert abs(bias[0]) > 0.05 and bias[0] == pytest.approx(bias[1], abs=2e-3)
     np.testing.assert_array_equal(*(one.state.positions for one in both.recorded))
     # the same readings twice say twice as much
-    assert np.mean(widths(both) / widths(alone[0])) == pytest.approx(np.sqrt(0.5), abs=0.12)
+    assert np.mean(position_sds(both) / position_sds(alone[0])) == pytest.approx(
+        np.sqrt(0.5), abs=0.12
+    )
 
 
 def test_the_ladder_keeps_what_gains():
@@ -144,7 +165,7 @@ def test_the_ladder_keeps_what_gains():
     # simulated to first order in the lag: what the fit has beyond looks like delays of IMUs
     kept = {rung.name for rung in rungs if rung.kept} - {"delay of each IMU"}
     assert kept == {"lag of the gyroscopes"}
-    assert np.sqrt(np.mean((errors(found, truth) / widths(found)) ** 2)) < 2
+    assert np.sqrt(np.mean((errors(found, truth) / position_sds(found)) ** 2)) < 2
     few = imuarray.select(simulated(3.0)[0], 60)
     found, rungs = climb([arrange(few, sparse=True)])
     assert not any(rung.kept for rung in rungs)

@@ -39,10 +39,14 @@ def test_known_maps_are_found_whatever_the_mounts(different):
     board, found = calibrated(1, **different)
     maps = found.gyroscopes
     error = maps.matrix - board.truth.gyroscopes
-    sds = np.sqrt(np.einsum("kii->ki", maps.covariance)).reshape(error.shape)
+    sds = np.sqrt(np.diag(maps.covariance)).reshape(error.shape)
     assert rms(error) < 4e-4 and rms(error / sds) < 2.0
     assert rms(found.triads.matrix - board.truth.accelerometers) < 6e-4
-    rates = correct(board.recording(), found).angular_rate
+    corrected = correct(board.recording(), found)
+    common = (np.linalg.inv(maps.matrix) @ board.truth.gyroscopes).mean(axis=0) - np.eye(3)
+    known = corrected.gyroscope_common_covariance
+    assert common.ravel() @ np.linalg.solve(known, common.ravel()) < 28  # chi-squared, 9: 0.1 %
+    rates = corrected.angular_rate
     assert rms(rates[:, 0] - board.truth.rate) < 2.5e-3  # noise of 1e-3, offsets
 
 
@@ -273,5 +277,8 @@ def test_the_file_and_the_report_carry_it(tmp_path, recording, capsys):
     assert "gyroscope_matrix" not in without and "gyroscope_common_scale_sd" not in without.attrs
     # what later steps read
     assert main(["select", str(tmp_path / "a.nc"), "--out", str(tmp_path / "c.nc")]) == 0
-    assert read_recording(tmp_path / "c.nc").gyroscope_common_scale_sd == sd
-    assert np.isnan(read_recording(tmp_path / "b.nc").gyroscope_common_scale_sd)
+    kept, bare = (read_recording(tmp_path / f"{x}.nc") for x in "cb")
+    # maps relative to a common one that is 1 within some per cent
+    assert kept.gyroscope_common_scale_sd == pytest.approx(sd, rel=0.02)
+    assert bare.gyroscope_map_covariance is None and np.isnan(bare.gyroscope_common_scale_sd)
+    assert kept.accelerometer_map_covariance.shape == bare.accelerometer_map_covariance.shape

@@ -8,6 +8,7 @@ import xarray as xr
 from imuarray.analysis.model import model_of
 from imuarray.engine.estimate import Estimate
 from imuarray.engine.parameters import POSITION
+from imuarray.engine.widths import widths
 from imuarray.model import ArrayModel
 from imuarray.model.names import parameter_names
 from imuarray.motion.state import UNITS
@@ -96,7 +97,7 @@ def residual_ratio(recording: Recording, model: ArrayModel, found, saturated) ->
 def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
     """Of the engine's estimate."""
     first, readings = recordings[0], found.recorded[0].readings
-    covariance, *sds = found.widths()
+    covariance, *sds = widths(found)
     effects = _effects_of(found)
     place, size = _places(found, effects)
     count = 3 * (readings.array.accelerometers - 1)

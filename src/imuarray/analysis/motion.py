@@ -46,7 +46,7 @@ def apply(
             found = _papers(calibration, recording, accelerometer_noise)
     except np.linalg.LinAlgError as error:
         raise InputError(f"expected a calibration that determines the motion: {error}") from None
-    found = _with_common_map(found, calibration.attrs.get("gyroscope_common_scale_sd", np.nan))
+    found = _with_common_map(found, calibration, recording)
     lost = recording.saturated_accelerometers().any(axis=(1, 2))
     if not (np.einsum("tii->ti", found.covariance)[~lost] > 0).all():  # NaN, too
         raise InputError("expected a calibration that gives the motion variances, found none")
@@ -62,17 +62,23 @@ def apply(
     return dataset
 
 
-def _with_common_map(found, scale_sd: float):
-    """The angular rate as uncertain as the map common to all gyroscopes leaves it.
+def _with_common_map(found, calibration: xr.Dataset, recording: Recording):
+    """The angular rate as uncertain as the map is that all gyroscopes share.
 
-    ``scale_sd`` is that of the mean of its diagonal; each of its nine entries is as well known.
+    Its errors are the same at all samples. Where the calibration has estimated the gyroscopes'
+    maps, their common scale alone is left.
     """
-    if not np.isfinite(scale_sd):
-        return found
     rate = np.asarray(found.estimate.motion.angular_rate)
+    if "gyroscope_scale" in calibration.attrs.get("effects", "").split(","):
+        scale_sd = np.nan_to_num(calibration.attrs.get("gyroscope_common_scale_sd", np.nan))
+        own = scale_sd**2 * rate[:, :, None] * rate[:, None]
+    elif recording.gyroscope_common_covariance is None:
+        return found
+    else:
+        spread = recording.gyroscope_common_covariance.reshape(3, 3, 3, 3)
+        own = np.einsum("tj,ijkl,tl->tik", rate, spread, rate)
     more = np.zeros((len(rate), 9, 9))
-    axes = np.arange(3)
-    more[:, axes, axes] = 3.0 * scale_sd**2 * np.sum(rate**2, axis=1, keepdims=True)
+    more[:, :3, :3] = own
     return found._replace(
         covariance=found.covariance + more, from_calibration=found.from_calibration + more
     )

@@ -25,6 +25,7 @@ from imuarray.engine.fit import Fit, at, fit
 from imuarray.engine.heldout import Scores, gain, log_scores
 from imuarray.engine.parameters import prior_precision
 from imuarray.engine.settings import SETTINGS as ENGINE
+from imuarray.engine.widths import widths
 from imuarray.linear import scaled_inverse
 from imuarray.model.effects import DATA_EFFECTS, KINDS
 from imuarray.recording import Recording
@@ -50,7 +51,7 @@ class Fitted:
         found, place = self.fit.state.positions, self.fit.columns.of("position")
         if self.robust is None:
             return found, self.sds[: len(found), place]
-        sds = np.sqrt(np.diag(self.robust.widths()[0]))
+        sds = np.sqrt(np.diag(widths(self.robust)[0]))
         whole = np.zeros(self.fit.active.shape)
         whole[self.fit.active] = sds[self.robust.places[0]]
         return self.robust.positions, whole[: len(found), place]

@@ -22,16 +22,14 @@ from imuarray.engine.fit import (
     with_rough_prior,
 )
 from imuarray.engine.linearise import State
-from imuarray.engine.parameters import Columns, gauge_masks, prior_precision
+from imuarray.engine.parameters import Columns, prior_precision
 from imuarray.engine.passes import Pass, normal_pass
 from imuarray.engine.readings import Readings
 from imuarray.engine.robust import distances, freedoms, judged
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import is_smooth, start
-from imuarray.linear import scaled_inverse
 from imuarray.model.effects import EFFECTS
 
-CORRECTED = "accelerometer_scale", "accelerometer_misalignment"  # what first order leaves of them
 NORMAL = np.array([np.inf, np.inf])
 
 
@@ -92,60 +90,10 @@ class Estimate:
         """The parameters (n,)."""
         return _values(self.recorded, self.columns, self.active, self.places)
 
-    def widths(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Covariance (n, n); formal sds (n,), and a jackknife's: the covariance has the larger."""
-        formal = self._formal() + self._corrected()
-        sds, resampled = (
-            np.sqrt(np.diag(formal)),
-            _jackknifed(self.information + self.precision, self.blocks),
-        )
-        wider = np.maximum(resampled / sds, 1.0)
-        return formal * np.outer(wider, wider), sds, resampled
-
-    def _corrected(self) -> np.ndarray:
-        """What errors left by the accelerometers' first-order correction add, (n, n).
-
-        They are not estimated: by so much would they move what is.
-        """
-        sd = np.fmin.reduce([one.readings.matrix_sd for one in self.recorded])
-        matrix = np.isin(self.columns.names, CORRECTED) & self.columns.owner & ~self.active
-        if not (np.isfinite(sd) and matrix.any()):
-            return np.zeros_like(self.information)
-        blocks, _, _ = tested(self, self.active | matrix)
-        places = places_of(self.columns, self.active | matrix, len(self.recorded))
-        mine = matrix[self.active | matrix]
-        added = np.unique(np.concatenate([place[mine] for place in places]))
-        kept = np.setdiff1d(np.arange(len(blocks[0][1])), added)
-        cross = sum(inner[np.ix_(kept, added)] for inner, _ in blocks)
-        moved = scaled_inverse(self.information + self.precision) @ cross
-        return sd**2 * moved @ moved.T
-
     @property
     def scale_sd(self) -> float:
         """Of the scale common to all gyroscopes: the least that a recording knows, or NaN."""
         return float(np.fmin.reduce([one.readings.scale_sd for one in self.recorded]))
-
-    def _formal(self) -> np.ndarray:
-        """Gauges that the array's size takes up not pinned, but as large as they may well be."""
-        known = np.isfinite(self.scale_sd)
-        prior = _pinned(self.recorded, self.columns, self.active, self.places, resized=known)
-        if known:
-            # r goes with the rate's scale to the power of -2
-            size = np.zeros(len(prior))
-            pairs = np.argwhere(self.active)
-            mine = pairs[:, 1] < 3
-            size[self.places[0][mine]] = 2.0 * self.positions[pairs[mine, 0], pairs[mine, 1]]
-            inverse = scaled_inverse(self.information + prior)
-            return _lost(self.freedoms) * inverse + self.scale_sd**2 * np.outer(size, size)
-        for effect, mask in gauge_masks(self.columns, self.active):
-            if not effect.resizes:
-                continue
-            chosen = self.places[0][mask[self.active]]
-            mean = np.zeros(len(prior))
-            mean[chosen] = 1.0 / len(chosen)
-            # the mean of so many that differ by so much
-            prior += np.outer(mean, mean) * len(chosen) / np.var(self.values[chosen], ddof=1)
-        return _lost(self.freedoms) * scaled_inverse(self.information + prior)
 
     def residual_ratio(self) -> float:
         """Rms residual over the declared noise, degrees of freedom allowed for."""
@@ -164,12 +112,7 @@ class Estimate:
         return np.sqrt(wide * np.mean(squares, axis=0))
 
 
-def _lost(freedoms) -> float:
-    """Normal noise's information over Student's t's: weights fall as readings move away."""
-    return max((nu + 5) / (nu + 3) if np.isfinite(nu) else 1.0 for nu in freedoms)
-
-
-def _jackknifed(information, blocks) -> np.ndarray:
+def jackknifed(information, blocks) -> np.ndarray:
     """Sds (n,) from leaving out a block of time after the other, priors in the information."""
     moved = np.array([-np.linalg.solve(information - inner, score) for inner, score in blocks])
     count = len(moved)
@@ -186,7 +129,7 @@ def estimate(
     normal noise. ``steps``: at most. LinAlgError where the readings do not determine the motion.
     """
     places = places_of(columns, active, len(recorded))
-    precision = _pinned(recorded, columns, active, places)
+    precision = pinned(recorded, columns, active, places)
     recorded, nu, length, last, moved = tuple(recorded), NORMAL, 1.0, np.inf, []
     for number in range(steps):
         recorded, passes = _passed(recorded, columns, active)
@@ -194,7 +137,7 @@ def estimate(
         values = _values(recorded, columns, active, places)
         slope = score - precision @ (values - _means(recorded, columns, active, places))
         step, sds = scaled_solve(information + precision, slope)
-        sds = np.maximum(sds, _jackknifed(information + precision, blocks))
+        sds = np.maximum(sds, jackknifed(information + precision, blocks))
         moved.append(float(np.max(np.abs(step) / sds, initial=0.0)))
         if robust and number >= SETTINGS.normal_first:
             nu = _freedoms(recorded, passes)
@@ -266,7 +209,7 @@ def _means(recorded, columns, active, places) -> np.ndarray:
     return _spread([prior_means(one.readings, columns)[active] for one in recorded], places)
 
 
-def _pinned(recorded, columns, active, places, resized=True) -> np.ndarray:
+def pinned(recorded, columns, active, places, resized=True) -> np.ndarray:
     """Precision (n, n) of the priors, gauges pinned, and what does not move in rough motion."""
     inner = prior_precision(columns, active, resized)
     parts = []
@@ -326,4 +269,4 @@ def tested(found: Estimate, active):
     recorded, passes = _passed(found.recorded, found.columns, active)
     blocks = _summed(passes, places)[2]
     values = _values(recorded, found.columns, active, places)
-    return blocks, _pinned(recorded, found.columns, active, places), values
+    return blocks, pinned(recorded, found.columns, active, places), values

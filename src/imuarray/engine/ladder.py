@@ -8,12 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.engine.estimate import CORRECTED, Estimate, Recorded, estimate, places_of, tested
+from imuarray.engine.estimate import Estimate, Recorded, estimate, places_of, tested
 from imuarray.engine.fit import flat_parameters, from_flat
 from imuarray.engine.heldout import gain_of
 from imuarray.engine.parameters import POSITION, Columns, columns_of
 from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS
+from imuarray.engine.widths import MAPS
 from imuarray.errors import InputError
 from imuarray.model.effects import EFFECTS
 
@@ -58,8 +59,8 @@ def climb(readings: Sequence[Readings]) -> tuple[Estimate, list[Rung]]:
     smooth = all(one.gapless for one in readings)
     names = [n for n, ids in RUNGS.items() if smooth or not any(map(_needs_neighbours, ids))]
     effects = [effect for name in names for effect in RUNGS[name]]
-    if np.isfinite([one.matrix_sd for one in readings]).any():
-        effects += CORRECTED
+    if any(left is not None for one in readings for left in one.left):
+        effects += [name for name in MAPS if name not in effects]
     columns = columns_of(readings[0].array, effects, readings[0].position_prior_sd)
     bare = mask_of(columns, [POSITION])
     found = estimate(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from imuarray.errors import InputError
 from imuarray.firstorder.allan import lag_correlation, white_noise_sd
@@ -64,6 +65,18 @@ class FirstOrder:
         The identity but where it is the first that is turned, by more than a mount is off.
         """
         return shared_turn(nearest_orthogonal(self.triads.matrix))
+
+    def left(self) -> tuple[np.ndarray, np.ndarray | None]:
+        """Covariances (9 A, 9 A) and (9 G, 9 G) of the maps left in the corrected readings.
+
+        None for gyroscopes without a common map: nothing is known of their scale.
+        """
+        count = len(self.triads.matrix)
+        split = self.triads.covariance.reshape(count, 12, count, 12)[:, :9, :, :9]
+        forces = _behind(self.triads.matrix, split.reshape(9 * count, 9 * count))
+        if np.isnan(self.common_scale_sd):
+            return forces, None
+        return forces, _behind(self.gyroscope_matrix, self.gyroscopes.covariance)
 
     @property
     def common_scale_sd(self) -> float:
@@ -126,6 +139,7 @@ def correct(recording: Recording, found: FirstOrder) -> Recording:
     rate, rate_rails = _corrected(
         maps, recording.angular_rate - found.gyroscope_offset, recording.saturated_gyroscopes()
     )
+    forces_left, rates_left = found.left()
     still = np.zeros(len(recording.time), bool)
     for pose in found.poses:
         still[pose] = True
@@ -140,12 +154,18 @@ def correct(recording: Recording, found: FirstOrder) -> Recording:
             recording.accelerometer_range, found.triads.matrix, found.triads.offset
         ),
         gyroscope_range=_nearest_rail(recording.gyroscope_range, maps, found.gyroscope_offset),
-        gyroscope_common_scale_sd=found.common_scale_sd,
-        accelerometer_matrix_sd=found.triads.matrix_sd,
+        accelerometer_map_covariance=forces_left,
+        gyroscope_map_covariance=rates_left,
         stationary=still,
         specific_force_saturated=force_rails,
         angular_rate_saturated=rate_rails,
     )
+
+
+def _behind(matrix, covariance) -> np.ndarray:
+    """Covariance of matrices (K, 3, 3) as that of what is left when they are taken out."""
+    back = block_diag(*(np.kron(inverse, np.eye(3)) for inverse in np.linalg.inv(matrix)))
+    return back @ covariance @ back.T
 
 
 def _corrected(matrix, readings, rails) -> tuple[np.ndarray, np.ndarray]:

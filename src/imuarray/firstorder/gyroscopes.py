@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from imuarray.firstorder.moves import CommonMap, common_map, gather, prior_precision
 from imuarray.firstorder.relative import Relative, compare
@@ -20,7 +21,7 @@ class Gyroscopes:
     Attributes
     ----------
     matrix : (G, 3, 3), reading = matrix @ angular rate + offset
-    covariance : (G, 9, 9) of each, row by row
+    covariance : (9 G, 9 G) of all, row by row
     relative, common : `Relative` and `CommonMap`, or the reason why there is none
     """
 
@@ -28,6 +29,13 @@ class Gyroscopes:
     covariance: np.ndarray
     relative: Relative | str
     common: CommonMap | str
+
+    @property
+    def blocks(self) -> np.ndarray:
+        """(G, 9, 9) covariance of each matrix, row by row."""
+        count = len(self.matrix)
+        split = self.covariance.reshape(count, 9, count, 9)
+        return split[range(count), :, range(count)]
 
     @property
     def common_scale_sd(self) -> float:
@@ -78,7 +86,7 @@ def _start(recording: Recording, triads: TriadFit) -> np.ndarray:
 
 
 def _together(turn, maps, relative, common) -> tuple[np.ndarray, np.ndarray]:
-    """Matrices (G, 3, 3) and covariances (G, 9, 9); the prior's of what was not estimated."""
+    """Matrices (G, 3, 3) and their covariance (9 G, 9 G); the prior's of what was not estimated."""
     unknown = np.linalg.inv(prior_precision())
     axes, change, spread = np.eye(3), np.eye(3), unknown
     if not isinstance(common, str):
@@ -87,9 +95,10 @@ def _together(turn, maps, relative, common) -> tuple[np.ndarray, np.ndarray]:
     back = np.linalg.inv(change)
     behind = axes.T @ back
     matrix = turn @ maps @ behind
-    by_map = [np.kron(t, behind.T) for t in turn]
-    by_common = [np.kron(m, back.T) for m in matrix]
-    covariance = [
-        a @ spread @ a.T + b @ c @ b.T for a, b, c in zip(by_common, by_map, own, strict=True)
-    ]
-    return matrix, np.array(covariance)
+    count = len(turn)
+    # of relative maps the mean is known
+    apart = np.kron(np.eye(count) - 1 / count, np.eye(9))
+    by_map = block_diag(*(np.kron(t, behind.T) for t in turn)) @ apart
+    by_common = np.vstack([np.kron(m, back.T) for m in matrix])
+    own = block_diag(*own)
+    return matrix, by_common @ spread @ by_common.T + by_map @ own @ by_map.T

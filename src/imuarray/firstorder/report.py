@@ -28,7 +28,7 @@ def parameter_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
     parts, sds = {}, {}
     if found.gyroscopes is not None:
         maps = found.gyroscopes
-        parts, sds = parts_of(maps.matrix), parts_sd_of(maps.matrix, maps.covariance)
+        parts, sds = parts_of(maps.matrix), parts_sd_of(maps.matrix, maps.blocks)
     parts["offset"], sds["offset"] = found.gyroscope_offset, found.gyroscope_offset_sd
     rows += _rows("gyroscope", recording.gyroscope_labels, parts, sds, "rad s-1")
     names = ["sensor", "triad", "parameter", "component", "value", "sd", "unit"]

@@ -60,7 +60,7 @@ def _gyroscopes(maps: Gyroscopes, limits) -> tuple[dict, dict]:
     square, rows = ("gyroscope", "axis", "axis_other"), {"long_name": "of a matrix row by row"}
     variables = {
         "gyroscope_matrix": (square, maps.matrix, {"units": "1"}),
-        "gyroscope_covariance": (("gyroscope", "entry", "entry_other"), maps.covariance, rows),
+        "gyroscope_covariance": (("gyroscope", "entry", "entry_other"), maps.blocks, rows),
         "gyroscope_turn": (square, nearest_orthogonal(maps.matrix), {"units": "1"}),
     }
     attrs = {}

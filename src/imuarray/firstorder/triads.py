@@ -65,13 +65,6 @@ class TriadFit:
         """The same over all poses, those left out included."""
         return np.sqrt(np.mean(self.residual**2, axis=(0, 2)))
 
-    @property
-    def matrix_sd(self) -> float:
-        """Rms sd of the matrices' entries, no unit."""
-        count = len(self.matrix)
-        variances = np.diag(self.covariance).reshape(count, 12)[:, :9]
-        return float(np.sqrt(np.mean(variances[variances > 0])))
-
     def parts(self) -> dict[str, np.ndarray]:
         """Scale (A, 3), misalignment (A, 3: xy, xz, yz) and orientation (A, 3: rotation vector)."""
         return parts_of(self.matrix)

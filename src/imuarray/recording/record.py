@@ -28,6 +28,8 @@ DIMENSIONS = {
     "stationary": ("time",),
     "specific_force_saturated": ("time", "accelerometer", "axis"),
     "angular_rate_saturated": ("time", "gyroscope", "axis"),
+    "accelerometer_map_covariance": ("accelerometer_entry", "accelerometer_entry_other"),
+    "gyroscope_map_covariance": ("gyroscope_entry", "gyroscope_entry_other"),
 }
 
 # Optional variables that are true or false.
@@ -54,8 +56,8 @@ NUMBERS = {
     "position_prior_sd": "m",
 }
 
-# Optional attributes that are positive numbers, NaN where they are not known, and their units.
-OPTIONAL_NUMBERS = {"gyroscope_common_scale_sd": "1", "accelerometer_matrix_sd": "1"}
+# Optional variables: how well the maps are known by which the readings were corrected.
+COVARIANCES = ("accelerometer_map_covariance", "gyroscope_map_covariance")
 
 # A simulated sensor need not have a rail.
 MAY_BE_INFINITE = ("accelerometer_range", "gyroscope_range")
@@ -88,10 +90,9 @@ class Recording:
         Still poses.
     specific_force_saturated, angular_rate_saturated : ndarray (T, A or G, 3) bool, or None
         Readings at a rail, where a correction moved them off the range (first-order calibration).
-    gyroscope_common_scale_sd : float
-        Of the scale error that all gyroscopes share, no unit; NaN if not known.
-    accelerometer_matrix_sd : float
-        Of an entry of the 3 x 3 matrix by which an accelerometer was corrected; NaN if not known.
+    accelerometer_map_covariance, gyroscope_map_covariance : (9 A, 9 A) and (9 G, 9 G), or None
+        Of the 3 x 3 maps, no unit, that are left between the truth and the readings where these
+        were corrected: about the identity, row by row, triad by triad.
     title, source, license : str, empty if not known
     selected : str
         How many samples of how many, where these are not all that were recorded; else empty.
@@ -111,8 +112,8 @@ class Recording:
     stationary: np.ndarray | None = None
     specific_force_saturated: np.ndarray | None = None
     angular_rate_saturated: np.ndarray | None = None
-    gyroscope_common_scale_sd: float = np.nan
-    accelerometer_matrix_sd: float = np.nan
+    accelerometer_map_covariance: np.ndarray | None = None
+    gyroscope_map_covariance: np.ndarray | None = None
     title: str = ""
     source: str = ""
     license: str = ""
@@ -127,6 +128,9 @@ class Recording:
         for name in FLAGS:
             if getattr(self, name) is not None:
                 variables[name] = (DIMENSIONS[name], np.asarray(getattr(self, name), bool))
+        for name in COVARIANCES:
+            if getattr(self, name) is not None:
+                variables[name] = DIMENSIONS[name], getattr(self, name), {"units": "1"}
         coordinates = {
             "time": variables.pop("time"),
             "accelerometer": ("accelerometer", np.array(self.accelerometer_labels, object)),
@@ -134,13 +138,25 @@ class Recording:
             "axis": ("axis", np.array(AXES, object)),
         }
         attributes = {name: float(getattr(self, name)) for name in NUMBERS}
-        optional = {name: float(getattr(self, name)) for name in OPTIONAL_NUMBERS}
-        attributes |= {name: value for name, value in optional.items() if not np.isnan(value)}
         attributes |= {name: getattr(self, name) for name in TEXTS if getattr(self, name)}
         try:
             return xr.Dataset(variables, coordinates, attributes)
         except ValueError as error:
             raise InputError(f"recording: expected arrays of matching shapes, {error}") from error
+
+    @property
+    def gyroscope_common_covariance(self) -> np.ndarray | None:
+        """(9, 9) of the map that all gyroscopes share, their mean's; None if not known."""
+        if self.gyroscope_map_covariance is None:
+            return None
+        count = len(self.gyroscope_labels)
+        return self.gyroscope_map_covariance.reshape(count, 9, count, 9).mean(axis=(0, 2))
+
+    @property
+    def gyroscope_common_scale_sd(self) -> float:
+        """Of the scale error that all gyroscopes share, no unit; NaN if not known."""
+        common = self.gyroscope_common_covariance
+        return np.nan if common is None else float(np.sqrt(common[::4, ::4].sum())) / 3
 
     def relative_positions(self) -> np.ndarray:
         """Nominal positions relative to the reference triad, (A, 3) metres; row 0 is zero."""

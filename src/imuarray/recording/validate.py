@@ -18,12 +18,12 @@ from imuarray.errors import LARGEST, SMALLEST, IdentifiabilityError, InputError
 from imuarray.geometry.array import require_count, require_planar_extent
 from imuarray.recording.record import (
     AXES,
+    COVARIANCES,
     DIMENSIONS,
     FLAGS,
     LABELS,
     MAY_BE_INFINITE,
     NUMBERS,
-    OPTIONAL_NUMBERS,
     QUANTITIES,
     SI,
     Recording,
@@ -70,8 +70,11 @@ def check_structure(dataset: xr.Dataset, where: str) -> None:
     for name in FLAGS:
         if name in dataset:
             _check_boolean(dataset[name], where)
-    for name in (*NUMBERS, *(name for name in OPTIONAL_NUMBERS if name in dataset.attrs)):
+    for name in NUMBERS:
         _check_number(dataset.attrs, name, where)
+    for name in COVARIANCES:
+        if name in dataset:
+            _check_covariance(dataset, name, where)
 
 
 def check_values(recording: Recording, where: str) -> None:
@@ -142,7 +145,7 @@ def _check_boolean(variable: xr.DataArray, where: str) -> None:
 
 
 def _check_number(attributes: dict, name: str, where: str) -> None:
-    unit = (NUMBERS | OPTIONAL_NUMBERS)[name]
+    unit = NUMBERS[name]
     bounds = f"between {SMALLEST:g} and {LARGEST:g}"
     expected = f"expected the attribute '{name}' to be a number {bounds} in {unit}"
     if name not in attributes:
@@ -156,6 +159,22 @@ def _check_number(attributes: dict, name: str, where: str) -> None:
     # written so that NaN fails
     if not SMALLEST <= number <= LARGEST:
         raise InputError(f"{where}: {expected}, found {number}")
+
+
+def _check_covariance(dataset: xr.Dataset, name: str, where: str) -> None:
+    _check_present(dataset, name, where)
+    _check_numeric(dataset[name], where)
+    values = dataset[name].values.astype(float)
+    count = 9 * dataset.sizes[name.partition("_")[0]]
+    if values.shape != (count, count) or not (np.abs(values) <= LARGEST).all():
+        raise InputError(
+            f"{where}: {name}: expected {count} x {count} finite numbers, found"
+            f" {' x '.join(map(str, values.shape))}, or others"
+        )
+    least, *_, most = np.linalg.eigvalsh((values + values.T) / 2)
+    even = np.allclose(values, values.T, rtol=0, atol=1e-9 * most)
+    if not (even and least >= -1e-9 * most):
+        raise InputError(f"{where}: {name}: expected a covariance, found none")
 
 
 def _check_counts(recording: Recording, where: str) -> None:
