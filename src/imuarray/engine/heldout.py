@@ -69,17 +69,20 @@ def gain(one: Scores, other: Scores) -> tuple[float, float]:
     return float(difference.sum() / samples), float(error / samples)
 
 
-def gain_of(parts, ridge, values, freed) -> tuple[float, float]:
+def gain_of(parts, ridge, values, freed, spare=None) -> tuple[float, float]:
     """Nats that ``freed`` (n,) bool parameters gain on held-out blocks over zero, and their error.
 
     ``parts`` [(information (n, n), score (n,))] of the blocks at ``values`` (n,), ``ridge`` (n, n)
     the prior's precision. Both rivals are trained without the block, the freed parameters shrunk
-    as their score in the training blocks deserves (positive-part James-Stein).
+    as their score in the training blocks deserves (positive-part James-Stein). ``spare`` (n,) bool:
+    parameters that both rivals have beside the others.
     """
     information, score = sum(p[0] for p in parts), sum(p[1] for p in parts)
-    gains = []
-    for block, slope in parts:
-        trained = information - block + ridge, score - slope
+    spare = np.zeros(len(freed), bool) if spare is None else spare
+    freed, values, gains = freed[~spare], values[~spare], []
+    for part in parts:
+        trained = information - part[0] + ridge, score - part[1]
+        trained, (block, slope) = _eliminated(trained, part, spare)
         without = _solve(*trained, values, freed, 0.0)
         full = _solve(*trained, values, freed, None)
         found = (full + values)[freed]
@@ -89,6 +92,23 @@ def gain_of(parts, ridge, values, freed) -> tuple[float, float]:
         kept = _solve(*trained, values, freed, shrink * found)
         gains.append(_predicted(kept, block, slope) - _predicted(without, block, slope))
     return float(np.sum(gains)), float(np.std(gains, ddof=1) * np.sqrt(len(gains)))
+
+
+def _eliminated(trained, part, spare):
+    """Training and held-out block for the rest, the ``spare`` parameters where training puts them.
+
+    Up to a constant of the block's.
+    """
+    if not spare.any():
+        return trained, part
+    (inner, score), (block, slope), rest = trained, part, ~spare
+    cross, held = inner[np.ix_(rest, spare)], block[np.ix_(spare, spare)]
+    solved = np.linalg.solve(inner[np.ix_(spare, spare)], np.column_stack([score[spare], cross.T]))
+    at, back = solved[:, 0], solved[:, 1:]
+    left = block[np.ix_(rest, spare)] - back.T @ held
+    reduced = inner[np.ix_(rest, rest)] - cross @ back, score[rest] - cross @ at
+    seen = block[np.ix_(rest, rest)] - left @ back - back.T @ block[np.ix_(spare, rest)]
+    return reduced, (seen, slope[rest] - back.T @ slope[spare] - left @ at)
 
 
 def _schur(information, chosen):

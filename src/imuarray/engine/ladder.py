@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import chdtrc
 
 from imuarray.engine.estimate import Estimate, Recorded, estimate, places_of, tested
 from imuarray.engine.fit import flat_parameters, from_flat
@@ -14,8 +15,9 @@ from imuarray.engine.heldout import gain_of
 from imuarray.engine.parameters import POSITION, Columns, columns_of
 from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS
-from imuarray.engine.widths import MAPS
+from imuarray.engine.widths import MAPS, SCALES, SKEWS, spread_of
 from imuarray.errors import InputError
+from imuarray.linear import scaled_inverse
 from imuarray.model.effects import EFFECTS
 
 RUNGS = {
@@ -25,7 +27,9 @@ RUNGS = {
     "delay of each IMU": ("sensor_delay",),
     "lever arms of the axes": ("size_effect",),
 }
-LEAST_Z = 2.0  # standard errors of a gain on held-out time from which a rung is kept
+FIXED = 1e-7  # sd of a map's entry that is known
+CHANCE = 1e-3  # of maps as far from those of first order
+LEAST_Z, LEAST_NATS = 2.0, 2.0  # standard errors of a gain, and nats, from which a rung is kept
 
 
 class Rung(NamedTuple):
@@ -91,6 +95,28 @@ def without(found: Estimate, active) -> list[Recorded]:
     return out
 
 
+def _left(found: Estimate) -> list[tuple[np.ndarray, np.ndarray]]:
+    """[(mask (N, m), covariance)] of accelerometers' and gyroscopes' maps that were corrected.
+
+    The first recording's stands for all.
+    """
+    first, out = found.recorded[0].readings, []
+    for which, covariance in enumerate(first.left):
+        mask = mask_of(found.columns, [name[which] for name in (SCALES, SKEWS)])
+        if covariance is not None:
+            spread = spread_of(first.left, found.columns, mask)
+            out.append((mask, spread + FIXED**2 * np.eye(len(spread))))
+    return out
+
+
+def _contradicted(parts, ridge, values, freed, spread) -> bool:
+    """Whether parameters that are known to be zero within ``spread`` (f, f) come out as others."""
+    spread = spread + scaled_inverse(sum(part[0] for part in parts) + ridge)[np.ix_(freed, freed)]
+    step = np.linalg.solve(sum(part[0] for part in parts) + ridge, sum(part[1] for part in parts))
+    off = (step + values)[freed]
+    return bool(chdtrc(len(off), off @ np.linalg.solve(spread, off)) < CHANCE)
+
+
 def _needs_neighbours(effect: str) -> bool:
     return EFFECTS[effect].derivatives
 
@@ -103,23 +129,54 @@ def mask_of(columns: Columns, effects) -> np.ndarray:
 def gains(found: Estimate, names: Sequence[str], kept: Container[str] = ()) -> list[Rung]:
     """What each rung gains on held-out time beside those kept, and those before it that gain.
 
-    By one linearisation with all of them.
+    By one linearisation with all of them. Maps that first order has left are beside them all, as
+    uncertain as it left them: what they explain is no rung's gain.
     """
     every = [name for name in RUNGS if name in names or name in kept]
     masks = {name: mask_of(found.columns, RUNGS[name]) for name in every}
-    active = found.active | np.any(list(masks.values()), axis=0)
-    blocks, precision, values = tested(found, active)
+    left = _left(found)
+    active = found.active | np.any([*masks.values(), *(mask for mask, _ in left)], axis=0)
     places, out = places_of(found.columns, active, len(found.recorded)), []
+    given = _Given(*tested(found, active), active, places)
     beside = found.active | np.any([masks[n] for n in every if n in kept] or [False], axis=0)
     for name in names:
-        freed, used = (np.zeros(len(values), bool) for _ in range(2))
-        for place in places:
-            freed[place] |= masks[name][active]
-            used[place] |= (beside | masks[name])[active]
-        chosen = np.ix_(used, used)
-        parts = [(inner[chosen], slope[used]) for inner, slope in blocks]
-        nats, error = gain_of(parts, precision[chosen], values[used], freed[used])
-        good = bool(nats > max(LEAST_Z * error, 0.0))
-        beside = beside | (masks[name] & good)
-        out.append(Rung(name, nats, error, good))
+        out.append(_tried(name, given, masks[name], beside, left))
+        beside = beside | (masks[name] & out[-1].kept)
     return out
+
+
+class _Given(NamedTuple):
+    """What `tested` says of n parameters, and which they are."""
+
+    blocks: list
+    precision: np.ndarray
+    values: np.ndarray
+    active: np.ndarray
+    places: tuple[np.ndarray, ...]
+
+    def chosen(self, mask) -> np.ndarray:
+        """(n,) bool of (N, m), in all recordings."""
+        found = np.zeros(len(self.values), bool)
+        for place in self.places:
+            found[place] |= mask[self.active]
+        return found
+
+
+def _tried(name: str, given: _Given, own, beside, left) -> Rung:
+    """A rung's gain, and whether it is kept; ``own`` and ``beside`` (N, m) bool."""
+    freed, used, ridge = given.chosen(own), given.chosen(beside | own), given.precision.copy()
+    spare, known = np.zeros(len(used), bool), None
+    for mask, spread in left:
+        mine = given.chosen(mask)
+        if not (mine & used).any():
+            spare |= mine
+            ridge[np.ix_(mine, mine)] = np.linalg.inv(spread)
+        elif (mine == freed).all():
+            known = spread
+    used |= spare
+    square = np.ix_(used, used)
+    parts = [(inner[square], slope[used]) for inner, slope in given.blocks]
+    system = parts, ridge[square], given.values[used], freed[used]
+    nats, error = gain_of(*system, spare[used])
+    good = nats > max(LEAST_Z * error, LEAST_NATS)
+    return Rung(name, nats, error, bool(good and (known is None or _contradicted(*system, known))))

@@ -76,11 +76,11 @@ def _corrected(found: Estimate) -> np.ndarray:
     parts = np.split(np.array([inner for inner, _ in blocks]), len(wide.recorded))
     for one, place, part in zip(wide.recorded, places, parts, strict=True):
         moved = inverse @ part.sum(axis=0)[np.ix_(kept, place[mine])]
-        out += moved @ _spread(one.readings.left, wide.columns, maps) @ moved.T
+        out += moved @ spread_of(one.readings.left, wide.columns, maps) @ moved.T
     return out
 
 
-def _spread(left, columns: Columns, maps) -> np.ndarray:
+def spread_of(left, columns: Columns, maps) -> np.ndarray:
     """Covariance of the parameters ``maps`` (N, m) bool, in their order, from those of the maps."""
     pairs = np.argwhere(maps)
     kind = np.array([columns.names[c].startswith("gyroscope") for c in pairs[:, 1]], int)
