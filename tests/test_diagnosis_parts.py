@@ -9,6 +9,7 @@ from scipy.signal import savgol_coeffs
 from scipy.sparse import lil_matrix
 from scipy.stats import chi2, norm, poisson
 
+import imuarray
 from imuarray.blind import Case
 from imuarray.blind.cases import make
 from imuarray.diagnosis import noise as noises
@@ -27,6 +28,7 @@ from imuarray.engine.readings import arrange, part_of
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import start
 from imuarray.errors import InputError
+from imuarray.geometry import sub_array
 
 SHORT = 4.0  # s
 
@@ -244,6 +246,20 @@ def test_noise_scales_are_unbiased_with_the_errors_they_claim(clean):
     z = np.array(z)
     assert abs(z.mean()) < 0.3
     assert 0.8 < z.std() < 1.2
+
+
+def test_a_triads_residual_is_normal_where_few_others_are():
+    """Of four IMUs; each reading by itself scaled, the squares' sum has a second moment of 17."""
+    recording, _ = imuarray.simulate(sub_array(imuarray.mimu4444(), 4), 3.0)
+    readings, rng = arrange(recording), np.random.default_rng(4)
+    columns = columns_of(readings.array, (), readings.position_prior_sd)
+    made = fit(readings, columns, columns.owner, start(readings, columns))
+    fourth = []
+    for _ in range(40):
+        left = made.less_motion(rng.standard_normal(made.residual.shape))
+        found = [variance.triad(replace(made, residual=left), imu, 0) for imu in range(4)]
+        fourth.append(np.mean(np.sum(np.square(found), axis=2) ** 2))
+    assert np.mean(fourth) == pytest.approx(15, abs=0.6)
 
 
 def test_a_noisy_triad_is_found_and_the_others_are_not():

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis.noise import Noise, expected_ratio, standardised
+from imuarray.diagnosis.noise import Noise, expected_ratio
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.tails import QUARTILE, log_chi_square, log_normal
 from imuarray.engine.fit import Fit
@@ -47,8 +47,24 @@ class Mixture(NamedTuple):
 
 
 def triad(fit: Fit, imu: int, kind: int) -> np.ndarray:
-    """A triad's standardised residual (T, 3), NaN where left out."""
-    return standardised(fit)[:, imu, 3 * kind : 3 * kind + 3]
+    """A triad's residual (T, 3) as three uncorrelated ones of unit variance, NaN where left out.
+
+    What the motion takes up correlates them: on a small array the sum of their squares would have
+    tails where the noise has none.
+    """
+    rows = slice(6 * imu + 3 * kind, 6 * imu + 3 * kind + 3)
+    basis, left = fit.basis[:, rows], fit.residual[:, imu, 3 * kind : 3 * kind + 3]
+    covariance = np.eye(3) - basis @ basis.swapaxes(1, 2)
+    out, factor = np.empty_like(left), np.zeros_like(covariance)
+    for i in range(3):  # Cholesky's factor and the forward substitution, all samples at once
+        for j in range(i):
+            known = np.einsum("tk,tk->t", factor[:, i, :j], factor[:, j, :j])
+            factor[:, i, j] = (covariance[:, i, j] - known) / factor[:, j, j]
+        own = covariance[:, i, i] - np.sum(factor[:, i, :i] ** 2, axis=1)
+        factor[:, i, i] = np.sqrt(np.maximum(own, 1e-6))
+        taken = np.einsum("tk,tk->t", factor[:, i, :i], out[:, :i])
+        out[:, i] = (left[:, i] - taken) / factor[:, i, i]
+    return np.where(fit.readings.keep[:, imu, 3 * kind : 3 * kind + 3], out, np.nan)
 
 
 def held_out(nats) -> tuple[float, float, np.ndarray]:
