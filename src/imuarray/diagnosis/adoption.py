@@ -41,11 +41,15 @@ def proposals(search: Search):
     return sorted(named, key=lambda pair: pair[0].log_p)
 
 
-def adopt(search: Search) -> Search:
-    """Forward: adopt while a test is significant, large enough and gains on held-out time."""
+def adopt(search: Search, proposed=None) -> Search:
+    """Forward: adopt while a test is significant, large enough and gains on held-out time.
+
+    ``proposed``: the `proposals` at the search as it is, where they are known.
+    """
     vain = 0
     while len(search.causes) < SETTINGS.most_causes and vain < SETTINGS.patience:
-        best, values = (proposals(search) or [(None, None)])[0]
+        found, proposed = proposals(search) if proposed is None else proposed, None
+        best, values = (found or [(None, None)])[0]
         if best is None or best.log_p > SETTINGS.limit(best.candidate.effect):
             break
         if best.statistic < search.least:
@@ -92,8 +96,8 @@ def keeps(search: Search, score, gain: float, error: float) -> bool:
 def predicted_gain(search: Search, candidate: Candidate, values) -> tuple[float, float]:
     """The held-out gain that one linearisation predicts: it spares hopeless fits."""
     state = search.started(candidate.effect, values)
-    made = at(search.readings, search.columns, search.active, state, False)
-    return heldout_gain(replace(search, fit=made).weighed(), candidate.effect)
+    made = at(search.readings, search.columns, search.active, state, False, all_columns=False)
+    return heldout_gain(replace(search, fit=made), candidate.effect)
 
 
 def label(search: Search, candidate) -> str:

@@ -29,7 +29,7 @@ PHASES = np.arange(32) / 32  # of a turn, tried at first
 def delay_score(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     """Each sample's score and information of each IMU's delay, (T, N) each, motion projected."""
     column = int(fit.columns.of(DELAY)[0])
-    return delay_parts(fit.residual, fit.whitened[..., column], fit.through[..., column])
+    return delay_parts(fit.residual, fit.whitened[..., column], fit.through([column])[..., 0])
 
 
 def delay_parts(residual, along, through) -> tuple[np.ndarray, np.ndarray]:
@@ -221,7 +221,7 @@ def placebo_of_ages(search) -> tuple[float, float]:
     What they have in common the motion takes up; 0 for a single clock, which has no other to go to.
     """
     fit, column = search.fit, search.columns.of(DELAY)[0]
-    along, through = fit.whitened[..., column], fit.through[..., column]
+    along, through = fit.whitened[..., column], fit.through([column])[..., 0]
     score, _ = delay_score(fit)
     clocks = search.columns.model.split(np.asarray(fit.state.parameters))[CLOCK]
     readings = search.readings

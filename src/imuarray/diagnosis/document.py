@@ -14,7 +14,7 @@ from imuarray.diagnosis.elimination import heldout_gain, need
 from imuarray.diagnosis.extension import extended_estimate
 from imuarray.diagnosis.noise import coloured_meat, per_triad, standardised
 from imuarray.diagnosis.noise_effects import held_out
-from imuarray.diagnosis.procedure import Found, prepared, run_procedure
+from imuarray.diagnosis.procedure import Found, run_procedure
 from imuarray.diagnosis.replicates import Discrepancy, discrepancies
 from imuarray.diagnosis.scores import information_at
 from imuarray.diagnosis.settings import SETTINGS
@@ -102,10 +102,9 @@ def diagnose(
     extended = fitted(search.fit, search.noise.correlation)
     nats = extended.scores.nats + nats_beside(found)
     say("estimating the extended model's positions")
-    readings = prepared(recording, without)[2]
     robust = None
     if search.smooth:  # where motion is rough the robust search ends elsewhere, and worse
-        robust = extended_estimate(readings, search.columns, search.active, search.fit.state)
+        robust = extended_estimate(found.whole, search.columns, search.active, search.fit.state)
     extended = replace(extended, scores=extended.scores._replace(nats=nats), robust=robust)
     base, inflated = rivals_of(found)
     rng = stream(seed, "diagnose", "replicates")
@@ -186,12 +185,13 @@ def rivals_of(found: Found) -> tuple[Fitted, Fitted]:
     if found.structural:
         # as read: the rivals know neither of rails nor of repeats nor of exchanged axes
         bare = replace(bare, values=found.raw.values)
-    declared = fit(bare, search.columns, alone, start, search.smooth, rough=True)
+    declared = fit(bare, search.columns, alone, start, search.smooth, True, all_columns=False)
     size = np.sqrt(np.nanmean(per_triad(standardised(declared)) ** 2, axis=-1))
     inflated_sd = bare.declared * np.where(bare.exists, np.maximum(size, 1e-3), 1.0)
     again = fit(
-        bare.with_sd(inflated_sd), search.columns, alone, declared.state, search.smooth, True
-    )
+        bare.with_sd(inflated_sd), search.columns, alone, declared.state, search.smooth, True,
+        all_columns=False,
+    )  # fmt: skip
     return fitted(declared), fitted(again)
 
 
@@ -302,5 +302,5 @@ def structural_gain(found: Found, item) -> tuple[float, float, np.ndarray]:
     mine = np.zeros_like(touched)
     mine[:, list(item.imus)] = touched[:, list(item.imus)]
     readings = replace(search.readings, values=values, keep=search.readings.keep | mine)
-    seen = at(readings, search.columns, search.active, search.fit.state, True)
+    seen = at(readings, search.columns, search.active, search.fit.state, True, all_columns=False)
     return held_out((seen.misfits - search.fit.misfits - mine.sum(axis=(1, 2))) / 2)

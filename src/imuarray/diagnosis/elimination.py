@@ -11,6 +11,7 @@ from imuarray.diagnosis.state import Search
 from imuarray.diagnosis.tails import log_chi_square
 from imuarray.engine.fit import flat_parameters, from_flat
 from imuarray.engine.heldout import gain_of, normal_blocks
+from imuarray.engine.parameters import prior_precision
 
 
 def freed_places(search: Search, effect: str, imus=None, among=None) -> np.ndarray:
@@ -34,11 +35,11 @@ def need(search: Search, effect: str, imus=None, among=None) -> tuple[float, int
 
 def heldout_gain(search: Search, effect: str) -> tuple[float, float]:
     """Nats gained on held-out blocks of time by an adopted effect, with standard error."""
-    given, mask = search.given, search.active
-    places = given.places(mask)
-    freed = np.isin(places, freed_places(search, effect))
-    ridge, values = given.precision[np.ix_(places, places)], given.values[places]
-    return gain_of(normal_blocks(search.fit, mask), ridge, values, freed)
+    columns, mask = search.columns, search.active
+    freed = np.isin(columns.names, effect) & mask
+    values = flat_parameters(columns, search.fit.state)[mask]
+    parts = normal_blocks(search.fit, mask)
+    return gain_of(parts, prior_precision(columns, mask), values, freed[mask])
 
 
 def prune(search: Search, effect: str) -> Search:

@@ -155,7 +155,7 @@ def coloured_meat(fit: Fit, information, correlation) -> np.ndarray | None:
     """Covariance of the score (K, K) where triads have AR(1) noise; None where all is white."""
     if not np.any(correlation):
         return None
-    pairs, through = pick(fit.through, fit.columns.owner)
+    pairs, through = pick(fit.through(fit.wanted), fit.described[:, fit.wanted])
     samples, count = fit.residual.shape[:2]
     basis = fit.basis.reshape(samples, count, 6, -1)
     meat = information.copy()

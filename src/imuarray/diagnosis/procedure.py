@@ -9,13 +9,14 @@ import numpy as np
 
 from imuarray.diagnosis import clocks, noise_effects
 from imuarray.diagnosis import noise as noises
-from imuarray.diagnosis.adoption import adopt
+from imuarray.diagnosis.adoption import adopt, proposals
 from imuarray.diagnosis.clipping import leave_out_clips, together
 from imuarray.diagnosis.elimination import eliminate
 from imuarray.diagnosis.final_checks import final_checks, within_tolerance
 from imuarray.diagnosis.noise_effects import COLOURED, SCALES, TAILS
 from imuarray.diagnosis.reading_effects import Structural, find_structural
 from imuarray.diagnosis.residual_checks import Check, all_checks
+from imuarray.diagnosis.scores import Score
 from imuarray.diagnosis.separability import rivals
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Search
@@ -28,14 +29,16 @@ from imuarray.recording import Recording
 
 @dataclass(frozen=True)
 class Found:
-    """What a diagnosis came to: its last `Search`, the base model's fit and checks, all causes.
+    """What a diagnosis came to: its last `Search`, the base model's fit, tests, checks, all causes.
 
     ``explained``: share of the base model's excess misfit; ``unexplained``: whether checks fail
-    beyond tolerance; ``raw``: the readings as recorded; ``rivals``: {effect: ids of its class}.
+    beyond tolerance; ``raw``: the search's readings as recorded; ``whole``: all readings, put
+    right; ``rivals``: {effect: ids of its class}.
     """
 
     search: Search
     base: Fit
+    base_scores: list[Score]
     base_checks: list[Check]
     structural: list[Structural]
     in_noise: list[noise_effects.Named]
@@ -43,6 +46,7 @@ class Found:
     explained: float
     unexplained: bool
     raw: Readings
+    whole: Readings
     rivals: dict = field(default_factory=dict)
 
 
@@ -53,20 +57,23 @@ def run_procedure(
 
     InputError where a recording has too few moving samples.
     """
-    raw, structural, readings, mended = prepared(recording, without)
+    raw, structural, whole, mended = prepared(recording, without)
+    most = SETTINGS.searched // max(len(whole.labels) // SETTINGS.large, 1)
+    raw, readings = part_of(raw, most), part_of(whole, most)
     effects = catalogue_effects(without)
     # clocks are scanned for by what a delay would gain, whether or not it is a candidate
     described = effects if clocks.DELAY in effects else (*effects, clocks.DELAY)
     columns = columns_of(readings.array, described, readings.position_prior_sd)
     say("fitting the papers' model, then looking for causes")
     search = Search(readings, columns, effects, say).fitted()
-    base = search.fit
-    base_checks = all_checks(base, search.given, search.noise)
+    base, first = search.fit.only_active(), proposals(search)
+    scores, base_checks = [s for s, _ in first], all_checks(search.fit, search.given, search.noise)
     if not mended:
-        return Found(search, base, base_checks, structural, [], base_checks, 0.0, True, raw)
-    if len(readings.time) > SETTINGS.long:
-        search = looked_ahead(search)
-    search = adopt(drop_outliers(search))
+        return Found(
+            search, base, scores, base_checks, structural, [], base_checks, 0.0, True, raw, whole
+        )
+    cleaned = drop_outliers(search)
+    search = adopt(cleaned, first if cleaned is search else None)
     say("fitting to the end")
     search = eliminate(search.refit(rough=False))
     search, clips = leave_out_clips(search, without)
@@ -81,8 +88,8 @@ def run_procedure(
     say("looking for what cannot be distinguished")
     classes = {cause.effect: rivals(search, cause) for cause in search.causes}
     return Found(
-        search, base, base_checks, together(structural, clips), in_noise, checks, explained,
-        failing, raw, classes,
+        search, base, scores, base_checks, together(structural, clips), in_noise, checks, explained,
+        failing, raw, whole, classes,
     )  # fmt: skip
 
 
@@ -97,17 +104,6 @@ def prepared(recording: Recording, without=(), sparse=False):
     if not used.all():
         raw, readings = raw.select(used), readings.select(used)
     return raw, structural, readings, mended
-
-
-def looked_ahead(whole: Search) -> Search:
-    """The whole recording's search, started with the causes that a part of it shows."""
-    part = part_of(whole.readings, SETTINGS.long)
-    ahead = adopt(drop_outliers(Search(part, whole.columns, whole.effects, whole.say).fitted()))
-    search = Search(
-        whole.readings, whole.columns, whole.effects, whole.say, causes=ahead.causes,
-        refused=ahead.refused,
-    ).fitted(ahead.fit.state)  # fmt: skip
-    return replace(search, excess=whole.excess, trace=ahead.trace)
 
 
 def drop_outliers(search: Search) -> Search:

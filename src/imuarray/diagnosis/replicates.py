@@ -13,7 +13,7 @@ import numpy as np
 
 from imuarray.diagnosis.noise import standardised
 from imuarray.diagnosis.quantities import first_up
-from imuarray.engine.fit import Fit, normal
+from imuarray.engine.fit import Fit
 from imuarray.model.effects import KINDS
 
 REPLICATES = 99
@@ -60,25 +60,27 @@ class Replicator:
 
     def __init__(self, fit: Fit, ridge):
         self.fit, self.pairs = fit, np.argwhere(fit.active)
-        information, _ = normal(fit.residual, fit.whitened, fit.through, fit.active)
+        information, _ = fit.normal(fit.active)
         self.inverse = np.linalg.pinv(information + ridge, hermitian=True)
-        self.along = [np.ascontiguousarray(fit.whitened[:, k, :, m]) for k, m in self.pairs]
+        place = np.searchsorted(fit.wanted, self.pairs[:, 1])
+        own = [np.flatnonzero(self.pairs[:, 0] == k) for k in range(len(fit.active))]
+        # of each IMU (T 6, n): what moves its readings
+        self.along = [
+            (rows, fit.whitened[:, k][..., place[rows]].reshape(6 * len(fit.residual), len(rows)))
+            for k, rows in enumerate(own)
+        ]
 
     def draw(self, rng) -> np.ndarray:
         """One residual after motion and parameters have been fitted to it."""
         fit = self.fit
         noise = rng.standard_normal(fit.residual.shape) * fit.readings.keep
-        left = fit.less_motion(noise)
-        by_imu = np.ascontiguousarray(left.transpose(1, 0, 2)).reshape(left.shape[1], -1)
-        score = np.array(
-            [
-                along.ravel() @ by_imu[k]
-                for along, (k, _) in zip(self.along, self.pairs, strict=True)
-            ]
-        )
-        step = np.zeros(fit.active.shape)
-        step[fit.active] = self.inverse @ score
-        return left - fit.less_motion(np.einsum("tkim,km->tki", fit.whitened, step))
+        left, score = fit.less_motion(noise), np.empty(len(self.pairs))
+        for k, (rows, along) in enumerate(self.along):
+            score[rows] = left[:, k].ravel() @ along
+        step = self.inverse @ score
+        moved = [along @ step[rows] for rows, along in self.along]
+        moved = np.stack(moved).reshape(len(moved), len(left), 6).swapaxes(0, 1)
+        return left - fit.less_motion(moved)
 
 
 def quantities(fit: Fit, unit) -> dict[str, Quantity]:

@@ -83,7 +83,9 @@ def regression_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]
     active = given.places(fit.active)
     both = given.information + given.precision
     inner = scaled_inverse(both[np.ix_(active, active)])
-    pairs, through = pick(fit.through, fit.active & fit.columns.owner)
+    chosen = np.flatnonzero(fit.active.any(axis=0))
+    pairs, through = pick(fit.through(chosen), fit.active[:, chosen])
+    place = np.searchsorted(fit.wanted, chosen)
     samples, count = fit.residual.shape[:2]
     basis = fit.basis.reshape(samples, count, 6, -1)
     groups: dict[str, list] = {}
@@ -103,7 +105,7 @@ def regression_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]
             stacked = np.hstack(list(table.values()))
             seen = -np.einsum("ti,tia->ta", basis[:, imu, axis], through)
             own = np.flatnonzero(pairs[:, 0] == imu)
-            seen[:, own] += fit.whitened[:, imu, axis][:, pairs[own, 1]]
+            seen[:, own] += fit.whitened[:, imu, axis][:, place[pairs[own, 1]]]
             kept = fit.readings.keep[:, imu, axis].astype(float)
             free = kept - np.sum(basis[:, imu, axis] ** 2, axis=1)
             score = stacked.T @ fit.residual[:, imu, axis]

@@ -10,7 +10,7 @@ import numpy as np
 
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.tails import log_chi_square
-from imuarray.engine.fit import Fit, flat_parameters, normal
+from imuarray.engine.fit import Fit, flat_parameters
 from imuarray.engine.parameters import Columns, prior_precision
 from imuarray.linear import scaled_eigh, scaled_inverse
 from imuarray.model.effects import EFFECTS, KINDS
@@ -143,10 +143,10 @@ class Information:
 
 
 def information_at(fit: Fit) -> Information:
-    """The quadratic form at a fit."""
+    """The quadratic form at a fit, in the parameters whose derivatives it has."""
     flat = flat_parameters(fit.columns, fit.state)
-    owner = fit.columns.owner
-    information, score = normal(fit.residual, fit.whitened, fit.through, owner)
+    owner = fit.described
+    information, score = fit.normal(owner)
     index = np.full(owner.shape, -1)
     index[owner] = np.arange(owner.sum())
     ridge = 1.0 / np.broadcast_to(fit.columns.prior_sd, owner.shape)[owner] ** 2

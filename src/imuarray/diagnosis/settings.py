@@ -26,7 +26,8 @@ class Settings:
     alike: float = 0.64  # share of an adopted effect's signal from which another is of its class
 
     # Readings (`reading_effects`, `clipping`, `procedure`)
-    long: int = 3500  # samples; longer recordings are looked at in part first
+    searched: int = 4096  # samples; of longer recordings, stretches spread over all of it
+    large: int = 32  # IMUs; of more, so many samples less
     least_repeats: int = 1  # samples that a triad repeats
     least_clipped: int = 3  # readings at one value that make a rail
     rare_repeats: float = -12.0  # log p from which repeats are no chance of a coarse converter

@@ -12,7 +12,7 @@ from imuarray.diagnosis.scores import (
 )
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.tails import log_chi_square
-from imuarray.engine.fit import Fit, flat_parameters, from_flat, normal
+from imuarray.engine.fit import Fit, flat_parameters, from_flat
 from imuarray.engine.heldout import blocks_of
 from imuarray.engine.parameters import POSITION
 from imuarray.linear import scaled_inverse
@@ -32,7 +32,7 @@ def scan_shifts(fit: Fit, given: Information, imus) -> list[Scanned]:
     for imu in imus:
         mask = fit.active.copy()
         mask[imu, chosen] = True
-        parts = [normal(fit.residual, fit.whitened, fit.through, mask, block) for block in blocks]
+        parts = [fit.normal(mask, block) for block in blocks]
         own, rest = _places(mask, fit.active, imu, chosen)
         ridge = np.diag(1.0 / fit.columns.prior_sd[fit.columns.of(SHIFT)[:3]] ** 2)
         best = (0.0, 0, np.zeros(3))
@@ -75,7 +75,7 @@ def refine_instant(fit: Fit, imu: int, around: float) -> float:
     chosen = columns.of(POSITION)[place]
     shift = columns.model.split(state.parameters)[SHIFT][imu, :3]
     along = fit.whitened[:, imu][..., chosen] @ shift
-    through = fit.through[:, imu][..., chosen] @ shift
+    through = fit.through(chosen)[:, imu] @ shift
     linear = np.einsum("ti,ti->t", along, fit.residual[:, imu])
     square = np.sum(along**2, axis=1) - np.sum(through**2, axis=1)
     after = fit.readings.time >= around

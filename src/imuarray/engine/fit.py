@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from imuarray.engine.linearise import (
+    CHUNK,
     Eliminated,
     RoughPrior,
     State,
     derivatives,
+    directions_of,
     linearise,
     no_derivatives,
+    through_of,
 )
 from imuarray.engine.parameters import POSITION, Columns, prior_precision
 from imuarray.engine.readings import Readings
@@ -28,10 +31,10 @@ class Fit:
     Attributes
     ----------
     active : (N, m) bool, the parameters that were fitted
+    wanted : (w,) the columns that derivatives are by
     residual : (T, N, 6) in the units of the noise sd, the motion's share taken out
-    whitened : (T, N, 6, m) derivative by the shared parameters, in those units
+    whitened : (T, N, 6, w) derivative by the shared parameters, in those units
     basis : (T, 6 N, D) basis of what the motion can explain, orthonormal with its prior's
-    through : (T, N, D, m) the derivative's coordinates in that basis
     log_volume : (T,) log determinant of the motion's information
     misfits : (T,) sums of squared residuals, the motion's prior included
     """
@@ -40,10 +43,10 @@ class Fit:
     columns: Columns
     state: State
     active: np.ndarray
+    wanted: np.ndarray
     residual: np.ndarray
     whitened: np.ndarray
     basis: np.ndarray
-    through: np.ndarray
     log_volume: np.ndarray
     misfits: np.ndarray
     converged: bool
@@ -60,8 +63,48 @@ class Fit:
 
     def less_motion(self, values) -> np.ndarray:
         """Whitened readings (T, N, 6) without what the motion can explain of them."""
-        taken = np.einsum("tri,tr->ti", self.basis, values.reshape(len(values), -1))
-        return values - np.einsum("tri,ti->tr", self.basis, taken).reshape(values.shape)
+        flat = values.reshape(len(values), -1, 1)
+        taken = np.swapaxes(self.basis, 1, 2) @ flat
+        return (flat - self.basis @ taken).reshape(values.shape)
+
+    @property
+    def described(self) -> np.ndarray:
+        """(N, m) bool: the parameters that there are derivatives by."""
+        return self.columns.owner & np.isin(np.arange(self.columns.size), self.wanted)
+
+    def only_active(self) -> Fit:
+        """The same with derivatives by the active parameters' columns alone."""
+        kept = self.active.any(axis=0)[self.wanted]
+        return replace(
+            self,
+            wanted=self.wanted[kept],
+            whitened=self.whitened[..., kept],
+        )
+
+    def along(self, step) -> np.ndarray:
+        """Change of the whitened readings (T, N, 6) with the wanted parameters' step (N, m)."""
+        moved = step[:, self.wanted]
+        used = moved.any(axis=0)
+        return np.einsum("tkim,km->tki", self.whitened[..., used], moved[:, used], optimize=True)
+
+    def normal(self, chosen, part=slice(None)) -> tuple[np.ndarray, np.ndarray]:
+        """Information (n, n) and score (n,) of the ``chosen`` (N, m) bool, of some samples."""
+        size, mask = int(chosen.sum()), chosen[:, self.wanted]
+        used, (first, last, _) = mask.any(axis=0), part.indices(len(self.residual))
+        information, score = np.zeros((size, size)), np.zeros(size)
+        for start in range(first, last, CHUNK):  # what is copied is small
+            rows = slice(start, min(start + CHUNK, last))
+            whitened = self.whitened[rows] if used.all() else self.whitened[rows][..., used]
+            through = through_of(self.basis[rows], whitened)
+            inner, slope = normal(self.residual[rows], whitened, through, mask[:, used])
+            information += inner
+            score += slope
+        return information, score
+
+    def through(self, columns) -> np.ndarray:
+        """(T, N, D, n) some columns' coordinates in the motion's basis."""
+        place = np.searchsorted(self.wanted, columns)
+        return through_of(self.basis, self.whitened[..., place])
 
     @property
     def free(self) -> int:
@@ -96,15 +139,16 @@ def normal(residual, whitened, through, chosen, part=slice(None)):
 
 
 def fit(
-    readings: Readings, columns: Columns, active, state: State, smooth=True, rough=False
-) -> Fit:
+    readings: Readings, columns: Columns, active, state: State, smooth=True, rough=False,
+    all_columns=True,
+) -> Fit:  # fmt: skip
     """Gauss-Newton over motion and the active parameters from a state, priors included.
 
     ``smooth`` says whether the motion's time derivatives may be had from its neighbours, ``rough``
-    that it may stop when a step gains little.
+    that it may stop when a step gains little; ``all_columns`` as for `at`.
     """
     state, converged, _ = search_optimum(readings, columns, active, state, smooth, rough)
-    return at(readings, columns, active, state, converged)
+    return at(readings, columns, active, state, converged, all_columns)
 
 
 def search_optimum(readings, columns, active, state, smooth, rough):
@@ -154,11 +198,14 @@ def held_where_rough(columns: Columns, active) -> np.ndarray:
     return mask[active]
 
 
-def at(readings: Readings, columns: Columns, active, state: State, converged: bool) -> Fit:
-    """The fit's quantities at a state, with the derivative by every parameter."""
-    seen = linearise(readings, columns, state)
+def at(
+    readings: Readings, columns: Columns, active, state: State, converged: bool, all_columns=True
+) -> Fit:
+    """The fit's quantities at a state, with the derivative by every parameter or the active."""
+    wanted = directions_of(columns, None if all_columns else np.flatnonzero(active.any(axis=0)))
+    seen = linearise(readings, columns, state, wanted, through=False)
     return Fit(
-        readings, columns, state, active, seen.residual, seen.whitened, seen.basis, seen.through,
+        readings, columns, state, active, wanted, seen.residual, seen.whitened, seen.basis,
         seen.log_volume, seen.misfit, converged,
     )  # fmt: skip
 

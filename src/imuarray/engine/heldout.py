@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.engine.fit import Fit, normal
+from imuarray.engine.fit import Fit
 from imuarray.engine.settings import SETTINGS
 
 
@@ -30,8 +30,7 @@ def blocks_of(samples: int, number=SETTINGS.blocks) -> list[slice]:
 
 def normal_blocks(fit: Fit, active) -> list[tuple[np.ndarray, np.ndarray]]:
     """(information (n, n), score (n,)) of the n ``active`` (N, m) parameters from each block."""
-    parts = fit.residual, fit.whitened, fit.through
-    return [normal(*parts, active, block) for block in blocks_of(len(fit.residual))]
+    return [fit.normal(active, block) for block in blocks_of(len(fit.residual))]
 
 
 def log_scores(fit: Fit, ridge) -> Scores:

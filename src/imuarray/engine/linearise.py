@@ -136,29 +136,35 @@ def _eliminated(residual, motion, whitened, gram, bare, sd) -> Eliminated:
     taken = np.swapaxes(basis, 1, 2) @ flat + expected @ bare[..., None]
     left = (flat - basis @ taken)[..., 0]
     unexpected = (bare[..., None] - np.swapaxes(expected, 1, 2) @ taken)[..., 0]
-    through = np.swapaxes(basis.reshape(samples, count, 6, -1), 2, 3) @ whitened
+    through = through_of(basis, whitened)
     misfit = np.sum(left**2, axis=1) + np.sum(unexpected**2, axis=1)
     volume = 2 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
     left = left.reshape(residual.shape)
     return Eliminated(left, whitened, basis, through, inverse, taken[..., 0], volume, misfit)
 
 
+def through_of(basis, whitened) -> np.ndarray:
+    """(T, N, D, m) coordinates in the motion's basis of each IMU's derivatives (T, N, 6, m)."""
+    return np.swapaxes(basis.reshape(*whitened.shape[:3], -1), 2, 3) @ whitened
+
+
 THREADS = 2
 
 
 def linearise(
-    readings: Readings, columns: Columns, state: State, wanted=None, spare=None
+    readings: Readings, columns: Columns, state: State, wanted=None, spare=None, through=True
 ) -> Eliminated:
     """Residual and derivatives at a state, the motion eliminated.
 
     ``wanted`` : indices of the columns to differentiate by, all if None.
-    ``spare`` : a former answer whose memory may be used again. LinAlgError where the readings do
-    not determine the motion.
+    ``spare`` : a former answer whose memory may be used again. ``through``: whether it is kept,
+    the largest part of all. LinAlgError where the readings do not determine the motion.
     """
     directions = directions_of(columns, wanted)
 
     def one(start):
-        return chunk_at(readings, columns, state, directions, start)
+        found = chunk_at(readings, columns, state, directions, start)
+        return found if through else found._replace(through=found.through[:, :0])
 
     return _joined(one, len(readings.values), spare)
 

@@ -118,10 +118,13 @@ def determined(readings: Readings, fewest: int = SETTINGS.least_samples) -> np.n
 
 
 def part_of(readings: Readings, most: int) -> Readings:
-    """Stretches of a recording, spread evenly, of some ``most`` samples in all."""
-    every = -(-len(readings.time) // most)
-    stretch = np.arange(len(readings.time)) // SETTINGS.stretch
-    return _stretches(readings, stretch, stretch % every == 0)
+    """All of up to ``most`` samples; of more, stretches of so many in all, spread evenly."""
+    samples = len(readings.time)
+    if samples <= most:
+        return readings
+    stretch = np.arange(samples) // SETTINGS.stretch
+    chosen = np.linspace(0, stretch[-1], max(most // SETTINGS.stretch, 1)).round()
+    return _stretches(readings, stretch, np.isin(stretch, chosen))
 
 
 def most_informative(readings: Readings, say: Callable[[str], None]) -> Readings:

@@ -10,10 +10,8 @@ from scipy.special import ndtri
 
 from imuarray.diagnosis.noise import standardised
 from imuarray.diagnosis.replicates import TESTS
-from imuarray.diagnosis.scores import candidates, information_at, score_all
 from imuarray.diagnosis.separability import separability
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.diagnosis.special import scans
 from imuarray.model.effects import KINDS
 
 if TYPE_CHECKING:
@@ -167,20 +165,16 @@ def score_table(diagnosis: Diagnosis) -> pd.DataFrame:
 
     ``log10_p`` allows for its IMUs and forms; ``limit`` is the critical value.
     """
-    search, made = diagnosis.found.search, diagnosis.found.base
-    given = information_at(made)
-    exists = made.readings.exists
-    scores = score_all(given, made, candidates(made.columns, exists, search.effects))
-    scores += [found.score for found in scans(made, given, search.effects, scores)]
+    search, exists = diagnosis.found.search, diagnosis.found.base.readings.exists
     best = {}
-    for score in sorted(scores, key=lambda item: item.log_p):
+    for score in diagnosis.found.base_scores:  # best first
         best.setdefault(score.candidate.effect, score)
     adopted = {cause.effect for cause in search.causes}
     return pd.DataFrame([
         {
             "effect": effect, "form": score.candidate.variant,
             "imus": "all" if len(score.candidate.imus) == len(exists)
-            else ", ".join(made.readings.labels[k] for k in score.candidate.imus),
+            else ", ".join(search.readings.labels[k] for k in score.candidate.imus),
             "statistic": score.statistic, "freedom": score.freedom,
             "log10_p": score.log_p / np.log(10),
             "limit": SETTINGS.limit(effect) / np.log(10), "adopted": effect in adopted,

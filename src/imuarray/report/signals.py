@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pandas as pd
 
-from imuarray.engine.fit import Fit, flat_parameters, normal
+from imuarray.engine.fit import Fit, flat_parameters
 from imuarray.linear import scaled_inverse
 
 if TYPE_CHECKING:
@@ -42,16 +42,16 @@ def signal_of(diagnosis: Diagnosis, cause) -> Signal:
     mask = np.zeros_like(made.active)
     mask[np.ix_(list(cause.imus), columns.of(cause.effect))] = True
     mask &= made.active
-    left = made.less_motion(along(made, np.where(mask, flat, 0.0)))
+    left = made.less_motion(made.along(np.where(mask, flat, 0.0)))
     others = made.active & ~mask
-    information, _ = normal(made.residual, made.whitened, made.through, others)
+    information, _ = made.normal(others)
     score = np.array(
         [np.sum(made.whitened[:, k, :, m] * left[:, k]) for k, m in np.argwhere(others)]
     )
     ridge = 1.0 / np.broadcast_to(columns.prior_sd, others.shape)[others] ** 2
     step = np.zeros(mask.shape)
     step[others] = scaled_inverse(information + np.diag(ridge)) @ score
-    explained = left - made.less_motion(along(made, step))
+    explained = left - made.less_motion(made.along(step))
     total = np.where(made.readings.keep, made.residual + explained, np.nan)
     # correlated neighbours are fewer independent ones
     rho = np.clip(diagnosis.found.search.noise.correlation, 0.0, 0.99)
@@ -61,11 +61,6 @@ def signal_of(diagnosis: Diagnosis, cause) -> Signal:
         made, cause.effect, tuple(cause.imus), mask, flat, diagnosis.extended.sds, explained,
         total, width,
     )  # fmt: skip
-
-
-def along(made: Fit, step) -> np.ndarray:
-    """Change of the whitened readings (T, N, 6) with the parameters' ``step`` (N, m)."""
-    return np.einsum("tkim,km->tki", made.whitened, step, optimize=True)
 
 
 def binned(x, total, explained, width, bins=BINS) -> pd.DataFrame:
