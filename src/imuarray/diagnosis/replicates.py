@@ -29,7 +29,7 @@ class Quantity(NamedTuple):
 
 
 class Test(NamedTuple):
-    """How a quantity is made: ``function`` (residuals (T, n, 3) of a kind, fit) -> values or None.
+    """How a quantity is made: ``function`` (`Part`) -> values or None.
 
     ``label`` in figures, ``words`` with a place for whose residual, ``by_axis`` or by triad.
     """
@@ -83,16 +83,62 @@ class Replicator:
         return left - fit.less_motion(moved)
 
 
-def quantities(fit: Fit, unit) -> dict[str, Quantity]:
+class Seen:
+    """What the test quantities of one fit's residuals have in common, whatever the residual."""
+
+    def __init__(self, fit: Fit):
+        self.keep = fit.readings.keep.astype(float)
+        time = fit.readings.time
+        self.time, self.length = time - time.mean(), np.ptp(time)
+        direction = fit.state.motion[:, 3:6]
+        length = np.linalg.norm(direction, axis=1, keepdims=True)
+        self.way = direction / np.where(length > 0, length, 1.0)
+        together = (np.diff(fit.readings.run) == 0)[:, None, None]
+        self.pairs = together * self.keep[1:] * self.keep[:-1]
+        self.sizes = {}  # of the motion: weights of its highest quarter and lowest half, (2, T)
+        for name, values in motion_sizes(fit).items():
+            size = np.linalg.norm(values, axis=1)
+            if np.any(size):
+                low, high = np.quantile(size, [0.5, 0.75])
+                self.sizes[name] = np.stack([size > high, size < low]).astype(float)
+
+
+class Part(NamedTuple):
+    """A kind's residuals: ``values`` and their squares (T, n, 3), zero where left out."""
+
+    seen: Seen
+    there: np.ndarray  # (6 N,) bool, which readings
+    values: np.ndarray
+    square: np.ndarray
+
+    @classmethod
+    def of(cls, seen: Seen, there, unit) -> Part:
+        """From the residuals (T, N, 6) of all, zero where left out."""
+        values = unit.reshape(len(unit), -1)[:, there].reshape(len(unit), -1, 3)
+        return cls(seen, there, values, values**2)
+
+    def kept(self, of) -> np.ndarray:
+        """Weights (T, N, 6) of readings, as ``values``."""
+        return of.reshape(len(of), -1)[:, self.there].reshape(len(of), -1, 3)
+
+    def mean(self, values) -> np.ndarray:
+        """Of what is zero where readings are left out, by triad."""
+        return values.sum(axis=(0, 2)) / self.kept(self.seen.keep).sum(axis=(0, 2))
+
+
+def quantities(fit: Fit, unit, seen: Seen | None = None) -> dict[str, Quantity]:
     """Test quantities of a standardised residual (T, N, 6), NaN where left out."""
-    readings, found = fit.readings, {}
+    readings, found, seen = fit.readings, {}, seen or Seen(fit)
+    filled = np.nan_to_num(unit)
     for kind, name in enumerate(KINDS):
         there = np.flatnonzero(readings.exists[:, kind])
         labels = tuple(readings.labels[k] for k in there)
         axes = tuple(f"{label}{axis}" for label in labels for axis in "xyz")
-        part = unit[:, there, 3 * kind : 3 * kind + 3]
+        mask = np.zeros(unit.shape[1:], bool)
+        mask[there, 3 * kind : 3 * kind + 3] = True
+        part = Part.of(seen, mask.ravel(), filled)
         for check, test in TESTS.items():
-            values = test.function(part, fit)
+            values = test.function(part)
             if values is not None:
                 said = test.words.format(f"the {name}s' residual")
                 found[f"{name} {check}"] = Quantity(values, axes if test.by_axis else labels, said)
@@ -111,53 +157,49 @@ def motion_sizes(fit: Fit) -> dict[str, np.ndarray]:
 def _growth(size):
     """rms in the highest quarter of a size of the motion over that in the lowest half, by triad."""
 
-    def ratio(part, fit):
-        values = np.linalg.norm(motion_sizes(fit)[size], axis=1)
-        if not np.any(values):
+    def ratio(part):
+        chosen = part.seen.sizes.get(size)
+        if chosen is None:
             return None
-        low, high = np.quantile(values, [0.5, 0.75])
-        square = part**2
-        above, below = (square[chosen] for chosen in (values > high, values < low))
-        return np.sqrt(np.nanmean(above, axis=(0, 2)) / np.nanmean(below, axis=(0, 2)))
+        above, below = (
+            (chosen @ values.reshape(len(values), -1)).reshape(2, -1, 3).sum(axis=2)
+            for values in (part.square, part.kept(part.seen.keep))
+        )
+        return np.sqrt(above[0] / below[0] / (above[1] / below[1]))
 
     return ratio
 
 
-def _rms(part, fit):
-    return np.sqrt(np.nanmean(part**2, axis=0)).ravel()
+def _rms(part):
+    return np.sqrt(part.square.sum(axis=0) / part.kept(part.seen.keep).sum(axis=0)).ravel()
 
 
-def _along(part, fit):
-    direction = fit.state.motion[:, 3:6]
-    length = np.linalg.norm(direction, axis=1, keepdims=True)
-    way = direction / np.where(length > 0, length, 1.0)
-    filled = np.nan_to_num(part)
-    along = np.einsum("tki,ti->tk", filled, way)
-    return np.sum(along**2, axis=0) / np.maximum(np.sum(filled**2, axis=(0, 2)), 1e-300)
+def _along(part):
+    along = np.einsum("tki,ti->tk", part.values, part.seen.way)
+    return np.sum(along**2, axis=0) / np.maximum(np.sum(part.square, axis=(0, 2)), 1e-300)
 
 
-def _lag_one(part, fit):
-    together = (np.diff(fit.readings.run) == 0)[:, None, None]
-    pairs = np.where(together, part[1:] * part[:-1], np.nan)
-    return np.nanmean(pairs, axis=(0, 2)) / np.nanmean(part**2, axis=(0, 2))
+def _lag_one(part):
+    pairs = part.kept(part.seen.pairs)
+    products = np.sum(pairs * part.values[1:] * part.values[:-1], axis=(0, 2))
+    return products / pairs.sum(axis=(0, 2)) / part.mean(part.square)
 
 
-def _kurtosis(part, fit):
-    square = part**2  # a fourth power by pow is slow
-    return np.nanmean(square * square, axis=(0, 2)) / np.nanmean(square, axis=(0, 2)) ** 2 - 3.0
+def _kurtosis(part):
+    # a fourth power by pow is slow
+    return part.mean(part.square * part.square) / part.mean(part.square) ** 2 - 3.0
 
 
-def _drift(part, fit):
-    time = fit.readings.time
-    x = time - time.mean()
-    slope = np.einsum("t,tki->ki", x, np.nan_to_num(part)) / np.sum(x**2)
-    return (slope * np.ptp(time)).ravel()
+def _drift(part):
+    x = part.seen.time
+    slope = x @ part.values.reshape(len(x), -1) / np.sum(x**2)
+    return slope * part.seen.length
 
 
-def _between(part, fit):
-    flat = np.nan_to_num(part).reshape(len(part), -1)
+def _between(part):
+    flat = part.values.reshape(len(part.values), -1)
     matrix = np.corrcoef(flat.T) if flat.shape[1] > 3 else np.eye(flat.shape[1])
-    count = part.shape[1]
+    count = part.values.shape[1]
     blocks = np.abs(matrix).reshape(count, 3, count, 3).max(axis=(1, 3))
     np.fill_diagonal(blocks, 0.0)
     return blocks.max(axis=1)
@@ -191,13 +233,12 @@ TESTS = {
 
 def discrepancies(fit: Fit, ridge, rng, replicates=REPLICATES) -> list[Discrepancy]:
     """Every test quantity of a fit beside its band over replicates, most striking first."""
-    replicator, share = Replicator(fit, ridge), np.sqrt(np.maximum(1.0 - fit.leverage, 1e-6))
-    keep = fit.readings.keep
-    measured = quantities(fit, standardised(fit))
+    replicator, seen = Replicator(fit, ridge), Seen(fit)
+    share = fit.readings.keep / np.sqrt(np.maximum(1.0 - fit.leverage, 1e-6))
+    measured = quantities(fit, standardised(fit), seen)
     drawn: dict[str, list] = {name: [] for name in measured}
     for _ in range(replicates):
-        unit = np.where(keep, replicator.draw(rng) / share, np.nan)
-        for name, quantity in quantities(fit, unit).items():
+        for name, quantity in quantities(fit, replicator.draw(rng) * share, seen).items():
             drawn[name].append(quantity.values)
     found = [_compare(name, measured[name], np.array(drawn[name])) for name in measured]
     return [item for _, item in sorted(found, key=lambda pair: pair[0], reverse=True)]

@@ -123,7 +123,7 @@ def part_of(readings: Readings, most: int) -> Readings:
     if samples <= most:
         return readings
     stretch = np.arange(samples) // SETTINGS.stretch
-    chosen = np.linspace(0, stretch[-1], max(most // SETTINGS.stretch, 1)).round()
+    chosen = np.linspace(0, stretch[-1], -(-most // SETTINGS.stretch)).round()
     return _stretches(readings, stretch, np.isin(stretch, chosen))
 
 
