@@ -111,8 +111,12 @@ def test_a_log_that_is_there_twice(recording):
         name: np.concatenate([getattr(recording, name)] * 2)
         for name in ("specific_force", "angular_rate")
     }
-    [said] = repeated(replace(recording, time=0.01 * np.arange(400), **parts))
+    twice = replace(recording, time=0.01 * np.arange(400), **parts)
+    [said] = repeated(twice)
     assert said.startswith("160 of 400 samples are copies of others, the first at 2.4 s of that at")
+    for step in (imuarray.first_order, imuarray.select):
+        with pytest.raises(InputError, match="once; 160 of 400 samples are copies"):
+            step(twice)
 
 
 def test_a_recording_given_twice(recording):

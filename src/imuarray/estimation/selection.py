@@ -11,6 +11,7 @@ from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.motion_ml import motion_from
 from imuarray.model import ArrayModel
 from imuarray.recording import Recording, array_of
+from imuarray.recording.channels import require_once
 
 SLOWEST = np.radians(100.0)  # rad/s; slower samples say nearly nothing of the positions
 SHAKEN = 3.0  # m/s^2, sd; a board in a hand that does not turn it has less
@@ -88,7 +89,9 @@ def select_dynamic(
     """Moving samples with no reading at a rail, nor next to one; of these the informative.
 
     ``slowest`` rad/s; ``share`` of the usable samples, the largest by `information`.
+    InputError where none moves off the rails, or a part of the recording is there twice.
     """
+    require_once(recording)
     speed = np.linalg.norm(recording.angular_rate.mean(axis=1), axis=1)
     still = np.zeros(speed.shape, bool) if recording.stationary is None else recording.stationary
     force, rate = recording.saturated_accelerometers(), recording.saturated_gyroscopes()

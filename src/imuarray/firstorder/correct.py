@@ -14,7 +14,7 @@ from imuarray.firstorder.still import SHORTEST, still_poses
 from imuarray.firstorder.triads import TriadFit, fit_triads
 from imuarray.firstorder.turns import nearest_orthogonal, shared_turn
 from imuarray.recording import Recording
-from imuarray.recording.channels import require_live
+from imuarray.recording.channels import require_live, require_once
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
 GYROSCOPES = ("calibrate", "offset")
@@ -97,11 +97,12 @@ def calibrate_first_order(
     shortest_pose : s, that a still pose lasts at least
 
     InputError or IdentifiabilityError where there are no poses, too few or too similar ones, and
-    where axes are mirrored, rates have another unit, or channels are constant or copied.
+    where axes are mirrored, rates have another unit, or channels or samples are copied.
     """
     if gyroscopes not in GYROSCOPES:
         raise InputError(f"gyroscopes: expected {' or '.join(GYROSCOPES)}, found {gyroscopes!r}")
     require_live(recording)
+    require_once(recording)
     poses = still_poses(recording, shortest=shortest_pose)
     force = [recording.specific_force[pose] for pose in poses]
     rate = [recording.angular_rate[pose] for pose in poses]

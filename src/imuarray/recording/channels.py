@@ -28,6 +28,16 @@ def require_live(recording: Recording, where: str = "recording") -> None:
         raise InputError(f"{where}: expected readings of live sensors; {'; '.join(found[:3])}")
 
 
+def require_once(recording: Recording) -> None:
+    """InputError for samples that are copies of others, before poses or samples are drawn of them.
+
+    Afterwards few copies may be left to see, and all would count twice.
+    """
+    found = _twice(recording, _turning(recording))
+    if found:
+        raise InputError(f"recording: expected each sample once; {found[0]}: leave it out")
+
+
 def require_apart(recordings: Sequence[Recording]) -> None:
     """InputError for no recording, and for turning samples that two of them share."""
     if not recordings:
