@@ -102,7 +102,12 @@ def main():
     few = imuarray.select(imuarray.simulate(array, 5.0, 50.0, seed=1)[0], 20)
     lines.append(fall("4 triads of a diagonal, T = 20", few, rise=True))
     chains = imuarray.sample(
-        few, steps=300, seed=1, motion_prior="flat", accelerometer_noise=few.accelerometer_noise_sd
+        few,
+        "papers",
+        steps=300,
+        seed=1,
+        motion_prior="flat",
+        accelerometer_noise=few.accelerometer_noise_sd,
     ).attrs
     lines.append(
         f"| NUTS there | R-hat {chains['rhat_max']:.2f}, on a line: {chains['on_a_line']} |"

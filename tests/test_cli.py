@@ -64,10 +64,10 @@ def test_calibrate(calls):
 
 def test_sample(calls):
     assert main("sample rec.nc --out p.nc --steps 50 --seed 3".split()) == 0
-    assert main("sample rec.nc --out p.nc".split()) == 0
+    assert main("sample rec.nc --out p.nc --model papers".split()) == 0
     first, second = (arguments for _, arguments in calls)
-    assert (first.method, first.steps, first.seed) == ("auto", 50, 3)
-    assert (second.steps, second.seed, second.effects) == (None, 0, ())
+    assert (first.model, first.method, first.steps, first.seed) == ("sensors", "auto", 50, 3)
+    assert (second.model, second.steps, second.seed, second.effects) == ("papers", None, 0, ())
 
 
 BAD = {

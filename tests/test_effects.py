@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from imuarray.engine.readings import measured
 from imuarray.errors import InputError
 from imuarray.estimation import calibrate_bcd, calibrate_gauss_newton
-from imuarray.estimation.blocks import pack_motion
 from imuarray.geometry import mimu4444_corners
 from imuarray.model import EFFECTS, ArrayModel, Noise, effect
 from imuarray.motion import Motion, hand_twisting
@@ -16,6 +16,11 @@ from imuarray.posterior.target import GaussianPrior, GenericTarget
 from imuarray.simulation import measure
 
 RATE = np.radians(0.06)
+
+
+def packed(model, motion):
+    """(T, 9 or 15)."""
+    return np.hstack([np.asarray(field) for field in motion[: model.motion_size // 3]])
 
 
 def simulated(effects, values, samples=120, seed=5):
@@ -86,8 +91,8 @@ def test_likelihood_prefers_the_true_effect():
     model, force, rate, positions, parameters, motion = simulated(
         ("sensor_delay",), CASES["sensor_delay"], samples=30
     )
-    start = pack_motion(model, motion)
-    likelihood = GenericLikelihood(model, force, rate, start, draws=2)
+    start = packed(model, motion)
+    likelihood = GenericLikelihood(model, measured(model, force, rate), start, draws=2)
     normals = np.random.default_rng(1).standard_normal((30, 2, 3))
     truth = np.concatenate([positions[1:].ravel(), parameters])
     nothing = np.concatenate([positions[1:].ravel(), np.zeros(8)])
@@ -107,7 +112,7 @@ def test_sampler_runs_on_an_extended_model_near_its_mode():
     mode = np.concatenate([found.positions[1:].ravel(), found.effect_parameters])
     sds = np.sqrt(np.diag(found.covariance))
     estimate = GenericLikelihood(
-        model, force, rate, pack_motion(model, found.motion.motion), draws=2
+        model, measured(model, force, rate), packed(model, found.motion.motion), draws=2
     )
     factor = np.linalg.cholesky(found.covariance)
     prior_sd = np.concatenate([np.full(21, 3e-3), model.effect_prior_sd])
@@ -123,7 +128,7 @@ def test_generic_likelihood_equals_the_collapsed_one_up_to_a_constant():
     """Differences between thetas agree within Monte Carlo error (seed 3, 5 sd)."""
     model, force, rate, positions, _, motion = simulated((), lambda rng: {}, samples=20)
     collapsed = Likelihood.of(model, force, rate)
-    generic = GenericLikelihood(model, force, rate, pack_motion(model, motion), draws=8)
+    generic = GenericLikelihood(model, measured(model, force, rate), packed(model, motion), draws=8)
     rng = np.random.default_rng(3)
     differences = []
     for _ in range(3):
@@ -149,7 +154,9 @@ def test_no_reward_along_a_gauge_with_a_proper_motion_prior():
     normals = np.random.default_rng(2).standard_normal((60, 4, 3))
     change = {}
     for name, used in (("flat", model), ("proper", model.with_motion(motion))):
-        likelihood = GenericLikelihood(used, force, rate, pack_motion(model, motion), steps=6)
+        likelihood = GenericLikelihood(
+            used, measured(used, force, rate), packed(model, motion), steps=6
+        )
         values = []
         for c in (0.0, -0.03):
             theta = np.concatenate([(positions[1:] * (1 + c) ** 2).ravel(), np.full(24, c)])
@@ -182,7 +189,9 @@ def test_a_new_effect_is_ten_lines_and_needs_nothing_else():
         found = calibrate_gauss_newton(model, force, rate, position_prior=prior)
         sd = np.sqrt(np.diag(found.covariance)[21:])
         assert np.max(np.abs(found.effect_parameters - parameters) / sd) < 4.5
-        likelihood = GenericLikelihood(model, force, rate, pack_motion(model, motion), draws=1)
+        likelihood = GenericLikelihood(
+            model, measured(model, force, rate), packed(model, motion), draws=1
+        )
         normals = np.zeros((len(force), 1, 3))
         flat = found.positions[1:].ravel()
         with_bias = likelihood.on(np.concatenate([flat, found.effect_parameters]), normals)

@@ -5,6 +5,7 @@ import pytest
 from scipy import stats
 from scipy.special import logsumexp
 
+from imuarray.engine.readings import measured
 from imuarray.errors import InputError
 from imuarray.estimation.reference import linear_part, nonlinear_part
 from imuarray.model import ArrayModel
@@ -166,7 +167,9 @@ def test_unknown_noise_and_motion_of_the_generic_likelihood():
     marginal, force, rate, model, positions = proper(gyroscope_sd=0.02)
     same = ArrayModel(model.array, model.noise, (), motion_sd=(*MOTION_SD, np.inf))
     start = np.hstack([rate.mean(axis=1), np.zeros((len(rate), 3)), force.mean(axis=1)])
-    generic = GenericLikelihood(same, force, rate, start, steps=8, logs=np.eye(5)[:, :4])
+    generic = GenericLikelihood(
+        same, measured(same, force, rate), start, steps=8, logs=np.eye(5)[:, :4]
+    )
 
     def one(theta):
         data, evidence = scaled(marginal.data, theta[12:])
@@ -206,7 +209,7 @@ def test_laplace_of_the_generic_likelihood():
     model = ArrayModel(array, model.noise, model.effects, motion_sd=(10.0, 300.0, 20.0))
     start = np.zeros((6, 15))
     start[:, :3], start[:, 6:9] = rate.mean(axis=1), force.mean(axis=1)
-    generic = GenericLikelihood(model, force, rate, start, draws=400, steps=8)
+    generic = GenericLikelihood(model, measured(model, force, rate), start, draws=400, steps=8)
     p = np.concatenate([array.parameters, 1e-3 * model.effect_prior_sd])
     values, density = [generic(p, rng) for _ in range(8)], jax.jit(generic.log_density)
     error = np.std(values, ddof=1) / np.sqrt(8)

@@ -116,6 +116,7 @@ def test_a_chain_that_falls_into_the_flat_priors_hole_is_told():
     said = []
     found = imuarray.sample(
         imuarray.select(recording, 20),
+        "papers",
         steps=100,
         seed=1,
         motion_prior="flat",

@@ -9,7 +9,7 @@ import imuarray
 from imuarray.errors import InputError
 from tests.test_bound import model
 
-PAPERS = {"rates": "spread", "motion_prior": "flat"}
+PAPERS = {"model": "papers", "rates": "spread", "motion_prior": "flat"}
 
 
 def railed(rail):
@@ -38,4 +38,4 @@ def test_without_any_other_sample_it_is_said():
 
 def test_the_proper_motion_prior_is_refused():
     with pytest.raises(InputError, match="expected --motion-prior flat with it"):
-        imuarray.sample(railed(15.0), rates="spread")
+        imuarray.sample(railed(15.0), "papers", rates="spread")

@@ -60,7 +60,7 @@ def test_the_command_as_it_is_needs_neither_the_noise_nor_the_motions_size():
     row = coverage(values).iloc[0]
     assert row.p > 1e-3 and row.none == row.slow == 0
     assert np.all(np.abs(row[["shift_z", "width_z", "size_z"]].astype(float)) < 4)
-    told = partial(imuarray.sample, accelerometer_noise=0.02)
+    told = partial(imuarray.sample, model="papers", accelerometer_noise=0.02)
     narrow = by_default.pit_values(setting("default"), range(20), told)
     assert coverage(narrow).width_z[0] > 3
 

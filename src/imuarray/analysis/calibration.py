@@ -11,9 +11,9 @@ import xarray as xr
 
 from imuarray.analysis import methods
 from imuarray.analysis.calibration_dataset import engine_dataset, papers_dataset
-from imuarray.analysis.model import Say, assumed, model_of, silent, usable
+from imuarray.analysis.fitting import fitted
+from imuarray.analysis.model import Say, assumed, model_of, require_together, silent, usable
 from imuarray.errors import InputError
-from imuarray.model.effects import find_effects
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording
 from imuarray.recording.channels import require_apart, require_live
@@ -70,8 +70,7 @@ def calibrate(
     if method not in (None, *methods.CALIBRATION):
         known = ", ".join(methods.CALIBRATION)
         raise InputError(f"method: expected any of {known}, found {method!r}")
-    find_effects(effects)  # an unknown one is named before anything else
-    _require_together(model, recordings, effects, accelerometer_noise)
+    require_together(model, recordings, effects, accelerometer_noise)
     if method is not None and model != "papers":
         raise InputError(f"--method {method}: expected it with --model papers, found {model}")
     if model == "papers":
@@ -83,30 +82,6 @@ def calibrate(
     data = [part for one in recordings for part in (one.specific_force, one.angular_rate)]
     dataset.attrs |= {"model": str(model), **stamp({"recording": digest(*data)}, 0)}
     return dataset
-
-
-def _require_together(model, recordings, effects, accelerometer_noise) -> None:
-    """InputError where options do not go together."""
-    if model not in methods.MODELS and not str(model).endswith(".json"):
-        known = ", ".join(methods.MODELS)
-        raise InputError(f"model: expected any of {known} or a diagnosis.json, found {model!r}")
-    if model == "papers" and effects:
-        raise InputError("--effects: expected none with --model papers, found some")
-    if model != "papers" and accelerometer_noise is not None:
-        raise InputError(
-            "--accelerometer-noise: expected it with --model papers only, found it where the noise"
-            " is estimated"
-        )
-    if len(recordings) > 1:
-        if model != "sensors":
-            raise InputError(f"--model {model}: expected one recording, found {len(recordings)}")
-        for other in recordings[1:]:
-            if other.accelerometer_labels != recordings[0].accelerometer_labels or not np.allclose(
-                other.relative_positions(), recordings[0].relative_positions(), atol=1e-9
-            ):
-                raise InputError(
-                    "recordings: expected one board, found other labels or nominal positions"
-                )
 
 
 def _papers(recording: Recording, method: str, accelerometer_noise, say: Say) -> xr.Dataset:
@@ -127,26 +102,7 @@ def _papers(recording: Recording, method: str, accelerometer_noise, say: Say) ->
 
 def _engine(recordings, model: str, effects, say: Say) -> xr.Dataset:
     """Robust least squares (`imuarray.engine`): a ladder, given effects, or a diagnosis'."""
-    from imuarray.engine.ladder import climb, with_effects
-    from imuarray.engine.readings import arrange, determined, most_informative
-
-    rungs: list = []
-    if model.endswith(".json"):
-        from imuarray.diagnosis.extension import diagnosed_estimate
-
-        found = diagnosed_estimate(model, recordings[0])
-    else:
-        arranged = [arrange(one, sparse=True) for one in recordings]
-        whole = [one.select(determined(one, 1)) for one in arranged]
-        readings = [most_informative(one, say) for one in whole]
-        if effects:
-            found = with_effects(readings, effects)
-        else:
-            found, rungs = climb(readings)
-            for rung in rungs:
-                verdict = "kept" if rung.kept else "left out"
-                say(f"{rung.name}: {verdict}, {rung.gain:.3g} ({rung.error:.2g}) nats on held-out"
-                    " time")  # fmt: skip
+    found, rungs = fitted(recordings, model, effects, say)
     dataset = engine_dataset(recordings, found)
     dataset.attrs["parts"] = json.dumps([rung._asdict() for rung in rungs])
     return dataset

@@ -98,8 +98,8 @@ def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
     """Of the engine's estimate."""
     first, readings = recordings[0], found.recorded[0].readings
     covariance, *sds = widths(found)
-    effects = _effects_of(found)
-    place, size = _places(found, effects)
+    effects = effects_of(found)
+    place, size = places_among(found, effects)
     count = 3 * (readings.array.accelerometers - 1)
     whole = np.zeros((size, size))
     used = np.flatnonzero(place >= 0)
@@ -123,7 +123,7 @@ def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
         labels = first.accelerometer_labels, first.gyroscope_labels
         sd = np.sqrt(np.diag(whole))[count:]
         variables |= {
-            "effect_parameter": (("parameter",), _parameters(found, model)),
+            "effect_parameter": (("parameter",), parameters_of(found, model)),
             "effect_sd": (("parameter",), sd),
             # of r_2 ... r_A, then the effects' parameters
             "whole_covariance": (("unknown", "unknown_other"), whole),
@@ -140,7 +140,7 @@ def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
     return dataset
 
 
-def _effects_of(found: Estimate) -> tuple[str, ...]:
+def effects_of(found: Estimate) -> tuple[str, ...]:
     """The effects with free parameters, or with values, in the model's order."""
     values = found.columns.model.split(found.recorded[0].state.parameters)
     free = set(np.array(found.columns.names)[found.active.any(axis=0)])
@@ -150,13 +150,13 @@ def _effects_of(found: Estimate) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def _parameters(found: Estimate, model: ArrayModel) -> np.ndarray:
+def parameters_of(found: Estimate, model: ArrayModel) -> np.ndarray:
     """Flat, in a model's order; a recording's own ones are the first recording's."""
     values = found.columns.model.split(found.recorded[0].state.parameters)
     return model.join({item.id: values[item.id] for item in model.chain})
 
 
-def _places(found: Estimate, effects) -> tuple[np.ndarray, int]:
+def places_among(found: Estimate, effects) -> tuple[np.ndarray, int]:
     """Of each of the n parameters its place among r_2 ... r_A and the effects'; -1 for none.
 
     Another recording's own ones have none. Also the number of places.

@@ -11,17 +11,22 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import block_diag
 
-from imuarray.analysis.model import Say, silent
-from imuarray.analysis.noise import estimated_noise
+from imuarray.analysis.calibration_dataset import effects_of, parameters_of, places_among
+from imuarray.analysis.model import Say, model_of, silent
+from imuarray.analysis.noise import Shown, estimated_noise, factors, shown
+from imuarray.engine.estimate import Estimate
+from imuarray.engine.linearise import State
+from imuarray.engine.parameters import gauge_masks, prior_precision
+from imuarray.engine.readings import Readings
 from imuarray.errors import IdentifiabilityError
-from imuarray.estimation.blocks import pack_motion
 from imuarray.geometry import positions_of
-from imuarray.model import ArrayModel
+from imuarray.linear import scaled_inverse
+from imuarray.model import ArrayModel, Noise
 from imuarray.posterior import tuning
 from imuarray.posterior.generic import SCALES, GenericLikelihood, log_laplace
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.rate_density import sample_covariance
-from imuarray.posterior.target import GaussianPrior, GenericTarget
+from imuarray.posterior.target import GaussianPrior, GenericTarget, TiedPrior
 from imuarray.recording import Recording
 from imuarray.streams import stream
 
@@ -30,13 +35,14 @@ NOT_CONVERGED = (
     "the search for the posterior's mode did not converge; chains start from where it ended"
 )
 WIDE = 3.0  # prior sd of the log of a noise's sd, and of the motion's: a factor of twenty
+HELD = 1e-3  # of its prior's sd: the sd of a parameter that the estimate does not free
 FEW, STARTS = 50, 8  # samples; searches for the mode where there are no more
 WIDER = 1.05  # than the mode's curvature, for preconditioned Crank-Nicolson proposals
 LENGTHS = np.geomspace(0.02, 0.99, 10)  # of those that are tried
 
 
 class Posterior(NamedTuple):
-    """What a sampler needs of a recording, by `posterior_of`."""
+    """What a sampler needs of a recording, by `posterior_of` or `posterior_beyond`."""
 
     recording: Recording
     model: ArrayModel  # with the noise, and the motion's prior, that belong to ``scales`` = 0
@@ -44,7 +50,8 @@ class Posterior(NamedTuple):
     mode: np.ndarray  # (P,)
     covariance: np.ndarray  # (P, P) about the mode's
     scales: tuple[str, ...]  # of `SCALES`, those whose logs are unknown
-    motion: np.ndarray  # (T, 9 or 15) at the mode
+    motion: np.ndarray | None = None  # (T, 9 or 15) at the mode; with effects
+    readings: Readings | None = None  # with effects: what is sampled from, with its noise
 
     @property
     def spread(self) -> np.ndarray:
@@ -68,26 +75,23 @@ class Posterior(NamedTuple):
 
     def generic(self, draws: int = 2) -> GenericLikelihood:
         """The likelihood of a model with effects."""
-        recording = self.recording
         return GenericLikelihood(
-            self.model, recording.specific_force, recording.angular_rate, self.motion,
-            draws=draws, saturated=recording.saturated_gyroscopes(), time=recording.time,
-            logs=self.spread,
-        )  # fmt: skip
+            self.model, self.readings, self.motion, draws=draws, logs=self.spread
+        )
 
 
 def posterior_of(
     recording: Recording, model: ArrayModel, flat: bool = False, rates: str = "declared",
     known: tuple[bool, bool] = (False, False), say: Say = silent,
 ) -> Posterior:  # fmt: skip
-    """The posterior of a recording under a model, around its mode.
+    """The posterior of a recording under the papers' model, around its mode.
 
     Parameters
     ----------
     flat
         Whether omega and omega_dot have the papers' prior, and the noise is at its estimate. By
-        default they, and with effects s, are normal of the recording's own size; that and the
-        noise are unknown, with log-normal priors a factor of twenty wide.
+        default they are normal of the recording's own size; that and the noise are unknown, with
+        log-normal priors a factor of twenty wide.
     rates
         As `imuarray.sample` has it; the noise is the model's where it is ``"spread"``.
     known
@@ -100,30 +104,107 @@ def posterior_of(
     if not found.converged:
         say(NOT_CONVERGED)
     sizes = np.array(fitted.motion_sd)
-    if model.effects:  # a compiled function has them: powers of two serve other recordings, too
-        chosen = replace(chosen, motion_sd=tuple(2.0 ** np.round(np.log2(sizes))))
-    elif not flat:  # s is flat: differences between triads do not show it
+    if not flat:  # s is flat: differences between triads do not show it
         chosen = replace(chosen, motion_sd=(*sizes[:2], np.inf))
-    free = [not flat and not fixed for fixed in known] + [not flat] * 2 + [bool(model.effects)]
-    declared = [np.trace(part) for part in (model.noise.accelerometer, model.noise.gyroscope)]
-    shown = [np.trace(part) for part in (chosen.noise.accelerometer, chosen.noise.gyroscope)]
-    before = 0.5 * np.log(np.divide(declared, shown))
-    with np.errstate(divide="ignore"):
-        own = np.log(sizes / chosen.motion_sd)
-    freedom = np.append(fitted.freedom, np.full(3, 3.0 * len(recording.time)))
-    extra = np.empty(0) if found.effect_parameters is None else found.effect_parameters
+    free = [not flat and not fixed for fixed in known] + [not flat] * 2 + [False]
+    unknown = _unknown(model, chosen, fitted.freedom, np.zeros(3), len(recording.time))
+    before, freedom = (part[free] for part in unknown)
     prior = prior_of(recording, chosen)
     return Posterior(
         recording, chosen,
         GaussianPrior(
-            np.concatenate([prior.mean, np.append(before, own)[free]]),
-            np.concatenate([prior.sd, np.full(sum(free), WIDE)]),
+            np.append(prior.mean, before), np.append(prior.sd, np.full(sum(free), WIDE))
         ),
-        np.concatenate([found.positions[1:].ravel(), extra, np.append([0.0, 0.0], own)[free]]),
-        block_diag(found.covariance, np.diag(0.5 / np.maximum(freedom[free], 1.0))),
+        np.concatenate([found.positions[1:].ravel(), np.zeros(sum(free))]),
+        block_diag(found.covariance, np.diag(0.5 / np.maximum(freedom, 1.0))),
         tuple(name for name, one in zip(SCALES, free, strict=True) if one),
-        pack_motion(chosen, found.motion.motion),
     )  # fmt: skip
+
+
+def _unknown(declared: ArrayModel, chosen: ArrayModel, freedom, own, samples: int):
+    """(prior means, degrees of freedom) (5,) of the logs of `SCALES`, 0 at the model ``chosen``.
+
+    ``own`` (3,): where the logs of the motion's size are expected.
+    """
+    kinds = "accelerometer", "gyroscope"
+    size = [
+        [np.trace(getattr(model.noise, kind)) for kind in kinds] for model in (declared, chosen)
+    ]
+    before = 0.5 * np.log(np.divide(*size))
+    return np.append(before, own), np.append(freedom, np.full(3, 3.0 * samples))
+
+
+def posterior_beyond(recording: Recording, found: Estimate) -> Posterior:
+    """The posterior under a model with effects, around where the engine has fitted it.
+
+    Readings, their noise, and what is known of gauges are the estimate's; noise and the size of
+    omega, omega_dot and s are unknown as in `posterior_of`.
+    """
+    one, effects = found.recorded[0], effects_of(found)
+    mine = found.places[0]
+    place = places_among(found, effects)[0][mine]
+    precision = _known(found)
+    whole = found.information[np.ix_(mine, mine)] + precision
+    readings, seen = _judged(found, scaled_inverse(whole))
+    sizes = seen.motion_sd
+    # a compiled function has them: powers of two serve other recordings, too
+    rounded = tuple(2.0 ** np.round(np.log2(sizes)))
+    declared, counts = model_of(recording, effects), readings.exists.sum(axis=0)
+    sds = (readings.sd[:n, kind] for kind, n in enumerate(counts))
+    model = replace(
+        declared, noise=Noise.of(*counts, *sds), motion_sd=rounded,
+        clock=(readings.origin, readings.span), derivative_sd=_derivative_sd(declared, one.state),
+    )  # fmt: skip
+    prior = prior_of(recording, model)
+    mode = np.concatenate([found.positions[1:].ravel(), parameters_of(found, model)])
+    held = np.setdiff1d(np.arange(len(mode)), place)
+    mean, root = prior.mean.copy(), np.diag(1.0 / (HELD * prior.sd))
+    mean[held] = mode[held]
+    root[np.ix_(place, place)] = np.linalg.cholesky(precision).T
+    covariance = np.diag((HELD * prior.sd) ** 2)
+    covariance[np.ix_(place, place)] = scaled_inverse(whole)
+    own = np.log(sizes / rounded)
+    before, freedom = _unknown(declared, model, seen.freedom.sum(axis=0), own, len(readings.time))
+    motion = one.state.motion[:, :9]
+    if model.needs_derivatives:
+        motion = np.hstack([motion, *one.state.jerk])
+    return Posterior(
+        recording, model,
+        TiedPrior.of(np.append(mean, before), block_diag(root, np.eye(len(SCALES)) / WIDE)),
+        np.concatenate([mode, [0.0, 0.0], own]),
+        block_diag(covariance, np.diag(0.5 / np.maximum(freedom, 1.0))), SCALES, motion, readings,
+    )  # fmt: skip
+
+
+def _known(found: Estimate) -> np.ndarray:
+    """Prior precision (n, n) of the active parameters: what the positions take up is pinned.
+
+    A gauge that the array's size takes up is as wide as its parameters, or as is known of it.
+    """
+    precision = prior_precision(found.columns, found.active, resized=False)
+    for effect, mask in gauge_masks(found.columns, found.active):
+        if effect.resizes and effect.kinds == [1] and np.isfinite(found.scale_sd):
+            mean = mask[found.active] / mask.sum()
+            precision += np.outer(mean, mean) / found.scale_sd**2
+    return precision
+
+
+def _judged(found: Estimate, covariance) -> tuple[Readings, Shown]:
+    """The estimate's readings with the normal noise that they show; few of them share a factor."""
+    one = found.recorded[0]
+    squares = np.where(one.readings.exists, found.noise_sd() ** 2, np.nan)
+    sds = np.broadcast_to(np.sqrt(np.nanmean(squares, axis=0)), squares.shape)
+    readings = one.readings.with_noise(sds, None)
+    seen = shown(readings, found.columns, one.state, found.active, covariance)
+    return readings.with_sd(sds * factors(seen, readings.exists)), seen
+
+
+def _derivative_sd(model: ArrayModel, state: State) -> tuple[float, float]:
+    """Prior sds of omega double dot and s dot: the recording's own where it shows them."""
+    sizes = [np.sqrt(np.mean(field**2)) for field in state.jerk]
+    if not model.needs_derivatives or not all(sizes):
+        return model.derivative_sd
+    return float(2.0 ** np.ceil(np.log2(sizes[0]))), float(2.0 ** np.ceil(np.log2(sizes[1])))
 
 
 def _spread(recording: Recording, model: ArrayModel, say: Say) -> Posterior:
@@ -134,7 +215,7 @@ def _spread(recording: Recording, model: ArrayModel, say: Say) -> Posterior:
     if not found.converged:
         say(NOT_CONVERGED)
     prior, mode = prior_of(recording, model), found.mean[1:].ravel()
-    return Posterior(recording, model, prior, mode, found.covariance, (), np.empty((0, 9)))
+    return Posterior(recording, model, prior, mode, found.covariance, ())
 
 
 def prior_of(recording: Recording, model: ArrayModel) -> GaussianPrior:
@@ -157,13 +238,13 @@ def _fit(recording: Recording) -> Callable:
     def search(model, start):
         return calibrate_gauss_newton(
             model, recording.specific_force, recording.angular_rate, start,
-            saturated=recording.saturated_gyroscopes(), time=recording.time,
+            saturated=recording.saturated_gyroscopes(),
             position_prior=(model.array.parameters, recording.position_prior_sd),
         )  # fmt: skip
 
     def fit(model):
         found = search(model, last[0] if last else None)
-        if not last and not model.effects and len(recording.time) <= FEW:
+        if not last and len(recording.time) <= FEW:
             rng = stream(0, "sample", "mode")
             for _ in range(STARTS):
                 off = recording.position_prior_sd * rng.standard_normal(found.positions.shape)
@@ -194,8 +275,8 @@ def log_papers(theta, data, nodes, weights, spread, mean, sd):
 def log_extended(model: ArrayModel, steps: int) -> Callable:
     """The same under a model with effects; one function for models that predict the same."""
 
-    def log_density(theta, data, mean, sd):
-        prior = -0.5 * (((theta - mean) / sd) ** 2).sum()
+    def log_density(theta, data, mean, root):
+        prior = -0.5 * ((root @ (theta - mean)) ** 2).sum()
         return log_laplace(model, steps, theta, data) + prior
 
     return log_density
@@ -207,7 +288,7 @@ def traced(posterior: Posterior, rates: str = "declared", say: Say = silent):
     if posterior.model.effects:
         generic = posterior.generic()
         function = log_extended(posterior.model, generic.steps)
-        return function, (generic.data, prior.mean, prior.sd)
+        return function, (generic.data, prior.mean, prior.root)
     from imuarray.posterior.marginal import Marginal
 
     recording = posterior.recording

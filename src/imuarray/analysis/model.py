@@ -7,8 +7,12 @@ from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
+import numpy as np
+
+from imuarray.analysis import methods
 from imuarray.errors import LARGEST, SMALLEST, InputError
 from imuarray.model import DATA_EFFECTS, ArrayModel
+from imuarray.model.effects import find_effects
 from imuarray.recording import Recording, array_of
 from imuarray.recording.channels import require_live
 
@@ -58,10 +62,35 @@ def usable(recording: Recording, say: Say = silent) -> Recording:
     return recording.select(~lost) if lost.any() else recording
 
 
-def extender(
-    diagnosis: str | PathLike | None, effects: Sequence[str] = (),
-    accelerometer_noise: float | None = None, say: Say = silent,
-):  # fmt: skip
+def require_together(
+    model, recordings: Sequence[Recording], effects: Sequence[str],
+    accelerometer_noise: float | None,
+) -> None:  # fmt: skip
+    """InputError where a model, its effects, noise and recordings do not go together."""
+    find_effects(effects)  # an unknown one is named before anything else
+    if model not in methods.MODELS and not str(model).endswith(".json"):
+        known = ", ".join(methods.MODELS)
+        raise InputError(f"model: expected any of {known} or a diagnosis.json, found {model!r}")
+    if model == "papers" and effects:
+        raise InputError("--effects: expected none with --model papers, found some")
+    if model != "papers" and accelerometer_noise is not None:
+        raise InputError(
+            "--accelerometer-noise: expected it with --model papers only, found it where the noise"
+            " is estimated"
+        )
+    if len(recordings) > 1:
+        if model != "sensors":
+            raise InputError(f"--model {model}: expected one recording, found {len(recordings)}")
+        for other in recordings[1:]:
+            if other.accelerometer_labels != recordings[0].accelerometer_labels or not np.allclose(
+                other.relative_positions(), recordings[0].relative_positions(), atol=1e-9
+            ):
+                raise InputError(
+                    "recordings: expected one board, found other labels or nominal positions"
+                )
+
+
+def extender(diagnosis: str | PathLike | None, effects: Sequence[str] = (), say: Say = silent):
     """What gives a model the effects and the noise of ``diagnosis`` (diagnosis.json), or None.
 
     A function of the model and of the labels of accelerometers and gyroscopes, the model's own
@@ -73,11 +102,6 @@ def extender(
 
     if effects:
         raise InputError("--effects: expected none beside --diagnosis, found some")
-    if accelerometer_noise is not None:
-        raise InputError(
-            "--accelerometer-noise: expected none beside --diagnosis, whose noise is used, found"
-            f" {accelerometer_noise:g}"
-        )
     extension = read_extension(Path(diagnosis))
     for name in extension.before:
         if not DATA_EFFECTS[name].left_out:
@@ -88,16 +112,3 @@ def extender(
         return extended_model(extension, model, labels or (model.array.labels,) * 2)
 
     return extended
-
-
-def chosen_model(
-    recording: Recording, effects: Sequence[str] = (), diagnosis: str | PathLike | None = None,
-    accelerometer_noise: float | None = None, say: Say = silent,
-) -> tuple[Recording, ArrayModel]:  # fmt: skip
-    """The recording with the noise assumed, and its model with the effects or the diagnosis."""
-    extended = extender(diagnosis, effects, accelerometer_noise, say)
-    recording = assumed(recording, accelerometer_noise)
-    if extended is None:
-        return recording, model_of(recording, effects)
-    labels = recording.accelerometer_labels, recording.gyroscope_labels
-    return recording, extended(model_of(recording), labels)

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from imuarray.analysis.model import Say, silent
-from imuarray.estimation import blocks
+from imuarray.engine.fit import padded, pick
+from imuarray.engine.linearise import (
+    CHUNK,
+    Eliminated,
+    State,
+    chunk_at,
+    directions_of,
+    no_derivatives,
+)
+from imuarray.engine.parameters import Columns, columns_of
+from imuarray.engine.readings import Readings, measured
 from imuarray.estimation.bcd import Calibration
 from imuarray.model import ArrayModel, Noise
-from imuarray.model.jax64 import jax, jnp
-from imuarray.model.small_linear import cholesky, solve_lower
 from imuarray.recording import Recording
 
 ROUNDS, ENOUGH = 6, 0.02  # of fit and noise by turns; change of all sds that ends them
@@ -30,52 +37,39 @@ class Fitted(NamedTuple):
     freedom: np.ndarray  # (2,) degrees that the two kinds of noise rest on
 
 
-@partial(jax.jit, static_argnums=0)
-def _leverage(model, x, p, covariance, readings, span, whiten):
-    """(squares (T, R), leverages (T, R), covariances of omega, omega_dot, s (T, 3, 3, 3))."""
+class Shown(NamedTuple):
+    """What residuals and motion of a fit show."""
 
-    def one(x, readings):
-        def flat(x, p):
-            return blocks.residual(model, x, p, *readings, span, *whiten)
-
-        moved, shared = jax.jacfwd(flat, (0, 1))(x, p)
-        factor = cholesky(moved.T @ moved)
-        basis = solve_lower(factor, moved.T)
-        left = shared - basis.T @ (basis @ shared)
-        own = jnp.sum(basis**2, axis=0) + jnp.sum((left @ covariance) * left, axis=1)
-        roots = solve_lower(factor, jnp.eye(x.size))[:, :9].reshape(-1, 3, 3)
-        return flat(x, p) ** 2, own, jnp.einsum("nki,nkj->kij", roots, roots)
-
-    return jax.vmap(one)(x, readings)
+    squares: np.ndarray  # (N, 2) of each triad's residuals, in their sds
+    freedom: np.ndarray  # (N, 2) degrees that motion and shared parameters leave them
+    motion_sd: np.ndarray  # (3,) sizes of omega, omega_dot, s: what is not noise of their estimates
 
 
-def _looked_at(recording: Recording, model: ArrayModel, found):
-    """Chi-square and degrees of freedom of each triad (A + G,), size of the motion (3,)."""
-    given = blocks.problem(
-        model, recording.specific_force, recording.angular_rate,
-        recording.saturated_gyroscopes(), time=recording.time,
-    )  # fmt: skip
-    x = blocks.pack_motion(model, found.motion.motion)
-    extra = np.empty(0) if found.effect_parameters is None else found.effect_parameters
-    p = np.concatenate([found.positions[1:].ravel(), extra])
-    readings = given.specific_force, given.angular_rate, given.keep, given.time
-    whiten = given.whiten_force, given.whiten_rate[0]
-    parts = []
-    for start in range(0, len(x), blocks.CHUNK):
-        use = np.minimum(np.arange(start, start + blocks.CHUNK), len(x) - 1)
-        made = _leverage(
-            model, x[use], p, found.covariance, tuple(part[use] for part in readings), given.span,
-            whiten,
-        )  # fmt: skip
-        parts.append([np.asarray(part)[: len(x) - start] for part in made])
-    squares, leverage, spread = (np.concatenate(part) for part in zip(*parts, strict=True))
-    count = 3 * model.array.accelerometers
-    rows = count + given.keep.shape[1]
-    there = np.hstack([np.ones((len(x), count)), given.keep != 0])
-    triads = [part[:, :rows].sum(axis=0).reshape(-1, 3).sum(axis=1)
-              for part in (squares, there - leverage[:, :rows])]  # fmt: skip
-    sizes = [_size(x[:, 3 * k : 3 * k + 3], spread[:, k]) for k in range(3)]
-    return *triads, np.array(sizes)
+def shown(readings: Readings, columns: Columns, state: State, active, covariance) -> Shown:
+    """Of a fit's state, the ``active`` (N, m) parameters' covariance (n, n) allowed for."""
+    wanted = np.flatnonzero(active.any(axis=0))
+    directions = directions_of(columns, wanted)
+    few = padded(active[:, wanted], len(directions))
+    samples, count = readings.values.shape[:2]
+    squares, freedom, spread = np.zeros((count, 2)), np.zeros((count, 2)), []
+    for start in range(0, samples, CHUNK):
+        used = slice(None, min(CHUNK, samples - start))
+        seen = chunk_at(readings, columns, state, directions, start)
+        seen = Eliminated(*(np.asarray(part)[used] for part in seen))
+        keep = readings.keep[start : start + CHUNK]
+        pairs, through = pick(seen.through, few)
+        for k in range(count):
+            basis, own = seen.basis[:, 6 * k : 6 * k + 6], np.flatnonzero(pairs[:, 0] == k)
+            left = -basis @ through
+            left[..., own] += seen.whitened[:, k][..., pairs[own, 1]]
+            taken = np.sum(basis**2, axis=2) + np.sum((left @ covariance) * left, axis=2)
+            squares[k] += np.sum(seen.residual[:, k].reshape(-1, 2, 3) ** 2, axis=(0, 2))
+            freedom[k] += np.sum((keep[:, k] * (1 - taken)).reshape(-1, 2, 3), axis=(0, 2))
+        roots = seen.inverse[..., :9].reshape(len(keep), -1, 3, 3)
+        spread.append(np.einsum("trki,trkj->tkij", roots, roots))
+    spread = np.concatenate(spread)
+    sizes = [_size(state.motion[:, 3 * k : 3 * k + 3], spread[:, k]) for k in range(3)]
+    return Shown(squares, freedom, np.array(sizes))
 
 
 def _size(estimates, covariances) -> float:
@@ -89,8 +83,17 @@ def _size(estimates, covariances) -> float:
     return float(np.sqrt(found))
 
 
+def factors(seen: Shown, exists, known=(False, False)) -> np.ndarray:
+    """By what the triads' sds are wrong (N, 2); 1 where they are ``known`` or do not exist."""
+    out = np.ones(exists.shape)
+    for kind in np.flatnonzero(~np.array(known)):
+        own = exists[:, kind]
+        out[own, kind] = _factors(seen.squares[own, kind], seen.freedom[own, kind], APART[kind])
+    return out
+
+
 def _factors(squares, freedom, apart: int) -> np.ndarray:
-    """By what the triads' sds of one kind are wrong, (n,): each its own, or one for all."""
+    """Of one kind of sensor, (n,): each its own, or one for all."""
     if len(squares) < apart or freedom.min() < FREEDOM:
         squares, freedom = np.full(len(squares), squares.sum()), freedom.sum()
         if np.all(freedom < 1):
@@ -98,19 +101,10 @@ def _factors(squares, freedom, apart: int) -> np.ndarray:
     return np.sqrt(np.maximum(squares / freedom, 1e-12))
 
 
-def _louder(noise: Noise, factors, count: int) -> Noise:
-    """With the sds of each triad so many times as large, (A + G,)."""
-    rows = np.repeat(factors, 3)
-    force, rate = rows[: 3 * count], rows[3 * count :]
-    return Noise(
-        force[:, None] * noise.accelerometer * force, rate[:, None] * noise.gyroscope * rate
-    )
-
-
 def estimated_noise(
     recording: Recording, model: ArrayModel, fit, known=(False, False), say: Say = silent
 ) -> Fitted:
-    """The fit of a recording, and the noise of each triad that goes with it.
+    """The papers' model's fit of a recording, and the noise of each triad that goes with it.
 
     Restricted maximum likelihood: each triad's squared residuals against the degrees of freedom
     that motion and positions leave it, fit and noise by turns. Where those are few, or triads too
@@ -122,19 +116,25 @@ def estimated_noise(
     known : (bool, bool)
         Whether the accelerometers' noise, the gyroscopes', is the model's own.
     """
-    count, found = model.array.accelerometers, fit(model)
-    for _ in range(ROUNDS):
-        squares, freedom, motion_sd = _looked_at(recording, model, found)
-        kinds = slice(None, count), slice(count, None)
-        factors = np.concatenate(
-            [np.ones(len(squares[kind])) if fixed else
-             _factors(squares[kind], freedom[kind], apart)
-             for kind, fixed, apart in zip(kinds, known, APART, strict=True)]
-        )  # fmt: skip
-        if np.abs(np.log(factors)).max() < ENOUGH:
-            break
-        model = replace(model, noise=_louder(model.noise, factors, count))
+    counts, columns = (
+        (model.array.accelerometers, model.array.gyroscopes),
+        columns_of(model.array, (), recording.position_prior_sd),
+    )
+    readings = measured(
+        model, recording.specific_force, recording.angular_rate, recording.saturated_gyroscopes()
+    )
+    for number in range(ROUNDS + 1):
         found = fit(model)
-    else:
-        say("the estimates of noise and positions did not settle; the last ones are taken")
-    return Fitted(model, found, motion_sd, np.array([freedom[kind].sum() for kind in kinds]))
+        motion = np.hstack(found.motion.motion[:3])
+        state = State(motion, found.positions, np.empty(0), no_derivatives(len(motion), counts[0]))
+        seen = shown(readings, columns, state, columns.owner, found.covariance)
+        wrong = factors(seen, readings.exists, known)
+        if np.abs(np.log(wrong)).max() < ENOUGH:
+            break
+        if number == ROUNDS:
+            say("the estimates of noise and positions did not settle; the last ones are taken")
+            break
+        readings = readings.with_sd(readings.sd * wrong)
+        sds = (readings.sd[:n, kind] for kind, n in enumerate(counts))
+        model = replace(model, noise=Noise.of(*counts, *sds))
+    return Fitted(model, found, seen.motion_sd, seen.freedom.sum(axis=0))

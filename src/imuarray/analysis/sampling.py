@@ -12,14 +12,18 @@ import pandas as pd
 import xarray as xr
 
 from imuarray.analysis import methods
+from imuarray.analysis.calibration_dataset import effects_of
 from imuarray.analysis.density import (
+    NOT_CONVERGED,
     Posterior,
     at_estimate,
+    posterior_beyond,
     posterior_of,
     traced,
     tuned_target,
 )
-from imuarray.analysis.model import Say, chosen_model, silent, usable
+from imuarray.analysis.fitting import fitted_beyond
+from imuarray.analysis.model import Say, assumed, model_of, require_together, silent, usable
 from imuarray.errors import InputError, require_integer
 from imuarray.model import ArrayModel
 from imuarray.model.names import parameter_names
@@ -62,9 +66,9 @@ class Made(NamedTuple):
 
 
 def sample(
-    recording: Recording, method: str = "auto", steps: int | None = None, seed: int = 0,
-    rates: str = "declared", effects: Sequence[str] = (),
-    diagnosis: str | PathLike | None = None, accelerometer_noise: float | None = None,
+    recording: Recording, model: str | PathLike = "sensors", method: str = "auto",
+    steps: int | None = None, seed: int = 0, rates: str = "declared",
+    effects: Sequence[str] = (), accelerometer_noise: float | None = None,
     motion_prior: str = "proper", progress: bool = False, say: Say = silent,
     beside: str | PathLike | None = None,
 ) -> xr.DataTree:  # fmt: skip
@@ -74,6 +78,10 @@ def sample(
     ----------
     recording
         Moving samples; still poses and samples with an accelerometer at its rail are left out.
+    model, effects
+        As in `imuarray.calibrate`: with ``"sensors"`` the sensor model's parts that gain on the
+        recording's held-out time, with what they do not determine left out; where none gains, and
+        where there are too few samples to tell, the papers' model.
     method
         ``"nuts"``, what ``"auto"`` takes: the no-U-turn sampler on the exact marginal likelihood;
         ``"pmmh"``: pseudo-marginal Metropolis-Hastings (paper 2021), N and the step length tuned
@@ -87,17 +95,13 @@ def sample(
     rates
         p(omega | y_g) from the ``"declared"`` gyroscopes, or from the ``"spread"`` among those
         of each sample (equation (30)), with the papers' flat prior and the declared noise.
-    effects
-        As in `imuarray.calibrate`.
-    diagnosis
-        As in `imuarray.calibrate`; the noise is then the diagnosis'.
     accelerometer_noise
-        Sd (m/s^2) that is taken for known; by default the noise of both kinds is unknown, as
-        log-normal about what restricted maximum likelihood gives.
+        Of the papers' model: sd (m/s^2) that is taken for known; by default the noise of both
+        kinds is unknown, as log-normal about what restricted maximum likelihood gives.
     motion_prior
         ``"proper"``: angular rate and acceleration are normal of the recording's own size;
-        ``"flat"``: paper 2021's, which shrinks the array (docs/findings.md), and the noise at its
-        estimate.
+        ``"flat"``, of the papers' model: paper 2021's, which shrinks the array (docs/findings.md),
+        and the noise at its estimate.
     progress
         Whether to show a bar.
     say
@@ -129,20 +133,20 @@ def sample(
     if steps is not None:
         require_integer("steps", steps)
     require_integer("seed", seed, 0)
-    recording, model = chosen_model(
-        usable(recording, say), effects, diagnosis, accelerometer_noise, say
-    )
+    require_together(model, [recording], effects, accelerometer_noise)
     flat = motion_prior == "flat"
-    if flat and model.effects:
-        raise InputError("--motion-prior flat: expected no --effects with it, found some")
-    if rates == "spread":
-        if not flat:
-            raise InputError("--rates spread: expected --motion-prior flat with it, found proper")
-        recording = _off_rails(recording, say)
-    given = diagnosis is not None
-    posterior = posterior_of(
-        recording, model, flat, rates, (given or accelerometer_noise is not None, given), say
-    )
+    if flat and model != "papers":
+        raise InputError(f"--motion-prior flat: expected --model papers with it, found {model}")
+    if rates == "spread" and not flat:
+        raise InputError("--rates spread: expected --motion-prior flat with it, found proper")
+    moving, posterior = usable(recording, say), None
+    if model != "papers":
+        posterior = _beyond(recording, str(model), effects, say)
+    if posterior is None:
+        if rates == "spread":
+            moving = _off_rails(moving, say)
+        moving, told = assumed(moving, accelerometer_noise), accelerometer_noise is not None
+        posterior = posterior_of(moving, model_of(moving), flat, rates, (told, False), say)
     pull = shrinkage(posterior) if flat else 0.0
     if flat:
         say(f"the flat motion prior makes the array {pull:.1f} posterior sds smaller than it is"
@@ -155,6 +159,16 @@ def sample(
         say("a chain went to where the triads lie on one line: the flat motion prior has no bound"
             " there, and these triads are not far enough from it (docs/findings.md)")  # fmt: skip
     return tree
+
+
+def _beyond(recording: Recording, model: str, effects, say: Say) -> Posterior | None:
+    """Under a model that has more than the papers'; None where there is no more to be had."""
+    found = fitted_beyond(recording, model, effects, say)
+    if found is None or not effects_of(found):
+        return None
+    if not found.converged:
+        say(NOT_CONVERGED)
+    return posterior_beyond(recording, found)
 
 
 def shrinkage(posterior: Posterior) -> float:
@@ -238,13 +252,14 @@ def flattest(draws, recording: Recording) -> float:
 
 def _key(posterior: Posterior, asked: Asked, *rest) -> str:
     recording, model, prior = posterior.recording, posterior.model, posterior.prior
+    used = posterior.readings
     return digest(
         recording.time, recording.specific_force, recording.angular_rate,
-        recording.saturated_gyroscopes(), recording.accelerometer_position, model.effect_start,
-        model.effect_prior_mean, model.effect_prior_sd, list(model.clock or ()),
-        model.noise.accelerometer, model.noise.gyroscope, list(model.motion_sd), prior.mean,
-        prior.sd, *rest, asked.seed, list(model.effects), asked.rates, asked.motion_prior,
-        asked.method, code_digest(),
+        recording.saturated_gyroscopes(), recording.accelerometer_position,
+        *(() if used is None else (used.time, used.values, used.weights, prior.root)),
+        list(model.clock or ()), model.noise.accelerometer, model.noise.gyroscope,
+        list(model.motion_sd), list(model.derivative_sd), prior.mean, prior.sd, *rest, asked.seed,
+        list(model.effects), asked.rates, asked.motion_prior, asked.method, code_digest(),
     )  # fmt: skip
 
 

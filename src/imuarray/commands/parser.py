@@ -36,8 +36,8 @@ SEED = _number("--seed", "S", "of the random numbers (default: 0)", 0, seed)
 NOISE = _number(
     "--accelerometer-noise",
     "SD",
-    "assumed sd, m/s^2 (default: estimated, under the papers' model"
-    " of calibrate as the recording declares)",
+    "assumed sd, m/s^2, of the papers' model (default: of calibrate and apply as declared, of"
+    " sample unknown)",
 )
 EFFECT_FILE = _file(
     "--effect-file", "Python file with effects of your own, which is run: they join the catalogue;"
@@ -51,6 +51,17 @@ EFFECTS = (
     ),
     _file("--diagnosis", "diagnosis.json whose extended model to use: its effects, their values,"
           " its noise"),
+)  # fmt: skip
+
+
+MODEL = (
+    _option("--model", "sensors: what a standard sensor model needs, noise estimated (default);"
+            " papers: positions and motion alone, the papers' noise; or the diagnosis.json of"
+            " `imuarray diagnose`", default="sensors", metavar="{sensors,papers,FILE.json}",
+            type=model),
+    EFFECT_FILE,
+    _option("--effects", "effects to have in the model instead, separated by commas",
+            type=effects, default=(), metavar="A,B"),
 )  # fmt: skip
 
 
@@ -133,13 +144,7 @@ COMMANDS = (
         (
             _option("recordings", "recording to read (NetCDF-4), or several of one board",
                     type=InputFile, nargs="+", metavar="recording"),
-            _option("--model", "sensors: what a standard sensor model needs, noise estimated"
-                    " (default); papers: that of paper 2017, with the declared noise; or the"
-                    " diagnosis.json of `imuarray diagnose`", default="sensors",
-                    metavar="{sensors,papers,FILE.json}", type=model),
-            EFFECT_FILE,
-            _option("--effects", "effects to have in the model instead, separated by commas",
-                    type=effects, default=(), metavar="A,B"),
+            *MODEL,
             _option("--method", "of the papers' model. bcd: block coordinate descent (default);"
                     " gauss-newton: the same in fewer iterations", choices=methods.CALIBRATION),
             NOISE,
@@ -162,13 +167,14 @@ COMMANDS = (
         "rec.nc --seed 1 --out posterior.nc",
         "posterior to write (NetCDF-4)",
         (
-            RECORDING, NOISE, *EFFECTS,
+            RECORDING, *MODEL, NOISE,
             _option("--method", "nuts, which auto takes (default): the no-U-turn sampler on the"
                     " exact marginal likelihood; pmmh: pseudo-marginal Metropolis-Hastings, as"
                     " paper 2021; pcn: the same with preconditioned Crank-Nicolson proposals",
                     choices=methods.SAMPLING, default="auto"),
             _option("--motion-prior", "proper (default): angular rate and acceleration are normal,"
-                    " of the recording's own size; flat: as paper 2021, which shrinks the array",
+                    " of the recording's own size; flat: as paper 2021, of the papers' model, which"
+                    " shrinks the array",
                     choices=methods.MOTION_PRIORS, default="proper"),
             _option("--rates", "p(omega | y_g) from the gyroscopes' noise (default: declared), or"
                     " from the spread among the gyroscopes of each sample, as paper 2021 does with"

@@ -27,8 +27,8 @@ def sample(arguments) -> None:
     output = Output(arguments)
     recording = read_recording(arguments.recording)
     posterior = sampled(
-        recording, arguments.method, arguments.steps, arguments.seed,
-        arguments.rates, arguments.effects, arguments.diagnosis, arguments.accelerometer_noise,
+        recording, arguments.model, arguments.method, arguments.steps, arguments.seed,
+        arguments.rates, arguments.effects, arguments.accelerometer_noise,
         arguments.motion_prior, output.progress, output.say, beside=arguments.out,
     )  # fmt: skip
     checkpoint = posterior.attrs.pop("checkpoint", None)

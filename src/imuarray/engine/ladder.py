@@ -53,34 +53,45 @@ def with_effects(readings: Sequence[Readings], effects) -> Estimate:
     return estimate([Recorded.of(one, columns) for one in readings], columns, active)
 
 
-def climb(readings: Sequence[Readings]) -> tuple[Estimate, list[Rung]]:
+def rungs_of(readings: Sequence[Readings]) -> list[str]:
+    """Those that recordings may determine: none of fewer samples than two in a block."""
+    if sum(len(one.time) for one in readings) < 2 * SETTINGS.blocks:
+        return []
+    smooth = all(one.gapless for one in readings)
+    return [n for n, ids in RUNGS.items() if smooth or not any(map(_needs_neighbours, ids))]
+
+
+def climb(readings: Sequence[Readings], bare: bool = True) -> tuple[Estimate, list[Rung]]:
     """The sensor model of a board from its recordings, rung by rung.
 
     Each sweep tests the rungs in order, beside those that it has kept before; what is kept is
     fitted, then the others are tested again. At last each must still gain beside all others.
-    InputError or LinAlgError where the readings do not determine positions or motion.
+    ``bare``: whether the last fit is wanted where no rung is kept. InputError or LinAlgError where
+    the readings do not determine positions or motion.
     """
-    smooth = all(one.gapless for one in readings)
-    names = [n for n, ids in RUNGS.items() if smooth or not any(map(_needs_neighbours, ids))]
+    names = rungs_of(readings)
     effects = [effect for name in names for effect in RUNGS[name]]
     if any(left is not None for one in readings for left in one.left):
         effects += [name for name in MAPS if name not in effects]
     columns = columns_of(readings[0].array, effects, readings[0].position_prior_sd)
-    bare = mask_of(columns, [POSITION])
+    placed = mask_of(columns, [POSITION])
     found = estimate(
-        [Recorded.of(one, columns) for one in readings], columns, bare, steps=SETTINGS.rung_steps
+        [Recorded.of(one, columns) for one in readings], columns, placed, steps=SETTINGS.rung_steps
     )
     kept: set[str] = set()
+    rungs: list[Rung] = []
     for _ in names:
         rungs = gains(found, names, kept)
         new = {rung.name for rung in rungs if rung.kept} - kept
         if not new:
             break
         kept |= new
-        active = bare | mask_of(columns, [e for name in kept for e in RUNGS[name]])
+        active = placed | mask_of(columns, [e for name in kept for e in RUNGS[name]])
         found = estimate(found.recorded, columns, active, steps=SETTINGS.rung_steps)
     kept = {rung.name for rung in rungs if rung.kept}
-    active = bare | mask_of(columns, [e for name in kept for e in RUNGS[name]])
+    active = placed | mask_of(columns, [e for name in kept for e in RUNGS[name]])
+    if not (kept or bare):
+        return found, rungs
     return estimate(without(found, active), columns, active), rungs
 
 

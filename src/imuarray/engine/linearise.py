@@ -11,6 +11,7 @@ import numpy as np
 
 from imuarray.engine.parameters import POSITION, Columns
 from imuarray.engine.readings import Readings
+from imuarray.model import ArrayModel
 from imuarray.model.effects import Instant, Prediction
 from imuarray.model.jax64 import jax, jnp
 from imuarray.model.slopes import by_effects, stacked
@@ -84,13 +85,15 @@ def _instant(x, positions, extra, time, span) -> Instant:
     jerk, force_rate, second, third = extra
     turn = None
     if len(x) > KNOWN:
-        jerk, force_rate, turn = x[9:12], x[12:15], x[3:6] + x[15:18]
+        jerk, force_rate = x[9:12], x[12:15]
+    if len(x) > 15:
+        turn = x[3:6] + x[15:18]
     motion = Motion(x[:3], x[3:6], x[6:9], jerk, force_rate)
     return Instant(motion, positions, time, span, second, third, turn)
 
 
-def _reading(model, count, x, positions, parameters, extra, time, span):
-    """(N, 6) predicted readings of one sample."""
+def reading(model, count, x, positions, parameters, extra, time, span):
+    """(N, 6) predicted readings of one sample, of motion x as in `State`; traceable by JAX."""
     when = _instant(x, positions, extra, time, span)._asdict()
     return stacked(count, model.predict(parameters=parameters, **when))
 
@@ -105,7 +108,7 @@ def _chunk(model, count, placed, x, extra, time, span, positions, parameters, da
 
     def one(x, extra, time):
         def flat(x, positions):
-            return _reading(model, count, x, positions, parameters, extra, time, span)
+            return reading(model, count, x, positions, parameters, extra, time, span)
 
         def moved(direction):
             return jax.jvp(lambda r: flat(x, r), (positions,), (direction,))[1]
@@ -193,9 +196,13 @@ def chunk_at(readings: Readings, columns: Columns, state: State, directions, sta
 
 def _chunk_of(readings: Readings, state: State, start):
     """(indices (CHUNK,), motion, derivatives, the motion's prior) of a chunk."""
-    index = np.minimum(np.arange(start, start + CHUNK), len(readings.values) - 1)
+    return _rows_of(state, np.minimum(np.arange(start, start + CHUNK), len(readings.values) - 1))
+
+
+def _rows_of(state: State, index):
+    """The same of any samples."""
     extra = jax.tree.map(lambda field: field[index], state.derivatives)
-    nothing = np.zeros((CHUNK, 0))
+    nothing = np.zeros((len(index), 0))
     prior = (nothing, nothing)
     if state.rough_prior is not None:
         prior = state.rough_prior.mean[index], state.rough_prior.sd[index]
@@ -207,31 +214,47 @@ def motion_step(readings: Readings, columns: Columns, state: State, start) -> np
 
     LinAlgError where the readings do not determine it.
     """
-    index, x, extra, (mean, sd) = _chunk_of(readings, state, start)
-    gram, slope = _motion(
-        columns.model, readings.values.shape[1], x, extra, readings.time[index], readings.span,
-        state.positions, state.parameters, (readings.values[index], readings.weights_of(index)),
-    )  # fmt: skip
-    gram, slope = np.array(gram), np.array(slope)
+    index, *_ = _chunk_of(readings, state, start)
+    gram, slope, _ = motion_equations(readings, columns.model, state, index)
+    return np.linalg.solve(gram, slope[..., None])[..., 0]
+
+
+def motion_equations(readings: Readings, model: ArrayModel, state: State, index, rails=None):
+    """Of the motion of the samples ``index`` (CHUNK,): (CHUNK, D, D), (CHUNK, D), costs (CHUNK,).
+
+    Information, score and squared residuals, the prior's included. ``rails`` (T, N, 6): weights of
+    readings that count as far as the prediction falls short of them.
+    """
+    index, x, extra, (mean, sd) = _rows_of(state, index)
+    one_sided = None if rails is None else rails[index]
+    gram, slope, cost = map(np.array, _motion(
+        model, readings.values.shape[1], x, extra, readings.time[index], readings.span,
+        state.positions, state.parameters,
+        (readings.values[index], readings.weights_of(index), one_sided),
+    ))  # fmt: skip
     free = np.arange(KNOWN, gram.shape[1])
     gram[:, free, free] += sd**-2.0
-    slope[:, free] += (mean - x[:, KNOWN:]) / sd**2
-    return np.linalg.solve(gram, slope[..., None])[..., 0]
+    off = (mean - x[:, KNOWN:]) / sd
+    slope[:, free] += off / sd
+    return gram, slope, cost + np.sum(off**2, axis=1)
 
 
 @partial(jax.jit, static_argnums=(0, 1))
 def _motion(model, count, x, extra, time, span, positions, parameters, data):
     def one(x, extra, time):
         def flat(x):
-            return _reading(model, count, x, positions, parameters, extra, time, span)
+            return reading(model, count, x, positions, parameters, extra, time, span)
 
         return flat(x), jax.jacfwd(flat)(x)
 
     predicted, motion = jax.vmap(one)(x, extra, time)
-    values, weights = data
+    values, weights, rails = data
+    if rails is not None:
+        weights = weights + rails * (jnp.sign(values) * (values - predicted) > 0)
     motion = (weights[..., None] * motion).reshape(len(x), 6 * count, -1)
     residual = (weights * (values - predicted)).reshape(len(x), -1)
-    return (jnp.einsum("tri,trj->tij", motion, motion), jnp.einsum("tri,tr->ti", motion, residual))
+    slope = jnp.einsum("tri,tr->ti", motion, residual)
+    return jnp.einsum("tri,trj->tij", motion, motion), slope, jnp.sum(residual**2, axis=1)
 
 
 def _joined(one, samples, spare) -> Eliminated:

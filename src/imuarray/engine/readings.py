@@ -11,6 +11,7 @@ from imuarray.engine.settings import SETTINGS
 from imuarray.errors import InputError
 from imuarray.estimation.selection import neighbours
 from imuarray.geometry import Array
+from imuarray.model import ArrayModel
 from imuarray.model.structure import design
 from imuarray.recording import Recording, array_of
 
@@ -216,6 +217,32 @@ def arrange(recording: Recording, sparse: bool = False) -> Readings:
         np.tile(noise, (count, 1)), runs(time[used]), tuple(longer), recording.position_prior_sd,
         gapless, float(recording.time[0]), recording.gyroscope_common_scale_sd,
         (recording.accelerometer_map_covariance, recording.gyroscope_map_covariance),
+    )  # fmt: skip
+
+
+def measured(
+    model: ArrayModel, specific_force, angular_rate, saturated=None, time=None
+) -> Readings:  # fmt: skip
+    """`Readings` of all samples (T, A, 3) m/s^2, (T, G, 3) rad/s as they are, the model's noise.
+
+    ``saturated`` (T, G, 3) bool: gyroscope axes at the rail, left out; ``time`` (T,) s. InputError
+    where the axes of a triad differ in their noise, or triads' noise is correlated.
+    """
+    counts = model.array.accelerometers, model.array.gyroscopes
+    sds, exists = np.ones((max(counts), 2)), np.arange(max(counts))[:, None] < np.array(counts)
+    for kind, covariance in enumerate((model.noise.accelerometer, model.noise.gyroscope)):
+        variances = np.diag(covariance)[::3]
+        if not np.array_equal(covariance, np.diag(np.repeat(variances, 3))):
+            raise InputError("noise: expected one sd for each triad, found a covariance")
+        sds[: len(variances), kind] = np.sqrt(variances)
+    force, rate = np.asarray(specific_force, float), np.asarray(angular_rate, float)
+    lost = np.zeros(rate.shape, bool) if saturated is None else np.asarray(saturated, bool)
+    keep = ~by_imu(np.zeros(force.shape, bool), lost) & np.repeat(exists, 3, axis=1)
+    since, span = model.since(len(force), time)
+    run = runs(since) if time is not None and len(since) > 1 else np.zeros(len(since), int)
+    return Readings(
+        model.array, since, span, by_imu(force, rate), keep, exists, sds, sds, run,
+        model.array.labels, np.nan, False,
     )  # fmt: skip
 
 

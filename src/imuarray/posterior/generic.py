@@ -19,9 +19,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from imuarray.engine.linearise import reading
+from imuarray.engine.readings import Readings
 from imuarray.errors import InputError
-from imuarray.estimation.blocks import problem, residual
 from imuarray.model import ArrayModel
+from imuarray.model.effects import Prediction
 from imuarray.model.jax64 import jax, jnp
 from imuarray.model.small_linear import cholesky, log_determinant, solve_lower, solve_upper
 
@@ -62,11 +64,20 @@ class Unknown(NamedTuple):
     """A recording as the compiled likelihood wants it, and the sds that are unknown (K)."""
 
     start: np.ndarray  # (T, 9 or 15)
-    readings: tuple  # force, rate, keep, time
+    readings: tuple  # values and weights (T, N, 6), as `Readings` has them; time (T,)
     span: float
-    whiten_force: np.ndarray
-    whiten_rate: np.ndarray
     logs: np.ndarray  # (5, K) from the last K parameters to the logs of `SCALES`
+
+
+def residual(model, x, p, values, weights, time, span):
+    """Residuals of one sample in their sds, (6 N + the motion's priors,)."""
+    split = 3 * (model.array.accelerometers - 1)
+    positions = jnp.concatenate([jnp.zeros((1, 3)), p[:split].reshape(-1, 3)])
+    known = jnp.zeros(3), jnp.zeros(3), Prediction(0.0, 0.0), Prediction(0.0, 0.0)
+    predicted = reading(model, len(values), x, positions, p[split:], known, time, span)
+    sds = *model.motion_sd, *(model.derivative_sd if model.needs_derivatives else ())
+    priors = [x[3 * k : 3 * k + 3] / sd for k, sd in enumerate(sds) if np.isfinite(sd)]
+    return jnp.concatenate([(weights * (values - predicted)).ravel(), *priors])
 
 
 def _whitened(model, parameters, given: Unknown):
@@ -74,18 +85,18 @@ def _whitened(model, parameters, given: Unknown):
     alone; what each sample's likelihood is divided by, (T,) of logs)."""
     size = parameters.size - given.logs.shape[1]
     logs = given.logs @ parameters[size:]
-    counts = [3 * model.array.accelerometers, 3 * model.array.gyroscopes]
-    counts += [3 * int(np.isfinite(sd)) for sd in model.motion_sd]
-    wide = [jnp.full(n, jnp.exp(-log)) for n, log in zip(counts, logs, strict=True)]
+    weights = given.readings[1]
+    triads = jnp.exp(-jnp.repeat(logs[:2], 3))
+    counts = [3 * int(np.isfinite(sd)) for sd in model.motion_sd]
+    wide = [jnp.tile(triads, weights.shape[1])]
+    wide += [jnp.full(n, jnp.exp(-log)) for n, log in zip(counts, logs[2:], strict=True)]
     wide = jnp.concatenate([*wide, jnp.ones(6 * model.needs_derivatives)])
 
     def flat(x, data):
-        p = parameters[:size]
-        whiten = given.whiten_force, given.whiten_rate
-        return wide * residual(model, x, p, *data, given.span, *whiten)
+        return wide * residual(model, x, parameters[:size], *data, given.span)
 
-    fixed = sum(n * logs[place] for place, n in enumerate(counts) if place != 1)
-    return flat, fixed + logs[1] * jnp.sum(given.readings[2] > 0, axis=1)
+    used = jnp.sum((weights > 0).reshape(len(weights), -1, 2, 3), axis=(1, 3))
+    return flat, used @ logs[:2] + sum(n * log for n, log in zip(counts, logs[2:], strict=True))
 
 
 @partial(jax.jit, static_argnums=(0, 1))
@@ -134,29 +145,25 @@ def log_laplace(model, steps, parameters, given: Unknown):
 class GenericLikelihood:
     """log p-hat(y | theta, effect parameters) for a model with any effects.
 
-    ``start`` (T, 9 or 15) is where each sample's Gauss-Newton begins (the motion at the
-    calibrated parameters, say); ``draws`` is N, ``steps`` the Gauss-Newton steps. ``logs`` (5, K)
-    maps the last K parameters to logs of factors on the sds that `SCALES` names; none by default.
+    ``readings`` are what is known, their ``sd`` the noise. ``start`` (T, 9 or 15) is where each
+    sample's Gauss-Newton begins (the motion at the calibrated parameters, say); ``draws`` is N,
+    ``steps`` the Gauss-Newton steps. ``logs`` (5, K) maps the last K parameters to logs of factors
+    on the sds that `SCALES` names; none by default.
     """
 
     def __init__(
-        self, model: ArrayModel, specific_force, angular_rate, start, draws=4, steps=3,
-        saturated=None, time=None, logs=None,
+        self, model: ArrayModel, readings: Readings, start, draws=4, steps=3, logs=None,
     ):  # fmt: skip
-        given = problem(model, specific_force, angular_rate, saturated, time=time)
-        seen = given.keep.reshape(len(given.keep), -1, 3).any(axis=1).all(axis=1)
+        seen = readings.keep[..., 3:].any(axis=1).all(axis=1)
         if not seen.all():
             raise InputError(
                 "gyroscopes: expected one unsaturated per axis in every sample, found none in"
                 f" sample {np.flatnonzero(~seen)[0]} (and {np.sum(~seen) - 1} more)"
             )
         self.model, self.draws, self.steps = model, draws, steps
-
         self.data = Unknown(
-            np.asarray(start),
-            (given.specific_force, given.angular_rate, given.keep, given.time), given.span,
-            # the declared noise, the same in every sample
-            given.whiten_force, given.whiten_rate[0], np.zeros((5, 0)) if logs is None else logs,
+            np.asarray(start), (readings.values, readings.weights, readings.time), readings.span,
+            np.zeros((5, 0)) if logs is None else logs,
         )  # fmt: skip
 
     def on(self, parameters, normals) -> float:

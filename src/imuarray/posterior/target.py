@@ -48,6 +48,22 @@ class GaussianPrior:
 
 
 @dataclass(frozen=True)
+class TiedPrior(GaussianPrior):
+    """The same with precision ``root``' ``root`` (size, size)."""
+
+    root: np.ndarray
+
+    @classmethod
+    def of(cls, mean, root) -> TiedPrior:
+        """With the sds that follow."""
+        return cls(mean, np.sqrt(np.sum(np.linalg.inv(root) ** 2, axis=1)), root)
+
+    def log_density(self, theta) -> float:
+        """Up to its constant."""
+        return -0.5 * float(np.sum((self.root @ (theta - self.mean)) ** 2))
+
+
+@dataclass(frozen=True)
 class CompiledTarget:
     """The papers' model: theta are the positions r_2 ... r_A, everything compiled."""
 
