@@ -15,6 +15,7 @@ from imuarray.analysis.calibration_dataset import effects_of, parameters_of, pla
 from imuarray.analysis.model import Say, model_of, silent
 from imuarray.analysis.noise import Shown, estimated_noise, factors, shown
 from imuarray.engine.estimate import Estimate
+from imuarray.engine.fit import flat_parameters
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import gauge_masks, prior_precision
 from imuarray.engine.readings import Readings
@@ -179,13 +180,19 @@ def posterior_beyond(recording: Recording, found: Estimate) -> Posterior:
 def _known(found: Estimate) -> np.ndarray:
     """Prior precision (n, n) of the active parameters: what the positions take up is pinned.
 
-    A gauge that the array's size takes up is as wide as its parameters, or as is known of it.
+    A gauge that the array's size takes up is as wide as is known of it, or as the mean of
+    parameters that differ as these do.
     """
-    precision = prior_precision(found.columns, found.active, resized=False)
-    for effect, mask in gauge_masks(found.columns, found.active):
-        if effect.resizes and effect.kinds == [1] and np.isfinite(found.scale_sd):
-            mean = mask[found.active] / mask.sum()
-            precision += np.outer(mean, mean) / found.scale_sd**2
+    columns, active = found.columns, found.active
+    precision = prior_precision(columns, active, resized=False)
+    values = flat_parameters(columns, found.recorded[0].state)
+    for effect, mask in gauge_masks(columns, active):
+        if effect.resizes:
+            mean, prior = mask[active] / mask.sum(), np.mean(np.diag(precision)[mask[active]])
+            more = max(1.0 / np.var(values[mask], ddof=1) - prior, 0.0) * mask.sum()
+            if effect.kinds == [1] and np.isfinite(found.scale_sd):
+                more = found.scale_sd**-2
+            precision += np.outer(mean, mean) * more
     return precision
 
 
