@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from imuarray.estimation.blocks import motion_equations, pack_motion, problem
+from imuarray.engine.fusion import better, equations, fuse, one_sided, turned
+from imuarray.engine.linearise import State, no_derivatives
+from imuarray.engine.readings import measured
 from imuarray.estimation.collapsed import Collapsed
-from imuarray.estimation.extended import fuse_extended
-from imuarray.estimation.fusion import fuse
 from imuarray.estimation.motion_ml import motion_from
-from imuarray.estimation.samplewise import better, one_sided, turned
 from imuarray.model import Noise
 from imuarray.motion import Motion, normal_motion
 from imuarray.simulation import measure
@@ -37,9 +36,12 @@ def test_a_lost_reading_counts_below_it_and_on_the_other_side():
     ):  # fmt: skip
         motion = Motion.of(np.array([omega]), np.zeros((1, 3)), np.zeros((1, 3)))
         force, _ = own.predict_many(motion, own.array.relative)
-        given, x = problem(own, force, rate, saturated), pack_motion(own, motion)
-        p = own.array.parameters
-        plain, found = (motion_equations(g, x, p)[2] for g in (given, one_sided(given, saturated)))
+        given, x = measured(own, force, rate, saturated), np.hstack(motion[:3])
+        state = State(x, own.array.relative, np.empty(0), no_derivatives(1, 5))
+        plain, found = (
+            equations(given, own, state, np.array([0]), rails)[2]
+            for rails in (None, one_sided(given, saturated))
+        )
         assert np.allclose(found - plain, short / 0.02**2)
     readings, lost = rate[:, :1], saturated[:, :1]
     assert np.array_equal(turned(np.array([[-7.0, -3.0, 2.0]]), readings, lost), [[7, -5, 2]])
@@ -57,7 +59,8 @@ def test_no_estimate_contradicts_a_reading_at_its_rail():
     data = Collapsed.of(own, force, rate, saturated)
     plain = motion_from(data, own.array.relative)
     one = fuse(own, force, rate, None, None, saturated).estimate
-    other = fuse_extended(own, force, rate, own.array.parameters, None, saturated).estimate
+    biased, p = replace(own, effects=("gyroscope_bias",)), own.array.parameters
+    other = fuse(biased, force, rate, np.append(p, np.zeros(15)), None, saturated).estimate
     lost = saturated.any(axis=1)
     side = np.sign(rate.mean(axis=1))
     before = np.asarray(plain.motion.angular_rate)

@@ -11,6 +11,7 @@ from imuarray.analysis.checked import require_fit
 from imuarray.analysis.model import assumed, model_of
 from imuarray.errors import InputError
 from imuarray.geometry import Array
+from imuarray.model import ArrayModel
 from imuarray.model.names import parameter_names
 from imuarray.model.noise import Noise
 from imuarray.motion.state import UNITS
@@ -40,10 +41,7 @@ def apply(
     require_fit(calibration, recording)
     saturated = recording.saturated_gyroscopes()
     try:
-        if "effect_parameter" in calibration:
-            _, found = extended_motion(calibration, recording, saturated, accelerometer_noise)
-        else:
-            found = _papers(calibration, recording, accelerometer_noise)
+        _, found = motion_under(calibration, recording, saturated, accelerometer_noise)
     except np.linalg.LinAlgError as error:
         raise InputError(f"expected a calibration that determines the motion: {error}") from None
     found = _with_common_map(found, calibration, recording)
@@ -92,59 +90,49 @@ def _noise(calibration: xr.Dataset, array: Array, accelerometer_noise: float | N
     return Noise.of(array.accelerometers, array.gyroscopes, *sds)
 
 
-def _papers(
-    calibration: xr.Dataset, recording: Recording, accelerometer_noise: float | None = None
-):  # fmt: skip
-    """The papers' model: in closed blocks, fast."""
-    from imuarray.estimation.fusion import fuse
-
-    size = 3 * (calibration.sizes["accelerometer"] - 1)
-    covariance = calibration["position_covariance"].to_numpy()[1:, :, 1:, :].reshape(size, size)
-    positions = calibration["position"].to_numpy()
-    model = model_of(recording)
-    model = replace(model, noise=_noise(calibration, model.array, accelerometer_noise))
-    return fuse(
-        model, recording.specific_force, recording.angular_rate,
-        positions - positions[0], covariance, recording.saturated_gyroscopes(),
-    )  # fmt: skip
-
-
-def extended_motion(
+def motion_under(
     calibration: xr.Dataset, recording: Recording, saturated,
     accelerometer_noise: float | None = None,
 ):  # fmt: skip
-    """(model, `Fused`) under a calibration with effects, their parameters and noise as calibrated.
+    """(model, `Fused`) under a calibration's model, its parameters and noise as calibrated.
 
     ``saturated`` (T, G, 3) bool: gyroscope axes to be left out.
     """
-    from imuarray.estimation.extended import fuse_extended
+    from imuarray.engine.fusion import fuse
 
-    positions = calibration["position"].to_numpy()
-    model = model_of(recording, calibration.attrs["effects"].split(","))
-    expected = parameter_names(model, (recording.accelerometer_labels, recording.gyroscope_labels))
+    positions, attrs = calibration["position"].to_numpy(), calibration.attrs
+    parameters, since, span = (positions - positions[0])[1:].ravel(), None, None
+    covariance = calibration["position_covariance"].to_numpy()[1:, :, 1:, :]
+    covariance = covariance.reshape((parameters.size,) * 2)
+    extended = "effect_parameter" in calibration
+    model = model_of(recording, attrs["effects"].split(",") if extended else ())
+    if extended:
+        _require_parameters(calibration, recording, model)
+        parameters = np.append(parameters, calibration["effect_parameter"].to_numpy())
+        whole = calibration.get("whole_covariance")
+        covariance = None if whole is None else whole.to_numpy()
+        since, span = recording.time - attrs["time_origin"], attrs["span"]
+    model = replace(model, noise=_noise(calibration, model.array, accelerometer_noise))
+    return model, fuse(
+        model, recording.specific_force, recording.angular_rate, parameters, covariance,
+        saturated, since, span,
+    )  # fmt: skip
+
+
+def _require_parameters(calibration: xr.Dataset, recording: Recording, model: ArrayModel) -> None:
+    labels = recording.accelerometer_labels, recording.gyroscope_labels
+    expected = parameter_names(model, labels)
     found = [str(name) for name in calibration["parameter"].to_numpy()]
     if found != expected:
         raise InputError(
             f"expected {len(expected)} parameters of {', '.join(model.effects)}, found"
             f" {len(found)}, or others: the effects are not those of the calibration"
         )
-    model = replace(model, noise=_noise(calibration, model.array, accelerometer_noise))
-    parameters = np.concatenate(
-        [(positions - positions[0])[1:].ravel(), calibration["effect_parameter"].to_numpy()]
-    )
-    covariance = None
-    if "whole_covariance" in calibration:
-        covariance = calibration["whole_covariance"].to_numpy()
-    return model, fuse_extended(
-        model, recording.specific_force, recording.angular_rate, parameters,
-        covariance, saturated,
-        recording.time - calibration.attrs["time_origin"], calibration.attrs["span"],
-    )  # fmt: skip
 
 
 def motion_dataset(recording: Recording, found, lost) -> xr.Dataset:
     """Motion of the reference triad, its sds and covariances; NaN where ``lost``."""
-    from imuarray.estimation.fusion import COMPONENTS
+    from imuarray.engine.fusion import COMPONENTS
 
     covariance = np.where(lost[:, None, None], np.nan, found.covariance)
     sds = np.sqrt(np.einsum("tii->ti", covariance)).reshape(-1, 3, 3)

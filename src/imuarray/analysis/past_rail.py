@@ -12,9 +12,9 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from imuarray.analysis.motion import extended_motion
+from imuarray.analysis.motion import motion_under
+from imuarray.engine.fusion import fuse
 from imuarray.errors import InputError
-from imuarray.estimation.fusion import fuse
 from imuarray.model import ArrayModel
 from imuarray.recording import Recording, array_of
 
@@ -70,7 +70,7 @@ def past_rail(
         ways["transferred"] = elsewhere
     for name, (positions, lead) in ways.items():
         errors[name] = _predicted(clipped, withheld, positions, lead) - chosen.angular_rate
-    model, found = extended_motion(diagnosed, clipped, withheld)
+    model, found = motion_under(diagnosed, clipped, withheld)
     predicted = _readings(model, diagnosed, found, chosen.time)
     errors["extended"] = predicted - chosen.angular_rate
     variance = np.einsum("tii->ti", found.covariance)[:, None, :3]
@@ -85,8 +85,9 @@ def _predicted(clipped: Recording, withheld, positions, lead: float) -> np.ndarr
     """Gyroscopes' readings (T, 1, 3) rad/s by the papers' model, ``lead`` s after the motion."""
     model = ArrayModel.isotropic(array_of(clipped), ASSUMED, clipped.gyroscope_noise_sd)
     motion = fuse(
-        model, clipped.specific_force, clipped.angular_rate, positions, None, withheld
-    ).estimate.motion
+        model, clipped.specific_force, clipped.angular_rate,
+        (positions - positions[0])[1:].ravel(), None, withheld,
+    ).estimate.motion  # fmt: skip
     return (motion.angular_rate + lead * motion.angular_acceleration)[:, None]
 
 
