@@ -12,7 +12,8 @@ import numpy as np
 
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.tails import QUARTILE, log_normal, log_poisson
-from imuarray.engine.fit import Fit, pick
+from imuarray.engine.fit import Fit, seen_through
+from imuarray.engine.linearise import CHUNK
 from imuarray.engine.readings import Readings
 
 DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / np.sqrt(70.0)
@@ -155,19 +156,26 @@ def coloured_meat(fit: Fit, information, correlation) -> np.ndarray | None:
     """Covariance of the score (K, K) where triads have AR(1) noise; None where all is white."""
     if not np.any(correlation):
         return None
-    pairs, through = pick(fit.through(fit.wanted), fit.described[:, fit.wanted])
-    samples, count = fit.residual.shape[:2]
-    basis = fit.basis.reshape(samples, count, 6, -1)
     meat = information.copy()
     for imu, kind in np.argwhere(correlation != 0):
-        rows = slice(3 * kind, 3 * kind + 3)
-        seen = -(basis[:, imu, rows] @ through)
-        own = np.flatnonzero(pairs[:, 0] == imu)
-        seen[..., own] += fit.whitened[:, imu, rows][..., pairs[own, 1]]
+        seen = _projected(fit, int(imu), slice(3 * kind, 3 * kind + 3))
         spread = _ar_sum(seen, correlation[imu, kind])
-        flat = seen.reshape(-1, len(pairs))
-        meat += flat.T @ spread.reshape(-1, len(pairs))
+        meat += seen.reshape(-1, len(meat)).T @ spread.reshape(-1, len(meat))
     return (meat + meat.T) / 2
+
+
+def _projected(fit: Fit, imu: int, axes: slice) -> np.ndarray:
+    """(T, 3, K) derivatives of a triad's readings, the motion's share taken out."""
+    mask = fit.described[:, fit.wanted]
+    seen = np.empty((len(fit.residual), 3, int(mask.sum())))
+    for start in range(0, len(seen), CHUNK):
+        part = slice(start, start + CHUNK)
+        through, blocks = seen_through(fit.whitened[part], fit.basis[part], mask)
+        own = fit.basis[part, 6 * imu : 6 * imu + 6][:, axes]
+        np.matmul(-own, through, out=seen[part])
+        for _, places, block in (item for item in blocks if item[0] == imu):
+            seen[part, :, places] += block[:, axes]
+    return seen
 
 
 def _ar_sum(values, rho) -> np.ndarray:

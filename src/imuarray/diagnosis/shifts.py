@@ -28,11 +28,10 @@ def scan_shifts(fit: Fit, given: Information, imus) -> list[Scanned]:
         given.information[np.ix_(active, active)] + given.precision[np.ix_(active, active)]
     )
     blocks = blocks_of(len(fit.residual), SETTINGS.cuts)
-    found = []
+    mask, found = fit.active.copy(), []
+    mask[np.ix_(imus, chosen)] = True
+    parts = [fit.normal(mask, block) for block in blocks]
     for imu in imus:
-        mask = fit.active.copy()
-        mask[imu, chosen] = True
-        parts = [fit.normal(mask, block) for block in blocks]
         own, rest = _places(mask, fit.active, imu, chosen)
         ridge = np.diag(1.0 / fit.columns.prior_sd[fit.columns.of(SHIFT)[:3]] ** 2)
         best = (0.0, 0, np.zeros(3))

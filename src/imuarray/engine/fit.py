@@ -90,13 +90,11 @@ class Fit:
     def normal(self, chosen, part=slice(None)) -> tuple[np.ndarray, np.ndarray]:
         """Information (n, n) and score (n,) of the ``chosen`` (N, m) bool, of some samples."""
         size, mask = int(chosen.sum()), chosen[:, self.wanted]
-        used, (first, last, _) = mask.any(axis=0), part.indices(len(self.residual))
         information, score = np.zeros((size, size)), np.zeros(size)
-        for start in range(first, last, CHUNK):  # what is copied is small
+        first, last, _ = part.indices(len(self.residual))
+        for start in range(first, last, CHUNK):  # what is made of it is small
             rows = slice(start, min(start + CHUNK, last))
-            whitened = self.whitened[rows] if used.all() else self.whitened[rows][..., used]
-            through = through_of(self.basis[rows], whitened)
-            inner, slope = normal(self.residual[rows], whitened, through, mask[:, used])
+            inner, slope = normal(self.residual, self.whitened, self.basis, mask, rows)
             information += inner
             score += slope
         return information, score
@@ -123,18 +121,34 @@ def pick(through, chosen) -> tuple[np.ndarray, np.ndarray]:
     return pairs, seen
 
 
-def normal(residual, whitened, through, chosen, part=slice(None)):
+def seen_through(whitened, basis, chosen):
+    """What the motion sees of the n ``chosen`` (N, m) bool: (T, D, n), and [(imu, places, block)].
+
+    A block is an IMU's own part of the derivatives ``whitened`` (T, N, 6, m), (T, 6, n_imu).
+    """
+    counts = chosen.sum(axis=1)
+    through, blocks = np.empty((len(basis), basis.shape[2], counts.sum())), []
+    for imu in np.flatnonzero(counts):
+        block = whitened[:, imu]
+        if not chosen[imu].all():
+            block = block[..., chosen[imu]]
+        places = slice(counts[:imu].sum(), counts[: imu + 1].sum())
+        own = np.swapaxes(basis[:, 6 * imu : 6 * imu + 6], 1, 2)
+        np.matmul(own, block, out=through[..., places])
+        blocks.append((imu, places, block))
+    return through, blocks
+
+
+def normal(residual, whitened, basis, chosen, part=slice(None)):
     """Information (n, n) and score (n,) of the chosen parameters, motion projected out."""
-    pairs, seen = pick(through[part], chosen)
-    flat = seen.reshape(seen.shape[0] * seen.shape[1], len(pairs))
-    information = -(flat.T @ flat)
-    score = np.empty(len(pairs))
-    for imu in np.unique(pairs[:, 0]):
-        rows = np.flatnonzero(pairs[:, 0] == imu)
-        block = whitened[part, imu][..., pairs[rows, 1]].reshape(-1, len(rows))
-        information[np.ix_(rows, rows)] += block.T @ block
+    through, blocks = seen_through(whitened[part], basis[part], chosen)
+    flat = through.reshape(through.shape[0] * through.shape[1], -1)
+    information, score = -(flat.T @ flat), np.empty(flat.shape[1])
+    for imu, places, block in blocks:
+        own = block.reshape(-1, block.shape[-1])
+        information[places, places] += own.T @ own
         # the residual is orthogonal to the motion already
-        score[rows] = block.T @ residual[part, imu].ravel()
+        score[places] = own.T @ residual[part, imu].ravel()
     return information, score
 
 
@@ -166,7 +180,7 @@ def search_optimum(readings, columns, active, state, smooth, rough):
         seen = linearise(readings, columns, state, wanted, seen)
         few = padded(active[:, wanted], seen.whitened.shape[-1])
         misfit = float(np.sum(seen.misfit))
-        information, score = normal(seen.residual, seen.whitened, seen.through, few)
+        information, score = normal(seen.residual, seen.whitened, seen.basis, few)
         offset = flat_parameters(columns, state)[active] - prior_mean
         if held is not None:
             offset[held] = 0.0
@@ -203,7 +217,7 @@ def at(
 ) -> Fit:
     """The fit's quantities at a state, with the derivative by every parameter or the active."""
     wanted = directions_of(columns, None if all_columns else np.flatnonzero(active.any(axis=0)))
-    seen = linearise(readings, columns, state, wanted, through=False)
+    seen = linearise(readings, columns, state, wanted)
     return Fit(
         readings, columns, state, active, wanted, seen.residual, seen.whitened, seen.basis,
         seen.log_volume, seen.misfit, converged,
@@ -218,7 +232,8 @@ def advance(columns, state, active, step, few, seen: Eliminated, length) -> Stat
     step = length * step
     blocks = np.zeros(few.shape)
     blocks[few] = step
-    moved = np.einsum("tkdm,km->td", seen.through, blocks, optimize=True)
+    along = np.einsum("tkim,km->tki", seen.whitened, blocks, optimize=True)
+    moved = (along.reshape(len(along), 1, -1) @ seen.basis)[:, 0]
     move = np.einsum("tji,tj->ti", seen.inverse, seen.taken - moved)
     whole = flat_parameters(columns, state)
     whole[active] += step

@@ -73,11 +73,15 @@ class Eliminated(NamedTuple):
     residual: np.ndarray  # (T, N, 6), the motion's share taken out
     whitened: np.ndarray  # (T, N, 6, m), each IMU's readings by its own parameters
     basis: np.ndarray  # (T, 6 N, D) of what the motion can explain, orthonormal with its prior's
-    through: np.ndarray  # (T, N, D, m), the derivative's coordinates in that basis
     inverse: np.ndarray  # (T, D, D) of the factor of the motion's information
     taken: np.ndarray  # (T, D) the residual's coordinates in the basis
     log_volume: np.ndarray  # (T,) log determinant of the motion's information
     misfit: np.ndarray  # (T,) squared residuals, the prior's included
+
+    @property
+    def through(self) -> np.ndarray:
+        """(T, N, D, m), the derivative's coordinates in that basis."""
+        return through_of(self.basis, self.whitened)
 
 
 def _instant(x, positions, extra, time, span) -> Instant:
@@ -139,11 +143,10 @@ def _eliminated(residual, motion, whitened, gram, bare, sd) -> Eliminated:
     taken = np.swapaxes(basis, 1, 2) @ flat + expected @ bare[..., None]
     left = (flat - basis @ taken)[..., 0]
     unexpected = (bare[..., None] - np.swapaxes(expected, 1, 2) @ taken)[..., 0]
-    through = through_of(basis, whitened)
     misfit = np.sum(left**2, axis=1) + np.sum(unexpected**2, axis=1)
     volume = 2 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
     left = left.reshape(residual.shape)
-    return Eliminated(left, whitened, basis, through, inverse, taken[..., 0], volume, misfit)
+    return Eliminated(left, whitened, basis, inverse, taken[..., 0], volume, misfit)
 
 
 def through_of(basis, whitened) -> np.ndarray:
@@ -155,19 +158,18 @@ THREADS = 2
 
 
 def linearise(
-    readings: Readings, columns: Columns, state: State, wanted=None, spare=None, through=True
+    readings: Readings, columns: Columns, state: State, wanted=None, spare=None
 ) -> Eliminated:
     """Residual and derivatives at a state, the motion eliminated.
 
     ``wanted`` : indices of the columns to differentiate by, all if None.
-    ``spare`` : a former answer whose memory may be used again. ``through``: whether it is kept,
-    the largest part of all. LinAlgError where the readings do not determine the motion.
+    ``spare`` : a former answer whose memory may be used again. LinAlgError where the readings do
+    not determine the motion.
     """
     directions = directions_of(columns, wanted)
 
     def one(start):
-        found = chunk_at(readings, columns, state, directions, start)
-        return found if through else found._replace(through=found.through[:, :0])
+        return chunk_at(readings, columns, state, directions, start)
 
     return _joined(one, len(readings.values), spare)
 

@@ -60,7 +60,7 @@ def normal_pass(
         squares[part], freedom[part] = _by_triad(residual**2), _by_triad(left)
         unit[part] = _by_triad(residual**2 / np.maximum(1.0 - leverage, LEAST_FREE))
         known = [
-            (block, *normal(seen.residual, seen.whitened, seen.through, few, rows))
+            (block, *normal(seen.residual, seen.whitened, seen.basis, few, rows))
             for block, rows in _inside(blocks, part)
         ]
         return known, float(np.sum(seen.misfit[:used])), float(np.sum(seen.taken[:used] ** 2))

@@ -183,6 +183,7 @@ def files(figure: Figure, table: pd.DataFrame) -> dict[str, bytes]:
     for suffix, metadata in (("pdf", {"CreationDate": None}), ("png", {"Software": None})):
         buffer = io.BytesIO()
         figure.savefig(buffer, format=suffix, metadata=metadata)
+        figure.set_layout_engine("none")  # laid out once
         found[suffix] = buffer.getvalue()
     return found
 
