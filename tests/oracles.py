@@ -1,9 +1,15 @@
 """Slow, obvious forms that the fast paths are tested and benchmarked against."""
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy.special import logsumexp
 
+from imuarray.estimation import estimate_motion
 from imuarray.estimation.reference import linear_part, nonlinear_part, skew
+from imuarray.model import ArrayModel
+from imuarray.model.jax64 import jax, jnp
+from imuarray.motion import Motion
 from imuarray.posterior.reference import projection
 
 
@@ -95,3 +101,72 @@ def position_information(jacobian, unknowns):
     basis, _ = np.linalg.qr(nuisance)
     left = wanted - basis @ (basis.T @ wanted)
     return left.T @ left
+
+
+class Joint(NamedTuple):
+    """What `joint_map` came to; the parameters are r_2 ... r_A, then the effects'."""
+
+    positions: np.ndarray  # (A, 3)
+    effects: np.ndarray
+    covariance: np.ndarray  # of the parameters
+    motion: np.ndarray  # (T, 9 or 15)
+    cost: float
+    converged: bool
+
+
+def joint_map(model, force, rate, saturated=None, prior=None, limit=40):
+    """Plain Gauss-Newton on motion, positions and effects at once, by automatic differentiation.
+
+    Any model and noise; ``prior`` None or (mean, sd) of r_2 ... r_A. Steps that raise the cost are
+    halved.
+    """
+    split, D = 3 * (model.array.accelerometers - 1), model.motion_size
+    whiten = [np.linalg.cholesky(np.linalg.inv(part)).T
+              for part in (model.noise.accelerometer, model.noise.gyroscope)]  # fmt: skip
+    keep = np.ones(rate.shape) if saturated is None else 1.0 - saturated
+    mean, sd = (np.zeros(split), np.inf) if prior is None else prior
+    mean = np.append(mean, model.effect_prior_mean)
+    sd = np.append(np.broadcast_to(sd, split), model.effect_prior_sd)
+
+    def one(x, p, force, rate, keep):
+        places = jnp.concatenate([jnp.zeros((1, 3)), p[:split].reshape(-1, 3)])
+        fields = jnp.concatenate([x, jnp.zeros(15 - D)]).reshape(5, 3)
+        found = model.predict(Motion(*fields), places, p[split:])
+        parts = [whiten[0] @ (force - found.specific_force).ravel(),
+                 whiten[1] @ (keep * (rate - found.angular_rate)).ravel()]  # fmt: skip
+        return jnp.concatenate([*parts, x[9:] / np.repeat(model.derivative_sd, 3)[: D - 9]])
+
+    parts = (0, None, 0, 0, 0)
+    values = jax.jit(jax.vmap(one, parts))
+    slopes = jax.jit(jax.vmap(jax.jacfwd(one, (0, 1)), parts))
+    first = estimate_motion(ArrayModel(model.array, model.noise), force, rate, None, saturated)
+    x = np.hstack([*first.motion[:3], np.zeros((len(force), D - 9))])
+    p = np.append(model.array.relative[1:].ravel(), model.effect_start)
+
+    def cost(x, p):
+        off = np.asarray(values(x, p, force, rate, keep))
+        return off, np.sum(off**2) + np.sum(((p - mean) / sd) ** 2)
+
+    off, best = cost(x, p)
+    for _ in range(limit):
+        mine, shared = map(np.asarray, slopes(x, p, force, rate, keep))
+        inverse = np.linalg.inv(mine.mT @ mine)
+        cross, slope = mine.mT @ shared, (mine.mT @ off[..., None])[..., 0]
+        flat, taken = shared.reshape(-1, p.size), (inverse @ cross).reshape(-1, p.size)
+        known = flat.T @ flat - cross.reshape(-1, p.size).T @ taken + np.diag(sd**-2.0)
+        down = flat.T @ off.ravel() - taken.T @ slope.ravel() + (p - mean) / sd**2
+        scale = np.sqrt(np.diag(known))
+        covariance = np.linalg.inv(known / np.outer(scale, scale)) / np.outer(scale, scale)
+        step = -covariance @ down
+        turn = -np.einsum("tab,tb->ta", inverse, slope + cross @ step)
+        converged = np.abs(step / np.sqrt(np.diag(covariance))).max() < 1e-7
+        for length in 0.5 ** np.arange(12):
+            tried = x + length * turn, p + length * step
+            again, lower = cost(*tried)
+            if lower <= best * (1 + 1e-12):
+                (x, p), off, best = tried, again, lower
+                break
+        if converged:
+            break
+    places = np.vstack([np.zeros(3), p[:split].reshape(-1, 3)])
+    return Joint(places, p[split:], covariance, x, float(best), bool(converged))

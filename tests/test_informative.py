@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from imuarray.estimation.information import information_at
 from imuarray.estimation.informative import patterns, weak_directions
 from imuarray.geometry import mimu4444
 from imuarray.model import ArrayModel
 from imuarray.motion import normal_motion
-from imuarray.studies.bound import information_at
 
 ARRAY = mimu4444()
 

@@ -60,9 +60,7 @@ def papers_dataset(recording: Recording, model: ArrayModel, found, saturated) ->
 
     covariance = found.covariance
     if covariance is None:
-        covariance = parameter_covariance(
-            model, recording.specific_force, recording.angular_rate, found, saturated
-        )
+        covariance = parameter_covariance(model, found, saturated)
     dataset = positions_dataset(recording, found.positions, covariance)
     sds = [
         np.sqrt(np.diag(part)).reshape(-1, 3)[:, 0]

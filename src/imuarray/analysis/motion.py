@@ -12,6 +12,7 @@ from imuarray.analysis.model import assumed, model_of
 from imuarray.errors import InputError
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
+from imuarray.model.effects import find_effects
 from imuarray.model.names import parameter_names
 from imuarray.model.noise import Noise
 from imuarray.motion.state import UNITS
@@ -67,7 +68,9 @@ def _with_common_map(found, calibration: xr.Dataset, recording: Recording):
     maps, their common scale alone is left.
     """
     rate = np.asarray(found.estimate.motion.angular_rate)
-    if "gyroscope_scale" in calibration.attrs.get("effects", "").split(","):
+    names = calibration.attrs.get("effects", "")
+    effects = find_effects(names.split(",") if names else ())
+    if any(item.resizes and item.kinds == [1] for item in effects):
         scale_sd = np.nan_to_num(calibration.attrs.get("gyroscope_common_scale_sd", np.nan))
         own = scale_sd**2 * rate[:, :, None] * rate[:, None]
     elif recording.gyroscope_common_covariance is None:

@@ -23,8 +23,7 @@ class Calibration:
     ``positions`` (A, 3) m relative to the reference triad; ``cost`` and ``step`` per
     iteration: twice the negative log likelihood before, and the largest position change
     (m) in, that iteration; ``snapshots`` (S, A, 3) after the iterations asked for.
-    ``covariance`` (P, P) of (r_2 ... r_A, effect parameters), ``effect_parameters`` (P',),
-    where the method gives them.
+    ``covariance`` (P, P) of r_2 ... r_A where the method gives it.
     """
 
     positions: np.ndarray
@@ -34,7 +33,6 @@ class Calibration:
     converged: bool
     snapshots: np.ndarray
     covariance: np.ndarray | None = None
-    effect_parameters: np.ndarray | None = None
 
 
 @njit

@@ -17,7 +17,8 @@ from imuarray.compiled import njit
 from imuarray.estimation import kernels
 from imuarray.estimation.collapsed import Collapsed, tables
 from imuarray.estimation.rates import lower, precision_at, rate_information
-from imuarray.model import structure_tensor
+from imuarray.model import ArrayModel, structure_tensor
+from imuarray.model.structure import products
 
 TILE = 128  # samples at a time
 
@@ -191,3 +192,17 @@ def information(data: Collapsed, positions, rate, made, found) -> np.ndarray:
     return fisher(
         positions, data.weights, rate, made[1:], found, data.gyroscope_information, halves()
     )
+
+
+def information_at(model: ArrayModel, motion, positions, saturated=None) -> np.ndarray:
+    """Fisher information (3 (A - 1),) squared, 1 / m^2, of r_2 ... r_A at a true motion (T, 3).
+
+    The motion is unknown to who estimates; ``saturated`` (T, G, 3) axes say nothing.
+    """
+    force, rate = model.predict_many(motion, positions)
+    data = Collapsed.of(model, force, rate, saturated)
+    turning = np.ascontiguousarray(np.asarray(motion.angular_rate).T)
+    state = np.zeros((12, data.samples))
+    state[:6], state[6:9] = products(turning.T).T, np.asarray(motion.angular_acceleration).T
+    found, _ = data.reduce(positions)
+    return information(data, positions, turning, arms(state), found)

@@ -20,7 +20,7 @@ class MotionEstimate:
     """Motion per sample with its convergence.
 
     ``motion`` fields (T, 3); ``cost`` (T,) twice the negative log likelihood up to a
-    constant (NaN from `calibrate_gauss_newton` with effects, which sums it over samples);
+    constant;
     ``iterations`` (T,) Gauss-Newton steps; ``converged`` (T,) bool.
     """
 

@@ -61,7 +61,7 @@ def fisher_scoring(
     work = here.work
     return Calibration(
         here.positions, motion_estimate(data, here.rate, work.state, here.costs, work.counts),
-        costs, steps, status == CONVERGED, here.positions[None], width, np.empty(0),
+        costs, steps, status == CONVERGED, here.positions[None], width,
     )  # fmt: skip
 
 

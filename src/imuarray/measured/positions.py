@@ -11,8 +11,9 @@ from scipy.special import ndtri
 
 from imuarray.estimation import calibrate_bcd, calibrate_gauss_newton
 from imuarray.estimation.bcd import Calibration
-from imuarray.estimation.blocks import normal_equations, pack_motion, problem
+from imuarray.estimation.collapsed import Collapsed
 from imuarray.model import ArrayModel
+from imuarray.model.structure import product_slopes
 from imuarray.posterior.rate_density import rate_distribution
 from imuarray.recording import Recording, array_of
 from imuarray.simulation import simulate_samples
@@ -82,11 +83,8 @@ def _fit(recording: Recording, assumed: float, start=None):
 def _locate(recording, assumed, start) -> tuple[Positions, np.ndarray]:
     model, data, prior, found = _fit(recording, assumed, start)
     residual = residual_force(model, recording, found)
-    given = problem(model, *data, **prior)
-    unknowns = pack_motion(model, found.motion.motion), found.positions[1:].ravel()
-    blocks = normal_equations(given, *unknowns)
     size = 3 * (model.array.accelerometers - 1)
-    freedom = residual.size - _explained(blocks, prior["rate_covariance"]) - size
+    freedom = residual.size - _explained(model, data, found, prior["rate_covariance"]) - size
     sd = float(np.sqrt(np.sum(residual**2) / freedom))
     positions = Positions(
         found.positions, found.covariance[:size, :size], assumed, sd, found.converged,
@@ -95,12 +93,15 @@ def _locate(recording, assumed, start) -> tuple[Positions, np.ndarray]:
     return positions, found.positions
 
 
-def _explained(blocks, rate_covariance) -> float:
+def _explained(model: ArrayModel, data, found: Calibration, rate_covariance) -> float:
     """Degrees of freedom of the accelerometers that the motion uses up: 9 a sample, less
     what the prior of omega supplies of them."""
-    inverse = np.linalg.inv(blocks.motion)[:, :3, :3]
-    supplied = np.einsum("tij,tji->", inverse, np.linalg.inv(rate_covariance))
-    return 9 * len(inverse) - float(supplied)
+    prior = np.linalg.inv(rate_covariance)
+    slope = product_slopes(found.motion.motion.angular_rate)
+    reduced, _ = Collapsed.of(model, *data).reduce(found.positions)
+    known = prior + np.einsum("tai,ab,tbj->tij", slope, reduced.C, slope)
+    supplied = np.einsum("tij,tji->", np.linalg.inv(known), prior)
+    return 9 * len(known) - float(supplied)
 
 
 def residual_force(model: ArrayModel, recording: Recording, found: Calibration) -> np.ndarray:

@@ -10,7 +10,7 @@ import pandas as pd
 
 from imuarray.estimation.bcd import calibrate_bcd
 from imuarray.estimation.collapsed import Collapsed
-from imuarray.estimation.information import arms, information
+from imuarray.estimation.information import arms, information_at
 from imuarray.estimation.newton import fisher_scoring
 from imuarray.geometry import Array, sub_array
 from imuarray.linear import scaled_eigh
@@ -26,20 +26,6 @@ BCD_LIMIT = 20000  # iterations after which ML-BCD is given up
 PATIENCE = 400  # iterations of Gauss-Newton where noise is large
 SCORING_LIMIT = 10  # and Gauss-Newton
 RANK = 1e-10  # of the largest eigenvalue of the scaled information
-
-
-def information_at(model: ArrayModel, motion, positions, saturated=None) -> np.ndarray:
-    """Fisher information (3 (A - 1),) squared, 1 / m^2, of r_2 ... r_A at a true motion (T, 3).
-
-    The motion is unknown to who estimates; ``saturated`` (T, G, 3) axes say nothing.
-    """
-    force, rate = model.predict_many(motion, positions)
-    data = Collapsed.of(model, force, rate, saturated)
-    turning = np.ascontiguousarray(np.asarray(motion.angular_rate).T)
-    state = np.zeros((12, data.samples))
-    state[:6], state[6:9] = products(turning.T).T, np.asarray(motion.angular_acceleration).T
-    found, _ = data.reduce(positions)
-    return information(data, positions, turning, arms(state), found)
 
 
 def block_information(model: ArrayModel, motion) -> np.ndarray:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from imuarray.estimation.information import information_at
 from imuarray.motion import sphere_motion
 from imuarray.streams import stream
 from imuarray.studies.batches import root_mean_square
-from imuarray.studies.bound import information_at
 
 REPEATS = 20  # motions averaged over; the bound varies little between them
 
