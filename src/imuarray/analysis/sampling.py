@@ -12,12 +12,12 @@ import pandas as pd
 import xarray as xr
 
 from imuarray.analysis import methods
+from imuarray.analysis.beyond import posterior_beyond
 from imuarray.analysis.calibration_dataset import effects_of
 from imuarray.analysis.density import (
     NOT_CONVERGED,
     Posterior,
     at_estimate,
-    posterior_beyond,
     posterior_of,
     traced,
     tuned_target,
