@@ -13,7 +13,8 @@ from imuarray.engine.ladder import climb, mask_of
 from imuarray.engine.parameters import POSITION, columns_of
 from imuarray.engine.passes import normal_pass
 from imuarray.engine.readings import arrange, most_informative
-from imuarray.engine.widths import widths
+from imuarray.engine.turning import turned
+from imuarray.engine.widths import settled, widths
 from imuarray.geometry import sub_array
 from imuarray.motion.state import Motion
 
@@ -109,17 +110,32 @@ def test_what_a_correction_left_widens_by_as_much_as_it_moves():
     recording, _ = simulated(2.0)
     recording = replace(recording, angular_rate_saturated=recording.saturated_gyroscopes())
     bare, rng = fitted(recording, robust=False), np.random.default_rng(2)
+    any_map = 2e-4 * rng.standard_normal((4, 3, 3))
+    changes = {"accelerometer": any_map, "gyroscope": np.tile(1e-3 * np.eye(3), (4, 1, 1))}
     for kind, name in (("accelerometer", "specific_force"), ("gyroscope", "angular_rate")):
-        values = getattr(recording, name)
-        change = 1e-4 * rng.standard_normal((values.shape[1], 3, 3))
-        change += 1e-3 * np.diag(rng.standard_normal(3)) * (kind == "gyroscope")  # they share it
+        values, change = getattr(recording, name), changes[kind]
         other = replace(recording, **{name: values + np.einsum("kij,tkj->tki", change, values)})
         size = np.abs(fitted(other, robust=False).positions - bare.positions)[1:].ravel()
-        spread = np.outer(change, change)
-        left = replace(recording, **{f"{kind}_map_covariance": spread})
-        added = widths(fitted(left, robust=False))[1] ** 2 - widths(bare)[1] ** 2
-        assert size.max() > 5e-6
-        np.testing.assert_allclose(np.sqrt(added), size, atol=0.15 * size.max())
+        # so small that the readings say nothing of it
+        spread = 0.05**2 * np.outer(change, change)
+        left = settled(
+            fitted(replace(recording, **{f"{kind}_map_covariance": spread}), robust=False)
+        )
+        added = np.sqrt(widths(left)[1] ** 2 - widths(bare)[1] ** 2)
+        assert size.max() > 1e-5
+        np.testing.assert_allclose(added, 0.05 * size, atol=0.15 * 0.05 * size.max())
+
+
+def test_the_rates_change_says_more_than_the_accelerometers_of_turning():
+    """Slower twisting, as the window of a derivative has to be short beside it."""
+    ratios, z = [], []
+    for seed in (1, 2):
+        recording, truth = simulated(2.0, seed, bandwidth=2.0)
+        alone = fitted(recording)
+        both = estimate([turned(one) for one in alone.recorded], alone.columns, alone.active)
+        ratios.append(np.mean(position_sds(both) / position_sds(alone)))
+        z.append(errors(both, truth) / position_sds(both))
+    assert max(ratios) < 0.95 and 0.5 < np.sqrt(np.mean(np.square(z))) < 1.6
 
 
 def test_readings_far_out_lose_their_say():

@@ -18,6 +18,7 @@ from imuarray.engine.linearise import State
 from imuarray.engine.parameters import POSITION, Columns, columns_of
 from imuarray.engine.readings import Readings, most_informative
 from imuarray.engine.start import start
+from imuarray.engine.widths import settled
 from imuarray.errors import LARGEST, SMALLEST, InputError
 from imuarray.model import EFFECTS, ArrayModel
 from imuarray.model.array_model import EffectPrior
@@ -194,4 +195,4 @@ def extended_estimate(readings: Readings, columns: Columns, active, state: State
             )
         readings, _ = without_jumps(readings, columns, recorded.state, imus, SETTINGS.edge)
         recorded = replace(recorded, readings=readings)
-    return estimate([recorded], columns, active)
+    return settled(estimate([recorded], columns, active))

@@ -148,7 +148,7 @@ def estimate(
         length = max(length / 2, SETTINGS.shortest) if moved[-1] > last else min(1.0, 1.5 * length)
         last = moved[-1]
         recorded = tuple(
-            replace(one, state=_stepped(one.state, columns, active, length * step[place]))
+            replace(one, state=stepped(one.state, columns, active, length * step[place]))
             for one, place in zip(noisy, places, strict=True)
         )
     return Estimate(
@@ -254,10 +254,15 @@ def _noise_change(before, after) -> float:
     )
 
 
-def _stepped(state: State, columns, active, step) -> State:
+def stepped(state: State, columns, active, step) -> State:
     whole = flat_parameters(columns, state)
     whole[active] += step
     return from_flat(columns, state, whole)
+
+
+def means(found: Estimate) -> np.ndarray:
+    """The priors' means of its parameters (n,)."""
+    return _means(found.recorded, found.columns, found.active, found.places)
 
 
 def tested(found: Estimate, active):

@@ -15,7 +15,8 @@ from imuarray.engine.heldout import gain_of
 from imuarray.engine.parameters import POSITION, Columns, columns_of
 from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS
-from imuarray.engine.widths import MAPS, SCALES, SKEWS, spread_of
+from imuarray.engine.turning import turned
+from imuarray.engine.widths import FIXED, MAPS, SCALES, SKEWS, settled, spread_of
 from imuarray.errors import InputError
 from imuarray.linear import scaled_inverse
 from imuarray.model.effects import EFFECTS
@@ -27,7 +28,7 @@ RUNGS = {
     "delay of each IMU": ("sensor_delay",),
     "lever arms of the axes": ("size_effect",),
 }
-FIXED = 1e-7  # sd of a map's entry that is known
+AGREES = 1.02  # times the residual that a prior of omega_dot may make
 CHANCE = 1e-3  # of maps as far from those of first order
 LEAST_Z, LEAST_NATS = 2.0, 2.0  # standard errors of a gain, and nats, from which a rung is kept
 
@@ -50,7 +51,7 @@ def with_effects(readings: Sequence[Readings], effects) -> Estimate:
             f" {', '.join(effects)}"
         )
     active = mask_of(columns, [POSITION, *effects])
-    return estimate([Recorded.of(one, columns) for one in readings], columns, active)
+    return settled(estimate([Recorded.of(one, columns) for one in readings], columns, active))
 
 
 def rungs_of(readings: Sequence[Readings]) -> list[str]:
@@ -65,7 +66,8 @@ def climb(readings: Sequence[Readings], bare: bool = True) -> tuple[Estimate, li
     """The sensor model of a board from its recordings, rung by rung.
 
     Each sweep tests the rungs in order, beside those that it has kept before; what is kept is
-    fitted, then the others are tested again. At last each must still gain beside all others.
+    fitted, then the others are tested again. At last each must still gain beside all others. Where
+    motion is smooth and no sensor late, the rate's own change is then a prior of omega_dot.
     ``bare``: whether the last fit is wanted where no rung is kept. InputError or LinAlgError where
     the readings do not determine positions or motion.
     """
@@ -92,7 +94,13 @@ def climb(readings: Sequence[Readings], bare: bool = True) -> tuple[Estimate, li
     active = placed | mask_of(columns, [e for name in kept for e in RUNGS[name]])
     if not (kept or bare):
         return found, rungs
-    return estimate(without(found, active), columns, active), rungs
+    found = estimate(without(found, active), columns, active)
+    late = any(_needs_neighbours(effect) for name in kept for effect in RUNGS[name])
+    if all(one.smooth for one in found.recorded) and not late:
+        better = estimate([turned(one) for one in found.recorded], columns, active)
+        if better.residual_ratio() < AGREES * found.residual_ratio():
+            found = better
+    return settled(found), rungs
 
 
 def without(found: Estimate, active) -> list[Recorded]:

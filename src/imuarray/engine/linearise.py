@@ -50,6 +50,7 @@ class State(NamedTuple):
     parameters: np.ndarray  # (P,) of the model with all effects
     derivatives: tuple  # omega double dot, s dot (T, 3); second, third of (force, rate)
     rough_prior: RoughPrior | None = None  # where the motion is rough
+    turning: tuple[np.ndarray, np.ndarray] | None = None  # omega_dot's prior: mean, sd (T, 3)
 
     @property
     def gyroscopes_free(self) -> bool:
@@ -131,14 +132,17 @@ def _chunk(model, count, placed, x, extra, time, span, positions, parameters, da
 
 
 def _eliminated(residual, motion, whitened, gram, bare, sd) -> Eliminated:
-    """A chunk, the motion projected out; ``bare`` (T, D - 9) is what its prior expects, in sds."""
+    """A chunk, the motion projected out; ``bare`` (T, k) is what its prior expects, in sds.
+
+    A prior of the motion's last k numbers, ``sd`` infinite where it has none.
+    """
     samples, count = residual.shape[:2]
-    free = np.arange(KNOWN, gram.shape[1])
+    free = np.arange(gram.shape[1] - sd.shape[1], gram.shape[1])
     gram[:, free, free] += sd**-2.0
     factor = np.linalg.cholesky(gram)
     inverse = np.linalg.inv(factor)
     basis = motion @ np.swapaxes(inverse, 1, 2)
-    expected = inverse[:, :, KNOWN:] / sd[:, None]
+    expected = inverse[:, :, free] / sd[:, None]
     flat = residual.reshape(samples, -1, 1)
     taken = np.swapaxes(basis, 1, 2) @ flat + expected @ bare[..., None]
     left = (flat - basis @ taken)[..., 0]
@@ -188,7 +192,7 @@ def chunk_at(readings: Readings, columns: Columns, state: State, directions, sta
         readings.span, state.positions, state.parameters,
         (readings.values[index], readings.weights_of(index)),
     )  # fmt: skip
-    bare = (mean - x[:, KNOWN:]) / sd
+    bare = (mean - x[:, x.shape[1] - sd.shape[1] :]) / sd
     # factorisations are LAPACK's, called from here (see `jax64`)
     return _eliminated(
         np.asarray(residual), np.asarray(motion), np.asarray(whitened)[..., directions],
@@ -208,6 +212,10 @@ def _rows_of(state: State, index):
     prior = (nothing, nothing)
     if state.rough_prior is not None:
         prior = state.rough_prior.mean[index], state.rough_prior.sd[index]
+    if state.turning is not None:
+        free = np.zeros((len(index), 3)), np.full((len(index), 3), np.inf)  # of s
+        parts = zip((part[index] for part in state.turning), free, prior, strict=True)
+        prior = tuple(np.hstack(part) for part in parts)
     return index, state.motion[index], extra, prior
 
 
@@ -234,9 +242,9 @@ def motion_equations(readings: Readings, model: ArrayModel, state: State, index,
         state.positions, state.parameters,
         (readings.values[index], readings.weights_of(index), one_sided),
     ))  # fmt: skip
-    free = np.arange(KNOWN, gram.shape[1])
+    free = np.arange(gram.shape[1] - sd.shape[1], gram.shape[1])
     gram[:, free, free] += sd**-2.0
-    off = (mean - x[:, KNOWN:]) / sd
+    off = (mean - x[:, free]) / sd
     slope[:, free] += off / sd
     return gram, slope, cost + np.sum(off**2, axis=1)
 

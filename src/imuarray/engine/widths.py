@@ -5,9 +5,18 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
-from imuarray.engine.estimate import Estimate, jackknifed, pinned, places_of, tested
-from imuarray.engine.fit import flat_parameters, from_flat
+from imuarray.engine.estimate import (
+    Estimate,
+    jackknifed,
+    means,
+    pinned,
+    places_of,
+    stepped,
+    tested,
+)
+from imuarray.engine.fit import flat_parameters, from_flat, scaled_solve
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import Columns, columns_of, gauge_masks
 from imuarray.linear import scaled_inverse
@@ -16,14 +25,63 @@ from imuarray.model.catalogue import OFF_COLUMNS, OFF_ROWS
 SCALES, SKEWS = ("accelerometer_scale", "gyroscope_scale"), (
     "accelerometer_misalignment", "gyroscope_misalignment",
 )  # fmt: skip
+FIXED = 1e-7  # sd of a map's entry that is known
 MAPS = SCALES + SKEWS  # effects that are 3 x 3 maps, which first order corrects
+
+
+def settled(found: Estimate) -> Estimate:
+    """An estimate beside what a first-order correction left of the maps, each as uncertain as that.
+
+    One step of everything at once: such errors are so small that it is the last one. The maps stay
+    out of the answer, as they belong to a recording's correction; ``information``, ``precision``
+    and ``blocks`` have them after the n parameters, those of each recording.
+    """
+    if all(left is None for one in found.recorded for left in one.readings.left):
+        return found
+    wide = _with_maps(found)
+    maps = mask_of_left(wide)
+    active, count = wide.active | maps, len(found.values)
+    blocks, _, _ = tested(wide, active)
+    precision, places = [found.precision], []
+    for number, place in enumerate(places_of(wide.columns, active, len(wide.recorded))):
+        own, mine = np.empty(len(place), int), maps[active]
+        own[~mine] = found.places[number]
+        own[mine] = count + number * mine.sum() + np.arange(mine.sum())
+        left = spread_of(wide.recorded[number].readings.left, wide.columns, maps)
+        precision.append(np.linalg.inv(left + FIXED**2 * np.eye(len(left))))
+        places.append((place, own))
+    precision = block_diag(*precision)
+    blocks = _placed(blocks, places, len(precision))
+    information = sum(inner for inner, _ in blocks)
+    slope = sum(score for _, score in blocks)
+    slope[:count] -= found.precision @ (found.values - means(found))
+    step = scaled_solve(information + precision, slope)[0][:count]
+    recorded = tuple(
+        replace(one, state=stepped(one.state, found.columns, found.active, step[place]))
+        for one, place in zip(found.recorded, found.places, strict=True)
+    )
+    return replace(
+        found, recorded=recorded, information=information, precision=precision, blocks=blocks
+    )
+
+
+def _placed(blocks, places, size):
+    """[(information, score)] of ``size``, from those of each recording's ``places``: from, to."""
+    out, each = [], len(blocks) // len(places)
+    for number, (inner, score) in enumerate(blocks):
+        source, target = places[number // each]
+        whole, slope = np.zeros((size, size)), np.zeros(size)
+        whole[np.ix_(target, target)] = inner[np.ix_(source, source)]
+        slope[target] = score[source]
+        out.append((whole, slope))
+    return out
 
 
 def widths(found: Estimate) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Covariance (n, n); formal sds (n,), and a jackknife's: the covariance has the larger."""
-    formal = _formal(found) + _corrected(found)
+    formal, count = _formal(found), len(found.values)
     sds = np.sqrt(np.diag(formal))
-    resampled = jackknifed(found.information + found.precision, found.blocks)
+    resampled = jackknifed(found.information + found.precision, found.blocks)[:count]
     wider = np.maximum(resampled / sds, 1.0)
     return formal * np.outer(wider, wider), sds, resampled
 
@@ -31,7 +89,10 @@ def widths(found: Estimate) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _formal(found: Estimate) -> np.ndarray:
     """Gauges that the array's size takes up not pinned, but as large as they may well be."""
     known, gauges = np.isfinite(found.scale_sd), gauge_masks(found.columns, found.active)
-    prior = pinned(found.recorded, found.columns, found.active, found.places, resized=known)
+    count, prior = len(found.values), found.precision.copy()
+    prior[:count, :count] = pinned(
+        found.recorded, found.columns, found.active, found.places, resized=known
+    )
     sizes = [mask[found.active] for effect, mask in gauges if effect.resizes]
     if not known:
         for mine in sizes:
@@ -40,10 +101,10 @@ def _formal(found: Estimate) -> np.ndarray:
             mean[chosen] = 1.0 / len(chosen)
             # the mean of so many that differ by so much
             prior += np.outer(mean, mean) * len(chosen) / np.var(found.values[chosen], ddof=1)
-    out = _lost(found.freedoms) * scaled_inverse(found.information + prior)
+    out = _lost(found.freedoms) * scaled_inverse(found.information + prior)[:count, :count]
     if known and sizes:
         # r goes with the rate's scale to the power of -2
-        size = np.zeros(len(prior))
+        size = np.zeros(count)
         pairs = np.argwhere(found.active)
         mine = pairs[:, 1] < 3
         size[found.places[0][mine]] = 2.0 * found.positions[pairs[mine, 0], pairs[mine, 1]]
@@ -56,28 +117,11 @@ def _lost(freedoms) -> float:
     return max((nu + 5) / (nu + 3) if np.isfinite(nu) else 1.0 for nu in freedoms)
 
 
-def _corrected(found: Estimate) -> np.ndarray:
-    """What is added by errors that a first-order correction left in maps, (n, n).
-
-    Maps that are not estimated: by so much would their errors move what is. Each recording has
-    its own correction.
-    """
-    if all(left is None for one in found.recorded for left in one.readings.left):
-        return np.zeros_like(found.information)
-    wide = _with_maps(found)
-    maps = np.isin(wide.columns.names, MAPS) & wide.columns.owner & ~wide.active
-    active = wide.active | maps
-    blocks, _, _ = tested(wide, active)
-    places = places_of(wide.columns, active, len(wide.recorded))
-    mine, size = maps[active], len(blocks[0][1])
-    added = np.unique(np.concatenate([place[mine] for place in places]))
-    kept = np.setdiff1d(np.arange(size), added)
-    inverse, out = scaled_inverse(found.information + found.precision), np.zeros((len(kept),) * 2)
-    parts = np.split(np.array([inner for inner, _ in blocks]), len(wide.recorded))
-    for one, place, part in zip(wide.recorded, places, parts, strict=True):
-        moved = inverse @ part.sum(axis=0)[np.ix_(kept, place[mine])]
-        out += moved @ spread_of(one.readings.left, wide.columns, maps) @ moved.T
-    return out
+def mask_of_left(found: Estimate) -> np.ndarray:
+    """(N, m) bool of the maps that a correction left, where they are not estimated."""
+    left = found.recorded[0].readings.left
+    named = [name for name in MAPS if left[name.startswith("gyroscope")] is not None]
+    return np.isin(found.columns.names, named) & found.columns.owner & ~found.active
 
 
 def spread_of(left, columns: Columns, maps) -> np.ndarray:
