@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import imuarray
-from imuarray.analysis.density import posterior_beyond
+from imuarray.analysis.beyond import posterior_beyond
 from imuarray.analysis.fitting import fitted_beyond
 from imuarray.engine.widths import widths
 from imuarray.errors import InputError

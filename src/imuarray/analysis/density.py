@@ -11,23 +11,17 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import block_diag
 
-from imuarray.analysis.calibration_dataset import effects_of, parameters_of, places_among
-from imuarray.analysis.model import Say, model_of, silent
-from imuarray.analysis.noise import Shown, estimated_noise, factors, shown
-from imuarray.engine.estimate import Estimate
-from imuarray.engine.fit import flat_parameters
-from imuarray.engine.linearise import State
-from imuarray.engine.parameters import gauge_masks, prior_precision
+from imuarray.analysis.model import Say, silent
+from imuarray.analysis.noise import estimated_noise
 from imuarray.engine.readings import Readings
 from imuarray.errors import IdentifiabilityError
 from imuarray.geometry import positions_of
-from imuarray.linear import scaled_inverse
-from imuarray.model import ArrayModel, Noise
+from imuarray.model import ArrayModel
 from imuarray.posterior import tuning
 from imuarray.posterior.generic import SCALES, GenericLikelihood, log_laplace
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.rate_density import sample_covariance
-from imuarray.posterior.target import GaussianPrior, GenericTarget, TiedPrior
+from imuarray.posterior.target import GaussianPrior, GenericTarget
 from imuarray.recording import Recording
 from imuarray.streams import stream
 
@@ -36,7 +30,6 @@ NOT_CONVERGED = (
     "the search for the posterior's mode did not converge; chains start from where it ended"
 )
 WIDE = 3.0  # prior sd of the log of a noise's sd, and of the motion's: a factor of twenty
-HELD = 1e-3  # of its prior's sd: the sd of a parameter that the estimate does not free
 FEW, STARTS = 50, 8  # samples; searches for the mode where there are no more
 WIDER = 1.05  # than the mode's curvature, for preconditioned Crank-Nicolson proposals
 LENGTHS = np.geomspace(0.02, 0.99, 10)  # of those that are tried
@@ -108,7 +101,7 @@ def posterior_of(
     if not flat:  # s is flat: differences between triads do not show it
         chosen = replace(chosen, motion_sd=(*sizes[:2], np.inf))
     free = [not flat and not fixed for fixed in known] + [not flat] * 2 + [False]
-    unknown = _unknown(model, chosen, fitted.freedom, np.zeros(3), len(recording.time))
+    unknown = unknown_scales(model, chosen, fitted.freedom, np.zeros(3), len(recording.time))
     before, freedom = (part[free] for part in unknown)
     prior = prior_of(recording, chosen)
     return Posterior(
@@ -122,7 +115,7 @@ def posterior_of(
     )  # fmt: skip
 
 
-def _unknown(declared: ArrayModel, chosen: ArrayModel, freedom, own, samples: int):
+def unknown_scales(declared: ArrayModel, chosen: ArrayModel, freedom, own, samples: int):
     """(prior means, degrees of freedom) (5,) of the logs of `SCALES`, 0 at the model ``chosen``.
 
     ``own`` (3,): where the logs of the motion's size are expected.
@@ -133,85 +126,6 @@ def _unknown(declared: ArrayModel, chosen: ArrayModel, freedom, own, samples: in
     ]
     before = 0.5 * np.log(np.divide(*size))
     return np.append(before, own), np.append(freedom, np.full(3, 3.0 * samples))
-
-
-def posterior_beyond(recording: Recording, found: Estimate) -> Posterior:
-    """The posterior under a model with effects, around where the engine has fitted it.
-
-    Readings, their noise, and what is known of gauges are the estimate's; noise and the size of
-    omega, omega_dot and s are unknown as in `posterior_of`.
-    """
-    one, effects = found.recorded[0], effects_of(found)
-    mine = found.places[0]
-    place = places_among(found, effects)[0][mine]
-    precision = _known(found)
-    whole = found.information[np.ix_(mine, mine)] + precision
-    readings, seen = _judged(found, scaled_inverse(whole))
-    sizes = seen.motion_sd
-    # a compiled function has them: powers of two serve other recordings, too
-    rounded = tuple(2.0 ** np.round(np.log2(sizes)))
-    declared, counts = model_of(recording, effects), readings.exists.sum(axis=0)
-    sds = (readings.sd[:n, kind] for kind, n in enumerate(counts))
-    model = replace(
-        declared, noise=Noise.of(*counts, *sds), motion_sd=rounded,
-        clock=(readings.origin, readings.span), derivative_sd=_derivative_sd(declared, one.state),
-    )  # fmt: skip
-    prior = prior_of(recording, model)
-    mode = np.concatenate([found.positions[1:].ravel(), parameters_of(found, model)])
-    held = np.setdiff1d(np.arange(len(mode)), place)
-    mean, root = prior.mean.copy(), np.diag(1.0 / (HELD * prior.sd))
-    mean[held] = mode[held]
-    root[np.ix_(place, place)] = np.linalg.cholesky(precision).T
-    covariance = np.diag((HELD * prior.sd) ** 2)
-    covariance[np.ix_(place, place)] = scaled_inverse(whole)
-    own = np.log(sizes / rounded)
-    before, freedom = _unknown(declared, model, seen.freedom.sum(axis=0), own, len(readings.time))
-    motion = one.state.motion[:, :9]
-    if model.needs_derivatives:
-        motion = np.hstack([motion, *one.state.jerk])
-    return Posterior(
-        recording, model,
-        TiedPrior.of(np.append(mean, before), block_diag(root, np.eye(len(SCALES)) / WIDE)),
-        np.concatenate([mode, [0.0, 0.0], own]),
-        block_diag(covariance, np.diag(0.5 / np.maximum(freedom, 1.0))), SCALES, motion, readings,
-    )  # fmt: skip
-
-
-def _known(found: Estimate) -> np.ndarray:
-    """Prior precision (n, n) of the active parameters: what the positions take up is pinned.
-
-    A gauge that the array's size takes up is as wide as is known of it, or as the mean of
-    parameters that differ as these do.
-    """
-    columns, active = found.columns, found.active
-    precision = prior_precision(columns, active, resized=False)
-    values = flat_parameters(columns, found.recorded[0].state)
-    for effect, mask in gauge_masks(columns, active):
-        if effect.resizes:
-            mean, prior = mask[active] / mask.sum(), np.mean(np.diag(precision)[mask[active]])
-            more = max(1.0 / np.var(values[mask], ddof=1) - prior, 0.0) * mask.sum()
-            if effect.kinds == [1] and np.isfinite(found.scale_sd):
-                more = found.scale_sd**-2
-            precision += np.outer(mean, mean) * more
-    return precision
-
-
-def _judged(found: Estimate, covariance) -> tuple[Readings, Shown]:
-    """The estimate's readings with the normal noise that they show; few of them share a factor."""
-    one = found.recorded[0]
-    squares = np.where(one.readings.exists, found.noise_sd() ** 2, np.nan)
-    sds = np.broadcast_to(np.sqrt(np.nanmean(squares, axis=0)), squares.shape)
-    readings = one.readings.with_noise(sds, None)
-    seen = shown(readings, found.columns, one.state, found.active, covariance)
-    return readings.with_sd(sds * factors(seen, readings.exists)), seen
-
-
-def _derivative_sd(model: ArrayModel, state: State) -> tuple[float, float]:
-    """Prior sds of omega double dot and s dot: the recording's own where it shows them."""
-    sizes = [np.sqrt(np.mean(field**2)) for field in state.jerk]
-    if not model.needs_derivatives or not all(sizes):
-        return model.derivative_sd
-    return float(2.0 ** np.ceil(np.log2(sizes[0]))), float(2.0 ** np.ceil(np.log2(sizes[1])))
 
 
 def _spread(recording: Recording, model: ArrayModel, say: Say) -> Posterior:

@@ -12,12 +12,12 @@ import pandas as pd
 import xarray as xr
 
 from imuarray.analysis import methods
+from imuarray.analysis.beyond import posterior_beyond
 from imuarray.analysis.calibration_dataset import effects_of
 from imuarray.analysis.density import (
     NOT_CONVERGED,
     Posterior,
     at_estimate,
-    posterior_beyond,
     posterior_of,
     traced,
     tuned_target,
@@ -35,7 +35,8 @@ from imuarray.recording import Recording
 from imuarray.streams import stream
 
 STEPS = {"pmmh": (200_000, 10_000), "pcn": (40_000, 4_000)}  # compiled, any effects
-NUTS_STEPS, NUTS_WARMUP = 1250, 300  # 1000 left the worst of 93 R-hats above 1.01 now and then
+# 1000 left the worst of 93 R-hats above 1.01 now and then; with effects a step costs ten times more
+NUTS_STEPS, NUTS_WARMUP = (1250, 500), 300
 APART = 2.0  # posterior sds by which the starts differ
 STORED = 2000
 RHAT_THRESHOLD = 1.05
@@ -310,7 +311,7 @@ def _nuts(posterior: Posterior, asked: Asked) -> Made:
     rng, prior = _stream(asked, "starts"), posterior.prior
     wide = posterior.flat and not posterior.model.effects
     starts = spread_starts(prior.mean, prior.sd, rng) if wide else _apart(posterior, rng)
-    steps = asked.steps or NUTS_STEPS
+    steps = asked.steps or NUTS_STEPS[bool(posterior.model.effects)]
     found = run_nuts(
         log_density, posterior.mode, posterior.covariance, starts, NUTS_WARMUP, steps, asked.seed,
         quiet=not asked.progress, data=data,

@@ -97,11 +97,6 @@ class Noise:
         total = np.sum((force @ self.accelerometer_precision) * force)
         return float(total + np.sum(np.linalg.solve(self.gyroscope, rate.T).T * rate))
 
-    @property
-    def uncorrelated_gyroscopes(self) -> bool:
-        """Whether the gyroscopes' covariance is diagonal."""
-        return np.array_equal(np.diag(np.diag(self.gyroscope)), self.gyroscope)
-
     def angular_rate_given_gyroscopes(self, angular_rate, saturated=None):
         """The Gaussian p(omega_t | y_g) under a flat prior (paper 2021, eq. 15).
 
