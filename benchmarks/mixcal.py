@@ -31,6 +31,12 @@ OFFSETS = {"first-order": LINES["first-order"] + " --gyroscopes offset"}
 ROWS = {
     "mounts 0.3 degrees, else ideal": (Options(**IDEAL), "rec.nc", {}),
     "mounts 2 degrees, else ideal": (Options(mount=2.0, **IDEAL), "rec.nc", {}),
+    "two IMUs on 10 cm, at 37 degrees, else ideal": (
+        Options(imus=2, turned=37.0, **IDEAL),
+        "rec.nc",
+        {},
+    ),
+    "the same, scale errors, corrected": (Options(imus=2, turned=37.0), "corrected.nc", {}),
     "real scale errors, gyroscopes' offsets corrected": (Options(), "corrected.nc", OFFSETS),
     "the same, gyroscopes' maps corrected": (Options(), "corrected.nc", {}),
 }

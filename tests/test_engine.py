@@ -15,7 +15,8 @@ from imuarray.engine.passes import normal_pass
 from imuarray.engine.readings import arrange, most_informative
 from imuarray.engine.turning import turned
 from imuarray.engine.widths import settled, widths
-from imuarray.geometry import sub_array
+from imuarray.errors import IdentifiabilityError, InputError
+from imuarray.geometry import Array, sub_array
 from imuarray.motion.state import Motion
 
 EFFECTS = ("gyroscope_bias", "accelerometer_scale")
@@ -136,6 +137,21 @@ def test_the_rates_change_says_more_than_the_accelerometers_of_turning():
         ratios.append(np.mean(position_sds(both) / position_sds(alone)))
         z.append(errors(both, truth) / position_sds(both))
     assert max(ratios) < 0.95 and 0.5 < np.sqrt(np.mean(np.square(z))) < 1.6
+
+
+def test_two_imus_take_the_angular_acceleration_from_the_gyroscopes():
+    """What the accelerometers leave open about the line between them."""
+    array = Array(np.array([[0, 0, 0], [0.1, 0, 0]]), ("1", "2"), 2)
+    recording, truth = imuarray.simulate(array, 4.0, 200.0, angular_rate=8.0, bandwidth=2.0)
+    found = imuarray.calibrate(recording)
+    sds = np.sqrt(np.einsum("kaka->ka", found["position_covariance"].to_numpy()))[1]
+    error = (found["position"].to_numpy() - truth["position"].to_numpy())[1]
+    assert np.abs(error / sds).max() < 3 and sds.max() < 1e-4
+    with pytest.raises(InputError, match="follow each other, of two IMUs, found too few"):
+        imuarray.calibrate(recording.select(slice(None, None, 40)))
+    for step in (imuarray.sample, imuarray.diagnose, imuarray.select):
+        with pytest.raises(IdentifiabilityError, match="at least 3 accelerometer triads, found 2"):
+            step(recording)
 
 
 def test_readings_far_out_lose_their_say():

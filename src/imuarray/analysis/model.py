@@ -11,6 +11,7 @@ import numpy as np
 
 from imuarray.analysis import methods
 from imuarray.errors import LARGEST, SMALLEST, InputError
+from imuarray.geometry.array import require_planar_extent
 from imuarray.model import DATA_EFFECTS, ArrayModel
 from imuarray.model.effects import find_effects
 from imuarray.recording import Recording, array_of
@@ -44,9 +45,11 @@ def assumed(recording: Recording, accelerometer_noise: float | None) -> Recordin
 def usable(recording: Recording, say: Say = silent) -> Recording:
     """The recording without still poses and samples with an accelerometer at its rail.
 
-    InputError where that leaves none, and for constant or copied channels.
+    InputError where that leaves none, and for constant or copied channels; IdentifiabilityError
+    for two IMUs.
     """
     require_live(recording)
+    require_planar_extent(recording.accelerometer_position, "recording")
     lost = recording.saturated_accelerometers().any(axis=(1, 2))
     if lost.all():
         raise InputError("recording: expected samples off the rail, found every one at a rail")

@@ -26,6 +26,7 @@ from imuarray.engine.heldout import Scores, gain, log_scores
 from imuarray.engine.parameters import prior_precision
 from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.engine.widths import widths
+from imuarray.geometry.array import require_planar_extent
 from imuarray.linear import scaled_inverse
 from imuarray.model.effects import DATA_EFFECTS, KINDS
 from imuarray.recording import Recording
@@ -96,6 +97,7 @@ def diagnose(
     constant and for copied channels.
     """
     require_live(recording)
+    require_planar_extent(recording.accelerometer_position, "recording")
     found = run_procedure(recording, without, say)
     search = found.search
     say("fitting the papers' model to the same readings")

@@ -66,6 +66,11 @@ class Readings:
         return found if self.trust is None else found * np.repeat(self.trust[index], 3, axis=2)
 
     @property
+    def pair(self) -> bool:
+        """Whether two accelerometers leave omega_dot open about the line that joins them."""
+        return self.array.accelerometers == 2
+
+    @property
     def window(self) -> int:
         """Samples in a derivative's polynomial, odd, at least five."""
         return odd_window(self.time)
@@ -101,6 +106,8 @@ def determined(readings: Readings, fewest: int = SETTINGS.least_samples) -> np.n
     """
     positions = readings.array.relative
     rows = design(positions)[:, 6:]
+    if readings.pair:
+        rows = rows[:, 3:]  # of two, omega_dot is the gyroscopes' matter
     kept = readings.keep[:, : len(positions), :3].reshape(len(readings.time), -1)
     least, whole = (
         np.linalg.eigvalsh(np.einsum("tr,ri,rj->tij", part.astype(float), rows, rows))[:, 0]

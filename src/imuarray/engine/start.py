@@ -31,6 +31,8 @@ def _linear_motion(readings, positions, rate) -> np.ndarray:
     target = weight * (force - products(rate) @ both[:, :6].T)
     matrix = weight[..., None] * both[None, :, 6:]
     left = np.swapaxes(matrix, 1, 2) @ matrix
+    if readings.pair:
+        left += 1e-9 * np.trace(left, axis1=1, axis2=2)[:, None, None] * np.eye(6)
     right = np.einsum("tri,tr->ti", matrix, target)
     return np.linalg.solve(left, right[..., None])[..., 0]
 

@@ -9,6 +9,7 @@ import numpy as np
 from imuarray.errors import InputError
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.motion_ml import motion_from
+from imuarray.geometry.array import require_planar_extent
 from imuarray.model import ArrayModel
 from imuarray.recording import Recording, array_of
 from imuarray.recording.channels import require_once
@@ -92,6 +93,7 @@ def select_dynamic(
     InputError where none moves off the rails, or a part of the recording is there twice.
     """
     require_once(recording)
+    require_planar_extent(recording.accelerometer_position, "recording")
     speed = np.linalg.norm(recording.angular_rate.mean(axis=1), axis=1)
     still = np.zeros(speed.shape, bool) if recording.stationary is None else recording.stationary
     force, rate = recording.saturated_accelerometers(), recording.saturated_gyroscopes()

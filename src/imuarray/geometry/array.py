@@ -69,13 +69,24 @@ def require_count(count: int, where: str, kind: str) -> None:
         raise InputError(f"{where}: expected at most {MAX_TRIADS} {kind} triads, found {count}")
 
 
+def require_apart(positions: np.ndarray, where: str) -> None:
+    """IdentifiabilityError for fewer than two triads, two at one place, or collinear ones."""
+    if len(positions) > 2:
+        require_planar_extent(positions, where)
+    elif len(positions) < 2 or np.array_equal(*positions):
+        raise IdentifiabilityError(
+            f"{where}: expected two accelerometer triads at least, at different places, found"
+            f" {len(positions)}"
+        )
+
+
 def require_planar_extent(positions: np.ndarray, where: str = "array") -> None:
     """Raise IdentifiabilityError for fewer than three or collinear triads (2017, section II)."""
     if len(positions) < 3:
         raise IdentifiabilityError(
             f"{where}: expected at least 3 accelerometer triads, found {len(positions)}: they"
             " measure the angular acceleration of each sample, which two leave open about the line"
-            " through them"
+            " through them (`calibrate`'s sensor model alone takes it from the gyroscopes)"
         )
     spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
     if spread[1] <= 1e-9 * max(spread[0], 1e-300) or spread[0] == 0.0:

@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.errors import LARGEST, SMALLEST, IdentifiabilityError, InputError
-from imuarray.geometry.array import require_count, require_planar_extent
+from imuarray.geometry.array import require_apart, require_count
 from imuarray.recording.record import (
     AXES,
     COVARIANCES,
@@ -85,7 +85,7 @@ def check_values(recording: Recording, where: str) -> None:
     for name in QUANTITIES:
         _check_finite(recording, name, where)
     _check_time(recording.time, where, declared=bool(recording.selected))
-    require_planar_extent(recording.accelerometer_position, f"{where}: accelerometer_position")
+    require_apart(recording.accelerometer_position, f"{where}: accelerometer_position")
     _check_range(recording, "specific_force", recording.accelerometer_range, where)
     _check_range(recording, "angular_rate", recording.gyroscope_range, where)
 
