@@ -97,23 +97,42 @@ def sawtooth(time, score, information):
         for fine in (1.0, 0.25, 0.06):
             around = best[1][1] if fine < 1 and best[0] > 0 else guess
             for trial in around + fine * width * np.linspace(-1, 1, 9):
-                gain, (period, phase, offset) = _shape(trial * time, score, information)
+                gain, (period, phase, offset) = _of_phases(trial * time, score, information)
                 if gain > best[0]:
                     turn = np.sign(period)  # the same sawtooth with time reversed
                     best = (gain, np.array([turn * period, turn * trial, turn * phase, offset, 0]))
     return best
 
 
-def _shape(turns, score, information, start=PHASES):
+def _shape(turns, score, information, start):
     """(gain, (P, phi, c)): best phase of a sawtooth of given turns (T,), by least squares.
 
     A negative period is the same sawtooth with time reversed.
     """
     shape = np.mod(turns[:, None] + start, 1.0) - 0.5
     weighted = information[:, None] * shape
-    a, b, c = np.sum(weighted * shape, 0), weighted.sum(0), information.sum()
+    squares, sums = np.sum(weighted * shape, 0), weighted.sum(0)
+    return _best(squares, sums, score @ shape, score.sum(), information.sum(), start)
+
+
+def _of_phases(turns, score, information):
+    """The same at all of `PHASES`, whose sums are those of so many parts of a turn."""
+    number, part = len(PHASES), turns - np.floor(turns)
+    place = np.minimum((number * part).astype(int), number - 1)
+    weights = (information, information * part, information * part**2, score, score * part)
+    none, one, two, zeroth, first = (np.bincount(place, w, number) for w in weights)
+    # what a phase adds to the parts of a turn, those that it takes past the turn's end one less
+    added = PHASES[:, None] - 0.5 - (np.arange(number) >= number - np.arange(number)[:, None])
+    return _best(
+        two.sum() + 2 * added @ one + added**2 @ none, one.sum() + added @ none,
+        first.sum() + added @ zeroth, score.sum(), information.sum(), PHASES,
+    )  # fmt: skip
+
+
+def _best(a, b, along, total, c, start):
+    """The best of several phases from sums over their sawtooths: squares, weights, scores."""
     # the reading is taken age earlier: the delay is minus the age
-    right, total = -(score @ shape), -score.sum()
+    right, total = -along, -total
     determinant = np.maximum(a * c - b**2, 1e-300)
     period, offset = (c * right - b * total) / determinant, (a * total - b * right) / determinant
     gain = period * right + offset * total - total**2 / np.maximum(c, 1e-300)
