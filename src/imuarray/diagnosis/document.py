@@ -26,6 +26,7 @@ from imuarray.engine.heldout import Scores, gain, log_scores
 from imuarray.engine.parameters import prior_precision
 from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.engine.widths import widths
+from imuarray.estimation.threads import one_thread
 from imuarray.geometry.array import require_planar_extent
 from imuarray.linear import scaled_inverse
 from imuarray.model.effects import DATA_EFFECTS, KINDS
@@ -87,6 +88,7 @@ class Diagnosis:
         return json.dumps(self.document, indent=1, allow_nan=False)
 
 
+@one_thread()
 def diagnose(
     recording: Recording, seed: int = 0, without=(), recording_path: str | Path = "",
     say: Callable[[str], None] = lambda text: None, replicates: int = 99,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from scipy.ndimage import uniform_filter1d
 
 from imuarray.engine.linearise import (
     CHUNK,
+    THREADS,
     Eliminated,
     RoughPrior,
     State,
@@ -89,15 +91,20 @@ class Fit:
 
     def normal(self, chosen, part=slice(None)) -> tuple[np.ndarray, np.ndarray]:
         """Information (n, n) and score (n,) of the ``chosen`` (N, m) bool, of some samples."""
-        size, mask = int(chosen.sum()), chosen[:, self.wanted]
-        information, score = np.zeros((size, size)), np.zeros(size)
-        first, last, _ = part.indices(len(self.residual))
-        for start in range(first, last, CHUNK):  # what is made of it is small
-            rows = slice(start, min(start + CHUNK, last))
-            inner, slope = normal(self.residual, self.whitened, self.basis, mask, rows)
-            information += inner
-            score += slope
-        return information, score
+        mask, (first, last, _) = chosen[:, self.wanted], part.indices(len(self.residual))
+
+        def over(starts):
+            information, score = np.zeros((mask.sum(), mask.sum())), np.zeros(mask.sum())
+            for start in starts:  # what is made of it is small
+                rows = slice(start, min(start + CHUNK, last))
+                inner, slope = normal(self.residual, self.whitened, self.basis, mask, rows)
+                information += inner
+                score += slope
+            return information, score
+
+        with ThreadPoolExecutor(THREADS) as pool:
+            found = list(pool.map(over, np.array_split(np.arange(first, last, CHUNK), THREADS)))
+        return sum(inner for inner, _ in found), sum(slope for _, slope in found)
 
     def through(self, columns) -> np.ndarray:
         """(T, N, D, n) some columns' coordinates in the motion's basis."""

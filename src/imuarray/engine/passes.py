@@ -16,6 +16,7 @@ from imuarray.engine.heldout import blocks_of
 from imuarray.engine.linearise import CHUNK, THREADS, State, chunk_at, directions_of, motion_step
 from imuarray.engine.parameters import Columns
 from imuarray.engine.readings import Readings
+from imuarray.estimation.threads import one_thread
 
 LEAST_FREE = 1e-3  # of a reading's variance that the motion leaves, or its size says nothing
 
@@ -33,6 +34,7 @@ class Pass(NamedTuple):
     unit: np.ndarray  # (T, N, 2) the same squares, each reading's of unit expectation
 
 
+@one_thread()  # the chunks have one each
 def normal_pass(
     readings: Readings, columns: Columns, state: State, active, improved: int = 1
 ) -> Pass:
