@@ -11,7 +11,7 @@ import numpy as np
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.tails import log_poisson
 from imuarray.engine.linearise import polynomial_derivative
-from imuarray.engine.readings import Readings
+from imuarray.engine.readings import Readings, part_of
 from imuarray.model.effects import KINDS
 from imuarray.recording.record import AXES
 
@@ -213,7 +213,8 @@ def find_structural(readings: Readings, without=()):
             causes += found
             readings = readings.without(lost)
     if SWAP not in without:
-        found, turns, mended = find_swaps(readings)
+        # each triad against each: a part tells
+        found, turns, mended = find_swaps(part_of(readings, SETTINGS.searched))
         causes += found
-        readings = undo_swaps(readings, turns)
+        readings = undo_swaps(readings, turns) if found else readings
     return causes, readings, mended
