@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 import imuarray
+from imuarray.analysis.beyond import posterior_beyond
+from imuarray.analysis.fitting import fitted_beyond
 from imuarray.analysis.past_rail import past_rail
 from imuarray.cli import main
 from imuarray.errors import InputError
@@ -100,3 +102,14 @@ def test_what_is_never_fast_is_refused(withheld, diagnosis):
     found = imuarray.diagnosed(diagnosis, recording)
     with pytest.raises(InputError, match="beyond 9000 deg/s, found none"):
         past_rail(recording, found, truth["position"].to_numpy(), bins=(9000, 9500))
+
+
+def test_a_diagnosis_is_a_model_to_sample(withheld, diagnosis):
+    """The density stands at the estimate from its effects: all coordinates within 5 sds."""
+    recording, truth = withheld
+    found = fitted_beyond(recording, str(diagnosis), (), print)
+    posterior = posterior_beyond(recording, found)
+    assert posterior.model.effects == ("gyroscope_scale",)
+    off = posterior.mode[:12] - truth["position"].to_numpy()[1:].ravel()
+    assert np.abs(off / np.sqrt(np.diag(posterior.covariance))[:12]).max() < 5
+    assert np.isfinite(posterior.generic()(posterior.mode, np.random.default_rng(1)))
