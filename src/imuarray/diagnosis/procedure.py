@@ -74,6 +74,7 @@ def run_procedure(
         )
     cleaned = drop_outliers(search)
     search = adopt(cleaned, first if cleaned is search else None)
+    del cleaned  # it has derivatives of its own
     say("fitting to the end")
     search = eliminate(search.refit(rough=False))
     search, clips = leave_out_clips(search, without)
