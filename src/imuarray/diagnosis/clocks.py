@@ -11,12 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from imuarray.diagnosis.clock_from_gyros import clocks_from_gyroscopes, enough_gyroscopes
 from imuarray.diagnosis.noise import few_at_once
 from imuarray.diagnosis.scores import Candidate, Scanned, Score
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.tails import log_chi_square
 from imuarray.engine.fit import Fit, flat_parameters, from_flat
+from imuarray.engine.gyroscope_clocks import clocks_from_gyroscopes, enough_gyroscopes
 from imuarray.engine.linearise import State, linearise
 from imuarray.engine.parameters import Columns
 from imuarray.engine.readings import Readings

@@ -55,7 +55,7 @@ class Fitted:
             return found, self.sds[: len(found), place]
         sds = np.sqrt(np.diag(widths(self.robust)[0]))
         whole = np.zeros(self.fit.active.shape)
-        whole[self.fit.active] = sds[self.robust.places[0]]
+        whole[self.robust.active] = sds[self.robust.places[0]]
         return self.robust.positions, whole[: len(found), place]
 
     def section(self) -> dict:
@@ -106,9 +106,7 @@ def diagnose(
     extended = fitted(search.fit, search.noise.correlation)
     nats = extended.scores.nats + nats_beside(found)
     say("estimating the extended model's positions")
-    robust = None
-    if search.smooth:  # where motion is rough the robust search ends elsewhere, and worse
-        robust = extended_estimate(found.whole, search.columns, search.active, search.fit.state)
+    robust = extended_estimate(found.whole, search.columns, search.active, search.fit.state)
     extended = replace(extended, scores=extended.scores._replace(nats=nats), robust=robust)
     base, inflated = rivals_of(found)
     rng = stream(seed, "diagnose", "replicates")

@@ -12,8 +12,10 @@ import numpy as np
 from imuarray.diagnosis.clocks import CLOCK, without_jumps
 from imuarray.diagnosis.procedure import prepared
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray.engine.clock_phases import with_phases
 from imuarray.engine.estimate import Estimate, Recorded, estimate
 from imuarray.engine.fit import flat_parameters
+from imuarray.engine.gyroscope_clocks import enough_gyroscopes
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import POSITION, Columns, columns_of
 from imuarray.engine.readings import Readings, most_informative
@@ -179,20 +181,22 @@ def diagnosed_estimate(path: str | Path, recording: Recording) -> Estimate:
 
 
 def extended_estimate(readings: Readings, columns: Columns, active, state: State) -> Estimate:
-    """The robust estimate of a diagnosis' extended model from where its search ended.
-
-    InputError for clocks where motion is rough: the search's own positions are better there.
-    """
-    readings = most_informative(readings, lambda text: None)
-    recorded = Recorded.of(readings, columns, state)
-    imus = [k for k in range(len(active)) if CLOCK in columns.names and np.any(
-        active[k, columns.of(CLOCK)])]  # fmt: skip
+    """The robust estimate of a diagnosis' extended model from where its search ended."""
+    recorded = Recorded.of(most_informative(readings, lambda text: None), columns, state)
+    clocked = active[:, columns.of(CLOCK)].any(axis=1) if CLOCK in columns.names else []
+    imus = [int(k) for k in np.flatnonzero(clocked)]
     if imus:
-        if not recorded.smooth:
-            raise InputError(
-                "recording: expected motion that is smooth at its sampling rate beside clocks,"
-                " found rough motion; take the positions that diagnosis.json has"
-            )
-        readings, _ = without_jumps(readings, columns, recorded.state, imus, SETTINGS.edge)
-        recorded = replace(recorded, readings=readings)
+        recorded = _timed(recorded, columns, imus)
     return settled(estimate([recorded], columns, active))
+
+
+def _timed(recorded: Recorded, columns: Columns, imus) -> Recorded:
+    """Each reading in its own clock's turn, or without those near the jumps of clocks ``imus``."""
+    state, readings = recorded.state, recorded.readings
+    if recorded.smooth or not enough_gyroscopes(readings, imus):
+        readings, _ = without_jumps(readings, columns, state, imus, SETTINGS.edge)
+        return replace(recorded, readings=readings)
+    state = state._replace(rough_prior=state.rough_prior.freed(3))
+    clocks = flat_parameters(columns, state)[:, columns.of(CLOCK)]
+    readings = with_phases(readings, state, {imu: clocks[imu] for imu in imus})
+    return replace(recorded, readings=readings, state=state)

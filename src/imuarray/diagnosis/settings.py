@@ -51,19 +51,13 @@ class Settings:
     changing: float = 0.05  # of a drift's chi-square that its change must gain
     steady_drift: float = -50.0  # log p of a drift that does not change: it is misattributed
 
-    # Clocks and shifts (`clocks`, `clock_from_gyros`, `shifts`)
+    # Clocks and shifts (`clocks`, `gyroscope_clocks`, `shifts`)
     sawtooth: float = -10.0  # log p of a sawtooth beyond a constant delay
     many: float = 2.6  # log of the independent sawtooths per sample, from simulated white scores
     fair: float = 0.05  # of the constant delay's chi-square that a sawtooth must add
     least_turns: int = 3  # of a clock against the host's; fewer are a drift of the delay
     edge: float = 0.03  # of a turn: how near to a clock's jump a reading is left out
     jitter: float = 0.04  # the same where clocks were estimated from the gyroscopes
-    enough: int = 4  # gyroscopes with a clock
-    least_gyroscope_samples: int = 200  # samples at which all of them were read
-    most_gyroscope_samples: int = 2500  # samples, those of the largest angular acceleration
-    rounds: int = 18  # of the search
-    reach: float = 0.1  # turns, rms, by which a first guess may be off
-    drawn_in: float = 0.85  # factor of the reach from round to round
     cuts: int = 24  # instants tried at first
 
     # Noise (`noise`, `noise_effects`, `procedure`)

@@ -30,7 +30,7 @@ from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import is_smooth, start
 from imuarray.model.effects import EFFECTS
 
-NORMAL = np.array([np.inf, np.inf])
+NORMAL, ROBUST = np.array([np.inf, np.inf]), np.array([4.0, 4.0])  # degrees of freedom
 
 
 @dataclass(frozen=True)
@@ -128,22 +128,28 @@ def estimate(
     ``active`` (N, m) bool. ``robust``: Student's t with estimated degrees of freedom instead of
     normal noise. ``steps``: at most. LinAlgError where the readings do not determine the motion.
     """
+    if any(one.state.gyroscopes_free for one in recorded):
+        active = active.copy()
+        active[active] &= ~held_where_rough(columns, active)
     places = places_of(columns, active, len(recorded))
     precision = pinned(recorded, columns, active, places)
     recorded, nu, length, last, moved = tuple(recorded), NORMAL, 1.0, np.inf, []
     for number in range(steps):
         recorded, passes = _passed(recorded, columns, active)
+        if robust:
+            nu = ROBUST if number < SETTINGS.robust_first else _freedoms(recorded, passes)
+        noisy = _judged(recorded, passes, columns, active, nu)
+        change = _noise_change(recorded, noisy)
         information, score, blocks = _summed(passes, places)
+        if number == 0:  # what is far out is to have no say in the first step
+            recorded = noisy
+            continue
         values = _values(recorded, columns, active, places)
         slope = score - precision @ (values - _means(recorded, columns, active, places))
         step, sds = scaled_solve(information + precision, slope)
         sds = np.maximum(sds, jackknifed(information + precision, blocks))
         moved.append(float(np.max(np.abs(step) / sds, initial=0.0)))
-        if robust and number >= SETTINGS.normal_first:
-            nu = _freedoms(recorded, passes)
-        noisy = _judged(recorded, passes, columns, active, nu)
-        change = _noise_change(recorded, noisy)
-        if moved[-1] < SETTINGS.settled and change < SETTINGS.same_noise and number > 3:
+        if moved[-1] < SETTINGS.settled and change < SETTINGS.same_noise and number > 4:
             break
         length = max(length / 2, SETTINGS.shortest) if moved[-1] > last else min(1.0, 1.5 * length)
         last = moved[-1]
@@ -153,7 +159,7 @@ def estimate(
         )
     return Estimate(
         recorded, passes, columns, active, places, information, precision, blocks, nu,
-        tuple(moved), moved[-1] < SETTINGS.settled,
+        tuple(moved), bool(moved) and moved[-1] < SETTINGS.settled,
     )  # fmt: skip
 
 
@@ -177,8 +183,19 @@ def _passed(recorded, columns, active):
     for one in recorded:
         state = with_derivatives(one.readings, one.state, one.smooth)
         seen.append(normal_pass(one.readings, columns, state, active))
-        moved.append(replace(one, state=state._replace(motion=seen[-1].motion)))
+        state = state._replace(motion=seen[-1].motion)
+        moved.append(replace(one, state=_sized(state, seen[-1].rough)))
     return tuple(moved), tuple(seen)
+
+
+def _sized(state: State, rough) -> State:
+    """The prior of rough motion as wide as is likeliest (MacKay's step), where readings tell."""
+    if state.rough_prior is None:
+        return state
+    told = rough[1] > SETTINGS.told * len(state.motion)
+    factors = np.sqrt(rough[0] / np.where(told, rough[1], 1.0))
+    factors = np.clip(factors, 1 / SETTINGS.widening, SETTINGS.widening)
+    return state._replace(rough_prior=state.rough_prior.scaled(np.where(told, factors, 1.0)))
 
 
 def _summed(passes, places):
@@ -210,13 +227,9 @@ def _means(recorded, columns, active, places) -> np.ndarray:
 
 
 def pinned(recorded, columns, active, places, resized=True) -> np.ndarray:
-    """Precision (n, n) of the priors, gauges pinned, and what does not move in rough motion."""
+    """Precision (n, n) of the priors, gauges pinned."""
     inner = prior_precision(columns, active, resized)
-    parts = []
-    for one in recorded:
-        held = held_where_rough(columns, active) * one.state.gyroscopes_free
-        parts.append(inner + np.diag(held / SETTINGS.held_sd**2))
-    return _assembled(parts, places)
+    return _assembled([inner] * len(recorded), places)
 
 
 def _assembled(parts, places) -> np.ndarray:

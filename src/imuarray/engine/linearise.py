@@ -12,7 +12,7 @@ import numpy as np
 from imuarray.engine.parameters import POSITION, Columns
 from imuarray.engine.readings import Readings
 from imuarray.model import ArrayModel
-from imuarray.model.effects import Instant, Prediction
+from imuarray.model.effects import Instant, Prediction, Turning
 from imuarray.model.jax64 import jax, jnp
 from imuarray.model.slopes import by_effects, stacked
 from imuarray.motion.state import Motion
@@ -22,24 +22,31 @@ CHUNK = 256  # samples per compiled call: one compiled shape, bounded memory
 
 
 class RoughPrior(NamedTuple):
-    """Normal prior of what rough motion adds to a sample's unknowns: mean and sd, (T, 9) each.
+    """Normal prior of what rough motion adds to a sample's unknowns: mean and sd, (T, 15) each.
 
-    omega double dot, s dot, and by how much the gyroscopes' omega dot differs: they and the
-    accelerometers have filters, and what is too fast for the samples passes them differently.
+    omega double dot, s dot, and by how much the gyroscopes' omega dot, omega double dot and omega
+    differ: they and the accelerometers have filters, and what is too fast for the samples passes
+    them differently.
     """
 
     mean: np.ndarray
     sd: np.ndarray
-    own: np.ndarray  # (T, 3) sd of what the gyroscopes' omega dot has of its own, once free
+    own: np.ndarray  # (T, 9) sd of what the gyroscopes have of their own, once free
 
-    def freed(self) -> RoughPrior:
-        """The gyroscopes' omega dot free."""
-        return self._replace(sd=np.hstack([self.sd[:, :6], self.own]))
+    def freed(self, parts: int = 1) -> RoughPrior:
+        """The first ``parts`` of what the gyroscopes see free: omega dot, double dot, omega."""
+        wide = np.hstack([self.own[:, : 3 * parts], self.sd[:, 6 + 3 * parts :]])
+        return self._replace(sd=np.hstack([self.sd[:, :6], wide]))
+
+    def scaled(self, factors) -> RoughPrior:
+        """The sds of each three components times a factor (G,)."""
+        wide = np.repeat(factors, 3)
+        return self._replace(sd=wide * self.sd, own=wide[6:] * self.own)
 
     @property
     def free(self) -> bool:
         """Whether the gyroscopes' omega dot is free."""
-        return bool(np.any(self.sd[:, 6:] == self.own))
+        return bool(np.all(self.sd[:, 6:9] == self.own[:, :3]))
 
 
 class State(NamedTuple):
@@ -87,14 +94,14 @@ class Eliminated(NamedTuple):
 
 def _instant(x, positions, extra, time, span) -> Instant:
     """What effects may look at, at one sample."""
-    jerk, force_rate, second, third = extra
-    turn = None
+    jerk, force_rate, second, third, wander = (*extra, 0.0)[:5]
+    own = None
     if len(x) > KNOWN:
         jerk, force_rate = x[9:12], x[12:15]
     if len(x) > 15:
-        turn = x[3:6] + x[15:18]
+        own = Turning(x[:3] + x[21:24], x[3:6] + x[15:18], jerk + x[18:21])
     motion = Motion(x[:3], x[3:6], x[6:9], jerk, force_rate)
-    return Instant(motion, positions, time, span, second, third, turn)
+    return Instant(motion, positions, time, span, second, third, own, wander)
 
 
 def reading(model, count, x, positions, parameters, extra, time, span):
@@ -202,12 +209,14 @@ def chunk_at(readings: Readings, columns: Columns, state: State, directions, sta
 
 def _chunk_of(readings: Readings, state: State, start):
     """(indices (CHUNK,), motion, derivatives, the motion's prior) of a chunk."""
-    return _rows_of(state, np.minimum(np.arange(start, start + CHUNK), len(readings.values) - 1))
+    return _rows_of(
+        readings, state, np.minimum(np.arange(start, start + CHUNK), len(readings.values) - 1)
+    )
 
 
-def _rows_of(state: State, index):
+def _rows_of(readings: Readings, state: State, index):
     """The same of any samples."""
-    extra = jax.tree.map(lambda field: field[index], state.derivatives)
+    extra = jax.tree.map(lambda field: field[index], (*state.derivatives, readings.wandered))
     nothing = np.zeros((len(index), 0))
     prior = (nothing, nothing)
     if state.rough_prior is not None:
@@ -235,7 +244,7 @@ def motion_equations(readings: Readings, model: ArrayModel, state: State, index,
     Information, score and squared residuals, the prior's included. ``rails`` (T, N, 6): weights of
     readings that count as far as the prediction falls short of them.
     """
-    index, x, extra, (mean, sd) = _rows_of(state, index)
+    index, x, extra, (mean, sd) = _rows_of(readings, state, index)
     one_sided = None if rails is None else rails[index]
     gram, slope, cost = map(np.array, _motion(
         model, readings.values.shape[1], x, extra, readings.time[index], readings.span,

@@ -13,7 +13,15 @@ import numpy as np
 
 from imuarray.engine.fit import normal, padded
 from imuarray.engine.heldout import blocks_of
-from imuarray.engine.linearise import CHUNK, THREADS, State, chunk_at, directions_of, motion_step
+from imuarray.engine.linearise import (
+    CHUNK,
+    KNOWN,
+    THREADS,
+    State,
+    chunk_at,
+    directions_of,
+    motion_step,
+)
 from imuarray.engine.parameters import Columns
 from imuarray.engine.readings import Readings
 from imuarray.estimation.threads import one_thread
@@ -32,6 +40,7 @@ class Pass(NamedTuple):
     squares: np.ndarray  # (T, N, 2) squared residuals of each triad
     freedom: np.ndarray  # (T, N, 2) their expectation where noise is as assumed
     unit: np.ndarray  # (T, N, 2) the same squares, each reading's of unit expectation
+    rough: np.ndarray  # (2, G) of what rough motion adds: squares in prior sds, and how many it saw
 
 
 @one_thread()  # the chunks have one each
@@ -61,11 +70,13 @@ def normal_pass(
         left = np.where(readings.keep[part], 1.0 - leverage, 0.0)
         squares[part], freedom[part] = _by_triad(residual**2), _by_triad(left)
         unit[part] = _by_triad(residual**2 / np.maximum(1.0 - leverage, LEAST_FREE))
+        rough = _seen_of_prior(here, motion[part], seen.inverse[:used], part)
         known = [
             (block, *normal(seen.residual, seen.whitened, seen.basis, few, rows))
             for block, rows in _inside(blocks, part)
         ]
-        return known, float(np.sum(seen.misfit[:used])), float(np.sum(seen.taken[:used] ** 2))
+        taken = float(np.sum(seen.taken[:used] ** 2))
+        return known, float(np.sum(seen.misfit[:used])), taken, rough
 
     with ThreadPoolExecutor(THREADS) as pool:
         found = list(pool.map(one, range(0, samples, CHUNK)))
@@ -75,8 +86,22 @@ def normal_pass(
         # in order, whichever thread was first
         information[block] += inner
         score[block] += slope
-    misfit, taken = sum(f[1] for f in found), sum(f[2] for f in found)
-    return Pass(information, score, motion, misfit, taken, squares, freedom, unit)
+    misfit, taken, rough = (sum(f[part] for f in found) for part in (1, 2, 3))
+    return Pass(information, score, motion, misfit, taken, squares, freedom, unit, rough)
+
+
+def _seen_of_prior(state: State, motion, inverse, part) -> np.ndarray:
+    """(2, G) sums over a part's samples and each three components that rough motion adds.
+
+    Squares of their distance from the prior's mean in its sds; and of how many of them the readings
+    tell more than the prior does (1 less the posterior's share of its variance).
+    """
+    if state.rough_prior is None:
+        return np.zeros((2, 0))
+    sd = state.rough_prior.sd[part]
+    off = (motion[:, KNOWN:] - state.rough_prior.mean[part]) / sd
+    left = np.sum(inverse[..., KNOWN:] ** 2, axis=1) / sd**2
+    return np.array([np.sum(off**2, axis=0), np.sum(1.0 - left, axis=0)]).reshape(2, -1, 3).sum(-1)
 
 
 def _inside(blocks, part: slice) -> list[tuple[int, slice]]:

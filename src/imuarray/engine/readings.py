@@ -35,6 +35,7 @@ class Readings:
         a correction left in them, as a recording has them; or None
     gapless : bool, whether samples have neighbours that say something of time derivatives
     trust : (T, N, 2) square roots of a robust loss' weights, or None for all one
+    wander : (T, N) turns by which the IMUs' clocks depart from a steady drift, or None for none
     labels : N str
     """
 
@@ -54,6 +55,7 @@ class Readings:
     scale_sd: float = np.nan
     left: tuple[np.ndarray | None, np.ndarray | None] = (None, None)
     trust: np.ndarray | None = None
+    wander: np.ndarray | None = None
 
     @property
     def weights(self) -> np.ndarray:
@@ -69,6 +71,12 @@ class Readings:
     def pair(self) -> bool:
         """Whether two accelerometers leave omega_dot open about the line that joins them."""
         return self.array.accelerometers == 2
+
+    @property
+    def wandered(self) -> np.ndarray:
+        """`wander`, zeros where there is none."""
+        none = np.zeros(self.values.shape[:2])
+        return none if self.wander is None else self.wander
 
     @property
     def window(self) -> int:
@@ -90,10 +98,10 @@ class Readings:
     def select(self, used) -> Readings:
         """The samples in ``used`` (T,) bool, in new runs."""
         time = self.time[used]
-        trust = None if self.trust is None else self.trust[used]
+        trust, wander = (None if p is None else p[used] for p in (self.trust, self.wander))
         return replace(
             self, time=time, values=self.values[used], keep=self.keep[used], run=runs(time),
-            trust=trust,
+            trust=trust, wander=wander,
         )  # fmt: skip
 
 
@@ -160,10 +168,7 @@ def _stretches(readings: Readings, stretch, used) -> Readings:
         used[used] = long
         both = both[long]
     run = np.unique(both, return_inverse=True)[1]
-    return replace(
-        readings, time=readings.time[used], values=readings.values[used],
-        keep=readings.keep[used], run=run,
-    )  # fmt: skip
+    return replace(readings.select(used), run=run)  # fmt: skip
 
 
 def odd_window(time) -> int:

@@ -14,6 +14,7 @@ from imuarray.engine.readings import Readings
 
 FREEDOMS = np.array([3.0, 4.0, 6.0, 10.0, 20.0, 50.0, np.inf])
 ROUNDS = 20  # of the scale that goes with each of them
+MEDIAN = 2.37  # of chi-square of three readings
 
 
 def judged(readings: Readings, seen: Pass, owned, former: np.ndarray) -> Readings:
@@ -24,14 +25,21 @@ def judged(readings: Readings, seen: Pass, owned, former: np.ndarray) -> Reading
     """
     free = seen.freedom.sum(axis=0)
     free = np.maximum(free - owned, 0.1 * free)
-    ratio = np.where(free > 0, seen.squares.sum(axis=0) / np.where(free > 0, free, 1.0), 1.0)
-    sd = readings.sd * np.sqrt(np.where(readings.exists, ratio, 1.0))
     number = readings.keep.reshape(*readings.keep.shape[:2], 2, 3).sum(axis=-1)
-    distance = distances(readings, seen) * (readings.sd / sd) ** 2
-    weight = np.ones_like(distance)
+    trust = 1.0 if readings.trust is None else readings.trust
+    squares, distance = seen.squares / trust**2, distances(readings, seen)
+    ratio, weight = np.ones_like(free), np.ones_like(distance)
     for kind, nu in enumerate(former):
-        if np.isfinite(nu):
-            weight[..., kind] = (nu + number[..., kind]) / (nu + distance[..., kind])
+        own = readings.exists[:, kind] & (free[:, kind] > 0)
+        d, n, s = (part[:, own, kind] for part in (distance, number, squares))
+        if not np.isfinite(nu):
+            ratio[own, kind] = s.sum(axis=0) / free[own, kind]
+            continue
+        scale = np.median(d, axis=0) / MEDIAN
+        for _ in range(ROUNDS):
+            scale = np.sum((nu + n) / (nu + d / scale) * s, axis=0) / free[own, kind]
+        ratio[own, kind], weight[:, own, kind] = scale, (nu + n) / (nu + d / scale)
+    sd = readings.sd * np.sqrt(ratio)
     return readings.with_noise(sd, np.sqrt(weight) if np.isfinite(former).any() else None)
 
 

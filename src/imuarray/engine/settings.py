@@ -32,6 +32,9 @@ class Settings:
     wide: float = 10.0  # prior sd of the third derivatives, in sizes of the differences near by
     # prior sd of what the gyroscopes alone see of omega_dot, in its steps
     gyroscopes_own: float = 2.0
+    offset: float = 1e-5  # s, of what they see of omega, for each of that
+    told: float = 0.03  # of these that readings must tell, for their sds to be estimated
+    widening: float = 3.0  # factor by which an iteration may change such an sd
     tied: float = 1e-5  # of that sd, as long as it is not free
     near: int = 9  # samples that give the size of the motion's third derivatives
     stiff: float = 1e-3  # of a parameter's prior sd: the sd that a pinned mean keeps
@@ -39,7 +42,7 @@ class Settings:
     # Robust estimation of several recordings (`estimate`)
     iterations: int = 40  # Gauss-Newton steps at most
     rung_steps: int = 6  # the same while rungs of the sensor model are tried
-    normal_first: int = 2  # of them with normal noise, until readings far out are seen
+    robust_first: int = 4  # of them with Student's t of 4, until readings far out are seen
     settled: float = 0.05  # of a parameter's sd, a jackknife's where larger: shorter steps end it
     same_noise: float = 0.005  # relative change of a noise sd below which it is the same
     dense: float = 0.5  # share of samples in gapless runs from which neighbours are looked at
@@ -47,6 +50,19 @@ class Settings:
 
     # Held-out time (`heldout`)
     blocks: int = 10  # blocks of time that are held out in turn
+
+    # Clocks from the gyroscopes alone (`gyroscope_clocks`)
+    enough: int = 4  # gyroscopes with a clock
+    least_gyroscope_samples: int = 200  # samples at which all of them were read
+    most_gyroscope_samples: int = 2500  # samples, those of the largest angular acceleration
+    rounds: int = 18  # of the search
+    reach: float = 0.1  # turns, rms, by which a first guess may be off
+    drawn_in: float = 0.85  # factor of the reach from round to round
+    knot: float = 10.0  # s, of moving time between the knots of a clock's phase
+    phase_rounds: int = 20  # of the search for phases
+    most_knots: int = 40  # of them
+    jump_jitter: float = 0.1  # turns; a reading farther off is of another turn, and tells no phase
+    around_jump: float = 0.25  # turns from a clock's jump within which a reading's side is asked
 
 
 SETTINGS = Settings()

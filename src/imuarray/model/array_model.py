@@ -155,16 +155,18 @@ class ArrayModel:
         triad, ``parameters`` (P,) flat effect parameters; ``when`` is what else an `Instant`
         holds: time (s), span (s), second and third derivatives.
         """
-        predicted, instant = self.ideal(motion, positions), Instant(motion, positions, **when)
+        instant = Instant(motion, positions, **when)
+        predicted = self.ideal(instant)
         values = self.split(jnp.asarray(parameters)) if self.effects else {}
         for item in self.chain:
             predicted = item.apply(values[item.id], instant, predicted)
         return predicted
 
-    def ideal(self, motion: Motion, positions) -> Prediction:
+    def ideal(self, instant: Instant) -> Prediction:
         """The same without effects: what they are applied to."""
-        rate = jnp.broadcast_to(motion.angular_rate, (self.array.gyroscopes, 3))
-        return Prediction(kinematics.specific_force(motion, positions), rate)
+        seen = instant.gyroscopes or instant.motion
+        rate = jnp.broadcast_to(seen[0], (self.array.gyroscopes, 3))
+        return Prediction(kinematics.specific_force(instant.motion, instant.positions), rate)
 
     def predict_many(
         self, motion: Motion, positions, parameters=(), time=None, span: float | None = None

@@ -27,12 +27,20 @@ class Prediction(NamedTuple):
     angular_rate: object  # (G, 3) rad/s
 
 
+class Turning(NamedTuple):
+    """Turning as one kind of sensor sees it, its filter between: each (3,)."""
+
+    rate: object  # rad/s
+    acceleration: object  # rad/s^2
+    jerk: object  # rad/s^3
+
+
 class Instant(NamedTuple):
     """The truth an effect may look at: the motion, where the triads are and what time it is.
 
     ``second`` and ``third`` are the ideal measurement's time derivatives of those orders, zero
     where they are not known (only a recording's smooth motion determines them). Where it is rough,
-    the gyroscopes' filters may pass another angular acceleration than the accelerometers' do.
+    the gyroscopes' filters may pass another turning than the accelerometers' do.
     """
 
     motion: Motion
@@ -41,7 +49,8 @@ class Instant(NamedTuple):
     span: object = 1.0  # s, the recording's length
     second: Prediction = Prediction(0.0, 0.0)
     third: Prediction = Prediction(0.0, 0.0)
-    gyroscope_acceleration: object = None  # omega dot as the gyroscopes see it, where that is free
+    gyroscopes: Turning | None = None  # as they see the motion, where that is free
+    wander: object = 0.0  # turns by which the IMUs' clocks depart from a steady drift, (N,)
 
 
 @dataclass(frozen=True)

@@ -31,11 +31,14 @@ def _rate_later(tau, instant, common):
     """What the angular rate gains in ``tau`` (n, 1) s.
 
     Where the angular acceleration seen by the gyroscopes is free, a delay against the
-    accelerometers (``common``) has the mean of both, any other that one.
+    accelerometers (``common``) is the integral between both, any other has the gyroscopes'.
     """
-    turn, own = instant.motion.angular_acceleration, instant.gyroscope_acceleration
+    turn, own = instant.motion.angular_acceleration, instant.gyroscopes
+    if own is not None and common:
+        bent = own.jerk - instant.motion.angular_jerk
+        return tau * ((turn + own.acceleration) / 2 - tau / 12 * bent)
     if own is not None:
-        return tau * (turn + own) / 2 if common else tau * own
+        return tau * (own.acceleration + tau / 2 * own.jerk)
     return tau * (
         turn + tau / 2 * (instant.second.angular_rate + tau / 3 * instant.third.angular_rate)
     )
@@ -89,7 +92,7 @@ def sensor_clock(clock, instant, predicted):
     """
     period, _, _, offset, _ = clock.T
     turns = clock_turns(clock.T, instant.time, instant.span)
-    age = offset + period * (turns - jnp.floor(turns) - 0.5)
+    age = offset + period * (turns - jnp.floor(turns) - 0.5 + instant.wander)
     return later(-age, instant, predicted)
 
 

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.readings import Readings
+from imuarray.engine.settings import SETTINGS
 from imuarray.model.timing import clock_turns
 
 UNIT = 1e-3  # s, of the ages until their size is known
@@ -35,7 +35,7 @@ def clocks_from_gyroscopes(readings: Readings, acceleration, clocks: dict) -> di
     """{imu: (P, f, phi, c, g)} from as many first guesses of the same form.
 
     ``acceleration`` (T, 3): omega_dot by the accelerometers. The period that all get makes what the
-    gyroscopes see turn as much as what the accelerometers see.
+    gyroscopes see turn as much as what the accelerometers see, where that is smooth.
     """
     imus = sorted(clocks)
     seen = informative(readings, acceleration, imus)
@@ -55,10 +55,25 @@ def clocks_from_gyroscopes(readings: Readings, acceleration, clocks: dict) -> di
     ages = ages_of(guess, seen)
     motion, left = moved(seen, maps, ages, np.ones(ages.shape))
     motion = moved(seen, maps, ages, robust(left, size))[0]
-    both = [np.sqrt(np.mean(part**2)) for part in (motion[:, 3:], seen.acceleration)]
-    sign = np.sign(np.sum(motion[:, 3:] * seen.acceleration))
-    guess[:, 0] = sign * UNIT * both[0] / both[1]
+    guess[:, 0] = UNIT * as_much(motion[:, 3:], seen.acceleration)
     return dict(zip(imus, guess, strict=True))
+
+
+def as_much(turn, acceleration) -> float:
+    """The factor by which ``turn`` (T, 3) is as large as omega_dot, in the smoother half: a median.
+
+    What is too fast for the samples passes the two kinds of filter differently.
+    """
+    both = np.array([turn, acceleration])
+    usual = np.sqrt(np.mean(np.sum(both**2, axis=2), axis=1))
+    # both alike, or those that are large in one of them would be smaller in the other
+    size = np.linalg.norm(both / usual[:, None, None], axis=(0, 2))
+    near = np.zeros(len(turn))
+    near[1:-1] = np.linalg.norm(np.diff(both / usual[:, None, None], 2, axis=1), axis=(0, 2))
+    large = size > 0.5
+    smooth = large & (near <= np.median((near / size)[large]) * size)
+    ratio = np.divide(*np.linalg.norm(both[:, smooth], axis=2))
+    return float(np.sign(np.sum(turn * acceleration)) * np.median(ratio))
 
 
 def enough_gyroscopes(readings: Readings, imus) -> bool:
@@ -88,27 +103,41 @@ def ages_of(clocks, seen: Gyroscopes) -> np.ndarray:
     return clocks[:, 0] * (np.mod(clock_turns(clocks.T, seen.time[:, None], seen.span), 1) - 0.5)
 
 
-def moved(seen: Gyroscopes, maps, ages, weights):
-    """omega and omega_dot (T, 6) by weighted least squares, and what is left (T, K, 3)."""
-    matrix = np.broadcast_to(maps[..., :3], (*ages.shape, 3, 3))
-    matrix = np.concatenate([matrix, -ages[..., None, None] * matrix], axis=-1)
-    target = seen.values - maps[..., 3]
-    heavy = weights[..., None, None] * matrix
-    gram = np.einsum("tkia,tkib->tab", heavy, matrix, optimize=True)
+def moved(seen: Gyroscopes, maps, ages, weights, stiffness=None):
+    """omega and omega_dot (T, 6) by weighted least squares, and what is left (T, K, 3).
+
+    ``stiffness`` (T, 3): omega double dot is free, too, (T, 9); its precision, a reading's being 1.
+    """
+    samples, number = len(ages), 2 if stiffness is None else 3
+    powers = np.stack([np.ones_like(ages), -ages, ages**2 / 2][:number], axis=-1)
+    matrix, target = maps[..., :3], seen.values - maps[..., 3]
+    heavy = weights[..., None] * powers
+    both = (heavy[..., None] * powers[..., None, :]).reshape(samples, len(maps), -1)
+    square = (np.swapaxes(matrix, 1, 2) @ matrix).reshape(len(maps), 9)
+    gram = np.tensordot(both, square, axes=(1, 0)).reshape(samples, number, number, 3, 3)
+    gram = np.swapaxes(gram, 2, 3).reshape(samples, 3 * number, 3 * number)
+    turned_back = np.einsum("kji,tkj->tki", matrix, target)
+    right = np.einsum("tka,tki->tai", heavy, turned_back).reshape(samples, -1)
     # ages that agree at a sample do not determine it: it is the accelerometers' then
-    ridge = 1e-3 * UNIT**2 * np.eye(3)
-    gram[:, 3:, 3:] += ridge
-    right = np.einsum("tkia,tki->ta", heavy, target)
-    right[:, 3:] += seen.acceleration @ ridge
+    ridge = 1e-3 * UNIT**2
+    precision = np.full((samples, 3 * number), ridge) * (np.arange(3 * number) // 3 == 1)
+    if stiffness is not None:
+        precision[:, 6:] = stiffness
+    every = np.arange(3 * number)
+    gram[:, every, every] += precision
+    right[:, 3:6] += ridge * seen.acceleration
     motion = np.linalg.solve(gram, right[..., None])[..., 0]
-    return motion, target - np.einsum("tkia,ta->tki", matrix, motion)
+    along = np.einsum("tka,tai->tki", powers, motion.reshape(samples, number, 3))
+    return motion, target - np.einsum("kij,tkj->tki", matrix, along)
 
 
 def remapped(seen: Gyroscopes, motion, ages, weights) -> np.ndarray:
     """(K, 3, 4) each gyroscope's own map and bias, their mean that of perfect ones."""
     maps = []
     for k in range(ages.shape[1]):
-        rate = motion[:, :3] - ages[:, k, None] * motion[:, 3:]
+        rate = motion[:, :3] - ages[:, k, None] * motion[:, 3:6]
+        if motion.shape[1] > 6:
+            rate = rate + ages[:, k, None] ** 2 / 2 * motion[:, 6:]
         full = np.hstack([rate, np.ones((len(rate), 1))])
         heavy = weights[:, k, None] * full
         maps.append(np.linalg.solve(heavy.T @ full, heavy.T @ seen.values[:, k]).T)

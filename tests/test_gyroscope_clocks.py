@@ -3,12 +3,15 @@
 import numpy as np
 import pytest
 
-from imuarray.diagnosis.clock_from_gyros import (
+from imuarray.engine.clock_phases import with_phases
+from imuarray.engine.gyroscope_clocks import (
     Gyroscopes,
     ages_of,
     clocks_from_gyroscopes,
     moved,
 )
+from imuarray.engine.linearise import RoughPrior, State, no_derivatives
+from imuarray.engine.readings import Readings
 from imuarray.model.timing import clock_turns
 
 PERIOD, SPAN, NOISE = 1e-3, 90.0, 0.004
@@ -75,3 +78,34 @@ def test_with_true_ages_only_noise_is_left():
     np.testing.assert_allclose(motion[100].reshape(2, 3), expected, rtol=0.02, atol=0.02)
     # two of eight readings are used up; the maps' own percent of the rate is left in this test
     assert np.sqrt(np.mean(left**2)) < 0.01 * 15 * np.sqrt(3)
+
+
+def test_phases_that_wander_and_jumps_that_jitter_are_found_reading_by_reading():
+    there, rng = Rough(4, samples=1500, wrong=0.0), np.random.default_rng(4)
+    steady = clock_turns(there.clocks.T, there.time[:, None], SPAN)
+    turns = steady + 0.1 * np.sin(2 * np.pi * there.time[:, None] / 40 + np.arange(8))
+    jumps = np.floor(turns - 0.08 + rng.normal(0, 0.05, turns.shape))
+    ages = PERIOD * (turns - jumps - 0.5)
+    rate = rng.normal(0, 15, (len(ages), 3))
+    there.values[..., 3:] = rate[:, None] - ages[..., None] * there.turn[:, None]
+    there.values[..., 3:] += rng.normal(0, NOISE, there.values[..., 3:].shape)
+    every = np.ones((8, 2))
+    readings = Readings(
+        None, there.time, SPAN, there.values, there.keep, every > 0, NOISE * every, NOISE * every,
+        np.zeros(len(ages), int), tuple("12345678"), 1e-3,
+    )  # fmt: skip
+    motion = np.hstack([rate, there.acceleration, 0 * rate])
+    nothing = np.zeros((len(ages), 15))
+    prior = RoughPrior(nothing, nothing, np.full((len(ages), 9), 1e3))
+    state = State(motion, np.zeros((8, 3)), np.empty(0), no_derivatives(len(ages), 8), prior)
+    found = with_phases(readings, state, dict(enumerate(there.clocks)))
+    off = steady - np.floor(steady) - 0.5 + found.wander - ages / PERIOD
+    # a turn common to all is the motion's; where the board hardly turns nothing tells
+    off -= np.median(off, axis=1, keepdims=True)
+    told = np.linalg.norm(there.turn, axis=1) > 200
+    assert np.median(np.abs(off[told])) < 0.01
+    # left are samples with several readings beside a jump at once
+    assert np.mean(np.abs(off[told]) > 0.3) < 0.03
+    # the clock's own jumps leave as many readings a turn off as jitter and the jump's place do
+    plain = steady - np.floor(steady) - 0.5 - ages / PERIOD
+    assert np.mean(np.abs(plain[told]) > 0.3) > 0.09
