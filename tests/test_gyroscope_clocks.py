@@ -96,7 +96,7 @@ def test_phases_that_wander_and_jumps_that_jitter_are_found_reading_by_reading()
     )  # fmt: skip
     motion = np.hstack([rate, there.acceleration, 0 * rate])
     nothing = np.zeros((len(ages), 15))
-    prior = RoughPrior(nothing, nothing, np.full((len(ages), 9), 1e3))
+    prior = RoughPrior(nothing, nothing + 1e3, nothing)
     state = State(motion, np.zeros((8, 3)), np.empty(0), no_derivatives(len(ages), 8), prior)
     found = with_phases(readings, state, dict(enumerate(there.clocks)))
     off = steady - np.floor(steady) - 0.5 + found.wander - ages / PERIOD

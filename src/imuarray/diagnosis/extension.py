@@ -14,7 +14,7 @@ from imuarray.diagnosis.procedure import prepared
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.clock_phases import with_phases
 from imuarray.engine.estimate import Estimate, Recorded, estimate
-from imuarray.engine.fit import flat_parameters
+from imuarray.engine.fit import flat_parameters, with_free_gyroscopes
 from imuarray.engine.gyroscope_clocks import enough_gyroscopes
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import POSITION, Columns, columns_of
@@ -196,7 +196,7 @@ def _timed(recorded: Recorded, columns: Columns, imus) -> Recorded:
     if recorded.smooth or not enough_gyroscopes(readings, imus):
         readings, _ = without_jumps(readings, columns, state, imus, SETTINGS.edge)
         return replace(recorded, readings=readings)
-    state = state._replace(rough_prior=state.rough_prior.freed(3))
+    state = with_free_gyroscopes(readings, state)
     clocks = flat_parameters(columns, state)[:, columns.of(CLOCK)]
     readings = with_phases(readings, state, {imu: clocks[imu] for imu in imus})
     return replace(recorded, readings=readings, state=state)

@@ -20,7 +20,10 @@ from imuarray.model.timing import clock_turns
 
 
 def with_phases(readings: Readings, state: State, clocks: dict) -> Readings:
-    """The readings with the `wander` of clocks {imu: (P, f, phi, c, g)}; state: of rough motion."""
+    """The readings with the `wander` of clocks {imu: (P, f, phi, c, g)}.
+
+    ``state``: one of rough motion, `with_free_gyroscopes`.
+    """
     imus = sorted(clocks)
     values = np.array([clocks[imu] for imu in imus])
     kept = readings.keep[:, imus, 3:].all(axis=2)
@@ -31,7 +34,7 @@ def with_phases(readings: Readings, state: State, clocks: dict) -> Readings:
         state.motion[used, 3:6],
     )  # fmt: skip
     noise = np.sqrt(np.mean(readings.declared[imus, 1] ** 2))
-    stiffness = (noise / state.rough_prior.own[used, 3:6]) ** 2
+    stiffness = (noise / state.rough_prior.sd[used, 9:12]) ** 2
     every = splines(readings.time, seen.time)
     shift, place, jumps = _phases(
         seen, values[:, 0], steady[used], kept[used], stiffness, every[used]

@@ -274,23 +274,37 @@ def with_rough_prior(readings: Readings, state: State) -> State:
     Their prior has the polynomials' mean, and for sd ten times the size of the differences near by.
     It is that of the first motion and stays: one that followed the fit would shrink with it.
     What the gyroscopes' omega dot may have of its own is as large as twice the step from a sample
-    to the next, once it is `freed`; so is their omega double dot.
+    to the next, once it is `freed`.
     """
     dt = np.median(np.diff(readings.time))
     found = derivatives(readings, state.motion, state.positions)
-    mean = np.hstack([*found[:2], *3 * [np.zeros_like(found[0])]])
+    mean = np.hstack([*found[:2], np.zeros_like(found[0])])
     steps = np.diff(state.motion[:, 3:], axis=0, append=state.motion[-1:, 3:]) / dt
     steps[np.diff(readings.run, append=readings.run[-1]) > 0] = 0.0
     near = uniform_filter1d(np.mean(steps.reshape(-1, 2, 3) ** 2, axis=-1), SETTINGS.near, axis=0)
     size = np.repeat(np.sqrt(near) + 0.1 * np.sqrt(near.mean(axis=0)), 3, axis=1)
     own = SETTINGS.gyroscopes_own * dt * size[:, :3]
-    own = np.hstack([own, SETTINGS.wide * size[:, :3], SETTINGS.offset * own])
     sd = np.hstack([SETTINGS.wide * size, SETTINGS.tied * own])
     nothing = no_derivatives(len(mean), len(state.positions))
     return state._replace(
         motion=np.hstack([state.motion, mean]), derivatives=nothing,
         rough_prior=RoughPrior(mean, sd, own),
     )  # fmt: skip
+
+
+def with_free_gyroscopes(readings: Readings, state: State) -> State:
+    """The state where all that gyroscopes see of rough motion is free: to third order, and omega.
+
+    The sds are where an `estimate` begins, which sizes them.
+    """
+    prior = state.rough_prior.freed()
+    dt, nothing = np.median(np.diff(readings.time)), np.zeros((len(readings.time), 6))
+    third = SETTINGS.wide / (SETTINGS.gyroscopes_own * dt) * prior.own
+    sd = np.hstack([prior.sd, third, SETTINGS.offset * prior.own])
+    return state._replace(
+        motion=np.hstack([state.motion, nothing]),
+        rough_prior=prior._replace(mean=np.hstack([prior.mean, nothing]), sd=sd),
+    )
 
 
 def flat_parameters(columns: Columns, state: State) -> np.ndarray:

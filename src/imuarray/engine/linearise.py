@@ -22,31 +22,30 @@ CHUNK = 256  # samples per compiled call: one compiled shape, bounded memory
 
 
 class RoughPrior(NamedTuple):
-    """Normal prior of what rough motion adds to a sample's unknowns: mean and sd, (T, 15) each.
+    """Normal prior of what rough motion adds to a sample's unknowns: mean and sd, (T, 9) each.
 
-    omega double dot, s dot, and by how much the gyroscopes' omega dot, omega double dot and omega
-    differ: they and the accelerometers have filters, and what is too fast for the samples passes
-    them differently.
+    omega double dot, s dot, and by how much the gyroscopes' omega dot differs: they and the
+    accelerometers have filters, and what is too fast for the samples passes them differently.
+    Six more where clocks are known reading by reading: omega double dot and omega of that kind.
     """
 
     mean: np.ndarray
     sd: np.ndarray
-    own: np.ndarray  # (T, 9) sd of what the gyroscopes have of their own, once free
+    own: np.ndarray  # (T, 3) sd of what the gyroscopes' omega dot has of its own, once free
 
-    def freed(self, parts: int = 1) -> RoughPrior:
-        """The first ``parts`` of what the gyroscopes see free: omega dot, double dot, omega."""
-        wide = np.hstack([self.own[:, : 3 * parts], self.sd[:, 6 + 3 * parts :]])
-        return self._replace(sd=np.hstack([self.sd[:, :6], wide]))
+    def freed(self) -> RoughPrior:
+        """The gyroscopes' omega dot free."""
+        return self._replace(sd=np.hstack([self.sd[:, :6], self.own]))
 
     def scaled(self, factors) -> RoughPrior:
         """The sds of each three components times a factor (G,)."""
         wide = np.repeat(factors, 3)
-        return self._replace(sd=wide * self.sd, own=wide[6:] * self.own)
+        return self._replace(sd=wide * self.sd, own=wide[6:9] * self.own)
 
     @property
     def free(self) -> bool:
         """Whether the gyroscopes' omega dot is free."""
-        return bool(np.all(self.sd[:, 6:9] == self.own[:, :3]))
+        return bool(np.any(self.sd[:, 6:9] == self.own))
 
 
 class State(NamedTuple):
@@ -99,7 +98,9 @@ def _instant(x, positions, extra, time, span) -> Instant:
     if len(x) > KNOWN:
         jerk, force_rate = x[9:12], x[12:15]
     if len(x) > 15:
-        own = Turning(x[:3] + x[21:24], x[3:6] + x[15:18], jerk + x[18:21])
+        own = Turning(x[:3], x[3:6] + x[15:18], None)
+    if len(x) > 18:
+        own = Turning(x[:3] + x[21:24], own.acceleration, jerk + x[18:21])
     motion = Motion(x[:3], x[3:6], x[6:9], jerk, force_rate)
     return Instant(motion, positions, time, span, second, third, own, wander)
 

@@ -32,7 +32,7 @@ class Settings:
     wide: float = 10.0  # prior sd of the third derivatives, in sizes of the differences near by
     # prior sd of what the gyroscopes alone see of omega_dot, in its steps
     gyroscopes_own: float = 2.0
-    offset: float = 1e-5  # s, of what they see of omega, for each of that
+    offset: float = 1e-4  # s, of what they see of omega, for each of that
     told: float = 0.03  # of these that readings must tell, for their sds to be estimated
     widening: float = 3.0  # factor by which an iteration may change such an sd
     tied: float = 1e-5  # of that sd, as long as it is not free

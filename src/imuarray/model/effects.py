@@ -32,7 +32,7 @@ class Turning(NamedTuple):
 
     rate: object  # rad/s
     acceleration: object  # rad/s^2
-    jerk: object  # rad/s^3
+    jerk: object  # rad/s^3, or None where it is not told apart
 
 
 class Instant(NamedTuple):

@@ -34,11 +34,12 @@ def _rate_later(tau, instant, common):
     accelerometers (``common``) is the integral between both, any other has the gyroscopes'.
     """
     turn, own = instant.motion.angular_acceleration, instant.gyroscopes
-    if own is not None and common:
-        bent = own.jerk - instant.motion.angular_jerk
-        return tau * ((turn + own.acceleration) / 2 - tau / 12 * bent)
     if own is not None:
-        return tau * (own.acceleration + tau / 2 * own.jerk)
+        jerk = own.jerk is not None
+        bent = own.jerk - instant.motion.angular_jerk if jerk else 0.0
+        if common:
+            return tau * ((turn + own.acceleration) / 2 - tau / 12 * bent)
+        return tau * (own.acceleration + (tau / 2 * own.jerk if jerk else 0.0))
     return tau * (
         turn + tau / 2 * (instant.second.angular_rate + tau / 3 * instant.third.angular_rate)
     )
