@@ -21,7 +21,7 @@ from imuarray.posterior import tuning
 from imuarray.posterior.generic import SCALES, GenericLikelihood, log_laplace
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.rate_density import sample_covariance
-from imuarray.posterior.target import GaussianPrior, GenericTarget
+from imuarray.posterior.target import GaussianPrior, GenericTarget, TiedPrior
 from imuarray.recording import Recording
 from imuarray.streams import stream
 
@@ -69,6 +69,7 @@ class Posterior(NamedTuple):
 
     def generic(self, draws: int = 2) -> GenericLikelihood:
         """The likelihood of a model with effects."""
+        assert self.readings is not None  # there are, with effects
         return GenericLikelihood(
             self.model, self.readings, self.motion, draws=draws, logs=self.spread
         )
@@ -121,10 +122,11 @@ def unknown_scales(declared: ArrayModel, chosen: ArrayModel, freedom, own, sampl
     ``own`` (3,): where the logs of the motion's size are expected.
     """
     kinds = "accelerometer", "gyroscope"
-    size = [
-        [np.trace(getattr(model.noise, kind)) for kind in kinds] for model in (declared, chosen)
-    ]
-    before = 0.5 * np.log(np.divide(*size))
+    size, other = (
+        np.array([np.trace(getattr(model.noise, kind)) for kind in kinds])
+        for model in (declared, chosen)
+    )
+    before = 0.5 * np.log(size / other)
     return np.append(before, own), np.append(freedom, np.full(3, 3.0 * samples))
 
 
@@ -206,7 +208,7 @@ def log_extended(model: ArrayModel, steps: int) -> Callable:
 def traced(posterior: Posterior, rates: str = "declared", say: Say = silent):
     """(log density, data): a function of theta (P,) and of arrays, to be compiled by JAX."""
     prior = posterior.prior
-    if posterior.model.effects:
+    if isinstance(prior, TiedPrior):
         generic = posterior.generic()
         function = log_extended(posterior.model, generic.steps)
         return function, (generic.data, prior.mean, prior.root)

@@ -105,8 +105,8 @@ def motion_under(
 
     positions, attrs = calibration["position"].to_numpy(), calibration.attrs
     parameters, since, span = (positions - positions[0])[1:].ravel(), None, None
-    covariance = calibration["position_covariance"].to_numpy()[1:, :, 1:, :]
-    covariance = covariance.reshape((parameters.size,) * 2)
+    block = calibration["position_covariance"].to_numpy()[1:, :, 1:, :]
+    covariance: np.ndarray | None = block.reshape((parameters.size,) * 2)
     extended = "effect_parameter" in calibration
     model = model_of(recording, attrs["effects"].split(",") if extended else ())
     if extended:

@@ -67,8 +67,8 @@ def shown(readings: Readings, columns: Columns, state: State, active, covariance
             freedom[k] += np.sum((keep[:, k] * (1 - taken)).reshape(-1, 2, 3), axis=(0, 2))
         roots = seen.inverse[..., :9].reshape(len(keep), -1, 3, 3)
         spread.append(np.einsum("trki,trkj->tkij", roots, roots))
-    spread = np.concatenate(spread)
-    sizes = [_size(state.motion[:, 3 * k : 3 * k + 3], spread[:, k]) for k in range(3)]
+    every = np.concatenate(spread)
+    sizes = [_size(state.motion[:, 3 * k : 3 * k + 3], every[:, k]) for k in range(3)]
     return Shown(squares, freedom, np.array(sizes))
 
 

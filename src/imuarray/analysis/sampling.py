@@ -253,11 +253,11 @@ def flattest(draws, recording: Recording) -> float:
 
 def _key(posterior: Posterior, asked: Asked, *rest) -> str:
     recording, model, prior = posterior.recording, posterior.model, posterior.prior
-    used = posterior.readings
+    used, root = posterior.readings, getattr(prior, "root", None)
     return digest(
         recording.time, recording.specific_force, recording.angular_rate,
         recording.saturated_gyroscopes(), recording.accelerometer_position,
-        *(() if used is None else (used.time, used.values, used.weights, prior.root)),
+        *(() if used is None else (used.time, used.values, used.weights, root)),
         list(model.clock or ()), model.noise.accelerometer, model.noise.gyroscope,
         list(model.motion_sd), list(model.derivative_sd), prior.mean, prior.sd, *rest, asked.seed,
         list(model.effects), asked.rates, asked.motion_prior, asked.method, code_digest(),
