@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.analysis.model import Say, silent
-from imuarray.engine.fit import padded, pick
+from imuarray.engine.fit import pick
 from imuarray.engine.linearise import (
     CHUNK,
     Eliminated,
@@ -49,7 +49,7 @@ def shown(readings: Readings, columns: Columns, state: State, active, covariance
     """Of a fit's state, the ``active`` (N, m) parameters' covariance (n, n) allowed for."""
     wanted = np.flatnonzero(active.any(axis=0))
     directions = directions_of(columns, wanted)
-    few = padded(active[:, wanted], len(directions))
+    few = active[:, wanted]
     samples, count = readings.values.shape[:2]
     squares, freedom, spread = np.zeros((count, 2)), np.zeros((count, 2)), []
     for start in range(0, samples, CHUNK):

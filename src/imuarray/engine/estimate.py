@@ -15,7 +15,7 @@ import numpy as np
 from imuarray.engine.fit import (
     flat_parameters,
     from_flat,
-    held_where_rough,
+    movable,
     prior_means,
     scaled_solve,
     with_derivatives,
@@ -128,9 +128,7 @@ def estimate(
     ``active`` (N, m) bool. ``robust``: Student's t with estimated degrees of freedom instead of
     normal noise. ``steps``: at most. LinAlgError where the readings do not determine the motion.
     """
-    if any(one.state.gyroscopes_free for one in recorded):
-        active = active.copy()
-        active[active] &= ~held_where_rough(columns, active)
+    active = movable(columns, active, [one.state for one in recorded])
     places = places_of(columns, active, len(recorded))
     precision = pinned(recorded, columns, active, places)
     recorded, nu, length, last, moved = tuple(recorded), NORMAL, 1.0, np.inf, []

@@ -174,23 +174,19 @@ def fit(
 
 def search_optimum(readings, columns, active, state, smooth, rough):
     """(state, whether it converged, the recording linearised there or a step before)."""
+    active = movable(columns, active, [state])
     prior_mean = prior_means(readings, columns)[active]
     precision = prior_precision(columns, active)
-    held = held_where_rough(columns, active) if state.gyroscopes_free else None
-    if held is not None:
-        precision[held, held] += SETTINGS.held_sd**-2
     wanted = np.flatnonzero(active.any(axis=0))
+    few = active[:, wanted]
     converged, last, length, seen = False, np.inf, 1.0, None
     enough = SETTINGS.rough_gain if rough else SETTINGS.fine_gain
     for number in range(SETTINGS.steps):
         state = with_derivatives(readings, state, smooth)
         seen = linearise(readings, columns, state, wanted, seen)
-        few = padded(active[:, wanted], seen.whitened.shape[-1])
         misfit = float(np.sum(seen.misfit))
         information, score = normal(seen.residual, seen.whitened, seen.basis, few)
         offset = flat_parameters(columns, state)[active] - prior_mean
-        if held is not None:
-            offset[held] = 0.0
         score = score - precision @ offset
         step, sds = scaled_solve(information + precision, score)
         moved, in_motion = np.max(np.abs(step) / sds, initial=0.0), float(np.sum(seen.taken**2))
@@ -211,12 +207,14 @@ def search_optimum(readings, columns, active, state, smooth, rough):
     return state, converged, seen
 
 
-def held_where_rough(columns: Columns, active) -> np.ndarray:
-    """Which of the active parameters are not to move where the motion is rough, (n,) bool."""
-    mask = np.zeros_like(active)
+def movable(columns: Columns, active, states) -> np.ndarray:
+    """The active parameters (N, m) less those that stay where any gyroscopes' turning is free."""
+    if not any(state.gyroscopes_free for state in states):
+        return active
+    found = active.copy()
     for item in columns.model.chain:
-        mask[:, columns.of(item.id)[list(item.held_rough)]] = True
-    return mask[active]
+        found[:, columns.of(item.id)[list(item.held_rough)]] = False
+    return found
 
 
 def at(
@@ -245,11 +243,6 @@ def advance(columns, state, active, step, few, seen: Eliminated, length) -> Stat
     whole = flat_parameters(columns, state)
     whole[active] += step
     return from_flat(columns, state._replace(motion=state.motion + move), whole)
-
-
-def padded(mask, size) -> np.ndarray:
-    """A mask (N, n) with columns of False up to a size."""
-    return np.pad(mask, ((0, 0), (0, size - mask.shape[1])))
 
 
 def scaled_solve(information, right):

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.engine.fit import normal, padded
+from imuarray.engine.fit import normal
 from imuarray.engine.heldout import blocks_of
 from imuarray.engine.linearise import (
     CHUNK,
@@ -54,7 +54,7 @@ def normal_pass(
     samples, count = readings.values.shape[:2]
     wanted = np.flatnonzero(active.any(axis=0))
     directions = directions_of(columns, wanted)
-    few = padded(active[:, wanted], len(directions))
+    few = active[:, wanted]
     blocks = blocks_of(samples)
     motion = state.motion.copy()
     squares, freedom, unit = (np.empty((samples, count, 2)) for _ in range(3))

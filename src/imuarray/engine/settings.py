@@ -28,7 +28,6 @@ class Settings:
     fine_gain: float = 3e-6  # the same at the end
     converged: float = 0.02  # of a parameter's own sd: steps below it end the search
     shortest: float = 0.2  # share of a Gauss-Newton step
-    held_sd: float = 1e-8  # s, of a period that is not to move
     wide: float = 10.0  # prior sd of the third derivatives, in sizes of the differences near by
     # prior sd of what the gyroscopes alone see of omega_dot, in its steps
     gyroscopes_own: float = 2.0
