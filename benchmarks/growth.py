@@ -16,8 +16,7 @@ import numpy as np
 import xarray as xr
 
 from benchmarks.written import publish
-from imuarray.blind import Case
-from imuarray.blind.cases import make
+from imuarray.blind.cases import Case, make
 from imuarray.recording import write_recording
 
 RATE = 125.0  # Hz

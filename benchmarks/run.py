@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from written import publish  # noqa: E402
 
 from imuarray.config import model_from, read_config  # noqa: E402
-from imuarray.estimation import calibrate_bcd  # noqa: E402
+from imuarray.estimation.bcd import calibrate_bcd  # noqa: E402
 from imuarray.estimation.collapsed import Collapsed  # noqa: E402
 from imuarray.estimation.kernels import reduced  # noqa: E402
 from imuarray.estimation.newton import fisher_scoring  # noqa: E402
@@ -36,7 +36,7 @@ from imuarray.posterior.draws import TILE  # noqa: E402
 from imuarray.posterior.likelihood import Likelihood  # noqa: E402
 from imuarray.posterior.marginal import Marginal  # noqa: E402
 from imuarray.posterior.target import CompiledTarget, GaussianPrior  # noqa: E402
-from imuarray.simulation import measure  # noqa: E402
+from imuarray.simulation.measure import measure  # noqa: E402
 from imuarray.studies.bound import paths  # noqa: E402
 from tests.oracles import joint_jacobian  # noqa: E402
 

@@ -18,8 +18,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import beta
 
-from imuarray.blind import Case
-from imuarray.blind.cases import make
+from imuarray.blind.cases import Case, make
 from imuarray.diagnosis.adoption import proposals
 from imuarray.diagnosis.procedure import run_procedure
 from imuarray.diagnosis.settings import SETTINGS

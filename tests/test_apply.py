@@ -10,7 +10,7 @@ import imuarray
 from imuarray.cli import main
 from imuarray.motion import normal_motion
 from imuarray.recording import read_recording, write_recording
-from imuarray.simulation import measure
+from imuarray.simulation.measure import measure
 from tests.test_bound import model
 from tests.test_recording import make
 

@@ -12,13 +12,15 @@ from scipy.linalg import toeplitz
 from scipy.stats import multivariate_normal
 
 import imuarray.blind
-from imuarray.blind import CATALOGUE, EFFECTS, GAUGE, OUTSIDE, Case, Scene, inject_measured
 from imuarray.blind import cases as cases_module
 from imuarray.blind.added import ADDED, add, grade_added
+from imuarray.blind.cases import Case, make
 from imuarray.blind.change import draw_noise, finish, noiseless_readings, noisy_readings
-from imuarray.blind.measured import NOT_FROM_READINGS, measured_change
+from imuarray.blind.inject import CATALOGUE, EFFECTS, GAUGE, OUTSIDE
+from imuarray.blind.matrix import matrix
+from imuarray.blind.measured import NOT_FROM_READINGS, inject_measured, measured_change
 from imuarray.blind.projection import below_rails
-from imuarray.blind.scene import GYROSCOPE_RAIL, Pair
+from imuarray.blind.scene import GYROSCOPE_RAIL, Pair, Scene
 from imuarray.blind.sizes import (
     draw_seeded,
     is_of_noise,
@@ -477,7 +479,7 @@ def test_gauges_can_not_be_seen(name):
 
 @pytest.fixture(scope="module")
 def quick():
-    return [(case, *imuarray.blind.make(case, 5)) for case in imuarray.blind.matrix("quick")]
+    return [(case, *make(case, 5)) for case in matrix("quick")]
 
 
 def test_cases_are_valid_recordings_with_their_truth(quick):
@@ -502,7 +504,7 @@ def test_cases_are_valid_recordings_with_their_truth(quick):
 
 
 def test_case_residuals_are_the_declared_noise_where_nothing_is_injected():
-    recording, truth = imuarray.blind.make(Case("plain"), 3)
+    recording, truth = make(Case("plain"), 3)
     spread = recording.angular_rate - recording.angular_rate.mean(axis=1, keepdims=True)
     sd = np.sqrt((spread**2).sum() / (7 * 3 * 3000))
     # 63 000 degrees of freedom; 5 sd
@@ -512,10 +514,10 @@ def test_case_residuals_are_the_declared_noise_where_nothing_is_injected():
 
 def test_same_seed_same_recording_other_seed_another():
     case = Case("twice", (("gyroscope_scale", (2,)),), 12.0, kind="one", duration=4.0)
-    first, second, third = (imuarray.blind.make(case, seed) for seed in (1, 1, 2))
+    first, second, third = (make(case, seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first[0].specific_force, second[0].specific_force)
     assert first[1].to_json() == second[1].to_json() != third[1].to_json()
-    other = imuarray.blind.make(Case("other", case.effects, 12.0, kind="one", duration=4.0), 1)
+    other = make(Case("other", case.effects, 12.0, kind="one", duration=4.0), 1)
     assert not np.array_equal(first[0].specific_force, other[0].specific_force)
     with pytest.raises(ValueError, match="kind"):
         Case("x", kind="nothing")
@@ -524,8 +526,8 @@ def test_same_seed_same_recording_other_seed_another():
 @pytest.mark.parametrize(("scale", "least", "most"), [("quick", 28, 32), ("default", 450, 550),
                                                       ("paper", 3600, 4400)])  # fmt: skip
 def test_matrix_covers_every_effect_and_repeats_itself(scale, least, most):
-    found = imuarray.blind.matrix(scale)
-    assert found == imuarray.blind.matrix(scale) and least <= len(found) <= most
+    found = matrix(scale)
+    assert found == matrix(scale) and least <= len(found) <= most
     assert len({case.id for case in found}) == len(found)
     assert {case.kind for case in found} == set(cases_module.KINDS)
     standard = Counter((c.imus, c.sampling_rate, c.duration) == (8, 125.0, 24.0) for c in found)
@@ -538,7 +540,7 @@ def test_matrix_covers_every_effect_and_repeats_itself(scale, least, most):
             levels = {c.sigma for c in mine}
             assert levels == ({4, 8, 12, 20, 50, None} if EFFECTS[name].scalable else {None})
     with pytest.raises(ValueError, match="scale"):
-        imuarray.blind.matrix("huge")
+        matrix("huge")
 
 
 def as_recording(there, readings):

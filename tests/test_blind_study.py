@@ -9,9 +9,10 @@ import pandas as pd
 import pytest
 import yaml
 
-import imuarray.blind
-from imuarray.blind import Case, criteria, grade, study, summary
+from imuarray.blind import criteria, grade, study, summary
+from imuarray.blind.cases import Case
 from imuarray.blind.inject import CATALOGUE, EFFECTS
+from imuarray.blind.matrix import matrix
 from imuarray.figures import blind as drawing
 from imuarray.figures import blind_tables
 from imuarray.figures.style import write_figure
@@ -204,7 +205,7 @@ def test_a_crash_is_a_row(capsys):
 
 @pytest.mark.parametrize("batches", [1, 7, 26])
 def test_batches_hold_every_case_once(batches):
-    cases = imuarray.blind.matrix("default")
+    cases = matrix("default")
     dealt = [study.batch_of(cases, batch, batches) for batch in range(batches)]
     assert sorted(c.id for part in dealt for c in part) == sorted(c.id for c in cases)
     assert max(map(len, dealt)) - min(map(len, dealt)) <= 1
@@ -386,7 +387,7 @@ def test_figures_and_tables(tmp_path):
 def test_config_names_matrices_that_exist():
     config = yaml.safe_load((ROOT / "config.yaml").read_text(encoding="utf-8"))
     for scale in config["scales"].values():
-        assert scale["blind_batches"] <= len(imuarray.blind.matrix(scale["blind_cases"]))
+        assert scale["blind_batches"] <= len(matrix(scale["blind_cases"]))
 
 
 def test_results_of_the_papers_do_not_depend_on_the_size_of_the_blind_study(monkeypatch):

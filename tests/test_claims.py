@@ -11,7 +11,7 @@ from imuarray.claims.registry import FAILS, HOLDS, REGISTER, UNTESTED, claim
 from imuarray.config import model_from, read_config
 from imuarray.errors import InputError
 from imuarray.motion import normal_motion
-from imuarray.simulation import measure
+from imuarray.simulation.measure import measure
 from imuarray.studies.checks import identifiability, marginalisation, proposal
 from imuarray.studies.checks.accelerometers_only import accelerometers_only
 from imuarray.studies.checks.bound import bound_table

@@ -8,19 +8,17 @@ from hypothesis.extra.numpy import arrays
 from scipy.special import logsumexp
 
 from imuarray.errors import InputError
-from imuarray.estimation import (
-    Collapsed,
-    calibrate_bcd,
-    calibrate_gauss_newton,
-    estimate_motion,
-)
+from imuarray.estimation.bcd import calibrate_bcd
+from imuarray.estimation.collapsed import Collapsed
+from imuarray.estimation.gauss_newton import calibrate_gauss_newton
+from imuarray.estimation.motion_ml import estimate_motion
 from imuarray.estimation.reference import linear_part, nonlinear_part
 from imuarray.geometry import mimu4444
 from imuarray.model import ArrayModel
 from imuarray.motion import normal_motion
 from imuarray.posterior import draws, kernels, reference
 from imuarray.posterior.likelihood import Likelihood
-from imuarray.simulation import measure
+from imuarray.simulation.measure import measure
 from tests import oracles
 from tests.cases import noises, simulate, small_array
 

@@ -6,8 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from imuarray.blind import Case
-from imuarray.blind.cases import make
+from imuarray.blind.cases import Case, make
 from imuarray.cli import main
 from imuarray.diagnosis.document import diagnose, precision_of, structural_gain
 from imuarray.diagnosis.extension import extended_model, read_extension

@@ -10,8 +10,7 @@ from scipy.sparse import lil_matrix
 from scipy.stats import chi2, norm, poisson
 
 import imuarray
-from imuarray.blind import Case
-from imuarray.blind.cases import make
+from imuarray.blind.cases import Case, make
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects as variance
 from imuarray.diagnosis.clocks import sawtooth

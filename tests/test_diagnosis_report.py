@@ -11,8 +11,7 @@ import pandas as pd
 import pytest
 from scipy.linalg import subspace_angles
 
-from imuarray.blind import Case
-from imuarray.blind.cases import make
+from imuarray.blind.cases import Case, make
 from imuarray.diagnosis.document import diagnose
 from imuarray.diagnosis.quantities import number, plus_minus, probability, quantity, span
 from imuarray.diagnosis.replicates import _beside

@@ -5,7 +5,8 @@ import pytest
 
 from imuarray.engine.readings import measured
 from imuarray.errors import InputError
-from imuarray.estimation import calibrate_bcd, calibrate_gauss_newton
+from imuarray.estimation.bcd import calibrate_bcd
+from imuarray.estimation.gauss_newton import calibrate_gauss_newton
 from imuarray.geometry import mimu4444_corners
 from imuarray.model import EFFECTS, ArrayModel, Noise, effect
 from imuarray.motion import Motion, hand_twisting
@@ -13,7 +14,7 @@ from imuarray.posterior.generic import GenericLikelihood
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.pmmh import run_chains
 from imuarray.posterior.target import GaussianPrior, GenericTarget
-from imuarray.simulation import measure
+from imuarray.simulation.measure import measure
 from tests import oracles
 
 RATE = np.radians(0.06)

@@ -8,16 +8,11 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from imuarray.errors import IdentifiabilityError, InputError
-from imuarray.firstorder import (
-    allan_deviation,
-    calibrate_first_order,
-    correct,
-    fit_triads,
-    still_poses,
-)
-from imuarray.firstorder.allan import lag_correlation, white_noise_sd
+from imuarray.firstorder.allan import allan_deviation, lag_correlation, white_noise_sd
+from imuarray.firstorder.correct import calibrate_first_order, correct
 from imuarray.firstorder.report import noise_table, parameter_table, residual_table
-from imuarray.firstorder.still import window_spread
+from imuarray.firstorder.still import still_poses, window_spread
+from imuarray.firstorder.triads import fit_triads
 from imuarray.geometry import mimu4444_corners
 from imuarray.recording import Recording, read_recording, write_recording
 

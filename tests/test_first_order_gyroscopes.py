@@ -10,9 +10,10 @@ from scipy.linalg import rq
 from benchmarks.board import GRAVITY, Options, draw_board, draw_hand
 from imuarray.cli import main
 from imuarray.errors import InputError
-from imuarray.firstorder import calibrate_first_order, correct, still_poses
+from imuarray.firstorder.correct import calibrate_first_order, correct
 from imuarray.firstorder.moves import Move, _carried, _to_end, common_map
 from imuarray.firstorder.report import gyroscope_lines, parameter_table, turned_lines
+from imuarray.firstorder.still import still_poses
 from imuarray.recording import read_recording, write_recording
 from imuarray.recording.format import load_dataset
 

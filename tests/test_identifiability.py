@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from imuarray.errors import IdentifiabilityError
-from imuarray.estimation import calibrate_bcd
+from imuarray.estimation.bcd import calibrate_bcd
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.motion import Motion

@@ -5,8 +5,9 @@ import pytest
 from scipy.optimize import least_squares
 
 from imuarray.errors import IdentifiabilityError
-from imuarray.estimation import estimate_motion, rates
+from imuarray.estimation import rates
 from imuarray.estimation.collapsed import Collapsed
+from imuarray.estimation.motion_ml import estimate_motion
 from imuarray.estimation.reference import most_likely_motion
 from imuarray.geometry import mimu4444
 from imuarray.model import ArrayModel, Noise

@@ -5,8 +5,9 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from imuarray.errors import IdentifiabilityError, InputError
-from imuarray.estimation import calibrate_gauss_newton, newton
+from imuarray.estimation import newton
 from imuarray.estimation.collapsed import Collapsed
+from imuarray.estimation.gauss_newton import calibrate_gauss_newton
 from imuarray.estimation.information import arms, halves, information, information_at
 from imuarray.estimation.newton import fisher_scoring
 from imuarray.estimation.online import Online

@@ -15,7 +15,7 @@ from imuarray.geometry import mimu4444_corners
 from imuarray.model import ArrayModel
 from imuarray.motion import Motion, hand_twisting
 from imuarray.recording import write_recording
-from imuarray.simulation import simulate_samples
+from imuarray.simulation.recordings import simulate_samples
 
 ROOT = Path(__file__).parents[1]
 RATE, GRAVITY = 50.0, 9.81

@@ -9,14 +9,15 @@ import pytest
 SCRIPT = """
 import hashlib
 import numpy as np
-from imuarray.estimation import calibrate_bcd, calibrate_gauss_newton
+from imuarray.estimation.bcd import calibrate_bcd
+from imuarray.estimation.gauss_newton import calibrate_gauss_newton
 from imuarray.geometry import mimu4444
 from imuarray.model import ArrayModel
 from imuarray.motion import normal_motion
 from imuarray.model.jax64 import jax
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.marginal import Marginal
-from imuarray.simulation import measure
+from imuarray.simulation.measure import measure
 
 model = ArrayModel.isotropic(mimu4444(), 0.04, 1e-3)
 rng = np.random.default_rng(1)

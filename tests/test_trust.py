@@ -13,7 +13,7 @@ from imuarray.analysis import trust
 from imuarray.analysis.drawing import Places, departures
 from imuarray.analysis.rigid import slope, turning
 from imuarray.analysis.suspects import suspects, told
-from imuarray.blind import Case, make
+from imuarray.blind.cases import Case, make
 from imuarray.cli import main
 from imuarray.geometry import mimu4444, mimu4444_corners
 

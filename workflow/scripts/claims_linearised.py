@@ -10,7 +10,7 @@ with job(snakemake) as settings:  # noqa: F821
     from imuarray.motion import normal_motion
     from imuarray.provenance import write_csv
     from imuarray.recording import read_recording, read_truth
-    from imuarray.simulation import simulate_samples
+    from imuarray.simulation.recordings import simulate_samples
     from imuarray.streams import stream
     from imuarray.studies.bayes import select_disjoint
     from imuarray.studies.checks import linearised

@@ -3,8 +3,8 @@
 from job import job
 
 with job(snakemake):
-    from imuarray.firstorder import calibrate_first_order, report
-    from imuarray.firstorder.correct import STANDARD_GRAVITY
+    from imuarray.firstorder import report
+    from imuarray.firstorder.correct import STANDARD_GRAVITY, calibrate_first_order
     from imuarray.firstorder.still import SHORTEST
     from imuarray.firstorder.store import write_corrected
     from imuarray.provenance import write_csv

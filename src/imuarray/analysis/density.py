@@ -154,7 +154,7 @@ def _fit(recording: Recording) -> Callable:
 
     The first time from elsewhere, too, where few samples leave local optima.
     """
-    from imuarray.estimation import calibrate_gauss_newton
+    from imuarray.estimation.gauss_newton import calibrate_gauss_newton
 
     last: list[np.ndarray] = []
 

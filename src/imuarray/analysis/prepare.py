@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.errors import InputError, require_integer
-from imuarray.firstorder.correct import STANDARD_GRAVITY
+from imuarray.firstorder.correct import STANDARD_GRAVITY, calibrate_first_order, correct
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting
@@ -52,7 +52,7 @@ def simulate(
     gyroscope_range
         The rail, rad/s.
     """
-    from imuarray.simulation import simulate_recording
+    from imuarray.simulation.recordings import simulate_recording
 
     if not (duration > 0 and sampling_rate > 0):
         raise InputError(
@@ -93,8 +93,6 @@ def first_order(
 
     InputError without enough still poses, and for mirrored axes.
     """
-    from imuarray.firstorder import calibrate_first_order, correct
-
     return correct(recording, calibrate_first_order(recording, gravity, gyroscopes, shortest_pose))
 
 

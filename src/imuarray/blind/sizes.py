@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from imuarray.blind.change import EFFECTS, Change, noiseless_readings
+from imuarray.blind.change import Change, noiseless_readings
+from imuarray.blind.inject import EFFECTS
 from imuarray.blind.projection import below_rails, smallest_residual
 from imuarray.blind.scene import Pair, Scene
 

@@ -13,7 +13,7 @@ from imuarray.recording import read_recording, write_recording
 
 def first_order(arguments) -> None:
     """Calibration of each triad from poses and moves; the corrected recording carries it."""
-    from imuarray.firstorder import calibrate_first_order
+    from imuarray.firstorder.correct import calibrate_first_order
     from imuarray.firstorder.report import (
         gyroscope_lines,
         noise_table,

@@ -105,10 +105,26 @@ def block_descent(data, positions, tolerance, cost_tolerance, limit, marks):
     return status, cost[:done], moved[:done], snapshots
 
 
-def require_samples(samples: int) -> None:
-    """Raise IdentifiabilityError for fewer than two samples (2017, section II)."""
-    if samples < 2:
-        raise IdentifiabilityError(f"samples: expected at least 2, found {samples}")
+def arranged(model: ArrayModel, specific_force, angular_rate, start=None, saturated=None):
+    """(data, positions (A, 3) m relative to the reference) where a calibration begins.
+
+    IdentifiabilityError for fewer than two samples (2017, section II) and for collinear triads;
+    InputError for a model that is not the papers', with one noise sd for each accelerometer triad.
+    """
+    if model.effects or model.noise.triad_weights is None:
+        raise InputError(
+            "model: expected the papers', with one noise sd for each accelerometer triad, found"
+            f" {', '.join(model.effects) or 'a covariance'}"
+        )
+    if len(specific_force) < 2:
+        raise IdentifiabilityError(f"samples: expected at least 2, found {len(specific_force)}")
+    positions = model.array.relative if start is None else np.array(start, float)
+    require_shape("start", positions, model.array.positions.shape)
+    positions = np.ascontiguousarray(positions - positions[0])
+    require_planar_extent(positions, "positions")
+    data = Collapsed.of(model, specific_force, angular_rate, saturated)
+    require_rotation(data, positions)
+    return data, positions
 
 
 def explain(status: int) -> None:
@@ -153,16 +169,11 @@ def calibrate_bcd(
     IdentifiabilityError
         Fewer than 2 samples, fewer than 3 or collinear triads, or omega and omega_dot
         along one axis throughout (Lemma 1).
+    InputError
+        For effects, which `imuarray.calibrate` takes, and for noise that is not one sd for each
+        accelerometer triad.
     """
-    require_samples(len(specific_force))
-    positions = model.array.relative if start is None else np.array(start, float)
-    require_shape("start", positions, model.array.positions.shape)
-    positions = np.ascontiguousarray(positions - positions[0])
-    require_planar_extent(positions, "positions")
-    data = Collapsed.of(model, specific_force, angular_rate, saturated)
-    if data.weights is None:
-        raise InputError("bcd: expected isotropic noise per triad; use --method gauss-newton")
-    require_rotation(data, positions)
+    data, positions = arranged(model, specific_force, angular_rate, start, saturated)
     marks = np.asarray(sorted(marks), np.int64)
     status, *path = block_descent(
         data.arrays, positions, float(tolerance), float(cost_tolerance), limit, marks

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import NamedTuple
 
@@ -126,6 +126,15 @@ class Collapsed:
         if self.weights is None:
             return _weighted(self.precision, self.specific_force)
         return self.weights[:, None, None] * self.specific_force
+
+    def with_rates(self, covariance, mean=None) -> Collapsed:
+        """The same with the covariance (T, 3, 3) (rad/s)^2, and mean (T, 3), of angular rates."""
+        require_shape("rate_covariance", np.asarray(covariance), (self.samples, 3, 3))
+        precision = np.linalg.inv(covariance).transpose(1, 2, 0)
+        return replace(
+            self, gyroscope_information=np.ascontiguousarray(precision),
+            mean=self.mean if mean is None else np.ascontiguousarray(mean.T),
+        )  # fmt: skip
 
     def reduce(self, positions) -> tuple[kernels.Reduced, float]:
         """(the recording with phi eliminated at ``positions`` (A, 3), log |H' Lambda H|)."""

@@ -6,12 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from imuarray.errors import IdentifiabilityError, InputError, require_shape
-from imuarray.estimation.bcd import Calibration, require_rotation, require_samples
-from imuarray.estimation.collapsed import Collapsed
+from imuarray.errors import IdentifiabilityError
+from imuarray.estimation.bcd import Calibration, arranged, require_rotation
 from imuarray.estimation.information import information_at
 from imuarray.estimation.newton import fisher_scoring
-from imuarray.geometry.array import require_planar_extent
 from imuarray.linear import FLOOR, scaled_eigh, scaled_inverse
 from imuarray.model import ArrayModel
 
@@ -40,29 +38,15 @@ def calibrate_gauss_newton(
 
     Raises
     ------
-    IdentifiabilityError
+    IdentifiabilityError, InputError
         As `calibrate_bcd`, and where the information of the positions is singular.
-    InputError
-        For effects, which `imuarray.calibrate` takes, and for noise that is not one sd for each
-        accelerometer triad.
     """
-    if model.effects or model.noise.triad_weights is None:
-        raise InputError(
-            "model: expected the papers', with one noise sd for each accelerometer triad, found"
-            f" {', '.join(model.effects) or 'a covariance'}"
-        )
-    require_samples(len(specific_force))
-    positions = model.array.relative if start is None else np.asarray(start, float)
-    require_shape("start", positions, model.array.positions.shape)
-    positions = positions - positions[0]
-    require_planar_extent(positions, "positions")
-    data = Collapsed.of(model, specific_force, angular_rate, saturated)
-    require_rotation(data, positions)
+    data, positions = arranged(model, specific_force, angular_rate, start, saturated)
     if position_prior is not None:
         mean, sd = np.asarray(position_prior[0], float), position_prior[1]
         position_prior = mean, np.diag(np.broadcast_to(sd, mean.shape) ** -2.0)
     found = fisher_scoring(
-        data if rate_covariance is None else with_rates(data, rate_covariance), positions,
+        data if rate_covariance is None else data.with_rates(rate_covariance), positions,
         position_prior, tolerance, limit,
     )  # fmt: skip
     # the collapsed cost leaves out how the gyroscopes differ among themselves
@@ -70,13 +54,6 @@ def calibrate_gauss_newton(
     apart = model.noise.misfit(np.zeros((len(spread), 3 * len(positions))), spread, saturated)
     require_rotation(data, found.positions)
     return replace(found, cost=found.cost + apart)
-
-
-def with_rates(data: Collapsed, covariance) -> Collapsed:
-    """The same with the covariance (T, 3, 3) (rad/s)^2 of each sample's angular rate."""
-    require_shape("rate_covariance", np.asarray(covariance), (data.samples, 3, 3))
-    precision = np.linalg.inv(covariance)
-    return replace(data, gyroscope_information=np.ascontiguousarray(precision.transpose(1, 2, 0)))
 
 
 def parameter_covariance(model: ArrayModel, found: Calibration, saturated=None) -> np.ndarray:

@@ -9,14 +9,14 @@ import numpy as np
 import pandas as pd
 from scipy.special import ndtri
 
-from imuarray.estimation import calibrate_bcd, calibrate_gauss_newton
-from imuarray.estimation.bcd import Calibration
+from imuarray.estimation.bcd import Calibration, calibrate_bcd
 from imuarray.estimation.collapsed import Collapsed
+from imuarray.estimation.gauss_newton import calibrate_gauss_newton
 from imuarray.model import ArrayModel
 from imuarray.model.structure import product_slopes
 from imuarray.posterior.rate_density import rate_distribution
 from imuarray.recording import Recording, array_of
-from imuarray.simulation import simulate_samples
+from imuarray.simulation.recordings import simulate_samples
 
 TOLERANCE = 1e-3  # of a position's own sd
 LIMIT = 500  # large residuals make Gauss-Newton converge linearly

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from imuarray.estimation.collapsed import Collapsed
@@ -20,16 +18,11 @@ def proposals(collapsed: Collapsed, mean, covariance, positions, widening: float
     The integrand is p(omega_t | y_g) = N(``mean``, ``covariance``) times the exponential of
     (26a) at ``positions`` (A, 3) m.
     """
-    precision = np.linalg.inv(covariance)
-    given = replace(
-        collapsed,
-        mean=np.ascontiguousarray(mean.T),
-        gyroscope_information=np.ascontiguousarray(precision.transpose(1, 2, 0)),
-    )
+    given = collapsed.with_rates(covariance, mean)
     rate = motion_from(given, positions).motion.angular_rate
     found, _ = collapsed.reduce(positions)
     slope = product_slopes(rate)
-    curvature = precision + np.einsum("tai,ab,tbj->tij", slope, found.C, slope)
+    curvature = np.linalg.inv(covariance) + np.einsum("tai,ab,tbj->tij", slope, found.C, slope)
     misfit = products(rate) @ found.C - found.b.T
     full = curvature + np.einsum("ta,aij->tij", misfit, CURVATURES)
     # far from a good fit the second derivative may not be positive: then the first order serves

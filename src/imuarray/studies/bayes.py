@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from imuarray.config import model_from
-from imuarray.estimation import calibrate_bcd
+from imuarray.estimation.bcd import calibrate_bcd
 from imuarray.estimation.selection import disjoint, neighbours
 from imuarray.geometry import Array
 from imuarray.measured.positions import locate
@@ -18,7 +18,7 @@ from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.rate_density import rate_distribution
 from imuarray.posterior.target import CompiledTarget, GaussianPrior
 from imuarray.recording import Recording
-from imuarray.simulation import simulate_recording, simulate_samples
+from imuarray.simulation.recordings import simulate_recording, simulate_samples
 from imuarray.streams import stream
 
 

@@ -17,9 +17,9 @@ from imuarray.linear import scaled_eigh
 from imuarray.model import ArrayModel
 from imuarray.model.structure import products
 from imuarray.motion import normal_motion, sphere_motion
-from imuarray.simulation import measure
 from imuarray.streams import stream
 from imuarray.studies.batches import batches, root_mean_square, run_batches
+from imuarray.studies.truths import realisations
 
 NEAR = 1.01  # times the bound: as good as efficient
 BCD_LIMIT = 20000  # iterations after which ML-BCD is given up
@@ -58,11 +58,8 @@ def rms_width(known, prior_sd: float = np.inf) -> float:
 
 def _draw(model, rng, samples, motion, options):
     """(motion, truth, forces, rates, saturated) of a realisation."""
-    array = model.array
-    errors = options["position_sd"] * rng.standard_normal((array.accelerometers, 3))
-    truth = array.relative + errors - errors[0]
-    moves = sphere_motion(rng, (samples,), *motion)
-    return moves, truth, *measure(model, moves, truth, rng, gyroscope_range=options["rail"])
+    made = realisations(model, rng, 1, samples, motion, options["position_sd"], options["rail"])
+    return made.motion.select(0), *(part[0] for part in made[1:])
 
 
 def efficiency(

@@ -17,7 +17,7 @@ from imuarray.motion import normal_motion
 from imuarray.posterior.chains import chains_of
 from imuarray.posterior.diagnostics import ess
 from imuarray.recording import Recording
-from imuarray.simulation import measure
+from imuarray.simulation.measure import measure
 from imuarray.streams import stream
 from imuarray.studies.batches import run_batches
 from imuarray.studies.truths import Setting

@@ -10,15 +10,9 @@ import pandas as pd
 from imuarray.estimation.bcd import block_descent
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.model import ArrayModel
-from imuarray.motion import sphere_motion
-from imuarray.simulation import measure
 from imuarray.streams import stream
-from imuarray.studies.batches import (
-    batches,
-    root_mean_square,
-    run_batches,
-    share,
-)
+from imuarray.studies.batches import batches, root_mean_square, run_batches, share
+from imuarray.studies.truths import realisations
 
 
 def calibrate_batch(model, rng, count, samples, motion, position_sd, rail, limit, tolerance, marks):
@@ -27,23 +21,19 @@ def calibrate_batch(model, rng, count, samples, motion, position_sd, rail, limit
     Returns mean squared position errors (count, marks) in m^2, iterations (count,) and the
     kernel's status (count,): 1 converged, 0 limit, negative not identifiable (NaN errors).
     """
-    array = model.array
-    errors = position_sd * rng.standard_normal((count, array.accelerometers, 3))
-    truth = array.relative + errors - errors[:, :1]
-    moves = sphere_motion(rng, (count, samples), *motion)
-    force, rate, saturated = measure(model, moves, truth, rng, gyroscope_range=rail)
+    made = realisations(model, rng, count, samples, motion, position_sd, rail)
     squares = np.full((count, len(marks)), np.nan)
     iterations, status = np.zeros(count, int), np.zeros(count, int)
     marks = np.asarray(marks, np.int64)
     for i in range(count):
-        data = Collapsed.of(model, force[i], rate[i], saturated[i])
-        positions = array.relative.copy()
+        data = Collapsed.of(model, made.force[i], made.rate[i], made.saturated[i])
+        positions = model.array.relative.copy()
         status[i], cost, _, snapshots = block_descent(
             data.arrays, positions, tolerance, 0.0, limit, marks
         )
         iterations[i] = len(cost)
         if status[i] >= 0:
-            squares[i] = np.mean((snapshots - truth[i])[:, 1:] ** 2, axis=(1, 2))
+            squares[i] = np.mean((snapshots - made.truth[i])[:, 1:] ** 2, axis=(1, 2))
     return squares, iterations, status
 
 

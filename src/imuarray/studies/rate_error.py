@@ -5,30 +5,28 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from imuarray.estimation import estimate_motion
+from imuarray.estimation.motion_ml import estimate_motion
 from imuarray.model import ArrayModel
-from imuarray.motion import sphere_motion
-from imuarray.simulation import measure
 from imuarray.streams import stream
 from imuarray.studies.batches import batches, root_mean_square, run_batches
+from imuarray.studies.truths import realisations
 
 
-def _batch(model, rng, count, motion, position_sd, rail):
+def square_errors(model, rng, count, motion, position_sd, rail, gyroscopes: bool = True):
     """Squared errors of ``count`` realisations, each with its own true positions.
 
     The estimator assumes the nominal positions. Returns (count,) means over axes for the
-    array's omega, the gyroscopes' average, the array's omega_dot and s, and convergence.
+    array's omega, the gyroscopes' average, the array's omega_dot and s, and convergence. Without
+    ``gyroscopes`` these only start the search, which decides the sign of omega.
     """
-    array = model.array
-    errors = position_sd * rng.standard_normal((count, array.accelerometers, 3))
-    truth = array.relative + errors - errors[:, :1]
-    moves = sphere_motion(rng, (count, 1), *motion)
-    force, rate, saturated = measure(model, moves, truth, rng, gyroscope_range=rail)
-    found = estimate_motion(model, force[:, 0], rate[:, 0], saturated=saturated[:, 0])
+    moves, _, *readings = realisations(model, rng, count, 1, motion, position_sd, rail)
+    force, rate, saturated = (part[:, 0] for part in readings)
+    lost = saturated if gyroscopes else np.ones(rate.shape, bool)
+    found = estimate_motion(model, force, rate, saturated=lost)
     true = [field[:, 0] for field in moves]
     pairs = (
         (found.motion.angular_rate, true[0]),
-        (rate[:, 0].mean(axis=1), true[0]),
+        (rate.mean(axis=1), true[0]),
         (found.motion.angular_acceleration, true[1]),
         (found.motion.specific_force, true[2]),
     )
@@ -49,7 +47,7 @@ def rmse_against_rate(
 
             def job(batch, names=names, motion=motion, sd=position_sd):
                 rng = stream(seed, *names, batch[0])
-                return _batch(model, rng, batch[1], motion, sd, rail)
+                return square_errors(model, rng, batch[1], motion, sd, rail)
 
             parts = run_batches(job, batches(realisations), threads, True, "rate")
             array, gyroscopes, acceleration, force, converged = (

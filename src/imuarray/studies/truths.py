@@ -11,14 +11,35 @@ from imuarray.errors import IdentifiabilityError
 from imuarray.estimation.newton import fisher_scoring
 from imuarray.geometry import positions_of, sub_array
 from imuarray.model import ArrayModel
-from imuarray.motion import normal_motion
+from imuarray.motion import Motion, normal_motion, sphere_motion
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.target import GaussianPrior
-from imuarray.simulation import measure
+from imuarray.simulation.measure import measure
 from imuarray.streams import stream
 
 STARTS, GOOD = 50, 2.0  # of the search for a mode; mean square of residuals that ends it
 SPARE = 2**40  # a replicate that no study counts: for pilots
+
+
+class Realisations(NamedTuple):
+    """R times N samples of random motion, and what is measured of it; see `measure`."""
+
+    motion: Motion  # fields (R, N, 3)
+    truth: np.ndarray  # (R, A, 3) m relative to the reference
+    force: np.ndarray
+    rate: np.ndarray
+    saturated: np.ndarray
+
+
+def realisations(model: ArrayModel, rng, count, samples, motion, position_sd, rail) -> Realisations:
+    """``count`` arrays, each triad off its nominal position by ``position_sd`` (m), in motion.
+
+    ``motion``: magnitudes of `sphere_motion`; ``rail`` (rad/s) of the gyroscopes.
+    """
+    errors = position_sd * rng.standard_normal((count, model.array.accelerometers, 3))
+    truth = model.array.relative + errors - errors[:, :1]
+    moves = sphere_motion(rng, (count, samples), *motion)
+    return Realisations(moves, truth, *measure(model, moves, truth, rng, gyroscope_range=rail))
 
 
 class Setting(NamedTuple):

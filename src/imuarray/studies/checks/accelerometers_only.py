@@ -5,25 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from imuarray.estimation import estimate_motion
-from imuarray.motion import sphere_motion
-from imuarray.simulation import measure
 from imuarray.streams import stream
 from imuarray.studies.batches import root_mean_square
-
-
-def _squares(model, rng, count, motion_sizes, position_sd):
-    """Mean squared errors (count,) of omega and of omega_dot with every gyroscope left out."""
-    array = model.array
-    errors = position_sd * rng.standard_normal((count, array.accelerometers, 3))
-    truth = array.relative + errors - errors[:, :1]
-    motion = sphere_motion(rng, (count, 1), *motion_sizes)
-    force, rate, _ = measure(model, motion, truth, rng)
-    # left out they still start the iteration, which decides the sign of omega
-    lost = np.ones(rate[:, 0].shape, bool)
-    found = estimate_motion(model, force[:, 0], rate[:, 0], saturated=lost).motion
-    pairs = ((found.angular_rate, motion[0]), (found.angular_acceleration, motion[1]))
-    return [np.mean((estimate - true[:, 0]) ** 2, axis=1) for estimate, true in pairs]
+from imuarray.studies.rate_error import square_errors
 
 
 def accelerometers_only(
@@ -36,7 +20,9 @@ def accelerometers_only(
         for number, rate in enumerate(rates):
             rng = stream(seed, "accelerometers only", f"{position_sd:g}", number)
             sizes = (rate, angular_acceleration, specific_force)
-            squares, acceleration = _squares(model, rng, count, sizes, position_sd)
+            squares, _, acceleration, *_ = square_errors(
+                model, rng, count, sizes, position_sd, np.inf, gyroscopes=False
+            )
             rmse, error = root_mean_square(squares)
             rows.append(
                 {

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from imuarray.estimation import calibrate_bcd, estimate_motion
+from imuarray.estimation.bcd import calibrate_bcd
+from imuarray.estimation.motion_ml import estimate_motion
 from imuarray.motion import Motion, sphere_motion
 from imuarray.motion.random import directions
-from imuarray.simulation import measure
+from imuarray.simulation.measure import measure
 from imuarray.studies.checks.information import (
     NoiseLevels,
     joint_singular_values,

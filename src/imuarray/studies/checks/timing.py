@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-from imuarray.estimation import calibrate_bcd
+from imuarray.estimation.bcd import calibrate_bcd
 from imuarray.motion import sphere_motion
-from imuarray.simulation import measure
+from imuarray.simulation.measure import measure
 
 
 def _fastest(function, repeats: int) -> tuple[float, float]:
