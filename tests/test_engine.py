@@ -133,17 +133,24 @@ def test_the_rates_change_says_more_than_the_accelerometers_of_turning():
     for seed in (1, 2):
         recording, truth = simulated(2.0, seed, bandwidth=2.0)
         alone = fitted(recording)
-        both = estimate([turned(one) for one in alone.recorded], alone.columns, alone.active)
+        (one,) = alone.recorded
+        begun = replace(one, state=turned(one.readings, one.state))
+        both = estimate([begun], alone.columns, alone.active)
         ratios.append(np.mean(position_sds(both) / position_sds(alone)))
         z.append(errors(both, truth) / position_sds(both))
     assert max(ratios) < 0.95 and 0.5 < np.sqrt(np.mean(np.square(z))) < 1.6
 
 
 def test_two_imus_take_the_angular_acceleration_from_the_gyroscopes():
-    """What the accelerometers leave open about the line between them."""
+    """What the accelerometers leave open about the line between them; one of them is late."""
     array = Array(np.array([[0, 0, 0], [0.1, 0, 0]]), ("1", "2"), 2)
-    recording, truth = imuarray.simulate(array, 4.0, 200.0, angular_rate=8.0, bandwidth=2.0)
+    how = {"angular_rate": 8.0, "bandwidth": 2.0, "effects": ("sensor_delay",)}
+    recording, truth = imuarray.simulate(array, 4.0, 200.0, **how)
     found = imuarray.calibrate(recording)
+    late = np.diff(truth["effect_parameter"]) - np.diff(found["effect_parameter"])
+    assert found.attrs["effects"] == "sensor_delay" and np.abs(late) < 5e-6 < np.abs(
+        np.diff(truth["effect_parameter"])
+    )
     sds = np.sqrt(np.einsum("kaka->ka", found["position_covariance"].to_numpy()))[1]
     error = (found["position"].to_numpy() - truth["position"].to_numpy())[1]
     assert np.abs(error / sds).max() < 3 and sds.max() < 1e-4

@@ -23,6 +23,7 @@ from imuarray.engine.linearise import (
 from imuarray.engine.parameters import POSITION, Columns, prior_precision
 from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS
+from imuarray.engine.turning import turned
 from imuarray.linear import scaled_eigh
 
 
@@ -257,6 +258,8 @@ def with_derivatives(readings, state, smooth) -> State:
     """The state with the time derivatives of its own motion, if they are not free."""
     if not smooth:
         return state
+    if state.turning is not None:
+        state = turned(readings, state)
     found = derivatives(readings, state.motion, state.positions)
     return state._replace(derivatives=found)
 

@@ -51,7 +51,7 @@ def with_effects(readings: Sequence[Readings], effects) -> Estimate:
             f" {', '.join(effects)}"
         )
     active = mask_of(columns, [POSITION, *effects])
-    recorded = _followed([Recorded.of(one, columns) for one in readings])
+    recorded = [Recorded.of(one, columns) for one in readings]
     return settled(estimate(recorded, columns, active))
 
 
@@ -78,7 +78,7 @@ def climb(readings: Sequence[Readings], bare: bool = True) -> tuple[Estimate, li
         effects += [name for name in MAPS if name not in effects]
     columns = columns_of(readings[0].array, effects, readings[0].position_prior_sd)
     placed = mask_of(columns, [POSITION])
-    begun = _followed([Recorded.of(one, columns) for one in readings])
+    begun = [Recorded.of(one, columns) for one in readings]
     found = estimate(begun, columns, placed, steps=SETTINGS.rung_steps)
     kept: set[str] = set()
     rungs: list[Rung] = []
@@ -89,7 +89,7 @@ def climb(readings: Sequence[Readings], bare: bool = True) -> tuple[Estimate, li
             break
         kept |= new
         active = placed | mask_of(columns, [e for name in kept for e in RUNGS[name]])
-        found = estimate(_followed(found.recorded), columns, active, steps=SETTINGS.rung_steps)
+        found = estimate(found.recorded, columns, active, steps=SETTINGS.rung_steps)
     kept = {rung.name for rung in rungs if rung.kept}
     active = placed | mask_of(columns, [e for name in kept for e in RUNGS[name]])
     if not (kept or bare):
@@ -98,20 +98,11 @@ def climb(readings: Sequence[Readings], bare: bool = True) -> tuple[Estimate, li
     late = any(_needs_neighbours(effect) for name in kept for effect in RUNGS[name])
     pair = readings[0].pair
     if all(one.smooth for one in found.recorded) and (pair or not late):
-        better = estimate([turned(one) for one in found.recorded], columns, active)
+        begun = [replace(one, state=turned(one.readings, one.state)) for one in found.recorded]
+        better = estimate(begun, columns, active)
         if pair or better.residual_ratio() < AGREES * found.residual_ratio():
             found = better
     return settled(found), rungs
-
-
-def _followed(recorded: Sequence[Recorded]) -> list[Recorded]:
-    """Of two IMUs, with the rate's change as prior of omega_dot from the first on."""
-    if any(one.readings.pair and not one.smooth for one in recorded):
-        raise InputError(
-            "recording: expected samples that follow each other, of two IMUs, found too few: the"
-            " rate's change from sample to sample is their angular acceleration"
-        )
-    return [turned(one) if one.readings.pair else one for one in recorded]
 
 
 def without(found: Estimate, active) -> list[Recorded]:

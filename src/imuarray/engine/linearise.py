@@ -315,10 +315,13 @@ def derivatives(readings: Readings, motion, positions) -> tuple:
     return along(rate, 2), along(force, 1), second, third
 
 
-def polynomial_derivative(time, run, values, window, order) -> np.ndarray:
-    """The order-th derivative by local quartics, within runs; the ends use the end's polynomial."""
+def polynomial_derivative(time, run, values, window, order, degree=4) -> np.ndarray:
+    """The order-th derivative by local quartics, within runs; the ends use the end's polynomial.
+
+    Zero in runs shorter than the window; ``degree``: of other polynomials.
+    """
     step = np.median(np.diff(time))
-    taps = [quartic_taps(window, place, order) / step**order for place in range(window)]
+    taps = [polynomial_taps(window, place, order, degree) / step**order for place in range(window)]
     out = np.zeros_like(values)
     half = window // 2
     edges = np.flatnonzero(np.concatenate([[True], np.diff(run) > 0, [True]]))
@@ -337,12 +340,12 @@ def polynomial_derivative(time, run, values, window, order) -> np.ndarray:
     return out
 
 
-def quartic_taps(window, place, order) -> np.ndarray:
-    """(window,) weights that give a least-squares quartic's derivative at a place, by unit steps.
+def polynomial_taps(window, place, order, degree) -> np.ndarray:
+    """(window,) weights that give a least-squares polynomial's derivative at a place, unit steps.
 
     Savitzky and Golay's; scipy.signal has them, and is slow to import.
     """
-    powers = np.vander(np.arange(window) - place, 5, increasing=True)
+    powers = np.vander(np.arange(window) - place, degree + 1, increasing=True)
     return factorial(order) * np.linalg.pinv(powers)[order]
 
 

@@ -8,18 +8,31 @@ from imuarray.engine.linearise import State, no_derivatives, polynomial_derivati
 from imuarray.engine.parameters import Columns
 from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS
+from imuarray.engine.turning import turned
+from imuarray.errors import InputError
 from imuarray.model.structure import design, products
 
 
 def start(readings: Readings, columns: Columns) -> State:
-    """The state of no effects: omega the gyroscopes' median, omega_dot and s by least squares."""
+    """The state of no effects: omega the gyroscopes' median, omega_dot and s by least squares.
+
+    Of two IMUs the rate's change is a prior of omega_dot; InputError where samples are too few.
+    """
     positions = readings.array.relative
     used = readings.keep[..., 3:]
     rate = np.nanmedian(np.where(used, readings.values[..., 3:], np.nan), axis=1)
     linear = _linear_motion(readings, positions, rate)
     motion = np.concatenate([rate, linear], axis=1)
     parameters = np.zeros(columns.model.effect_size)
-    return State(motion, positions, parameters, no_derivatives(len(motion), len(positions)))
+    found = State(motion, positions, parameters, no_derivatives(len(motion), len(positions)))
+    if not readings.pair:
+        return found
+    if not readings.gapless:
+        raise InputError(
+            "recording: expected samples that follow each other, of two IMUs, found too few: the"
+            " rate's change from sample to sample is their angular acceleration"
+        )
+    return turned(readings, found)
 
 
 def _linear_motion(readings, positions, rate) -> np.ndarray:

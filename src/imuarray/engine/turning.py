@@ -1,44 +1,51 @@
 """Angular acceleration from the rate's own change: a prior of each sample's omega_dot.
 
-On a small array the gyroscopes know it far better than the accelerometers do.
+On a small array the gyroscopes know it far better than the accelerometers do; two accelerometers
+leave it open about the line that joins them.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from imuarray.engine.estimate import Recorded
-from imuarray.engine.linearise import polynomial_derivative, quartic_taps
+from imuarray.engine.linearise import State, polynomial_derivative, polynomial_taps
 from imuarray.engine.readings import Readings
 
 
-def turned(one: Recorded) -> Recorded:
-    """A recording with the slope of the rate that was fitted as prior mean of omega_dot.
+def turned(readings: Readings, state: State) -> State:
+    """A state with the slope of its own rate as prior mean of omega_dot.
 
-    Its sd is the gyroscopes' noise, and what a quartic over so many samples may leave out, as one
-    over twice as many shows it. For runs of a derivative's window at least.
+    The slope is a local sextic's, a quartic's in runs too short for that. The prior's sd is the
+    gyroscopes' noise in it, and what a quartic leaves out, as the sextic shows it.
     """
-    readings, rate = one.readings, one.state.motion[:, :3]
+    rate, quartic = state.motion[:, :3], readings.window
+    sextic = 3 * quartic // 4 * 2 + 1
     used = readings.keep[..., 3:] / np.square(readings.sd[:, 1])[:, None]
     noise = 1.0 / np.sqrt(np.maximum(used.sum(axis=1), used.max(initial=0.0)))
-    near, spread = _slope(readings, rate, readings.window)
-    wide, other = _slope(readings, rate, 2 * readings.window + 1)
-    # a quartic's error goes with the fourth power of its length
-    left = np.mean((wide - near) ** 2 - (spread**2 + other**2)[:, None] * noise**2) / 2.0**8
-    sd = np.sqrt((spread[:, None] * noise) ** 2 + max(left, 0.0))
-    return replace(one, state=one.state._replace(turning=(near, sd)))
+    short, spread = _slope(readings, rate, quartic, 4)
+    slope, other = _slope(readings, rate, sextic, 6)
+    long, left = other > 0, 0.0
+    if long.any():
+        padded = np.pad(_taps(readings, quartic, 4), (sextic - quartic) // 2)
+        both = np.sum((_taps(readings, sextic, 6) - padded) ** 2)  # noise of the difference
+        left = max(np.mean((slope - short)[long] ** 2 - both * noise[long] ** 2), 0.0)
+        short[long], spread[long] = slope[long], other[long]
+    return state._replace(turning=(short, np.sqrt((spread[:, None] * noise) ** 2 + left)))
 
 
-def _slope(readings: Readings, rate, window) -> tuple[np.ndarray, np.ndarray]:
-    """The rate's slope (T, 3), and how noise of one reading shows in it (T,), 1/s."""
-    slope = polynomial_derivative(readings.time, readings.run, rate, window, 1)
-    sizes = np.array([np.sqrt(np.sum(quartic_taps(window, k, 1) ** 2)) for k in range(window)])
+def _taps(readings: Readings, window, degree, place=None) -> np.ndarray:
+    """(window,) weights that give the slope at a place, by default the middle; 1/s."""
+    place = window // 2 if place is None else place
+    return polynomial_taps(window, place, 1, degree) / np.median(np.diff(readings.time))
+
+
+def _slope(readings: Readings, rate, window, degree) -> tuple[np.ndarray, np.ndarray]:
+    """The rate's slope (T, 3), and how noise of one reading shows in it (T,), 1/s; 0 for none."""
+    slope = polynomial_derivative(readings.time, readings.run, rate, window, 1, degree)
+    sizes = [np.linalg.norm(_taps(readings, window, degree, place)) for place in range(window)]
     first, count = np.unique(readings.run, return_index=True, return_counts=True)[1:]
     begin, length = np.repeat(first, count), np.repeat(count, count)
     place = np.arange(len(rate)) - begin
     left, half = length - 1 - place, window // 2
     place = np.where(place < half, place, np.where(left < half, window - 1 - left, half))
-    size = np.where(length < window, 0.0, sizes[np.clip(place, 0, window - 1)])
-    return slope, size / np.median(np.diff(readings.time))
+    return slope, np.where(length < window, 0.0, np.array(sizes)[np.clip(place, 0, window - 1)])
