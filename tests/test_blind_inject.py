@@ -201,6 +201,24 @@ def test_drift_starts_at_nothing_and_ends_at_its_parameter(seed):
         assert (np.abs(shape - np.linspace(0, 1, len(shape))).max() < 1e-9) == straight
 
 
+def test_a_warm_up_follows_one_temperature_in_all_sensors():
+    there = scene()
+    change = drawn(there, "warm_up", (1,))
+    assert change.sensors == tuple(range(8))
+    found, values = noiseless_readings(there, [change]), change.parameters
+    fast, slow = (1 - np.exp(-there.time / tau) for tau in values["time_constants"].value)
+    course = 0.8 * fast + 0.2 * slow
+    for name, readings, ideal in zip(("force", "rate"), found, there.ideal(), strict=True):
+        expected = course[:, None, None] / course[-1] * values[f"{name}_drift"].value
+        np.testing.assert_allclose(readings - ideal, expected, atol=1e-12)
+
+
+def test_a_drift_of_all_sensors_is_of_one_kind():
+    for seed in range(6):
+        change = drawn(scene(), "bias_drift", tuple(range(8)), seed)
+        assert len({"force_drift", "rate_drift"} & set(change.parameters)) == 1
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_axis_swap_is_a_signed_permutation_of_the_readings(seed):
     there = scene()

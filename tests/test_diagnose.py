@@ -52,6 +52,7 @@ ONE = [
     injected(("size_effect", ALL)),
     injected(("bias_drift", (6,))),
     injected(("position_shift", (3,))),
+    injected(("warm_up", ALL), realistic=True),
     injected(("gyroscope_noise", (1,))),
     injected(("coloured_noise", (7,))),
     injected(("sensor_clock", (2,)), realistic=True),

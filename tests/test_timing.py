@@ -88,6 +88,23 @@ def test_a_drift_is_a_cubic_of_time():
                 np.testing.assert_allclose(own, bias, atol=1e-10)
 
 
+@pytest.mark.parametrize("pace", [0.0, 3.0, -2.0])
+def test_a_warm_up_is_one_course_in_all_biases(pace):
+    model, positions, motion = scene("warm_up")
+    values = np.random.default_rng(4).standard_normal((8, 8))
+    values[:, 6:] = pace, 0.3
+    state = motion.at(TIMES)
+    found = model.predict_many(state, positions, model.join({"warm_up": values}), TIMES)
+    plain = ArrayModel(model.array, model.noise).predict_many(state, positions)
+    past, span = TIMES - TIMES[0], TIMES[-1] - TIMES[0]
+    warmth = past / span
+    if pace:
+        warmth = (1 - np.exp(-pace * past)) / (1 - np.exp(-pace * span))
+    for part, kind in ((slice(3), "specific_force"), (slice(3, 6), "angular_rate")):
+        bias = (warmth[:, None, None] - 0.3) * values[:, part]
+        np.testing.assert_allclose(getattr(found, kind) - getattr(plain, kind), bias, atol=1e-10)
+
+
 def test_a_shift_moves_a_triad_from_its_instant_on():
     model, positions, motion = scene("position_shift")
     shift = np.zeros((8, 4))

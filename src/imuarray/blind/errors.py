@@ -27,7 +27,8 @@ from imuarray.blind.scene import ACCELEROMETER_RAIL, GYROSCOPE_RAIL
 DEGREE = float(np.radians(1.0))
 GRAVITY = 9.80665  # m/s^2
 # What a drift of amplitude 1 adds up to in the course of a recording.
-DRIFT_FORCE, DRIFT_RATE = 0.1, 0.3 * DEGREE
+DRIFTS = 0.1, 0.3 * DEGREE
+WARMING = 0.05, 0.1 * DEGREE  # the same of a board that warms up
 
 
 def _off_diagonal(rng, sensors, size) -> np.ndarray:
@@ -107,22 +108,47 @@ def gyroscope_nonlinearity(curvature, field, sensors):
 
 @effect("0.1 m s-2 or 0.3 deg s-1", 0.33, 3.3)
 def bias_drift(scene, rng, sensors, size):
-    """u + b f(t), w + b f(t) with f from 0 to 1: a line, or a warm-up 1 - exp(-t / tau)."""
+    """u + b f(t), w + b f(t) with f from 0 to 1: a line, or a warm-up 1 - exp(-t / tau).
+
+    Never of all sensors of both kinds: they would follow one temperature.
+    """
     kinds = which_kinds(rng)
+    if all(kinds) and len(sensors) == scene.accelerometers:
+        kinds = (True, False)
     warming = rng.random() < 0.5
     constant = rng.uniform(0.15, 0.4) * scene.duration
     past = scene.time - scene.time[0]
     shape = 1 - np.exp(-past / constant) if warming else past
-    shape = (shape / shape[-1])[:, None, None]
-    parts = {"parameters": {"form": Parameter("exponential" if warming else "linear", "1")}}
+    said = {"form": Parameter("exponential" if warming else "linear", "1")}
     if warming:
-        parts["parameters"]["time_constant"] = Parameter(constant, "s")
-    units = ((DRIFT_FORCE, UNIT_FORCE, "force"), (DRIFT_RATE, UNIT_RATE, "rate"))
-    for (unit, name, what), chosen in zip(units, kinds, strict=True):
-        end = entries(rng, sensors, size * unit)
+        said["time_constant"] = Parameter(constant, "s")
+    ends = [size * unit for unit in DRIFTS]
+    return _drifting(rng, sensors, ends, kinds, (shape / shape[-1])[:, None, None], said)
+
+
+@effect("0.05 m s-2 and 0.1 deg s-1", 0.2, 2.0, everywhere=True)
+def warm_up(scene, rng, sensors, size):
+    """u + b T(t), w + b T(t): all sensors' offsets follow one temperature T from 0 to 1.
+
+    The chips warm the board (a first-order lag), and the board what holds it (a slower one).
+    """
+    past = scene.time - scene.time[0]
+    board, holder = rng.uniform([0.1, 0.5], [0.4, 1.5]) * scene.duration
+    warmth = 0.8 * (1 - np.exp(-past / board)) + 0.2 * (1 - np.exp(-past / holder))
+    said = {"time_constants": Parameter([float(board), float(holder)], "s")}
+    course = (warmth / warmth[-1])[:, None, None]
+    ends = [size * unit for unit in WARMING]
+    return _drifting(rng, sensors, ends, (True, True), course, said)
+
+
+def _drifting(rng, sensors, sizes, kinds, course, said) -> dict:
+    """Parts of a `Change`: offsets of the chosen kinds along a course (T, n or 1, 1)."""
+    parts, names = {"parameters": said}, (("force", UNIT_FORCE), ("rate", UNIT_RATE))
+    for (what, unit), size, chosen in zip(names, sizes, kinds, strict=True):
+        end = entries(rng, sensors, size)
         if chosen:
-            parts["parameters"][f"{what}_drift"] = Parameter(end, name)
-            parts[f"{what}_error"] = lambda field, end=end: end * shape
+            said[f"{what}_drift"] = Parameter(end, unit)
+            parts[f"{what}_error"] = lambda field, end=end: end * course
     return parts
 
 

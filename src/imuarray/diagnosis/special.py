@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis import clocks, shifts
+from imuarray.diagnosis import clocks, shifts, warming
 from imuarray.diagnosis.elimination import need
 from imuarray.diagnosis.residual_checks import Check
 from imuarray.diagnosis.scores import Candidate, score_all
@@ -83,6 +83,7 @@ SPECIAL = {
     ),
     shifts.SHIFT: Special(scan=lambda fit, given, imus, _: shifts.scan_shifts(fit, given, imus),
                           refine=shifts.refine_instants),
+    warming.WARM_UP: Special(scan=warming.scan_warming),
     DRIFT: Special(maybe=maybe_drift, check=drift_check),
 }  # fmt: skip
 

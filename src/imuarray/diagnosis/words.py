@@ -102,7 +102,7 @@ def sizes(cause: dict, labels) -> str:
             continue
         unit = unit_shown(cause["effect"], name, item["unit"])
         effect = known_effect(cause["effect"])
-        kind = part if effect.scanned and unit != "m" else ""
+        kind = part.split("_")[0] if effect.scanned and unit != "m" else ""
         if effect.kind != "mean":
             kind = "correlation time" if part.startswith("correlation_time") else part.split("_")[0]
         groups.setdefault((kind, unit), []).append((part, label, item))

@@ -22,7 +22,7 @@ MEANING = {
     "accelerometer_noise": "ln of noise / declared", "gyroscope_noise": "ln of noise / declared",
     "heavy_tails": "factor − 1", "coloured_noise": "coefficient", "saturation": "share cut off",
     "stale_samples": "share", "axis_swap": "no amplitude",
-    "bias_drift": "0.1 m/s² or 0.3 deg/s",
+    "bias_drift": "0.1 m/s² or 0.3 deg/s", "warm_up": "0.05 m/s² and 0.1 deg/s",
 }  # fmt: skip
 UNITS = {"m s-2": "m/s²", "rad s-1": "rad/s", "s2 m-1": "s²/m", "s rad-1": "s/rad",
          "rad s m-1": "rad/s per m/s²"}  # fmt: skip

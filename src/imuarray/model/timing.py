@@ -133,6 +133,29 @@ def bias_drift(drift, instant, predicted):
 
 
 @effect(
+    "warm_up", unit="m s-2, m s-2, m s-2, rad s-1, rad s-1, rad s-1, s-1, 1",
+    prior_sd=(0.05, 0.05, 0.05, 0.005, 0.005, 0.005, 0.01, 1.0), shape=lambda a, g: (max(a, g), 8),
+    scanned=True, held=(6, 7), against="time", own=True,
+    resembles=("bias_drift", "accelerometer_bias", "gyroscope_bias"),
+    components=((*(f"{kind}_{axis}" for kind in KINDS for axis in "xyz"), "pace", "zero"),),
+    meaning="the offsets of all sensors follow one temperature",
+)  # fmt: skip
+def warm_up(values, instant, predicted):
+    """Biases c (f - z) in all triads, f = (1 - e^(-p t)) / (1 - e^(-p T)) from 0 to 1: c, p, z."""
+    warmth = warming(values[:, 6:7], instant.time, instant.span) - values[:, 7:]
+    force, rate = predicted
+    bias = warmth * values[:, :6]
+    return Prediction(force + bias[: len(force), :3], rate + bias[: len(rate), 3:])
+
+
+def warming(pace, time, span):
+    """The course f of a warm-up at a ``pace`` (1/s): from 0 to 1, straight at 0, late below it."""
+    steady = jnp.abs(pace * span) < 1e-6
+    bent = jnp.where(steady, 1.0, pace)
+    return jnp.where(steady, time / span, jnp.expm1(-bent * time) / jnp.expm1(-bent * span))
+
+
+@effect(
     "position_shift", unit="m, m, m, s", prior_sd=(1e-3, 1e-3, 1e-3, 1e3),
     shape=lambda a, g: (a, 4), sensors="accelerometer", sampling=True, scanned=True, held=(3,),
     components=(("x", "y", "z", "time"),), against="place",

@@ -1,0 +1,109 @@
+"""Biases that follow one temperature: how `warm_up` is found, its course scanned for."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from imuarray.diagnosis.scores import Candidate, Information, Scanned, Score
+from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.tails import log_chi_square
+from imuarray.engine.fit import Fit
+from imuarray.engine.heldout import blocks_of
+from imuarray.linear import scaled_inverse
+from imuarray.model.effects import KINDS
+from imuarray.model.timing import warming
+
+WARM_UP = "warm_up"
+PACES = (-8.0, -4.0, -2.0, 0.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # in the recording's length
+ZEROS = (-1.0, 2.0)  # of a course from 0 to 1, between which all offsets vanish
+
+
+class Courses:
+    """What all biases along a course of time gain, all else that is fitted projected out.
+
+    From blocks of time, in each of which the course is taken for constant.
+    """
+
+    def __init__(self, fit: Fit, given: Information, imus):
+        columns = [c for kind in KINDS for c in fit.columns.of(f"{kind}_bias")]
+        mask = fit.active.copy()
+        mask[np.ix_(imus, columns)] = True
+        number = np.full(mask.shape, -1)
+        number[mask] = np.arange(mask.sum())
+        own, rest = number[np.ix_(imus, columns)].ravel(), number[fit.active]
+        blocks = blocks_of(len(fit.residual), SETTINGS.cuts)
+        parts = [fit.normal(mask, block) for block in blocks]
+        self.whole = np.array([part[0][np.ix_(own, own)] for part in parts])
+        self.cross = np.array([part[0][np.ix_(own, rest)] for part in parts])
+        self.score = np.array([part[1][own] for part in parts])
+        self.time = np.array([fit.readings.time[block].mean() for block in blocks])
+        self.span = fit.readings.span
+        own = fit.columns.prior_sd[fit.columns.of(WARM_UP)[: len(columns)]]
+        self.ridge = np.diag(np.tile(own**-2.0, len(imus)))
+        active = given.places(fit.active)
+        inner = given.information[np.ix_(active, active)] + given.precision[np.ix_(active, active)]
+        self.outside = scaled_inverse(inner)
+
+    def gain(self, course, among=slice(None)) -> tuple[float, np.ndarray]:
+        """(chi-square, coefficients (n,)) of n biases, or of some of them, along a course (B,)."""
+        whole = np.einsum("t,tmn->mn", course**2, self.whole)
+        aside = np.einsum("t,tmr->mr", course, self.cross)
+        left = (whole - aside @ self.outside @ aside.T + self.ridge)[among][:, among]
+        score = (course @ self.score)[among]
+        values = scaled_inverse(left) @ score
+        return float(score @ values), values
+
+    def course(self, pace: float, zero: float) -> np.ndarray:
+        """Of the blocks, (B,)."""
+        return np.asarray(warming(pace / self.span, self.time, self.span)) - zero
+
+    def best_zero(self, pace: float) -> tuple[float, float]:
+        """(chi-square, zero) of the courses of a pace."""
+        found = minimize_scalar(
+            lambda zero: -self.gain(self.course(pace, zero))[0], bounds=ZEROS, method="bounded"
+        )
+        return -found.fun, found.x
+
+    def best(self) -> tuple[float, float]:
+        """Pace and zero of the course that gains most."""
+        first = int(np.argmax([self.best_zero(pace)[0] for pace in PACES]))
+        around = PACES[max(first - 1, 0)], PACES[min(first + 1, len(PACES) - 1)]
+        pace = minimize_scalar(
+            lambda pace: -self.best_zero(pace)[0], bounds=around, method="bounded",
+            options={"xatol": 0.05},
+        ).x  # fmt: skip
+        return pace, self.best_zero(pace)[1]
+
+
+def scan_warming(fit: Fit, given: Information, imus, _=None) -> list[Scanned]:
+    """All IMUs' biases along the course where they gain most.
+
+    Biases of both kinds must follow it, and gain more by it than as constants: else it is no
+    thermometer.
+    """
+    biases = all(len(fit.columns.of(f"{kind}_bias")) for kind in KINDS)
+    few = len(fit.residual) < 2 * SETTINGS.cuts or len(imus) < fit.readings.exists.all(axis=1).sum()
+    if few or not biases:
+        return []
+    courses = Courses(fit, given, imus)
+    pace, zero = courses.best()
+    course, steady = courses.course(pace, zero), np.ones_like(courses.time)
+    gain, values = courses.gain(course)
+    if gain - courses.gain(steady)[0] < -2 * SETTINGS.effect:
+        return []
+    for kind in range(len(KINDS)):
+        own = np.arange(len(values)) % 6 // 3 == kind
+        alone = courses.gain(course, own)[0]
+        sure = log_chi_square(max(alone, 1e-9), own.sum()) < SETTINGS.likely_drift
+        if not sure or alone < courses.gain(steady, own)[0]:
+            return []
+    freedom = len(values) + 2
+    log_p = min(log_chi_square(gain, freedom) + np.log(2 * len(PACES)), 0.0)
+    each = values.reshape(len(imus), 6)
+    starts = {
+        imu: np.append(own, [pace / courses.span, zero])
+        for imu, own in zip(imus, each, strict=True)
+    }
+    score = Score(Candidate(WARM_UP, tuple(imus), "", True), gain, freedom, log_p)
+    return [Scanned(score, starts)]
