@@ -36,7 +36,12 @@ ROWS = {
         "rec.nc",
         {},
     ),
-    "the same, scale errors, corrected": (Options(imus=2, turned=37.0), "corrected.nc", {}),
+    "the same, the second 3 ms late": (
+        Options(imus=2, turned=37.0, late=0.003, **IDEAL),
+        "rec.nc",
+        {},
+    ),
+    "two IMUs, scale errors, corrected": (Options(imus=2, turned=37.0), "corrected.nc", {}),
     "real scale errors, gyroscopes' offsets corrected": (Options(), "corrected.nc", OFFSETS),
     "the same, gyroscopes' maps corrected": (Options(), "corrected.nc", {}),
 }

@@ -156,7 +156,15 @@ def test_two_imus_take_the_angular_acceleration_from_the_gyroscopes():
     assert np.abs(error / sds).max() < 3 and sds.max() < 1e-4
     with pytest.raises(InputError, match="follow each other, of two IMUs, found too few"):
         imuarray.calibrate(recording.select(slice(None, None, 40)))
-    for step in (imuarray.sample, imuarray.diagnose, imuarray.select):
+    motion = imuarray.apply(found, recording)
+    name = "angular_acceleration"
+    # at the mean of the IMUs' instants
+    expected = truth[name] + truth["effect_parameter"].mean() * truth["angular_jerk"]
+    off = (motion[name] - expected) / motion[f"{name}_sd"]
+    np.testing.assert_allclose(np.sqrt((off**2).mean("time")), 1.0, atol=0.25)
+    (cause,) = imuarray.diagnose(recording, replicates=9).document["causes"]
+    assert cause["effect"] == "sensor_delay"
+    for step in (imuarray.sample, imuarray.select):
         with pytest.raises(IdentifiabilityError, match="at least 3 accelerometer triads, found 2"):
             step(recording)
 

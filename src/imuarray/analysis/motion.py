@@ -36,7 +36,8 @@ def apply(
     ``_sd_from_calibration`` (NaN for a diagnosis, which does not tell it: sds are the noise's
     alone then); ``motion_covariance`` (time, component, component_other);
     ``converged``, and the flags ``gyroscope_at_rail`` and ``accelerometer_at_rail`` (time; the
-    motion is NaN where an accelerometer is). InputError says what does not fit together.
+    motion is NaN where an accelerometer is, and of two IMUs where an axis has no gyroscope off its
+    rail). InputError says what does not fit together.
     """
     recording = assumed(recording, accelerometer_noise)
     require_fit(calibration, recording)
@@ -46,7 +47,8 @@ def apply(
     except np.linalg.LinAlgError as error:
         raise InputError(f"expected a calibration that determines the motion: {error}") from None
     found = _with_common_map(found, calibration, recording)
-    lost = recording.saturated_accelerometers().any(axis=(1, 2))
+    railed = recording.saturated_accelerometers().any(axis=(1, 2))
+    lost = railed | np.isnan(found.estimate.cost)
     if not (np.einsum("tii->ti", found.covariance)[~lost] > 0).all():  # NaN, too
         raise InputError("expected a calibration that gives the motion variances, found none")
     dataset = motion_dataset(recording, found, lost)
@@ -54,7 +56,7 @@ def apply(
         for name in UNITS:
             dataset[f"{name}_sd_from_calibration"][:] = np.nan
     dataset["gyroscope_at_rail"] = (("time",), saturated.any(axis=(1, 2)))
-    dataset["accelerometer_at_rail"] = (("time",), lost)
+    dataset["accelerometer_at_rail"] = (("time",), railed)
     used = [calibration[name].to_numpy() for name in sorted(map(str, calibration.data_vars))]
     data = digest(recording.specific_force, recording.angular_rate, *used)
     dataset.attrs |= stamp({"recording and calibration": data}, 0)
@@ -104,7 +106,8 @@ def motion_under(
     from imuarray.engine.fusion import fuse
 
     positions, attrs = calibration["position"].to_numpy(), calibration.attrs
-    parameters, since, span = (positions - positions[0])[1:].ravel(), None, None
+    parameters = (positions - positions[0])[1:].ravel()
+    since, span = recording.time - recording.time[0], None
     block = calibration["position_covariance"].to_numpy()[1:, :, 1:, :]
     covariance: np.ndarray | None = block.reshape((parameters.size,) * 2)
     extended = "effect_parameter" in calibration

@@ -47,7 +47,7 @@ def _calibration(path: Path, recording: Recording) -> xr.Dataset:
 
 def document(dataset: xr.Dataset) -> dict:
     """The motion's main numbers; sds are rms over samples."""
-    lost = dataset["accelerometer_at_rail"].to_numpy()
+    lost = np.isnan(dataset["angular_rate"].to_numpy()).any(axis=1)
     railed = dataset["gyroscope_at_rail"].to_numpy() & ~lost
     found: dict[str, Any] = {
         "samples": lost.size,
@@ -69,7 +69,7 @@ def document(dataset: xr.Dataset) -> dict:
 def report(found: dict, average: float) -> list[str]:
     """The same for a person; ``average`` (rad/s) is the sd of the gyroscopes' mean."""
     lines = [
-        f"{found['samples']} samples: {found['left_out']} left out, an accelerometer at its rail;"
+        f"{found['samples']} samples: {found['left_out']} left out, at a rail;"
         f" {found['gyroscope_at_rail']} with a gyroscope at its rail"
     ]
     if "off_the_rail" in found:

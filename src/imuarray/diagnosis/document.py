@@ -27,7 +27,6 @@ from imuarray.engine.parameters import prior_precision
 from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.engine.widths import widths
 from imuarray.estimation.threads import one_thread
-from imuarray.geometry.array import require_planar_extent
 from imuarray.linear import scaled_inverse
 from imuarray.model.effects import DATA_EFFECTS, KINDS
 from imuarray.recording import Recording
@@ -99,7 +98,6 @@ def diagnose(
     constant and for copied channels.
     """
     require_live(recording)
-    require_planar_extent(recording.accelerometer_position, "recording")
     found = run_procedure(recording, without, say)
     search = found.search
     say("fitting the papers' model to the same readings")

@@ -14,6 +14,7 @@ from imuarray.engine.heldout import blocks_of
 from imuarray.model.effects import KINDS
 
 TAILS, COLOURED = "heavy_tails", "coloured_noise"
+ALIKE = 1e-9  # share of the largest information below which there is none
 SCALES = tuple(f"{kind}_noise" for kind in KINDS)
 
 
@@ -77,7 +78,9 @@ def verdict(log_ratio, covariance, limit):
     """(places far from zero, log p of the worst or of all) for normals (n,) of a covariance."""
     number = len(log_ratio)
     single = log_normal(np.abs(log_ratio) / np.sqrt(np.diag(covariance))) + np.log(2)
-    pooled = log_chi_square(float(log_ratio @ np.linalg.solve(covariance, log_ratio)), number)
+    inverse = np.linalg.pinv(covariance, ALIKE, hermitian=True)
+    freedom = int(np.linalg.matrix_rank(covariance, hermitian=True, rtol=ALIKE))
+    pooled = log_chi_square(float(log_ratio @ inverse @ log_ratio), freedom)
     log_p = min(single.min() + np.log(2 * number), pooled + np.log(2), 0.0)
     return np.flatnonzero(single + np.log(number) < limit), float(log_p)
 
@@ -112,7 +115,8 @@ def whole_scales(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
         surplus = fit.residual[part].reshape(-1, 6 * count) ** 2 * mask - left[:, rows, rows]
         score += surplus.sum(axis=0).reshape(2 * count, 3).sum(axis=1)
     there = readings.exists.ravel()
-    covariance = np.linalg.inv(information[np.ix_(there, there)])
+    # of two triads of a kind, how much of their difference is either's is not seen
+    covariance = np.linalg.pinv(information[np.ix_(there, there)], ALIKE, hermitian=True)
     wide = np.array([_width(fit, int(i), int(k)) for i, k in np.argwhere(readings.exists)])
     return covariance @ score[there], covariance * np.outer(wide, wide)
 

@@ -197,9 +197,10 @@ def _drift(part):
 
 
 def _between(part):
-    flat = part.values.reshape(len(part.values), -1)
-    matrix = np.corrcoef(flat.T) if flat.shape[1] > 3 else np.eye(flat.shape[1])
     count = part.values.shape[1]
+    if count < 3:
+        return None  # the motion leaves the difference of two
+    matrix = np.corrcoef(part.values.reshape(len(part.values), -1).T)
     blocks = np.abs(matrix).reshape(count, 3, count, 3).max(axis=(1, 3))
     np.fill_diagonal(blocks, 0.0)
     return blocks.max(axis=1)

@@ -47,7 +47,7 @@ class Recorded:
         first = start(readings, columns)
         if former is not None:
             first = first._replace(positions=former.positions, parameters=former.parameters)
-        smooth = readings.gapless and (readings.pair or is_smooth(readings, first.motion))
+        smooth = readings.gapless and is_smooth(readings, first.motion)
         if readings.gapless and not smooth:
             first = with_rough_prior(readings, first)
         return cls(readings, first, smooth)

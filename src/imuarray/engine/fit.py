@@ -116,7 +116,8 @@ class Fit:
     def free(self) -> int:
         """Degrees of freedom left: readings less motion less fitted parameters."""
         used = int(self.readings.keep.sum())
-        return used - 9 * len(self.residual) - int(self.active.sum())
+        motion = 9 if self.state.turning is None else 6
+        return used - motion * len(self.residual) - int(self.active.sum())
 
 
 def pick(through, chosen) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.engine.fit import flat_parameters, pick
+from imuarray.engine.fit import flat_parameters, pick, with_derivatives
 from imuarray.engine.linearise import (
     CHUNK,
     RoughPrior,
@@ -24,6 +24,7 @@ from imuarray.engine.linearise import (
 )
 from imuarray.engine.parameters import Columns, columns_of
 from imuarray.engine.readings import Readings, by_imu, measured
+from imuarray.engine.start import start
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.motion_ml import MotionEstimate, motion_at, motion_from
 from imuarray.geometry.array import positions_of, require_planar_extent
@@ -33,6 +34,7 @@ from imuarray.motion import Motion
 
 COMPONENTS = tuple(f"{name}_{axis}" for name in ("omega", "omega_dot", "s") for axis in "xyz")
 TOLERANCE, LIMIT = 1e-6, 50  # sds, steps
+TURNS = 2  # in which a pair's rate and its derivatives follow each other
 
 
 class Fused(NamedTuple):
@@ -70,24 +72,28 @@ def fuse(
         Gyroscope axes at the rail. Their readings give the side and the least size of the rate,
         and nothing to the covariances.
     time, span : (T,) s and s
-        Since the calibration's recording began, and its length, which drifts and clocks look at.
+        Since the calibration's recording began, and its length, which drifts and clocks look at;
+        of two IMUs the rate's change with time is a prior of the angular acceleration.
 
     Raises
     ------
     IdentifiabilityError
-        For fewer than three or collinear triads.
+        For collinear triads.
     InputError
-        For noise that is not one sd for each triad.
+        For noise that is not one sd for each triad, for two IMUs' samples that do not follow each
+        other.
     """
     parameters = model.array.parameters if parameters is None else np.asarray(parameters, float)
     split = 3 * (model.array.accelerometers - 1)
     positions = positions_of(parameters[:split])
-    require_planar_extent(positions, "positions")
-    data = Collapsed.of(model, specific_force, angular_rate, saturated)
     readings = measured(model, specific_force, angular_rate, saturated)
     if time is not None:
         since = np.asarray(time, float)
         readings = replace(readings, time=since, span=float(span) if span else clock(since)[1])
+    if readings.pair:
+        return _of_two(readings, model, positions, parameters[split:], covariance)
+    require_planar_extent(positions, "positions")
+    data = Collapsed.of(model, specific_force, angular_rate, saturated)
     rails = one_sided(readings, saturated)
     first = motion_from(data, positions)
     state = _state(model, first.motion, positions, parameters[split:])
@@ -110,6 +116,35 @@ def fuse(
     motion = Motion(*parts) if len(parts) == 5 else Motion.of(*parts)
     estimate = MotionEstimate(motion, found.cost, found.steps, found.converged)
     return Fused(estimate, *_covariances(readings, model, state, covariance))
+
+
+def _of_two(readings: Readings, model: ArrayModel, positions, effects, covariance) -> Fused:
+    """The motion that two IMUs see, their rate's change a prior of omega_dot.
+
+    NaN where an axis has no gyroscope off its rail.
+    """
+    samples = len(readings.time)
+    seen = np.flatnonzero(readings.keep[..., 3:].any(axis=1).all(axis=1))
+    part = readings.select(seen)
+    followed = np.bincount(part.run).max(initial=0) >= part.window if len(seen) > 1 else False
+    part = replace(part, gapless=bool(followed))
+    state = start(part, columns_of(model.array, model.effects, np.inf))
+    state = state._replace(positions=positions, parameters=np.asarray(effects))
+    for _ in range(TURNS):
+        state = with_derivatives(part, state, True)
+        found = descend(part, model, state, np.arange(len(seen)))
+        state = state._replace(motion=found.motion)
+    whole = [np.full((samples, *values.shape[1:]), np.nan) for values in (found.motion, found.cost)]
+    spreads = _covariances(part, model, state, covariance)
+    both = [np.full((samples, 9, 9), np.nan) for _ in spreads]
+    steps, converged = np.zeros(samples, int), np.zeros(samples, bool)
+    for target, values in zip(
+        (*whole, *both, steps, converged),
+        (found.motion, found.cost, *spreads, found.steps, found.converged), strict=True,
+    ):  # fmt: skip
+        target[seen] = values
+    motion = Motion.of(*np.split(whole[0], 3, axis=1))
+    return Fused(MotionEstimate(motion, whole[1], steps, converged), *both)
 
 
 def _state(model: ArrayModel, motion: Motion, positions, effects) -> State:

@@ -85,11 +85,18 @@ class Readings:
 
     def with_sd(self, sd) -> Readings:
         """The same with another noise sd (N, 2)."""
-        return replace(self, sd=np.asarray(sd, float))
+        return self.with_noise(sd, self.trust)
 
     def with_noise(self, sd, trust) -> Readings:
-        """The same with another noise sd (N, 2), and a robust loss' weights (T, N, 2) or None."""
-        return replace(self, sd=np.asarray(sd, float), trust=trust)
+        """The same with another noise sd (N, 2), and a robust loss' weights (T, N, 2) or None.
+
+        Two triads of a kind share their sd: the motion leaves but their difference.
+        """
+        sd = np.array(sd, float)
+        for kind in np.flatnonzero(self.exists.sum(axis=0) == 2):
+            own = self.exists[:, kind]
+            sd[own, kind] = np.sqrt(np.mean(sd[own, kind] ** 2))
+        return replace(self, sd=sd, trust=trust)
 
     def without(self, lost) -> Readings:
         """The same without the readings in ``lost`` (T, N, 6) bool."""

@@ -32,7 +32,8 @@ def start(readings: Readings, columns: Columns) -> State:
             "recording: expected samples that follow each other, of two IMUs, found too few: the"
             " rate's change from sample to sample is their angular acceleration"
         )
-    return turned(readings, found)
+    found = turned(readings, found)
+    return found._replace(motion=np.hstack([rate, found.turning[0], linear[:, 3:]]))
 
 
 def _linear_motion(readings, positions, rate) -> np.ndarray:

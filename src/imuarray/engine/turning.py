@@ -16,7 +16,8 @@ def turned(readings: Readings, state: State) -> State:
     """A state with the slope of its own rate as prior mean of omega_dot.
 
     The slope is a local sextic's, a quartic's in runs too short for that. The prior's sd is the
-    gyroscopes' noise in it, and what a quartic leaves out, as the sextic shows it.
+    gyroscopes' noise in it, and what a quartic leaves out, as the sextic shows it; in still shorter
+    runs all that is known is omega_dot's size.
     """
     rate, quartic = state.motion[:, :3], readings.window
     sextic = 3 * quartic // 4 * 2 + 1
@@ -30,7 +31,10 @@ def turned(readings: Readings, state: State) -> State:
         both = np.sum((_taps(readings, sextic, 6) - padded) ** 2)  # noise of the difference
         left = max(np.mean((slope - short)[long] ** 2 - both * noise[long] ** 2), 0.0)
         short[long], spread[long] = slope[long], other[long]
-    return state._replace(turning=(short, np.sqrt((spread[:, None] * noise) ** 2 + left)))
+    sd = np.sqrt((spread[:, None] * noise) ** 2 + left)
+    alone = spread == 0.0  # in runs that are too short: as large as elsewhere
+    sd[alone] = np.sqrt(np.mean(short[~alone] ** 2)) if not alone.all() else np.inf
+    return state._replace(turning=(short, sd))
 
 
 def _taps(readings: Readings, window, degree, place=None) -> np.ndarray:

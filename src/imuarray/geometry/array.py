@@ -84,9 +84,9 @@ def require_planar_extent(positions: np.ndarray, where: str = "array") -> None:
     """Raise IdentifiabilityError for fewer than three or collinear triads (2017, section II)."""
     if len(positions) < 3:
         raise IdentifiabilityError(
-            f"{where}: expected at least 3 accelerometer triads, found {len(positions)}: they"
-            " measure the angular acceleration of each sample, which two leave open about the line"
-            " through them (`calibrate`'s sensor model alone takes it from the gyroscopes)"
+            f"{where}: expected at least 3 accelerometer triads, found {len(positions)}: two leave"
+            " each sample's angular acceleration open about the line through them; `calibrate`,"
+            " `apply` and `diagnose` take it from the gyroscopes' change, from sample to sample"
         )
     spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
     if spread[1] <= 1e-9 * max(spread[0], 1e-300) or spread[0] == 0.0:
