@@ -23,9 +23,9 @@ from imuarray.model.effects import EFFECTS
 
 RUNGS = {
     "offsets": ("accelerometer_bias", "gyroscope_bias"),
-    "gyroscope maps": ("gyroscope_scale", "gyroscope_misalignment"),
-    "lag of the gyroscopes": ("gyroscope_delay",),
     "delay of each IMU": ("sensor_delay",),
+    "lag of the gyroscopes": ("gyroscope_delay",),
+    "gyroscope maps": ("gyroscope_scale", "gyroscope_misalignment"),
     "lever arms of the axes": ("size_effect",),
 }
 AGREES = 1.02  # times the residual that a prior of omega_dot may make
