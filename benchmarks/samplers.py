@@ -96,7 +96,7 @@ def timed(function):
 
 def judged(name, problem, chains, seconds, setup) -> Row:
     """A row from chains, burn-in left out."""
-    burn_in = find_burn_in(chains.draws, chains.log_target).draws
+    burn_in = find_burn_in(chains.draws, chains.log_target)[0]
     left = chains.draws[:, burn_in:]
     return Row(name, problem.samples, ess(left).min(), rhat(left).max(), seconds, setup, left)
 

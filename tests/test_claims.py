@@ -6,15 +6,25 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from imuarray.claims import CLAIMS, VERDICTS, Results, evaluate, markdown
-from imuarray.claims.registry import FAILS, HOLDS, REGISTER, UNTESTED, claim
+from imuarray.claims.page import markdown
+from imuarray.claims.registry import (
+    CLAIMS,
+    FAILS,
+    HOLDS,
+    REGISTER,
+    UNTESTED,
+    VERDICTS,
+    claim,
+    evaluate,
+)
+from imuarray.claims.results import Results
 from imuarray.config import model_from, read_config
 from imuarray.errors import InputError
 from imuarray.motion import normal_motion
 from imuarray.simulation.measure import measure
 from imuarray.studies.checks import identifiability, marginalisation, proposal
-from imuarray.studies.checks.accelerometers_only import accelerometers_only
 from imuarray.studies.checks.bound import bound_table
+from imuarray.studies.rate_error import accelerometers_only
 from imuarray.studies.settings2017 import magnitudes
 
 SAMPLES = (5, 50, 500)
@@ -249,31 +259,31 @@ FLIPS = [
 
 @pytest.mark.parametrize(("name", "change"), FLIPS, ids=[name for name, _ in FLIPS])
 def test_verdict_flips(results, name, change):
-    assert CLAIMS[name].test(results).verdict == HOLDS
+    assert CLAIMS[name](results).verdict == HOLDS
     changed = results.replace(change(results))
-    assert CLAIMS[name].test(changed).verdict == FAILS
+    assert CLAIMS[name](changed).verdict == FAILS
 
 
 def test_unconverged_chains_are_not_believed(results):
     """The claims then rest on the linearised posterior and say so."""
     change = replaced("posterior/T5", converged=False, rhat_max=2.0)(results)
     change |= scaled("posterior/T5", "sd_m", "sd_m > 0", 1e6)(results)
-    outcome = CLAIMS["2021-30"].test(results.replace(change))
+    outcome = CLAIMS["2021-30"](results.replace(change))
     assert outcome.verdict == HOLDS and "T5: R-hat 2" in outcome.remark
 
 
 @pytest.mark.parametrize("name", [f"2021-{n}" for n in (30, 31, 32, 33, 43, 45, 46, 47)])
 def test_fallback_is_named(results, name):
     prefix = {"2021-45": "standin_", "2021-46": "standin_", "2021-47": "simulation_"}.get(name, "")
-    assert "linearised" not in CLAIMS[name].test(results).remark
+    assert "linearised" not in CLAIMS[name](results).remark
     change = replaced(f"posterior/{prefix}T50", converged=False, rhat_max=2.0)(results)
-    remark = CLAIMS[name].test(results.replace(change)).remark
+    remark = CLAIMS[name](results.replace(change)).remark
     assert f"{prefix}T50: R-hat 2" in remark and "linearised posterior there" in remark
 
 
 def test_own_extension_of_figure_5_is_reported_not_judged(results):
     change = scaled(MOTION, "rmse_m", "angular_acceleration_dps2 == 200000", 100.0)(results)
-    outcome = CLAIMS["2017-10"].test(results.replace(change))
+    outcome = CLAIMS["2017-10"](results.replace(change))
     assert outcome.verdict == HOLDS
     assert re.search(r"our extension to 200000 deg/s\^2.*times larger at", outcome.remark)
 
@@ -282,7 +292,7 @@ def test_own_extension_of_figure_5_is_reported_not_judged(results):
 def test_noise_makes_no_claim_hold(results, name):
     path, column = (SAMPLE_TABLE, "rmse_se_m") if name == "2017-12" else (RATE, "array_rmse_se_dps")
     change = scaled(path, column, f"{column} > 0", 1000.0)(results)
-    assert CLAIMS[name].test(results.replace(change)).verdict == FAILS
+    assert CLAIMS[name](results.replace(change)).verdict == FAILS
 
 
 def test_page(table, settings):

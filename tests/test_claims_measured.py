@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from imuarray.claims import CLAIMS, Results
+from imuarray.claims.registry import CLAIMS
+from imuarray.claims.results import Results
 from imuarray.geometry import mimu4444_corners
 
 BOARD = mimu4444_corners()
@@ -47,7 +48,7 @@ def results(coverage=0.5, residual=2.0, noise=0.04, rate=0.001, variance=300.0, 
 
 
 def verdict(name, **changes):
-    return CLAIMS[name].test(results(**changes))
+    return CLAIMS[name](results(**changes))
 
 
 @pytest.mark.parametrize(
@@ -78,4 +79,4 @@ def test_three_packages_are_too_few_to_count_ellipses():
 def test_without_measured_data_they_are_not_judged():
     bare = Results("nowhere", SETTINGS)
     for name in ("2021-49", "2021-52", "2021-55", "2021-56", "2021-57"):
-        assert CLAIMS[name].test(bare).verdict == "cannot be tested here"
+        assert CLAIMS[name](bare).verdict == "cannot be tested here"

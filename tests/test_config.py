@@ -39,7 +39,7 @@ def test_schema_gives_each_key_a_description():
 @pytest.mark.parametrize(
     ("path", "value", "message"),
     [
-        (("scale",), "huge", "expected one of quick, default, paper, found huge"),
+        (("scale",), "huge", "expected any of quick, default, paper, found 'huge'"),
         (("noise", "accelerometer_sd"), -1, "noise.accelerometer_sd"),
         (("paper2021", "prior_sd"), "3 mm", "paper2021.prior_sd"),
         (("papers",), {}, "papers"),

@@ -228,5 +228,5 @@ def test_out_of_reach_says_why(source, tmp_path, monkeypatch):
     monkeypatch.setattr("pooch.retrieve", retrieve)
     with pytest.raises(InputError, match="IMUARRAY_MIRROR.*no route to host"):
         remote.fetch("board", "a/data.bin", tmp_path)
-    with pytest.raises(InputError, match="expected one of"):
+    with pytest.raises(InputError, match="expected any of"):
         remote.fetch("board", "b", tmp_path)

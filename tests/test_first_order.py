@@ -12,7 +12,7 @@ from imuarray.firstorder.allan import allan_deviation, lag_correlation, white_no
 from imuarray.firstorder.correct import calibrate_first_order, correct
 from imuarray.firstorder.report import noise_table, parameter_table, residual_table
 from imuarray.firstorder.still import still_poses, window_spread
-from imuarray.firstorder.triads import fit_triads
+from imuarray.firstorder.triads import fit_triads, parts_of
 from imuarray.geometry import mimu4444_corners
 from imuarray.recording import Recording, read_recording, write_recording
 
@@ -200,7 +200,7 @@ def test_the_parts_make_the_matrix_and_carry_its_errors():
     unit = directions(15, rng)
     mean = np.einsum("kij,pj->pki", matrix, GRAVITY * unit) + offset
     found = fit_triads(mean, np.full(mean.shape, 1e-3), GRAVITY)
-    parts = found.parts()
+    parts = parts_of(found.matrix)
     for k in range(3):
         scale, (xy, xz, yz) = parts["scale"][k], parts["misalignment"][k]
         upper = np.diag(scale) @ np.array([[1, xy, xz], [0, 1, yz], [0, 0, 1]])

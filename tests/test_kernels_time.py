@@ -61,7 +61,6 @@ CALLS = {
     "fixed_draws": "likelihood.on(r, rates)",
     "fixed_draws, general": "correlated.on(r, rates)",
     "fresh_draws": "likelihood.estimate(r, 10, own)",
-    "fresh_draws, threads": "likelihood.estimate(r, 10, own, threads=2)",
     "repeated": "likelihood.realisations(r, 10, 3, own)",
     "transitions": "target.transitions(array.parameters.copy(), -1e9, 1e-4, 5, own)",
     "angular_rates": "estimate_motion(model, force, rate).cost",

@@ -90,7 +90,7 @@ def test_plots(simulated, calibration, chains):
     assert "(mm)" in imuarray.plots.posterior(chains, labels[1]).get_xlabel()
     assert len(imuarray.plots.trace(chains, labels[2], "z").lines) == 2
     assert all(panel.has_data() for panel in imuarray.plots.residuals(simulated[0]))
-    with pytest.raises(imuarray.InputError, match="expected a triad of"):
+    with pytest.raises(imuarray.InputError, match="accelerometer: expected any of"):
         imuarray.plots.posterior(chains, labels[0])
 
 

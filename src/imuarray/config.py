@@ -6,7 +6,7 @@ from pathlib import Path
 
 import yaml
 
-from imuarray.errors import LARGEST, SMALLEST, InputError
+from imuarray.errors import LARGEST, SMALLEST, InputError, require_one_of
 
 DEEPEST = 8  # levels; the schema has six
 SCHEMA = Path(__file__).parent / "schemas" / "config.schema.yaml"
@@ -34,9 +34,7 @@ def check_config(config, where: str = "config") -> dict:
     if fault is not None:
         place = ".".join(str(part) for part in fault.absolute_path) or "top level"
         raise InputError(f"{where}: {place}: {fault.message}")
-    if config["scale"] not in config["scales"]:
-        known = ", ".join(config["scales"])
-        raise InputError(f"{where}: scale: expected one of {known}, found {config['scale']}")
+    require_one_of(f"{where}: scale", config["scale"], config["scales"])
     for name, scale in config["scales"].items():
         for key in ("transitions", "experiment_transitions", "measured_transitions"):
             _check_lengths(scale[key], config["paper2021"]["samples"], scale["draws"],

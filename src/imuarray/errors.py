@@ -1,5 +1,6 @@
 """What goes wrong because of the input, as opposed to because of a defect."""
 
+from collections.abc import Iterable
 from numbers import Integral
 
 # Sizes that a quantity in SI units may have: what is squared and summed stays a number, and
@@ -41,6 +42,12 @@ def require_integer(name: str, value: object, least: int = 1) -> None:
     integral = isinstance(value, Integral) and not isinstance(value, bool)
     if not integral or value < least:
         raise InputError(f"{name}: expected an integer of at least {least}, found {value!r}")
+
+
+def require_one_of(name: str, value: object, known: Iterable[str]) -> None:
+    """InputError unless ``value`` is one of the texts ``known``."""
+    if value not in known:
+        raise InputError(f"{name}: expected any of {', '.join(known)}, found {value!r}")
 
 
 def require_shape(name: str, value, shape: tuple[int, ...]) -> None:

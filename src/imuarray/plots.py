@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from imuarray.errors import InputError
+from imuarray.errors import require_one_of
 from imuarray.figures.style import GREY, look
 
 if TYPE_CHECKING:
@@ -92,8 +92,7 @@ def trace(chains: xr.DataTree, accelerometer: str, axis: str, axes: Axes | None 
 def _of(chains: xr.DataTree, accelerometer: str):
     """(draws (chain, draw, 3), prior mean (3,), prior sd (3,)) of one triad, in m."""
     known = [str(label) for label in chains["posterior"]["accelerometer"].to_numpy()]
-    if accelerometer not in known:
-        raise InputError(f"expected a triad of {', '.join(known)}, found {accelerometer!r}")
+    require_one_of("accelerometer", accelerometer, known)
     of = {"accelerometer": known.index(accelerometer)}
     prior = chains["prior"]
     return tuple(
@@ -107,8 +106,7 @@ def motion(dataset: xr.Dataset, quantity: str = "angular_rate", axes: Axes | Non
 
     ``dataset``: what `imuarray.apply` gave; InputError for another ``quantity``.
     """
-    if quantity not in MOTION:
-        raise InputError(f"expected any of {', '.join(MOTION)}, found {quantity!r}")
+    require_one_of("quantity", quantity, MOTION)
     axes, (label, factor) = _axes(axes), MOTION[quantity]
     time = dataset["time"].to_numpy()
     values, sds = (factor * dataset[name].to_numpy() for name in (quantity, f"{quantity}_sd"))

@@ -167,16 +167,20 @@ def target_of(path: str | Path) -> Path:
     return target
 
 
+def write_bytes(content: bytes, path: str | Path) -> None:
+    """Write a file as `atomic_write` does."""
+    with atomic_write(path) as temporary:
+        temporary.write_bytes(content)
+
+
 def write_json(value: Any, path: str | Path) -> None:
     """Write plain data (numpy's too) as indented JSON in the given order; see `_json` on NaN."""
-    with atomic_write(path) as temporary:
-        temporary.write_text(_json(value, indent=2) + "\n", encoding="utf-8", newline="\n")
+    write_bytes(f"{_json(value, indent=2)}\n".encode(), path)
 
 
 def write_csv(frame: pd.DataFrame, path: str | Path) -> None:
     """Write a table without its index; numbers have the digits that give them back exactly."""
-    with atomic_write(path) as temporary:
-        frame.to_csv(temporary, index=False, lineterminator="\n")
+    write_bytes(frame.to_csv(index=False, lineterminator="\n").encode(), path)
 
 
 def write_netcdf(
@@ -191,8 +195,7 @@ def write_netcdf(
     for name, dataset in (groups or {}).items():
         dataset.to_netcdf(image, mode="a", group=name, engine="h5netcdf")
     content = image.getvalue()
-    with atomic_write(path) as temporary:
-        temporary.write_bytes(content + SEAL + hashlib.sha256(content).digest())
+    write_bytes(content + SEAL + hashlib.sha256(content).digest(), path)
 
 
 SEAL = b"imuarray sha-256"  # before the digest, at a file's end, where HDF5 does not look

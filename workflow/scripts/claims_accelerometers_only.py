@@ -7,7 +7,7 @@ with job(snakemake) as settings:  # noqa: F821
 
     from imuarray.config import model_from
     from imuarray.provenance import write_csv
-    from imuarray.studies.checks.accelerometers_only import accelerometers_only
+    from imuarray.studies.rate_error import accelerometers_only
 
     paper = settings["paper2017"]
     span, rail = paper["fig3_rates_dps"], paper["gyroscope_range_dps"]

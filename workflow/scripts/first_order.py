@@ -4,17 +4,18 @@ from job import job
 
 with job(snakemake):
     from imuarray.firstorder import report
-    from imuarray.firstorder.correct import STANDARD_GRAVITY, calibrate_first_order
+    from imuarray.firstorder.correct import calibrate_first_order
     from imuarray.firstorder.still import SHORTEST
     from imuarray.firstorder.store import write_corrected
     from imuarray.provenance import write_csv
     from imuarray.recording import read_recording
+    from imuarray.recording.units import GRAVITY
 
     entry, made = snakemake.params.entry, snakemake.output
     recording = read_recording(snakemake.input.recording)
     found = calibrate_first_order(
         recording,
-        entry.get("gravity", STANDARD_GRAVITY),
+        entry.get("gravity", GRAVITY),
         entry.get("gyroscopes", "calibrate"),
         entry.get("shortest_pose", SHORTEST),
     )

@@ -8,7 +8,7 @@ with job(snakemake) as settings:  # noqa: F821
 
     from imuarray.figures.gallery import caption, gallery
     from imuarray.figures.notes import chain_lines
-    from imuarray.provenance import atomic_write
+    from imuarray.provenance import write_bytes
 
     output, source = Path(snakemake.output[0]), snakemake.params.source  # noqa: F821
     captions = {
@@ -26,6 +26,4 @@ with job(snakemake) as settings:  # noqa: F821
         name: (captions[name], output.with_name(f"{name}.md").read_text(encoding="utf-8"))
         for name in [*snakemake.params.tables, *snakemake.params.measured_tables]  # noqa: F821
     }
-    with atomic_write(output) as temporary:
-        page = gallery(figures, tables, settings, lines)
-        temporary.write_text(page, encoding="utf-8", newline="\n")
+    write_bytes(gallery(figures, tables, settings, lines).encode(), output)

@@ -13,7 +13,7 @@ from imuarray.analysis import methods
 from imuarray.analysis.calibration_dataset import engine_dataset, papers_dataset
 from imuarray.analysis.fitting import fitted
 from imuarray.analysis.model import Say, assumed, model_of, require_together, silent, usable
-from imuarray.errors import InputError
+from imuarray.errors import InputError, require_one_of
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording
 from imuarray.recording.channels import require_apart, require_live
@@ -67,14 +67,13 @@ def calibrate(
     for one in recordings:
         require_live(one)
     require_apart(recordings)
-    if method not in (None, *methods.CALIBRATION):
-        known = ", ".join(methods.CALIBRATION)
-        raise InputError(f"method: expected any of {known}, found {method!r}")
+    if method is not None:
+        require_one_of("method", method, methods.CALIBRATION)
     require_together(model, recordings, effects, accelerometer_noise)
     if method is not None and model != "papers":
         raise InputError(f"--method {method}: expected it with --model papers, found {model}")
     if model == "papers":
-        dataset = _papers(recordings[0], method or "bcd", accelerometer_noise, say)
+        dataset = _papers(recordings[0], method or methods.CALIBRATION[0], accelerometer_noise, say)
     else:
         dataset = _engine(recordings, str(model), tuple(effects), say)
     if not all(np.isfinite(dataset[f"position{name}"]).all() for name in ("", "_covariance")):

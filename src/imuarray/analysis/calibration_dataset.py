@@ -9,7 +9,7 @@ from imuarray.analysis.model import model_of
 from imuarray.engine.estimate import Estimate
 from imuarray.engine.parameters import POSITION
 from imuarray.engine.widths import widths
-from imuarray.model import ArrayModel
+from imuarray.model import ArrayModel, Noise
 from imuarray.model.names import parameter_names
 from imuarray.motion.state import UNITS
 from imuarray.recording import Recording
@@ -37,9 +37,11 @@ def positions_dataset(recording: Recording, positions, covariance) -> xr.Dataset
     return xr.Dataset(variables, coords, {"position_prior_sd": recording.position_prior_sd})
 
 
-def _noise(sds) -> dict:
-    """Sds (A,) m/s^2 and (G,) rad/s as variables of triads and axes."""
-    force, rate = (np.repeat(np.asarray(part)[:, None], 3, axis=1) for part in sds)
+def noise_variables(noise: Noise) -> dict:
+    """The sds of triads and axes, m/s^2 and rad/s, as variables."""
+    force, rate = (
+        np.sqrt(np.diag(part)).reshape(-1, 3) for part in (noise.accelerometer, noise.gyroscope)
+    )
     return {
         "accelerometer_sd": (PLACE, force, {"units": "m s-2"}),
         "gyroscope_sd": (("gyroscope", "axis"), rate, {"units": "rad s-1"}),
@@ -62,11 +64,7 @@ def papers_dataset(recording: Recording, model: ArrayModel, found, saturated) ->
     if covariance is None:
         covariance = parameter_covariance(model, found, saturated)
     dataset = positions_dataset(recording, found.positions, covariance)
-    sds = [
-        np.sqrt(np.diag(part)).reshape(-1, 3)[:, 0]
-        for part in (model.noise.accelerometer, model.noise.gyroscope)
-    ]
-    variables = _motion(found.motion.motion[:3]) | _noise(sds)
+    variables = _motion(found.motion.motion[:3]) | noise_variables(model.noise)
     variables |= {
         "motion_converged": (("time",), found.motion.converged),
         "cost": (("iteration",), found.cost),
@@ -107,9 +105,9 @@ def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
         f"position_sd_{name}": (PLACE, _by_triad(place, sd, count), {"units": "m"})
         for name, sd in zip(("formal", "jackknife"), sds, strict=True)
     }
-    kinds = readings.array.accelerometers, readings.array.gyroscopes
-    noise = found.noise_sd()
-    variables |= _noise([noise[: kinds[0], 0], noise[: kinds[1], 1]])
+    counts = readings.array.accelerometers, readings.array.gyroscopes
+    own = (part[:n] for part, n in zip(found.noise_sd().T, counts, strict=True))
+    variables |= noise_variables(Noise.of(*counts, *own))
     variables["step"] = (("iteration",), np.array(found.steps))
     coords: dict[str, object] = {}
     if len(recordings) == 1:

@@ -20,6 +20,7 @@ from imuarray.model import ArrayModel
 from imuarray.posterior import tuning
 from imuarray.posterior.generic import SCALES, GenericLikelihood, log_laplace
 from imuarray.posterior.likelihood import Likelihood
+from imuarray.posterior.marginal import Marginal, log_posterior
 from imuarray.posterior.rate_density import sample_covariance
 from imuarray.posterior.target import GaussianPrior, GenericTarget, TiedPrior
 from imuarray.recording import Recording
@@ -180,20 +181,6 @@ def _fit(recording: Recording) -> Callable:
     return fit
 
 
-def log_papers(theta, data, nodes, weights, spread, mean, sd):
-    """Log posterior density under the papers' model, to be traced by JAX; data of `traced`."""
-    from imuarray.model.jax64 import jnp
-    from imuarray.posterior.marginal import log_marginal, scaled
-
-    count = data.weighted.shape[1] - 3
-    evidence = -0.5 * jnp.sum(((theta - mean) / sd) ** 2)
-    if theta.size > count:
-        data, more = scaled(data, (spread @ theta[count:])[:4])
-        evidence += more
-    positions = jnp.concatenate([jnp.zeros((1, 3)), theta[:count].reshape(-1, 3)])
-    return log_marginal(positions, data, nodes, weights) + evidence
-
-
 @cache
 def log_extended(model: ArrayModel, steps: int) -> Callable:
     """The same under a model with effects; one function for models that predict the same."""
@@ -212,8 +199,6 @@ def traced(posterior: Posterior, rates: str = "declared", say: Say = silent):
         generic = posterior.generic()
         function = log_extended(posterior.model, generic.steps)
         return function, (generic.data, prior.mean, prior.root)
-    from imuarray.posterior.marginal import Marginal
-
     recording = posterior.recording
     likelihood = posterior.likelihood(rates)
     saturated = recording.saturated_gyroscopes()
@@ -228,7 +213,7 @@ def traced(posterior: Posterior, rates: str = "declared", say: Say = silent):
     if found.gap > GAP:
         say("gyroscopes that see little of the motion: the likelihood is good to"
             f" {found.gap:.1g} nats only")  # fmt: skip
-    return log_papers, (
+    return log_posterior, (
         found.data, found.nodes, found.log_weights, posterior.spread, prior.mean, prior.sd
     )  # fmt: skip
 

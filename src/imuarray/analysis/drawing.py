@@ -14,21 +14,22 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from scipy.special import chdtrc
 
+from imuarray.recording.units import GRAVITY
+
 ALARM = 1e-6  # p value from which a departure is no chance: 4.9 sds
 SIZES = 0.5, 2.0  # beyond these the size is the first thing to be said
 FAR = 5.0  # sds
 ALIKE = 0.3  # of the drawing's own size: shapes that agree to this are one shape
 LEFT = 0.1  # of chi-square may an explanation leave
 AS_GOOD = 10.0  # chi-square by which another explanation may be worse and still be named
-G = 9.80665
 DEGREE = np.degrees(1.0)
 MISTAKES = (
     (DEGREE**-2, "gyroscopes in deg/s declared rad/s?", "57.3^2"),
     (DEGREE**2, "gyroscopes in rad/s declared deg/s, or degrees turned to radians twice?",
      "57.3^2"),
     (DEGREE**4, "degrees turned to radians three times?", "57.3^4"),
-    (1 / G, "specific force in g declared m/s^2?", "9.81"),
-    (G, "specific force in m/s^2 declared g?", "9.81"),
+    (1 / GRAVITY, "specific force in g declared m/s^2?", "9.81"),
+    (GRAVITY, "specific force in m/s^2 declared g?", "9.81"),
     (1e-3, "nominal positions in mm declared m?", "1000"),
     (1e-2, "nominal positions in cm declared m?", "100"),
     (0.0254, "nominal positions in inches declared m?", "39.4"),

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from imuarray.analysis.calibration_dataset import noise_variables, positions_dataset
 from imuarray.analysis.model import model_of
 from imuarray.diagnosis.extension import extended_model, read_extension
 from imuarray.errors import InputError
@@ -26,7 +27,7 @@ def diagnosed(diagnosis: str | PathLike, recording: Recording) -> xr.Dataset:
     extension = read_extension(Path(diagnosis))
     labels = recording.accelerometer_labels, recording.gyroscope_labels
     model = extended_model(extension, model_of(recording), labels)
-    positions, sds = extension.positions, extension.positions_sd.copy()
+    positions, sds = extension.positions, extension.positions_sd
     names = parameter_names(model, labels)
     # 0 where the diagnosis states none
     effect_sds = np.array([
@@ -39,30 +40,10 @@ def diagnosed(diagnosis: str | PathLike, recording: Recording) -> xr.Dataset:
             f"{diagnosis}: expected positions of {count} accelerometers, as in the recording, found"
             f" {len(positions)}"
         )
-    sds[0] = 0.0  # the reference's
-    covariance = np.diag(sds.ravel() ** 2).reshape(count, 3, count, 3)
-    noise = [
-        np.sqrt(np.diag(part)).reshape(-1, 3)
-        for part in (model.noise.accelerometer, model.noise.gyroscope)
-    ]
-    place = ("accelerometer", "axis")
-    variables = {
-        "position": (place, positions - positions[0], {"units": "m", "relative_to": labels[0][0]}),
-        "nominal_position": (place, recording.relative_positions(), {"units": "m"}),
-        "position_covariance": (
-            (*place, "accelerometer_other", "axis_other"), covariance, {"units": "m2"},
-        ),
-        "effect_parameter": (("parameter",), model.effect_start),
-        "effect_sd": (("parameter",), effect_sds),
-        "accelerometer_sd": (place, noise[0], {"units": "m s-2"}),
-        "gyroscope_sd": (("gyroscope", "axis"), noise[1], {"units": "rad s-1"}),
-    }  # fmt: skip
-    coords = {
-        "accelerometer": list(labels[0]), "gyroscope": list(labels[1]), "axis": list("xyz"),
-        "accelerometer_other": list(labels[0]), "axis_other": list("xyz"), "parameter": names,
-    }  # fmt: skip
-    attrs = {
-        "effects": ",".join(model.effects), "time_origin": extension.clock[0],
-        "span": extension.clock[1],
-    }  # fmt: skip
-    return xr.Dataset(variables, coords, attrs)
+    found = positions_dataset(recording, positions - positions[0], np.diag(sds[1:].ravel() ** 2))
+    found = found.assign(
+        effect_parameter=("parameter", model.effect_start), effect_sd=("parameter", effect_sds),
+        **noise_variables(model.noise),
+    ).assign_coords(parameter=names)  # fmt: skip
+    origin, span = extension.clock
+    return found.assign_attrs(effects=",".join(model.effects), time_origin=origin, span=span)

@@ -8,11 +8,12 @@ import numpy as np
 import xarray as xr
 
 from imuarray.errors import InputError, require_integer
-from imuarray.firstorder.correct import STANDARD_GRAVITY, calibrate_first_order, correct
+from imuarray.firstorder.correct import calibrate_first_order, correct
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting
 from imuarray.recording import Recording
+from imuarray.recording.units import GRAVITY
 from imuarray.streams import stream
 
 
@@ -73,7 +74,7 @@ def simulate(
 
 
 def first_order(
-    recording: Recording, gravity: float = STANDARD_GRAVITY, gyroscopes: str = "calibrate",
+    recording: Recording, gravity: float = GRAVITY, gyroscopes: str = "calibrate",
     shortest_pose: float = 3.0,
 ) -> Recording:  # fmt: skip
     """The recording with each triad's offset, scale, misalignment and turn corrected.

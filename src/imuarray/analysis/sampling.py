@@ -24,7 +24,7 @@ from imuarray.analysis.density import (
 )
 from imuarray.analysis.fitting import fitted_beyond
 from imuarray.analysis.model import Say, assumed, model_of, require_together, silent, usable
-from imuarray.errors import InputError, require_integer
+from imuarray.errors import InputError, require_integer, require_one_of
 from imuarray.model import ArrayModel
 from imuarray.model.names import parameter_names
 from imuarray.posterior.chains import Chains
@@ -124,13 +124,9 @@ def sample(
     InputError
         The recording does not determine the positions, or the options do not go together.
     """
-    for name, value, known in (
-        ("method", method, methods.SAMPLING),
-        ("rates", rates, methods.RATES),
-        ("motion_prior", motion_prior, methods.MOTION_PRIORS),
-    ):
-        if value not in known:
-            raise InputError(f"{name}: expected any of {', '.join(known)}, found {value!r}")
+    require_one_of("method", method, methods.SAMPLING)
+    require_one_of("rates", rates, methods.RATES)
+    require_one_of("motion_prior", motion_prior, methods.MOTION_PRIORS)
     if steps is not None:
         require_integer("steps", steps)
     require_integer("seed", seed, 0)

@@ -14,9 +14,10 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
-from imuarray.analysis.drawing import DEGREE, G, angle_words
+from imuarray.analysis.drawing import DEGREE, angle_words
 from imuarray.analysis.rigid import COHERENT, FEWEST, runs, slope, turning
 from imuarray.recording import Recording
+from imuarray.recording.units import GRAVITY
 
 FAR = 4.0  # times the median triad's error, and the declared noise
 TAKEN = 0.35  # of the error must be left at most
@@ -186,7 +187,7 @@ LIKE = 0.1  # of one: a slope that a factor makes so is right
 FACTORS = (  # of time, force, rates, positions, to undo a mistake
     ((1, 1, DEGREE, 1), "all rates are 57.3 times too small: in rad/s declared deg/s"),
     ((1, 1, 1 / DEGREE, 1), "all rates are 57.3 times too large: in deg/s declared rad/s"),
-    ((1, G, 1, 1), "specific force is 9.81 times too small: in g declared m/s^2"),
+    ((1, GRAVITY, 1, 1), "specific force is 9.81 times too small: in g declared m/s^2"),
     ((1, 1, 1, 1e-3), "nominal positions are 1000 times too large: in mm declared m"),
     ((1, 1, 1, 1e3), "nominal positions are 1000 times too small: in m declared mm"),
     ((1, -1, 1, 1), WRONG_SIGN),
@@ -243,10 +244,10 @@ def gravity(recording: Recording) -> list[str]:
     if still is None or not still.any():
         return []
     size = float(np.median(np.linalg.norm(recording.specific_force[still], axis=2)))
-    if abs(size / G - 1) < STILL:
+    if abs(size / GRAVITY - 1) < STILL:
         return []
     unit = ": in g declared m/s^2?" if abs(size - 1) < STILL else ""
-    return [f"specific force in the still poses is {size:.4g} m/s^2, gravity {G:.4g}{unit}"]
+    return [f"specific force in the still poses is {size:.4g} m/s^2, gravity {GRAVITY:.4g}{unit}"]
 
 
 def clipped(recording: Recording) -> list[str]:

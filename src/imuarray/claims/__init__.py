@@ -9,30 +9,14 @@ from imuarray.claims import (
     estimator2021,
     experiment2021,
     measured2021,
-    physics2017,
     posterior2021,
     rate2017,
-    size2021,
     theory2017,
     tuning2021,
 )
-from imuarray.claims.page import markdown, write_markdown
-from imuarray.claims.registry import CLAIMS, VERDICTS, Claim, Outcome, evaluate
-from imuarray.claims.results import Results
 
 MODULES = (
-    error2017, rate2017, theory2017, physics2017,
+    error2017, rate2017, theory2017,
     estimator2021, tuning2021, posterior2021, experiment2021,
-    measured2021, size2021,
+    measured2021,
 )  # fmt: skip
-
-__all__ = [
-    "CLAIMS",
-    "VERDICTS",
-    "Claim",
-    "Outcome",
-    "Results",
-    "evaluate",
-    "markdown",
-    "write_markdown",
-]

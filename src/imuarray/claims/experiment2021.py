@@ -7,6 +7,7 @@ import numpy as np
 from imuarray.claims.numbers import by_samples, falls, listed, show
 from imuarray.claims.registry import claim, judged, untested
 from imuarray.geometry import UNDERSIDE_ROTATION
+from imuarray.recording.units import GRAVITY
 
 MEASURED = "measured data needed; the value is for a simulated stand-in"
 RANGE = 157.0  # m/s^2, where the accelerometers saturate
@@ -30,7 +31,7 @@ def half_percent(results):
 
 @claim("2021-41")
 def saturation(results):
-    value = 16 * 9.80665
+    value = 16 * GRAVITY
     return judged(f"{show(value, 4)} m/s^2", "none", abs(value / RANGE - 1) < 0.01)
 
 

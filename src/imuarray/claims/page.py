@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pandas as pd
 
 from imuarray.claims.registry import VERDICTS
-from imuarray.provenance import atomic_write
 
 TITLES = {
     "2017": "On-the-fly geometric calibration of inertial sensor arrays (2017)",
@@ -51,9 +48,3 @@ def markdown(table: pd.DataFrame, settings: dict) -> str:
         lines += ["", f"## {title}", ""]
         lines += _rows(table.loc[table.paper == paper, list(COLUMNS)], COLUMNS.values())
     return "\n".join(lines) + "\n"
-
-
-def write_markdown(table: pd.DataFrame, settings: dict, path) -> None:
-    """`markdown` to a file."""
-    with atomic_write(Path(path)) as temporary:
-        temporary.write_text(markdown(table, settings), encoding="utf-8", newline="\n")

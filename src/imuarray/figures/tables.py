@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from imuarray.provenance import atomic_write, write_csv
+from imuarray.provenance import write_bytes, write_csv
 
 
 @dataclass(frozen=True)
@@ -30,12 +30,8 @@ class Column:
 def write_table(table, columns, caption: str, notes, csv, tex, md) -> None:
     """``table`` in full as CSV; the ``columns`` of it as LaTeX and Markdown, with notes."""
     write_csv(table, csv)
-    for path, text in (
-        (tex, latex(table, columns, caption, notes)),
-        (md, markdown(table, columns, caption, notes)),
-    ):
-        with atomic_write(path) as temporary:
-            temporary.write_text(text, encoding="utf-8", newline="\n")
+    for path, form in ((tex, latex), (md, markdown)):
+        write_bytes(form(table, columns, caption, notes).encode(), path)
 
 
 def _cells(table, columns) -> pd.DataFrame:

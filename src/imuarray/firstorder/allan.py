@@ -5,25 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 
-def allan_deviation(pieces, step: float, taus=None) -> tuple[np.ndarray, np.ndarray]:
+def allan_deviation(pieces, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Overlapping Allan deviation pooled over still pieces.
 
     Parameters
     ----------
     pieces : list of (n, ...) arrays, readings of still poses, equally spaced
     step : float, s, between samples
-    taus : averaging times in s, or None for octaves up to a third of the longest piece
 
     Returns
     -------
-    taus (S,) s and deviations (S, ...) in the readings' unit. Each piece counts with its
-    number of overlapping differences; pieces shorter than 2 tau + 1 samples do not count.
+    taus (S,) s, octaves up to a third of the longest piece, and deviations (S, ...) in the
+    readings' unit. Each piece counts with its number of overlapping differences; pieces shorter
+    than 2 tau + 1 samples do not count.
     """
     longest = max(len(piece) for piece in pieces)
-    if taus is None:
-        widths = 2 ** np.arange(int(np.log2(max(longest / 3, 1))) + 1)
-    else:
-        widths = np.unique(np.maximum(np.round(np.asarray(taus) / step), 1).astype(int))
+    widths = 2 ** np.arange(int(np.log2(max(longest / 3, 1))) + 1)
     widths = widths[2 * widths < longest]
     sums = [np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(x - x.mean(0), 0)])
             for x in pieces]  # fmt: skip

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from imuarray.errors import InputError
+from imuarray.errors import require_one_of
 from imuarray.firstorder.allan import lag_correlation, white_noise_sd
 from imuarray.firstorder.gyroscopes import Gyroscopes, calibrate_gyroscopes
 from imuarray.firstorder.still import SHORTEST, still_poses
@@ -15,8 +15,8 @@ from imuarray.firstorder.triads import TriadFit, fit_triads
 from imuarray.firstorder.turns import nearest_orthogonal, shared_turn
 from imuarray.recording import Recording
 from imuarray.recording.channels import require_live, require_once
+from imuarray.recording.units import GRAVITY
 
-STANDARD_GRAVITY = 9.80665  # m/s^2
 GYROSCOPES = ("calibrate", "offset")
 COUPLED = 0.1  # a rail of one axis shows in another that the correction mixes it into by this much
 
@@ -85,7 +85,7 @@ class FirstOrder:
 
 
 def calibrate_first_order(
-    recording: Recording, gravity: float = STANDARD_GRAVITY, gyroscopes: str = GYROSCOPES[0],
+    recording: Recording, gravity: float = GRAVITY, gyroscopes: str = GYROSCOPES[0],
     shortest_pose: float = SHORTEST,
 ) -> FirstOrder:  # fmt: skip
     """First-order model of every triad from still poses and the moves between them.
@@ -99,8 +99,7 @@ def calibrate_first_order(
     InputError or IdentifiabilityError where there are no poses, too few or too similar ones, and
     where axes are mirrored, rates have another unit, or channels or samples are copied.
     """
-    if gyroscopes not in GYROSCOPES:
-        raise InputError(f"gyroscopes: expected {' or '.join(GYROSCOPES)}, found {gyroscopes!r}")
+    require_one_of("gyroscopes", gyroscopes, GYROSCOPES)
     require_live(recording)
     require_once(recording)
     poses = still_poses(recording, shortest=shortest_pose)

@@ -22,7 +22,7 @@ UNITS = {"scale": "1", "misalignment": "1", "orientation": "rad"}
 
 def parameter_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
     """One row a parameter: sensor, triad, parameter, component, value, sd, unit."""
-    parts, sds = found.triads.parts(), found.triads.parts_sd()
+    parts, sds = parts_of(found.triads.matrix), found.triads.parts_sd()
     parts["offset"] = found.triads.offset
     rows = _rows("accelerometer", recording.accelerometer_labels, parts, sds, "m s-2")
     parts, sds = {}, {}

@@ -6,6 +6,7 @@ import numpy as np
 
 from imuarray.errors import InputError
 from imuarray.recording import Recording
+from imuarray.recording.channels import runs
 
 WINDOW = 1.0  # s, over which a reading's spread is judged
 SHORTEST = 3.0  # s, of a pose by default, its ends included
@@ -29,12 +30,6 @@ def window_spread(readings: np.ndarray, window: int) -> np.ndarray:
     count = (last - first)[:, None]
     mean, square = ((total[last] - total[first]) / count for total in sums)
     return np.sqrt(np.maximum(square - mean**2, 0.0).mean(axis=1))
-
-
-def runs(mask: np.ndarray) -> list[tuple[int, int]]:
-    """First and past-the-last index of each run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def still_poses(recording: Recording, window=WINDOW, shortest=SHORTEST) -> list[slice]:

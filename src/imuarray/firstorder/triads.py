@@ -65,12 +65,8 @@ class TriadFit:
         """The same over all poses, those left out included."""
         return np.sqrt(np.mean(self.residual**2, axis=(0, 2)))
 
-    def parts(self) -> dict[str, np.ndarray]:
-        """Scale (A, 3), misalignment (A, 3: xy, xz, yz) and orientation (A, 3: rotation vector)."""
-        return parts_of(self.matrix)
-
     def parts_sd(self) -> dict[str, np.ndarray]:
-        """Standard deviations of `parts`, and of the offset."""
+        """Standard deviations of `parts_of` the matrices, and of the offset."""
         count = len(self.matrix)
         blocks = self.covariance.reshape(count, 12, count, 12)[range(count), :, range(count)]
         offset = np.sqrt(np.einsum("kii->ki", blocks[:, 9:, 9:]))

@@ -17,6 +17,7 @@ from imuarray.measured.positions import LIMIT
 from imuarray.model import ArrayModel
 from imuarray.motion import Motion
 from imuarray.recording import Recording, array_of
+from imuarray.simulation.measure import clip, measure
 
 # The shape of the picture, not the positions' last micrometre, is wanted.
 TOLERANCE = 0.05
@@ -59,21 +60,16 @@ def fit_residuals(recording: Recording) -> Residuals:
 
 def simulate_like(recording: Recording, fit: Residuals, rng) -> Recording:
     """The recording as the papers' model would have given it, with its rails and noise."""
-    array = array_of(recording)
     sds = recording.accelerometer_noise_sd, recording.gyroscope_noise_sd
-    predicted = ArrayModel.isotropic(array, *sds).predict_many(fit.motion, fit.positions)
-    force, rate = (
-        part + sd * rng.standard_normal(part.shape) for part, sd in zip(predicted, sds, strict=True)
+    model = ArrayModel.isotropic(array_of(recording), *sds)
+    force, rate, _ = measure(
+        model, fit.motion, fit.positions, rng, gyroscope_range=recording.gyroscope_range
     )
-    limits = recording.accelerometer_range, recording.gyroscope_range
     return replace(
-        recording,
-        specific_force=np.clip(force, -limits[0], limits[0]),
-        angular_rate=np.clip(rate, -limits[1], limits[1]),
-        specific_force_saturated=None,
-        angular_rate_saturated=None,
+        recording, specific_force=clip(force, recording.accelerometer_range)[0], angular_rate=rate,
+        specific_force_saturated=None, angular_rate_saturated=None,
         title="simulated from the fitted motion",
-    )
+    )  # fmt: skip
 
 
 def residual_summary(fit: Residuals, recording: Recording, source: str) -> pd.DataFrame:

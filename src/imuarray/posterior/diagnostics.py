@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -49,24 +48,15 @@ def agreement(draws) -> np.ndarray:
     return np.abs(means[0] - means[1]) / np.sqrt(variances)
 
 
-@dataclass(frozen=True)
-class BurnIn:
-    """Stored draws to discard, whether R-hat then passed, and the table it rests on."""
-
-    draws: int
-    reached: bool
-    table: pd.DataFrame
-
-
-def find_burn_in(draws, log_target, threshold: float = 1.05, candidates: int = 12) -> BurnIn:
-    """Burn-in from the paired chains alone, by cross-reference (2021, section III-C).
+def find_burn_in(draws, log_target, threshold: float = 1.05, candidates: int = 12):
+    """(stored draws to discard, the table that says so), by cross-reference (2021, section III-C).
 
     No burn-in ends before each chain's log target has entered the range of the other
     chain's second half. For candidates from there to half of the chain, and for none: the
     largest R-hat over all parameters and the log target of what remains, and the smallest
     effective sample size, which a transient left in the chains lowers. The burn-in is the
     candidate with the largest such size among those below ``threshold``; where none is
-    below, the one with the smallest R-hat, and ``reached`` is False.
+    below, the one with the smallest R-hat.
     """
     length = draws.shape[1]
     first = min(_entry(log_target), length // 2)
@@ -88,8 +78,7 @@ def find_burn_in(draws, log_target, threshold: float = 1.05, candidates: int = 1
     allowed = table[table.burn_in >= first]
     passing = allowed[allowed.rhat_max < threshold]
     best = passing.ess_min.idxmax() if len(passing) else allowed.rhat_max.idxmin()
-    chosen = table.loc[best]
-    return BurnIn(int(chosen.burn_in), bool(len(passing)), table)
+    return int(table.burn_in[best]), table
 
 
 def _entry(log_target) -> int:
@@ -116,15 +105,15 @@ def summarise(chains: Chains, labels, threshold: float, truth=None):
 
     ``labels`` of the estimated triads; ``truth`` (A - 1, 3) m where known.
     """
-    burn_in = find_burn_in(chains.draws, chains.log_target, threshold)
-    left = chains.draws[:, burn_in.draws :]
+    burn_in, tried = find_burn_in(chains.draws, chains.log_target, threshold)
+    left = chains.draws[:, burn_in:]
     # over every sampled parameter, effects included, and the log target
-    every = np.concatenate([left, chains.log_target[:, burn_in.draws :, None]], axis=2)
+    every = np.concatenate([left, chains.log_target[:, burn_in:, None]], axis=2)
     worst, sizes = rhat(every), ess(every[..., :-1])
     table = _coordinates(left, labels, truth, worst, sizes)
     verdict = {
-        "burn_in_steps": burn_in.draws * chains.thin,
-        "burn_in_draws": burn_in.draws,
+        "burn_in_steps": burn_in * chains.thin,
+        "burn_in_draws": burn_in,
         "converged": bool(worst.max() < threshold),
         "rhat_max": float(worst.max()),
         "rhat_threshold": threshold,
@@ -137,7 +126,7 @@ def summarise(chains: Chains, labels, threshold: float, truth=None):
         "step_length_m": chains.step,
         "chains": chains.draws.shape[0],
     }
-    return verdict, table, burn_in.table.assign(burn_in_steps=burn_in.table.burn_in * chains.thin)
+    return verdict, table, tried.assign(burn_in_steps=tried.burn_in * chains.thin)
 
 
 def _coordinates(left, labels, truth, rhats, sizes) -> pd.DataFrame:

@@ -5,6 +5,8 @@ rounded as written, so other machines give the same bits (`imuarray.compiled.fma
 slowly).
 """
 
+import math
+
 import numpy as np
 
 from imuarray.compiled import as_bits, as_number, fma, njit
@@ -18,24 +20,28 @@ LOG2E = 1.4426950408889634
 LOG2_HIGH, LOG2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10  # their sum: log 2
 
 
+EXP = tuple(1.0 / math.factorial(k) for k in range(12, -1, -1))
+ARTANH = tuple(2.0 / k for k in range(19, 2, -2))
+SIN = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(7, 0, -1))
+COS = tuple((-1.0) ** k / math.factorial(2 * k) for k in range(8, -1, -1))
+
+
+@njit(inline="always")
+def _horner(x, coefficients):
+    """A polynomial, the coefficient of the highest power first."""
+    p = coefficients[0]
+    for c in coefficients[1:]:
+        p = fma(p, x, c)
+    return p
+
+
 @njit(inline="always")
 def exp(x):
     """The exponential for x in [-700, 700], a power of 2 times Taylor's series."""
     shifted = fma(x, LOG2E, INTEGER)
     k = shifted - INTEGER
     r = fma(-k, LOG2_LOW, fma(-k, LOG2_HIGH, x))
-    p = fma(1.0 / 479001600.0, r, 1.0 / 39916800.0)
-    p = fma(p, r, 1.0 / 3628800.0)
-    p = fma(p, r, 1.0 / 362880.0)
-    p = fma(p, r, 1.0 / 40320.0)
-    p = fma(p, r, 1.0 / 5040.0)
-    p = fma(p, r, 1.0 / 720.0)
-    p = fma(p, r, 1.0 / 120.0)
-    p = fma(p, r, 1.0 / 24.0)
-    p = fma(p, r, 1.0 / 6.0)
-    p = fma(p, r, 0.5)
-    p = fma(p, r, 1.0)
-    return fma(p, r, 1.0) * as_number((as_bits(shifted) + BIAS) << PLACES)
+    return _horner(r, EXP) * as_number((as_bits(shifted) + BIAS) << PLACES)
 
 
 @njit(inline="always")
@@ -47,14 +53,7 @@ def log(u):
     k = as_number(INTEGER_BITS + (exponent - BIAS)) - INTEGER
     q = (m - 1.0) / (m + 1.0)
     r = q * q
-    p = fma(2.0 / 19.0, r, 2.0 / 17.0)
-    p = fma(p, r, 2.0 / 15.0)
-    p = fma(p, r, 2.0 / 13.0)
-    p = fma(p, r, 2.0 / 11.0)
-    p = fma(p, r, 2.0 / 9.0)
-    p = fma(p, r, 2.0 / 7.0)
-    p = fma(p, r, 2.0 / 5.0)
-    p = fma(p, r, 2.0 / 3.0)
+    p = _horner(r, ARTANH)
     return fma(k, LOG2_HIGH, fma(2.0, q, fma(k, LOG2_LOW, (p * r) * q)))
 
 
@@ -62,17 +61,4 @@ def log(u):
 def sin_cos(x):
     """(sin x, cos x) within pi / 4 of zero, by Taylor's series."""
     r = x * x
-    s = fma(-1.0 / 1307674368000.0, r, 1.0 / 6227020800.0)
-    s = fma(s, r, -1.0 / 39916800.0)
-    s = fma(s, r, 1.0 / 362880.0)
-    s = fma(s, r, -1.0 / 5040.0)
-    s = fma(s, r, 1.0 / 120.0)
-    s = fma(s, r, -1.0 / 6.0)
-    c = fma(1.0 / 20922789888000.0, r, -1.0 / 87178291200.0)
-    c = fma(c, r, 1.0 / 479001600.0)
-    c = fma(c, r, -1.0 / 3628800.0)
-    c = fma(c, r, 1.0 / 40320.0)
-    c = fma(c, r, -1.0 / 720.0)
-    c = fma(c, r, 1.0 / 24.0)
-    c = fma(c, r, -0.5)
-    return fma(s * r, x, x), fma(c, r, 1.0)
+    return fma(_horner(r, SIN) * r, x, x), _horner(r, COS)

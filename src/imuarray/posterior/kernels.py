@@ -95,14 +95,14 @@ def fixed_draws(positions, data, rates, power):
 
 
 @njit
-def fresh_draws(positions, data, work, power, first, last):
-    """log p-hat (26a) of samples first..last-1 with omega drawn anew from p(omega | y_g)."""
+def fresh_draws(positions, data, work, power):
+    """log p-hat (26a) with omega drawn anew from p(omega | y_g)."""
     found = work.reduced
     logdet = collapse(positions, data, found)
     total, tile = 0.0, work.tile
     draws.folded(found.C, tile.quartic)
-    for start in range(first, last, draws.TILE):
-        size = min(draws.TILE, last - start)
+    for start in range(0, data.energy.size, draws.TILE):
+        size = min(draws.TILE, data.energy.size - start)
         mean, factor = data.mean, data.factor
         numbers = draws.drawn(size, tile)
         draws.exponents(start, size, mean, factor, tile.quartic, found.b, numbers, tile.exponent)
@@ -111,7 +111,7 @@ def fresh_draws(positions, data, work, power, first, last):
                 start, size, data.log_weight, mean, factor, numbers, tile.exponent
             )
         total += draws.log_means(size, tile)
-    return _assemble(total, found.const[first:last], logdet, power)
+    return _assemble(total, found.const, logdet, power)
 
 
 @njit
@@ -119,7 +119,7 @@ def repeated(positions, data, rng, count, power, out):
     """Independent realisations of log p-hat at one theta, filling ``out``."""
     for i in range(out.size):
         work = workspace(data.energy.size, count, rng)
-        out[i] = fresh_draws(positions, data, work, power, 0, data.energy.size)
+        out[i] = fresh_draws(positions, data, work, power)
 
 
 @njit
@@ -139,7 +139,7 @@ def transitions(theta, log_target, prior, step, draws, power, data, rng, count):
         for i in range(size):
             flat[i] = theta[i] + step * rng.standard_normal()
             proposed -= 0.5 * prior[1, i] * (flat[i] - prior[0, i]) ** 2
-        proposed += fresh_draws(positions, data, work, power, 0, data.energy.size)
+        proposed += fresh_draws(positions, data, work, power)
         if math.log(rng.random()) < proposed - log_target:
             theta[:] = flat
             log_target = proposed
@@ -179,7 +179,7 @@ def crank_nicolson(theta, log_target, prior, centre, factor, step, draws, power,
                 value += factor[i, j] * new[j]
             flat[i] = value
             proposed -= 0.5 * prior[1, i] * (value - prior[0, i]) ** 2
-        proposed += fresh_draws(positions, data, work, power, 0, data.energy.size)
+        proposed += fresh_draws(positions, data, work, power)
         ratio = proposed - log_target + 0.5 * (moved - square)
         if math.log(rng.random()) < ratio:
             theta[:] = flat

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from imuarray.errors import InputError, require_shape
+from imuarray.errors import InputError, require_one_of, require_shape
 from imuarray.estimation.collapsed import Collapsed, tables
 from imuarray.model import ArrayModel, structure_tensor
 from imuarray.posterior import kernels
@@ -52,10 +51,7 @@ class Likelihood:
         omega (rad/s) and omega_dot (rad/s^2), infinite as in the paper. InputError where an axis
         of some sample has no unsaturated gyroscope.
         """
-        if determinant not in DETERMINANTS:
-            raise InputError(
-                f"determinant: expected one of {sorted(DETERMINANTS)}, found {determinant}"
-            )
+        require_one_of("determinant", determinant, DETERMINANTS)
         collapsed = Collapsed.of(model, specific_force, angular_rate, saturated)
         if rate_distribution is None:
             information = collapsed.gyroscope_information.transpose(2, 0, 1)
@@ -118,39 +114,15 @@ class Likelihood:
         require_shape("rates", rates, (self.samples, rates.shape[1], 3))
         return kernels.fixed_draws(self._relative(positions), self.data, rates, self.power)
 
-    def estimate(self, positions, draws: int, rng, threads: int = 1) -> float:
-        """log p-hat at ``positions`` (A, 3) m with N = ``draws`` fresh draws a sample.
-
-        With ``threads`` > 1 blocks of samples are shared out, each with a stream of its
-        own spawned from ``rng``: the value depends on ``threads``, its law does not.
-        """
-        positions = self._relative(positions)
-        edges = np.linspace(0, self.samples, threads + 1).astype(int)
-
-        def block(job):
-            generator, first, last = job
-            work = kernels.workspace(self.samples, draws, generator)
-            return kernels.fresh_draws(positions, self.data, work, self.power, first, last)
-
-        if threads == 1:
-            return block((rng, 0, self.samples))
-        jobs = list(zip(rng.spawn(threads), edges[:-1], edges[1:], strict=True))
-        return float(sum(_pool(threads).map(block, jobs)))
+    def estimate(self, positions, draws: int, rng) -> float:
+        """log p-hat at ``positions`` (A, 3) m with N = ``draws`` fresh draws a sample."""
+        return float(self.realisations(positions, draws, 1, rng)[0])
 
     def realisations(self, positions, draws: int, count: int, rng) -> np.ndarray:
         """``count`` independent values of log p-hat at ``positions`` (paper 2021, figure 2)."""
         out = np.empty(count)
         kernels.repeated(self._relative(positions), self.data, rng, draws, self.power, out)
         return out
-
-
-_POOLS: dict[int, ThreadPoolExecutor] = {}
-
-
-def _pool(threads: int) -> ThreadPoolExecutor:
-    if threads not in _POOLS:
-        _POOLS[threads] = ThreadPoolExecutor(threads)
-    return _POOLS[threads]
 
 
 def _lower(covariance) -> np.ndarray:

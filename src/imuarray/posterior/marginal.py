@@ -155,6 +155,24 @@ def log_marginal(positions, data: MarginalData, nodes, log_weights):
     return inside - volume + data.volume - 0.5 * len(rate) * logdet
 
 
+def log_posterior(theta, data: MarginalData, nodes, log_weights, spread, mean, sd):
+    """Log density of theta (P,) = (r_2 ... r_A, logs of `scaled` by ``spread``), up to a constant.
+
+    Normal prior of ``mean`` and ``sd`` (P,); to be traced by JAX.
+    """
+    count = data.weighted.shape[1] - 3
+    evidence = -0.5 * jnp.sum(((theta - mean) / sd) ** 2)
+    if theta.size > count:
+        data, more = scaled(data, (spread @ theta[count:])[:4])
+        evidence += more
+    return log_marginal(_positions(theta[:count]), data, nodes, log_weights) + evidence
+
+
+def _positions(theta):
+    """`geometry.positions_of` as JAX traces it."""
+    return jnp.concatenate([jnp.zeros((1, 3)), theta.reshape(-1, 3)])
+
+
 def _exponent(rate, C, b, constant, data):
     """That of (26a) at omega (T, N, 3) of each sample, (T, N)."""
     w = _products(rate)
@@ -257,8 +275,7 @@ class Marginal:
 
     def log_density(self, theta):
         """The same of theta (3 (A - 1),), to be traced and differentiated by JAX."""
-        positions = jnp.concatenate([jnp.zeros((1, 3)), theta.reshape(-1, 3)])
-        return log_marginal(positions, self.data, self.nodes, self.log_weights)
+        return log_marginal(_positions(theta), self.data, self.nodes, self.log_weights)
 
 
 def _precision(collapsed: Collapsed) -> np.ndarray:

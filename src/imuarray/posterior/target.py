@@ -2,31 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from imuarray.geometry import positions_of
 from imuarray.posterior import kernels
 from imuarray.posterior.likelihood import Likelihood
-
-
-class Target(Protocol):
-    """A posterior density estimated with fresh randomness at each evaluation."""
-
-    @property
-    def size(self) -> int:
-        """Number of parameters."""
-        ...
-
-    def log_target(self, theta, rng) -> float:
-        """log prior + log p-hat at theta (size,)."""
-        ...
-
-    def transitions(self, theta, log_target, step, count, rng) -> tuple[int, float]:
-        """Advance ``theta`` in place by ``count`` steps; (accepted, the last log target)."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -63,23 +46,40 @@ class TiedPrior(GaussianPrior):
         return -0.5 * float(np.sum((self.root @ (theta - self.mean)) ** 2))
 
 
+class Target:
+    """A posterior density estimated with fresh randomness at each evaluation.
+
+    ``estimate(theta, rng)`` gives log p-hat at theta (size,), positions first.
+    """
+
+    prior: GaussianPrior
+    estimate: Callable
+
+    @property
+    def size(self) -> int:
+        """Number of parameters."""
+        return self.prior.mean.size
+
+    def log_target(self, theta, rng) -> float:
+        """log prior + log p-hat with fresh draws."""
+        return self.prior.log_density(theta) + self.estimate(theta, rng)
+
+    def transitions(self, theta, log_target, step, count, rng) -> tuple[int, float]:
+        """Advance ``theta`` in place by ``count`` steps; (accepted, the last log target)."""
+        raise NotImplementedError
+
+
 @dataclass(frozen=True)
-class CompiledTarget:
+class CompiledTarget(Target):
     """The papers' model: theta are the positions r_2 ... r_A, everything compiled."""
 
     likelihood: Likelihood
     prior: GaussianPrior
     draws: int
 
-    @property
-    def size(self) -> int:
-        """3 (A - 1)."""
-        return self.prior.mean.size
-
-    def log_target(self, theta, rng) -> float:
-        """log prior + log p-hat with fresh draws."""
-        positions = positions_of(theta)
-        return self.prior.log_density(theta) + self.likelihood.estimate(positions, self.draws, rng)
+    def estimate(self, theta, rng) -> float:
+        """log p-hat."""
+        return self.likelihood.estimate(positions_of(theta), self.draws, rng)
 
     def transitions(self, theta, log_target, step, count, rng) -> tuple[int, float]:
         """`Target.transitions`, compiled; releases the interpreter for other chains."""
@@ -114,7 +114,7 @@ class PreconditionedTarget(CompiledTarget):
 
 
 @dataclass(frozen=True)
-class GenericTarget:
+class GenericTarget(Target):
     """Any model: ``estimate(theta, rng)`` returns log p-hat; one Python step at a time.
 
     ``scale``, (size,) or a lower factor (size, size), turns the walk's one step length into a
@@ -122,22 +122,10 @@ class GenericTarget:
     a ``centre`` (size,) proposals are those of `PreconditionedTarget`, ``scale`` their factor.
     """
 
-    estimate: object
+    estimate: Callable
     prior: GaussianPrior
     scale: np.ndarray
     centre: np.ndarray | None = None
-
-    @property
-    def size(self) -> int:
-        """Number of parameters, positions first."""
-        return self.prior.mean.size
-
-    def log_target(self, theta, rng) -> float:
-        """log prior + log p-hat with fresh draws."""
-        return self.prior.log_density(theta) + self.estimate(theta, rng)
-
-    def _shaped(self, normals):
-        return self.scale @ normals if self.scale.ndim == 2 else self.scale * normals
 
     def _energy(self, theta) -> float:
         """Minus the log of the normal density that proposals leave as it is."""
@@ -148,8 +136,9 @@ class GenericTarget:
     def transitions(self, theta, log_target, step, count, rng) -> tuple[int, float]:
         """`Target.transitions` in plain Python."""
         accepted, energy = 0, self._energy(theta)
+        shaped = np.matmul if self.scale.ndim == 2 else np.multiply
         for _ in range(count):
-            proposal = theta + step * self._shaped(rng.standard_normal(self.size))
+            proposal = theta + step * shaped(self.scale, rng.standard_normal(self.size))
             if self.centre is not None:
                 proposal += (np.sqrt(1 - step**2) - 1) * (theta - self.centre)
             value, moved = self.log_target(proposal, rng), self._energy(proposal)

@@ -159,16 +159,16 @@ def _held(recording: Recording, kind: str, turning) -> list[str]:
     found = []
     for k, label in enumerate(labels):
         share = again[:, k].sum() / max(judged[:, k].sum(), 1)
-        run, begin = _longest(again[:, k])
+        begin, end = max(runs(again[:, k]), key=lambda run: run[1] - run[0], default=(0, 0))
         if share > HELD:
             found.append(
                 f"{kind} {label!r} repeats {100 * share:.0f} % of its readings while the array"
                 " turns: slower than the log and filled up? keep the samples it took"
             )
-        elif run >= FROZEN:
+        elif end - begin >= FROZEN:
             found.append(
-                f"{kind} {label!r} is frozen at {recording.time[begin]:g} s, for {run + 1} samples"
-                " in which the array turns: leave them out"
+                f"{kind} {label!r} is frozen at {recording.time[begin]:g} s, for"
+                f" {end - begin + 1} samples in which the array turns: leave them out"
             )
     return found
 
@@ -201,14 +201,10 @@ def _rows(recording: Recording) -> np.ndarray:
     return np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1)
 
 
-def _longest(mask) -> tuple[int, int]:
-    """Length and begin of the longest run of True in ``mask`` (T,)."""
+def runs(mask) -> list[tuple[int, int]]:
+    """First and past-the-last index of each run of True in ``mask`` (T,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
-    begins, lengths = edges[::2], edges[1::2] - edges[::2]
-    if not len(lengths):
-        return 0, 0
-    longest = int(np.argmax(lengths))
-    return int(lengths[longest]), int(begins[longest])
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def _marks(rows) -> np.ndarray:

@@ -7,7 +7,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from imuarray.errors import InputError
+from imuarray.errors import InputError, require_one_of
 
 MIRROR = "IMUARRAY_MIRROR"  # environment variable: a folder that already holds the files
 
@@ -46,9 +46,8 @@ def fetch(source: str, name: str, folder: str | Path) -> Path:
     InputError where there is no such file, where a copy has another checksum, and where it
     can not be had: the message says why.
     """
-    if source not in SOURCES or name not in SOURCES[source].files:
-        known = ", ".join(f"{s}/{f}" for s, item in SOURCES.items() for f in item.files)
-        raise InputError(f"published: expected one of {known}, found {source}/{name}")
+    known = [f"{s}/{f}" for s, item in SOURCES.items() for f in item.files]
+    require_one_of("published", f"{source}/{name}", known)
     expected = SOURCES[source].files[name]
     for place in _copies(source, name, Path(folder)):
         if place.is_file():

@@ -69,6 +69,7 @@ def check_structure(dataset: xr.Dataset, where: str) -> None:
     _check_axis(dataset["axis"], where)
     for name in FLAGS:
         if name in dataset:
+            _check_present(dataset, name, where)
             _check_boolean(dataset[name], where)
     for name in NUMBERS:
         _check_number(dataset.attrs, name, where)
@@ -130,12 +131,6 @@ def _check_axis(coordinate: xr.DataArray, where: str) -> None:
 
 
 def _check_boolean(variable: xr.DataArray, where: str) -> None:
-    expected = DIMENSIONS[variable.name]
-    if variable.dims != expected:
-        raise InputError(
-            f"{where}: {variable.name}: expected dimensions {_listed(expected)}, "
-            f"found {_listed(variable.dims)}"
-        )
     values = variable.values
     if values.dtype.kind not in "biu" or not np.isin(values, (0, 1)).all():
         raise InputError(

@@ -25,7 +25,7 @@ from imuarray.diagnosis.quantities import (
 from imuarray.diagnosis.words import part_in_words, sensors_of, split_name, whose, words
 from imuarray.figures.style import styled
 from imuarray.model import EFFECTS
-from imuarray.provenance import atomic_write
+from imuarray.provenance import write_bytes
 from imuarray.report import drawings as drawn
 from imuarray.report import numbers
 from imuarray.report.answers import USUAL, answers, verdict
@@ -120,15 +120,10 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for drawing in drawings:
         for suffix, content in drawing.files.items():
-            _write(folder / f"{drawing.name}.{suffix}", content)
+            write_bytes(content, folder / f"{drawing.name}.{suffix}")
     _remove_former(folder, {drawing.name for drawing in drawings})
-    _write(folder / "report.html", page.encode())
-    _write(folder / "diagnosis.json", document.encode())
-
-
-def _write(path: Path, content: bytes) -> None:
-    with atomic_write(path) as temporary:
-        temporary.write_bytes(content)
+    write_bytes(page.encode(), folder / "report.html")
+    write_bytes(document.encode(), folder / "diagnosis.json")
 
 
 def _remove_former(folder: Path, names) -> None:

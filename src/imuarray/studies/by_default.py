@@ -7,6 +7,7 @@ own: it is handed a recording, and knows neither the noise nor the size of the m
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from imuarray.motion import normal_motion
 from imuarray.posterior.chains import chains_of
 from imuarray.posterior.diagnostics import ess
 from imuarray.recording import Recording
-from imuarray.simulation.measure import measure
+from imuarray.simulation.recordings import simulate_samples
 from imuarray.streams import stream
 from imuarray.studies.batches import run_batches
 from imuarray.studies.truths import Setting
@@ -43,15 +44,11 @@ def drawn(setting: Setting, number: int) -> Drawn:
     effects = model.effect_prior_sd * rng.standard_normal(model.effect_size)
     motion = normal_motion(rng, (setting.samples,), *setting.motion_sd)
     time = np.arange(setting.samples) / RATE
-    force, rate, _ = measure(model, motion, positions_of(positions), rng, effects, time=time)
-    labels, noise = model.array.labels, model.noise
-    recording = Recording(
-        time=time, specific_force=force, angular_rate=rate,
-        accelerometer_position=model.array.positions, accelerometer_labels=labels,
-        gyroscope_labels=labels, accelerometer_noise_sd=float(noise.accelerometer[0, 0] ** 0.5),
-        gyroscope_noise_sd=float(noise.gyroscope[0, 0] ** 0.5), accelerometer_range=BEYOND,
-        gyroscope_range=BEYOND, position_prior_sd=setting.prior_sd,
+    recording, _ = simulate_samples(
+        model, motion, positions_of(positions), model.array.positions, rng, time, effects,
+        BEYOND, BEYOND, setting.prior_sd,
     )  # fmt: skip
+    recording = replace(recording, gyroscope_labels=model.array.labels)
     return Drawn(number, np.concatenate([positions, effects]), recording)
 
 

@@ -78,18 +78,9 @@ def _start(setting: Setting, one: Replicate, name: str) -> np.ndarray:
     return rng.multivariate_normal(one.mode, APART**2 * one.covariance)
 
 
-def _log_posterior(theta, data, nodes, weights, mean, sd):
-    """Of positions under the papers' model, to be traced by JAX."""
-    from imuarray.model.jax64 import jnp
-    from imuarray.posterior.marginal import log_marginal
-
-    positions = jnp.concatenate([jnp.zeros((1, 3)), theta.reshape(-1, 3)])
-    return log_marginal(positions, data, nodes, weights) - 0.5 * jnp.sum(((theta - mean) / sd) ** 2)
-
-
 def nuts(setting: Setting, made, threads: int = 1) -> Found:
     """By NUTS on the exact marginal likelihood."""
-    from imuarray.posterior.marginal import Marginal
+    from imuarray.posterior.marginal import Marginal, log_posterior
     from imuarray.posterior.nuts import run_nuts
 
     prior, name = setting.prior, "nuts"
@@ -99,9 +90,9 @@ def nuts(setting: Setting, made, threads: int = 1) -> Found:
         found = Marginal.of(one.likelihood, positions_of(one.mode), count)
         start = _start(setting, one, name)[None]
         return run_nuts(
-            _log_posterior, one.mode, one.covariance, start, WARMUP, DRAWS * SPACING, setting.seed,
+            log_posterior, one.mode, one.covariance, start, WARMUP, DRAWS * SPACING, setting.seed,
             (*where[1:], one.number), WARMUP + DRAWS * SPACING, True,
-            (found.data, found.nodes, found.log_weights, prior.mean, prior.sd), 1,
+            (found.data, found.nodes, found.log_weights, None, prior.mean, prior.sd), 1,
         ).draws[0]  # fmt: skip
 
     pilot = replicate(setting, SPARE)

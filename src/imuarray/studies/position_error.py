@@ -84,45 +84,31 @@ def joined(shares) -> Errors:
     return Errors(*(np.concatenate(one, axis=1) for one in zip(*shares, strict=True)))
 
 
-def against_samples(cases, errors: Errors, marks) -> pd.DataFrame:
-    """Figure 4: RMSE over N and iterations; one row for each pair."""
+def _table(cases, errors: Errors, marks) -> pd.DataFrame:
+    """A row for each case and number of iterations."""
     rows = []
     for case, squares, iterations, status in zip(cases, *errors, strict=True):
         good = status >= 0
         for column, mark in enumerate(marks):
             rmse, error = root_mean_square(squares[good, column])
-            rows.append(
-                {
-                    "samples": case.samples,
-                    "iterations": mark,
-                    "rmse_m": rmse,
-                    "rmse_se_m": error,
-                    "realisations": int(good.sum()),
-                    "not_identifiable": int((~good).sum()),
-                    "converged_share": float(np.mean(status == 1)),
-                    "median_iterations": float(np.median(iterations[good])),
-                }  # fmt: skip
-            )
+            rows.append({
+                "angular_rate_dps": np.degrees(case.motion[0]),
+                "angular_acceleration_dps2": np.degrees(case.motion[1]),
+                "specific_force_mps2": case.motion[2], "samples": case.samples,
+                "iterations": mark, "rmse_m": rmse, "rmse_se_m": error,
+                "realisations": int(good.sum()), "not_identifiable": int((~good).sum()),
+                "converged_share": float(np.mean(status == 1)),
+                "median_iterations": float(np.median(iterations[good])),
+            })  # fmt: skip
     return pd.DataFrame(rows)
+
+
+def against_samples(cases, errors: Errors, marks) -> pd.DataFrame:
+    """Figure 4: RMSE over N and iterations; one row for each pair."""
+    return _table(cases, errors, marks).loc[:, "samples":]
 
 
 def against_motion(cases, errors: Errors, marks) -> pd.DataFrame:
     """Figure 5: RMSE for each case's |omega|, |omega_dot| and |s|."""
-    rows = []
-    for case, squares, _, status in zip(cases, *errors, strict=True):
-        good = status >= 0
-        rmse, error = root_mean_square(squares[good, -1])
-        rows.append(
-            {
-                "angular_rate_dps": np.degrees(case.motion[0]),
-                "angular_acceleration_dps2": np.degrees(case.motion[1]),
-                "specific_force_mps2": case.motion[2],
-                "samples": case.samples,
-                "iterations": marks[-1],
-                "rmse_m": rmse,
-                "rmse_se_m": error,
-                "realisations": int(good.sum()),
-                "converged_share": float(np.mean(status == 1)),
-            }  # fmt: skip
-        )
-    return pd.DataFrame(rows)
+    last = Errors(errors.squares[..., -1:], errors.iterations, errors.status)
+    return _table(cases, last, marks[-1:]).drop(columns=["not_identifiable", "median_iterations"])

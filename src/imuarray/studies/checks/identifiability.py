@@ -9,6 +9,7 @@ from imuarray.estimation.bcd import calibrate_bcd
 from imuarray.estimation.motion_ml import estimate_motion
 from imuarray.motion import Motion, sphere_motion
 from imuarray.motion.random import directions
+from imuarray.recording.units import GRAVITY
 from imuarray.simulation.measure import measure
 from imuarray.studies.checks.information import (
     NoiseLevels,
@@ -164,7 +165,7 @@ def measured_acceleration(rng, model, motion_sizes, rail, count: int) -> dict:
         ("middle", model.array.positions - model.array.positions.mean(axis=0)),
     ):
         force, _, saturated = measure(model, motion, positions, rng, gyroscope_range=rail)
-        size = np.linalg.norm(force, axis=2) / 9.80665
+        size = np.linalg.norm(force, axis=2) / GRAVITY
         for label, values in (("largest", size.max(axis=1)), ("all", size.ravel())):
             found[f"{name}_{label}_quantiles_g"] = np.quantile(values, [0.05, 0.5, 0.95]).tolist()
         medians = np.median(size.max(axis=1)[: count // 10 * 10].reshape(10, -1), axis=1)
