@@ -13,12 +13,11 @@ import imuarray
 from imuarray.blind.cases import Case, make
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects as variance
-from imuarray.diagnosis.clocks import sawtooth
 from imuarray.diagnosis.replicates import Replicator, discrepancies
 from imuarray.diagnosis.scores import candidates, information_at, mask_of, score_all
 from imuarray.diagnosis.settings import SETTINGS as CRITICAL
 from imuarray.diagnosis.state import Search
-from imuarray.diagnosis.tails import QUARTILE, log_chi_square, log_normal, log_poisson
+from imuarray.engine.clock_scan import sawtooth
 from imuarray.engine.fit import Fit, fit, flat_parameters, from_flat, normal
 from imuarray.engine.heldout import blocks_of, log_scores
 from imuarray.engine.linearise import linearise, polynomial_taps
@@ -28,6 +27,7 @@ from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import start
 from imuarray.errors import InputError
 from imuarray.geometry import sub_array
+from imuarray.tails import QUARTILE, log_chi_square, log_normal, log_poisson
 
 SHORT = 4.0  # s
 

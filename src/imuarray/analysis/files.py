@@ -25,19 +25,21 @@ def read_csv(path: str | PathLike, columns: str | PathLike) -> Recording:
 def read_mimu(
     path: str | PathLike, positions: str | PathLike, underside: str | None = None,
     accelerometer_noise: float = 0.04, gyroscope_noise: float = float(np.radians(0.06)),
-    position_prior: float = 3e-3,
+    position_prior: float = 3e-3, output_rate: float = 1000.0,
 ) -> Recording:  # fmt: skip
     """Packets of a MIMU board; damaged ones are left out.
 
     ``positions``: CSV of nominal positions in m; ``underside``: labels of the IMUs turned over,
     separated by commas, by default the even-numbered ones; noise sds in m/s^2 and rad/s, the
-    positions' prior sd in m. InputError says what does not fit.
+    positions' prior sd in m; ``output_rate`` Hz, at which a sensor makes readings of which the host
+    takes the newest. InputError says what does not fit.
     """
     from imuarray.recording.mimu_recording import read_board
 
     return read_board(
         Path(path), Path(positions), underside, accelerometer_noise_sd=accelerometer_noise,
         gyroscope_noise_sd=gyroscope_noise, position_prior_sd=position_prior,
+        output_rate=output_rate,
     )[0]  # fmt: skip
 
 

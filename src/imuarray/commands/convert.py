@@ -17,7 +17,7 @@ def convert_mimu(arguments) -> None:
         arguments.data, arguments.positions, arguments.underside,
         accelerometer_noise_sd=arguments.accelerometer_noise,
         gyroscope_noise_sd=float(np.radians(arguments.gyroscope_noise_dps)),
-        position_prior_sd=arguments.position_prior,
+        position_prior_sd=arguments.position_prior, output_rate=arguments.output_rate,
     )  # fmt: skip
     attrs = stamp({"source": str(arguments.data)}, 0) | account.attributes()
     write_recording(recording, arguments.out, attrs=attrs)

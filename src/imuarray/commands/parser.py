@@ -100,6 +100,8 @@ COMMANDS = (
                     0.06),
             _number("--position-prior", "SD", "sd of the nominal positions, m (default: 0.003)",
                     3e-3),
+            _number("--output-rate", "HZ", "readings that a sensor makes in a second, of which the"
+                    " host takes the newest (default: 1000)", 1000.0),
         ),
     ),
     Command(

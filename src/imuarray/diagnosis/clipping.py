@@ -15,8 +15,8 @@ from imuarray.diagnosis.reading_effects import RAILS, Structural, rails_cause, u
 from imuarray.diagnosis.residual_checks import Check
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Search
-from imuarray.diagnosis.tails import log_normal
 from imuarray.model.effects import KINDS
+from imuarray.tails import log_normal
 
 
 class Peak(NamedTuple):

@@ -8,10 +8,10 @@ import numpy as np
 
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Search
-from imuarray.diagnosis.tails import log_chi_square
 from imuarray.engine.fit import flat_parameters, from_flat
 from imuarray.engine.heldout import gain_of, normal_blocks
 from imuarray.engine.parameters import prior_precision
+from imuarray.tails import log_chi_square
 
 
 def freed_places(search: Search, effect: str, imus=None, among=None) -> np.ndarray:

@@ -9,13 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis.clocks import CLOCK, without_jumps
 from imuarray.diagnosis.procedure import prepared
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.engine.clock_phases import with_phases
+from imuarray.engine.clock_scan import CLOCK
+from imuarray.engine.clocks import timed
 from imuarray.engine.estimate import Estimate, Recorded, estimate
-from imuarray.engine.fit import flat_parameters, with_free_gyroscopes
-from imuarray.engine.gyroscope_clocks import enough_gyroscopes
+from imuarray.engine.fit import flat_parameters
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import POSITION, Columns, columns_of
 from imuarray.engine.readings import Readings, most_informative
@@ -186,17 +185,5 @@ def extended_estimate(readings: Readings, columns: Columns, active, state: State
     clocked = active[:, columns.of(CLOCK)].any(axis=1) if CLOCK in columns.names else []
     imus = [int(k) for k in np.flatnonzero(clocked)]
     if imus:
-        recorded = _timed(recorded, columns, imus)
+        recorded = timed(recorded, recorded.readings.keep, columns, imus)
     return settled(estimate([recorded], columns, active))
-
-
-def _timed(recorded: Recorded, columns: Columns, imus) -> Recorded:
-    """Each reading in its own clock's turn, or without those near the jumps of clocks ``imus``."""
-    state, readings = recorded.state, recorded.readings
-    if recorded.smooth or not enough_gyroscopes(readings, imus):
-        readings, _ = without_jumps(readings, columns, state, imus, SETTINGS.edge)
-        return replace(recorded, readings=readings)
-    state = with_free_gyroscopes(readings, state)
-    clocks = flat_parameters(columns, state)[:, columns.of(CLOCK)]
-    readings = with_phases(readings, state, {imu: clocks[imu] for imu in imus})
-    return replace(recorded, readings=readings, state=state)

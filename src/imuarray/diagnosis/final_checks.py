@@ -13,10 +13,10 @@ from imuarray.diagnosis.residual_checks import Check, normal_checks
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL
 from imuarray.diagnosis.state import Search
-from imuarray.diagnosis.tails import log_normal
 from imuarray.engine.fit import flat_parameters
 from imuarray.engine.linearise import linearise
 from imuarray.engine.parameters import POSITION
+from imuarray.tails import log_normal
 
 STRICT = ("outliers", "size of", "change of")  # checks that a small residual does not excuse
 

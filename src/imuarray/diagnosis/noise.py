@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.diagnosis.tails import QUARTILE, log_normal, log_poisson
 from imuarray.engine.fit import Fit, seen_through
 from imuarray.engine.linearise import CHUNK
-from imuarray.engine.readings import Readings
+from imuarray.engine.readings import Readings, few_at_once
+from imuarray.tails import QUARTILE, log_normal, log_poisson
 
 DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / np.sqrt(70.0)
 HALF = len(DIFFERENCE) // 2
@@ -96,17 +96,6 @@ def _outliers(fast, core) -> np.ndarray:
         peak[shift:] &= worst[shift:] >= worst[:-shift]
         peak[:-shift] &= worst[:-shift] >= worst[shift:]
     return few_at_once(peak)
-
-
-def few_at_once(far) -> np.ndarray:
-    """Outliers (T, N, 2) bool without the samples where a quarter of a kind stands out at once.
-
-    Those are events of the whole array, and leaving them out would leave no motion, which takes
-    three triads.
-    """
-    number = far.shape[1]
-    crowd = far.sum(axis=1, keepdims=True) > min(max(1, number // 4), max(0, number - 3))
-    return far & ~crowd
 
 
 def _colour(unit, readings: Readings):

@@ -8,10 +8,10 @@ import numpy as np
 
 from imuarray.diagnosis.noise import Noise, expected_ratio
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.diagnosis.tails import QUARTILE, log_chi_square, log_normal
 from imuarray.engine.fit import Fit
 from imuarray.engine.heldout import blocks_of
 from imuarray.model.effects import KINDS
+from imuarray.tails import QUARTILE, log_chi_square, log_normal
 
 TAILS, COLOURED = "heavy_tails", "coloured_noise"
 ALIKE = 1e-9  # share of the largest information below which there is none

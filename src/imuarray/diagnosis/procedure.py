@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from imuarray.diagnosis import clocks, noise_effects
 from imuarray.diagnosis import noise as noises
+from imuarray.diagnosis import noise_effects
 from imuarray.diagnosis.adoption import adopt, proposals
 from imuarray.diagnosis.clipping import leave_out_clips, together
 from imuarray.diagnosis.elimination import eliminate
@@ -20,9 +20,10 @@ from imuarray.diagnosis.scores import Score
 from imuarray.diagnosis.separability import rivals
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Search
+from imuarray.engine.clock_scan import DELAY
 from imuarray.engine.fit import Fit, fit
 from imuarray.engine.parameters import catalogue_effects, columns_of
-from imuarray.engine.readings import Readings, arrange, determined, part_of
+from imuarray.engine.readings import Readings, arrange, determined, few_at_once, part_of
 from imuarray.model.effects import EFFECTS
 from imuarray.recording import Recording
 
@@ -62,7 +63,7 @@ def run_procedure(
     raw, readings = part_of(raw, most), part_of(whole, most)
     effects = catalogue_effects(without)
     # clocks are scanned for by what a delay would gain, whether or not it is a candidate
-    described = effects if clocks.DELAY in effects else (*effects, clocks.DELAY)
+    described = effects if DELAY in effects else (*effects, DELAY)
     columns = columns_of(readings.array, described, readings.position_prior_sd)
     say("fitting the papers' model, then looking for causes")
     search = Search(readings, columns, effects, say).fitted()
@@ -132,7 +133,7 @@ def fit_heavy_tails(search: Search, without) -> tuple[Search, list, list]:
     far = np.zeros((*whole.keep.shape[:2], 2), bool)
     for imu, kind, mix in hits:
         far[:, imu, kind] = mix.outlier > 0.5
-    lost = np.repeat(noises.few_at_once(far), 3, axis=2)
+    lost = np.repeat(few_at_once(far), 3, axis=2)
     before = len(search.causes)
     search = adopt(replace(search, readings=whole.without(lost)).refit())
     if len(search.causes) > before:

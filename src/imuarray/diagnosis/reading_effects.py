@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.diagnosis.tails import log_poisson
 from imuarray.engine.linearise import polynomial_derivative
 from imuarray.engine.readings import Readings, part_of
 from imuarray.model.effects import KINDS
 from imuarray.recording.record import AXES
+from imuarray.tails import log_poisson
 
 RAILS = "saturation"
 UNITS = ("m s-2", "rad s-1")  # of the two kinds

@@ -17,9 +17,9 @@ from imuarray.diagnosis.noise import Noise, standardised, tail_log_p
 from imuarray.diagnosis.replicates import motion_sizes
 from imuarray.diagnosis.scores import Information
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.diagnosis.tails import log_chi_square, log_normal
 from imuarray.engine.fit import Fit, pick
 from imuarray.linear import scaled_inverse, scaled_square
+from imuarray.tails import log_chi_square, log_normal
 
 
 class Check(NamedTuple):

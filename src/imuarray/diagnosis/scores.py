@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.diagnosis.tails import log_chi_square
 from imuarray.engine.fit import Fit, flat_parameters
 from imuarray.engine.parameters import Columns, prior_precision
 from imuarray.linear import scaled_eigh, scaled_inverse
 from imuarray.model.effects import EFFECTS, KINDS
+from imuarray.tails import log_chi_square
 
 
 @dataclass(frozen=True)

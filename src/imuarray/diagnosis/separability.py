@@ -18,11 +18,11 @@ from imuarray.diagnosis.scores import (
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL
 from imuarray.diagnosis.state import Cause, Search
-from imuarray.diagnosis.tails import log_chi_square
 from imuarray.engine.fit import Fit
 from imuarray.engine.parameters import POSITION
 from imuarray.linear import scaled_eigh, scaled_inverse, scaled_square
 from imuarray.model import EFFECTS
+from imuarray.tails import log_chi_square
 
 
 @dataclass(frozen=True)

@@ -52,11 +52,6 @@ class Settings:
     steady_drift: float = -50.0  # log p of a drift that does not change: it is misattributed
 
     # Clocks and shifts (`clocks`, `gyroscope_clocks`, `shifts`)
-    sawtooth: float = -10.0  # log p of a sawtooth beyond a constant delay
-    many: float = 2.6  # log of the independent sawtooths per sample, from simulated white scores
-    fair: float = 0.05  # of the constant delay's chi-square that a sawtooth must add
-    least_turns: int = 3  # of a clock against the host's; fewer are a drift of the delay
-    edge: float = 0.03  # of a turn: how near to a clock's jump a reading is left out
     jitter: float = 0.04  # the same where clocks were estimated from the gyroscopes
     cuts: int = 24  # instants tried at first
 

@@ -11,11 +11,11 @@ from imuarray.diagnosis.scores import (
     Score,
 )
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.diagnosis.tails import log_chi_square
 from imuarray.engine.fit import Fit, flat_parameters, from_flat
 from imuarray.engine.heldout import blocks_of
 from imuarray.engine.parameters import POSITION
 from imuarray.linear import scaled_inverse
+from imuarray.tails import log_chi_square
 
 SHIFT = "position_shift"
 

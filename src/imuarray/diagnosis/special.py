@@ -10,11 +10,12 @@ import numpy as np
 from imuarray.diagnosis import clocks, shifts, warming
 from imuarray.diagnosis.elimination import need
 from imuarray.diagnosis.residual_checks import Check
-from imuarray.diagnosis.scores import Candidate, score_all
+from imuarray.diagnosis.scores import Candidate, Scanned, score_all
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.diagnosis.tails import log_chi_square
+from imuarray.engine.clock_scan import CLOCK, DELAY
 from imuarray.engine.fit import flat_parameters
 from imuarray.model.effects import EFFECTS
+from imuarray.tails import log_chi_square
 
 DRIFT = "bias_drift"
 
@@ -36,7 +37,7 @@ class Special(NamedTuple):
     check: Callable | None = None
 
 
-def scans(fit, given, effects, scores, taken=lambda effect: ()) -> list[clocks.Scanned]:
+def scans(fit, given, effects, scores, taken=lambda effect: ()) -> list[Scanned]:
     """All scans, of IMUs that can have the effect and have not (``taken`` (effect) -> IMUs)."""
     exists, found = fit.readings.exists, []
     for effect, special in SPECIAL.items():
@@ -49,9 +50,9 @@ def scans(fit, given, effects, scores, taken=lambda effect: ()) -> list[clocks.S
     return found
 
 
-def scan_clocks(fit, given, imus, scores) -> list[clocks.Scanned]:
+def scan_clocks(fit, given, imus, scores) -> list[Scanned]:
     """Clocks, beyond the constant delays that were tested."""
-    delays = {s.candidate.imus: s.statistic for s in scores if s.candidate.effect == clocks.DELAY}
+    delays = {s.candidate.imus: s.statistic for s in scores if s.candidate.effect == DELAY}
     return clocks.scan_clocks(fit, imus, delays)
 
 
@@ -78,7 +79,7 @@ def drift_check(search, cause) -> list[Check]:
 
 
 SPECIAL = {
-    clocks.CLOCK: Special(
+    CLOCK: Special(
         scan=scan_clocks, linear=False, maybe=clocks.maybe_clock, placebo=clocks.placebo_of_ages
     ),
     shifts.SHIFT: Special(scan=lambda fit, given, imus, _: shifts.scan_shifts(fit, given, imus),

@@ -16,6 +16,7 @@ from imuarray.diagnosis import clocks
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis.scores import Candidate, Information, information_at, mask_of
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray.engine.clock_scan import CLOCK, estimated_again, without_jumps
 from imuarray.engine.fit import (
     Fit,
     at,
@@ -27,6 +28,7 @@ from imuarray.engine.fit import (
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import POSITION, Columns
 from imuarray.engine.readings import Readings
+from imuarray.engine.settings import SETTINGS as CLOCKS
 from imuarray.engine.start import is_smooth, start
 
 
@@ -100,7 +102,7 @@ class Search:
     @property
     def clocks(self) -> tuple[int, ...]:
         """IMUs with an adopted clock."""
-        return self.imus_with(clocks.CLOCK)
+        return self.imus_with(CLOCK)
 
     @property
     def left(self) -> float:
@@ -146,7 +148,7 @@ class Search:
             limit = SETTINGS.steady_noise
             if (change < limit and enough) or (turn + 1 >= turns and change < 5 * limit):
                 break
-            state = clocks.estimated_again(search._with_jumps, search.columns, state, search.clocks)
+            state = estimated_again(search._with_jumps, search.columns, state, search.clocks)
             search = replace(search, readings=readings.with_sd(judged.sd))
         made = at(search.readings, search.columns, search.active, state, converged)
         noise = noises.judge(made.readings, made.residual, made.basis)
@@ -159,10 +161,8 @@ class Search:
 
     def _without_jumps(self, state: State, turn: int) -> Search:
         """Without the readings near the jumps of the clocks at a state."""
-        width = SETTINGS.jitter if state.gyroscopes_free else SETTINGS.edge / (1 + turn)
-        readings, jumps = clocks.without_jumps(
-            self._with_jumps, self.columns, state, self.clocks, width
-        )
+        width = SETTINGS.jitter if state.gyroscopes_free else CLOCKS.edge / (1 + turn)
+        readings, jumps = without_jumps(self._with_jumps, self.columns, state, self.clocks, width)
         return replace(self, readings=readings, jumps=jumps)
 
     def weighed(self) -> Search:
@@ -186,7 +186,7 @@ class Search:
         whole[~self.active & ~held] = 0.0
         whole[: len(state.positions), columns.of(POSITION)] = state.positions
         chosen = columns.of(effect)
-        if effect == clocks.CLOCK and values is not None and state.rough_prior is not None:
+        if effect == CLOCK and values is not None and state.rough_prior is not None:
             # clocks that are there already are estimated again, all as one
             values = {imu: whole[imu, chosen] for imu in self.clocks} | values
             state, values = clocks.started_by_gyroscopes(self.readings, state, values)

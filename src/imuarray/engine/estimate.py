@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from imuarray.engine.alike import with_likely_spread
 from imuarray.engine.fit import (
     flat_parameters,
     from_flat,
@@ -130,7 +131,6 @@ def estimate(
     """
     active = movable(columns, active, [one.state for one in recorded])
     places = places_of(columns, active, len(recorded))
-    precision = pinned(recorded, columns, active, places)
     recorded, nu, length, last, moved = tuple(recorded), NORMAL, 1.0, np.inf, []
     for number in range(steps):
         recorded, passes = _passed(recorded, columns, active)
@@ -139,10 +139,13 @@ def estimate(
         noisy = _judged(recorded, passes, columns, active, nu)
         change = _noise_change(recorded, noisy)
         information, score, blocks = _summed(passes, places)
+        precision = pinned(recorded, columns, active, places)
         if number == 0:  # what is far out is to have no say in the first step
             recorded = noisy
             continue
         values = _values(recorded, columns, active, places)
+        columns = with_likely_spread(columns, active, values, information + precision, places[0])
+        precision = pinned(recorded, columns, active, places)
         slope = score - precision @ (values - _means(recorded, columns, active, places))
         step, sds = scaled_solve(information + precision, slope)
         sds = np.maximum(sds, jackknifed(information + precision, blocks))

@@ -34,8 +34,9 @@ class Gyroscopes(NamedTuple):
 def clocks_from_gyroscopes(readings: Readings, acceleration, clocks: dict) -> dict:
     """{imu: (P, f, phi, c, g)} from as many first guesses of the same form.
 
-    ``acceleration`` (T, 3): omega_dot by the accelerometers. The period that all get makes what the
-    gyroscopes see turn as much as what the accelerometers see, where that is smooth.
+    ``acceleration`` (T, 3): omega_dot by the accelerometers. The period that all get is the
+    declared one, or makes what the gyroscopes see turn as much as what the accelerometers see,
+    where that is smooth.
     """
     imus = sorted(clocks)
     seen = informative(readings, acceleration, imus)
@@ -56,6 +57,8 @@ def clocks_from_gyroscopes(readings: Readings, acceleration, clocks: dict) -> di
     motion, left = moved(seen, maps, ages, np.ones(ages.shape))
     motion = moved(seen, maps, ages, robust(left, size))[0]
     guess[:, 0] = UNIT * as_much(motion[:, 3:], seen.acceleration)
+    if abs(np.log(np.abs(guess[0, 0]) / readings.period)) < SETTINGS.declared_period:
+        guess[:, 0] = np.copysign(readings.period, guess[:, 0])
     return dict(zip(imus, guess, strict=True))
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from scipy.special import chdtrc
 
+from imuarray.engine.clock_scan import CLOCK
+from imuarray.engine.clocks import refined, shown_clocks, timed, with_clocks
 from imuarray.engine.estimate import Estimate, Recorded, estimate, places_of, tested
 from imuarray.engine.fit import flat_parameters, from_flat
 from imuarray.engine.heldout import gain_of
@@ -16,16 +18,18 @@ from imuarray.engine.parameters import POSITION, Columns, columns_of
 from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.turning import turned
-from imuarray.engine.widths import FIXED, MAPS, SCALES, SKEWS, settled, spread_of
+from imuarray.engine.widths import FIXED, MAPS, SCALES, SKEWS, beside_maps, settled, spread_of
 from imuarray.errors import InputError
 from imuarray.linear import scaled_inverse
 from imuarray.model.effects import EFFECTS
 
+CLOCKS, GYROSCOPES = "clocks of the IMUs", "gyroscope maps"
 RUNGS = {
+    CLOCKS: (CLOCK,),
     "offsets": ("accelerometer_bias", "gyroscope_bias"),
     "delay of each IMU": ("sensor_delay",),
     "lag of the gyroscopes": ("gyroscope_delay",),
-    "gyroscope maps": ("gyroscope_scale", "gyroscope_misalignment"),
+    GYROSCOPES: ("gyroscope_scale", "gyroscope_misalignment"),
     "lever arms of the axes": ("size_effect",),
 }
 AGREES = 1.02  # times the residual that a prior of omega_dot may make
@@ -67,42 +71,105 @@ def climb(readings: Sequence[Readings], bare: bool = True) -> tuple[Estimate, li
     """The sensor model of a board from its recordings, rung by rung.
 
     Each sweep tests the rungs in order, beside those that it has kept before; what is kept is
-    fitted, then the others are tested again. At last each must still gain beside all others. Where
-    motion is smooth and no sensor late, the rate's own change is then a prior of omega_dot.
-    ``bare``: whether the last fit is wanted where no rung is kept. InputError or LinAlgError where
-    the readings do not determine positions or motion.
+    fitted, then the others are tested again. At last each must still gain beside all others, but
+    for clocks, whose jumps a fit does not move. Where motion is smooth and no sensor late, the
+    rate's own change is then a prior of omega_dot. ``bare``: whether the last fit is wanted where
+    no rung is kept. InputError or LinAlgError where the readings do not determine positions or
+    motion.
     """
     names = rungs_of(readings)
     effects = [effect for name in names for effect in RUNGS[name]]
     if any(left is not None for one in readings for left in one.left):
         effects += [name for name in MAPS if name not in effects]
     columns = columns_of(readings[0].array, effects, readings[0].position_prior_sd)
-    placed = mask_of(columns, [POSITION])
     begun = [Recorded.of(one, columns) for one in readings]
-    found = estimate(begun, columns, placed, steps=SETTINGS.rung_steps)
-    kept: set[str] = set()
-    rungs: list[Rung] = []
+    found = estimate(begun, columns, mask_of(columns, [POSITION]), steps=SETTINGS.rung_steps)
+    now = _Rungs(found, tuple(one.readings.keep for one in begun), {})
+    clocks, rungs = [], []
     for _ in names:
-        rungs = gains(found, names, kept)
-        new = {rung.name for rung in rungs if rung.kept} - kept
-        if not new:
+        before = set(now.kept)
+        if CLOCKS in names and CLOCKS not in now.kept:
+            now, clocks = now.clocked()
+        rungs = now.tried(names)
+        now = now.with_kept([rung.name for rung in rungs if rung.kept])
+        if set(now.kept) == before:
             break
-        kept |= new
-        active = placed | mask_of(columns, [e for name in kept for e in RUNGS[name]])
-        found = estimate(found.recorded, columns, active, steps=SETTINGS.rung_steps)
-    kept = {rung.name for rung in rungs if rung.kept}
-    active = placed | mask_of(columns, [e for name in kept for e in RUNGS[name]])
-    if not (kept or bare):
-        return found, rungs
-    found = estimate(without(found, active), columns, active)
-    late = any(_needs_neighbours(effect) for name in kept for effect in RUNGS[name])
+        now = now.fitted(SETTINGS.rung_steps)
+    now = now.without([rung.name for rung in rungs if not rung.kept])
+    if not (now.kept or bare):
+        return now.found, clocks + rungs
+    now = now.fitted()
+    if GYROSCOPES in names and beside_maps(now.found)[1].get("gyroscope", 1.0) < CHANCE:
+        rungs = [rung._replace(kept=rung.kept or rung.name == GYROSCOPES) for rung in rungs]
+        now = now.with_kept([GYROSCOPES]).fitted()
+    found = now.found
+    late = any(_needs_neighbours(effect) for name in now.kept for effect in RUNGS[name])
     pair = readings[0].pair
     if all(one.smooth for one in found.recorded) and (pair or not late):
         begun = [replace(one, state=turned(one.readings, one.state)) for one in found.recorded]
-        better = estimate(begun, columns, active)
+        better = estimate(begun, columns, found.active)
         if pair or better.residual_ratio() < AGREES * found.residual_ratio():
             found = better
-    return settled(found), rungs
+    return settled(found), clocks + rungs
+
+
+class _Rungs(NamedTuple):
+    """The ladder so far: ``kept`` {rung: (N, m) bool}, ``keep`` of each recording all readings."""
+
+    found: Estimate
+    keep: tuple[np.ndarray, ...]
+    kept: dict[str, np.ndarray]
+
+    @property
+    def active(self) -> np.ndarray:
+        """Parameters (N, m) of the positions and of what is kept."""
+        placed = mask_of(self.found.columns, [POSITION])
+        return np.any([placed, *self.kept.values()], axis=0)
+
+    def with_kept(self, names) -> _Rungs:
+        """With more rungs kept."""
+        new = {name: mask_of(self.found.columns, RUNGS[name]) for name in names}
+        return self._replace(kept=new | self.kept)
+
+    def without(self, names) -> _Rungs:
+        """Without some of those kept, their parameters back at zero."""
+        now = self._replace(kept={n: mask for n, mask in self.kept.items() if n not in names})
+        recorded = tuple(without(self.found, now.active))
+        return now._replace(found=replace(self.found, recorded=recorded))
+
+    def tried(self, names) -> list[Rung]:
+        """What rungs gain, but those of which a clock is the whole."""
+        part = EFFECTS[CLOCK].contains if CLOCKS in self.kept else ()
+        asked = [n for n in names if n != CLOCKS and not set(RUNGS[n]) <= set(part)]
+        masks = {name: mask_of(self.found.columns, RUNGS[name]) for name in asked}
+        return gains(self.found, masks, self.kept)
+
+    def clocked(self) -> tuple[_Rungs, list[Rung]]:
+        """With clocks, if IMUs' ages show some and these gain; and that rung, if there is one."""
+        columns, recorded = self.found.columns, self.found.recorded
+        each = [shown_clocks(one, columns) for one in recorded]
+        imus = sorted(set().union(*each))
+        if not imus:
+            return self, [Rung(CLOCKS, 0.0, 0.0, False)]
+        hinted = tuple(
+            with_clocks(one, columns, own) for one, own in zip(recorded, each, strict=True)
+        )
+        now = self._replace(found=replace(self.found, recorded=hinted))
+        mask = mask_of(columns, [CLOCK])
+        mask[np.setdiff1d(np.arange(len(mask)), imus)] = False
+        rung = gains(now.found, {CLOCKS: mask}, self.kept)[0]
+        return (now._replace(kept={CLOCKS: mask} | self.kept) if rung.kept else self), [rung]
+
+    def fitted(self, steps: int = SETTINGS.iterations) -> _Rungs:
+        """With all that is kept estimated, each reading in its clock's turn."""
+        columns, recorded = self.found.columns, list(self.found.recorded)
+        if CLOCKS in self.kept:
+            imus = np.flatnonzero(self.kept[CLOCKS].any(axis=1))
+            recorded = [
+                timed(refined(one, keep, columns, imus), keep, columns, imus)
+                for one, keep in zip(recorded, self.keep, strict=True)
+            ]
+        return self._replace(found=estimate(recorded, columns, self.active, steps=steps))
 
 
 def without(found: Estimate, active) -> list[Recorded]:
@@ -147,22 +214,23 @@ def mask_of(columns: Columns, effects) -> np.ndarray:
     return np.isin(columns.names, list(effects)) & columns.owner
 
 
-def gains(found: Estimate, names: Sequence[str], kept: Container[str] = ()) -> list[Rung]:
+def gains(found: Estimate, masks: dict, kept: dict | None = None) -> list[Rung]:
     """What each rung gains on held-out time beside those kept, and those before it that gain.
 
-    By one linearisation with all of them. Maps that first order has left are beside them all, as
-    uncertain as it left them: what they explain is no rung's gain.
+    ``masks``, ``kept`` {rung: (N, m) bool}. By one linearisation with all of them. Maps that first
+    order has left are beside them all, as uncertain as it left them: what they explain is no rung's
+    gain.
     """
-    every = [name for name in RUNGS if name in names or name in kept]
-    masks = {name: mask_of(found.columns, RUNGS[name]) for name in every}
+    kept = kept or {}
     left = _left(found)
-    active = found.active | np.any([*masks.values(), *(mask for mask, _ in left)], axis=0)
+    every = [*masks.values(), *kept.values(), *(mask for mask, _ in left)]
+    active = np.any([found.active, *every], axis=0)
     places, out = places_of(found.columns, active, len(found.recorded)), []
     given = _Given(*tested(found, active), active, places)
-    beside = found.active | np.any([masks[n] for n in every if n in kept] or [False], axis=0)
-    for name in names:
-        out.append(_tried(name, given, masks[name], beside, left))
-        beside = beside | (masks[name] & out[-1].kept)
+    beside = np.any([found.active, *kept.values()], axis=0)
+    for name, mask in masks.items():
+        out.append(_tried(name, given, mask, beside, left))
+        beside = beside | (mask & out[-1].kept)
     return out
 
 

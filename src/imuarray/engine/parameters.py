@@ -28,7 +28,8 @@ POSITION = "position"
 class Columns:
     """The m columns of an IMU's block: ``names`` (m,) the effect of each, ``places`` (m,) where.
 
-    ``owner`` (N, m) says which IMUs have the parameter.
+    ``owner`` (N, m) says which IMUs have the parameter. ``prior_sd`` (m,) of each IMU's own,
+    ``common_sd`` (m,) of what they all share.
     """
 
     model: ArrayModel
@@ -36,6 +37,7 @@ class Columns:
     places: tuple[tuple[int, ...], ...]
     owner: np.ndarray
     prior_sd: np.ndarray
+    common_sd: np.ndarray
 
     def of(self, effect: str) -> np.ndarray:
         """The columns of an effect (or of the positions)."""
@@ -58,6 +60,7 @@ def columns_of(array: Array, effects, position_sd: float) -> Columns:
     model = full_model(array, effects)
     count = max(array.accelerometers, array.gyroscopes)
     names, places, owner, sds = [POSITION] * 3, [(i,) for i in range(3)], [], [position_sd] * 3
+    common = [0.0] * 3
     owner += [(np.arange(count) < array.accelerometers) & (np.arange(count) > 0)] * 3
     for item, shape in zip(model.chain, model.shapes, strict=True):
         spread = np.broadcast_to(item.prior_sd, shape)[0]
@@ -67,7 +70,10 @@ def columns_of(array: Array, effects, position_sd: float) -> Columns:
             free = not (place and place[-1] in item.held)
             owner.append((np.arange(count) < shape[0]) & free)
             sds.append(float(spread[place]))
-    return Columns(model, tuple(names), tuple(places), np.array(owner).T, np.array(sds))
+            common.append(item.common_sd)
+    return Columns(
+        model, tuple(names), tuple(places), np.array(owner).T, np.array(sds), np.array(common)
+    )
 
 
 def catalogue_effects(without=()) -> tuple[str, ...]:
@@ -82,21 +88,27 @@ def prior_precision(columns: Columns, active, resized: bool = True) -> np.ndarra
     """
     sds = np.broadcast_to(columns.prior_sd, active.shape)[active]
     precision = np.diag(1.0 / sds**2)
+    column, common = np.nonzero(active)[1], columns.common_sd[np.nonzero(active)[1]]
+    alike = (column[:, None] == column) & (common > 0)
+    for mine in np.unique(alike[common > 0], axis=0):
+        # own variance of each, and a common one: Sherman and Morrison
+        own, shared = sds[mine][0] ** 2, common[mine][0] ** 2
+        precision[np.ix_(mine, mine)] -= shared / own / (own + mine.sum() * shared)
     for effect, mask in gauge_masks(columns, active):
         if effect.resizes and not resized:
             continue
         along = mask[active].astype(float)
-        along /= along.sum() * SETTINGS.stiff * sds[along > 0].mean()
+        along /= np.abs(along).sum() * SETTINGS.stiff * sds[along != 0].mean()
         precision += np.outer(along, along)
     return precision
 
 
 def gauge_masks(columns: Columns, active) -> list[tuple[Effect, np.ndarray]]:
-    """Effects, and (N, m) bool of parameters whose mean is a gauge, where all are active."""
+    """Effects, and (N, m) weights of parameters whose mean is a gauge, where all are active."""
     found, model = [], columns.model
     for item, shape in zip(model.chain, model.shapes, strict=True):
-        for own in item.gauge(shape) if item.gauge else ():
-            mask = np.zeros_like(active)
+        for own in item.gauge(shape, model.array.turns) if item.gauge else ():
+            mask = np.zeros(active.shape, np.asarray(own).dtype)
             mask[: shape[0], columns.of(item.id)] = np.reshape(own, (shape[0], -1))
-            found.append((item, mask & columns.owner))
-    return [(item, mask) for item, mask in found if mask.any() and active[mask].all()]
+            found.append((item, mask * columns.owner))
+    return [(item, mask) for item, mask in found if mask.any() and active[mask != 0].all()]

@@ -35,6 +35,7 @@ class Readings:
         a correction left in them, as a recording has them; or None
     gapless : bool, whether samples have neighbours that say something of time derivatives
     trust : (T, N, 2) square roots of a robust loss' weights, or None for all one
+    period : s, of the clocks of sensors that have one, NaN where it is not declared
     wander : (T, N) turns by which the IMUs' clocks depart from a steady drift, or None for none
     labels : N str
     """
@@ -56,6 +57,7 @@ class Readings:
     left: tuple[np.ndarray | None, np.ndarray | None] = (None, None)
     trust: np.ndarray | None = None
     wander: np.ndarray | None = None
+    period: float = np.nan
 
     @property
     def weights(self) -> np.ndarray:
@@ -178,6 +180,17 @@ def _stretches(readings: Readings, stretch, used) -> Readings:
     return replace(readings.select(used), run=run)  # fmt: skip
 
 
+def few_at_once(far) -> np.ndarray:
+    """Outliers (T, N, 2) bool without the samples where a quarter of a kind stands out at once.
+
+    Those are events of the whole array, and leaving them out would leave no motion, which takes
+    three triads.
+    """
+    number = far.shape[1]
+    crowd = far.sum(axis=1, keepdims=True) > min(max(1, number // 4), max(0, number - 3))
+    return far & ~crowd
+
+
 def odd_window(time) -> int:
     """Samples in `SETTINGS.window` seconds, odd, at least five."""
     return max(5, 2 * int(SETTINGS.window / np.median(np.diff(time)) / 2) + 1)
@@ -236,6 +249,7 @@ def arrange(recording: Recording, sparse: bool = False) -> Readings:
         np.tile(noise, (count, 1)), runs(time[used]), tuple(longer), recording.position_prior_sd,
         gapless, float(recording.time[0]), recording.gyroscope_common_scale_sd,
         (recording.accelerometer_map_covariance, recording.gyroscope_map_covariance),
+        period=recording.output_period,
     )  # fmt: skip
 
 

@@ -47,8 +47,18 @@ class Settings:
     dense: float = 0.5  # share of samples in gapless runs from which neighbours are looked at
     longest_step: float = 0.025  # s, between neighbours: longer ones say nothing of derivatives
 
+    # Parameters alike on all triads (`alike`)
+    least_told: float = 1.0  # differences that readings must tell, for their size to be estimated
+
     # Held-out time (`heldout`)
     blocks: int = 10  # blocks of time that are held out in turn
+
+    # Clocks by what a delay would gain (`clock_scan`)
+    sawtooth: float = -10.0  # log p of a sawtooth beyond a constant delay
+    many: float = 2.6  # log of the independent sawtooths per sample, from simulated white scores
+    fair: float = 0.05  # of the constant delay's chi-square that a sawtooth must add
+    least_turns: int = 3  # of a clock against the host's; fewer are a drift of the delay
+    edge: float = 0.03  # of a turn: how near to a clock's jump a reading is left out
 
     # Clocks from the gyroscopes alone (`gyroscope_clocks`)
     enough: int = 4  # gyroscopes with a clock
@@ -57,6 +67,7 @@ class Settings:
     rounds: int = 18  # of the search
     reach: float = 0.1  # turns, rms, by which a first guess may be off
     drawn_in: float = 0.85  # factor of the reach from round to round
+    declared_period: float = 0.2  # log of the found over it, beyond which the found one is used
     knot: float = 10.0  # s, of moving time between the knots of a clock's phase
     phase_rounds: int = 20  # of the search for phases
     most_knots: int = 40  # of them

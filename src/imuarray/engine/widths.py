@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import block_diag
+from scipy.special import chdtrc
 
 from imuarray.engine.estimate import (
     Estimate,
@@ -21,6 +22,7 @@ from imuarray.engine.linearise import State
 from imuarray.engine.parameters import Columns, columns_of, gauge_masks
 from imuarray.linear import scaled_inverse
 from imuarray.model.catalogue import OFF_COLUMNS, OFF_ROWS
+from imuarray.model.effects import KINDS
 
 SCALES, SKEWS = ("accelerometer_scale", "gyroscope_scale"), (
     "accelerometer_misalignment", "gyroscope_misalignment",
@@ -36,8 +38,16 @@ def settled(found: Estimate) -> Estimate:
     out of the answer, as they belong to a recording's correction; ``information``, ``precision``
     and ``blocks`` have them after the n parameters, those of each recording.
     """
+    return beside_maps(found)[0]
+
+
+def beside_maps(found: Estimate) -> tuple[Estimate, dict[str, float]]:
+    """`settled`, and how likely maps as far from the correction's as it takes them to be are.
+
+    {"accelerometer" or "gyroscope": p} of the kinds whose maps were corrected and not estimated.
+    """
     if all(left is None for one in found.recorded for left in one.readings.left):
-        return found
+        return found, {}
     wide = _with_maps(found)
     maps = mask_of_left(wide)
     active, count = wide.active | maps, len(found.values)
@@ -55,14 +65,23 @@ def settled(found: Estimate) -> Estimate:
     information = sum(inner for inner, _ in blocks)
     slope = sum(score for _, score in blocks)
     slope[:count] -= found.precision @ (found.values - means(found))
-    step = scaled_solve(information + precision, slope)[0][:count]
+    whole = scaled_solve(information + precision, slope)[0]
+    step, off = whole[:count], whole[count:]
+    names = np.array(wide.columns.names)[np.nonzero(maps)[1]]
+    likely = {}
+    for kind in KINDS:
+        own = np.tile(np.char.startswith(names, kind), len(wide.recorded))
+        if own.any():
+            inner = precision[count:, count:][np.ix_(own, own)]
+            likely[kind] = float(chdtrc(own.sum(), off[own] @ inner @ off[own]))
     recorded = tuple(
         replace(one, state=stepped(one.state, found.columns, found.active, step[place]))
         for one, place in zip(found.recorded, found.places, strict=True)
     )
-    return replace(
+    found = replace(
         found, recorded=recorded, information=information, precision=precision, blocks=blocks
     )
+    return found, likely
 
 
 def _placed(blocks, places, size):

@@ -157,9 +157,17 @@ def correct(recording: Recording, found: FirstOrder) -> Recording:
         accelerometer_map_covariance=forces_left,
         gyroscope_map_covariance=rates_left,
         stationary=still,
+        accelerometer_axes=_axes(recording, found),
         specific_force_saturated=force_rails,
         angular_rate_saturated=rate_rails,
     )
+
+
+def _axes(recording: Recording, found: FirstOrder) -> np.ndarray:
+    """Rotations (A, 3, 3) from the accelerometers' own axes to those of the corrected readings."""
+    own = recording.accelerometer_axes
+    back = np.swapaxes(nearest_orthogonal(found.triads.matrix), 1, 2)
+    return back if own is None else back @ own
 
 
 def _behind(matrix, covariance) -> np.ndarray:

@@ -20,6 +20,8 @@ class Array:
     labels : tuple of A str
     gyroscopes : int
         Number G of gyroscope triads (all measure the same angular rate).
+    axes : ndarray (A, 3, 3) or None
+        Rotations from the accelerometers' own axes to the array's; None for identities.
     package : tuple of 3 floats, metres
         Outline of one IMU package, for drawings only.
     """
@@ -29,11 +31,17 @@ class Array:
     gyroscopes: int
     name: str = "array"
     package: tuple[float, float, float] = field(default=(0.004, 0.004, 0.001))
+    axes: np.ndarray | None = None
 
     @property
     def accelerometers(self) -> int:
         """Number A of accelerometer triads."""
         return len(self.positions)
+
+    @property
+    def turns(self) -> np.ndarray:
+        """`axes`, (A, 3, 3)."""
+        return np.tile(np.eye(3), (self.accelerometers, 1, 1)) if self.axes is None else self.axes
 
     @property
     def relative(self) -> np.ndarray:
@@ -52,7 +60,8 @@ def sub_array(array: Array, triads: int) -> Array:
         return array
     chosen = np.linspace(0, array.accelerometers - 1, triads).round().astype(int)
     labels = tuple(array.labels[k] for k in chosen)
-    return Array(array.positions[chosen], labels, triads, array.name, array.package)
+    axes = None if array.axes is None else array.axes[chosen]
+    return Array(array.positions[chosen], labels, triads, array.name, array.package, axes)
 
 
 def positions_of(theta) -> np.ndarray:

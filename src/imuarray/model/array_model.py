@@ -155,12 +155,16 @@ class ArrayModel:
         triad, ``parameters`` (P,) flat effect parameters; ``when`` is what else an `Instant`
         holds: time (s), span (s), second and third derivatives.
         """
-        instant = Instant(motion, positions, **when)
+        instant = self.placed(Instant(motion, positions, **when))
         predicted = self.ideal(instant)
         values = self.split(jnp.asarray(parameters)) if self.effects else {}
         for item in self.chain:
             predicted = item.apply(values[item.id], instant, predicted)
         return predicted
+
+    def placed(self, instant: Instant) -> Instant:
+        """An instant that knows how the triads are mounted."""
+        return instant._replace(axes=self.array.turns)
 
     def ideal(self, instant: Instant) -> Prediction:
         """The same without effects: what they are applied to."""
@@ -208,7 +212,8 @@ class ArrayModel:
     def _function(self) -> tuple:
         """All that `predict` and the compiled residuals depend on, noise excepted."""
         counts = self.array.accelerometers, self.array.gyroscopes
-        return (*counts, self.chain, self.derivative_sd, self.motion_sd)
+        axes = None if self.array.axes is None else self.array.axes.tobytes()
+        return (*counts, axes, self.chain, self.derivative_sd, self.motion_sd)
 
     def __hash__(self):
         return hash(self._function)

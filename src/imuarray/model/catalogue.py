@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from imuarray.model import kinematics
-from imuarray.model.effects import KINDS, common_mean, common_means, data_effect, effect
+from imuarray.model.effects import KINDS, common_mean, data_effect, effect
 from imuarray.model.jax64 import jnp
 
 # Rows and columns of the off-diagonal entries of a 3 x 3 matrix, row by row.
@@ -66,9 +66,18 @@ def accelerometer_nonlinearity(curvature, instant, predicted):
     return predicted._replace(specific_force=force + curvature * force**2)
 
 
-def _axes_places(shape):
-    """The mean over triads of each axis' place; the mean place of a triad's axes: its position."""
-    masks = common_means(shape)
+OBLIQUE = 0.2  # of an axis, by which triads are mounted off the array's axes
+
+
+def _axes_places(shape, axes):
+    """The mean over triads of each axis' place; the mean place of a triad's axes: its position.
+
+    The first of axes of the array: specific force takes it up, where all triads' are along them.
+    """
+    along, masks = np.round(axes), []
+    if np.abs(along - axes).max() < OBLIQUE:
+        for axis, coordinate in np.ndindex(3, 3):
+            masks.append(along[:, axis, :, None] ** 2 * along[:, coordinate, None, :])
     for triad in range(shape[0]):
         for coordinate in range(3):
             masks.append(np.zeros(shape, bool))
@@ -77,19 +86,21 @@ def _axes_places(shape):
 
 
 @effect(
-    "size_effect", unit="m", prior_sd=5e-4, shape=lambda a, g: (a, 3, 3), sampling=True,
-    gauge=_axes_places, against="lever arm",
+    "size_effect", unit="m", prior_sd=5e-4, common_sd=5e-4, shape=lambda a, g: (a, 3, 3),
+    sampling=True, gauge=_axes_places, against="lever arm",
     meaning="the three axes of an accelerometer sit at places of their own",
 )  # fmt: skip
 def size_effect(offset, instant, predicted):
-    """Axis i of triad k sits at r_k + d_ki: its own lever arm; ``offset`` (A, axis, xyz)."""
+    """Axis i of triad k sits at r_k + R_k d_ki, in the chip's axes; ``offset`` (A, axis, xyz)."""
+    here = kinematics.specific_force(instant.motion, instant.positions)
 
     def seen_by(axis):
-        moved = kinematics.specific_force(instant.motion, instant.positions + offset[:, axis])
-        here = kinematics.specific_force(instant.motion, instant.positions)
-        return (moved - here)[:, axis]
+        arm = jnp.einsum("kij,kj->ki", instant.axes, offset[:, axis])
+        moved = kinematics.specific_force(instant.motion, instant.positions + arm)
+        along = instant.axes[:, :, axis]
+        return along * jnp.sum(along * (moved - here), axis=1, keepdims=True)
 
-    change = jnp.stack([seen_by(axis) for axis in range(3)], axis=1)
+    change = sum(seen_by(axis) for axis in range(3))
     return predicted._replace(specific_force=predicted.specific_force + change)
 
 

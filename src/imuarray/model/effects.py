@@ -50,6 +50,7 @@ class Instant(NamedTuple):
     second: Prediction = Prediction(0.0, 0.0)
     third: Prediction = Prediction(0.0, 0.0)
     gyroscopes: Turning | None = None  # as they see the motion, where that is free
+    axes: object = None  # rotations from the accelerometers' own axes to the array's, (A, 3, 3)
     wander: object = 0.0  # turns by which the IMUs' clocks depart from a steady drift, (N,)
 
 
@@ -77,8 +78,9 @@ class Effect:
     components : tuple of tuples of str
         Names of a triad's parameters along each axis after the first, joined by underscores; of
         a scalar, its one name. By default axes (x, xy), or numbers.
-    gauge : callable (shape) -> list of bool arrays, or None
-        Sets of parameters whose mean the motion or the positions take up: `common_mean`, ...
+    gauge : callable (shape, axes) -> list of arrays, or None
+        Sets of parameters (bool, or weights) whose mean the motion or the positions take up:
+        `common_mean`, ...; ``axes`` (A, 3, 3) as in `Instant`.
     meaning : str
         What it is, in the words of one who holds the board.
     shown : str
@@ -110,6 +112,9 @@ class Effect:
         Whether the array's size takes its gauge up: then it matters what the mean is.
     own : bool
         Whether it is a recording's own, not the board's: recordings fitted jointly each have it.
+    common_sd : float
+        Prior sd of what a parameter of all triads has in common, beside each one's own: chips of
+        one kind are alike. How much they differ, ``prior_sd`` at first, an estimate finds.
     """
 
     id: str
@@ -121,7 +126,7 @@ class Effect:
     sensors: str = "imu"
     sampling: bool = False
     components: tuple[tuple[str, ...], ...] = ()
-    gauge: Callable[[tuple[int, ...]], list] | None = None
+    gauge: Callable[[tuple[int, ...], np.ndarray], list] | None = None
     meaning: str = ""
     shown: str = ""
     against: str = ""
@@ -137,6 +142,7 @@ class Effect:
     left_out: bool = False
     resizes: bool = False
     own: bool = False
+    common_sd: float = 0.0
 
     @property
     def shifts_time(self) -> bool:
@@ -180,12 +186,12 @@ def known_effect(id) -> Effect:
     return EFFECTS.get(id) or DATA_EFFECTS.get(id) or Effect(id)
 
 
-def common_mean(shape) -> list[np.ndarray]:
+def common_mean(shape, axes=None) -> list[np.ndarray]:
     """A gauge: the mean of all parameters of all triads together."""
     return [np.ones(shape, bool)]
 
 
-def common_means(shape) -> list[np.ndarray]:
+def common_means(shape, axes=None) -> list[np.ndarray]:
     """A gauge: the mean over all triads, of each of a triad's parameters."""
     masks = []
     for place in np.ndindex(*shape[1:]):

@@ -71,7 +71,7 @@ def gyroscope_delay(delay, instant, predicted):
 CLOCK = ("period", "frequency", "phase", "offset", "drift")
 
 
-def _common_offset(shape):
+def _common_offset(shape, axes):
     """The mean age of all IMUs is the motion's."""
     return [np.broadcast_to(np.array(CLOCK) == "offset", shape)]
 

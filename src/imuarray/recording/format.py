@@ -14,9 +14,10 @@ from imuarray.errors import InputError
 from imuarray.provenance import is_damaged, write_netcdf
 from imuarray.recording import validate
 from imuarray.recording.record import (
-    COVARIANCES,
     FLAGS,
+    MATRICES,
     NUMBERS,
+    OPTIONAL_NUMBERS,
     QUANTITIES,
     TEXTS,
     TRUTH,
@@ -29,15 +30,16 @@ def from_dataset(dataset: xr.Dataset, where: str = "recording") -> Recording:
     """Turn the file's dataset into a recording; InputError, naming `where`, if it is not one."""
     validate.check_structure(dataset, where)
     arrays = {name: _in_si_units(dataset[name], where) for name in QUANTITIES}
-    spread = {name: dataset[name].values.astype(float) for name in COVARIANCES if name in dataset}
+    matrices = {name: dataset[name].values.astype(float) for name in MATRICES if name in dataset}
+    numbers = [*NUMBERS, *(name for name in OPTIONAL_NUMBERS if name in dataset.attrs)]
     flags = {name: dataset[name].values.astype(bool) for name in FLAGS if name in dataset}
     recording = Recording(
         **arrays,
         accelerometer_labels=_labels(dataset["accelerometer"]),
         gyroscope_labels=_labels(dataset["gyroscope"]),
         **flags,
-        **spread,
-        **{name: float(np.asarray(dataset.attrs[name]).item()) for name in NUMBERS},
+        **matrices,
+        **{name: float(np.asarray(dataset.attrs[name]).item()) for name in numbers},
         **{name: str(dataset.attrs.get(name, "")) for name in TEXTS},
     )
     validate.check_values(recording, where)

@@ -16,6 +16,7 @@ from imuarray.recording.units import GRAVITY
 COUNTS_PER_G = 2048.0
 COUNTS_PER_DPS = 16.4
 RAIL = 32767
+OUTPUT_RATE = 1000.0  # Hz, at which the MPU-9150 makes readings of both kinds
 
 
 def read_positions(path: str | Path) -> tuple[np.ndarray, tuple[str, ...]]:
@@ -79,6 +80,7 @@ def to_recording(
     accelerometer_noise_sd: float = 0.04,
     gyroscope_noise_sd: float = float(np.radians(0.06)),
     position_prior_sd: float = 3e-3,
+    output_rate: float = OUTPUT_RATE,
     title: str = "",
     source: str = "",
 ) -> Recording:
@@ -96,6 +98,7 @@ def to_recording(
     force = stream.counts[..., :3] * (GRAVITY / COUNTS_PER_G)
     rate = stream.counts[..., 3:] * np.radians(1 / COUNTS_PER_DPS)
     under = np.array([label in turned for label in labels])
+    axes = np.where(under[:, None, None], UNDERSIDE_ROTATION, np.eye(3))
     for values in (force, rate):
         values[:, under] = values[:, under] @ UNDERSIDE_ROTATION.T
     return Recording(
@@ -105,4 +108,5 @@ def to_recording(
         gyroscope_noise_sd=gyroscope_noise_sd, position_prior_sd=position_prior_sd,
         accelerometer_range=RAIL / COUNTS_PER_G * GRAVITY,
         gyroscope_range=float(np.radians(RAIL / COUNTS_PER_DPS)), title=title, source=source,
+        accelerometer_axes=axes, output_period=1 / output_rate,
     )  # fmt: skip

@@ -30,6 +30,7 @@ DIMENSIONS = {
     "angular_rate_saturated": ("time", "gyroscope", "axis"),
     "accelerometer_map_covariance": ("accelerometer_entry", "accelerometer_entry_other"),
     "gyroscope_map_covariance": ("gyroscope_entry", "gyroscope_entry_other"),
+    "accelerometer_axes": ("accelerometer", "axis", "axis_other"),
 }
 
 # Optional variables that are true or false.
@@ -56,8 +57,14 @@ NUMBERS = {
     "position_prior_sd": "m",
 }
 
+# Attributes that need not be there.
+OPTIONAL_NUMBERS = {"output_period": "s"}
+
 # Optional variables: how well the maps are known by which the readings were corrected.
 COVARIANCES = ("accelerometer_map_covariance", "gyroscope_map_covariance")
+
+# Optional variables without a unit.
+MATRICES = (*COVARIANCES, "accelerometer_axes")
 
 # A simulated sensor need not have a rail.
 MAY_BE_INFINITE = ("accelerometer_range", "gyroscope_range")
@@ -93,6 +100,11 @@ class Recording:
     accelerometer_map_covariance, gyroscope_map_covariance : (9 A, 9 A) and (9 G, 9 G), or None
         Of the 3 x 3 maps, no unit, that are left between the truth and the readings where these
         were corrected: about the identity, row by row, triad by triad.
+    accelerometer_axes : (A, 3, 3), or None
+        Rotations from the accelerometers' own axes, those of their chips, to the array's.
+    output_period : float, s, NaN where not declared
+        Between readings that the sensors make on clocks of their own, where the host takes the
+        newest.
     title, source, license : str, empty if not known
     selected : str
         How many samples of how many, where these are not all that were recorded; else empty.
@@ -114,6 +126,8 @@ class Recording:
     angular_rate_saturated: np.ndarray | None = None
     accelerometer_map_covariance: np.ndarray | None = None
     gyroscope_map_covariance: np.ndarray | None = None
+    accelerometer_axes: np.ndarray | None = None
+    output_period: float = np.nan
     title: str = ""
     source: str = ""
     license: str = ""
@@ -128,7 +142,7 @@ class Recording:
         for name in FLAGS:
             if getattr(self, name) is not None:
                 variables[name] = (DIMENSIONS[name], np.asarray(getattr(self, name), bool))
-        for name in COVARIANCES:
+        for name in MATRICES:
             if getattr(self, name) is not None:
                 variables[name] = DIMENSIONS[name], getattr(self, name), {"units": "1"}
         coordinates = {
@@ -138,6 +152,9 @@ class Recording:
             "axis": ("axis", np.array(AXES, object)),
         }
         attributes = {name: float(getattr(self, name)) for name in NUMBERS}
+        for name in OPTIONAL_NUMBERS:
+            if not np.isnan(getattr(self, name)):
+                attributes[name] = float(getattr(self, name))
         attributes |= {name: getattr(self, name) for name in TEXTS if getattr(self, name)}
         try:
             return xr.Dataset(variables, coordinates, attributes)
@@ -188,5 +205,5 @@ class Recording:
 def array_of(recording: Recording, gyroscopes: int | None = None) -> Array:
     """The geometry a recording declares, with its own or another number of gyroscope triads."""
     count = recording.angular_rate.shape[1] if gyroscopes is None else gyroscopes
-    labels = recording.accelerometer_labels
-    return Array(recording.accelerometer_position, labels, count, "recording")
+    labels, axes = recording.accelerometer_labels, recording.accelerometer_axes
+    return Array(recording.accelerometer_position, labels, count, "recording", axes=axes)

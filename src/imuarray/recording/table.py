@@ -12,6 +12,7 @@ import yaml
 from imuarray.errors import LARGEST, SMALLEST, InputError
 from imuarray.recording.record import Recording
 from imuarray.recording.units import factor
+from imuarray.recording.validate import is_rotation
 
 LEAVE_OUT = "leave out"  # what `incomplete_rows` may be
 OFTEN = 0.1  # share of blank cells from which a sensor is slower than the log
@@ -23,7 +24,8 @@ WIDEST = 2.0  # m; beyond this, positions without a declared unit are taken to b
 WHITESPACE = r"\s+"  # the one delimiter longer than a character
 KEYS = {
     "delimiter": False, "comment": False, "time": True, "incomplete_rows": False,
-    "position_unit": False, "position_prior": False, "accelerometers": True, "gyroscopes": True,
+    "position_unit": False, "position_prior": False, "output_rate": False,
+    "accelerometers": True, "gyroscopes": True,
 }  # fmt: skip
 KINDS = "accelerometers", "gyroscopes"
 SENSOR_KEYS = {"unit": True, "scale": False, "noise": True, "range": True, "triads": True}
@@ -94,11 +96,14 @@ def read_table(path: str | Path, columns: str | Path) -> Recording:
             " name the position_unit, mm or m"
         )
     numbers = _numbers(layout, str(columns))
+    if "output_rate" in layout:
+        numbers["output_period"] = 1 / _positive(layout["output_rate"], f"{columns}: output_rate")
     prior = _positive(layout.get("position_prior", 3e-3 / length), f"{columns}: position_prior")
     return Recording(
         time=_time(table, layout["time"], where, str(columns)), specific_force=force,
         angular_rate=rate, accelerometer_position=length * np.array(places),
         accelerometer_labels=labels, gyroscope_labels=rate_labels,
+        accelerometer_axes=_axes(layout, str(columns)),
         position_prior_sd=length * prior, source=Path(path).name, selected=account, **numbers,
     )  # fmt: skip
 
@@ -217,6 +222,12 @@ def _sensors(table, layout, kind, units, where, layout_name):
     return np.stack(parts, axis=1), tuple(str(label) for label in section["triads"])
 
 
+def _axes(layout, where: str) -> np.ndarray:
+    """Rotations (A, 3, 3) from the accelerometers' own axes to the array's."""
+    triads = layout["accelerometers"]["triads"].items()
+    return np.array([_turn(triad.get("axes", list("xyz")), f"{where}: {n}") for n, triad in triads])
+
+
 def _turn(axes, where: str) -> np.ndarray:
     """Rotation from the sensor's axes to the array's: [-y, -x, -z] or a 3 x 3 matrix.
 
@@ -234,7 +245,7 @@ def _turn(axes, where: str) -> np.ndarray:
             matrix[row, "xyz".index(letter)] = -1.0 if name.startswith("-") else 1.0
     else:
         matrix = np.array([_three(row, where) for row in axes])
-    if not np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6) or np.linalg.det(matrix) < 0:
+    if not is_rotation(matrix):
         raise InputError(f"{where}: {expected}, found {axes!r}, which is no rotation")
     return matrix
 

@@ -24,6 +24,7 @@ from imuarray.recording.record import (
     LABELS,
     MAY_BE_INFINITE,
     NUMBERS,
+    OPTIONAL_NUMBERS,
     QUANTITIES,
     SI,
     Recording,
@@ -71,11 +72,16 @@ def check_structure(dataset: xr.Dataset, where: str) -> None:
         if name in dataset:
             _check_present(dataset, name, where)
             _check_boolean(dataset[name], where)
-    for name in NUMBERS:
-        _check_number(dataset.attrs, name, where)
+    for name, unit in NUMBERS.items():
+        _check_number(dataset.attrs, name, unit, where)
+    for name, unit in OPTIONAL_NUMBERS.items():
+        if name in dataset.attrs:
+            _check_number(dataset.attrs, name, unit, where)
     for name in COVARIANCES:
         if name in dataset:
             _check_covariance(dataset, name, where)
+    if "accelerometer_axes" in dataset:
+        _check_rotations(dataset, "accelerometer_axes", where)
 
 
 def check_values(recording: Recording, where: str) -> None:
@@ -139,8 +145,7 @@ def _check_boolean(variable: xr.DataArray, where: str) -> None:
         )
 
 
-def _check_number(attributes: dict, name: str, where: str) -> None:
-    unit = NUMBERS[name]
+def _check_number(attributes: dict, name: str, unit: str, where: str) -> None:
     bounds = f"between {SMALLEST:g} and {LARGEST:g}"
     expected = f"expected the attribute '{name}' to be a number {bounds} in {unit}"
     if name not in attributes:
@@ -170,6 +175,21 @@ def _check_covariance(dataset: xr.Dataset, name: str, where: str) -> None:
     even = np.allclose(values, values.T, rtol=0, atol=1e-9 * most)
     if not (even and least >= -1e-9 * most):
         raise InputError(f"{where}: {name}: expected a covariance, found none")
+
+
+def _check_rotations(dataset: xr.Dataset, name: str, where: str) -> None:
+    _check_present(dataset, name, where)
+    _check_numeric(dataset[name], where)
+    values = dataset[name].values.astype(float)
+    square = values.shape[1:] == (3, 3) and (np.abs(values) <= 2).all()
+    if not square or not is_rotation(values).all():
+        raise InputError(f"{where}: {name}: expected rotations, 3 x 3 each, found others")
+
+
+def is_rotation(matrices) -> np.ndarray:
+    """Whether matrices (..., 3, 3) are rotations, to six digits."""
+    unit = np.abs(matrices @ np.swapaxes(matrices, -1, -2) - np.eye(3)).max(axis=(-2, -1)) < 1e-6
+    return unit & (np.linalg.det(matrices) > 0)
 
 
 def _check_counts(recording: Recording, where: str) -> None:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from imuarray.diagnosis.clocks import age_of, delay_score
+from imuarray.diagnosis.clocks import delay_score
+from imuarray.engine.clock_scan import age_of
 from imuarray.engine.heldout import blocks_of
 from imuarray.engine.parameters import POSITION
 from imuarray.linear import scaled_inverse
