@@ -32,7 +32,7 @@ import numpy as np
 from imuarray.model.effects import effect
 
 
-def common_gain(shape):
+def common_gain(shape, axes):
     """One gain of all accelerometers is a unit of length."""
     return [np.ones(shape, bool)]
 

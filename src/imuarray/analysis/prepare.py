@@ -75,7 +75,7 @@ def simulate(
 
 def first_order(
     recording: Recording, gravity: float = GRAVITY, gyroscopes: str = "calibrate",
-    shortest_pose: float = 3.0,
+    shortest_pose: float = 3.0, others: Sequence[Recording] = (),
 ) -> Recording:  # fmt: skip
     """The recording with each triad's offset, scale, misalignment and turn corrected.
 
@@ -91,10 +91,14 @@ def first_order(
         "calibrate", or "offset" for no more than their offsets, as paper 2021.
     shortest_pose
         That a still pose lasts at least, s.
+    others
+        Further recordings of the board: the gyroscopes' maps, and so the array's size, are from the
+        moves of all.
 
     InputError without enough still poses, and for mirrored axes.
     """
-    return correct(recording, calibrate_first_order(recording, gravity, gyroscopes, shortest_pose))
+    found = calibrate_first_order(recording, gravity, gyroscopes, shortest_pose, others)
+    return correct(recording, found)
 
 
 def select(recording: Recording, samples: int | None = None) -> Recording:

@@ -24,8 +24,9 @@ def first_order(arguments) -> None:
 
     recording, output = read_recording(arguments.recording), Output(arguments)
     found = calibrate_first_order(
-        recording, arguments.gravity, arguments.gyroscopes, arguments.shortest_pose
-    )
+        recording, arguments.gravity, arguments.gyroscopes, arguments.shortest_pose,
+        [read_recording(path) for path in arguments.others],
+    )  # fmt: skip
     write_corrected(recording, found, arguments.out)
     length = sum(pose.stop - pose.start for pose in found.poses)
     table, offsets = residual_table(found, recording), found.triads.offset

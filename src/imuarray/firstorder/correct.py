@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import block_diag
 
-from imuarray.errors import require_one_of
+from imuarray.errors import InputError, require_one_of
 from imuarray.firstorder.allan import lag_correlation, white_noise_sd
-from imuarray.firstorder.gyroscopes import Gyroscopes, calibrate_gyroscopes
+from imuarray.firstorder.gyroscopes import Gyroscopes, Still, calibrate_gyroscopes
 from imuarray.firstorder.still import SHORTEST, still_poses
 from imuarray.firstorder.triads import TriadFit, fit_triads
 from imuarray.firstorder.turns import nearest_orthogonal, shared_turn
 from imuarray.recording import Recording
-from imuarray.recording.channels import require_live, require_once
+from imuarray.recording.channels import require_apart, require_live, require_once
 from imuarray.recording.units import GRAVITY
 
 GYROSCOPES = ("calibrate", "offset")
@@ -86,7 +87,7 @@ class FirstOrder:
 
 def calibrate_first_order(
     recording: Recording, gravity: float = GRAVITY, gyroscopes: str = GYROSCOPES[0],
-    shortest_pose: float = SHORTEST,
+    shortest_pose: float = SHORTEST, others: Sequence[Recording] = (),
 ) -> FirstOrder:  # fmt: skip
     """First-order model of every triad from still poses and the moves between them.
 
@@ -95,14 +96,35 @@ def calibrate_first_order(
     gravity : m/s^2
     gyroscopes : "calibrate" for their maps, "offset" for no more than their offsets (paper 2021)
     shortest_pose : s, that a still pose lasts at least
+    others : further recordings of the same board, whose moves, too, say what the gyroscopes' maps
+        are; a recording's own say the scale common to all of them to 0.1 % or so
 
     InputError or IdentifiabilityError where there are no poses, too few or too similar ones, and
     where axes are mirrored, rates have another unit, or channels or samples are copied.
     """
     require_one_of("gyroscopes", gyroscopes, GYROSCOPES)
+    for other in others:
+        if other.gyroscope_labels != recording.gyroscope_labels:
+            raise InputError("recordings: expected one board, found gyroscopes of other labels")
+    if others:
+        require_apart([recording, *others])
+    found = _of_poses(recording, gravity, shortest_pose)
+    if gyroscopes == "calibrate":
+        more = [_still(one, _of_poses(one, gravity, shortest_pose)) for one in others]
+        found = replace(found, gyroscopes=calibrate_gyroscopes(_still(recording, found), more))
+    return found
+
+
+def _still(recording: Recording, found: FirstOrder) -> Still:
+    offsets = np.array([recording.angular_rate[pose].mean(axis=0) for pose in found.poses])
+    return Still(recording, found.poses, found.triads, offsets, found.gyroscope_noise)
+
+
+def _of_poses(recording: Recording, gravity: float, shortest: float) -> FirstOrder:
+    """What the still poses alone say: nothing of the gyroscopes' maps."""
     require_live(recording)
     require_once(recording)
-    poses = still_poses(recording, shortest=shortest_pose)
+    poses = still_poses(recording, shortest=shortest)
     force = [recording.specific_force[pose] for pose in poses]
     rate = [recording.angular_rate[pose] for pose in poses]
     noise = white_noise_sd(force)
@@ -114,13 +136,10 @@ def calibrate_first_order(
     offsets = np.array([piece.mean(axis=0) for piece in rate])
     spread = offsets.std(axis=0, ddof=1) if len(poses) > 1 else np.full(offsets.shape[1:], np.nan)
     triads = fit_triads(mean, sd, gravity, recording.accelerometer_labels)
-    rate_noise, maps = white_noise_sd(rate), None
-    if gyroscopes == "calibrate":
-        maps = calibrate_gyroscopes(recording, poses, triads, offsets, rate_noise)
     return FirstOrder(
         poses, triads, np.average(offsets, axis=0, weights=counts),
-        spread / np.sqrt(len(poses)), noise, rate_noise, lag_correlation(force),
-        lag_correlation(rate), gravity, maps,
+        spread / np.sqrt(len(poses)), noise, white_noise_sd(rate), lag_correlation(force),
+        lag_correlation(rate), gravity,
     )  # fmt: skip
 
 

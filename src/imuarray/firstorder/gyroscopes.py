@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
 
-from imuarray.firstorder.moves import CommonMap, common_map, gather, prior_precision
+from imuarray.firstorder.moves import CommonMap, Move, common_map, gather, prior_precision
 from imuarray.firstorder.relative import Relative, compare
 from imuarray.firstorder.triads import TriadFit
 from imuarray.firstorder.turns import nearest_orthogonal
 from imuarray.recording import Recording
+
+APART = 1000.0  # s, between recordings that are looked at as one
 
 
 @dataclass(frozen=True)
@@ -43,39 +47,84 @@ class Gyroscopes:
         return np.nan if isinstance(self.common, str) else self.common.scale_sd
 
 
-def calibrate_gyroscopes(
-    recording: Recording, poses, triads: TriadFit, offsets, noise
-) -> Gyroscopes:
+class Still(NamedTuple):
+    """A recording's P still poses, and what they say of its sensors.
+
+    ``offsets`` (P, G, 3) rad/s the gyroscopes' mean readings in them, ``noise`` (G, 3) rad/s.
+    """
+
+    recording: Recording
+    poses: list[slice]
+    triads: TriadFit
+    offsets: np.ndarray
+    noise: np.ndarray
+
+    def rate(self) -> np.ndarray:
+        """Angular rates (T, G, 3) rad/s without their offsets."""
+        counts = [pose.stop - pose.start for pose in self.poses]
+        return self.recording.angular_rate - np.average(self.offsets, axis=0, weights=counts)
+
+    def good(self) -> np.ndarray:
+        """(T,) bool: no gyroscope is at its rail."""
+        return ~self.recording.saturated_gyroscopes().any(axis=(1, 2))
+
+    def free(self) -> np.ndarray:
+        """(T,) bool: nor is the board still."""
+        free = self.good()
+        for pose in self.poses:
+            free[pose] = False
+        return free
+
+
+def calibrate_gyroscopes(own: Still, others: Sequence[Still] = ()) -> Gyroscopes:
     """Maps of all gyroscopes: relative to their mean, and one common map from the moves.
 
-    Parameters
-    ----------
-    poses : P slices, ``offsets`` (P, G, 3) rad/s the mean readings in them
-    triads : accelerometers; an IMU's gyroscope starts turned as its accelerometer is
-    noise : (G, 3) rad/s
+    An IMU's gyroscope starts turned as its accelerometer is. ``others``: of the same board, whose
+    rates and moves say as much of the maps.
 
     InputError for a gyroscope that is mirrored or dead, for wrong units and for left-handed axes.
     """
-    counts = [pose.stop - pose.start for pose in poses]
-    rate = recording.angular_rate - np.average(offsets, axis=0, weights=counts)
-    good = ~recording.saturated_gyroscopes().any(axis=(1, 2))
-    free = good.copy()
-    for pose in poses:
-        free[pose] = False
-    start = _start(recording, triads)
-    relative = compare(rate, recording.time, free, start, recording.gyroscope_labels)
+    every, begun = [own, *others], 0.0
+    times = []
+    for one in every:  # one after the other, far apart
+        times.append(one.recording.time - one.recording.time[0] + begun)
+        begun = times[-1][-1] + APART
+    rate = np.concatenate([one.rate() for one in every])
+    free = np.concatenate([one.free() for one in every])
+    start = _start(own.recording, own.triads)
+    labels = own.recording.gyroscope_labels
+    relative = compare(rate, np.concatenate(times), free, start, labels)
     if isinstance(relative, str):
         turn, maps = start, np.broadcast_to(np.eye(3), start.shape)
     else:
         turn, maps = relative.turn, relative.map
-    back = np.linalg.inv(turn @ maps)
-    count = len(back)
-    mean = np.einsum("kij,tkj->ti", back, recording.angular_rate) / count
-    still = np.einsum("kij,pkj->pi", back, offsets) / count
-    sd = float(np.sqrt(np.mean(noise**2) / count))
-    moves = gather(mean, recording.time, poses, still, good, sd)
-    common = common_map(moves, triads.direction, triads.direction_covariance)
+    common = _common([(one, _moves(one, turn @ maps)) for one in every])
     return Gyroscopes(*_together(turn, maps, relative, common), relative, common)
+
+
+def _moves(one: Still, matrix) -> list[Move]:
+    """Its moves, of the mean of rates with maps (G, 3, 3) taken out."""
+    back = np.linalg.inv(matrix)
+    count = len(back)
+    mean = np.einsum("kij,tkj->ti", back, one.recording.angular_rate) / count
+    still = np.einsum("kij,pkj->pi", back, one.offsets) / count
+    sd = float(np.sqrt(np.mean(one.noise**2) / count))
+    return gather(mean, one.recording.time, one.poses, still, one.good(), sd)
+
+
+def _common(several) -> CommonMap | str:
+    """The map common to all gyroscopes from [(recording, moves)]; its moves are the first one's."""
+    moves, poses = [], 0
+    for one, own in several:
+        moves += [move._replace(first=move.first + poses) for move in own]
+        poses += len(one.poses)
+    triads = [one.triads for one, _ in several]
+    direction = np.concatenate([each.direction for each in triads])
+    found = common_map(moves, direction, block_diag(*(t.direction_covariance for t in triads)))
+    if isinstance(found, str):
+        return found
+    own = found.first < len(several[0][0].poses)
+    return replace(found, first=found.first[own], error=found.error[own], weight=found.weight[own])
 
 
 def _start(recording: Recording, triads: TriadFit) -> np.ndarray:
