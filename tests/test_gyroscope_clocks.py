@@ -23,7 +23,7 @@ class Rough:
     def __init__(self, seed, samples=3000, wrong=0.02):
         rng = np.random.default_rng(seed)
         self.time = np.sort(rng.choice(int(62.5 * SPAN), samples, replace=False)) / 62.5
-        self.span, self.keep = SPAN, np.ones((samples, 8, 6), bool)
+        self.span, self.keep, self.period = SPAN, np.ones((samples, 8, 6), bool), np.nan
         self.clocks = np.column_stack([
             np.full(8, PERIOD), rng.uniform(-3, 3, 8), rng.uniform(0, 1, 8), np.zeros(8),
             rng.normal(0, 1e-4, 8) + 2e-4,
@@ -109,3 +109,11 @@ def test_phases_that_wander_and_jumps_that_jitter_are_found_reading_by_reading()
     # the clock's own jumps leave as many readings a turn off as jitter and the jump's place do
     plain = steady - np.floor(steady) - 0.5 - ages / PERIOD
     assert np.mean(np.abs(plain[told]) > 0.3) > 0.09
+
+
+def test_a_declared_period_near_the_found_one_is_taken():
+    there = Rough(3, samples=400)
+    there.period = 1.1 * PERIOD
+    guesses = there.guesses(np.random.default_rng(3))
+    found = clocks_from_gyroscopes(there, there.acceleration, guesses)
+    assert {values[0] for values in found.values()} == {there.period}

@@ -182,6 +182,7 @@ def test_no_module_beside_the_finders_names_an_effect():
     finders = {
         "clocks",
         "shifts",
+        "warming",
         "special",
         "reading_effects",
         "noise_effects",

@@ -7,12 +7,12 @@ from scipy.optimize import minimize_scalar
 
 from imuarray.diagnosis.scores import Candidate, Information, Scanned, Score
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.diagnosis.tails import log_chi_square
 from imuarray.engine.fit import Fit
 from imuarray.engine.heldout import blocks_of
 from imuarray.linear import scaled_inverse
 from imuarray.model.effects import KINDS
 from imuarray.model.timing import warming
+from imuarray.tails import log_chi_square
 
 WARM_UP = "warm_up"
 PACES = (-8.0, -4.0, -2.0, 0.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # in the recording's length
