@@ -213,6 +213,24 @@ def test_a_warm_up_follows_one_temperature_in_all_sensors():
         np.testing.assert_allclose(readings - ideal, expected, atol=1e-12)
 
 
+def test_a_shock_rings_within_a_millisecond_and_fades():
+    there = scene()
+    change = drawn(there, "shock", (1,), amplitude=3.0)
+    assert change.sensors == tuple(range(8))
+    force, rate = noiseless_readings(there, [change])
+    force, rate = force - there.ideal().force, rate - there.ideal().rate
+    begin = change.parameters["begin"].value
+    since = there.time - begin[np.searchsorted(begin, there.time) - 1]
+    late = (since > 0.25) | (there.time < begin[0])
+    assert 0.5 < np.abs(force).max() < 60 and np.abs(force[late]).max() < 1e-3
+    # of one rigid body, each IMU at an instant of its own: no two are alike
+    struck = np.abs(force[..., 0]).max(axis=1) > 0.5
+    assert struck.sum() > 5 and np.abs(np.corrcoef(force[struck, :, 0].T) - np.eye(8)).max() < 0.98
+    # the rate is the integral of what turns: smaller by 2 pi 400 Hz
+    turning = np.abs(rate[struck]).max() * 2 * np.pi * 400 * 0.02
+    assert 0.1 < turning / np.abs(force[struck]).max() < 10
+
+
 def test_a_drift_of_all_sensors_is_of_one_kind():
     for seed in range(6):
         change = drawn(scene(), "bias_drift", tuple(range(8)), seed)

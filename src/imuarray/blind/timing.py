@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from imuarray.blind.change import Parameter, effect, spread
+from imuarray.blind.change import UNIT_FORCE, Parameter, effect, spread
 from imuarray.blind.scene import Pair
 
 CLOCK_PERIOD = 1e-3  # s, P of a free-running IMU
@@ -49,3 +49,31 @@ def sensor_clock(scene, rng, sensors, size):
         "largest_age": Parameter(size * (1 + offset), "s"),
     }
     return {"parameters": said, "ages": Pair(ages, ages)}
+
+
+@effect(UNIT_FORCE, 0.5, 5.0, everywhere=True, scalable=False, from_readings=False)
+def shock(scene, rng, sensors, size):
+    """The board is struck and rings for some 20 ms at 400 Hz, a rigid body.
+
+    Each IMU reads that at an instant of its own in the millisecond before the host's, and the
+    motion of the hand, which is slow, as ever. Size is the acceleration of the ringing, m/s^2.
+    """
+    number = max(2, round(scene.duration * rng.uniform(0.3, 1.0)))
+    begin = np.sort(scene.time[0] + rng.random(number) * scene.duration)
+    ringing = 2 * np.pi * rng.uniform(350.0, 450.0, number)
+    fading = rng.uniform(0.01, 0.03, number)
+    push = size * rng.standard_normal((number, 3))
+    turn = size / 0.02 * rng.standard_normal((number, 3))  # rad/s^2: as much at 2 cm
+    instants = scene.time[:, None] - CLOCK_PERIOD * rng.random((len(scene.time), len(sensors)))
+    past = instants[..., None] - begin
+    gone = np.maximum(past, 0.0)
+    wave = np.where(past > 0, np.exp(-gone / fading) * np.exp(1j * ringing * gone), 0.0)
+    force, twist = wave.imag @ push, wave.imag @ turn
+    rate = -(wave.real / ringing) @ turn
+    arms = scene.positions[list(sensors)]
+    said = {"begin": Parameter(begin, "s"), "frequency": Parameter(ringing / (2 * np.pi), "Hz")}
+    return {
+        "parameters": said,
+        "force_error": lambda field: force + np.cross(twist, arms),
+        "rate_error": lambda field: rate,
+    }

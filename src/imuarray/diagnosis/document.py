@@ -262,7 +262,14 @@ def causes_of(found: Found, extended: Fitted) -> list[dict]:
             gain_in_sample_nats=true,
         ))  # fmt: skip
     causes += [
-        _entry(item, labels, item.parameters, (item.gain, item.gain_se)) for item in found.in_noise
+        _entry(
+            item,
+            labels,
+            item.parameters,
+            (item.gain, item.gain_se),
+            **({"stretches_s": [list(pair) for pair in item.where]} if item.where else {}),
+        )
+        for item in found.in_noise
     ]
     return causes
 

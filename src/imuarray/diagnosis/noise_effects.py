@@ -30,6 +30,7 @@ class Named(NamedTuple):
     blocks: np.ndarray  # nats of each held-out block
     beside: bool = False  # whether its gain is in no fit's score, which takes noise for white
     accounts_for: tuple[str, ...] = ()  # checks that must fail where it is
+    where: tuple = ()  # (first, last) s of stretches of time
 
 
 class Mixture(NamedTuple):

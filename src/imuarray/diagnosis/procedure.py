@@ -19,11 +19,13 @@ from imuarray.diagnosis.residual_checks import Check, all_checks
 from imuarray.diagnosis.scores import Score
 from imuarray.diagnosis.separability import rivals
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.shocks import SHOCK, find_shocks
 from imuarray.diagnosis.state import Search
 from imuarray.engine.clock_scan import DELAY
 from imuarray.engine.fit import Fit, fit
 from imuarray.engine.parameters import catalogue_effects, columns_of
 from imuarray.engine.readings import Readings, arrange, determined, few_at_once, part_of
+from imuarray.errors import InputError
 from imuarray.model.effects import EFFECTS
 from imuarray.recording import Recording
 
@@ -80,12 +82,17 @@ def run_procedure(
     search = eliminate(search.refit(rough=False))
     search, clips = leave_out_clips(search, without)
     say("judging the noise")
+    search = with_outliers(search)
+    shock, used = unshaken(search, without)
+    if not used.all():
+        raw = raw.select(used)
+        search, base = without_shocks(search, used)
     search, tailed, in_noise = fit_heavy_tails(search, without)
     search = fit_coloured_noise(search, without)
     say("testing what is left")
     checks = all_checks(search.fit, search.given, search.noise) + final_checks(search, tailed)
     untied = all(c.log_p >= SETTINGS.check for c in checks if c.name.startswith("residual"))
-    in_noise += named_noise(search, without, tailed, untied)
+    in_noise += [*shock, *named_noise(search, without, tailed, untied)]
     explained, failing = within_tolerance(search, checks, in_noise)
     say("looking for what cannot be distinguished")
     classes = {cause.effect: rivals(search, cause) for cause in search.causes}
@@ -108,6 +115,40 @@ def prepared(recording: Recording, without=(), sparse=False):
     return raw, structural, readings, mended
 
 
+def with_outliers(search: Search) -> Search:
+    """Refitted to all readings that count, once the means are known."""
+    return replace(search, readings=replace(search.readings, keep=search.allowed)).refit()
+
+
+def unshaken(search: Search, without) -> tuple[list, np.ndarray]:
+    """Shocks, if there are any, and the samples (T,) bool to go on with.
+
+    All of them where the motion is rough: clocks and lags show in what is shaken, too.
+    """
+    every = np.ones(len(search.readings.time), bool)
+    if SHOCK in without:
+        return [], every
+    shock, shaken = find_shocks(search.fit, SETTINGS.limit(SHOCK))
+    if shock is None or not search.smooth:
+        return [shock] if shock else [], every
+    try:
+        return [shock], determined(search.readings.without(shaken[:, None, None]))
+    except InputError:  # too few are left
+        return [shock], every
+
+
+def without_shocks(search: Search, used) -> tuple[Search, Fit]:
+    """The search gone on with in the samples ``used`` (T,) bool, and the base model's fit there."""
+    search.say(f"going on without shocks, in {used.sum()} of {used.size} samples")
+    readings = replace(search.readings, keep=search.allowed).select(used)
+    fresh = Search(readings.with_sd(readings.declared), search.columns, search.effects, search.say)
+    fresh = fresh.fitted()
+    former = {name: getattr(search.fit.state, name) for name in ("positions", "parameters")}
+    found = replace(fresh, causes=search.causes, trace=search.trace)
+    found = adopt(drop_outliers(found.refit(fresh.fit.state._replace(**former))))
+    return with_outliers(eliminate(found)), fresh.fit.only_active()
+
+
 def drop_outliers(search: Search) -> Search:
     """Leave out isolated outliers while means are looked for, whatever their cause is."""
     if np.min(noises.tail_log_p(search.noise)) >= SETTINGS.limit(TAILS):
@@ -117,25 +158,23 @@ def drop_outliers(search: Search) -> Search:
 
 
 def fit_heavy_tails(search: Search, without) -> tuple[Search, list, list]:
-    """Heavy tails: judged on all readings once the means are known, then left out of the fit.
+    """Heavy tails: judged on all readings (`with_outliers`), then left out of the fit.
 
     Returns the search, the triads [(imu, kind, Mixture)] that have them, or may have, and the
     causes.
     """
-    whole = replace(search.readings, keep=search.allowed)
-    search = replace(search, readings=whole).refit()
     if TAILS in without:
         return search, [], []
     limit = SETTINGS.limit(TAILS)
     named, hits, others = noise_effects.heavy_tails(search.fit, search.noise, limit)
     if named is None:
         return search, [], []
-    far = np.zeros((*whole.keep.shape[:2], 2), bool)
+    far = np.zeros((*search.readings.keep.shape[:2], 2), bool)
     for imu, kind, mix in hits:
         far[:, imu, kind] = mix.outlier > 0.5
     lost = np.repeat(few_at_once(far), 3, axis=2)
     before = len(search.causes)
-    search = adopt(replace(search, readings=whole.without(lost)).refit())
+    search = adopt(replace(search, readings=search.readings.without(lost)).refit())
     if len(search.causes) > before:
         search = eliminate(search)
     return search, hits + others, [named]

@@ -67,6 +67,14 @@ class Settings:
     tailed: float = 0.25  # log ratio by which a mixture's core may miss the noise
     delayed: float = 0.1  # log ratio of noise that an adopted delay may bring with it
 
+    # Shocks (`shocks`)
+    least_shaken: int = 4  # IMUs; with one of fewer left out, too little is there to agree
+    shaken: float = 1e-7  # chance of a sample of plain noise to be called shaken
+    ringing: float = 1e-2  # the same beside a shaken sample
+    lasting: float = 0.5  # of a shaken sample's residual that the next one has: misfit, no shock
+    apart: int = 5  # samples between two shaken ones that are of two stretches
+    stated: int = 20  # stretches
+
     # Checks of what is left (`residual_checks`, `final_checks`, `words`)
     # of a feature's own information must survive the projection to count
     seen_feature: float = 1e-4

@@ -71,6 +71,9 @@ def cause_in_words(cause: dict, labels, says: str = "") -> str:
     text = f"{words(effect)}, {whose(cause['sensors'])}: {item.meaning or words(effect)}"
     size = says or sizes(cause, labels)
     text += f"; {size}" if size else ""
+    if stretches := cause.get("stretches_s"):
+        first = [f"{a:.4g} to {b:.4g}" for a, b in stretches[:FEW]]
+        text += f"; longest at {', '.join(first)} s"
     gain = plus_minus(cause["heldout_gain_nats"], cause["heldout_gain_se"])
     p_value = probability(cause["log10_p_value"])
     text += f". Gain on held-out time {gain} nats, p{NARROW}={NARROW}{p_value}."

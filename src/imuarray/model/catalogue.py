@@ -170,6 +170,10 @@ data_effect(
     " fit",
 )  # fmt: skip
 data_effect(
+    "shock", kind="noise", meaning="motion faster than the IMUs' instants are alike shakes them",
+    remedy="shaken samples are left out, and weighed down in the robust estimate",
+)  # fmt: skip
+data_effect(
     "coloured_noise", kind="noise", meaning="noise is autocorrelated from sample to sample",
     remedy="noise is autocorrelated, AR(1), and widths allow for it",
 )  # fmt: skip

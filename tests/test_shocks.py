@@ -1,0 +1,68 @@
+"""Shocks are told from a single IMU's outliers and from slow misfit."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from imuarray.blind.cases import Case, make
+from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.shocks import SHOCK, find_shocks, misfits
+from imuarray.diagnosis.state import Search
+from imuarray.engine.parameters import columns_of
+from imuarray.engine.readings import arrange
+
+ALL = tuple(range(8))
+
+
+@cache
+def fitted(effect="", imus=ALL, size=None):
+    case = Case(f"shocks-{effect}", ((effect, imus),) if effect else (), size, duration=3.0,
+                kind="one" if effect else "clean")  # fmt: skip
+    recording, truth = make(case, 3)
+    readings = arrange(recording)
+    columns = columns_of(readings.array, (), readings.position_prior_sd)
+    return Search(readings, columns, (), lambda text: None).fitted().fit, truth
+
+
+def test_misfit_is_that_of_the_motion_fitted_without_an_imu():
+    made, _ = fitted()
+    basis, found = made.basis[7], misfits(made)
+    original = made.residual[7].ravel() + basis @ np.random.default_rng(1).standard_normal(
+        basis.shape[1]
+    )
+    best = []
+    for imu in ALL:
+        rest = np.arange(48) // 6 != imu
+        left = np.linalg.lstsq(basis[rest], original[rest], rcond=None)
+        best.append(float(left[1][0]))
+    size = np.sum(made.residual[7] ** 2) / found.whole[7]
+    assert found.least[7] * size == pytest.approx(min(best), rel=1e-5)
+    assert found.worst[7] == np.argmin(best)
+
+
+def test_shocks_are_found_where_they_are():
+    made, truth = fitted("shock")
+    named, shaken = find_shocks(made, SETTINGS.limit(SHOCK))
+    assert named.effect == SHOCK and named.imus == ALL
+    begin = np.array(truth.effects[0]["parameters"]["begin"]["value"])
+    time = made.readings.time[shaken]
+    since = (time[:, None] - begin)[np.arange(len(time)), np.searchsorted(begin, time) - 1]
+    assert np.all((since > -0.01) & (since < 0.2))
+    assert named.parameters["share"][0] == shaken.mean() and named.gain > 0
+    assert all(any(a <= t <= b for a, b in named.where) for t in time)
+
+
+@pytest.mark.parametrize(
+    ("effect", "imus", "size"),
+    [
+        ("", ALL, None),
+        ("heavy_tails", (2,), None),
+        ("heavy_tails", ALL, None),
+        ("gyroscope_scale", ALL, 300.0),
+    ],
+)
+def test_nothing_else_is_a_shock(effect, imus, size):
+    made, _ = fitted(effect, imus, size)
+    named, shaken = find_shocks(made, SETTINGS.limit(SHOCK))
+    assert named is None and not shaken.any()
