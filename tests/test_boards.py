@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from benchmarks.board import GRAVITY, Options, draw_board, draw_hand, write
-from imuarray.recording.table import read_table
+from imuarray.recording.table import read_csv
 
 FEW = Options(poses=3, still=1.0, twisting=3.0, shock=0.5)
 
@@ -39,7 +39,7 @@ def test_still_poses_show_gravity_in_every_matrix(tmp_path):
     """Averages of 100 readings, noise 0.04 m/s^2: 6 sds; read back from the table."""
     board = draw_board(2, FEW)
     write(board.table(), board.columns(), tmp_path)
-    recording = read_table(tmp_path / "log.csv", tmp_path / "columns.yaml")
+    recording = read_csv(tmp_path / "log.csv", tmp_path / "columns.yaml")
     np.testing.assert_allclose(recording.angular_rate, board.recording().angular_rate, atol=1e-12)
     np.testing.assert_allclose(recording.specific_force, board.recording().specific_force)
     poses = [slice(a, a + 100) for a in (50, 650, 1250)]

@@ -11,7 +11,7 @@ from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.recording import Recording, read_recording, write_recording
 from imuarray.recording import published as remote
-from imuarray.recording.table import read_table
+from imuarray.recording.table import read_csv
 from tests.mimu_writer import packets, readings
 
 ROOT = Path(__file__).parents[1]
@@ -28,7 +28,7 @@ def example(tmp_path):
 
 
 def test_the_documented_example(example):
-    found = read_table(example / "log.csv", example / "columns.yaml")
+    found = read_csv(example / "log.csv", example / "columns.yaml")
     g = 9.80665
     np.testing.assert_allclose(found.time, [0, 0.01, 0.02])
     np.testing.assert_allclose(found.specific_force[0, 0], [0.01 * g, -0.02 * g, g])
@@ -46,7 +46,7 @@ def test_a_rate_instead_of_a_time_column(example):
     layout = yaml.safe_load((example / "columns.yaml").read_text())
     layout["time"] = {"rate": 100.0}
     (example / "columns.yaml").write_text(yaml.safe_dump(layout))
-    found = read_table(example / "log.csv", example / "columns.yaml")
+    found = read_csv(example / "log.csv", example / "columns.yaml")
     np.testing.assert_allclose(found.time, [0, 0.01, 0.02])
 
 
@@ -85,7 +85,7 @@ def test_a_wrong_layout_is_one_line(example, path, value, words):
     set_key(layout, path, value)
     (example / "columns.yaml").write_text(yaml.safe_dump(layout))
     with pytest.raises(InputError, match=words) as caught:
-        read_table(example / "log.csv", example / "columns.yaml")
+        read_csv(example / "log.csv", example / "columns.yaml")
     assert "\n" not in str(caught.value)
 
 
@@ -101,7 +101,7 @@ def test_a_wrong_cell_is_named_by_row(example, old, new, words):
     text = (example / "log.csv").read_text().replace(old, new, 1)
     (example / "log.csv").write_text(text)
     with pytest.raises(InputError, match=words):
-        read_table(example / "log.csv", example / "columns.yaml")
+        read_csv(example / "log.csv", example / "columns.yaml")
 
 
 def test_mutated_tables_are_refused_or_sound(example):
@@ -121,7 +121,7 @@ def test_mutated_tables_are_refused_or_sound(example):
                 del data[at : at + int(rng.integers(1, 20))]
         (example / name).write_bytes(bytes(data))
         try:
-            found = read_table(example / "log.csv", example / "columns.yaml")
+            found = read_csv(example / "log.csv", example / "columns.yaml")
             assert isinstance(found, Recording)
             write_recording(found, example / "rec.nc")
             outcomes["read"] += 1

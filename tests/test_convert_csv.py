@@ -5,7 +5,7 @@ import pytest
 import yaml
 
 from imuarray.errors import InputError
-from imuarray.recording.table import read_table
+from imuarray.recording.table import read_csv
 
 HEADER = ["t", *(f"{kind}{axis}{i}" for i in (1, 2, 3) for kind in "ag" for axis in "xyz")]
 
@@ -38,7 +38,7 @@ def read(folder, rows, columns=None, delimiter=","):
     columns = layout() if columns is None else columns
     text = columns if isinstance(columns, str) else yaml.safe_dump(columns)
     (folder / "columns.yaml").write_text(text)
-    return read_table(folder / "log.csv", folder / "columns.yaml")
+    return read_csv(folder / "log.csv", folder / "columns.yaml")
 
 
 @pytest.mark.parametrize("extra", ["7", ""])

@@ -187,7 +187,7 @@ def test_bcd_lies_at_the_same_place():
     recording, truth = samples(np.random.default_rng(9), count=400)
     found, other = locate(recording, 0.3), bcd_positions(recording, 0.3)
     assert other.converged
-    assert np.abs(other.positions - found.mean)[1:].max() < 2 * found.sd.max()
+    assert np.abs(other.mean - found.mean)[1:].max() < 2 * found.sd.max()
 
 
 def test_simulated_twins_have_the_assumed_noise():

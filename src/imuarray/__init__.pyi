@@ -2,7 +2,6 @@ from . import plots as plots
 from .analysis.calibration import calibrate as calibrate
 from .analysis.extension import diagnosed as diagnosed
 from .analysis.files import read_calibration as read_calibration
-from .analysis.files import read_csv as read_csv
 from .analysis.files import read_mimu as read_mimu
 from .analysis.files import read_posterior as read_posterior
 from .analysis.motion import apply as apply
@@ -24,6 +23,7 @@ from .model.own import read_effects as read_effects
 from .recording.format import read_recording as read_recording
 from .recording.format import write_recording as write_recording
 from .recording.record import Recording as Recording
+from .recording.table import read_csv as read_csv
 from .report.write import write_report as write_report
 
 __version__: str

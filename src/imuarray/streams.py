@@ -30,21 +30,15 @@ def _words(name: str | int) -> tuple[int, int, int]:
     return kind, value & 0xFFFFFFFF, value >> 32
 
 
-def seed_sequence(seed: int, *names: str | int) -> np.random.SeedSequence:
-    """Seed sequence of the stream called `names` under `seed`.
+def stream(seed: int, *names: str | int) -> np.random.Generator:
+    """Generator of the stream called `names` under `seed`.
 
+    The same seed and names give the same numbers on every machine; different ones are independent.
     Raises InputError if the seed is not a non-negative integer, or a name is neither text nor an
     integer from 0 to 2**64 - 1.
     """
     if not isinstance(seed, Integral) or isinstance(seed, bool) or seed < 0:
         raise InputError(f"seed: expected a non-negative integer, found {seed!r}")
     key = tuple(word for name in names for word in _words(name))
-    return np.random.SeedSequence(int(seed), spawn_key=key)
-
-
-def stream(seed: int, *names: str | int) -> np.random.Generator:
-    """Generator of the stream called `names` under `seed`; errors as in `seed_sequence`.
-
-    The same seed and names give the same numbers on every machine; different ones are independent.
-    """
-    return np.random.Generator(np.random.PCG64DXSM(seed_sequence(seed, *names)))
+    sequence = np.random.SeedSequence(int(seed), spawn_key=key)
+    return np.random.Generator(np.random.PCG64DXSM(sequence))

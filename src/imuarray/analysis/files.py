@@ -12,16 +12,6 @@ from imuarray.errors import InputError
 from imuarray.recording import Recording, load_dataset
 
 
-def read_csv(path: str | PathLike, columns: str | PathLike) -> Recording:
-    """A table; the YAML file ``columns`` names its columns and units (docs/convert.md).
-
-    InputError, with the row or the key, for anything that does not fit.
-    """
-    from imuarray.recording.table import read_table
-
-    return read_table(Path(path), Path(columns))
-
-
 def read_mimu(
     path: str | PathLike, positions: str | PathLike, underside: str | None = None,
     accelerometer_noise: float = 0.04, gyroscope_noise: float = float(np.radians(0.06)),

@@ -102,11 +102,13 @@ def below_rails(scene: Scene, readings: Pair) -> np.ndarray:
 
 
 def smallest_residual(scene: Scene, clean: Pair, perturbed: Pair, steps: int = 1) -> float:
-    """Norm of what no motion and no positions absorb, in sigma.
+    """Norm of what no motion and no positions absorb, in sigma: the size of a change of the mean.
 
-    ``clean`` is what the model predicts at the truth, which knows of no rails (`Scene.ideal`);
-    samples where ``perturbed`` is at a declared rail are left out, as whoever reads the recording
-    will. A lower, undeclared rail is thus held against the true motion, not a clipped one.
+    Without priors, over all positions but the reference's. ``clean`` is what the model predicts at
+    the truth, which knows of no rails (`Scene.ideal`), ``perturbed`` what is read then, both
+    without noise, (T, A, 3) m/s^2 and (T, G, 3) rad/s. Samples where ``perturbed`` is at a declared
+    rail are left out, as whoever reads the recording will. A lower, undeclared rail is thus held
+    against the true motion, not a clipped one.
     ``steps`` is the number of Gauss-Newton steps: 1 is linear at the truth.
     """
     keep = below_rails(scene, perturbed)

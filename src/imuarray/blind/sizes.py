@@ -7,20 +7,9 @@ import numpy as np
 from imuarray.blind.change import Change, noiseless_readings
 from imuarray.blind.inject import EFFECTS
 from imuarray.blind.projection import below_rails, smallest_residual
-from imuarray.blind.scene import Pair, Scene
+from imuarray.blind.scene import Scene
 
 TOLERANCE = 0.01  # of a size that was asked for
-
-
-def total_size(scene: Scene, clean: Pair, perturbed: Pair, steps: int = 1) -> float:
-    """Size of a change of the mean: root of the least sum of squared whitened differences.
-
-    The least over the motion of every sample (w, w', s free) and over all positions but the
-    reference's, without priors, linear at the truth (``steps`` Gauss-Newton steps otherwise).
-    ``clean`` (`Scene.ideal`, without rails) and ``perturbed`` are without noise, (T, A, 3) m/s^2
-    and (T, G, 3) rad/s; a sample with any perturbed reading at a declared rail is left out whole.
-    """
-    return smallest_residual(scene, clean, perturbed, steps)
 
 
 def size_of(scene: Scene, changes: Change | list[Change], steps: int = 1) -> float:
@@ -32,7 +21,7 @@ def size_of(scene: Scene, changes: Change | list[Change], steps: int = 1) -> flo
     changes = [changes] if isinstance(changes, Change) else list(changes)
     moving = [change for change in changes if not is_of_noise(change)]
     perturbed = noiseless_readings(scene, moving)
-    squared = total_size(scene, scene.ideal(), perturbed, steps) ** 2 if moving else 0.0
+    squared = smallest_residual(scene, scene.ideal(), perturbed, steps) ** 2 if moving else 0.0
     samples = int(below_rails(scene, perturbed).sum())
     for change in changes:
         if is_of_noise(change):

@@ -26,9 +26,9 @@ def convert_mimu(arguments) -> None:
 
 def convert_csv(arguments) -> None:
     """A table and its description to a recording."""
-    from imuarray.recording.table import read_table
+    from imuarray.recording.table import read_csv
 
-    recording = read_table(arguments.data, arguments.columns)
+    recording = read_csv(arguments.data, arguments.columns)
     write_recording(recording, arguments.out, attrs=stamp({"source": str(arguments.data)}, 0))
     _report(arguments, recording, [])
 

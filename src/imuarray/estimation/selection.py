@@ -16,7 +16,7 @@ from imuarray.recording.channels import require_once
 
 SLOWEST = np.radians(100.0)  # rad/s; slower samples say nearly nothing of the positions
 SHAKEN = 3.0  # m/s^2, sd; a board in a hand that does not turn it has less
-INFORMATIVE = 0.5  # the share of the moving, unsaturated samples that is kept
+INFORMATIVE = 0.5  # the share of the moving, unsaturated samples that is kept: a half
 
 
 @dataclass(frozen=True)
@@ -84,12 +84,9 @@ def information(recording: Recording) -> np.ndarray:
     return np.sqrt(2 * np.sum(rate**2, axis=1) ** 2 + 2 * np.sum(turn**2, axis=1))
 
 
-def select_dynamic(
-    recording: Recording, slowest: float = SLOWEST, share: float = INFORMATIVE
-) -> Selection:
+def select_dynamic(recording: Recording) -> Selection:
     """Moving samples with no reading at a rail, nor next to one; of these the informative.
 
-    ``slowest`` rad/s; ``share`` of the usable samples, the largest by `information`.
     InputError where none moves off the rails, or a part of the recording is there twice.
     """
     require_once(recording)
@@ -100,7 +97,7 @@ def select_dynamic(
     rails = force.any(axis=(1, 2)), rate.any(axis=(1, 2))
     criteria = {
         "still pose": still,
-        f"slower than {np.degrees(slowest):g} deg/s": speed < slowest,
+        f"slower than {np.degrees(SLOWEST):g} deg/s": speed < SLOWEST,
         "accelerometer at a rail": rails[0],
         "gyroscope at a rail": rails[1],
         "next to a rail": neighbours(rails[0] | rails[1]),
@@ -117,8 +114,8 @@ def select_dynamic(
             + _shaken(recording, still, speed)
         )  # fmt: skip
     size = information(recording.select(usable))
-    keep = size >= np.quantile(size, 1 - share)
-    removed["less informative half" if share == 0.5 else "less informative"] = int((~keep).sum())
+    keep = size >= np.quantile(size, 1 - INFORMATIVE)
+    removed["less informative half"] = int((~keep).sum())
     return Selection(usable[keep], usable, removed)
 
 

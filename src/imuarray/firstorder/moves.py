@@ -15,6 +15,7 @@ from scipy.linalg import block_diag
 from scipy.spatial.transform import Rotation
 
 from imuarray.errors import InputError
+from imuarray.estimation.reference import skew
 
 FEWEST = 4  # moves
 LONGEST, FARTHEST = 30.0, 30.0  # s and rad of a move; drift and other errors are too large beyond
@@ -203,10 +204,6 @@ def _tangent(unit) -> np.ndarray:
     return np.linalg.svd(unit[None])[2][1:]
 
 
-def _skew(v) -> np.ndarray:
-    return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
-
-
 def _linear(moves, direction, change):
     """Errors (2 n,), slopes in the map (2 n, 9) and in directions (2 n, 3 P), own (n, 2, 2)."""
     errors, slopes, own = [], [], []
@@ -216,7 +213,7 @@ def _linear(moves, direction, change):
         carried = turned.T @ direction[move.first]
         across = _tangent(carried)
         errors.append(across @ (direction[move.first + 1] - carried))
-        by_turn = across @ _skew(carried)
+        by_turn = across @ skew(carried)
         slopes.append(by_turn @ slope)
         own.append(by_turn @ np.diag(move.sd**2) @ by_turn.T)
         rows, place = slice(2 * i, 2 * i + 2), 3 * move.first

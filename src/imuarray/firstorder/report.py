@@ -106,10 +106,10 @@ def residual_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
 
 
 def _allan(found: FirstOrder, recording: Recording, sensor: str):
-    """Averaging times (S,) s and Allan deviations (S, K, 3) of the still poses."""
-    step = float(np.median(np.diff(recording.time)))
-    readings = getattr(recording, sensor)
-    return allan_deviation([readings[pose] for pose in found.poses], step)
+    """Averaging times (S,) s, Allan deviations (S, K, 3) of the still poses, the K labels."""
+    step, readings = float(np.median(np.diff(recording.time))), getattr(recording, sensor)
+    labels = getattr(recording, f"{SENSORS[sensor]}_labels")
+    return *allan_deviation([readings[pose] for pose in found.poses], step), labels
 
 
 def noise_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
@@ -120,12 +120,11 @@ def noise_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
     """
     parts = []
     for sensor, kind in SENSORS.items():
-        taus, deviation = _allan(found, recording, sensor)
+        taus, deviation, labels = _allan(found, recording, sensor)
         declared = getattr(recording, f"{kind}_noise_sd")
         sd = getattr(found, f"{kind}_noise").ravel()
         index = pd.MultiIndex.from_product(
-            [[sensor], getattr(recording, f"{kind}_labels"), list("xyz")],
-            names=["sensor", "triad", "axis"],
+            [[sensor], labels, list("xyz")], names=["sensor", "triad", "axis"]
         )
         columns = {
             "declared": declared, "sd": sd, "ratio": sd / declared,
@@ -141,9 +140,8 @@ def noise_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
 def allan_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
     """Allan deviations: sensor, triad, axis, tau_s, deviation (SI units)."""
     parts = []
-    for sensor, kind in SENSORS.items():
-        taus, deviation = _allan(found, recording, sensor)
-        labels = getattr(recording, f"{kind}_labels")
+    for sensor in SENSORS:
+        taus, deviation, labels = _allan(found, recording, sensor)
         index = pd.MultiIndex.from_product(
             [[sensor], taus, labels, list("xyz")], names=["sensor", "tau_s", "triad", "axis"]
         )

@@ -52,12 +52,12 @@ def locate(recording: Recording, accelerometer_sd: float | None = None) -> Posit
     until that no longer changes by 1 %.
     """
     if accelerometer_sd is not None:
-        return _locate(recording, accelerometer_sd, None)[0]
-    assumed, start = recording.accelerometer_noise_sd, None
+        return _locate(recording, accelerometer_sd)
     # from above: with a small sigma_a the gyroscopes' spread, not the data, sets the fit
-    assumed = max(assumed, 0.5)
+    assumed, start = max(recording.accelerometer_noise_sd, 0.5), None
     for _ in range(20):
-        found, start = _locate(recording, assumed, start)
+        found = _locate(recording, assumed, start)
+        start = found.mean
         if abs(found.residual_sd / assumed - 1) < 0.01:
             break
         assumed = found.residual_sd
@@ -80,17 +80,15 @@ def _fit(recording: Recording, assumed: float, start=None):
     return model, data, given, found
 
 
-def _locate(recording, assumed, start) -> tuple[Positions, np.ndarray]:
+def _locate(recording, assumed, start=None) -> Positions:
     model, data, prior, found = _fit(recording, assumed, start)
-    residual = residual_force(model, recording, found)
-    size = 3 * (model.array.accelerometers - 1)
-    freedom = residual.size - _explained(model, data, found, prior["rate_covariance"]) - size
-    sd = float(np.sqrt(np.sum(residual**2) / freedom))
-    positions = Positions(
-        found.positions, found.covariance[:size, :size], assumed, sd, found.converged,
-        len(found.cost),
-    )  # fmt: skip
-    return positions, found.positions
+    predicted = model.predict_many(found.motion.motion, found.positions).specific_force
+    residual = recording.specific_force - predicted
+    freedom = residual.size - _explained(model, data, found, prior["rate_covariance"])
+    sd = float(np.sqrt(np.sum(residual**2) / (freedom - found.positions[1:].size)))
+    return Positions(
+        found.positions, found.covariance, assumed, sd, found.converged, len(found.cost)
+    )
 
 
 def _explained(model: ArrayModel, data, found: Calibration, rate_covariance) -> float:
@@ -104,22 +102,24 @@ def _explained(model: ArrayModel, data, found: Calibration, rate_covariance) -> 
     return 9 * len(known) - float(supplied)
 
 
-def residual_force(model: ArrayModel, recording: Recording, found: Calibration) -> np.ndarray:
-    """Measured less predicted specific force, (T, A, 3) m/s^2."""
-    return recording.specific_force - model.predict_many(found.motion.motion, found.positions)[0]
+def bcd_positions(recording: Recording, accelerometer_sd: float) -> Positions:
+    """ML-BCD of the 2017 paper on the same samples; gyroscopes with the spread among them.
 
-
-def bcd_positions(recording: Recording, accelerometer_sd: float) -> Calibration:
-    """ML-BCD of the 2017 paper on the same samples; gyroscopes with the spread among them."""
+    Without widths, which it does not give: NaN.
+    """
     _, covariance = rate_distribution(recording)
     spread = float(np.sqrt(np.mean(np.einsum("tii->ti", covariance))))
     array = array_of(recording)
     model = ArrayModel.isotropic(array, accelerometer_sd, spread)
     saturated = recording.saturated_gyroscopes()
-    return calibrate_bcd(
+    found = calibrate_bcd(
         model, recording.specific_force, recording.angular_rate, saturated=saturated,
         tolerance=1e-8, limit=20000,
     )  # fmt: skip
+    unknown = np.full((found.positions[1:].size,) * 2, np.nan)
+    return Positions(
+        found.positions, unknown, accelerometer_sd, np.nan, found.converged, len(found.cost)
+    )
 
 
 def position_table(found: Positions, labels, /, **columns) -> pd.DataFrame:
@@ -189,23 +189,16 @@ def locate_table(recording: Recording, sigmas, /, **columns) -> pd.DataFrame:
     ``accelerometer_sd``, ``residual_sd`` (m/s^2), ``converged``, ``iterations``, and
     ``nominal_m``. Too few samples leave the residual no freedom: that row is then left out.
     """
-    labels, parts = recording.accelerometer_labels, []
-    for assumed in [*sigmas, None]:
-        found = locate(recording, assumed)
+    ways = [("map", locate, assumed) for assumed in [*sigmas, None]]
+    parts = []
+    for method, locating, assumed in [*ways, ("bcd", bcd_positions, sigmas[-1])]:
+        found = locating(recording, assumed)
         parts.append(position_table(
-            found, labels, **columns, method="map",
+            found, recording.accelerometer_labels, **columns, method=method,
             assumed="residual" if assumed is None else f"{assumed:g}",
             accelerometer_sd=found.accelerometer_sd, residual_sd=found.residual_sd,
             converged=found.converged, iterations=found.iterations,
         ))  # fmt: skip
-    found = bcd_positions(recording, sigmas[-1])
-    rows = Positions(found.positions, np.full((3 * len(labels) - 3,) * 2, np.nan), sigmas[-1],
-                     np.nan, found.converged, len(found.cost))  # fmt: skip
-    parts.append(position_table(
-        rows, labels, **columns, method="bcd", assumed=f"{sigmas[-1]:g}",
-        accelerometer_sd=sigmas[-1], residual_sd=np.nan, converged=found.converged,
-        iterations=len(found.cost),
-    ))  # fmt: skip
     table = pd.concat(parts, ignore_index=True)
     nominal = recording.relative_positions()[1:].ravel()
     return table.assign(nominal_m=np.tile(nominal, len(parts)))

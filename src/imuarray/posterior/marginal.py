@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.errors import InputError
-from imuarray.estimation.collapsed import Collapsed
 from imuarray.model import structure_tensor
 from imuarray.model.jax64 import jax, jnp
 from imuarray.model.small_linear import (
@@ -24,7 +23,6 @@ from imuarray.model.small_linear import (
 )
 from imuarray.model.structure import CURVATURES, PAIRS
 from imuarray.posterior.likelihood import DETERMINANTS, Likelihood
-from imuarray.posterior.proposals import proposals
 
 NODE_COUNTS = (1, 3, 5, 7, 9, 11)  # nodes on each axis of omega
 ENOUGH = 1e-4  # nats in total between one count and the next: then the former is taken
@@ -245,13 +243,13 @@ class Marginal:
         if likelihood.power != DETERMINANTS["derived"]:
             raise InputError("marginal: expected the derived determinant, found the printed one")
         collapsed = likelihood.collapsed
-        start = _modes(collapsed, likelihood, positions)
+        start = likelihood.centred(positions).data.mean.T  # the modes there
         weighted = collapsed.weighted.reshape(-1, collapsed.samples).T
         information = np.linalg.inv(likelihood.rate_covariance)
         prior = float(likelihood.rate_sd) ** -2.0
         seen = collapsed.mean.T if prior else likelihood.rate_mean
         parts = (
-            weighted, collapsed.energy, _precision(collapsed), likelihood.rate_mean, information,
+            weighted, collapsed.energy, collapsed.precision, likelihood.rate_mean, information,
             seen, prior, np.append(likelihood.data.ridge, np.zeros(3)), start,
             0.5 * np.sum(np.linalg.slogdet(information)[1]), np.array(spread, float),
         )  # fmt: skip
@@ -276,16 +274,3 @@ class Marginal:
     def log_density(self, theta):
         """The same of theta (3 (A - 1),), to be traced and differentiated by JAX."""
         return log_marginal(_positions(theta), self.data, self.nodes, self.log_weights)
-
-
-def _precision(collapsed: Collapsed) -> np.ndarray:
-    if collapsed.weights is None:
-        return collapsed.precision
-    return np.diag(np.repeat(collapsed.weights, 3))
-
-
-def _modes(collapsed: Collapsed, likelihood: Likelihood, positions) -> np.ndarray:
-    """Each sample's mode of omega at reference positions, (T, 3) rad/s."""
-    positions = np.asarray(positions, float)
-    relative = np.ascontiguousarray(positions - positions[0])
-    return proposals(collapsed, likelihood.rate_mean, likelihood.rate_covariance, relative)[0]

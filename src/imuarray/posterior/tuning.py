@@ -52,6 +52,19 @@ def tune(
     may_centre : bool
         False: omega from p(omega | y_g), however large the variance.
     """
+    likelihood, draws, start, variances, centred = _tuned_draws(
+        likelihood, positions, mode, sweeps, rng, threads, may_centre
+    )
+    target = CompiledTarget(likelihood, prior, draws)
+    step = tune_step(
+        target, start, sweeps.steps, sweeps.transitions, rng("acceptance"), sweeps.acceptance,
+        threads,
+    )  # fmt: skip
+    return Tuned(target, start, step, variances, centred)
+
+
+def _tuned_draws(likelihood, positions, mode, sweeps, rng, threads, may_centre):
+    """(likelihood, N, start (P,), variances at first, whether omega is now drawn elsewhere)."""
 
     def variances(likelihood, positions):
         return variance_sweep(
@@ -64,13 +77,7 @@ def tune(
     if centred:
         likelihood = likelihood.centred(positions_of(start))
         found = variances(likelihood, positions_of(start))
-    draws = choose_draws(sweeps.draws, found, sweeps.variance)
-    target = CompiledTarget(likelihood, prior, draws)
-    step = tune_step(
-        target, start, sweeps.steps, sweeps.transitions, rng("acceptance"), sweeps.acceptance,
-        threads,
-    )  # fmt: skip
-    return Tuned(target, start, step, first, centred)
+    return likelihood, choose_draws(sweeps.draws, found, sweeps.variance), start, first, centred
 
 
 def tune_step(target: Target, start, steps, transitions: int, rng, aim=0.18, threads=1) -> float:
@@ -86,19 +93,12 @@ def tune_preconditioned(
     """(target, step) of preconditioned Crank-Nicolson proposals: N at the mode, the longest jumps.
 
     ``centre`` (P,) and ``factor`` (P, P) as in `PreconditionedTarget`; of the ``lengths`` that
-    with the largest expected squared jump. ``may_centre``: omega is drawn around the integrand's
-    mode where `tune` would do so.
+    with the largest expected squared jump. ``may_centre`` as in `tune`.
     """
-    tried, positions = Sweeps(lengths), positions_of(centre)
-
-    def variances(likelihood):
-        return variance_sweep(likelihood, positions, tried.draws, tried.realisations, rng)
-
-    found = variances(likelihood)
-    if may_centre and found.min() > 2 * tried.variance:
-        likelihood = likelihood.centred(positions)
-        found = variances(likelihood)
-    draws = choose_draws(tried.draws, found, tried.variance)
+    tried = Sweeps(lengths)
+    likelihood, draws, *_ = _tuned_draws(
+        likelihood, positions_of(centre), lambda _: centre, tried, lambda _: rng, 1, may_centre
+    )
     target = PreconditionedTarget(likelihood, prior, draws, centre, factor)
     return target, longest_jump(target, centre, lengths, tried.transitions, rng)
 

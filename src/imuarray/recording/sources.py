@@ -35,9 +35,9 @@ def read_source(entry: dict, files: dict[str, str]) -> tuple[Recording, dict]:
     if ending == ".nc":
         return read_recording(files["data"]), {}
     if ending == ".csv":
-        from imuarray.recording.table import read_table
+        from imuarray.recording.table import read_csv
 
-        return read_table(files["data"], files["columns"]), {}
+        return read_csv(files["data"], files["columns"]), {}
     from imuarray.recording.mimu_recording import read_board
 
     declared = {}

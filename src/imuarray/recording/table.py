@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +54,7 @@ class _Loader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
-def read_columns(path: str | Path) -> dict[str, Any]:
+def read_columns(path: str | PathLike) -> dict[str, Any]:
     """The YAML that describes a CSV; InputError for a missing file or a wrong key."""
     path = Path(path)
     if not path.is_file():
@@ -75,8 +76,8 @@ def read_columns(path: str | Path) -> dict[str, Any]:
     return layout
 
 
-def read_table(path: str | Path, columns: str | Path) -> Recording:
-    """Read ``path`` (CSV) as the YAML file ``columns`` says; see docs/convert.md.
+def read_csv(path: str | PathLike, columns: str | PathLike) -> Recording:
+    """A table; the YAML file ``columns`` names its columns and units (docs/convert.md).
 
     InputError, with the row or the key, for anything that does not fit.
     """

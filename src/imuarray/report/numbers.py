@@ -131,20 +131,16 @@ def gain_table(diagnosis: Diagnosis) -> pd.DataFrame:
 
 def position_table(diagnosis: Diagnosis) -> pd.DataFrame:
     """One row for each triad but the reference: positions and sds of both models, m."""
-    names, rows = imu_labels(diagnosis), []
-    base, extended = diagnosis.document["base"], diagnosis.document["extended"]
-    for number, label in enumerate(names[: len(base["positions_m"])]):
-        if not any(base["positions_sd_m"][number]):
-            continue  # the reference, the origin
-        for i, axis in enumerate("xyz"):
-            rows.append({
-                "imu": label, "axis": axis,
-                "base": base["positions_m"][number][i],
-                "base_sd": base["positions_sd_m"][number][i],
-                "extended": extended["positions_m"][number][i],
-                "extended_sd": extended["positions_sd_m"][number][i],
-            })  # fmt: skip
-    table = pd.DataFrame(rows)
+    document = diagnosis.document
+    names = imu_labels(diagnosis)[: len(document["base"]["positions_m"])]
+    pairs = [(label, axis) for label in names for axis in "xyz"]
+    table = pd.DataFrame(pairs, columns=["imu", "axis"])
+    for model in ("base", "extended"):
+        table[model] = np.ravel(document[model]["positions_m"])
+        table[f"{model}_sd"] = np.ravel(document[model]["positions_sd_m"])
+    # but for the reference, the origin
+    known = np.repeat(np.any(document["base"]["positions_sd_m"], axis=1), 3)
+    table = table[known].reset_index(drop=True)
     return table.assign(change=table.extended - table.base)
 
 

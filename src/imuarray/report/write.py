@@ -35,46 +35,39 @@ from imuarray.report.panels import cause_table
 if TYPE_CHECKING:
     from imuarray.diagnosis.document import Diagnosis
 
-FIGURES = {
-    "discrepancies": (numbers.discrepancy_table, drawn.discrepancy_figure),
-    "residual": (numbers.residual_table, drawn.residual_figure),
-    "gain": (numbers.gain_table, drawn.gain_figure),
-    "separability": (numbers.separability_table, separability_figure),
-    "positions": (numbers.position_table, position_figure),
-}
-SUFFIXES = ("pdf", "png", "csv")
-CAPTIONS = {
+FIGURES = {  # by name: table, drawing, title, caption
     "discrepancies": (
-        "Measured against simulated",
+        numbers.discrepancy_table, drawn.discrepancy_figure, "Measured against simulated",
         "Each check of the residual at its worst sensor, in sds of the band that simulations of the"
         " fitted model give there; the grey band is where the worst sensor is in 95 % of"
         " simulations, if sensors are independent. Filled: p at most 0.05, the choice of the sensor"
         " allowed for.",
     ),
     "residual": (
-        "Residual before and after",
+        numbers.residual_table, drawn.residual_figure, "Residual before and after",
         "rms residual of each triad in units of the declared noise, corrected for what the fitted"
         " motion takes up: 1 is what the declared noise gives.",
     ),
     "gain": (
-        "What each cause gains",
+        numbers.gain_table, drawn.gain_figure, "What each cause gains",
         "Nats gained on blocks of time that the model was not trained on; above the line by each"
         " cause, in the order of adoption, below it by the extended model over the papers' model"
         " with declared and with inflated noise. A placebo ought to gain nothing.",
     ),
     "separability": (
-        "What this recording can distinguish",
+        numbers.separability_table, separability_figure, "What this recording can distinguish",
         "Squared canonical correlation of the effects' signals, each on all IMUs, motion and"
         f" positions projected out. Framed: above {ALIKE}, one class. Below the diagonal the"
         " two most alike forms of two effects, above it the mean over the forms of the smaller"
         " effect: 1 below and little above means that a single form is a gauge.",
     ),
     "positions": (
-        "Positions",
+        numbers.position_table, position_figure, "Positions",
         "Where the extended model puts each triad, relative to the papers' model; bars are 95 %"
         " intervals as each model claims them.",
     ),
-}
+}  # fmt: skip
+SUFFIXES = ("pdf", "png", "csv")
 CAUSE_CAPTION = (
     "What would be back in the residual without this cause, motion and all else refitted (points:"
     " means of bins with two standard errors), and what the cause predicts (lines); where points"
@@ -159,10 +152,9 @@ def draw(diagnosis: Diagnosis) -> list[Drawing]:
 
 def _drawing(name: str, diagnosis: Diagnosis, footer) -> Drawing:
     """One of the figures that every report has."""
-    make_table, make_figure = FIGURES[name]
+    make_table, make_figure, *texts = FIGURES[name]
     table = make_table(diagnosis)
-    figure = make_figure(table, footer)
-    return Drawing(name, *CAPTIONS[name], files(figure, table))
+    return Drawing(name, *texts, files(make_figure(table, footer), table))
 
 
 def shortened(path: str, most: int = 70) -> str:

@@ -15,25 +15,6 @@ from imuarray.recording.validate import MAX_VALUES
 from imuarray.simulation.measure import clip, measure
 
 
-def _recording(model, time, force, rate, nominal, ranges, prior_sd, title) -> Recording:
-    array = model.array
-    return Recording(
-        time=time,
-        specific_force=force,
-        angular_rate=rate,
-        accelerometer_position=nominal,
-        accelerometer_labels=array.labels,
-        gyroscope_labels=tuple(str(k + 1) for k in range(array.gyroscopes)),
-        accelerometer_noise_sd=float(np.sqrt(model.noise.accelerometer[0, 0])),
-        gyroscope_noise_sd=float(np.sqrt(model.noise.gyroscope[0, 0])),
-        accelerometer_range=ranges[0],
-        gyroscope_range=ranges[1],
-        position_prior_sd=prior_sd,
-        title=title,
-        source="simulated by imuarray",
-    )
-
-
 def _truth(model: ArrayModel, motion: Motion, positions, parameters) -> xr.Dataset:
     axes = ("time", "axis")
     data = {name: (axes, getattr(motion, name)) for name in Motion._fields}
@@ -59,8 +40,15 @@ def simulate_samples(
     time = np.arange(samples, dtype=float) if time is None else np.asarray(time, float)
     force, rate, _ = measure(model, motion, relative, rng, parameters, gyroscope_range, time)
     force, _ = clip(force, accelerometer_range)
-    ranges = (accelerometer_range, gyroscope_range)
-    recording = _recording(model, time, force, rate, nominal, ranges, position_prior_sd, title)
+    recording = Recording(
+        time=time, specific_force=force, angular_rate=rate, accelerometer_position=nominal,
+        accelerometer_labels=model.array.labels,
+        gyroscope_labels=tuple(str(k + 1) for k in range(model.array.gyroscopes)),
+        accelerometer_noise_sd=float(np.sqrt(model.noise.accelerometer[0, 0])),
+        gyroscope_noise_sd=float(np.sqrt(model.noise.gyroscope[0, 0])),
+        accelerometer_range=accelerometer_range, gyroscope_range=gyroscope_range,
+        position_prior_sd=position_prior_sd, title=title, source="simulated by imuarray",
+    )  # fmt: skip
     return recording, _truth(model, motion, relative, parameters)
 
 
