@@ -23,7 +23,7 @@ from imuarray.diagnosis.words import cause_in_words, parameters_of, sensors_of
 from imuarray.engine.estimate import Estimate
 from imuarray.engine.fit import Fit, at, fit
 from imuarray.engine.heldout import Scores, gain, log_scores
-from imuarray.engine.parameters import prior_precision
+from imuarray.engine.parameters import POSITION, prior_precision
 from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.engine.widths import widths
 from imuarray.estimation.threads import one_thread
@@ -49,13 +49,13 @@ class Fitted:
     @property
     def positions(self) -> tuple[np.ndarray, np.ndarray]:
         """(A, 3) m relative to the first triad, and their sds."""
-        found, place = self.fit.state.positions, self.fit.columns.of("position")
+        found = self.fit.state.positions
         if self.robust is None:
-            return found, self.sds[: len(found), place]
+            return found, self.sds[: len(found), self.fit.columns.of(POSITION)]
         sds = np.sqrt(np.diag(widths(self.robust)[0]))
-        whole = np.zeros(self.fit.active.shape)
+        whole = np.zeros(self.robust.active.shape)
         whole[self.robust.active] = sds[self.robust.places[0]]
-        return self.robust.positions, whole[: len(found), place]
+        return self.robust.positions, whole[: len(found), self.robust.columns.of(POSITION)]
 
     def section(self) -> dict:
         """As `diagnosis.json` has it."""

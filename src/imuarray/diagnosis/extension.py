@@ -14,12 +14,12 @@ from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.clock_scan import CLOCK
 from imuarray.engine.clocks import timed
 from imuarray.engine.estimate import Estimate, Recorded, estimate
-from imuarray.engine.fit import flat_parameters
+from imuarray.engine.fit import flat_parameters, from_flat, in_use
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import POSITION, Columns, columns_of
 from imuarray.engine.readings import Readings, most_informative
 from imuarray.engine.start import start
-from imuarray.engine.widths import settled
+from imuarray.engine.widths import MAPS, settled
 from imuarray.errors import LARGEST, SMALLEST, InputError
 from imuarray.model import EFFECTS, ArrayModel
 from imuarray.model.array_model import EffectPrior
@@ -180,7 +180,14 @@ def diagnosed_estimate(path: str | Path, recording: Recording) -> Estimate:
 
 
 def extended_estimate(readings: Readings, columns: Columns, active, state: State) -> Estimate:
-    """The robust estimate of a diagnosis' extended model from where its search ended."""
+    """The robust estimate of a diagnosis' extended model from where its search ended.
+
+    With columns for what the model has, and for maps that first order may have left.
+    """
+    maps = MAPS if any(left is not None for left in readings.left) else ()
+    few, kept = in_use(columns, active, state, maps)
+    state = from_flat(few, state, flat_parameters(columns, state)[:, kept])
+    columns, active = few, active[:, kept]
     recorded = Recorded.of(most_informative(readings, lambda text: None), columns, state)
     clocked = active[:, columns.of(CLOCK)].any(axis=1) if CLOCK in columns.names else []
     imus = [int(k) for k in np.flatnonzero(clocked)]

@@ -145,11 +145,15 @@ def coloured_meat(fit: Fit, information, correlation) -> np.ndarray | None:
     """Covariance of the score (K, K) where triads have AR(1) noise; None where all is white."""
     if not np.any(correlation):
         return None
+    from scipy.signal import lfilter  # slow to import, and seldom needed
+
     meat = information.copy()
     for imu, kind in np.argwhere(correlation != 0):
-        seen = _projected(fit, int(imu), slice(3 * kind, 3 * kind + 3))
-        spread = _ar_sum(seen, correlation[imu, kind])
-        meat += seen.reshape(-1, len(meat)).T @ spread.reshape(-1, len(meat))
+        seen, rho = _projected(fit, int(imu), slice(3 * kind, 3 * kind + 3)), correlation[imu, kind]
+        # the sum over samples before of rho^lag times theirs; of those after it is the transpose
+        spread = lfilter([0.0, rho], [1.0, -rho], seen, axis=0)
+        half = seen.reshape(-1, len(meat)).T @ spread.reshape(-1, len(meat))
+        meat += half + half.T
     return (meat + meat.T) / 2
 
 
@@ -165,15 +169,3 @@ def _projected(fit: Fit, imu: int, axes: slice) -> np.ndarray:
         for _, places, block in (item for item in blocks if item[0] == imu):
             seen[part, :, places] += block[:, axes]
     return seen
-
-
-def _ar_sum(values, rho) -> np.ndarray:
-    """Sum over lags other than zero of rho^|lag| values, along the first axis."""
-    out = np.zeros_like(values)
-    for order in (slice(None), slice(None, None, -1)):
-        carried = np.zeros_like(values[0])
-        series, target = values[order], out[order]
-        for t in range(1, len(values)):
-            carried = rho * (carried + series[t - 1])
-            target[t] += carried
-    return out

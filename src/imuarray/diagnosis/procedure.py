@@ -76,12 +76,13 @@ def run_procedure(
             search, base, scores, base_checks, structural, [], base_checks, 0.0, True, raw, whole
         )
     cleaned = drop_outliers(search)
-    search = adopt(cleaned, first if cleaned is search else None)
+    search = adopt(cleaned, first if cleaned is search else None).light()
     del cleaned  # it has derivatives of its own
     say("fitting to the end")
     search = eliminate(search.refit(rough=False))
     search, clips = leave_out_clips(search, without)
     say("judging the noise")
+    search = search.light()
     search = with_outliers(search)
     shock, used = unshaken(search, without)
     if not used.all():
@@ -173,7 +174,7 @@ def fit_heavy_tails(search: Search, without) -> tuple[Search, list, list]:
     for imu, kind, mix in hits:
         far[:, imu, kind] = mix.outlier > 0.5
     lost = np.repeat(few_at_once(far), 3, axis=2)
-    before = len(search.causes)
+    before, search = len(search.causes), search.light()
     search = adopt(replace(search, readings=search.readings.without(lost)).refit())
     if len(search.causes) > before:
         search = eliminate(search)

@@ -132,6 +132,10 @@ class Search:
         search = replace(self, allowed=self.readings.keep, smooth=smooth).refit(first)
         return replace(search, excess=search.left)
 
+    def light(self) -> Search:
+        """The same without the derivatives that its next fit makes anew."""
+        return replace(self, fit=self.fit.only_active(), given=None)
+
     def refit(self, state: State | None = None, turns=2, rough=True) -> Search:
         """Fit what is adopted, with the noise that the residual's fast part shows."""
         state = self.fit.state if state is None else state

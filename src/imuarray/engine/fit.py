@@ -20,7 +20,7 @@ from imuarray.engine.linearise import (
     no_derivatives,
     through_of,
 )
-from imuarray.engine.parameters import POSITION, Columns, prior_precision
+from imuarray.engine.parameters import POSITION, Columns, columns_of, prior_precision
 from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.turning import turned
@@ -176,7 +176,10 @@ def fit(
 
 def search_optimum(readings, columns, active, state, smooth, rough):
     """(state, whether it converged, the recording linearised there or a step before)."""
-    active = movable(columns, active, [state])
+    whole, active = columns, movable(columns, active, [state])
+    columns, kept = in_use(whole, active, state)
+    parameters, active = flat_parameters(whole, state), active[:, kept]
+    state = from_flat(columns, state, parameters[:, kept])
     prior_mean = prior_means(readings, columns)[active]
     precision = prior_precision(columns, active)
     wanted = np.flatnonzero(active.any(axis=0))
@@ -206,7 +209,17 @@ def search_optimum(readings, columns, active, state, smooth, rough):
         length = max(length / 2, SETTINGS.shortest) if cost > last else min(1.0, 1.2 * length)
         last = cost
         state = advance(columns, state, active, step, few, seen, length)
-    return state, converged, seen
+    parameters[:, kept] = flat_parameters(columns, state)
+    return from_flat(whole, state, parameters), converged, seen
+
+
+def in_use(columns: Columns, active, state: State, also=()) -> tuple[Columns, np.ndarray]:
+    """Columns of the effects that are active or not zero, or in ``also``; (m,) bool, which."""
+    used = (active | (flat_parameters(columns, state) != 0)).any(axis=0)
+    names = {name for name, one in zip(columns.names, used, strict=True) if one} | {*also}
+    kept = np.isin(columns.names, [POSITION, *names])
+    effects = [name for name in columns.model.effects if name in names]
+    return columns_of(columns.model.array, effects, columns.prior_sd[0]), kept
 
 
 def movable(columns: Columns, active, states) -> np.ndarray:
