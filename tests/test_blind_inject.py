@@ -153,10 +153,33 @@ def test_gyroscope_delay_of_all_is_common_in_about_half_of_the_draws():
         assert (np.ptp(delay) == 0) == common[seed]
 
 
+def steady_host(there, sensors, steady=True):
+    """A seed whose host reads at even intervals, or not."""
+    return next(
+        seed for seed in range(20)
+        if (drawn(there, "sensor_clock", sensors, seed, 1e-3).parameters["host_latency"].value == 0)
+        == steady
+    )  # fmt: skip
+
+
+def test_a_host_that_reads_unevenly_gets_another_sample_near_a_jump_alone():
+    there = scene()
+    change = drawn(there, "sensor_clock", (3,), steady_host(there, (3,), False), 1e-3)
+    period, phase = (change.parameters[n].value[0] for n in ("period", "phase"))
+    age = change.ages.force[:, 3]
+    turns = (there.time + age - phase) / period
+    np.testing.assert_allclose(turns, np.round(turns), atol=1e-6)  # its own samples
+    late = np.mod(there.time - phase, period) + age  # turns by which it is not the newest
+    off = np.abs(late) > 1e-9
+    near = np.mod(there.time - phase + period / 2, period) - period / 2
+    assert 0.01 < off.mean() < 0.1 and np.abs(near[off]).max() < 5 * 5e-5
+    np.testing.assert_allclose(np.abs(late[off]), period, rtol=1e-6)
+
+
 @pytest.mark.parametrize("sensors", SOME)
 def test_clock_gives_the_newest_sample_of_a_free_running_clock(sensors):
     there = scene()
-    change = drawn(there, "sensor_clock", sensors, amplitude=1e-3)
+    change = drawn(there, "sensor_clock", sensors, seed=steady_host(there, sensors), amplitude=1e-3)
     found = noiseless_readings(there, [change])
     for row, k in enumerate(sensors):
         period = change.parameters["period"].value[row]
@@ -210,6 +233,21 @@ def test_a_warm_up_follows_one_temperature_in_all_sensors():
     for name, readings, ideal in zip(("force", "rate"), found, there.ideal(), strict=True):
         expected = course[:, None, None] / course[-1] * values[f"{name}_drift"].value
         np.testing.assert_allclose(readings - ideal, expected, atol=1e-12)
+
+
+def test_chips_made_alike_have_their_axes_at_the_same_places_of_their_own():
+    there, every = scene(), tuple(range(8))
+    seeds = [s for s in range(9) if drawn(there, "size_effect", every, s).parameters["alike"].value]
+    arms = drawn(there, "size_effect", every, seeds[0], 1e-3).parameters["lever_arm"].value
+    underside = [[0, -1, 0], [-1, 0, 0], [0, 0, -1]]  # turned by half a turn about y = -x
+    own = []
+    for k in every:
+        turn = np.array(underside if k % 2 else np.eye(3))
+        order = np.argmax(np.abs(turn), axis=0)  # the array's axis that lies along each of its own
+        own.append([turn.T @ arms[k, order[axis]] for axis in range(3)])
+    apart = np.array(own) - np.mean(own, axis=0)
+    assert 1e-5 < apart.std() < 8e-5 and 3e-4 < np.mean(own, axis=0).std() < 3e-3
+    assert 0 < len(seeds) < 9
 
 
 def test_a_shock_rings_within_a_millisecond_and_fades():

@@ -102,6 +102,21 @@ def test_a_clean_recording_has_no_cause(seed):
     assert document["gain"]["heldout_log_score_nats_per_sample"] == pytest.approx(0, abs=0.05)
 
 
+def test_a_clock_is_found_where_the_host_reads_unevenly():
+    """What is a period off beside the clock's jumps passes for heavy tails, or is unexplained."""
+    document, truth = found_in(injected(("sensor_clock", (2,)), realistic=True, duration=4), 44)
+    assert truth.effects[0]["parameters"]["host_latency"]["value"] > 0
+    clock = next(cause for cause in document["causes"] if cause["effect"] == "sensor_clock")
+    assert clock["sensors"] == ["3"]
+    assert named(document) <= {"sensor_clock", "heavy_tails"} or document["unexplained"]
+
+
+def test_axes_at_the_same_places_in_all_chips_are_found():
+    document, truth = found_in(injected(("size_effect", ALL)), 42)
+    assert truth.effects[0]["parameters"]["alike"]["value"]
+    assert named(document) == {"size_effect"} and not document["unexplained"]
+
+
 def test_two_effects_at_once():
     case = injected(("gyroscope_bias", (1,)), ("accelerometer_scale", (6,)), kind="pair")
     document, _ = found_in(case)

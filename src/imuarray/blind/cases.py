@@ -120,6 +120,7 @@ def make(case: Case, seed: int) -> tuple[Recording, Truth]:
         gyroscope_range=scene.gyroscope_range,
         position_prior_sd=scene.position_prior_sd,
         source="simulated",
+        accelerometer_axes=scene.array.axes,
     )
     return recording, _truth(scene, case, seed, changes, recording)
 

@@ -28,6 +28,7 @@ DEGREE = float(np.radians(1.0))
 GRAVITY = 9.80665  # m/s^2
 # What a drift of amplitude 1 adds up to in the course of a recording.
 DRIFTS = 0.1, 0.3 * DEGREE
+UNLIKE = 0.04  # of an axis' place in its chip, from one chip to the other: 15 of 360 um
 WARMING = 0.05, 0.1 * DEGREE  # the same of a board that warms up
 
 
@@ -62,10 +63,23 @@ def accelerometer_nonlinearity(curvature, field, sensors):
     return curvature * field.force[:, sensors] ** 2
 
 
-@error_of("force", "lever_arm", "m", 1e-4, 1.5e-3, matrices, from_readings=False)
-def size_effect(arms, field, sensors):
-    """Axis i of triad k sits at r_k + d_k,i; size in metres; value (n, axis i, 3)."""
-    return apart(arms, field, sensors)
+@effect("m", 1e-4, 1.5e-3, from_readings=False)
+def size_effect(scene, rng, sensors, size):
+    """Axis i of triad k sits at r_k + d_k,i; size in metres; value (n, axis i, 3).
+
+    If all are chosen, half the time each chip is made alike: its axes' places, in the chip, are
+    the same nine numbers but for `UNLIKE` of them.
+    """
+    arms = matrices(rng, sensors, size)
+    alike = len(sensors) == scene.accelerometers and rng.random() < 0.5
+    if alike:
+        arms = size * rng.standard_normal((3, 3)) + UNLIKE * arms
+        turned = np.einsum("kij,kaj->kai", scene.array.turns, arms)
+        # which of its axes lies along each of the array's
+        arms = np.einsum("kia,kaj->kij", np.abs(scene.array.turns), turned)
+    said = {"lever_arm": Parameter(arms, "m"), "alike": Parameter(bool(alike), "1")}
+    error = {"force_error": lambda field: apart(arms, field, list(sensors))}
+    return {"parameters": said, **error}
 
 
 def apart(arms, field, sensors) -> np.ndarray:

@@ -6,13 +6,14 @@ measurement model with the diagnosis would share its mistakes too.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from imuarray.geometry import Array, mimu4444, mimu4444_corners
+from imuarray.geometry.mimu4444 import UNDERSIDE_ROTATION
 from imuarray.motion import SmoothMotion, hand_twisting
 
 GYROSCOPE_RAIL = np.radians(2000.0)  # rad/s
@@ -103,6 +104,9 @@ class Scene:
         if not 62.5 <= sampling_rate <= 500:
             raise ValueError(f"sampling_rate: expected 62.5 to 500 Hz, found {sampling_rate}")
         array = boards[imus]()
+        under = array.positions[:, 2] < 0
+        axes = np.where(under[:, None, None], UNDERSIDE_ROTATION, np.eye(3))
+        array = replace(array, axes=axes)
         error = POSITION_ERROR_SD * rng.standard_normal((imus, 3))
         error[0] = 0.0
         limits = {"accelerometer_range": ACCELEROMETER_RAIL, "gyroscope_range": GYROSCOPE_RAIL}

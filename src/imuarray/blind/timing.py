@@ -8,6 +8,7 @@ from imuarray.blind.change import UNIT_FORCE, Parameter, effect, spread
 from imuarray.blind.scene import Pair
 
 CLOCK_PERIOD = 1e-3  # s, P of a free-running IMU
+LATENCY = 5e-5  # s, sd of the host's
 
 
 @effect("s", 1e-5, 5e-3)
@@ -35,17 +36,21 @@ def sensor_clock(scene, rng, sensors, size):
 
     At size = P = 1 ms, the realistic one, this is exact. Other sizes keep the clocks and make the
     sawtooth of the age higher or lower: a shorter period would have another pattern of ages, and
-    its size would not grow smoothly with it.
+    its size would not grow smoothly with it. A realistic host asks, half the time, now earlier, now
+    later by `LATENCY`, which matters near a clock's jump alone: readings there are a period off.
     """
     offset = rng.uniform(0.01, 0.05, len(sensors)) * rng.choice([-1.0, 1.0], len(sensors))
     period = CLOCK_PERIOD * (1 + offset)
     phase = rng.random(len(sensors)) * period
-    waiting = np.mod(scene.time[:, None] - phase, period)
+    uneven = LATENCY * (size == CLOCK_PERIOD and rng.random() > 0.5)
+    late = uneven * rng.standard_normal((len(scene.time), 1))
+    waiting = np.mod(scene.time[:, None] + late - phase, period) - late
     ages = spread(scene, sensors, -waiting * (size / CLOCK_PERIOD))
     said = {
         "period": Parameter(period, "s"),
         "clock_offset": Parameter(offset, "1"),
         "phase": Parameter(phase, "s"),
+        "host_latency": Parameter(uneven, "s"),
         "largest_age": Parameter(size * (1 + offset), "s"),
     }
     return {"parameters": said, "ages": Pair(ages, ages)}
