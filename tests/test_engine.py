@@ -156,6 +156,8 @@ def test_two_imus_take_the_angular_acceleration_from_the_gyroscopes():
     assert np.abs(error / sds).max() < 3 and sds.max() < 1e-4
     with pytest.raises(InputError, match="follow each other, of two IMUs, found too few"):
         imuarray.calibrate(recording.select(slice(None, None, 40)))
+    with pytest.raises(InputError, match="follow each other, of two IMUs, found too few"):
+        imuarray.apply(found, recording.select(slice(None, None, 40)))
     motion = imuarray.apply(found, recording)
     name = "angular_acceleration"
     # at the mean of the IMUs' instants

@@ -24,6 +24,7 @@ from imuarray.engine.linearise import (
 )
 from imuarray.engine.parameters import Columns, columns_of
 from imuarray.engine.readings import Readings, by_imu, measured
+from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import start
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.motion_ml import MotionEstimate, motion_at, motion_from
@@ -126,7 +127,8 @@ def _of_two(readings: Readings, model: ArrayModel, positions, effects, covarianc
     samples = len(readings.time)
     seen = np.flatnonzero(readings.keep[..., 3:].any(axis=1).all(axis=1))
     part = readings.select(seen)
-    followed = np.bincount(part.run).max(initial=0) >= part.window if len(seen) > 1 else False
+    followed = len(seen) > 1 and np.median(np.diff(part.time)) < SETTINGS.longest_step
+    followed = followed and np.bincount(part.run).max() >= part.window
     part = replace(part, gapless=bool(followed))
     state = start(part, columns_of(model.array, model.effects, np.inf))
     state = state._replace(positions=positions, parameters=np.asarray(effects))
