@@ -72,7 +72,8 @@ def climb(readings: Sequence[Readings], bare: bool = True) -> tuple[Estimate, li
 
     Each sweep tests the rungs in order, beside those that it has kept before; what is kept is
     fitted, then the others are tested again. At last each must still gain beside all others, but
-    for clocks, whose jumps a fit does not move. Where motion is smooth and no sensor late, the
+    for clocks, whose jumps a fit does not move. Gyroscope maps at odds with those of first order
+    are estimated, too. Where motion is smooth and no sensor late, the
     rate's own change is then a prior of omega_dot. ``bare``: whether the last fit is wanted where
     no rung is kept. InputError or LinAlgError where the readings do not determine positions or
     motion.
@@ -93,16 +94,15 @@ def climb(readings: Sequence[Readings], bare: bool = True) -> tuple[Estimate, li
         rungs = now.tried(names)
         now = now.with_kept([rung.name for rung in rungs if rung.kept])
         if set(now.kept) == before:
+            if GYROSCOPES in names and beside_maps(now.found)[1].get("gyroscope", 1.0) < CHANCE:
+                rungs = [rung._replace(kept=rung.kept or rung.name == GYROSCOPES) for rung in rungs]
+                now = now.with_kept([GYROSCOPES])
             break
         now = now.fitted(SETTINGS.rung_steps)
     now = now.without([rung.name for rung in rungs if not rung.kept])
     if not (now.kept or bare):
         return now.found, clocks + rungs
-    now = now.fitted()
-    if GYROSCOPES in names and beside_maps(now.found)[1].get("gyroscope", 1.0) < CHANCE:
-        rungs = [rung._replace(kept=rung.kept or rung.name == GYROSCOPES) for rung in rungs]
-        now = now.with_kept([GYROSCOPES]).fitted()
-    found = now.found
+    found = now.fitted().found
     late = any(_needs_neighbours(effect) for name in now.kept for effect in RUNGS[name])
     pair = readings[0].pair
     if all(one.smooth for one in found.recorded) and (pair or not late):
