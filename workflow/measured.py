@@ -15,8 +15,9 @@ PLACES = {
     "claims": "results/{scale}/claims",
     "blind_confusion": "results/blind/{scale}/figures",
     "blind_bars": "results/blind/{scale}/tables",
-    "diagnosis_(positions|parameters|recordings)_.*|added_.*": "results/measured/tables",
-    "diagnosis_.*|past_rail_.*": "results/measured/figures",
+    "diagnosis_(positions|parameters|recordings)_.*": "results/measured/tables",
+    "added_.*|causes_table_.*": "results/measured/tables",
+    "diagnosis_.*|past_rail_.*|causes_.*": "results/measured/figures",
 }
 
 
@@ -141,6 +142,12 @@ class Measured:
         for group in self.groups():
             paths += [f"{folder}/figures/diagnosis_{group}.{k}" for k in FIGURE]
         return paths
+
+    def causes(self) -> list[str]:
+        """What each cause buys on each board with several recordings."""
+        folder = "results/measured"
+        paths = [f"{folder}/figures/causes_{group}.{k}" for group in self.groups() for k in FIGURE]
+        return paths + [f"{folder}/tables/causes_table_{group}.md" for group in self.groups()]
 
     def published(self, scale: str) -> dict[str, str]:
         """Names of the measured figures and tables in paper_figures/, and what they copy."""

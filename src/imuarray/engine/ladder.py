@@ -85,7 +85,7 @@ def climb(readings: Sequence[Readings], bare: bool = True) -> tuple[Estimate, li
     columns = columns_of(readings[0].array, effects, readings[0].position_prior_sd)
     begun = [Recorded.of(one, columns) for one in readings]
     found = estimate(begun, columns, mask_of(columns, [POSITION]), steps=SETTINGS.rung_steps)
-    now = _Rungs(found, tuple(one.readings.keep for one in begun), {})
+    now = Climbed(found, tuple(one.readings.keep for one in begun), {})
     clocks, rungs = [], []
     for _ in names:
         before = set(now.kept)
@@ -113,7 +113,7 @@ def climb(readings: Sequence[Readings], bare: bool = True) -> tuple[Estimate, li
     return settled(found), clocks + rungs
 
 
-class _Rungs(NamedTuple):
+class Climbed(NamedTuple):
     """The ladder so far: ``kept`` {rung: (N, m) bool}, ``keep`` of each recording all readings."""
 
     found: Estimate
@@ -126,12 +126,12 @@ class _Rungs(NamedTuple):
         placed = mask_of(self.found.columns, [POSITION])
         return np.any([placed, *self.kept.values()], axis=0)
 
-    def with_kept(self, names) -> _Rungs:
+    def with_kept(self, names) -> Climbed:
         """With more rungs kept."""
         new = {name: mask_of(self.found.columns, RUNGS[name]) for name in names}
         return self._replace(kept=new | self.kept)
 
-    def without(self, names) -> _Rungs:
+    def without(self, names) -> Climbed:
         """Without some of those kept, their parameters back at zero."""
         now = self._replace(kept={n: mask for n, mask in self.kept.items() if n not in names})
         recorded = tuple(without(self.found, now.active))
@@ -144,7 +144,7 @@ class _Rungs(NamedTuple):
         masks = {name: mask_of(self.found.columns, RUNGS[name]) for name in asked}
         return gains(self.found, masks, self.kept)
 
-    def clocked(self) -> tuple[_Rungs, list[Rung]]:
+    def clocked(self) -> tuple[Climbed, list[Rung]]:
         """With clocks, if IMUs' ages show some and these gain; and that rung, if there is one."""
         columns, recorded = self.found.columns, self.found.recorded
         each = [shown_clocks(one, columns) for one in recorded]
@@ -160,7 +160,7 @@ class _Rungs(NamedTuple):
         rung = gains(now.found, {CLOCKS: mask}, self.kept)[0]
         return (now._replace(kept={CLOCKS: mask} | self.kept) if rung.kept else self), [rung]
 
-    def fitted(self, steps: int = SETTINGS.iterations) -> _Rungs:
+    def fitted(self, steps: int = SETTINGS.iterations) -> Climbed:
         """With all that is kept estimated, each reading in its clock's turn."""
         columns, recorded = self.found.columns, list(self.found.recorded)
         if CLOCKS in self.kept:

@@ -292,3 +292,52 @@ def figure_past_rail(table: pd.DataFrame, rail_dps: float, footer=()):
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=3)
     return figure
+
+
+CAUSES = (
+    Column("model", "model", "model"),
+    Column("rms_m", "pairs: rms (µm)", r"rms ($\mu$m)", "{:.1f}", 1e6),
+    Column("median_m", "median (µm)", r"median ($\mu$m)", "{:.1f}", 1e6),
+    Column("same_size_rms_m", "rms at one size (µm)", r"at one size ($\mu$m)", "{:.1f}", 1e6),
+    Column("size_sd", "sd of the size (%)", r"size (\%)", "{:.3f}", 100.0),
+    Column("covered", "95 % intervals cover (%)", r"covered (\%)", "{:.0f}", 100.0),
+    Column("residual_ratio", "residual / still noise", "residual", "{:.1f}"),
+    Column("nats", "nats a sample, held out", "nats", "{:.1f}"),
+    Column("nats_error", "± ", r"$\pm$", "{:.1f}"),
+)
+
+
+def table_causes(summary: pd.DataFrame, group: str):
+    """What each cause buys; ``summary``: `measured.causes.repeated` of the board ``group``."""
+    note = (
+        f"{summary.recordings.max()} recordings of board {group}; differences of all pairs, all"
+        " coordinates. Nats: what is new in a row gains on held-out time over the row that it"
+        " extends, median over recordings."
+    )
+    return summary, CAUSES, "How positions repeat, and what each cause buys", [note]
+
+
+@styled
+def figure_causes(summary: pd.DataFrame, group: str):
+    """What each cause buys: repeatability, size and residual, a row a model.
+
+    ``summary``: `measured.causes.repeated` of the board ``group``.
+    """
+    footer = [
+        f"{summary.recordings.max()} recordings of board {group}, differences of all pairs in all"
+        " coordinates. Residual: rms over the noise of still poses, outliers with it."
+    ]
+    figure = new_figure(footer, PAGE, 2.9)
+    panels = figure.subplots(1, 3, sharey=True, width_ratios=(2, 1, 1))
+    rows = np.arange(len(summary))[::-1]
+    series = (("rms_m", "rms"), ("same_size_rms_m", "rms, at one size"), ("median_m", "median"))
+    for number, (column, label) in enumerate(series):
+        panels[0].plot(1e6 * summary[column], rows, label=label, markersize=4, **look(number))
+    panels[1].plot(100 * summary.size_sd, rows, markersize=4, **look(3))
+    panels[2].plot(summary.residual_ratio, rows, markersize=4, **look(4))
+    titles = "differences between recordings (µm)", "sd of the size (%)", "residual / still noise"
+    for axes, title in zip(panels, titles, strict=True):
+        axes.set(xscale="log", xlabel=title)
+    panels[0].set_yticks(rows, summary.model)
+    panels[0].legend()
+    return figure, summary

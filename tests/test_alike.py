@@ -1,0 +1,115 @@
+"""Parameters that chips of one kind have nearly in common, in the chips' own axes."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from imuarray.engine.alike import with_likely_spread
+from imuarray.engine.parameters import POSITION, columns_of, gauge_masks, prior_precision
+from imuarray.geometry import Array
+from imuarray.measured.causes import STEPS, repeated
+from imuarray.model import ArrayModel
+from imuarray.motion.state import Motion
+
+POSITIONS = np.array([[0.0, 0, 0], [0.02, 0, 0], [0, 0.02, 0], [0.02, 0.02, -0.002]])
+TURNED = np.array([[0.0, -1, 0], [-1, 0, 0], [0, 0, -1]])
+
+
+def board(axes=None):
+    return Array(POSITIONS, tuple("1234"), 4, axes=axes)
+
+
+def columns_with_all(array):
+    columns = columns_of(array, ("size_effect",), 1e-3)
+    return columns, columns.owner & (np.array(columns.names) != POSITION)
+
+
+def test_a_turned_chip_reads_what_it_reads_in_its_own_axes():
+    rng = np.random.default_rng(1)
+    turns = Rotation.random(4, random_state=2).as_matrix()
+    arms = 1e-3 * rng.standard_normal((4, 3, 3))
+    rate, turn, force = rng.standard_normal((3, 3)) * [[20], [900], [9]]
+    model = ArrayModel.isotropic(board(turns), 0.01, 0.01, ("size_effect",))
+    found = model.predict(
+        Motion(rate, turn, force, np.zeros(3), np.zeros(3)), POSITIONS, arms.ravel()
+    ).specific_force
+    for k, own in enumerate(turns):
+        # seen from the chip: the motion and the place in its axes, each axis at its own arm
+        w, a, s, r = (own.T @ v for v in (rate, turn, force, POSITIONS[k]))
+        read = [
+            (s + np.cross(w, np.cross(w, r + arm)) + np.cross(a, r + arm))[axis]
+            for axis, arm in enumerate(arms[k])
+        ]
+        np.testing.assert_allclose(found[k], own @ read, rtol=1e-12, atol=1e-12)
+
+
+def test_the_prior_is_of_what_is_shared_and_of_what_is_own():
+    columns, active = columns_with_all(board())
+    precision = prior_precision(columns, active)
+    pinned = np.zeros_like(precision)
+    sds = columns.prior_sd[np.nonzero(active)[1]]
+    for _, mask in gauge_masks(columns, active):
+        along = mask[active] / np.abs(mask[active]).sum() / (1e-3 * sds[mask[active] != 0].mean())
+        pinned += np.outer(along, along)
+    column = np.nonzero(active)[1]
+    expected = np.diag(sds**2) + 5e-4**2 * (column[:, None] == column)
+    np.testing.assert_allclose(np.linalg.inv(precision - pinned), expected, atol=1e-15)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_arms_common_along_the_arrays_axes_are_the_gauge(turned):
+    array = board(np.array([np.eye(3), TURNED, np.eye(3), TURNED]) if turned else None)
+    columns, active = columns_with_all(array)
+    arms = np.random.default_rng(1).standard_normal((3, 3))  # of the array's axes
+    own = np.array(
+        [[t.T @ arms[np.argmax(np.abs(t[:, i]))] for i in range(3)] for t in array.turns]
+    )
+    values = own.reshape(4, 9)
+    weights = [mask[:, columns.of("size_effect")] for _, mask in gauge_masks(columns, active)]
+    common = [np.sum(values * w) / np.abs(w).sum() for w in weights[:9]]
+    np.testing.assert_allclose(common, arms.ravel(), atol=1e-12)
+    # what a chip's arms have in common is a gauge only where all are mounted alike
+    alike = np.tile(arms.ravel(), (4, 1))
+    pinned = [np.sum(alike * w) / np.abs(w).sum() for w in weights[:9]]
+    assert (np.linalg.norm(pinned) < np.linalg.norm(arms) - 0.1) == turned
+
+
+def test_the_differences_size_is_found():
+    rng = np.random.default_rng(3)
+    array = Array(rng.standard_normal((16, 3)), tuple("abcdefghijklmnop"), 16)
+    columns, active = columns_with_all(array)
+    own = 2e-5 * rng.standard_normal((16, 3, 3))
+    own -= own.mean(axis=1, keepdims=True)  # a triad's mean place is its position
+    own -= own.mean(axis=0)
+    values = own.ravel()
+    place, told = np.arange(len(values)), np.eye(len(values)) / 2e-6**2
+    for _ in range(30):
+        whole = told + prior_precision(columns, active)
+        columns = with_likely_spread(
+            columns, active, np.linalg.solve(whole, told @ values), whole, place
+        )
+    assert columns.prior_sd[columns.of("size_effect")[0]] == pytest.approx(2e-5, rel=0.15)
+
+
+def test_repeatability_is_that_of_pairs():
+    import pandas as pd
+
+    rng, tables = np.random.default_rng(4), {}
+    truth = rng.standard_normal(6) * 0.02
+    for number in range(40):
+        found = truth * (1 + 1e-3 * rng.standard_normal()) + 1e-6 * rng.standard_normal(6)
+        parts = [
+            pd.DataFrame({
+                "step": step, "accelerometer": np.repeat(["2", "3"], 3), "axis": list("xyz") * 2,
+                "mean_m": found,
+                "sd_m": 1e-6, "residual_ratio": 2.0, "nats": 1.0, "nats_error": 0.1,
+                "converged": True,
+            })
+            for step in STEPS
+        ]  # fmt: skip
+        tables[f"exp_{number}"] = pd.concat(parts)
+    found = repeated(tables).iloc[0]
+    assert found.size_sd == pytest.approx(1e-3, rel=0.3)
+    # brought to one size, a direction less is left
+    assert found.same_size_rms_m == pytest.approx(np.sqrt(2 * 5 / 6) * 1e-6, rel=0.1)
+    assert found.rms_m > 5 * found.same_size_rms_m and found.covered < 0.3

@@ -1,0 +1,77 @@
+# What each cause buys on a board of several recordings; its own target, `causes`.
+
+
+rule buy_causes:
+    input:
+        recording="results/measured/recordings/{name}.nc",
+        others=lambda wc: expand(
+            "results/measured/recordings/{name}.nc", name=MEASURED.others(wc.name)
+        ),
+    output:
+        "results/measured/causes/{name}.csv",
+    log:
+        "results/measured/logs/causes/{name}.log",
+    benchmark:
+        "results/measured/benchmarks/causes/{name}.tsv"
+    threads: 2
+    resources:
+        mem_mb=4000,
+    params:
+        entry=lambda wc: RECORDINGS[wc.name],
+        code=CODE.digest("buy_causes"),
+    message:
+        "what each cause buys on {wildcards.name}"
+    script:
+        "../scripts/buy_causes.py"
+
+
+rule repeat_causes:
+    input:
+        lambda wc: expand("results/measured/causes/{name}.csv", name=MEASURED.board(wc.group)),
+    output:
+        "results/measured/causes_{group}.csv",
+    log:
+        "results/measured/logs/causes_{group}.log",
+    benchmark:
+        "results/measured/benchmarks/causes_{group}.tsv"
+    params:
+        names=lambda wc: MEASURED.board(wc.group),
+        code=CODE.digest("repeat_causes"),
+    message:
+        "how positions of {wildcards.group} repeat under each model"
+    script:
+        "../scripts/repeat_causes.py"
+
+
+rule figure_causes:
+    input:
+        summary="results/measured/causes_{group}.csv",
+    output:
+        **figure("causes_{group}", "Diagnosis", caption="causes", folder="results/measured"),
+    log:
+        "results/measured/logs/figures/causes_{group}.log",
+    benchmark:
+        "results/measured/benchmarks/figures/causes_{group}.tsv"
+    params:
+        code=CODE.digest("figure_causes"),
+    message:
+        "figure: what each cause buys on {wildcards.group}"
+    script:
+        "../scripts/figure_causes.py"
+
+
+rule table_causes:
+    input:
+        summary="results/measured/causes_{group}.csv",
+    output:
+        **table("causes_table_{group}", folder="results/measured"),
+    log:
+        "results/measured/logs/tables/causes_{group}.log",
+    benchmark:
+        "results/measured/benchmarks/tables/causes_{group}.tsv"
+    params:
+        code=CODE.digest("table_causes"),
+    message:
+        "table: what each cause buys on {wildcards.group}"
+    script:
+        "../scripts/table_causes.py"

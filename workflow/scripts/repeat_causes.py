@@ -1,0 +1,15 @@
+"""How positions repeat under each model -> CSV."""
+
+from job import job
+
+with job(snakemake):
+    import pandas as pd
+
+    from imuarray.measured.causes import repeated
+    from imuarray.provenance import write_csv
+
+    tables = {
+        name: pd.read_csv(path, dtype={"accelerometer": str})
+        for name, path in zip(snakemake.params.names, snakemake.input, strict=True)
+    }
+    write_csv(repeated(tables), snakemake.output[0])
