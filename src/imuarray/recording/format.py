@@ -78,13 +78,11 @@ def has_truth(path: str | Path) -> bool:
 
 def read_truth(path: str | Path) -> xr.Dataset:
     """Read what a simulated recording was made from; InputError if the file has no truth."""
-    path = _existing(path)
-    with _hdf5(path) as file:
-        if TRUTH not in file or not isinstance(file[TRUTH], h5py.Group):
-            raise InputError(
-                f"{path}: expected a group '{TRUTH}' (simulated recordings have one), found none"
-            )
-    return _load(path, group=TRUTH)
+    if not has_truth(path):
+        raise InputError(
+            f"{path}: expected a group '{TRUTH}' (simulated recordings have one), found none"
+        )
+    return _load(Path(path), group=TRUTH)
 
 
 def write_recording(
