@@ -112,4 +112,4 @@ def test_repeatability_is_that_of_pairs():
     assert found.size_sd == pytest.approx(1e-3, rel=0.5)
     # brought to one size, a direction less is left
     assert found.same_size_rms_m == pytest.approx(np.sqrt(2 * 5 / 6) * 1e-6, rel=0.3)
-    assert found.rms_m > 5 * found.same_size_rms_m and found.covered < 0.3
+    assert found.rms_m > 5 * found.same_size_rms_m and found.covered < 0.5
