@@ -23,11 +23,11 @@ from imuarray.errors import InputError
 from imuarray.linear import scaled_inverse
 from imuarray.model.effects import EFFECTS
 
-CLOCKS, GYROSCOPES = "clocks of the IMUs", "gyroscope maps"
+CLOCKS, DELAYS, GYROSCOPES = "clocks of the IMUs", "delay of each IMU", "gyroscope maps"
 RUNGS = {
     CLOCKS: (CLOCK,),
     "offsets": ("accelerometer_bias", "gyroscope_bias"),
-    "delay of each IMU": ("sensor_delay",),
+    DELAYS: ("sensor_delay",),
     "lag of the gyroscopes": ("gyroscope_delay",),
     GYROSCOPES: ("gyroscope_scale", "gyroscope_misalignment"),
     "lever arms of the axes": ("size_effect",),
@@ -149,7 +149,7 @@ class Climbed(NamedTuple):
         columns, recorded = self.found.columns, self.found.recorded
         each = [shown_clocks(one, columns) for one in recorded]
         imus = sorted(set().union(*each))
-        if not imus:
+        if not imus or not self.clocks_beside_delays():
             return self, [Rung(CLOCKS, 0.0, 0.0, False)]
         hinted = tuple(
             with_clocks(one, columns, own) for one, own in zip(recorded, each, strict=True)
@@ -159,6 +159,13 @@ class Climbed(NamedTuple):
         mask[np.setdiff1d(np.arange(len(mask)), imus)] = False
         rung = gains(now.found, {CLOCKS: mask}, self.kept)[0]
         return (now._replace(kept={CLOCKS: mask} | self.kept) if rung.kept else self), [rung]
+
+    def clocks_beside_delays(self) -> bool:
+        """Whether ages show clocks once IMUs' delays are fitted: a late IMU's misfit may, too."""
+        if not all(one.smooth for one in self.found.recorded):
+            return True
+        found = self.with_kept([DELAYS]).fitted(SETTINGS.rung_steps).found
+        return any(shown_clocks(one, found.columns) for one in found.recorded)
 
     def fitted(self, steps: int = SETTINGS.iterations) -> Climbed:
         """With all that is kept estimated, each reading in its clock's turn."""
