@@ -10,6 +10,7 @@ from imuarray.engine.estimate import Estimate
 from imuarray.engine.parameters import POSITION
 from imuarray.engine.widths import widths
 from imuarray.model import ArrayModel, Noise
+from imuarray.model.effects import KINDS
 from imuarray.model.names import parameter_names
 from imuarray.motion.state import UNITS
 from imuarray.recording import Recording
@@ -125,6 +126,13 @@ def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
             "whole_covariance": (("unknown", "unknown_other"), whole),
         }
         coords["parameter"] = parameter_names(model, labels)
+    smooth, counts = (
+        found.smooth_ratio(),
+        (readings.array.accelerometers, readings.array.gyroscopes),
+    )
+    if smooth is not None:
+        for which, kind in enumerate(KINDS):
+            variables[f"{kind}_smooth_residual"] = (kind,), smooth[: counts[which], which]
     dataset = dataset.assign(variables).assign_coords(coords)
     dataset.attrs |= {
         "converged": int(found.converged), "residual_ratio": found.residual_ratio(),

@@ -16,6 +16,7 @@ import xarray as xr
 from imuarray.analysis.drawing import FAR, Places, another_size, departures, size_of
 from imuarray.analysis.rigid import SLOPE, Slope, Turning, elsewhere, kept, slope, turning
 from imuarray.analysis.suspects import MIRRORED, clipped, common, gravity, suspects, told
+from imuarray.model.effects import KINDS
 from imuarray.recording import Recording
 from imuarray.recording.channels import repeated
 
@@ -230,6 +231,16 @@ def _residuals(recording: Recording, calibration: xr.Dataset, places: Places) ->
     found = {"": float(calibration.attrs["residual_ratio"])}
     if _is_papers(calibration):
         return _rigid(recording, places) | found
+    if "gyroscope_smooth_residual" in calibration:
+        # what is faster than the samples is no fault of the calibration, and its sds allow for it
+        smooth = {
+            f"{kind} {label}": float(value)
+            for kind in KINDS
+            for label, value in zip(
+                calibration[kind].values, calibration[f"{kind}_smooth_residual"].values, strict=True
+            )
+        }
+        return smooth | {"": float(np.sqrt(np.mean(np.square(list(smooth.values())))))}
     kinds = (("accelerometer", recording.accelerometer_noise_sd),
              ("gyroscope", recording.gyroscope_noise_sd))  # fmt: skip
     for kind, declared in kinds:

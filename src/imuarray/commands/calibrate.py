@@ -10,6 +10,7 @@ from imuarray.analysis.model import assumed
 from imuarray.analysis.trust import reasons_of_calibration
 from imuarray.commands.output import Output
 from imuarray.estimation.informative import weak_directions
+from imuarray.model.effects import KINDS
 from imuarray.provenance import trust, write_netcdf
 from imuarray.recording import read_recording
 
@@ -110,6 +111,14 @@ def _misfit(dataset: xr.Dataset) -> list[str]:
     if not ratio > MISFIT:
         return []
     papers = dataset.attrs["model"] == "papers"
+    if "gyroscope_smooth_residual" in dataset:
+        usual = {kind: float(np.median(dataset[f"{kind}_smooth_residual"])) for kind in KINDS}
+        sizes = [f"{value:.2g} ({kind}s)" for kind, value in usual.items()]
+        return [
+            f"rough motion: the residual is {' and '.join(sizes)} times the declared noise in the"
+            f" fifth of the samples of least jerk, {ratio:.3g} over all: shocks are faster than the"
+            " samples, and count little"
+        ]
     allowed = "are too small, by that or more" if papers else "take it for noise"
     return [
         f"residual {ratio:.3g} times the declared noise: the model misses something, and the"

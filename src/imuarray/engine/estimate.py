@@ -26,11 +26,12 @@ from imuarray.engine.linearise import State
 from imuarray.engine.parameters import Columns, prior_precision
 from imuarray.engine.passes import Pass, normal_pass
 from imuarray.engine.readings import Readings
-from imuarray.engine.robust import distances, freedoms, judged
+from imuarray.engine.robust import MEDIAN, distances, freedoms, judged
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import is_smooth, start
 from imuarray.model.effects import EFFECTS
 
+SMOOTH = 0.2  # share of rough samples that are looked at as the smooth ones
 NORMAL, ROBUST = np.array([np.inf, np.inf]), np.array([4.0, 4.0])  # degrees of freedom
 
 
@@ -104,6 +105,21 @@ class Estimate:
             squares += np.sum(distances(one.readings, seen) * scale)
             number += one.readings.keep.sum()
         return float(np.sqrt(squares / number))
+
+    def smooth_ratio(self) -> np.ndarray | None:
+        """Where motion is rough: (N, 2) the same of each triad in the fifth of least jerk, robust.
+
+        What is faster than the samples is in the rest. None where the motion is smooth.
+        """
+        parts = []
+        for one, seen in zip(self.recorded, self.passes, strict=True):
+            if one.state.rough_prior is None:
+                return None
+            jerk = np.linalg.norm(one.state.jerk[1], axis=1)
+            scale = (one.readings.sd / one.readings.declared) ** 2
+            smooth = jerk <= np.quantile(jerk, SMOOTH)
+            parts.append(distances(one.readings, seen)[smooth] * scale)
+        return np.sqrt(np.median(np.concatenate(parts), axis=0) / MEDIAN)
 
     def noise_sd(self) -> np.ndarray:
         """Sds (N, 2), m/s^2 and rad/s, that Student's t has; rms over the recordings."""
