@@ -126,10 +126,7 @@ def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
             "whole_covariance": (("unknown", "unknown_other"), whole),
         }
         coords["parameter"] = parameter_names(model, labels)
-    smooth, counts = (
-        found.smooth_ratio(),
-        (readings.array.accelerometers, readings.array.gyroscopes),
-    )
+    smooth = found.smooth_ratio()
     if smooth is not None:
         for which, kind in enumerate(KINDS):
             variables[f"{kind}_smooth_residual"] = (kind,), smooth[: counts[which], which]
