@@ -3,7 +3,7 @@
 from job import job
 
 with job(snakemake):
-    from imuarray.firstorder import calibrate_first_order, correct
+    from imuarray.firstorder.correct import calibrate_first_order, correct
     from imuarray.measured.causes import bought
     from imuarray.provenance import write_csv
     from imuarray.recording import read_recording
