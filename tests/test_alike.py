@@ -102,8 +102,8 @@ def test_repeatability_is_that_of_pairs():
             pd.DataFrame({
                 "step": step, "accelerometer": np.repeat(["2", "3"], 3), "axis": list("xyz") * 2,
                 "mean_m": found,
-                "sd_m": 1e-6, "residual_ratio": 2.0, "nats": 1.0, "nats_error": 0.1,
-                "converged": True,
+                "sd_m": 1e-6, "residual_ratio": 2.0, "smooth_ratio": 1.0,
+                "nats": 1.0, "nats_error": 0.1, "converged": True,
             })
             for step in STEPS
         ]  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+from matplotlib.ticker import LogLocator, NullFormatter
 from scipy.special import ndtr
 
 from imuarray.figures.style import (
@@ -302,6 +303,7 @@ CAUSES = (
     Column("size_sd", "sd of the size (%)", r"size (\%)", "{:.3f}", 100.0),
     Column("covered", "95 % intervals cover (%)", r"covered (\%)", "{:.0f}", 100.0),
     Column("residual_ratio", "residual / still noise", "residual", "{:.1f}"),
+    Column("smooth_ratio", "in smooth samples", "smooth", "{:.2f}"),
     Column("nats", "nats a sample, held out", "nats", "{:.1f}"),
     Column("nats_error", "± ", r"$\pm$", "{:.1f}"),
 )
@@ -325,7 +327,8 @@ def figure_causes(summary: pd.DataFrame, group: str):
     """
     footer = [
         f"{summary.recordings.max()} recordings of board {group}, differences of all pairs in all"
-        " coordinates. Residual: rms over the noise of still poses, outliers with it."
+        " coordinates. Residual over the noise of still poses: rms of all samples, outliers with"
+        " them; robust, of the fifth of least jerk."
     ]
     figure = new_figure(footer, PAGE, 2.9)
     panels = figure.subplots(1, 3, sharey=True, width_ratios=(2, 1, 1))
@@ -334,10 +337,15 @@ def figure_causes(summary: pd.DataFrame, group: str):
     for number, (column, label) in enumerate(series):
         panels[0].plot(1e6 * summary[column], rows, label=label, markersize=4, **look(number))
     panels[1].plot(100 * summary.size_sd, rows, markersize=4, **look(3))
-    panels[2].plot(summary.residual_ratio, rows, markersize=4, **look(4))
+    panels[2].plot(summary.residual_ratio, rows, label="all", markersize=4, **look(4))
+    panels[2].plot(summary.smooth_ratio, rows, label="smooth", markersize=4, **look(5))
     titles = "differences between recordings (µm)", "sd of the size (%)", "residual / still noise"
     for axes, title in zip(panels, titles, strict=True):
         axes.set(xscale="log", xlabel=title)
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.xaxis.set_minor_formatter(NullFormatter())
     panels[0].set_yticks(rows, summary.model)
-    panels[0].legend()
+    for axes in panels[::2]:
+        axes.legend()
     return figure, summary

@@ -20,11 +20,11 @@ LAG, ARMS = "lag of the gyroscopes", "lever arms of the axes"
 STEPS = {
     "normal": "papers' model, normal noise",
     "robust": "papers' model, Student's t",
-    "no clocks": "and maps, lag, lever arms",
-    "clocks": "t, clocks",
-    "no arms": "and maps, lag",
-    "own arms": "and lever arms, each chip's own",
-    "common arms": "lever arms nearly common to all chips",
+    "no clocks": "... and lag, maps, lever arms",
+    "clocks": "Student's t and clocks",
+    "no arms": "... and lag, maps",
+    "own arms": "... and lever arms, each chip's own",
+    "common arms": "... nearly common to all chips",
 }
 
 
@@ -32,7 +32,8 @@ def bought(recording: Recording) -> pd.DataFrame:
     """Positions of a corrected recording under each of `STEPS`, a row a coordinate.
 
     Columns step, accelerometer, axis, mean_m, sd_m; and of the step residual_ratio (rms residual
-    over the declared noise), nats and nats_error (a sample, on held-out time, what is new in it
+    over the declared noise), smooth_ratio (the same of the fifth of least jerk, robust, median of
+    all triads), nats and nats_error (a sample, on held-out time, what is new in it
     over the step that it extends; NaN where that is another noise), converged.
     """
     readings = arrange(recording, sparse=True)
@@ -40,12 +41,15 @@ def bought(recording: Recording) -> pd.DataFrame:
     labels, parts = recording.accelerometer_labels[1:], []
     for step, found, gain in _fits(readings):
         covariance, *_ = widths(found)
+        smooth = found.smooth_ratio()
         pairs = np.argwhere(found.active)
         mine = found.places[0][pairs[:, 1] < 3]
         parts.append(pd.DataFrame({
             "step": step, "accelerometer": np.repeat(labels, 3), "axis": list("xyz") * len(labels),
             "mean_m": found.positions[1:].ravel(), "sd_m": np.sqrt(np.diag(covariance)[mine]),
-            "residual_ratio": found.residual_ratio(), "nats": gain[0] / len(readings.time),
+            "residual_ratio": found.residual_ratio(),
+            "smooth_ratio": np.nan if smooth is None else np.median(smooth),
+            "nats": gain[0] / len(readings.time),
             "nats_error": gain[1] / len(readings.time), "converged": found.converged,
         }))  # fmt: skip
     return pd.concat(parts, ignore_index=True)
@@ -86,7 +90,7 @@ def repeated(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
 
     ``tables`` {recording: `bought`}. Differences of all pairs: rms_m, median_m, covered (share in
     95 % intervals), same_size_rms_m (each array brought to the mean size); size_sd (relative, of
-    the arrays' sizes); medians over recordings of residual_ratio and nats.
+    the arrays' sizes); medians over recordings of residual_ratio, smooth_ratio and nats.
     """
     whole = pd.concat([table.assign(recording=name) for name, table in tables.items()])
     rows = []
@@ -104,6 +108,7 @@ def repeated(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
             "same_size_rms_m": _rms(pairwise(alike).difference_m),
             "size_sd": size.std(ddof=1), "covered": np.mean(between.z.abs() < 1.96),
             "residual_ratio": each.residual_ratio.first().median(),
+            "smooth_ratio": each.smooth_ratio.first().median(),
             "nats": each.nats.first().median(), "nats_error": each.nats_error.first().median(),
             "converged": int(each.converged.first().sum()),
         })  # fmt: skip
