@@ -361,3 +361,30 @@ def test_a_motion_of_another_board_s_calibration(sound, tmp_path, capsys):
     imuarray.write_recording(sound, tmp_path / "rec.nc")
     status = main(["apply", *files, "--out", str(tmp_path / "motion.nc"), "--quiet"])
     assert status == 3 and "the calibration is not to be trusted" in capsys.readouterr().err
+
+
+def test_clocks_have_the_phases_of_their_own_recording(sound):
+    rate = np.median(sound.angular_rate, axis=1)[::2]
+    calibration = xr.Dataset(
+        {"angular_rate": (("time", "axis"), rate)}, {"time": sound.time[::2]},
+        {"effects": "sensor_clock,gyroscope_delay", "model": "sensors"},
+    )  # fmt: skip
+    assert trust._other_clocks(sound, calibration) == []
+    another = make(CASE, 2)[0]
+    (said,) = trust._other_clocks(another, calibration)
+    assert "clocks" in said
+    assert trust._other_clocks(another, calibration.assign_attrs(effects="gyroscope_delay")) == []
+
+
+def test_rough_motion_is_judged_by_its_smooth_samples(sound):
+    labels = list(sound.accelerometer_labels)
+    ones = np.ones(len(labels))
+    calibration = xr.Dataset(
+        {
+            "accelerometer_smooth_residual": ("accelerometer", ones),
+            "gyroscope_smooth_residual": ("gyroscope", 2 * ones),
+        },
+        {"accelerometer": labels, "gyroscope": labels}, {"residual_ratio": 40.0},
+    )  # fmt: skip
+    found = trust._residuals(sound, calibration, None)
+    assert found[""] == pytest.approx(np.sqrt(2.5)) and found[f"gyroscope {labels[0]}"] == 2.0

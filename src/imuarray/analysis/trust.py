@@ -16,7 +16,7 @@ import xarray as xr
 from imuarray.analysis.drawing import FAR, Places, another_size, departures, size_of
 from imuarray.analysis.rigid import SLOPE, Slope, Turning, elsewhere, kept, slope, turning
 from imuarray.analysis.suspects import MIRRORED, clipped, common, gravity, suspects, told
-from imuarray.model.effects import KINDS
+from imuarray.model.effects import EFFECTS, KINDS
 from imuarray.recording import Recording
 from imuarray.recording.channels import repeated
 
@@ -26,6 +26,7 @@ LEARNT = 0.5  # of the drawing's sd: positions known worse are hardly known from
 OTHER = 1.2  # times less residual elsewhere; 1.003 at most for the right board, 2 for another
 SHRUNK = 1.0  # sds: 95 % intervals then cover 83 %
 FEW = 20  # samples
+SAME = 0.1  # relative difference of rates, up to which they are those of one recording
 
 
 def reasons_of_calibration(
@@ -79,6 +80,7 @@ def reasons_of_motion(recording: Recording, calibration: xr.Dataset) -> list[str
     places = _places(recording, calibration["position"].to_numpy(), _covariance(calibration))
     residual = _rigid(recording, places) if _is_papers(calibration) else {}
     found = _judged(recording, places, residual) + _elsewhere(kept(recording), places)
+    found += _other_clocks(recording, calibration)
     return [f"the calibration is not to be trusted: {reason}" for reason in said] + [
         reason for reason in found if reason not in said
     ]
@@ -179,6 +181,24 @@ def _elsewhere(moving: Recording, places: Places) -> list[str]:
     return [
         f"this recording fits positions {1e3 * distance:.2g} mm rms from the calibration's better,"
         f" with {ratio:.2g} times less residual: is it the calibration of another board?"
+    ]
+
+
+def _other_clocks(recording: Recording, calibration: xr.Dataset) -> list[str]:
+    """One sentence where the calibration's clocks have their phases from another recording."""
+    effects = [EFFECTS[name] for name in calibration.attrs.get("effects", "").split(",") if name]
+    timed = any(item.own and item.scanned and item.shifts_time for item in effects)
+    if not timed or str(calibration.attrs.get("model", "")).endswith(".json"):
+        return []
+    if "angular_rate" in calibration:
+        rate, time = np.median(recording.angular_rate, axis=1), calibration["time"].to_numpy()
+        here = np.stack([np.interp(time, recording.time, axis) for axis in rate.T], axis=1)
+        there = calibration["angular_rate"].to_numpy()
+        if np.median(np.abs(here - there)) < SAME * np.median(np.abs(there)):
+            return []
+    return [
+        "the IMUs have clocks of their own, whose phases the calibration knows in its own (first)"
+        " recording only: calibrate this one, too, and apply that"
     ]
 
 
