@@ -183,6 +183,7 @@ def test_no_module_beside_the_finders_names_an_effect():
         "clocks",
         "shifts",
         "warming",
+        "shocks",
         "special",
         "reading_effects",
         "noise_effects",

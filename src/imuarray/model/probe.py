@@ -34,10 +34,12 @@ def _probe(item: Effect, sd, rng) -> bool:
     fields = [jnp.asarray(scale * rng.standard_normal(3)) for scale in (5, 100, 10, 1e3, 1e2)]
 
     def predicted(parameters, later, plain=plain, positions=positions, time=0.3):
-        instant = Instant(Motion(*fields[:3], *later), positions, time=time, span=1.0)
+        motion = Motion(*fields[:3], *later)
+        instant = Instant(motion, positions, time=time, span=1.0, axes=axes)
         return item.apply(jnp.asarray(parameters), instant, plain)
 
     later = tuple(fields[3:])
+    axes = np.tile(np.eye(3), (ACCELEROMETERS, 1, 1))
     nothing = _tried(item, sd.shape, lambda: predicted(np.zeros(sd.shape), later))
     _require_shapes(item, nothing, plain)
     for kind, old, new in zip(Prediction._fields, plain, nothing, strict=True):
