@@ -115,9 +115,9 @@ def _misfit(dataset: xr.Dataset) -> list[str]:
         usual = {kind: float(np.median(dataset[f"{kind}_smooth_residual"])) for kind in KINDS}
         sizes = [f"{value:.2g} ({kind}s)" for kind, value in usual.items()]
         return [
-            f"rough motion: the residual is {' and '.join(sizes)} times the declared noise in the"
-            f" fifth of the samples of least jerk, {ratio:.3g} over all: shocks are faster than the"
-            " samples, and count little"
+            f"rough motion: the residual is {' and '.join(sizes)} times the declared noise in"
+            f" smooth samples that turn fast, {ratio:.3g} over all: shocks are faster"
+            " than the samples, and count little"
         ]
     allowed = "are too small, by that or more" if papers else "take it for noise"
     return [

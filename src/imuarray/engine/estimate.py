@@ -107,9 +107,10 @@ class Estimate:
         return float(np.sqrt(squares / number))
 
     def smooth_ratio(self) -> np.ndarray | None:
-        """Where motion is rough: (N, 2) the same of each triad in the fifth of least jerk, robust.
+        """Where motion is rough: (N, 2) the same of each triad in the smooth samples, robust.
 
-        What is faster than the samples is in the rest. None where the motion is smooth.
+        Of the half with most angular acceleration, in which what a model misses shows, the fifth of
+        least jerk: what is faster than the samples is in the rest. None where motion is smooth.
         """
         parts = []
         for one, seen in zip(self.recorded, self.passes, strict=True):
@@ -117,7 +118,9 @@ class Estimate:
                 return None
             jerk = np.linalg.norm(one.state.jerk[1], axis=1)
             scale = (one.readings.sd / one.readings.declared) ** 2
-            smooth = jerk <= np.quantile(jerk, SMOOTH)
+            turn = np.linalg.norm(one.state.motion[:, 3:6], axis=1)
+            turning = turn > np.median(turn)
+            smooth = turning & (jerk <= np.quantile(jerk[turning], SMOOTH))
             parts.append(distances(one.readings, seen)[smooth] * scale)
         return np.sqrt(np.median(np.concatenate(parts), axis=0) / MEDIAN)
 

@@ -328,7 +328,7 @@ def figure_causes(summary: pd.DataFrame, group: str):
     footer = [
         f"{summary.recordings.max()} recordings of board {group}, differences of all pairs in all"
         " coordinates. Residual over the noise of still poses: rms of all samples, outliers with"
-        " them; robust, of the fifth of least jerk."
+        " them; robust, of the fifth of least jerk among those with most angular acceleration."
     ]
     figure = new_figure(footer, PAGE, 2.9)
     panels = figure.subplots(1, 3, sharey=True, width_ratios=(2, 1, 1))

@@ -32,8 +32,8 @@ def bought(recording: Recording) -> pd.DataFrame:
     """Positions of a corrected recording under each of `STEPS`, a row a coordinate.
 
     Columns step, accelerometer, axis, mean_m, sd_m; and of the step residual_ratio (rms residual
-    over the declared noise), smooth_ratio (the same of the fifth of least jerk, robust, median of
-    all triads), nats and nats_error (a sample, on held-out time, what is new in it
+    over the declared noise), smooth_ratio (the same of smooth samples, median of all triads, as
+    `Estimate.smooth_ratio`), nats and nats_error (a sample, on held-out time, what is new in it
     over the step that it extends; NaN where that is another noise), converged.
     """
     readings = arrange(recording, sparse=True)
