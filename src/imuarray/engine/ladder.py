@@ -73,10 +73,9 @@ def climb(readings: Sequence[Readings], bare: bool = True) -> tuple[Estimate, li
     Each sweep tests the rungs in order, beside those that it has kept before; what is kept is
     fitted, then the others are tested again. At last each must still gain beside all others, but
     for clocks, whose jumps a fit does not move. Gyroscope maps at odds with those of first order
-    are estimated, too. Where motion is smooth and no sensor late, the
-    rate's own change is then a prior of omega_dot. ``bare``: whether the last fit is wanted where
-    no rung is kept. InputError or LinAlgError where the readings do not determine positions or
-    motion.
+    are estimated, too. Where motion is smooth and no sensor late, the rate's own change is then a
+    prior of omega_dot. ``bare``: whether the last fit is wanted where no rung is kept. InputError
+    or LinAlgError where the readings do not determine positions or motion.
     """
     names = rungs_of(readings)
     effects = [effect for name in names for effect in RUNGS[name]]
