@@ -91,6 +91,26 @@ def test_the_differences_size_is_found():
     assert columns.prior_sd[columns.of("size_effect")[0]] == pytest.approx(2e-5, rel=0.15)
 
 
+def test_the_common_part_of_drifts_is_no_larger_than_their_differences_say():
+    """The motion takes up what all gyroscopes have in common: data alone say nothing of it."""
+    rng = np.random.default_rng(5)
+    columns = columns_of(board(), ("bias_drift",), 1e-3)
+    kind = np.array([place[0] for place in columns.places])
+    active = columns.owner & (np.array(columns.names) == "bias_drift") & (kind == 1)
+    drift = 1e-4 * rng.standard_normal(active.sum())
+    differing = np.eye(4) - 0.25
+    told = np.kron(differing, np.eye(12)) / 1e-5**2
+    place = np.arange(len(drift))
+    for _ in range(30):
+        whole = told + prior_precision(columns, active)
+        found = np.linalg.solve(whole, told @ drift)
+        columns = with_likely_spread(columns, active, found, whole, place)
+    own = columns.of("bias_drift")
+    assert columns.prior_sd[own[kind[own] == 1]] == pytest.approx(1e-4, rel=0.3)
+    # those of the other kind were not looked at
+    assert np.all(columns.prior_sd[own[kind[own] == 0]] == 0.1)
+
+
 def test_repeatability_is_that_of_pairs():
     import pandas as pd
 

@@ -1,6 +1,7 @@
 """Injected effects must be found: recordings of the independent injector."""
 
 import json
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -10,7 +11,9 @@ from imuarray.blind.cases import Case, make
 from imuarray.cli import main
 from imuarray.diagnosis.document import diagnose, precision_of, structural_gain
 from imuarray.diagnosis.extension import extended_model, read_extension
+from imuarray.diagnosis.procedure import run_procedure
 from imuarray.diagnosis.reading_effects import find_structural
+from imuarray.engine.fit import flat_parameters
 from imuarray.engine.heldout import gain, log_scores
 from imuarray.model import EFFECTS, ArrayModel
 from imuarray.model.effects import effect, known_effect
@@ -100,6 +103,24 @@ def test_a_clean_recording_has_no_cause(seed):
     assert document["causes"] == []
     assert not document["unexplained"]
     assert document["gain"]["heldout_log_score_nats_per_sample"] == pytest.approx(0, abs=0.05)
+
+
+def test_gyroscopes_offsets_that_walk_drift_by_what_they_walk():
+    """No polynomial is a random walk; that is the same cause, and leaves nothing unexplained."""
+    recording, _ = make(Case("test-walk", duration=DURATION), SEED)
+    steps = np.random.default_rng(SEED).standard_normal(recording.angular_rate.shape)
+    walk = 4e-4 * np.sqrt(1 / len(steps)) * np.cumsum(steps, axis=0)
+    found = run_procedure(replace(recording, angular_rate=recording.angular_rate + walk))
+    assert [cause.effect for cause in found.search.causes] == ["bias_drift"]
+    assert not found.unexplained and not found.in_noise
+    search = found.search
+    own = flat_parameters(search.columns, search.fit.state)[:, search.columns.of("bias_drift")]
+    own = own.reshape(8, 2, 3, 4)[:, 1]
+    drift = np.polynomial.legendre.legval(np.linspace(-1, 1, len(walk)), own.transpose(2, 0, 1))
+    apart = walk - walk.mean(axis=1, keepdims=True)
+    left = apart - np.moveaxis(drift - drift.mean(axis=0), -1, 0)
+    assert np.std(left) < 0.5 * np.std(apart)
+    assert np.std(drift.mean(axis=0)) < np.std(walk.mean(axis=1)) + np.std(apart)
 
 
 def test_a_clock_is_found_where_the_host_reads_unevenly():

@@ -15,7 +15,7 @@ from imuarray.diagnosis.special import SPECIAL
 from imuarray.diagnosis.state import Search
 from imuarray.engine.fit import flat_parameters
 from imuarray.engine.linearise import linearise
-from imuarray.engine.parameters import POSITION
+from imuarray.engine.parameters import POSITION, columns_of
 from imuarray.tails import log_normal
 
 STRICT = ("outliers", "size of", "change of")  # checks that a small residual does not excuse
@@ -56,7 +56,8 @@ def outlier_checks(search: Search) -> list[Check]:
 def plausibility_checks(search: Search) -> list[Check]:
     """Causes whose parameters are larger than such sensors have: misattributed."""
     columns, found = search.columns, []
-    whole = flat_parameters(columns, search.fit.state) / columns.prior_sd
+    usual = columns_of(columns.model.array, columns.model.effects, columns.prior_sd[0]).prior_sd
+    whole = flat_parameters(columns, search.fit.state) / usual
     for cause in search.causes:
         free = search.active[:, columns.of(cause.effect)]
         sizes = np.where(free, np.abs(whole[:, columns.of(cause.effect)]), 0.0)

@@ -16,6 +16,7 @@ from imuarray.diagnosis import clocks
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis.scores import Candidate, Information, information_at, mask_of
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray.engine.alike import likely_sizes
 from imuarray.engine.clock_scan import CLOCK, estimated_again, without_jumps
 from imuarray.engine.fit import (
     Fit,
@@ -156,7 +157,12 @@ class Search:
             search = replace(search, readings=readings.with_sd(judged.sd))
         made = at(search.readings, search.columns, search.active, state, converged)
         noise = noises.judge(made.readings, made.residual, made.basis)
-        return replace(search, fit=made, noise=noise).weighed()
+        search = replace(search, fit=made, noise=noise).weighed()
+        given, former = search.given, search.columns.prior_sd
+        columns = likely_sizes(made, given.information, given.score, given.index)
+        if np.allclose(columns.prior_sd, former, rtol=SETTINGS.steady_size):
+            return search
+        return replace(search, columns=columns).refit(made.state, turns, rough)
 
     @property
     def _with_jumps(self) -> Readings:

@@ -1,4 +1,4 @@
-"""Parameters that triads of one kind have nearly in common: how much each differs, estimated."""
+"""Parameters whose size an estimate finds: what triads of one kind have in common, and drifts."""
 
 from __future__ import annotations
 
@@ -6,32 +6,70 @@ from dataclasses import replace
 
 import numpy as np
 
+from imuarray.engine.fit import Fit, flat_parameters, prior_means, scaled_solve
 from imuarray.engine.parameters import Columns, prior_precision
 from imuarray.engine.settings import SETTINGS
 from imuarray.linear import scaled_inverse
+from imuarray.model.effects import EFFECTS
+from imuarray.model.names import unit_of
+
+
+def sized_groups(columns: Columns) -> np.ndarray:
+    """(m,) str: effect and unit of the columns whose prior sd is to be found, "" for all others."""
+    return np.array([
+        f"{name} {unit_of(name, place)}" if common > 0 or name in EFFECTS and EFFECTS[name].sized
+        else ""
+        for name, place, common in zip(
+            columns.names, columns.places, columns.common_sd, strict=True
+        )
+    ])  # fmt: skip
 
 
 def with_likely_spread(columns: Columns, active, values, information, place) -> Columns:
-    """The columns, own prior sds as large as differences between triads are likeliest (MacKay).
+    """The columns, own prior sds as large as the values are likeliest (MacKay).
 
+    As large as differences between triads are, where they have a part in common.
     ``values`` (n,) and ``information`` (n, n), the prior's with it, of all parameters; ``place``:
     where those ``active`` (N, m) bool are among them.
     """
-    sds, column, names = columns.prior_sd.copy(), np.nonzero(active)[1], np.array(columns.names)
-    alike = np.unique(names[column][columns.common_sd[column] > 0])
-    if len(alike) == 0:
+    sds, column, groups = columns.prior_sd.copy(), np.nonzero(active)[1], sized_groups(columns)
+    sized = np.setdiff1d(groups[column], "")
+    if len(sized) == 0:
         return columns
     prior = scaled_inverse(prior_precision(columns, active))
     covariance, values = scaled_inverse(information)[np.ix_(place, place)], values[place]
-    for name in alike:
-        mine = np.flatnonzero(names[column] == name)
-        same = column[mine][:, None] == column[mine]
-        own = np.eye(len(mine)) - same / same.sum(axis=1)
+    for group in sized:
+        mine = np.flatnonzero(groups[column] == group)
+        own = np.eye(len(mine))
+        if columns.common_sd[column[mine[0]]] > 0:
+            same = column[mine][:, None] == column[mine]
+            own -= same / same.sum(axis=1)
         square = np.ix_(mine, mine)
         unit = np.outer(sds[column[mine]], sds[column[mine]])
         told = np.sum(own * (prior - covariance)[square] / unit)
         if told > SETTINGS.least_told:
             off = values[mine] / sds[column[mine]]
             factor = np.sqrt(off @ own @ off / told)
-            sds[names == name] *= np.clip(factor, 1 / SETTINGS.widening, SETTINGS.widening)
+            sds[groups == group] *= np.clip(factor, 1 / SETTINGS.widening, SETTINGS.widening)
     return replace(columns, prior_sd=sds)
+
+
+def likely_sizes(fit: Fit, information, score, index) -> Columns:
+    """The columns of a fit, its sized effects as large as is likeliest, all else quadratic.
+
+    ``information`` (K, K) and ``score`` (K,) of the readings at the fit; ``index`` (N, m): places.
+    """
+    columns, active = fit.columns, fit.active
+    if not np.any(sized_groups(columns)[active.any(axis=0)] != ""):
+        return columns
+    place, every = index[active], np.arange(active.sum())
+    values, means = flat_parameters(columns, fit.state)[active], prior_means(fit.readings, columns)
+    inner = information[np.ix_(place, place)]
+    right = score[place] + inner @ values
+    for _ in range(SETTINGS.iterations):
+        precision, last = prior_precision(columns, active), columns.prior_sd
+        values, _ = scaled_solve(inner + precision, right + precision @ means[active])
+        columns = with_likely_spread(columns, active, values, inner + precision, every)
+        if np.allclose(columns.prior_sd, last, rtol=SETTINGS.same_noise):
+            break
+    return columns

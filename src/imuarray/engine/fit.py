@@ -219,7 +219,8 @@ def in_use(columns: Columns, active, state: State, also=()) -> tuple[Columns, np
     names = {name for name, one in zip(columns.names, used, strict=True) if one} | {*also}
     kept = np.isin(columns.names, [POSITION, *names])
     effects = [name for name in columns.model.effects if name in names]
-    return columns_of(columns.model.array, effects, columns.prior_sd[0]), kept
+    few = columns_of(columns.model.array, effects, columns.prior_sd[0])
+    return replace(few, prior_sd=columns.prior_sd[kept]), kept
 
 
 def movable(columns: Columns, active, states) -> np.ndarray:

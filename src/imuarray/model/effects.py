@@ -112,6 +112,9 @@ class Effect:
         Whether the array's size takes its gauge up: then it matters what the mean is.
     own : bool
         Whether it is a recording's own, not the board's: recordings fitted jointly each have it.
+    sized : bool
+        Whether an estimate finds its size, ``prior_sd`` at first: the data would not keep what
+        the motion takes up of it from being as large as a prior for any sensor allows.
     common_sd : float
         Prior sd of what a parameter of all triads has in common, beside each one's own: chips of
         one kind are alike. How much they differ, ``prior_sd`` at first, an estimate finds.
@@ -142,6 +145,7 @@ class Effect:
     left_out: bool = False
     resizes: bool = False
     own: bool = False
+    sized: bool = False
     common_sd: float = 0.0
 
     @property

@@ -119,7 +119,7 @@ def _drift_form(kind, highest):
         (f"{name} {form}", _drift_form(kind, highest))
         for kind, name in enumerate(KINDS) for form, highest in (("linear", 1), ("cubic", 3))
     ),
-    meaning="an offset changes through the recording", against="time", own=True,
+    meaning="an offset changes through the recording", against="time", own=True, sized=True,
 )  # fmt: skip
 def bias_drift(drift, instant, predicted):
     """Biases that are cubic polynomials of time: (accelerometer | gyroscope, axis, degree)."""
