@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import imuarray
+from imuarray.analysis.calibration_dataset import engine_dataset
 from imuarray.engine.estimate import Recorded, estimate
 from imuarray.engine.fit import flat_parameters
 from imuarray.engine.ladder import climb, mask_of
@@ -202,6 +203,13 @@ def test_recordings_of_a_board_are_fitted_jointly():
         bias = [flat_parameters(columns, r.state)[2, 3] for r in (one, other.recorded[0])]
         assert abs(bias[0]) > 0.05 and bias[0] == pytest.approx(bias[1], abs=2e-3)
     np.testing.assert_array_equal(*(one.state.positions for one in both.recorded))
+    file = engine_dataset(recordings, both)
+    assert file["position"].attrs["scope"] == "board" and set(file["scope"].values) == {"recording"}
+    np.testing.assert_array_equal(file["own"], file["parameter"])
+    x = file["own_parameter"].isel(own=6)  # of the third triad
+    np.testing.assert_allclose(x, [flat_parameters(columns, r.state)[2, 3] for r in both.recorded])
+    ratio = file["own_sd"] / engine_dataset(recordings[:1], alone[0])["effect_sd"].to_numpy()
+    np.testing.assert_allclose(ratio.median("own"), 1.0, atol=0.1)
     # the same readings twice say twice as much
     assert np.mean(position_sds(both) / position_sds(alone[0])) == pytest.approx(
         np.sqrt(0.5), abs=0.12

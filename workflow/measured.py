@@ -16,7 +16,7 @@ PLACES = {
     "blind_confusion": "results/blind/{scale}/figures",
     "blind_bars": "results/blind/{scale}/tables",
     "diagnosis_(positions|parameters|recordings)_.*": "results/measured/tables",
-    "added_.*|causes_table_.*": "results/measured/tables",
+    "added_.*|causes_table_.*|foretold_.*": "results/measured/tables",
     "diagnosis_.*|past_rail_.*|causes_.*": "results/measured/figures",
 }
 
@@ -147,7 +147,10 @@ class Measured:
         """What each cause buys on each board with several recordings."""
         folder = "results/measured"
         paths = [f"{folder}/figures/causes_{group}.{k}" for group in self.groups() for k in FIGURE]
-        return paths + [f"{folder}/tables/causes_table_{group}.md" for group in self.groups()]
+        names = [
+            f"{name}_{group}.md" for name in ("causes_table", "foretold") for group in self.groups()
+        ]
+        return paths + [f"{folder}/tables/{name}" for name in names]
 
     def published(self, scale: str) -> dict[str, str]:
         """Names of the measured figures and tables in paper_figures/, and what they copy."""

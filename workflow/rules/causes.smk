@@ -75,3 +75,70 @@ rule table_causes:
         "table: what each cause buys on {wildcards.group}"
     script:
         "../scripts/table_causes.py"
+
+
+# Leave one recording out: what the others say of the board, and of this one.
+rule leave_out:
+    input:
+        recording="results/measured/recordings/{name}.nc",
+        others=lambda wc: expand(
+            "results/measured/recordings/{name}.nc", name=MEASURED.others(wc.name)
+        ),
+    output:
+        recording="results/measured/left_out/{name}.nc",
+        calibration="results/measured/left_out/{name}_others.nc",
+    log:
+        "results/measured/logs/left_out/{name}.log",
+    benchmark:
+        "results/measured/benchmarks/left_out/{name}.tsv"
+    threads: 2
+    resources:
+        mem_mb=4000,
+    params:
+        entry=lambda wc: RECORDINGS[wc.name],
+        code=CODE.digest("leave_out"),
+    message:
+        "the board of {wildcards.name} as the other recordings show it"
+    script:
+        "../scripts/leave_out.py"
+
+
+rule foretell:
+    input:
+        recording="results/measured/left_out/{name}.nc",
+        calibration="results/measured/left_out/{name}_others.nc",
+    output:
+        "results/measured/foretold/{name}.csv",
+    log:
+        "results/measured/logs/foretold/{name}.log",
+    benchmark:
+        "results/measured/benchmarks/foretold/{name}.tsv"
+    threads: 2
+    resources:
+        mem_mb=4000,
+    params:
+        code=CODE.digest("foretell"),
+    message:
+        "what the other recordings say of {wildcards.name}"
+    script:
+        "../scripts/foretell.py"
+
+
+rule table_foretold:
+    input:
+        tables=lambda wc: expand(
+            "results/measured/foretold/{name}.csv", name=MEASURED.board(wc.group)
+        ),
+    output:
+        **table("foretold_{group}", folder="results/measured"),
+    log:
+        "results/measured/logs/tables/foretold_{group}.log",
+    benchmark:
+        "results/measured/benchmarks/tables/foretold_{group}.tsv"
+    params:
+        names=lambda wc: MEASURED.board(wc.group),
+        code=CODE.digest("table_foretold"),
+    message:
+        "table: recordings of {wildcards.group} foretold by the others"
+    script:
+        "../scripts/table_foretold.py"

@@ -54,8 +54,10 @@ def calibrate(
         motion at each sample: ``angular_rate`` rad/s, ``angular_acceleration`` rad/s^2,
         ``specific_force`` m/s^2; ``step``, the iterations' largest step in sds;
         ``accelerometer_sd`` m/s^2, ``gyroscope_sd`` rad/s; with effects ``effect_parameter`` and
-        ``effect_sd``. Attributes ``converged`` (0 or 1), ``residual_ratio`` (rms residual over the
-        declared noise), ``model``, ``parts`` (json), and the origin (config, seed, versions).
+        ``effect_sd``, whose coordinate ``scope`` is "imu" or "recording", and of several recordings
+        ``own_parameter``, ``own_sd`` (recording, own), the latter ones of each. Attributes
+        ``converged`` (0 or 1), ``residual_ratio`` (rms residual over the declared noise),
+        ``model``, ``parts`` (json), and the origin (config, seed, versions).
 
     Raises
     ------

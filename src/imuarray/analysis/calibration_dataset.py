@@ -10,8 +10,8 @@ from imuarray.engine.estimate import Estimate
 from imuarray.engine.parameters import POSITION
 from imuarray.engine.widths import widths
 from imuarray.model import ArrayModel, Noise
-from imuarray.model.effects import KINDS
-from imuarray.model.names import parameter_names
+from imuarray.model.effects import EFFECTS, KINDS
+from imuarray.model.names import parameter_ids, parameter_names
 from imuarray.motion.state import UNITS
 from imuarray.recording import Recording
 
@@ -25,7 +25,7 @@ def positions_dataset(recording: Recording, positions, covariance) -> xr.Dataset
     whole = np.zeros((count, 3, count, 3))
     whole[1:, :, 1:, :] = covariance.reshape(count - 1, 3, count - 1, 3)
     variables = {
-        "position": (PLACE, positions, {"units": "m", "relative_to": labels[0]}),
+        "position": (PLACE, positions, {"units": "m", "relative_to": labels[0], "scope": "board"}),
         "nominal_position": (PLACE, recording.relative_positions(), {"units": "m"}),
         "position_covariance": (
             (*PLACE, "accelerometer_other", "axis_other"), whole, {"units": "m2"}
@@ -125,7 +125,13 @@ def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
             # of r_2 ... r_A, then the effects' parameters
             "whole_covariance": (("unknown", "unknown_other"), whole),
         }
-        coords["parameter"] = parameter_names(model, labels)
+        scope = [EFFECTS[effect].scope for effect, _ in parameter_ids(model, labels)]
+        coords["parameter"] = names = parameter_names(model, labels)
+        coords["scope"] = "parameter", scope
+        own = np.flatnonzero(np.array(scope) == "recording")
+        if len(recordings) > 1 and len(own):
+            variables |= _of_recordings(found, model, own, np.sqrt(np.diag(covariance)))
+            coords["own"] = [names[number] for number in own]
     smooth = found.smooth_ratio()
     if smooth is not None:
         for which, kind in enumerate(KINDS):
@@ -141,6 +147,19 @@ def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
     return dataset
 
 
+def _of_recordings(found: Estimate, model: ArrayModel, own, sds) -> dict:
+    """Each recording's ``own`` ones of the parameters as variables; ``sds`` (n,) of all."""
+    values, widths = [], []
+    for number in range(len(found.recorded)):
+        place, size = places_among(found, model.effects, number)
+        sd = np.zeros(size)
+        sd[place[place >= 0]] = sds[place >= 0]
+        values.append(parameters_of(found, model, number)[own])
+        widths.append(sd[size - model.effect_size :][own])
+    dims = ("recording", "own")
+    return {"own_parameter": (dims, np.array(values)), "own_sd": (dims, np.array(widths))}
+
+
 def effects_of(found: Estimate) -> tuple[str, ...]:
     """The effects with free parameters, or with values, in the model's order."""
     values = found.columns.model.split(found.recorded[0].state.parameters)
@@ -151,13 +170,13 @@ def effects_of(found: Estimate) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def parameters_of(found: Estimate, model: ArrayModel) -> np.ndarray:
-    """Flat, in a model's order; a recording's own ones are the first recording's."""
-    values = found.columns.model.split(found.recorded[0].state.parameters)
+def parameters_of(found: Estimate, model: ArrayModel, number: int = 0) -> np.ndarray:
+    """Flat, in a model's order; a recording's own ones are those of the recording ``number``."""
+    values = found.columns.model.split(found.recorded[number].state.parameters)
     return model.join({item.id: values[item.id] for item in model.chain})
 
 
-def places_among(found: Estimate, effects) -> tuple[np.ndarray, int]:
+def places_among(found: Estimate, effects, recording: int = 0) -> tuple[np.ndarray, int]:
     """Of each of the n parameters its place among r_2 ... r_A and the effects'; -1 for none.
 
     Another recording's own ones have none. Also the number of places.
@@ -176,7 +195,7 @@ def places_among(found: Estimate, effects) -> tuple[np.ndarray, int]:
         else:
             first, shape = shapes[name]
             place = first + np.ravel_multi_index((imu, *inner), shape)
-        out[found.places[0][number]] = place
+        out[found.places[recording][number]] = place
     return out, offset
 
 

@@ -44,21 +44,32 @@ def log_scores(fit: Fit, ridge) -> Scores:
     readings = fit.readings
     blocks = blocks_of(len(fit.residual))
     parts = normal_blocks(fit, fit.active)
-    information, score = sum(p[0] for p in parts), sum(p[1] for p in parts)
     fixed = np.where(readings.keep, np.repeat(np.log(readings.sd), 3, axis=1), 0.0)
     constant = fixed.sum(axis=(1, 2)) + fit.log_volume / 2
     constant += np.log(2 * np.pi) / 2 * (readings.keep.sum(axis=(1, 2)) - 9)
     if fit.state.rough_prior is not None:
         constant += np.log(fit.state.rough_prior.sd).sum(axis=1)
-    nats = []
-    for (block, slope), part in zip(parts, blocks, strict=True):
-        # at the optimum score and prior balance: without the block, minus its score is left
-        left = information - block + ridge
-        step = np.linalg.solve(left, (score - slope) - score) if len(score) else np.zeros(0)
-        better = slope @ step - step @ block @ step / 2
-        misfit = np.sum(fit.misfits[part])
-        nats.append(float(better - misfit / 2 - constant[part].sum()))
+    better = trained_elsewhere(parts, ridge)
+    nats = [
+        -np.sum(fit.misfits[part]) / 2 - constant[part].sum() + more
+        for part, more in zip(blocks, better, strict=True)
+    ]
     return Scores(np.array(nats), np.array([part.stop - part.start for part in blocks]))
+
+
+def trained_elsewhere(parts, ridge) -> np.ndarray:
+    """(B,) what blocks' log likelihoods gain (or lose) by parameters trained on the other blocks.
+
+    ``parts`` [(information (n, n), score (n,))] of the blocks at the optimum of all; one
+    Gauss-Newton step from there.
+    """
+    information = sum(inner for inner, _ in parts) + ridge
+    # at the optimum score and prior balance: without the block, minus its score is left
+    return np.array([
+        _predicted(np.linalg.solve(information - inner, -slope), inner, slope)
+        if len(slope) else 0.0
+        for inner, slope in parts
+    ])  # fmt: skip
 
 
 def gain(one: Scores, other: Scores) -> tuple[float, float]:

@@ -319,6 +319,38 @@ def table_causes(summary: pd.DataFrame, group: str):
     return summary, CAUSES, "How positions repeat, and what each cause buys", [note]
 
 
+FORETOLD = (
+    Column("recording", "recording", "recording"),
+    Column("samples", "samples", "samples", "{:d}"),
+    Column("heavy", "papers' model, Student's t", "papers', t", "{:.1f}"),
+    Column("heavy_error", "±", r"$\pm$", "{:.1f}"),
+    Column("board", "board of the others", "board of the others", "{:.1f}"),
+    Column("board_error", "±", r"$\pm$", "{:.1f}"),
+    Column("beyond", "own fit beyond that", "own fit beyond", "{:.2f}"),
+    Column("beyond_error", "±", r"$\pm$", "{:.2f}"),
+)
+
+
+def table_foretold(tables: list[pd.DataFrame], names: list[str], group: str):
+    """What each recording gains by the others' board; `analysis.foresight.foretold` of each."""
+    rows = []
+    for name, table in zip(names, tables, strict=True):
+        by = table.set_index("model")
+        rows.append({
+            "recording": name, "samples": int(by.samples.iloc[0]),
+            "heavy": by.over_inflated.heavy, "heavy_error": by.over_inflated_error.heavy,
+            "board": by.over_inflated.board, "board_error": by.over_inflated_error.board,
+            "beyond": by.over_board.own, "beyond_error": by.over_board_error.own,
+        })  # fmt: skip
+    note = (
+        f"Board {group}: its parameters from the other recordings; biases, clocks, noise and motion"
+        " fitted to the recording. Nats a sample on held-out blocks of time over the papers' model"
+        " with normal noise as large as the residual, positions fitted to the recording; ± standard"
+        " error between blocks. Last: what a fit of all parameters to the recording has beyond."
+    )
+    return pd.DataFrame(rows), FORETOLD, "Recordings foretold by the others", [note]
+
+
 @styled
 def figure_causes(summary: pd.DataFrame, group: str):
     """What each cause buys: repeatability, size and residual, a row a model.

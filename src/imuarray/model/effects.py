@@ -149,6 +149,11 @@ class Effect:
     common_sd: float = 0.0
 
     @property
+    def scope(self) -> str:
+        """Whose its parameters are, as files have it: the "recording"'s, or the "imu"'s."""
+        return "recording" if self.own else "imu"
+
+    @property
     def shifts_time(self) -> bool:
         """Whether it says when a triad samples: its first parameter is a time."""
         return self.sampling and self.unit.split(",")[0] == "s"

@@ -1,0 +1,73 @@
+"""A board from some recordings, and what it says of another one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_t
+
+from imuarray.analysis.calibration_dataset import engine_dataset
+from imuarray.analysis.foresight import foretold, with_board
+from imuarray.engine.densities import block_scores, log_densities
+from imuarray.engine.fit import at, flat_parameters
+from imuarray.engine.heldout import log_scores
+from imuarray.engine.linearise import linearise
+from imuarray.figures.measured import table_foretold
+from tests.test_engine import fitted, simulated
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return fitted(simulated(2.0)[0], robust=False)
+
+
+def test_scores_of_normal_noise_are_those_of_the_diagnosis(plain):
+    (one,) = plain.recorded
+    made = at(one.readings, plain.columns, plain.active, one.state, True, False)
+    expected, found = log_scores(made, plain.precision), block_scores(plain)
+    np.testing.assert_array_equal(found.samples, expected.samples)
+    np.testing.assert_allclose(found.nats, expected.nats, atol=0.02)
+    many = log_densities(one, plain.columns, np.array([1e7, 1e7]))
+    normal = log_densities(one, plain.columns, np.array([np.inf, np.inf]))
+    np.testing.assert_allclose(many, normal, atol=1e-2)
+
+
+def test_the_density_is_students(plain):
+    """Of two freedoms at one residual: the difference is that of scipy's t."""
+    (one,) = plain.recorded
+    left = linearise(one.readings, plain.columns, one.state, []).residual[0]
+    scores = [log_densities(one, plain.columns, np.full(2, nu))[0] for nu in (3.0, 8.0)]
+    by_scipy = [
+        sum(multivariate_t(np.zeros(3), np.eye(3), nu).logpdf(r) for r in left.reshape(-1, 3))
+        for nu in (3.0, 8.0)
+    ]
+    assert scores[1] - scores[0] == pytest.approx(by_scipy[1] - by_scipy[0], abs=1e-9)
+
+
+def test_a_board_foretells_another_recording():
+    """Its scales are known, the offset is the recording's: a fit of all has little to add."""
+    effects = "gyroscope_scale", "accelerometer_bias"
+    whole, parts = simulated(4.0, effects=effects[:1])[0], []
+    for part, offset in ((slice(0, 200), 0.3), (slice(200, 400), -0.2)):
+        one = whole.select(np.arange(400)[part])
+        shifted = one.specific_force + offset * np.eye(4)[2][:, None] * np.eye(3)[0]
+        parts.append(replace(one, specific_force=shifted))
+    calibration = engine_dataset(parts[:1], fitted(parts[0], effects))
+    readings, own = with_board(parts[1], calibration)
+    np.testing.assert_array_equal(own.positions, calibration["position"])
+    (state,), columns = (one.state for one in own.recorded), own.columns
+    kept, known = (
+        columns.model.split(values)["gyroscope_scale"]
+        for values in (state.parameters, calibration["effect_parameter"].to_numpy())
+    )
+    np.testing.assert_array_equal(kept, known)
+    bias = flat_parameters(columns, state)[2, columns.of("accelerometer_bias")[0]]
+    alone = fitted(parts[1], effects).recorded[0].state
+    assert bias == pytest.approx(flat_parameters(columns, alone)[2, 6], abs=5e-3) and bias < -0.05
+    table = foretold(parts[1], calibration)
+    by = table.set_index("model")
+    assert by.over_inflated.board > 5 and abs(by.over_board.own) < 0.3
+    assert (by.samples == len(readings.time)).all() and by.converged.all()
+    rows, columns, _, notes = table_foretold([table], ["one"], "board")
+    assert rows.board[0] == by.over_inflated.board and "board" in notes[0]
+    assert {column.name for column in columns} == set(rows)

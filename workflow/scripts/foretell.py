@@ -1,0 +1,11 @@
+"""A recording's held-out log density under the board of the others and other models -> CSV."""
+
+from job import job
+
+with job(snakemake):
+    from imuarray.analysis.foresight import foretold
+    from imuarray.provenance import write_csv
+    from imuarray.recording import load_dataset, read_recording
+
+    recording = read_recording(snakemake.input.recording)
+    write_csv(foretold(recording, load_dataset(snakemake.input.calibration)), snakemake.output[0])

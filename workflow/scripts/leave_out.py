@@ -1,0 +1,19 @@
+"""A board from all recordings but one, which is corrected by their maps -> two NetCDF files."""
+
+from job import job
+
+with job(snakemake):
+    from imuarray.analysis.foresight import left_out
+    from imuarray.provenance import digest, stamp, write_netcdf
+    from imuarray.recording import read_recording, write_recording
+
+    entry, made = snakemake.params.entry, snakemake.output
+    recording, *others = [
+        read_recording(path) for path in (snakemake.input.recording, *snakemake.input.others)
+    ]
+    options = {key: entry[key] for key in ("gravity", "shortest_pose") if key in entry}
+    corrected, calibration = left_out(recording, others, **options)
+    data = digest(*(one.angular_rate for one in (recording, *others)))
+    origin = stamp({"recordings": data}, 0)
+    write_recording(corrected, made.recording, attrs=origin)
+    write_netcdf(calibration.assign_attrs(origin), made.calibration)

@@ -1,0 +1,9 @@
+"""What recordings of a board gain by the others' board -> CSV, LaTeX, Markdown."""
+
+from job import job
+
+with job(snakemake):
+    from imuarray.figures.measured import table_foretold
+    from imuarray.figures.publish import publish
+
+    publish(table_foretold, snakemake)
