@@ -1,7 +1,5 @@
 """Folders where compiled code is kept between processes, and JAX set to use one."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import platform

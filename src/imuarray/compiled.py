@@ -5,8 +5,6 @@ one of another file was compiled would keep the old one after an update, and res
 those of the code that they name.
 """
 
-from __future__ import annotations
-
 import hashlib
 from functools import cache, partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The configuration: read, validated, and turned into models."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import yaml

@@ -4,8 +4,6 @@ Metres beside seconds and radians make eigenvalues meaningless and inverses inex
 the square roots of the diagonal's numbers, they are those of a correlation matrix.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Logarithms of tail probabilities by scipy.special: scipy.stats is slow to import."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy import special
 

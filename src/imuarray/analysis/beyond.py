@@ -1,7 +1,5 @@
 """The posterior density under a model with effects, around where the engine has fitted it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Positions of a board and parameters of its sensors from recordings, as one labelled dataset."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from os import PathLike

@@ -1,7 +1,5 @@
 """A calibration as a labelled dataset, of the papers' estimators and of the engine."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

@@ -4,8 +4,6 @@ A file may have been cut, edited, or belong to another board; what is computed w
 numbers all the same.
 """
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The posterior density of a recording's positions: noise, motion's prior, likelihood, mode."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace

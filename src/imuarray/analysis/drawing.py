@@ -5,8 +5,6 @@ chance allows is compared with what a known mistake would make of the drawing: a
 turned, inverted or mirrored array, two IMUs exchanged.
 """
 
-from __future__ import annotations
-
 from itertools import combinations
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The extended model of a diagnosis as a calibration: what `imuarray.apply` can use."""
 
-from __future__ import annotations
-
 from os import PathLike
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Recordings from loggers' files, and what the commands have written, back in memory."""
 
-from __future__ import annotations
-
 from os import PathLike
 from pathlib import Path
 

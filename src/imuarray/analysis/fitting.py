@@ -1,7 +1,5 @@
 """A board's recordings under any model but the papers', by the engine."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from imuarray.analysis.model import Say

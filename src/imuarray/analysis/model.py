@@ -1,7 +1,5 @@
 """What the analyses work on: the recording's usable samples, and the model asked for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from os import PathLike

@@ -1,7 +1,5 @@
 """The calibrated array as one sensor: what calibration is for."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

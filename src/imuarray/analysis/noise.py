@@ -1,7 +1,5 @@
 """The noise and the motion's size that a recording itself shows, by restricted likelihood."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ On a measured recording nobody knows the rate past the gyroscopes' rail. So a lo
 up: readings beyond it are withheld from the estimate and compared with it.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

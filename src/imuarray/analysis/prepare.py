@@ -1,7 +1,5 @@
 """A recording before it is calibrated: simulated, corrected triad by triad, its best samples."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ Quick and without a model of errors: what does not agree here to some per cent i
 noise. Sensors that are known to be wrong can be left out.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Chains of the positions' posterior, as one labelled tree."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path

@@ -5,8 +5,6 @@ what the others say of its place. A triad that is far off is turned, delayed or 
 takes most of its error away is named.
 """
 
-from __future__ import annotations
-
 from itertools import product
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ leave no residual. What is known besides is the drawing, that rates and forces a
 and that still poses show gravity.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """An effect added to a measured recording is to be found on top of whatever is there."""
 
-from __future__ import annotations
-
 from imuarray.blind.grade import classes
 from imuarray.blind.inject import EFFECTS
 from imuarray.blind.measured import inject_measured, measured_change

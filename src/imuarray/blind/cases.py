@@ -1,7 +1,5 @@
 """A case by name, and the recording and the truth that a seed makes of it."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict, dataclass
 

@@ -5,8 +5,6 @@ sensors (computed from the true quantities, and added up), the axes' labels, the
 and last what happens to the finished readings.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """The acceptance criteria that the diagnosis is held against, and whether it meets them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ u is the true specific force at a triad and w the true angular rate, at the sens
 The drawn entries have the sd ``size``; see `change.error_of` and `change.effect`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.blind.change import (

@@ -3,8 +3,6 @@
 The sensors asked for are ignored; every IMU is affected alike.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.blind.change import UNIT_FORCE, Parameter, effect, error_of, spread

@@ -5,8 +5,6 @@ is then the class. A *wrong name* is a named effect that is not in the truth and
 no effect of the truth. Whether the right sensors are named counts apart.
 """
 
-from __future__ import annotations
-
 from itertools import permutations
 
 import numpy as np

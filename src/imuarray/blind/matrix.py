@@ -1,7 +1,5 @@
 """Which cases a scale asks for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 from imuarray.blind.cases import Case

@@ -1,7 +1,5 @@
 """Effects of the catalogue on the noise and on finished readings: noise, rails, repetition."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Effects that the catalogue does not hold: the right answer is "unexplained"."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.blind.change import (

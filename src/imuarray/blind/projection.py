@@ -1,7 +1,5 @@
 """What of a change in the readings no motion and no positions can absorb, written out by hand."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

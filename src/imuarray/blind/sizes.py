@@ -1,7 +1,5 @@
 """How large an effect is, in sigma: what a test that knows it could see of it at best."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.blind.change import Change, noiseless_readings

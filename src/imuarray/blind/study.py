@@ -1,7 +1,5 @@
 """The blind study: recordings go to a diagnosis that learns nothing else of their cases."""
 
-from __future__ import annotations
-
 import json
 import time
 import traceback

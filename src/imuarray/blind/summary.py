@@ -1,7 +1,5 @@
 """Graded rows as tables: recordings, effects, detection, confusion, gain and coverage."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Effects of the catalogue on the instants at which sensors sample: delays and clocks."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.blind.change import UNIT_FORCE, Parameter, effect, spread

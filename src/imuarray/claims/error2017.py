@@ -1,7 +1,5 @@
 """Paper 2017, figures 4 and 5: the error of the calibrated positions."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.special import chdtrc
 

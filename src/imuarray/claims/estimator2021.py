@@ -1,7 +1,5 @@
 """Paper 2021, sections II and III-A, III-B and the appendix: model, algebra, estimator."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

@@ -1,7 +1,5 @@
 """Paper 2021, sections IV-B and IV-C, figure 5 and table II: the experiment and its simulation."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.claims.numbers import by_samples, falls, listed, show

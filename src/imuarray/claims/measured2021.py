@@ -1,7 +1,5 @@
 """Paper 2021, sections IV-B and IV-C: what only measured data can show."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.special import bdtr
 

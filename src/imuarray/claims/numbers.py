@@ -1,7 +1,5 @@
 """Fits, comparisons and how numbers are written."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -1,7 +1,5 @@
 """The claims as a page to read."""
 
-from __future__ import annotations
-
 import pandas as pd
 
 from imuarray.claims.registry import VERDICTS

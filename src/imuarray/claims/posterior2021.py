@@ -1,7 +1,5 @@
 """Paper 2021, section IV-A, figures 3 and 4: the chains and the simulated posteriors."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.special import chdtri
 

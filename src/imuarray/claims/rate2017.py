@@ -1,7 +1,5 @@
 """Paper 2017, figure 3: the angular rate when positions are wrong."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.claims.numbers import listed, ratio, show

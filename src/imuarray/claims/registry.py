@@ -1,7 +1,5 @@
 """The list of claims (`register.yaml`) and the functions that judge them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Paper 2017: identifiability and cost; the proof mass, ranges, and what the paper quotes."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.claims.numbers import listed, power_law, show

@@ -1,7 +1,5 @@
 """Paper 2021, section III-C, figure 2 and table I: tuning."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.claims.numbers import by_samples, listed, near, power_law, rises, show

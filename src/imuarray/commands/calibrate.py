@@ -1,7 +1,5 @@
 """The work behind `imuarray calibrate`."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

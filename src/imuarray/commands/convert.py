@@ -1,7 +1,5 @@
 """The work behind `imuarray convert`."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.commands.output import Output

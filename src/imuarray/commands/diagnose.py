@@ -1,7 +1,5 @@
 """The work behind `imuarray diagnose`."""
 
-from __future__ import annotations
-
 import sys
 import time
 

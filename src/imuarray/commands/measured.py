@@ -1,7 +1,5 @@
 """The work behind the commands for measured data: first-order, select, residuals, repeat."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

@@ -1,7 +1,5 @@
 """What a command prints: text for a person, or one JSON object for a program."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The work behind `imuarray simulate`."""
 
-from __future__ import annotations
-
 from imuarray.analysis.model import extender
 from imuarray.commands.output import Output
 from imuarray.provenance import stamp

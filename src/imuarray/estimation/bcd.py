@@ -1,7 +1,5 @@
 """ML-BCD: positions and motion by block coordinate descent (2017, Algorithm 1)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

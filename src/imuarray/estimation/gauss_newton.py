@@ -1,7 +1,5 @@
 """Positions of the papers' model by Gauss-Newton in collapsed form, with their covariance."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

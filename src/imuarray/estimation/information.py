@@ -6,8 +6,6 @@ in (1, r_k). So the information is Lambda (x) sum_t Omega_t Omega_t' less a matr
 of what the motion takes up: sums over samples of 12 x 12, however many triads there are.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import NamedTuple
 

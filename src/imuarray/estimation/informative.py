@@ -1,7 +1,5 @@
 """How informative a recording was: the worst determined combinations of positions, in words."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

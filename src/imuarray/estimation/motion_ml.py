@@ -1,7 +1,5 @@
 """Motion by maximum likelihood given the positions, sample by sample."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

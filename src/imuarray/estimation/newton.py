@@ -4,8 +4,6 @@ The whole search is compiled: a step is a tenth of a millisecond's arithmetic, a
 would double it.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import NamedTuple
 

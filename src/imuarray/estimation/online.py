@@ -1,7 +1,5 @@
 """Positions while the samples arrive: a recursive estimate of bounded memory."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

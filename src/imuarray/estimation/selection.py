@@ -1,7 +1,5 @@
 """Which samples of a recording to calibrate with: moving, off the rails, informative."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """BLAS with one thread, where products are small."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache

@@ -1,7 +1,5 @@
 """The blind study: how small an effect is found, and what it is taken for."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from matplotlib.colors import LinearSegmentedColormap

@@ -1,7 +1,5 @@
 """Tables of the blind study: the acceptance criteria; gain, position error and coverage."""
 
-from __future__ import annotations
-
 import pandas as pd
 
 from imuarray.blind import summary

@@ -1,7 +1,5 @@
 """`paper_figures/README.md`: every figure and table with its caption and its parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Measured data: residuals beside the simulation's, agreement between recordings, noise, rails."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from matplotlib.ticker import LogLocator, NullFormatter

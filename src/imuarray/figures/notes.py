@@ -1,7 +1,5 @@
 """The small print under figures and tables: scale, and how good the chains are."""
 
-from __future__ import annotations
-
 SOURCES = {
     "standin": "simulated stand-in; no measured data here",
     "simulation": "simulation with the experiment's noise",

@@ -1,7 +1,5 @@
 """Paper 2017: what position errors do to the angular rate, and how well ML-BCD finds them."""
 
-from __future__ import annotations
-
 import matplotlib
 import numpy as np
 import pandas as pd

@@ -1,7 +1,5 @@
 """Paper 2021: tuning, chains and posteriors. (Its array: `paper2021_array`.)"""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from matplotlib.lines import Line2D

@@ -1,7 +1,5 @@
 """Paper 2021, figures 1 and 5: the array, and where in its package each triad is."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from matplotlib.lines import Line2D

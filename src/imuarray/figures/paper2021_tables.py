@@ -1,7 +1,5 @@
 """Paper 2021: tables I and II."""
 
-from __future__ import annotations
-
 import pandas as pd
 
 from imuarray.figures.notes import SOURCES, scale_line, unfinished

@@ -1,7 +1,5 @@
 """From a rule's input files to those of its figure or table."""
 
-from __future__ import annotations
-
 import inspect
 import json
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """House style of all figures: sizes, colours, footers, and files with the same bytes each time."""
 
-from __future__ import annotations
-
 import functools
 import textwrap
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Tables as CSV, LaTeX and Markdown."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

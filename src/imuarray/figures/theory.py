@@ -1,7 +1,5 @@
 """Estimation theory: the Cramer-Rao bound, who reaches it, how fast, and the array's size."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

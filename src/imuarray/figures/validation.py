@@ -1,7 +1,5 @@
 """Simulation-based calibration: rank histograms, and how often intervals hold the truth."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from scipy import stats

@@ -1,7 +1,5 @@
 """Allan deviation of still readings: which part of the noise averaging can remove."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

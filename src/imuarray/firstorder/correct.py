@@ -1,7 +1,5 @@
 """The whole first-order calibration of a recording, and the recording it corrects."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

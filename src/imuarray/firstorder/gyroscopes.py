@@ -1,7 +1,5 @@
 """Gyroscopes in the accelerometers' frame: turns, scales and skews from poses and moves."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple

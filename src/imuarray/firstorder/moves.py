@@ -4,8 +4,6 @@ No residual between gyroscopes shows it, but the rotation between two still pose
 rates have to turn gravity's direction in the first pose into that in the next one.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Gyroscopes against each other: how each one is turned, scaled and skewed beside their mean."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

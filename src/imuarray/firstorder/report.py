@@ -1,7 +1,5 @@
 """Tables of a first-order calibration: parameters with their sds, residuals, noise."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation

@@ -1,7 +1,5 @@
 """Find the still poses of a recording by itself: where array-averaged readings only show noise."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.errors import InputError

@@ -1,7 +1,5 @@
 """A first-order calibration in a file: the corrected recording with the numbers in a group."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

@@ -5,8 +5,6 @@ unknown direction: y_kp = M_k u_p + b_k + e. The reference triad's matrix M_1 is
 triangular, which makes its axes the array frame (paper 2021, section IV-B, after its [18]).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 

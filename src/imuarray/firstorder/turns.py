@@ -1,7 +1,5 @@
 """Orthogonal matrices nearest to a linear map; which axis has the wrong sign where one reflects."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.errors import InputError

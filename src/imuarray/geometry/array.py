@@ -1,7 +1,5 @@
 """An array of triads on one rigid body: labels, nominal positions, sides."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

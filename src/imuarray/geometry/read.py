@@ -1,7 +1,5 @@
 """An array from a file or a configuration, checked."""
 
-from __future__ import annotations
-
 import csv
 
 import numpy as np

@@ -4,8 +4,6 @@ u is the true specific force at a triad, omega the true angular rate; each funct
 predicted measurement departs from them. Prior scales are those of consumer MEMS; ids are fixed.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.model import kinematics

@@ -8,8 +8,6 @@ that (its words, its gauge, what contains it, what only a scan finds) are fields
 `docs/effects.md` adds one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """What the parameters of effects are called, in every file and on every page."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.model.array_model import ArrayModel

@@ -1,7 +1,5 @@
 """Effects of a user's own, read from a Python file."""
 
-from __future__ import annotations
-
 import traceback
 from pathlib import Path
 

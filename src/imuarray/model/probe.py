@@ -1,7 +1,5 @@
 """Whether an effect is what it declares: found out once, before anything rests on it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.errors import InputError

@@ -1,7 +1,5 @@
 """Derivatives of a prediction by all effects' parameters, the chain rule taken effect by effect."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ A reading taken at t + tau is the ideal one plus tau times its derivative, and t
 order where the recording's smooth motion determines them (`Instant`).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.model import kinematics

@@ -1,7 +1,5 @@
 """Smooth continuous motion with exact derivatives, sampled at any instants."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

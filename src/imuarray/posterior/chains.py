@@ -1,7 +1,5 @@
 """What a sampler hands back, and its file: an `xarray.DataTree` in NetCDF-4."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Judging paired chains: burn-in, R-hat, effective sample size, agreement, a summary."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

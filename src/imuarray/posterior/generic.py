@@ -12,8 +12,6 @@ Parameters may end in logs of factors on the sds of the noise and of the motion'
 `Unknown` says which: those sds are then unknown, too.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import NamedTuple
 

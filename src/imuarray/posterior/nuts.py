@@ -1,7 +1,5 @@
 """The no-U-turn sampler on a density with a gradient, whitened at its mode (numpyro's)."""
 
-from __future__ import annotations
-
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial

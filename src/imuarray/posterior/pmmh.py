@@ -1,7 +1,5 @@
 """Pseudo-marginal Metropolis-Hastings (2021, Algorithm 1), run by emcee."""
 
-from __future__ import annotations
-
 import sys
 import zipfile
 from concurrent.futures import ThreadPoolExecutor

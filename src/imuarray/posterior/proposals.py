@@ -1,7 +1,5 @@
 """Where the integrand of (26) is: a normal density around its mode in omega, per sample."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.estimation.collapsed import Collapsed

@@ -1,7 +1,5 @@
 """p(omega_t | y_g) from the spread among gyroscopes, (30a) and (30b) of paper 2021."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.errors import InputError

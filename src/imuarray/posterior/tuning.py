@@ -1,7 +1,5 @@
 """Tuning of PmMH as in section III-C of paper 2021: first N, then sigma_q."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple

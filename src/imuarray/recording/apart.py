@@ -3,8 +3,6 @@
 Wrong bytes can make HDF5 loop for ever or end the process; our own files have a seal for that.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -3,8 +3,6 @@
 Equality tells: while an array turns, noise does not repeat a reading of three axes for long.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

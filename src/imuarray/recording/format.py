@@ -1,7 +1,5 @@
 """The NetCDF-4 file of a recording, read with validation and written."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

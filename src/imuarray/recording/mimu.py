@@ -5,8 +5,6 @@ K times accelerometer and gyroscope x, y, z (int16), and the 16-bit sum of all b
 big endian. Acknowledgements (A0, a byte, their 16-bit sum) may stand between packets.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_left
 from dataclasses import dataclass, field
 from pathlib import Path

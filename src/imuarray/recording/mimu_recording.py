@@ -1,7 +1,5 @@
 """From a MIMU stream and the board's geometry to a recording in the array frame."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

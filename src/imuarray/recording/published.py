@@ -1,7 +1,5 @@
 """Recordings that others published: where they are, what they must be, and how to get them."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 from dataclasses import dataclass

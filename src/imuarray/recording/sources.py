@@ -1,7 +1,5 @@
 """A configured recording: where its file is, and how to read it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from imuarray.errors import InputError

@@ -1,7 +1,5 @@
 """Anybody's logger: a CSV file, and a small YAML that names its columns and units."""
 
-from __future__ import annotations
-
 from os import PathLike
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The spellings of units that recordings and tables may use, and what each is in SI units."""
 
-from __future__ import annotations
-
 import math
 
 from imuarray.errors import InputError

@@ -3,8 +3,6 @@
 Every error says what was expected, what was found and where.
 """
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections import Counter

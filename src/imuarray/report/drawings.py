@@ -1,7 +1,5 @@
 """What a diagnosis draws of one recording: what is wrong, and what its causes gain."""
 
-from __future__ import annotations
-
 import matplotlib.ticker as ticks
 import numpy as np
 import pandas as pd

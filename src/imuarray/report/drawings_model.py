@@ -1,7 +1,5 @@
 """Each cause, the extended model's positions, and which effects a recording can distinguish."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from matplotlib.colors import LinearSegmentedColormap

@@ -1,7 +1,5 @@
 """Positions of one board from several recordings, before and after the model was extended."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

@@ -1,7 +1,5 @@
 """Whole simulated recordings with their truth."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

@@ -1,7 +1,5 @@
 """Monte Carlo realisations in batches, each with a random stream of its own."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np

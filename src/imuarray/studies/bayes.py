@@ -1,7 +1,5 @@
 """The Bayesian studies of paper 2021: data, targets and chains from a configuration."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

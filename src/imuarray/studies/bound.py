@@ -1,7 +1,5 @@
 """The Cramer-Rao bound of the positions: who reaches it, how fast, and what it depends on."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ Truths, motion and measurements are drawn as for `studies.sbc`. But the analysis
 own: it is handed a recording, and knows neither the noise nor the size of the motion.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple

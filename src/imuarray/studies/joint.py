@@ -5,8 +5,6 @@ Were the sampler, the likelihood or the simulator wrong, or not of one model, th
 drift away from their prior.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """PIT values: quantiles of truths in their posteriors, by each method; uniform if all is right."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """RMSE of the calibrated positions: paper 2017, figures 4 and 5."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """RMSE of the estimated motion when positions are wrong: paper 2017, figure 3."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

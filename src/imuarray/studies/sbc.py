@@ -4,8 +4,6 @@ Positions are drawn from their prior and motion from its own, measurements from 
 that is right puts the truth at a uniform quantile of its posterior.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from scipy import stats

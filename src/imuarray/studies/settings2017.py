@@ -1,7 +1,5 @@
 """Paper 2017's settings from a configuration, in SI units."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.studies import position_error

@@ -1,7 +1,5 @@
 """Truths drawn from their prior, what is measured of them, and where their posteriors are."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The Cramer-Rao bound of the positions, motion unknown (left open in paper 2017)."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

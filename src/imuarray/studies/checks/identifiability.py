@@ -1,7 +1,5 @@
 """What determines the positions and the motion: ranks, Lemma 1, invariances (paper 2017)."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

@@ -1,7 +1,5 @@
 """Fisher information of the papers' model, from its structure tensor alone."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -4,8 +4,6 @@ One Gauss-Newton step from the truth with prior: Gaussian, no chains. Good where
 is narrow; it is what the claims fall back on where the chains are too short to have converged.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

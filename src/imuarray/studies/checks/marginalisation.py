@@ -1,7 +1,5 @@
 """The algebra and the estimator of paper 2021, section III-B, on numbers."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The tuning rules that paper 2021 quotes in section III-C."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.optimize import minimize
 from scipy.special import ndtr

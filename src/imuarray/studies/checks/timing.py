@@ -1,7 +1,5 @@
 """Processor time, by the clock: not reproducible to the byte, for rough comparisons only."""
 
-from __future__ import annotations
-
 import time
 from functools import partial
 
