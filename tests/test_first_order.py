@@ -159,6 +159,26 @@ def test_the_fit_is_that_of_the_plain_form():
     np.testing.assert_allclose(found.direction, plain[2], atol=1e-7)
 
 
+def test_recordings_of_a_board_share_matrices_and_have_offsets_of_their_own():
+    rng = np.random.default_rng(12)
+    matrix, offset = triads(3, rng)
+    offsets = np.array([offset, offset + rng.normal(0, 0.05, offset.shape)])
+    recording = np.repeat([0, 1], [9, 12])
+    unit = directions(21, rng)
+    sd = np.full((21, 3, 3), 1e-3)
+    mean = np.einsum("kij,pj->pki", matrix, GRAVITY * unit) + offsets[recording]
+    mean += sd * rng.standard_normal(mean.shape)
+    both = fit_triads(mean, sd, GRAVITY, recording=recording)
+    alone = fit_triads(mean[:9], sd[:9], GRAVITY)
+    np.testing.assert_allclose(both.offset, offsets[0], atol=4e-3)
+    np.testing.assert_allclose(both.matrix, matrix, atol=5e-4)
+    assert both.residual_ratio == pytest.approx(1.0, abs=0.25)
+    narrower = both.parts_sd()["scale"] / both.residual_ratio < alone.parts_sd()["scale"]
+    assert narrower.all()
+    own = both.first()
+    assert own.residual.shape == (9, 3, 3) and own.direction_covariance.shape == (27, 27)
+
+
 def test_a_jumping_offset_is_left_out_where_it_jumps():
     rng = np.random.default_rng(8)
     matrix, offset = triads(4, rng)

@@ -90,8 +90,8 @@ def first_order(
     shortest_pose
         That a still pose lasts at least, s.
     others
-        Further recordings of the board: the gyroscopes' maps, and so the array's size, are from the
-        moves of all.
+        Further recordings of the board, made at the same place: maps, and so the array's frame and
+        size, are from the poses and moves of all; offsets are this recording's own.
 
     InputError without enough still poses, and for mirrored axes.
     """

@@ -22,12 +22,12 @@ COUPLED = 0.1  # a rail of one axis shows in another that the correction mixes i
 
 @dataclass(frozen=True)
 class FirstOrder:
-    """Per triad calibration from the still poses of one recording.
+    """Per triad calibration from the still poses of one recording, or of several of one board.
 
     Attributes
     ----------
     poses : list of slice
-    triads : TriadFit, accelerometers
+    triads : TriadFit, accelerometers, with this recording's poses
     gyroscope_offset, gyroscope_offset_sd : (G, 3) rad/s
         Mean over poses, and its sd from the spread among poses, which holds drift and whatever
         depends on gravity.
@@ -94,49 +94,67 @@ def calibrate_first_order(
     gravity : m/s^2
     gyroscopes : "calibrate" for their maps, "offset" for no more than their offsets (paper 2021)
     shortest_pose : s, that a still pose lasts at least
-    others : further recordings of the same board, whose moves, too, say what the gyroscopes' maps
-        are; a recording's own say the scale common to all of them to 0.1 % or so
+    others : further recordings of the same board at the same place, whose poses and moves, too, say
+        what the maps are; offsets are each recording's own
 
     InputError or IdentifiabilityError where there are no poses, too few or too similar ones, and
     where axes are mirrored, rates have another unit, or channels or samples are copied.
     """
     require_one_of("gyroscopes", gyroscopes, GYROSCOPES)
     for other in others:
-        if other.gyroscope_labels != recording.gyroscope_labels:
-            raise InputError("recordings: expected one board, found gyroscopes of other labels")
+        if _labels(other) != _labels(recording):
+            raise InputError("recordings: expected one board, found sensors of other labels")
     if others:
         require_apart([recording, *others])
-    found = _of_poses(recording, gravity, shortest_pose)
+    every = [_still(one, shortest_pose) for one in (recording, *others)]
+    triads = _triads(every, gravity)
+    found = _of_poses(every[0], triads.first(), gravity)
     if gyroscopes == "calibrate":
-        more = [_still(one, _of_poses(one, gravity, shortest_pose)) for one in others]
-        found = replace(found, gyroscopes=calibrate_gyroscopes(_still(recording, found), more))
+        found = replace(found, gyroscopes=calibrate_gyroscopes(every, triads))
     return found
 
 
-def _still(recording: Recording, found: FirstOrder) -> Still:
-    offsets = np.array([recording.angular_rate[pose].mean(axis=0) for pose in found.poses])
-    return Still(recording, found.poses, found.triads, offsets, found.gyroscope_noise)
+def _labels(recording: Recording) -> tuple:
+    return *recording.accelerometer_labels, *recording.gyroscope_labels
 
 
-def _of_poses(recording: Recording, gravity: float, shortest: float) -> FirstOrder:
-    """What the still poses alone say: nothing of the gyroscopes' maps."""
+def _still(recording: Recording, shortest: float) -> Still:
     require_live(recording)
     require_once(recording)
     poses = still_poses(recording, shortest=shortest)
-    force = [recording.specific_force[pose] for pose in poses]
     rate = [recording.angular_rate[pose] for pose in poses]
-    noise = white_noise_sd(force)
-    # a quantised reading that never changes has no spread of its own
-    noise = np.maximum(noise, 1e-6 * gravity)
-    counts = np.array([len(piece) for piece in force])
-    mean = np.array([piece.mean(axis=0) for piece in force])
-    sd = noise / np.sqrt(counts)[:, None, None]
     offsets = np.array([piece.mean(axis=0) for piece in rate])
-    spread = offsets.std(axis=0, ddof=1) if len(poses) > 1 else np.full(offsets.shape[1:], np.nan)
-    triads = fit_triads(mean, sd, gravity, recording.accelerometer_labels)
+    return Still(recording, poses, offsets, white_noise_sd(rate))
+
+
+def _forces(still: Still) -> tuple[list[np.ndarray], np.ndarray]:
+    """Readings of the accelerometers in each pose, and the noise (A, 3) m/s^2 of one."""
+    force = [still.recording.specific_force[pose] for pose in still.poses]
+    # a quantised reading that never changes has no spread of its own
+    return force, np.maximum(white_noise_sd(force), 1e-6 * GRAVITY)
+
+
+def _triads(every: Sequence[Still], gravity: float) -> TriadFit:
+    """Of the poses of all recordings, one recording after the other."""
+    mean, sd = [], []
+    for one in every:
+        force, noise = _forces(one)
+        mean += [piece.mean(axis=0) for piece in force]
+        sd += [noise / np.sqrt(len(piece)) for piece in force]
+    recording = np.repeat(np.arange(len(every)), [len(one.poses) for one in every])
+    labels = every[0].recording.accelerometer_labels
+    return fit_triads(np.array(mean), np.array(sd), gravity, labels, recording)
+
+
+def _of_poses(still: Still, triads: TriadFit, gravity: float) -> FirstOrder:
+    """What the still poses alone say: nothing of the gyroscopes' maps."""
+    force, noise = _forces(still)
+    rate = [still.recording.angular_rate[pose] for pose in still.poses]
+    offsets, counts = still.offsets, [len(piece) for piece in rate]
+    spread = offsets.std(axis=0, ddof=1) if len(rate) > 1 else np.full(offsets.shape[1:], np.nan)
     return FirstOrder(
-        poses, triads, np.average(offsets, axis=0, weights=counts),
-        spread / np.sqrt(len(poses)), noise, white_noise_sd(rate), lag_correlation(force),
+        still.poses, triads, np.average(offsets, axis=0, weights=counts),
+        spread / np.sqrt(len(rate)), noise, still.noise, lag_correlation(force),
         lag_correlation(rate), gravity,
     )  # fmt: skip
 

@@ -46,14 +46,13 @@ class Gyroscopes:
 
 
 class Still(NamedTuple):
-    """A recording's P still poses, and what they say of its sensors.
+    """A recording's P still poses, and what the gyroscopes read in them.
 
-    ``offsets`` (P, G, 3) rad/s the gyroscopes' mean readings in them, ``noise`` (G, 3) rad/s.
+    ``offsets`` (P, G, 3) rad/s the mean readings, ``noise`` (G, 3) rad/s.
     """
 
     recording: Recording
     poses: list[slice]
-    triads: TriadFit
     offsets: np.ndarray
     noise: np.ndarray
 
@@ -74,29 +73,29 @@ class Still(NamedTuple):
         return free
 
 
-def calibrate_gyroscopes(own: Still, others: Sequence[Still] = ()) -> Gyroscopes:
+def calibrate_gyroscopes(every: Sequence[Still], triads: TriadFit) -> Gyroscopes:
     """Maps of all gyroscopes: relative to their mean, and one common map from the moves.
 
-    An IMU's gyroscope starts turned as its accelerometer is. ``others``: of the same board, whose
-    rates and moves say as much of the maps.
+    An IMU's gyroscope starts turned as its accelerometer is. ``every``: recordings of one board,
+    the one to be corrected first; ``triads`` are of all their poses, one recording after the other.
 
     InputError for a gyroscope that is mirrored or dead, for wrong units and for left-handed axes.
     """
-    every, begun = [own, *others], 0.0
+    own, begun = every[0], 0.0
     times = []
     for one in every:  # one after the other, far apart
         times.append(one.recording.time - one.recording.time[0] + begun)
         begun = times[-1][-1] + APART
     rate = np.concatenate([one.rate() for one in every])
     free = np.concatenate([one.free() for one in every])
-    start = _start(own.recording, own.triads)
+    start = _start(own.recording, triads)
     labels = own.recording.gyroscope_labels
     relative = compare(rate, np.concatenate(times), free, start, labels)
     if isinstance(relative, str):
         turn, maps = start, np.broadcast_to(np.eye(3), start.shape)
     else:
         turn, maps = relative.turn, relative.map
-    common = _common([(one, _moves(one, turn @ maps)) for one in every])
+    common = _common([(one, _moves(one, turn @ maps)) for one in every], triads)
     return Gyroscopes(*_together(turn, maps, relative, common), relative, common)
 
 
@@ -110,15 +109,13 @@ def _moves(one: Still, matrix) -> list[Move]:
     return gather(mean, one.recording.time, one.poses, still, one.good(), sd)
 
 
-def _common(several) -> CommonMap | str:
+def _common(several, triads: TriadFit) -> CommonMap | str:
     """The map common to all gyroscopes from [(recording, moves)]; its moves are the first one's."""
     moves, poses = [], 0
     for one, own in several:
         moves += [move._replace(first=move.first + poses) for move in own]
         poses += len(one.poses)
-    triads = [one.triads for one, _ in several]
-    direction = np.concatenate([each.direction for each in triads])
-    found = common_map(moves, direction, block_diag(*(t.direction_covariance for t in triads)))
+    found = common_map(moves, triads.direction, triads.direction_covariance)
     if isinstance(found, str):
         return found
     own = found.first < len(several[0][0].poses)

@@ -3,10 +3,12 @@
 All triads of a rigid array see the same specific force u_p in pose p, of known magnitude and
 unknown direction: y_kp = M_k u_p + b_k + e. The reference triad's matrix M_1 is upper
 triangular, which makes its axes the array frame (paper 2021, section IV-B, after its [18]).
+Several recordings of a board share the matrices, and have offsets b_k of their own.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from typing import Self
 
 import numpy as np
 from scipy.linalg import rq
@@ -26,12 +28,12 @@ SMALL = np.radians(20.0)  # a triad turned by less starts from the drawing
 
 @dataclass(frozen=True)
 class TriadFit:
-    """What the still poses say of A accelerometer triads.
+    """What the P still poses of a recording, or of several, say of A accelerometer triads.
 
     Attributes
     ----------
     matrix : (A, 3, 3), reading = matrix @ specific force + offset; the first upper triangular
-    offset : (A, 3) m/s^2
+    offset : (A, 3) m/s^2, in the first recording
     direction : (P, 3) unit vectors of the specific force in the poses
     residual : (P, A, 3) m/s^2
     covariance : (12 A, 12 A) of (matrix row by row, offset) triad by triad, scaled to the
@@ -41,6 +43,7 @@ class TriadFit:
     used : (P, A) bool
         False where a triad's reading in a pose was left out as an outlier.
     direction_covariance : (3 P, 3 P), scaled like the other; along a direction it says nothing
+    recording : (P,) int, the recording of each pose
     """
 
     matrix: np.ndarray
@@ -51,6 +54,16 @@ class TriadFit:
     residual_ratio: float
     used: np.ndarray
     direction_covariance: np.ndarray
+    recording: np.ndarray
+
+    def first(self) -> Self:
+        """The same with the poses of the first recording only."""
+        own = self.recording == 0
+        both = np.ix_(np.repeat(own, 3), np.repeat(own, 3))
+        return replace(
+            self, direction=self.direction[own], residual=self.residual[own], used=self.used[own],
+            direction_covariance=self.direction_covariance[both], recording=self.recording[own],
+        )  # fmt: skip
 
     @property
     def residual_rms(self) -> np.ndarray:
@@ -125,23 +138,23 @@ def _part_slopes(matrix) -> dict[str, np.ndarray]:
     return {"scale": diagonal.T, "misalignment": skew.T, "orientation": small}
 
 
-def _unpack(p, triads):
-    """(matrices (A, 3, 3), offsets (A, 3), directions (P, 3) not normalised) from the flat p."""
+def _unpack(p, triads, poses):
+    """(matrices (A, 3, 3), offsets (R, A, 3), directions (P, 3) not normalised) from the flat p."""
     first = jnp.zeros((3, 3)).at[UPPER].set(p[:6])
-    split = 6 + 9 * (triads - 1)
+    split, end = 6 + 9 * (triads - 1), len(p) - 3 * poses
     others = p[6:split].reshape(triads - 1, 3, 3)
-    offsets = p[split : split + 3 * triads].reshape(triads, 3)
-    return jnp.concatenate([first[None], others]), offsets, p[split + 3 * triads :].reshape(-1, 3)
+    offsets = p[split:end].reshape(-1, triads, 3)
+    return jnp.concatenate([first[None], others]), offsets, p[end:].reshape(-1, 3)
 
 
-def _predict(p, triads, magnitude):
-    matrices, offsets, directions = _unpack(p, triads)
+def _predict(p, triads, magnitude, recording):
+    matrices, offsets, directions = _unpack(p, triads, len(recording))
     length = jnp.sqrt(jnp.sum(directions**2, axis=1, keepdims=True))
     force = magnitude * directions / length
-    return jnp.einsum("kij,pj->pki", matrices, force) + offsets
+    return jnp.einsum("kij,pj->pki", matrices, force) + offsets[recording]
 
 
-def fit_triads(mean, sd, magnitude: float, labels=None) -> TriadFit:
+def fit_triads(mean, sd, magnitude: float, labels=None, recording=None) -> TriadFit:
     """ML estimate from the poses' averages, without the readings that stand far out.
 
     A triad whose offset has jumped or drifts (sensors settling after power-on do) spoils the
@@ -155,6 +168,8 @@ def fit_triads(mean, sd, magnitude: float, labels=None) -> TriadFit:
     sd : (P, A, 3) m/s^2, standard deviation of that average
     magnitude : float, m/s^2, gravity where the recording was made
     labels : of the triads, for messages; by default their numbers
+    recording : (P,) int, which of several recordings of the board, from 0, each pose is from; the
+        board was not taken apart between them. By default all are of one.
 
     Raises
     ------
@@ -163,6 +178,7 @@ def fit_triads(mean, sd, magnitude: float, labels=None) -> TriadFit:
     IdentifiabilityError
         Where the poses are too few or too alike to determine all parameters.
     """
+    recording = np.zeros(len(mean), int) if recording is None else np.asarray(recording)
     turns = _turns(mean, labels or [str(k + 1) for k in range(mean.shape[1])])
     # all triads' mean in the frame of the first
     unit = np.einsum("kji,pkj->pki", turns, mean).mean(axis=1) / magnitude
@@ -175,7 +191,7 @@ def fit_triads(mean, sd, magnitude: float, labels=None) -> TriadFit:
         )
     used = np.ones(mean.shape[:2], bool)
     while True:
-        found, gain = _fit(mean, sd, magnitude, used, (turns, unit))
+        found, gain = _fit(mean, sd, magnitude, recording, used, (turns, unit))
         spare = (~used).sum(axis=0) < MOST_LEFT_OUT * len(mean)
         candidates = np.where(used & spare, gain, 0.0)
         worst = np.unravel_index(np.argmax(candidates), gain.shape)
@@ -194,17 +210,17 @@ def _turns(mean, labels) -> np.ndarray:
 
 
 @partial(jax.jit, static_argnums=1)
-def _residual(p, triads, mean, weight, magnitude):
-    misfit = ((mean - _predict(p, triads, magnitude)) * weight).ravel()
+def _residual(p, triads, mean, weight, magnitude, recording):
+    misfit = ((mean - _predict(p, triads, magnitude, recording)) * weight).ravel()
     # fixes the directions' free lengths at 1; zero at the solution, so it costs nothing
-    lengths = jnp.sum(_unpack(p, triads)[2] ** 2, axis=1) - 1.0
+    lengths = jnp.sum(_unpack(p, triads, len(mean))[2] ** 2, axis=1) - 1.0
     return jnp.concatenate([misfit, lengths])
 
 
 _slopes = jax.jit(jax.jacfwd(_residual), static_argnums=1)
 
 
-def _fit(mean, sd, magnitude, used, start) -> tuple[TriadFit, np.ndarray]:
+def _fit(mean, sd, magnitude, recording, used, start) -> tuple[TriadFit, np.ndarray]:
     """Least squares over the readings ``used``; also what leaving each one out would gain.
 
     The gain (P, A) is how much the sum of squares would fall (by linear theory), so that a
@@ -212,11 +228,10 @@ def _fit(mean, sd, magnitude, used, start) -> tuple[TriadFit, np.ndarray]:
     directions (P, 3).
     """
     poses, triads = mean.shape[:2]
-    given = mean, used[..., None] / sd, magnitude
+    given = mean, used[..., None] / sd, magnitude, recording
     turns, unit = start
-    start = np.concatenate(
-        [np.eye(3)[UPPER], turns[1:].ravel(), np.zeros(3 * triads), unit.ravel()]
-    )
+    offsets = np.zeros(3 * triads * (1 + recording.max()))
+    start = np.concatenate([np.eye(3)[UPPER], turns[1:].ravel(), offsets, unit.ravel()])
     found = least_squares(
         lambda p: np.asarray(_residual(p, triads, *given)), start,
         jac=lambda p: np.asarray(_slopes(p, triads, *given)),
@@ -237,13 +252,14 @@ def _fit(mean, sd, magnitude, used, start) -> tuple[TriadFit, np.ndarray]:
     misfit = found.fun[: mean.size].reshape(poses, triads, 3)
     # a reading that alone determines something cannot be spared: its inverse is kept finite
     solved = np.linalg.solve(free + 1e-9 * np.eye(3), misfit[..., None])[..., 0]
-    return _result(found, mean, used, magnitude), np.einsum("pki,pki->pk", misfit, solved)
+    gain = np.einsum("pki,pki->pk", misfit, solved)
+    return _result(found, mean, used, magnitude, recording), gain
 
 
-def _result(found, mean, used, magnitude) -> TriadFit:
+def _result(found, mean, used, magnitude, recording) -> TriadFit:
     poses, triads = used.shape
     freedom = 3 * int(used.sum()) + poses - found.x.size
-    matrices, offsets, directions = (np.asarray(x) for x in _unpack(found.x, triads))
+    matrices, offsets, directions = (np.asarray(x) for x in _unpack(found.x, triads, poses))
     ratio = np.sqrt(2 * found.cost / freedom) if freedom > 0 else np.nan
     scale = max(ratio, 1.0) if freedom > 0 else 1.0
     shape = 12 * triads - 3
@@ -259,8 +275,8 @@ def _result(found, mean, used, magnitude) -> TriadFit:
     covariance = np.zeros((12 * triads, 12 * triads))
     covariance[np.ix_(place, place)] = small[:shape, :shape]
     direction = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    residual = mean - np.asarray(_predict(found.x, triads, magnitude))
+    residual = mean - np.asarray(_predict(found.x, triads, magnitude, recording))
     return TriadFit(
-        matrices, offsets, direction, residual, covariance, float(ratio), used,
-        small[shape:, shape:],
+        matrices, offsets[0], direction, residual, covariance, float(ratio), used,
+        small[-3 * poses :, -3 * poses :], recording,
     )  # fmt: skip
