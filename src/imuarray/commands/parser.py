@@ -127,8 +127,8 @@ COMMANDS = (
                     choices=("calibrate", "offset"), default="calibrate"),
             _number("--shortest-pose", "S", "that a still pose lasts at least, s (default: 3)",
                     3.0),
-            _option("--with", "further recordings of the board, made at the same place: maps, and so"
-                    " the array's frame and size, are from the poses and moves of all",
+            _option("--with", "further recordings of the board, made at the same place: maps, and"
+                    " so the array's frame and size, are from the poses and moves of all",
                     type=InputFile, nargs="+", default=[], dest="others", metavar="other.nc"),
         ),
     ),
