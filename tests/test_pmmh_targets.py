@@ -18,7 +18,6 @@ from imuarray.posterior.target import (
     CompiledTarget,
     GaussianPrior,
     GenericTarget,
-    PreconditionedTarget,
 )
 from tests import oracles
 from tests.cases import SHAPE, simulate
@@ -168,7 +167,7 @@ def test_preconditioned_proposals_have_the_same_law():
     centre = mean + 0.3 * np.sqrt(np.diag(spread))
     factor = 1.2 * np.linalg.cholesky(spread)
     likelihood = Likelihood.of(model, force, rate)
-    target = PreconditionedTarget(likelihood, prior, 20, centre, factor)
+    target = CompiledTarget(likelihood, prior, 20, centre, factor)
     starts = mean + 1e-3 * np.random.default_rng(5).standard_normal((4, 6))
     run = run_chains(target, starts, 0.7, 2000, 20, seed=6, quiet=True)
     sample = run.draws[:, 200:]

@@ -11,6 +11,8 @@ from imuarray.geometry import positions_of
 from imuarray.posterior import kernels
 from imuarray.posterior.likelihood import Likelihood
 
+WALK = np.empty(0), np.empty((0, 0))  # no centre, no factor: the walk (27)
+
 
 @dataclass(frozen=True)
 class GaussianPrior:
@@ -71,11 +73,21 @@ class Target:
 
 @dataclass(frozen=True)
 class CompiledTarget(Target):
-    """The papers' model: theta are the positions r_2 ... r_A, everything compiled."""
+    """The papers' model: theta are the positions r_2 ... r_A, everything compiled.
+
+    With a ``centre`` (size,) and a ``factor`` (lower (size, size)) proposals are preconditioned
+    Crank-Nicolson: they leave the normal density of that mean and covariance factor factor' as it
+    is. With a posterior close to it nearly all are accepted, however long the step. ``step`` is
+    then a share of that density's own spread, 1 an independent draw. Like the random walk it is
+    exact whatever the centre and shape; a ``factor`` a little wider than the posterior keeps it
+    from sticking in the tails.
+    """
 
     likelihood: Likelihood
     prior: GaussianPrior
     draws: int
+    centre: np.ndarray | None = None
+    factor: np.ndarray | None = None
 
     def estimate(self, theta, rng) -> float:
         """log p-hat."""
@@ -84,32 +96,10 @@ class CompiledTarget(Target):
     def transitions(self, theta, log_target, step, count, rng) -> tuple[int, float]:
         """`Target.transitions`, compiled; releases the interpreter for other chains."""
         prior = np.stack([self.prior.mean, self.prior.sd**-2.0])
+        shape = WALK if self.centre is None else (self.centre, self.factor)
         return kernels.transitions(
-            theta, log_target, prior, step, self.draws, self.likelihood.power,
+            theta, log_target, prior, *shape, step, self.draws, self.likelihood.power,
             self.likelihood.data, rng, count,
-        )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class PreconditionedTarget(CompiledTarget):
-    """The papers' model with preconditioned Crank-Nicolson proposals.
-
-    Proposals leave the normal density of mean ``centre`` (size,) and covariance factor factor'
-    (``factor`` lower (size, size)) as it is: with a posterior close to it nearly all are accepted,
-    however long the step. ``step`` is a share of that density's own spread, 1 an independent
-    draw. Like the random walk it is exact whatever the centre and shape; a ``factor`` a little
-    wider than the posterior keeps it from sticking in the tails.
-    """
-
-    centre: np.ndarray = None
-    factor: np.ndarray = None
-
-    def transitions(self, theta, log_target, step, count, rng) -> tuple[int, float]:
-        """`Target.transitions`, compiled; releases the interpreter for other chains."""
-        prior = np.stack([self.prior.mean, self.prior.sd**-2.0])
-        return kernels.crank_nicolson(
-            theta, log_target, prior, self.centre, self.factor, step, self.draws,
-            self.likelihood.power, self.likelihood.data, rng, count,
         )  # fmt: skip
 
 
@@ -119,7 +109,7 @@ class GenericTarget(Target):
 
     ``scale``, (size,) or a lower factor (size, size), turns the walk's one step length into a
     step per parameter: effects have units of their own, and gauges that tie them together. With
-    a ``centre`` (size,) proposals are those of `PreconditionedTarget`, ``scale`` their factor.
+    a ``centre`` (size,) proposals are preconditioned Crank-Nicolson, ``scale`` their factor.
     """
 
     estimate: Callable

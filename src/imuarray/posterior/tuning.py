@@ -8,7 +8,7 @@ import numpy as np
 
 from imuarray.geometry import positions_of
 from imuarray.posterior.likelihood import Likelihood
-from imuarray.posterior.target import CompiledTarget, GaussianPrior, PreconditionedTarget, Target
+from imuarray.posterior.target import CompiledTarget, GaussianPrior, Target
 
 
 class Sweeps(NamedTuple):
@@ -87,17 +87,17 @@ def tune_step(target: Target, start, steps, transitions: int, rng, aim=0.18, thr
 def tune_preconditioned(
     likelihood: Likelihood, prior: GaussianPrior, centre, factor, lengths, rng,
     may_centre: bool = False,
-) -> tuple[PreconditionedTarget, float]:  # fmt: skip
+) -> tuple[CompiledTarget, float]:  # fmt: skip
     """(target, step) of preconditioned Crank-Nicolson proposals: N at the mode, the longest jumps.
 
-    ``centre`` (P,) and ``factor`` (P, P) as in `PreconditionedTarget`; of the ``lengths`` that
+    ``centre`` (P,) and ``factor`` (P, P) as in `CompiledTarget`; of the ``lengths`` that
     with the largest expected squared jump. ``may_centre`` as in `tune`.
     """
     tried = Sweeps(lengths)
     likelihood, draws, *_ = _tuned_draws(
         likelihood, positions_of(centre), lambda _: centre, tried, lambda _: rng, 1, may_centre
     )
-    target = PreconditionedTarget(likelihood, prior, draws, centre, factor)
+    target = CompiledTarget(likelihood, prior, draws, centre, factor)
     return target, longest_jump(target, centre, lengths, tried.transitions, rng)
 
 

@@ -17,7 +17,7 @@ from imuarray.model import ArrayModel
 from imuarray.motion import normal_motion
 from imuarray.posterior.diagnostics import ess_of_mean
 from imuarray.posterior.likelihood import Likelihood
-from imuarray.posterior.target import CompiledTarget, GaussianPrior, PreconditionedTarget
+from imuarray.posterior.target import CompiledTarget, GaussianPrior
 from imuarray.simulation.measure import measure
 from imuarray.streams import stream
 from imuarray.studies.truths import misfit
@@ -85,7 +85,7 @@ def _walk(likelihood: Likelihood, model: ArrayModel, prior: GaussianPrior) -> Co
 def _preconditioned(likelihood, model, prior) -> CompiledTarget:
     """Omega drawn around each integrand's mode, at positions that do not hang on theta."""
     centred = likelihood.centred(model.array.relative)
-    return PreconditionedTarget(centred, prior, DRAWS, prior.mean, np.diag(prior.sd))
+    return CompiledTarget(centred, prior, DRAWS, prior.mean, np.diag(prior.sd))
 
 
 TARGETS = {"walk": _walk, "pcn": _preconditioned}

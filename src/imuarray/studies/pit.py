@@ -9,7 +9,7 @@ from scipy import stats
 from imuarray.geometry import positions_of
 from imuarray.posterior import tuning
 from imuarray.posterior.diagnostics import ess
-from imuarray.posterior.target import CompiledTarget, PreconditionedTarget
+from imuarray.posterior.target import CompiledTarget
 from imuarray.streams import stream
 from imuarray.studies.batches import run_batches
 from imuarray.studies.truths import SPARE, Replicate, Setting, misfit, replicate
@@ -134,7 +134,7 @@ def _preconditioned(setting: Setting, pilot: Replicate, rng):
     )
 
     def target(one):
-        return PreconditionedTarget(one.likelihood, setting.prior, tuned.draws, *shape(one))
+        return CompiledTarget(one.likelihood, setting.prior, tuned.draws, *shape(one))
 
     # the tails are not the normal density's: where long steps are refused, short ones are not
     return target, (best, best / SHORTER)
@@ -180,12 +180,12 @@ def _learnt(target, theta, lengths, spacing: int, rng):
         for row in kept:
             value = _moved(target, theta, value, lengths, spacing, rng)
             row[:] = theta
-        if isinstance(target, PreconditionedTarget):
+        if target.centre is not None:
             target = _reshaped(target, kept[LEARNT // 4 :])
     return target, value
 
 
-def _reshaped(target: PreconditionedTarget, kept) -> PreconditionedTarget:
+def _reshaped(target: CompiledTarget, kept) -> CompiledTarget:
     """Around what was seen; the shape's prior weighs as much as a draw for each coordinate."""
     centre, (count, size) = kept.mean(axis=0), kept.shape
     seen, before = np.cov(kept.T), target.factor @ target.factor.T / WIDER**2
