@@ -11,6 +11,7 @@ from imuarray.analysis.calibration_dataset import engine_dataset
 from imuarray.engine.estimate import Recorded, estimate
 from imuarray.engine.fit import flat_parameters
 from imuarray.engine.ladder import climb, mask_of
+from imuarray.engine.linearise import reading
 from imuarray.engine.parameters import POSITION, columns_of
 from imuarray.engine.passes import normal_pass
 from imuarray.engine.readings import arrange, most_informative
@@ -18,6 +19,7 @@ from imuarray.engine.turning import turned
 from imuarray.engine.widths import settled, widths
 from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.geometry import Array, sub_array
+from imuarray.model.effects import Prediction
 from imuarray.motion.state import Motion
 
 EFFECTS = ("gyroscope_bias", "accelerometer_scale")
@@ -239,3 +241,17 @@ def test_a_long_recording_keeps_its_most_informative_stretches(monkeypatch):
     assert len(part.time) == 128
     size = [np.mean(np.sum(r.values[:, 0, 3:] ** 2, axis=1) ** 2) for r in (part, whole)]
     assert size[0] > size[1]
+
+
+def test_a_clock_that_wanders_is_read_at_other_ages():
+    """As far as an offset of so many turns; what else an instant knows is not in its place."""
+    columns = columns_of(sub_array(imuarray.mimu4444(), 3), ("sensor_clock",), 1e-3)
+    places, x = np.eye(3), np.concatenate([np.arange(9.0), np.zeros(15)])
+    flat = Prediction(np.zeros((3, 3)), np.zeros((1, 3)))
+    read = []
+    for offset, turns in ((0.25e-3, 0.0), (0.0, 0.25)):
+        clock = np.tile([1e-3, 0.5, 0.1, offset, 0.0], 3)
+        extra = np.zeros(3), np.zeros(3), flat, flat, np.full(3, turns)
+        read.append(reading(columns.model, 3, x, places, clock, extra, 1.0, 9.0))
+    np.testing.assert_allclose(*read, rtol=1e-12)
+    assert np.abs(read[0][0, 3:] - x[:3]).max() > 1e-4

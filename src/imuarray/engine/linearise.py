@@ -102,7 +102,7 @@ def _instant(x, positions, extra, time, span) -> Instant:
     if len(x) > 18:
         own = Turning(x[:3] + x[21:24], own.acceleration, jerk + x[18:21])
     motion = Motion(x[:3], x[3:6], x[6:9], jerk, force_rate)
-    return Instant(motion, positions, time, span, second, third, own, wander)
+    return Instant(motion, positions, time, span, second, third, own, wander=wander)
 
 
 def reading(model, count, x, positions, parameters, extra, time, span):
