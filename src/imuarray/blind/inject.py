@@ -4,10 +4,9 @@ Ids of the catalogue are those of the project's list; ``outside_`` ones are not 
 ones can not be distinguished from a clean recording.
 """
 
-from imuarray.blind import errors, gauge, noise, outside, timing
+from imuarray.blind import errors, gauge, noise, outside, timing  # noqa: F401  (they register)
 from imuarray.blind.change import EFFECTS
 
-MODULES = (errors, gauge, noise, outside, timing)
 GAUGE = tuple(name for name in EFFECTS if name.startswith("gauge_"))
 OUTSIDE = tuple(name for name in EFFECTS if name.startswith("outside_"))
 CATALOGUE = tuple(name for name in EFFECTS if name not in GAUGE + OUTSIDE)

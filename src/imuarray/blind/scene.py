@@ -160,17 +160,10 @@ class Scene:
         ]
         return States(*(np.stack(x, axis=1) for x in zip(*columns, strict=True)))
 
-    def ideal(
-        self, times: np.ndarray | None = None, gyroscope_times: np.ndarray | None = None
-    ) -> Pair:
-        """Readings without noise or error: u_k (T, A, 3) m/s^2 and w (T, G, 3) rad/s.
-
-        ``times`` (T, A) seconds are the instants of each IMU, or of its accelerometers alone if
-        ``gyroscope_times`` (T, G) is given.
-        """
-        turning = self.states(times if gyroscope_times is None else gyroscope_times).rate
-        shape = (len(self.time), self.accelerometers, 3)
-        return Pair(force_at(self.states(times), self.positions), np.broadcast_to(turning, shape))
+    def ideal(self) -> Pair:
+        """Readings without noise or error: u_k (T, A, 3) m/s^2 and w (T, G, 3) rad/s."""
+        here = self.field(Pair(None, None))
+        return Pair(here.force, here.rate)
 
     def field(self, ages: Pair) -> Field:
         """What the sensors meet at their own instants, the host's plus ``ages``."""

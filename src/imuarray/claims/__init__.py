@@ -14,9 +14,3 @@ from imuarray.claims import (
     theory2017,
     tuning2021,
 )
-
-MODULES = (
-    error2017, rate2017, theory2017,
-    estimator2021, tuning2021, posterior2021, experiment2021,
-    measured2021,
-)  # fmt: skip

@@ -3,14 +3,3 @@
 from imuarray.geometry.array import Array, positions_of, sub_array
 from imuarray.geometry.mimu4444 import UNDERSIDE_ROTATION, mimu4444, mimu4444_corners
 from imuarray.geometry.read import array_from_config, array_from_csv
-
-__all__ = [
-    "UNDERSIDE_ROTATION",
-    "Array",
-    "array_from_config",
-    "array_from_csv",
-    "mimu4444",
-    "mimu4444_corners",
-    "positions_of",
-    "sub_array",
-]

@@ -6,17 +6,3 @@ from imuarray.model.effects import DATA_EFFECTS, EFFECTS, Effect, effect
 from imuarray.model.noise import Noise
 from imuarray.model.own import read_effects
 from imuarray.model.structure import structure_tensor
-
-__all__ = [
-    "DATA_EFFECTS",
-    "EFFECTS",
-    "ArrayModel",
-    "Effect",
-    "Noise",
-    "Prediction",
-    "catalogue",
-    "effect",
-    "read_effects",
-    "structure_tensor",
-    "timing",
-]

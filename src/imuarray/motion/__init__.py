@@ -3,5 +3,3 @@
 from imuarray.motion.random import normal_motion, sphere_motion
 from imuarray.motion.smooth import SmoothMotion, hand_twisting
 from imuarray.motion.state import Motion
-
-__all__ = ["Motion", "SmoothMotion", "hand_twisting", "normal_motion", "sphere_motion"]

@@ -8,13 +8,3 @@ from imuarray.recording.format import (
     write_recording,
 )
 from imuarray.recording.record import Recording, array_of
-
-__all__ = [
-    "Recording",
-    "array_of",
-    "has_truth",
-    "load_dataset",
-    "read_recording",
-    "read_truth",
-    "write_recording",
-]

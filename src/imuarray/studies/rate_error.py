@@ -34,7 +34,7 @@ def square_errors(model, rng, count, motion, position_sd, rail, gyroscopes: bool
 
 def rmse_against_rate(
     model: ArrayModel, seed, rates, angular_acceleration, specific_force, position_sds,
-    realisations, rail, threads=1, quiet=True,
+    realisations, rail, threads=1,
 ) -> pd.DataFrame:  # fmt: skip
     """Figure 3: RMSE of the motion for each |omega| (rad/s) and position error sd (m)."""
     rows = []
