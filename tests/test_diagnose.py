@@ -11,10 +11,16 @@ from imuarray.blind.cases import Case, make
 from imuarray.cli import main
 from imuarray.diagnosis.document import diagnose, precision_of, structural_gain
 from imuarray.diagnosis.extension import extended_model, read_extension
+from imuarray.diagnosis.final_checks import beside_left
 from imuarray.diagnosis.procedure import run_procedure
 from imuarray.diagnosis.reading_effects import find_structural
+from imuarray.diagnosis.residual_checks import all_checks
+from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.state import Search
 from imuarray.engine.fit import flat_parameters
 from imuarray.engine.heldout import gain, log_scores
+from imuarray.engine.parameters import catalogue_effects, columns_of
+from imuarray.engine.readings import arrange
 from imuarray.model import EFFECTS, ArrayModel
 from imuarray.model.effects import effect, known_effect
 from imuarray.recording import write_recording
@@ -121,6 +127,21 @@ def test_gyroscopes_offsets_that_walk_drift_by_what_they_walk():
     left = apart - np.moveaxis(drift - drift.mean(axis=0), -1, 0)
     assert np.std(left) < 0.5 * np.std(apart)
     assert np.std(drift.mean(axis=0)) < np.std(walk.mean(axis=1)) + np.std(apart)
+
+
+def test_what_first_order_says_it_left_is_no_fault_of_the_model():
+    recording, _ = make(Case("test-maps", duration=DURATION), SEED)
+    off = 1e-3 * np.random.default_rng(SEED).standard_normal((8, 3, 3))
+    rate = np.einsum("kij,tkj->tki", np.eye(3) + off, recording.angular_rate)
+    readings = arrange(replace(recording, angular_rate=rate))
+    columns = columns_of(readings.array, catalogue_effects(), readings.position_prior_sd)
+    search = Search(readings, columns, (), str).fitted()
+    corrected = replace(readings, left=(None, 1e-6 * np.eye(72)))
+    least = [
+        min(c.log_p for c in all_checks(*beside_left(found), found.noise) if "residual" in c.name)
+        for found in (search, replace(search, readings=corrected))
+    ]
+    assert least[0] < -20 and least[1] > SETTINGS.check
 
 
 def test_a_clock_is_found_where_the_host_reads_unevenly():

@@ -11,6 +11,7 @@ from imuarray.diagnosis.scores import Candidate, candidates, score_all
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL, scans
 from imuarray.diagnosis.state import Adoption, Cause, Search
+from imuarray.engine.alike import likely_sizes
 from imuarray.engine.fit import at
 from imuarray.model.effects import EFFECTS
 
@@ -48,14 +49,16 @@ def adopt(search: Search, proposed=None) -> Search:
     """
     vain = 0
     while len(search.causes) < SETTINGS.most_causes and vain < SETTINGS.patience:
-        found, proposed = proposals(search) if proposed is None else proposed, None
-        best, values = (found or [(None, None)])[0]
+        proposed = proposals(search) if proposed is None else proposed
+        best, values = (proposed or [(None, None)])[0]
         if best is None or best.log_p > SETTINGS.limit(best.candidate.effect):
             break
         if best.statistic < search.least:
             break
         found = attempt(search, best, values)
-        vain = 0 if len(found.trace) > len(search.trace) else vain + 1
+        # refused, it leaves all others' tests as they are
+        adopted = len(found.trace) > len(search.trace)
+        proposed, vain = (None, 0) if adopted else (proposed[1:], vain + 1)
         search = found
     return search
 
@@ -95,9 +98,12 @@ def keeps(search: Search, score, gain: float, error: float) -> bool:
 
 def predicted_gain(search: Search, candidate: Candidate, values) -> tuple[float, float]:
     """The held-out gain that one linearisation predicts: it spares hopeless fits."""
-    state = search.started(candidate.effect, values)
-    made = at(search.readings, search.columns, search.active, state, False, all_columns=False)
-    return heldout_gain(replace(search, fit=made), candidate.effect)
+    state, made = search.started(candidate.effect, values), search.fit
+    if not np.array_equal(state.parameters, made.state.parameters):
+        made = at(search.readings, search.columns, search.active, state, False, all_columns=False)
+    made = replace(made, active=search.active)
+    columns = likely_sizes(made)
+    return heldout_gain(replace(search, fit=made, columns=columns), candidate.effect)
 
 
 def label(search: Search, candidate) -> str:

@@ -9,21 +9,48 @@ import numpy as np
 from imuarray.diagnosis import noise_effects
 from imuarray.diagnosis.clipping import lone_checks
 from imuarray.diagnosis.elimination import need
-from imuarray.diagnosis.residual_checks import Check, normal_checks
+from imuarray.diagnosis.residual_checks import Check, all_checks, normal_checks
+from imuarray.diagnosis.scores import Information
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL
 from imuarray.diagnosis.state import Search
-from imuarray.engine.fit import flat_parameters
+from imuarray.engine.fit import Fit, flat_parameters, prior_means, scaled_solve
 from imuarray.engine.linearise import linearise
 from imuarray.engine.parameters import POSITION, columns_of
+from imuarray.engine.widths import FIXED, mask_of_left, spread_of
 from imuarray.tails import log_normal
 
 STRICT = ("outliers", "size of", "change of")  # checks that a small residual does not excuse
 
 
+def beside_left(search: Search) -> tuple[Fit, Information]:
+    """The fit, and its information, one step on beside what a correction left of the maps.
+
+    They are as uncertain as the correction says: that is no fault of the model.
+    """
+    made, given, columns = search.fit, search.given, search.columns
+    left = search.readings.left
+    maps = mask_of_left(left, columns, made.active)
+    if not maps.any():
+        return made, given
+    spread = spread_of(left, columns, maps)
+    place, every = given.places(maps), made.active | maps
+    precision = given.precision.copy()
+    precision[np.ix_(place, place)] = np.linalg.inv(spread + FIXED**2 * np.eye(len(spread)))
+    offset = flat_parameters(columns, made.state) - prior_means(search.readings, columns)
+    both = given.places(every)
+    precise = precision[np.ix_(both, both)]
+    slope = given.score[both] - precise @ offset[every]
+    moved = np.zeros(every.shape)
+    moved[every] = scaled_solve(given.information[np.ix_(both, both)] + precise, slope)[0]
+    residual = made.residual - made.less_motion(made.along(moved))
+    return replace(made, active=every, residual=residual), replace(given, precision=precision)
+
+
 def final_checks(search: Search, tailed) -> list[Check]:
-    """All tests of an extended model beside those of its residual; ``tailed``: known mixtures."""
-    checks = [*outlier_checks(search), *plausibility_checks(search)]
+    """All tests of an extended model; ``tailed``: known mixtures."""
+    checks = all_checks(*beside_left(search), search.noise)
+    checks += [*outlier_checks(search), *plausibility_checks(search)]
     for cause in search.causes:
         special = SPECIAL.get(cause.effect)
         checks += special.check(search, cause) if special and special.check else []

@@ -91,7 +91,7 @@ def run_procedure(
     search, tailed, in_noise = fit_heavy_tails(search, without)
     search = fit_coloured_noise(search, without)
     say("testing what is left")
-    checks = all_checks(search.fit, search.given, search.noise) + final_checks(search, tailed)
+    checks = final_checks(search, tailed)
     untied = all(c.log_p >= SETTINGS.check for c in checks if c.name.startswith("residual"))
     in_noise += [*shock, *named_noise(search, without, tailed, untied)]
     explained, failing = within_tolerance(search, checks, in_noise)

@@ -158,9 +158,8 @@ class Search:
         made = at(search.readings, search.columns, search.active, state, converged)
         noise = noises.judge(made.readings, made.residual, made.basis)
         search = replace(search, fit=made, noise=noise).weighed()
-        given, former = search.given, search.columns.prior_sd
-        columns = likely_sizes(made, given.information, given.score, given.index)
-        if np.allclose(columns.prior_sd, former, rtol=SETTINGS.steady_size):
+        columns = likely_sizes(made)
+        if np.allclose(columns.prior_sd, search.columns.prior_sd, rtol=SETTINGS.steady_size):
             return search
         return replace(search, columns=columns).refit(made.state, turns, rough)
 

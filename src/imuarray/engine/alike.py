@@ -54,18 +54,15 @@ def with_likely_spread(columns: Columns, active, values, information, place) -> 
     return replace(columns, prior_sd=sds)
 
 
-def likely_sizes(fit: Fit, information, score, index) -> Columns:
-    """The columns of a fit, its sized effects as large as is likeliest, all else quadratic.
-
-    ``information`` (K, K) and ``score`` (K,) of the readings at the fit; ``index`` (N, m): places.
-    """
+def likely_sizes(fit: Fit) -> Columns:
+    """The columns of a fit, its sized effects as large as is likeliest, all else quadratic."""
     columns, active = fit.columns, fit.active
     if not np.any(sized_groups(columns)[active.any(axis=0)] != ""):
         return columns
-    place, every = index[active], np.arange(active.sum())
+    every = np.arange(active.sum())
     values, means = flat_parameters(columns, fit.state)[active], prior_means(fit.readings, columns)
-    inner = information[np.ix_(place, place)]
-    right = score[place] + inner @ values
+    inner, score = fit.normal(active)
+    right = score + inner @ values
     for _ in range(SETTINGS.iterations):
         precision, last = prior_precision(columns, active), columns.prior_sd
         values, _ = scaled_solve(inner + precision, right + precision @ means[active])

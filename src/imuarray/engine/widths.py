@@ -49,7 +49,7 @@ def beside_maps(found: Estimate) -> tuple[Estimate, dict[str, float]]:
     if all(left is None for one in found.recorded for left in one.readings.left):
         return found, {}
     wide = _with_maps(found)
-    maps = mask_of_left(wide)
+    maps = mask_of_left(wide.recorded[0].readings.left, wide.columns, wide.active)
     active, count = wide.active | maps, len(found.values)
     blocks, _, _ = tested(wide, active)
     precision, places = [found.precision], []
@@ -136,11 +136,10 @@ def _lost(freedoms) -> float:
     return max((nu + 5) / (nu + 3) if np.isfinite(nu) else 1.0 for nu in freedoms)
 
 
-def mask_of_left(found: Estimate) -> np.ndarray:
+def mask_of_left(left, columns: Columns, active) -> np.ndarray:
     """(N, m) bool of the maps that a correction left, where they are not estimated."""
-    left = found.recorded[0].readings.left
     named = [name for name in MAPS if left[name.startswith("gyroscope")] is not None]
-    return np.isin(found.columns.names, named) & found.columns.owner & ~found.active
+    return np.isin(columns.names, named) & columns.owner & ~active
 
 
 def spread_of(left, columns: Columns, maps) -> np.ndarray:
