@@ -3,16 +3,18 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import multivariate_t
 
 from imuarray.analysis.calibration_dataset import engine_dataset
+from imuarray.analysis.experiment import located
 from imuarray.analysis.foresight import foretold, with_board
 from imuarray.engine.densities import block_scores, log_densities
 from imuarray.engine.fit import at, flat_parameters
 from imuarray.engine.heldout import log_scores
 from imuarray.engine.linearise import linearise
-from imuarray.figures.measured import table_foretold
+from imuarray.figures.measured import table_experiment, table_foretold
 from tests.test_engine import fitted, simulated
 
 
@@ -71,3 +73,28 @@ def test_a_board_foretells_another_recording():
     rows, columns, _, notes = table_foretold([table], ["one"], "board")
     assert rows.board[0] == by.over_inflated.board and "board" in notes[0]
     assert {column.name for column in columns} == set(rows)
+
+
+def test_positions_from_few_samples_are_those_of_a_fit_with_the_sensors_held():
+    """Of all samples the same as `estimate` gives; of fewer, wider, and wider yet where the sensors
+    are uncertain."""
+    whole = simulated(4.0, effects=("gyroscope_scale",))[0]
+    fit = fitted(whole, ("gyroscope_scale",))
+    calibration = engine_dataset([whole], fit)
+    found = located(whole, calibration, [20, 400])
+    off = found.position.sel(samples=400) - calibration.position
+    sd = np.sqrt(np.diagonal(calibration.position_covariance.to_numpy().reshape(12, 12)))[3:]
+    assert np.max(np.abs(off.to_numpy().ravel()[3:]) / sd) < 0.05
+    claimed = np.sqrt(np.diagonal(found.position_covariance.to_numpy().reshape(2, 12, 12), 0, 1, 2))
+    # the fit's are a jackknife's where that is wider
+    np.testing.assert_allclose(claimed[1, 3:], sd, rtol=0.1)
+    assert (claimed[0, 3:] > claimed[1, 3:]).all()
+    sure = calibration.assign(whole_covariance=0 * calibration.whole_covariance)
+    certain = located(whole, sure, [400])
+    narrow = np.sqrt(np.diag(certain.position_covariance.to_numpy().reshape(12, 12)))[3:]
+    assert (narrow < sd).all()
+    papers = pd.DataFrame({"samples": [20], "assumed": ["0.8"], "claimed_m": [1.0]})
+    moved = found.assign(position=found.position + 1e-6)
+    table, columns, *_ = table_experiment([found, moved], ["a", "b"], papers, "board")
+    assert table.model.tolist() == ["papers', σa 0.8 m/s²", "sensors", "sensors"]
+    np.testing.assert_allclose(table.spread_m[1:], 1e-6 / np.sqrt(2))

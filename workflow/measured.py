@@ -16,8 +16,8 @@ PLACES = {
     "blind_confusion": "results/blind/{scale}/figures",
     "blind_bars": "results/blind/{scale}/tables",
     "diagnosis_(positions|parameters|recordings)_.*": "results/measured/tables",
-    "added_.*|causes_table_.*|foretold_.*": "results/measured/tables",
-    "diagnosis_.*|past_rail_.*|causes_.*": "results/measured/figures",
+    "added_.*|causes_table_.*|experiment_table_.*|foretold_.*": "results/measured/tables",
+    "diagnosis_.*|past_rail_.*|causes_.*|experiment_.*": "results/measured/figures",
 }
 
 
@@ -144,12 +144,17 @@ class Measured:
         return paths
 
     def causes(self) -> list[str]:
-        """What each cause buys on each board with several recordings."""
+        """What each cause buys on each board with several recordings, and the experiment anew."""
         folder = "results/measured"
         paths = [f"{folder}/figures/causes_{group}.{k}" for group in self.groups() for k in FIGURE]
         names = [
-            f"{name}_{group}.md" for name in ("causes_table", "foretold") for group in self.groups()
+            f"{name}_{group}.md"
+            for name in ("causes_table", "experiment_table", "foretold")
+            for group in self.groups()
         ]
+        shown = self.config["experiment"]["recording"]
+        if any(shown in self.board(group) for group in self.groups()):
+            paths += [f"{folder}/figures/experiment_{shown}.{kind}" for kind in FIGURE]
         return paths + [f"{folder}/tables/{name}" for name in names]
 
     def published(self, scale: str) -> dict[str, str]:

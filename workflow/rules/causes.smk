@@ -142,3 +142,66 @@ rule table_foretold:
         "table: recordings of {wildcards.group} foretold by the others"
     script:
         "../scripts/table_foretold.py"
+
+
+# Paper 2021's experiment once more, with the sensors as the other recordings show them.
+rule locate_experiment:
+    input:
+        recording="results/measured/left_out/{name}.nc",
+        calibration="results/measured/left_out/{name}_others.nc",
+    output:
+        "results/measured/located/{name}.nc",
+    log:
+        "results/measured/logs/located/{name}.log",
+    benchmark:
+        "results/measured/benchmarks/located/{name}.tsv"
+    threads: 2
+    resources:
+        mem_mb=4000,
+    params:
+        samples=SAMPLES,
+        code=CODE.digest("locate_experiment"),
+    message:
+        "positions from few samples of {wildcards.name}, sensors known"
+    script:
+        "../scripts/locate_experiment.py"
+
+
+rule figure_experiment:
+    input:
+        located="results/measured/located/{name}.nc",
+        recordings=["results/measured/left_out/{name}.nc"],
+    output:
+        **figure("experiment_{name}", "Measured", caption="experiment", folder="results/measured"),
+    log:
+        "results/measured/logs/figures/experiment_{name}.log",
+    benchmark:
+        "results/measured/benchmarks/figures/experiment_{name}.tsv"
+    params:
+        settings=effective(config, config["scale"], "paper2021", "experiment"),
+        code=CODE.digest("figure_experiment"),
+    message:
+        "figure 5 of 2021 once more, from {wildcards.name} with sensors known"
+    script:
+        "../scripts/figure_experiment.py"
+
+
+rule table_experiment:
+    input:
+        located=lambda wc: expand(
+            "results/measured/located/{name}.nc", name=MEASURED.board(wc.group)
+        ),
+        summary="results/measured/agreement/{group}.csv",
+    output:
+        **table("experiment_table_{group}", folder="results/measured"),
+    log:
+        "results/measured/logs/tables/experiment_{group}.log",
+    benchmark:
+        "results/measured/benchmarks/tables/experiment_{group}.tsv"
+    params:
+        names=lambda wc: MEASURED.board(wc.group),
+        code=CODE.digest("table_experiment"),
+    message:
+        "table II of 2021 once more, {wildcards.group}"
+    script:
+        "../scripts/table_experiment.py"

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from imuarray.engine.robust import MEDIAN, distances, freedoms, judged
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import is_smooth, start
 from imuarray.model.effects import EFFECTS
+from imuarray.model.jax64 import jax
 
 SMOOTH = 0.2  # share of rough samples that are looked at as the smooth ones
 NORMAL, ROBUST = np.array([np.inf, np.inf]), np.array([4.0, 4.0])  # degrees of freedom
@@ -53,6 +55,13 @@ class Recorded:
         if readings.gapless and not smooth:
             first = with_rough_prior(readings, first)
         return cls(readings, first, smooth)
+
+    def select(self, used) -> Self:
+        """The samples in ``used`` (T,) bool, where they are fitted."""
+        shared = {"positions": self.state.positions, "parameters": self.state.parameters}
+        ofsamples = self.state._replace(**dict.fromkeys(shared))
+        state = jax.tree.map(lambda field: field[used], ofsamples)._replace(**shared)
+        return replace(self, readings=self.readings.select(used), state=state)
 
 
 @dataclass(frozen=True)

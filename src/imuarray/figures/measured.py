@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 from matplotlib.ticker import LogLocator, NullFormatter
 from scipy.special import ndtr
 
@@ -16,6 +17,7 @@ from imuarray.figures.style import (
     styled,
 )
 from imuarray.figures.tables import Column
+from imuarray.measured.positions import agreement, pairwise
 
 SOURCES = {
     "measured": {"color": VERMILLION, "marker": "o", "linestyle": "-"},
@@ -315,6 +317,52 @@ def table_causes(summary: pd.DataFrame, group: str):
         " extends, median over recordings."
     )
     return summary, CAUSES, "How positions repeat, and what each cause buys", [note]
+
+
+EXPERIMENT = (
+    Column("samples", "T", "$T$", "{:d}"),
+    Column("model", "model", "model"),
+    Column("claimed_m", "claimed sd (µm)", r"claimed sd ($\mu$m)", "{:.1f}", 1e6),
+    Column("spread_m", "sd between recordings (µm)", r"between ($\mu$m)", "{:.1f}", 1e6),
+    Column("coverage_50", "50 % intervals hold (%)", r"50 \%", "{:.0f}", 100.0),
+    Column("coverage_95", "95 % intervals hold (%)", r"95 \%", "{:.0f}", 100.0),
+    Column("z_rms", "rms of z", "rms of $z$", "{:.2f}"),
+)
+
+
+def table_experiment(located: list, names: list[str], summary: pd.DataFrame, group: str):
+    """Table II of 2021 once more: positions from T samples under the papers' and the sensor model.
+
+    ``located``: `analysis.experiment.located` of the recordings ``names`` of the board ``group``;
+    ``summary``: `measured.agreement` under the papers' model.
+    """
+    assumed = summary.assumed.astype(str)
+    noise = np.where(assumed == "residual", "the residual's", assumed + " m/s²")
+    rows = [summary.assign(model=[f"papers', σa {each}" for each in noise])]
+    for each in located[0].samples.to_numpy():
+        table = pd.concat([
+            _coordinates(one.sel(samples=each)).assign(recording=name)
+            for name, one in zip(names, located, strict=True)
+        ])  # fmt: skip
+        found = agreement(pairwise(table), table)
+        rows.append(pd.DataFrame([found | {"samples": int(each), "model": "sensors"}]))
+    table = pd.concat(rows, ignore_index=True).sort_values("samples", kind="stable")
+    note = (
+        f"{table.recordings.max()} recordings of board {group}; sds are rms over coordinates,"
+        " shares and z of the differences of all pairs. Sensors: maps, delays and lever arms from"
+        " the board's other recordings, biases and clocks from the whole recording, positions from"
+        " T samples."
+    )
+    table = table[[column.name for column in EXPERIMENT]]
+    return table, EXPERIMENT, "Table II of 2021 once more: sds of the positions, measured", [note]
+
+
+def _coordinates(one: xr.Dataset) -> pd.DataFrame:
+    """A row a coordinate: accelerometer, axis, mean_m, sd_m."""
+    count = 3 * one.sizes["accelerometer"]
+    sd = np.sqrt(np.diag(one.position_covariance.to_numpy().reshape(count, count)))
+    table = one.position.to_series().rename("mean_m").to_frame().assign(sd_m=sd)
+    return table.reset_index().iloc[3:]
 
 
 FORETOLD = (

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from scipy.stats import chi2
@@ -158,11 +159,46 @@ def figure_2021_fig5(
     """
     array = recordings[0] if recordings else array_from_config(settings["array"])
     draws, verdicts = after_burn_in(chains, verdicts)
-    draws = {samples: values.reshape(-1, *values.shape[2:]) for samples, values in draws.items()}
     known = "truth_m" in coordinates[0]
     truth = coordinates[0].truth_m.to_numpy().reshape(-1, 3) if known else None
-    table = ellipse_table(array, draws, prior_of(chains), truth)
+    posteriors = {samples: _moments_of(values) for samples, values in draws.items()}
+    table = ellipse_table(array, posteriors, prior_of(chains), truth)
     footer = [scale_line(settings, source), *chain_lines(verdicts)]
+    figure = _ellipses(table, array, settings, footer)
+    figure.suptitle(
+        SOURCES.get(kind, kind).upper(), size=8, weight="bold",
+        color=BLACK if kind == "measured" else VERMILLION,
+    )  # fmt: skip
+    return figure, table
+
+
+@styled
+def figure_experiment(located: xr.Dataset, recordings: list, name: str, settings: dict):
+    """`figure_2021_fig5` once more, under the sensor model.
+
+    ``located``: `analysis.experiment.located` of the recording ``name``.
+    """
+    array = recordings[0]
+    posteriors = {}
+    for each in located.samples.to_numpy():
+        one = located.sel(samples=each).isel(accelerometer=slice(1, None))
+        wide = one.position_covariance.isel(accelerometer_other=slice(1, None)).to_numpy()
+        own = wide[range(len(wide)), :, range(len(wide))]
+        posteriors[int(each)] = one.position.to_numpy(), own[:, :2, :2]
+    nominal = located.nominal_position.to_numpy().reshape(-1, *array.positions.shape)[0, 1:]
+    sd = np.full(nominal.shape, located.attrs["position_prior_sd"])
+    table = ellipse_table(array, posteriors, (nominal, sd))
+    footer = [
+        f"Recording {name}, measured. Sensor model: maps, delays and lever arms from the board's"
+        " other recordings, biases and clocks from the whole recording, positions from T samples."
+    ]
+    figure = _ellipses(table, array, settings, footer)
+    figure.suptitle("MEASURED, SENSOR MODEL", size=8, weight="bold")
+    return figure, table
+
+
+def _ellipses(table: pd.DataFrame, array: Array, settings: dict, footer: list[str]):
+    """Both sides of the board with the ellipses of `ellipse_table`, and all packages enlarged."""
     level = settings["experiment"]["ellipse_level"]
     figure = new_figure(footer, PAGE, 6.6)
     mosaic = figure.subplot_mosaic(
@@ -187,22 +223,24 @@ def figure_2021_fig5(
         axes.grid(False)
         _zoom(mosaic[zoom], rows[rows.samples == names[-1]], level, _style(names, names[-1]))
         mosaic[zoom].set_title(f"({letter}) all packages laid over each other, $T = {names[-1]}$")
-    figure.suptitle(
-        SOURCES.get(kind, kind).upper(), size=8, weight="bold",
-        color=BLACK if kind == "measured" else VERMILLION,
-    )  # fmt: skip
     mosaic["legend"].axis("off")
     mosaic["legend"].legend(handles=_handles(names, level, table), loc="center", ncols=7)
-    return figure, table
+    return figure
 
 
-def ellipse_table(
-    array: Array, posteriors: dict[int, np.ndarray], prior, truth=None
-) -> pd.DataFrame:
+def _moments_of(draws) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (A - 1, 3) and covariance (A - 1, 2, 2) of x and y from (chains, draws, A - 1, 3)."""
+    draws = draws.reshape(-1, *draws.shape[2:])
+    plane = np.moveaxis(draws[..., :2], 1, 0)
+    return draws.mean(axis=0), np.array([np.cov(own.T) for own in plane])
+
+
+def ellipse_table(array: Array, posteriors: dict, prior, truth=None) -> pd.DataFrame:
     """Means and covariances of x and y, in mm in the array frame, per triad and T.
 
-    ``posteriors[T]`` (draws, A - 1, 3) m relative to the first triad; ``prior`` mean and sd,
-    each (A - 1, 3) m; ``truth`` (A - 1, 3) m where known. Rows with samples 0 are the prior.
+    ``posteriors[T]``: mean (A - 1, 3) m relative to the first triad and covariance (A - 1, 2, 2)
+    of x and y; ``prior`` mean and sd, each (A - 1, 3) m; ``truth`` (A - 1, 3) m where known. Rows
+    with samples 0 are the prior.
     """
     layout = layout_table(array).iloc[1:].reset_index(drop=True)
     origin = array.positions[0, :2]
@@ -217,10 +255,8 @@ def ellipse_table(
     variances = np.zeros((len(table), 2, 2))
     variances[:, [0, 1], [0, 1]] = prior[1][:, :2] ** 2
     parts = [_moments(table, 0, prior[0][:, :2] + origin, variances)]
-    for samples, draws in posteriors.items():
-        plane = draws[..., :2]
-        covariance = np.array([np.cov(plane[:, k].T) for k in range(plane.shape[1])])
-        parts.append(_moments(table, samples, plane.mean(axis=0) + origin, covariance))
+    for samples, (mean, covariance) in posteriors.items():
+        parts.append(_moments(table, samples, mean[:, :2] + origin, covariance))
     return pd.concat(parts, ignore_index=True)
 
 

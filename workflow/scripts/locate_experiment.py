@@ -1,0 +1,13 @@
+"""Positions from few samples of a recording whose sensors are known from others -> NetCDF."""
+
+from job import job
+
+with job(snakemake):
+    from imuarray.analysis.experiment import located
+    from imuarray.provenance import write_netcdf
+    from imuarray.recording import load_dataset, read_recording
+
+    recording = read_recording(snakemake.input.recording)
+    calibration = load_dataset(snakemake.input.calibration)
+    found = located(recording, calibration, snakemake.params.samples)
+    write_netcdf(found, snakemake.output[0])
