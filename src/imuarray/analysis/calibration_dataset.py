@@ -126,10 +126,10 @@ def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
         scope = [EFFECTS[effect].scope for effect, _ in parameter_ids(model, labels)]
         coords["parameter"] = names = parameter_names(model, labels)
         coords["scope"] = "parameter", scope
-        own = np.flatnonzero(np.array(scope) == "recording")
-        if len(recordings) > 1 and len(own):
-            variables |= _of_recordings(found, model, own, np.sqrt(np.diag(covariance)))
-            coords["own"] = [names[number] for number in own]
+        theirs = np.flatnonzero(np.array(scope) == "recording")
+        if len(recordings) > 1 and len(theirs):
+            variables |= _of_recordings(found, model, theirs, np.sqrt(np.diag(covariance)))
+            coords["own"] = [names[number] for number in theirs]
     smooth = found.smooth_ratio()
     if smooth is not None:
         for which, kind in enumerate(KINDS):

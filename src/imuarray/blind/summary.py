@@ -155,7 +155,7 @@ def confusion(rows: list[dict]) -> pd.DataFrame:
     """
     tally: dict[tuple, Counter] = {}
     for row in rows:
-        if row["kind"] == "pair" or (row["kind"] == "one" and not is_large(row["sigma"])):
+        if row["kind"] == "pair" or (row["kind"] == "one" and row["sigma"] < REACHED * LARGE):
             continue
         truth = "+".join(effect["effect"] for effect in row["truth"]) or "clean"
         counts = tally.setdefault((row["kind"], truth), Counter())
@@ -171,11 +171,6 @@ def confusion(rows: list[dict]) -> pd.DataFrame:
             share = {"right_share": right / number, "wrong_share": wrong / number}
             lines.append(line | {"right": right, "wrong": wrong} | share)
     return pd.DataFrame(lines)
-
-
-def is_large(sigma: float) -> bool:
-    """Whether an effect is of a size that is to be found."""
-    return sigma >= REACHED * LARGE
 
 
 def _columns(row: dict) -> dict[str, bool]:

@@ -39,16 +39,12 @@ def one_inverse(results):
     return judged(value, EXACT, size == [3, 3] and difference < 1e-12)
 
 
-@claim("2017-27")
-def translation_exact(results):
-    change = _checks(results, "invariances")["translation_position_change_m"]
-    return judged(f"{show(change, 2)} m", EXACT, change < 1e-12)
-
-
-@claim("2017-28")
-def origin(results):
-    change = _checks(results, "invariances")["origin_relative"]
-    return judged(show(change, 2), EXACT, change < TINY)
+@claim("2017-27", part="invariances", name="translation_position_change_m", limit=1e-12, unit=" m")
+@claim("2017-28", part="invariances", name="origin_relative", limit=TINY)
+@claim("2017-30", part="lemma", name="eigenvalue_relative", limit=TINY)
+def rounding_only(results, part, name, limit, unit=""):
+    change = _checks(results, part)[name]
+    return judged(f"{show(change, 2)}{unit}", EXACT, change < limit)
 
 
 @claim("2017-29")
@@ -56,12 +52,6 @@ def lemma(results):
     found = _checks(results, "lemma")
     value = f"{found['parallel_rank_2']} of {found['draws']} draws"
     return judged(value, "", found["parallel_rank_2"] == found["draws"])
-
-
-@claim("2017-30")
-def eigenvalues(results):
-    worst = _checks(results, "lemma")["eigenvalue_relative"]
-    return judged(show(worst, 2), EXACT, worst < TINY)
 
 
 @claim("2017-31")

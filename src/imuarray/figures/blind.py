@@ -2,14 +2,13 @@
 
 import numpy as np
 import pandas as pd
-from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.ticker import NullFormatter
 
 from imuarray.blind import summary
 from imuarray.blind.inject import CATALOGUE
 from imuarray.blind.summary import ALL, CRASH, NOTHING, UNEXPLAINED
 from imuarray.figures.notes import scale_line
-from imuarray.figures.style import BLACK, BLUE, PAGE, SKY, VERMILLION, new_figure, styled
+from imuarray.figures.style import BLACK, BLUE, PAGE, SKY, VERMILLION, new_figure, shade, styled
 
 COLUMNS = 6  # panels in a row
 FOUND, WRONG = {"color": BLUE, "marker": "o"}, {"color": VERMILLION, "marker": "s"}
@@ -166,17 +165,12 @@ def figure_blind_confusion(rows: dict, settings: dict):
     return figure, found
 
 
-def _shade(color: str, share: float):
-    """White to ``color``; half of it already for a small share, so that it is seen."""
-    shades = LinearSegmentedColormap.from_list("shades", ["white", color])
-    return shades(0.12 + 0.88 * share) if share > 0 else "white"
-
-
 def _cell(axes, column: int, line: int, row) -> None:
     """One cell: coloured by the larger part, the number in bold where any of it is wrong."""
     right = row.right_share >= row.wrong_share
     share = row.right_share + row.wrong_share
-    color = _shade(BLUE if right else VERMILLION, share)
+    # a small share is seen, too
+    color = shade(BLUE if right else VERMILLION, 0.12 + 0.88 * share) if share > 0 else "white"
     axes.fill_between([column - 0.5, column + 0.5], line - 0.5, line + 0.5, color=color, lw=0)
     dark = share > (0.55 if right else 0.8)
     axes.text(

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import matplotlib.style
 import pandas as pd
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from imuarray.provenance import atomic_write, write_csv
@@ -92,6 +93,11 @@ def level(axes, value: float, text: str, **options) -> None:
 def logarithmic(axes, x: str, y: str, **options) -> None:
     """Both axes logarithmic, with their labels."""
     axes.set(xscale="log", yscale="log", xlabel=x, ylabel=y, **options)
+
+
+def shade(color: str, share: float):
+    """White (0) to ``color`` (1)."""
+    return LinearSegmentedColormap.from_list("shades", ["white", color])(share)
 
 
 def significant(value: float) -> str:

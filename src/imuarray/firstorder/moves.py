@@ -197,11 +197,6 @@ def _carried(move: Move, change) -> tuple[np.ndarray, np.ndarray]:
     return turned[0], np.einsum("tji,tk->jik", middle, angle).swapaxes(0, 1).reshape(3, 9)
 
 
-def _tangent(unit) -> np.ndarray:
-    """Two directions across a unit vector, (2, 3)."""
-    return np.linalg.svd(unit[None])[2][1:]
-
-
 def _linear(moves, direction, change):
     """Errors (2 n,), slopes in the map (2 n, 9) and in directions (2 n, 3 P), own (n, 2, 2)."""
     errors, slopes, own = [], [], []
@@ -209,7 +204,7 @@ def _linear(moves, direction, change):
     for i, move in enumerate(moves):
         turned, slope = _carried(move, change)
         carried = turned.T @ direction[move.first]
-        across = _tangent(carried)
+        across = np.linalg.svd(carried[None])[2][1:]  # two directions across it
         errors.append(across @ (direction[move.first + 1] - carried))
         by_turn = across @ skew(carried)
         slopes.append(by_turn @ slope)

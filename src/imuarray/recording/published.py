@@ -47,18 +47,14 @@ def fetch(source: str, name: str, folder: str | Path) -> Path:
     known = [f"{s}/{f}" for s, item in SOURCES.items() for f in item.files]
     require_one_of("published", f"{source}/{name}", known)
     expected = SOURCES[source].files[name]
-    for place in _copies(source, name, Path(folder)):
+    mirrors = filter(None, [os.environ.get(MIRROR)])
+    for place in [Path(root) / source / name for root in (*mirrors, folder)]:
         if place.is_file():
             found = hashlib.sha256(place.read_bytes()).hexdigest()
             if found != expected:
                 raise InputError(f"{place}: expected sha256 {expected}, found {found}")
             return place
     return _download(source, name, Path(folder), expected)
-
-
-def _copies(source, name, folder) -> list[Path]:
-    mirror = os.environ.get(MIRROR)
-    return ([Path(mirror) / source / name] if mirror else []) + [folder / source / name]
 
 
 def _download(source, name, folder, expected) -> Path:

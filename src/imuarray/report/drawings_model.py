@@ -2,11 +2,10 @@
 
 import numpy as np
 import pandas as pd
-from matplotlib.colors import LinearSegmentedColormap
 
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.words import words
-from imuarray.figures.style import BLACK, BLUE, LOOKS, PAGE, VERMILLION, new_figure, styled
+from imuarray.figures.style import BLACK, BLUE, LOOKS, PAGE, VERMILLION, new_figure, shade, styled
 from imuarray.report.drawings import MODELS, NAMES, imu_ticks, legend_above, plain
 
 ALIKE = SETTINGS.alike  # squared correlation from which two effects are one class
@@ -67,13 +66,9 @@ def separability_figure(table: pd.DataFrame, footer=()):
     return figure
 
 
-def _shades():
-    return LinearSegmentedColormap.from_list("shades", ["white", BLUE])
-
-
 def _cell(axes, line, column, value):
-    shade = _shades()(value)
-    axes.fill_between([column - 0.5, column + 0.5], line - 0.5, line + 0.5, color=shade, lw=0)
+    color = shade(BLUE, value)
+    axes.fill_between([column - 0.5, column + 0.5], line - 0.5, line + 0.5, color=color, lw=0)
     one_class = value > ALIKE
     axes.text(
         column, line, f"{value:.2f}".replace("0.", ".").replace("1.00", "1"), size=6.5,

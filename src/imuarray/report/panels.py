@@ -124,7 +124,8 @@ def parameter_panels(signal: Signal) -> list[pd.DataFrame]:
         x = derivative[:, axis] * made.readings.sd[imu, axis // 3]
         name = component(signal.effect, made.columns.places[column])
         factor, label, root = abscissa(signal.effect, name)
-        x = factor * (x if not root else own_reading(signal, imu, axis))
+        # a curved response bends the reading itself
+        x = factor * (made.readings.values[:, imu, axis] if root else x)
         panels.append(axis_panel(signal, imu, axis, x, f" ({name})" * (len(name) > 1), label))
     return panels
 
@@ -145,11 +146,6 @@ def abscissa(effect: str, name: str) -> tuple[float, str, bool]:
     quantity = own if item.against == "reading" else item.against
     factor, unit = ABSCISSAE[quantity]
     return factor, f"{quantity} {name[-1]} ({unit})", item.against == "reading"
-
-
-def own_reading(signal: Signal, imu, axis) -> np.ndarray:
-    """(T,) the reading that a curved response bends, SI units."""
-    return signal.made.readings.values[:, imu, axis]
 
 
 def delay_panels(signal: Signal) -> list[pd.DataFrame]:
