@@ -16,7 +16,7 @@ PLACES = {
     "blind_confusion": "results/blind/{scale}/figures",
     "blind_bars": "results/blind/{scale}/tables",
     "diagnosis_(positions|parameters|recordings)_.*": "results/measured/tables",
-    "added_.*|causes_table_.*|experiment_table_.*|foretold_.*": "results/measured/tables",
+    "added_.*|causes_table_.*|experiment_table_.*|left_out_.*": "results/measured/tables",
     "diagnosis_.*|past_rail_.*|causes_.*|experiment_.*": "results/measured/figures",
 }
 
@@ -149,7 +149,7 @@ class Measured:
         paths = [f"{folder}/figures/causes_{group}.{k}" for group in self.groups() for k in FIGURE]
         names = [
             f"{name}_{group}.md"
-            for name in ("causes_table", "experiment_table", "foretold")
+            for name in ("causes_table", "experiment_table", "left_out")
             for group in self.groups()
         ]
         shown = self.config["experiment"]["recording"]

@@ -103,45 +103,45 @@ rule leave_out:
         "../scripts/leave_out.py"
 
 
-rule foretell:
+rule predict_left_out:
     input:
         recording="results/measured/left_out/{name}.nc",
         calibration="results/measured/left_out/{name}_others.nc",
     output:
-        "results/measured/foretold/{name}.csv",
+        "results/measured/predicted/{name}.csv",
     log:
-        "results/measured/logs/foretold/{name}.log",
+        "results/measured/logs/predicted/{name}.log",
     benchmark:
-        "results/measured/benchmarks/foretold/{name}.tsv"
+        "results/measured/benchmarks/predicted/{name}.tsv"
     threads: 2
     resources:
         mem_mb=4000,
     params:
-        code=CODE.digest("foretell"),
+        code=CODE.digest("predict_left_out"),
     message:
         "what the other recordings say of {wildcards.name}"
     script:
-        "../scripts/foretell.py"
+        "../scripts/predict_left_out.py"
 
 
-rule table_foretold:
+rule table_left_out:
     input:
         tables=lambda wc: expand(
-            "results/measured/foretold/{name}.csv", name=MEASURED.board(wc.group)
+            "results/measured/predicted/{name}.csv", name=MEASURED.board(wc.group)
         ),
     output:
-        **table("foretold_{group}", folder="results/measured"),
+        **table("left_out_{group}", folder="results/measured"),
     log:
-        "results/measured/logs/tables/foretold_{group}.log",
+        "results/measured/logs/tables/left_out_{group}.log",
     benchmark:
-        "results/measured/benchmarks/tables/foretold_{group}.tsv"
+        "results/measured/benchmarks/tables/left_out_{group}.tsv"
     params:
         names=lambda wc: MEASURED.board(wc.group),
-        code=CODE.digest("table_foretold"),
+        code=CODE.digest("table_left_out"),
     message:
-        "table: recordings of {wildcards.group} foretold by the others"
+        "table: recordings of {wildcards.group} predicted by the others"
     script:
-        "../scripts/table_foretold.py"
+        "../scripts/table_left_out.py"
 
 
 # Paper 2021's experiment once more, with the sensors as the other recordings show them.

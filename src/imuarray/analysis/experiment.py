@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis.calibration_dataset import places_among, positions_dataset
-from imuarray.analysis.foresight import with_board
+from imuarray.analysis.leave_out import with_board
 from imuarray.engine.estimate import Estimate, stepped
 from imuarray.engine.fit import flat_parameters, prior_means
 from imuarray.engine.ladder import mask_of
@@ -23,7 +23,7 @@ SETTLED = 1e-3  # of a position's sd
 def located(recording: Recording, calibration: xr.Dataset, samples: Sequence[int]) -> xr.Dataset:
     """Positions from ``samples`` moving samples of a recording, with the drawing as prior.
 
-    ``recording``, ``calibration``: as `imuarray.analysis.foresight.left_out` gives them. Sensors
+    ``recording``, ``calibration``: as `imuarray.analysis.leave_out.left_out` gives them. Sensors
     are as the calibration, of other recordings, has them, biases and clocks as the whole recording;
     samples are spread evenly. Variables of `positions_dataset` for each of ``samples``; the widths
     have the calibration's own.

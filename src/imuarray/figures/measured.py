@@ -365,7 +365,7 @@ def _coordinates(one: xr.Dataset) -> pd.DataFrame:
     return table.reset_index().iloc[3:]
 
 
-FORETOLD = (
+LEFT_OUT = (
     Column("recording", "recording", "recording"),
     Column("samples", "samples", "samples", "{:d}"),
     Column("heavy", "papers' model, Student's t", "papers', t", "{:.1f}"),
@@ -377,8 +377,8 @@ FORETOLD = (
 )
 
 
-def table_foretold(tables: list[pd.DataFrame], names: list[str], group: str):
-    """What each recording gains by the others' board; `analysis.foresight.foretold` of each."""
+def table_left_out(tables: list[pd.DataFrame], names: list[str], group: str):
+    """What each recording gains by the others' board; `analysis.leave_out.predicted` of each."""
     rows = []
     for name, table in zip(names, tables, strict=True):
         by = table.set_index("model")
@@ -394,7 +394,7 @@ def table_foretold(tables: list[pd.DataFrame], names: list[str], group: str):
         " with normal noise as large as the residual, positions fitted to the recording; ± standard"
         " error between blocks. Last: what a fit of all parameters to the recording has beyond."
     )
-    return pd.DataFrame(rows), FORETOLD, "Recordings foretold by the others", [note]
+    return pd.DataFrame(rows), LEFT_OUT, "Recordings predicted by the others", [note]
 
 
 @styled

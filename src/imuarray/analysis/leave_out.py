@@ -65,7 +65,7 @@ def with_board(recording: Recording, calibration: xr.Dataset) -> tuple[Readings,
     return readings, with_own(readings, effects, calibration["position"].to_numpy(), values)
 
 
-def foretold(recording: Recording, calibration: xr.Dataset) -> pd.DataFrame:
+def predicted(recording: Recording, calibration: xr.Dataset) -> pd.DataFrame:
     """Held-out log densities of a recording under several models, a row for each.
 
     ``recording``, ``calibration``: as `left_out` gives them. Models: ``inflated``, the papers' with

@@ -3,9 +3,9 @@
 from job import job
 
 with job(snakemake):
-    from imuarray.analysis.foresight import foretold
+    from imuarray.analysis.leave_out import predicted
     from imuarray.provenance import write_csv
     from imuarray.recording import load_dataset, read_recording
 
     recording = read_recording(snakemake.input.recording)
-    write_csv(foretold(recording, load_dataset(snakemake.input.calibration)), snakemake.output[0])
+    write_csv(predicted(recording, load_dataset(snakemake.input.calibration)), snakemake.output[0])

@@ -9,12 +9,12 @@ from scipy.stats import multivariate_t
 
 from imuarray.analysis.calibration_dataset import engine_dataset
 from imuarray.analysis.experiment import located
-from imuarray.analysis.foresight import foretold, with_board
+from imuarray.analysis.leave_out import predicted, with_board
 from imuarray.engine.densities import block_scores, log_densities
 from imuarray.engine.fit import at, flat_parameters
 from imuarray.engine.heldout import log_scores
 from imuarray.engine.linearise import linearise
-from imuarray.figures.measured import table_experiment, table_foretold
+from imuarray.figures.measured import table_experiment, table_left_out
 from tests.test_engine import fitted, simulated
 
 
@@ -46,7 +46,7 @@ def test_the_density_is_students(plain):
     assert scores[1] - scores[0] == pytest.approx(by_scipy[1] - by_scipy[0], abs=1e-9)
 
 
-def test_a_board_foretells_another_recording():
+def test_a_board_predicts_another_recording():
     """Its scales are known, the offset is the recording's: a fit of all has little to add."""
     effects = "gyroscope_scale", "accelerometer_bias"
     whole, parts = simulated(4.0, effects=effects[:1])[0], []
@@ -66,11 +66,11 @@ def test_a_board_foretells_another_recording():
     bias = flat_parameters(columns, state)[2, columns.of("accelerometer_bias")[0]]
     alone = fitted(parts[1], effects).recorded[0].state
     assert bias == pytest.approx(flat_parameters(columns, alone)[2, 6], abs=5e-3) and bias < -0.05
-    table = foretold(parts[1], calibration)
+    table = predicted(parts[1], calibration)
     by = table.set_index("model")
     assert by.over_inflated.board > 5 and abs(by.over_board.own) < 0.3
     assert (by.samples == len(readings.time)).all() and by.converged.all()
-    rows, columns, _, notes = table_foretold([table], ["one"], "board")
+    rows, columns, _, notes = table_left_out([table], ["one"], "board")
     assert rows.board[0] == by.over_inflated.board and "board" in notes[0]
     assert {column.name for column in columns} == set(rows)
 
