@@ -1,7 +1,5 @@
 """Leave one recording out: the board that the others show, and what it says of the one left out."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ Where a rail clips several readings they pile up at one value, which needs no mo
 (`imuarray.diagnosis.reading_effects`); one alone is seen only beside its prediction.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """IMUs on clocks of their own: the test for `sensor_clock`, by a scan (`engine.clock_scan`)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.diagnosis.scores import Candidate, Scanned, Score

@@ -1,7 +1,5 @@
 """The four answers on one recording: what is wrong, why, the extended model, what it gains."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """The extended model that a diagnosis came to, for the other commands."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What is left after the last cause: is it within tolerance, and are the causes what they seem?"""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -4,8 +4,6 @@ Misfit that the motion causes is smooth in time, noise is not: fourth difference
 half of the spectrum show the noise whatever the means get wrong.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The whole procedure on one recording: readings, means, noise, what is left, who else it is."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 

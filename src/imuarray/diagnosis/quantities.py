@@ -1,7 +1,5 @@
 """Numbers with units as people read them: SI in the files, degrees and micrometres on the page."""
 
-from __future__ import annotations
-
 import math
 
 from imuarray.model.catalogue import FULL_SCALE_FORCE, FULL_SCALE_RATE

@@ -1,7 +1,5 @@
 """Effects of whole readings, found before any fit: repeats, rails, exchanged axes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import permutations, product
 from typing import NamedTuple

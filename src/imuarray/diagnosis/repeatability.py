@@ -1,7 +1,5 @@
 """Recordings of one board: do their positions, and the causes' numbers, agree?"""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

@@ -5,8 +5,6 @@ fitted parameters and the motion projected out; and the residual's size, its aut
 the correlation between sensors.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

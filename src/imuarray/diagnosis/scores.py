@@ -1,7 +1,5 @@
 """Score tests: what each effect would gain, from one fit, motion and positions projected out."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple

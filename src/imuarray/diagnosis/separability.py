@@ -1,7 +1,5 @@
 """Which effects a recording can distinguish: correlations of their signals, and a cause's class."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A triad that moves on the board: how `position_shift` is found, and its instant refined."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.diagnosis.scores import (

@@ -4,8 +4,6 @@ What shakes a board within a millisecond is another motion to each IMU, which re
 of its own. One motion for all then fits a sample no better where any one IMU is left out.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -3,8 +3,6 @@
 The sentences of `diagnosis.json` and of its page alike.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.diagnosis.quantities import (

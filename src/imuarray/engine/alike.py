@@ -1,7 +1,5 @@
 """Parameters whose size an estimate finds: what triads of one kind have in common, and drifts."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -5,8 +5,6 @@ clock's jump. The gyroscopes of a sample tell: once their ages are nearly known,
 a reading over the angular acceleration is how far its own age is off.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

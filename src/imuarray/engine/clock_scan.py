@@ -4,8 +4,6 @@ Each sample's score and information of an IMU's delay show its age; a clock's ag
 whose frequency and phase a scan finds. Fits cannot move them past the sawtooth's jumps.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Recordings whose IMUs sample on clocks of their own: found, and each reading in its own turn."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How likely an estimate makes its readings, on blocks of time that it was not trained on."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.special import gammaln
 

@@ -5,8 +5,6 @@ long as the rate falls short, and not beyond. Specific force determines products
 there may be several minima where gyroscopes are lost; one of them agrees with the readings' sides.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import NamedTuple
 

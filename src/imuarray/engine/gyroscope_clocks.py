@@ -9,8 +9,6 @@ But all gyroscopes see one omega and one omega_dot, free at each sample:
 and three gyroscopes or more that sample at different ages overdetermine both.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Log scores on blocks of time that a model was not trained on."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

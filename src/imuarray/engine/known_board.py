@@ -1,7 +1,5 @@
 """A recording of a board that is known: its biases, clocks, noise and motion, fitted anew."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -9,8 +9,6 @@ directions wander as soon as anything else is misfitted; pinned they stay where 
 common part, and the reported sds say what the priors leave open.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

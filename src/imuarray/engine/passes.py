@@ -4,8 +4,6 @@ What a sample's derivatives need is freed with its chunk, so memory does not gro
 parameters times samples (`linearise` keeps all of it, for score tests).
 """
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 

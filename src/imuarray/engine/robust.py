@@ -4,8 +4,6 @@ A triad's three readings of a sample share one weight, (nu + 3) / (nu + d^2) at 
 d^2: normal noise keeps weights near one, a reading far out loses its say.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.special import gammaln
 

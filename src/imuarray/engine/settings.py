@@ -1,7 +1,5 @@
 """Every number that the engine rests on and that no equation gives: value, unit, origin."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

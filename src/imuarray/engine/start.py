@@ -1,7 +1,5 @@
 """Where a fit begins: nominal positions, no effects, the motion that the readings say."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.engine.linearise import State, no_derivatives, polynomial_derivative

@@ -4,8 +4,6 @@ On a small array the gyroscopes know it far better than the accelerometers do; t
 leave it open about the line that joins them.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from imuarray.engine.linearise import State, polynomial_derivative, polynomial_taps

@@ -1,7 +1,5 @@
 """How well an estimate's parameters are known: formal, by a jackknife, and what was corrected."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What each cause buys: a board's recordings fitted rung by rung, and how the positions repeat."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Measured recordings of one board: positions, residuals, agreement between recordings."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import combinations
 

@@ -5,8 +5,6 @@ simulated from the fitted motion and positions, with that noise and the same rai
 likewise. Where the model holds, the two are alike.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
