@@ -84,20 +84,6 @@ def _rate(t, mean, factor, u, v, w):
     )
 
 
-@njit
-def exponents(first, size, mean, factor, quartic, b, numbers, out):
-    """-(w' C w - 2 b . w) / 2 at mean + factor n, n of ``numbers`` (N, 3, size).
-
-    Here and below the sample's index is unsigned: one that might count from the end would be
-    looked up number by number.
-    """
-    for n in range(out.shape[0]):
-        for i in range(size):
-            t = np.uint64(first + i)
-            x, y, z = _rate(t, mean, factor, numbers[n, 0, i], numbers[n, 1, i], numbers[n, 2, i])
-            out[n, i] = _exponent(x, y, z, quartic, b, t)
-
-
 @njit(inline="always")
 def log_weight(k, t, x, y, z):
     """log p(omega | y_g) less the log of the density it is drawn from."""
@@ -108,13 +94,21 @@ def log_weight(k, t, x, y, z):
 
 
 @njit
-def add_log_weights(first, size, k, mean, factor, numbers, out):
-    """Add `log_weight` to `exponents`."""
+def exponents(first, size, data, quartic, b, numbers, out):
+    """-(w' C w - 2 b . w) / 2 and `log_weight` at mean + factor n, n of ``numbers`` (N, 3, size).
+
+    The sample's index is unsigned: one that might count from the end would be looked up number by
+    number.
+    """
+    mean, factor, k = data.mean, data.factor, data.log_weight
+    weighted = k.shape[1] > 0
     for n in range(out.shape[0]):
         for i in range(size):
             t = np.uint64(first + i)
             x, y, z = _rate(t, mean, factor, numbers[n, 0, i], numbers[n, 1, i], numbers[n, 2, i])
-            out[n, i] += log_weight(k, t, x, y, z)
+            out[n, i] = _exponent(x, y, z, quartic, b, t)
+            if weighted:
+                out[n, i] += log_weight(k, t, x, y, z)
 
 
 @njit

@@ -103,13 +103,8 @@ def fresh_draws(positions, data, work, power):
     draws.folded(found.C, tile.quartic)
     for start in range(0, data.energy.size, draws.TILE):
         size = min(draws.TILE, data.energy.size - start)
-        mean, factor = data.mean, data.factor
         numbers = draws.drawn(size, tile)
-        draws.exponents(start, size, mean, factor, tile.quartic, found.b, numbers, tile.exponent)
-        if data.log_weight.shape[1] > 0:
-            draws.add_log_weights(
-                start, size, data.log_weight, mean, factor, numbers, tile.exponent
-            )
+        draws.exponents(start, size, data, tile.quartic, found.b, numbers, tile.exponent)
         total += draws.log_means(size, tile)
     return _assemble(total, found.const, logdet, power)
 
