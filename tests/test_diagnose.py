@@ -12,17 +12,19 @@ from imuarray.cli import main
 from imuarray.diagnosis.document import diagnose, precision_of, structural_gain
 from imuarray.diagnosis.extension import extended_model, read_extension
 from imuarray.diagnosis.final_checks import beside_left
+from imuarray.diagnosis.noise_effects import verdict
 from imuarray.diagnosis.procedure import run_procedure
 from imuarray.diagnosis.reading_effects import find_structural
 from imuarray.diagnosis.residual_checks import all_checks
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.diagnosis.state import Search
+from imuarray.diagnosis.state import Cause, Search
+from imuarray.diagnosis.warming import Courses
 from imuarray.engine.fit import flat_parameters
 from imuarray.engine.heldout import gain, log_scores
 from imuarray.engine.parameters import catalogue_effects, columns_of
 from imuarray.engine.readings import arrange
 from imuarray.model import EFFECTS, ArrayModel
-from imuarray.model.effects import effect, known_effect
+from imuarray.model.effects import KINDS, effect, known_effect
 from imuarray.recording import write_recording
 from imuarray.streams import stream
 
@@ -142,6 +144,26 @@ def test_what_first_order_says_it_left_is_no_fault_of_the_model():
         for found in (search, replace(search, readings=corrected))
     ]
     assert least[0] < -20 and least[1] > SETTINGS.check
+
+
+def test_biases_put_back_gain_along_a_course_what_they_had_to_gain():
+    readings = arrange(make(injected(("warm_up", ALL)), SEED)[0])
+    columns = columns_of(readings.array, catalogue_effects(), readings.position_prior_sd)
+    bare = Search(readings, columns, (), str).fitted()
+    causes = (Cause(f"{kind}_bias", ALL, frozenset({""}), -9.0) for kind in KINDS)
+    fitted = replace(bare, causes=tuple(causes)).refit()
+    gains = []
+    for search in (bare, fitted):
+        courses = Courses(search.fit, search.given, ALL, back=True)
+        gains.append([courses.gain(courses.course(pace, 0.0))[0] for pace in (-4.0, 0.0, 8.0)])
+    np.testing.assert_allclose(*gains, rtol=0.03)
+
+
+def test_the_others_of_those_far_off_are_not_at_zero_where_that_is_unlikely():
+    sure, some = np.array([9.0, 0.3, 0.2, -0.4]), np.array([9.0, 2.0, -2.2, 2.1])
+    assert list(verdict(sure, np.eye(4), SETTINGS.effect)[0]) == [0]
+    assert list(verdict(some, np.eye(4), SETTINGS.effect)[0]) == [0, 1, 2, 3]
+    assert list(verdict(some[1:], np.eye(3), SETTINGS.effect)[0]) == []
 
 
 def test_a_clock_is_found_where_the_host_reads_unevenly():

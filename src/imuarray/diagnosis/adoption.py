@@ -39,7 +39,14 @@ def proposals(search: Search):
     found = [(score, None) for score in scores]
     found += scans(search.fit, search.given, search.effects, scores, search.imus_with)
     named = [(s, v) for s, v in found if s.candidate not in search.refused]
-    return sorted(named, key=lambda pair: pair[0].log_p)
+    return sorted(named, key=lambda pair: log_odds(search, pair[0]))
+
+
+def log_odds(search: Search, score) -> float:
+    """A test's log p; more where it is of the others of what some IMUs have: chips are alike."""
+    own = score.candidate
+    others = own.whole and not own.variant and search.imus_with(own.effect)
+    return score.log_p + (SETTINGS.limit(own.effect) - SETTINGS.others if others else 0.0)
 
 
 def adopt(search: Search, proposed=None) -> Search:
@@ -51,7 +58,7 @@ def adopt(search: Search, proposed=None) -> Search:
     while len(search.causes) < SETTINGS.most_causes and vain < SETTINGS.patience:
         proposed = proposals(search) if proposed is None else proposed
         best, values = (proposed or [(None, None)])[0]
-        if best is None or best.log_p > SETTINGS.limit(best.candidate.effect):
+        if best is None or log_odds(search, best) > SETTINGS.limit(best.candidate.effect):
             break
         if best.statistic < search.least:
             break

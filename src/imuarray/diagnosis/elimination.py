@@ -50,7 +50,7 @@ def prune(search: Search, effect: str) -> Search:
     limit = SETTINGS.limit(effect)
     keep = tuple(k for k in imus if needed(search, effect, limit - np.log(len(imus)), [k]))
     rest = [imu for imu in imus if imu not in keep]
-    if not keep or len(keep) > len(imus) / 2 or needed(search, effect, limit, rest):
+    if not keep or len(keep) > len(imus) / 2 or needed(search, effect, SETTINGS.others, rest):
         return search
     causes = tuple(
         replace(cause, imus=keep) if cause.effect == effect else cause for cause in search.causes

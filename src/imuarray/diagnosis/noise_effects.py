@@ -76,14 +76,22 @@ def held_out(nats) -> tuple[float, float, np.ndarray]:
 
 
 def verdict(log_ratio, covariance, limit):
-    """(places far from zero, log p of the worst or of all) for normals (n,) of a covariance."""
+    """(places far from zero, log p of the worst or of all) for normals (n,) of a covariance.
+
+    All places where the others of those far off are not at zero either.
+    """
     number = len(log_ratio)
     single = log_normal(np.abs(log_ratio) / np.sqrt(np.diag(covariance))) + np.log(2)
     inverse = np.linalg.pinv(covariance, ALIKE, hermitian=True)
     freedom = int(np.linalg.matrix_rank(covariance, hermitian=True, rtol=ALIKE))
     pooled = log_chi_square(float(log_ratio @ inverse @ log_ratio), freedom)
     log_p = min(single.min() + np.log(2 * number), pooled + np.log(2), 0.0)
-    return np.flatnonzero(single + np.log(number) < limit), float(log_p)
+    far = single + np.log(number) < limit
+    rest = np.flatnonzero(~far)
+    if far.any() and len(rest):
+        own = log_ratio[rest] @ np.linalg.solve(covariance[np.ix_(rest, rest)], log_ratio[rest])
+        far |= log_chi_square(float(own), len(rest)) < SETTINGS.others
+    return np.flatnonzero(far), float(log_p)
 
 
 def autocorrelation(fit: Fit, imu: int, kind: int) -> tuple[float, int]:
@@ -237,7 +245,11 @@ def heavy_tails(fit: Fit, noise: Noise, limit: float):
     maybe = logs - np.log(len(triads)) < SETTINGS.maybe
     for kind in {k for _, k, _ in hits}:
         rest = (triads[:, 1] == kind) & (logs >= limit)
-        if rest.any() and log_chi_square(max(gains[rest].sum(), 1e-9), 2 * rest.sum()) < limit:
+        # one that has none gains nothing half the times, and one degree's chi-square else
+        less = np.sort(gains[rest])[:-1]
+        if len(less) and log_chi_square(max(less.sum(), 1e-9), len(less)) < SETTINGS.others:
+            hits += [item for item, also in zip(tried, rest, strict=True) if also]
+        elif rest.any() and log_chi_square(max(gains[rest].sum(), 1e-9), 2 * rest.sum()) < limit:
             hits += [item for item, also in zip(tried, rest & maybe, strict=True) if also]
             maybe |= rest
     there = {item[:2] for item in hits}

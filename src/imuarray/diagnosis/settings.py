@@ -40,6 +40,7 @@ class Settings:
     visible: float = 1e-3  # the same of a combination that is no gauge of motion and positions
     patience: int = 8  # refusals in a row: what is left is none of the catalogue
     most_causes: int = 12  # causes
+    others: float = -4.6  # log p of the other IMUs having what some surely have: chips are alike
     kept: float = 0.05  # of the gain that a test predicts must be there on held-out time
     uncertain: float = 50.0  # nats; smaller predicted gains need not be confirmed
     least_z: float = 1.5  # standard errors that a gain on held-out time must have

@@ -84,7 +84,7 @@ SPECIAL = {
     ),
     shifts.SHIFT: Special(scan=lambda fit, given, imus, _: shifts.scan_shifts(fit, given, imus),
                           refine=shifts.refine_instants),
-    warming.WARM_UP: Special(scan=warming.scan_warming),
+    warming.WARM_UP: Special(scan=warming.scan_warming, maybe=warming.maybe_warming),
     DRIFT: Special(maybe=maybe_drift, check=drift_check),
 }  # fmt: skip
 

@@ -7,7 +7,7 @@ from scipy.optimize import minimize_scalar
 
 from imuarray.diagnosis.scores import Candidate, Information, Scanned, Score
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.engine.fit import Fit
+from imuarray.engine.fit import Fit, flat_parameters
 from imuarray.engine.heldout import blocks_of
 from imuarray.linear import scaled_inverse
 from imuarray.model.effects import KINDS
@@ -22,26 +22,33 @@ ZEROS = (-1.0, 2.0)  # of a course from 0 to 1, between which all offsets vanish
 class Courses:
     """What all biases along a course of time gain, all else that is fitted projected out.
 
-    From blocks of time, in each of which the course is taken for constant.
+    From blocks of time, in each of which the course is taken for constant. ``back``: whether
+    biases that are fitted go back to zero.
     """
 
-    def __init__(self, fit: Fit, given: Information, imus):
+    def __init__(self, fit: Fit, given: Information, imus, back: bool = False):
         columns = [c for kind in KINDS for c in fit.columns.of(f"{kind}_bias")]
-        mask = fit.active.copy()
-        mask[np.ix_(imus, columns)] = True
+        places, beside = np.ix_(imus, columns), fit.active.copy()
+        values = np.zeros(len(imus) * len(columns))
+        if back:
+            beside[places] = False
+            values = flat_parameters(fit.columns, fit.state)[places].ravel()
+        mask = beside.copy()
+        mask[places] = True
         number = np.full(mask.shape, -1)
         number[mask] = np.arange(mask.sum())
-        own, rest = number[np.ix_(imus, columns)].ravel(), number[fit.active]
+        own, rest = number[places].ravel(), number[beside]
         blocks = blocks_of(len(fit.residual), SETTINGS.cuts)
         parts = [fit.normal(mask, block) for block in blocks]
         self.whole = np.array([part[0][np.ix_(own, own)] for part in parts])
         self.cross = np.array([part[0][np.ix_(own, rest)] for part in parts])
-        self.score = np.array([part[1][own] for part in parts])
+        self.score = np.array([part[1][own] for part in parts]) + self.whole @ values
+        self.moved = values @ self.cross.sum(axis=0)
         self.time = np.array([fit.readings.time[block].mean() for block in blocks])
         self.span = fit.readings.span
         own = fit.columns.prior_sd[fit.columns.of(WARM_UP)[: len(columns)]]
         self.ridge = np.diag(np.tile(own**-2.0, len(imus)))
-        active = given.places(fit.active)
+        active = given.places(beside)
         inner = given.information[np.ix_(active, active)] + given.precision[np.ix_(active, active)]
         self.outside = scaled_inverse(inner)
 
@@ -50,7 +57,7 @@ class Courses:
         whole = np.einsum("t,tmn->mn", course**2, self.whole)
         aside = np.einsum("t,tmr->mr", course, self.cross)
         left = (whole - aside @ self.outside @ aside.T + self.ridge)[among][:, among]
-        score = (course @ self.score)[among]
+        score = (course @ self.score - aside @ self.outside @ self.moved)[among]
         values = scaled_inverse(left) @ score
         return float(score @ values), values
 
@@ -107,3 +114,16 @@ def scan_warming(fit: Fit, given: Information, imus, _=None) -> list[Scanned]:
     }
     score = Score(Candidate(WARM_UP, tuple(imus), "", True), gain, freedom, log_p)
     return [Scanned(score, starts)]
+
+
+def maybe_warming(search, cause, own: float) -> bool:
+    """Whether the biases of all sensors may as well follow one course as be constant."""
+    imus = [int(k) for k in np.flatnonzero(search.readings.exists.all(axis=1))]
+    if any(len(search.imus_with(f"{kind}_bias")) < len(imus) for kind in KINDS):
+        return False
+    courses = Courses(search.fit, search.given, imus, back=True)
+    gain, steady = (
+        courses.gain(course)[0]
+        for course in (courses.course(*courses.best()), np.ones_like(courses.time))
+    )
+    return bool(gain > steady - 2 * SETTINGS.rival)
