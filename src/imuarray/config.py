@@ -101,6 +101,15 @@ def model_from(settings: dict, accelerometer_sd: float | None = None, effects=()
     return ArrayModel.isotropic(array_from_config(settings["array"]), force, rate, effects)
 
 
+def motion_sds(settings: dict) -> tuple[float, float, float]:
+    """Sds of omega (rad/s), omega_dot (rad/s^2) and s (m/s^2) in section IV-A of paper 2021."""
+    import numpy as np
+
+    paper = settings["paper2021"]
+    turning = paper["angular_rate_sd_dps"], paper["angular_acceleration_sd_dps2"]
+    return *np.radians(turning), paper["specific_force_sd"]
+
+
 def describe_schema() -> str:
     """config/README.md: every key of the schema with its meaning, as Markdown."""
     with open(SCHEMA, encoding="utf-8") as handle:

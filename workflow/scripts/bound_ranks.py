@@ -3,19 +3,13 @@
 from job import job
 
 with job(snakemake) as settings:
-    import numpy as np
-
-    from imuarray.config import model_from
+    from imuarray.config import model_from, motion_sds
     from imuarray.provenance import write_csv
     from imuarray.studies import bound
     from imuarray.studies.settings2017 import magnitudes
 
-    sds = settings["paper2021"]
-    normal = (
-        np.radians(sds["angular_rate_sd_dps"]), np.radians(sds["angular_acceleration_sd_dps2"]),
-        sds["specific_force_sd"],
-    )  # fmt: skip
     cases = bound.rank_cases(
-        model_from(settings), settings["seed"], magnitudes(settings["paper2017"]), normal
-    )
+        model_from(settings), settings["seed"], magnitudes(settings["paper2017"]),
+        motion_sds(settings),
+    )  # fmt: skip
     write_csv(bound.ranks(cases), snakemake.output[0])

@@ -6,7 +6,7 @@ with job(snakemake) as settings:  # noqa: F821
     import numpy as np
     import pandas as pd
 
-    from imuarray.config import model_from
+    from imuarray.config import model_from, motion_sds
     from imuarray.motion import normal_motion
     from imuarray.provenance import write_csv
     from imuarray.recording import read_recording, read_truth
@@ -46,8 +46,7 @@ with job(snakemake) as settings:  # noqa: F821
     rng, samples = stream(settings["seed"], "determinant"), paper["samples"][0]
     for force_sd in (sd, assumed):
         small = tiny_model(force_sd, np.radians(settings["noise"]["gyroscope_sd_dps"]))
-        sds = np.radians([paper["angular_rate_sd_dps"], paper["angular_acceleration_sd_dps2"]])
-        motion = normal_motion(rng, (samples,), *sds, paper["specific_force_sd"])
+        motion = normal_motion(rng, (samples,), *motion_sds(settings))
         place = small.array.positions
         recording, truth = simulate_samples(
             small, motion, place, place, rng, position_prior_sd=paper["prior_sd"]

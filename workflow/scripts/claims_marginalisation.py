@@ -3,9 +3,7 @@
 from job import job
 
 with job(snakemake) as settings:  # noqa: F821
-    import numpy as np
-
-    from imuarray.config import model_from
+    from imuarray.config import model_from, motion_sds
     from imuarray.provenance import stamp, write_json
     from imuarray.recording import read_recording, read_truth
     from imuarray.streams import stream
@@ -13,11 +11,7 @@ with job(snakemake) as settings:  # noqa: F821
     from imuarray.studies.checks import proposal
 
     model, paper, seed = model_from(settings), settings["paper2021"], settings["seed"]
-    sds = (
-        np.radians(paper["angular_rate_sd_dps"]),
-        np.radians(paper["angular_acceleration_sd_dps2"]),
-        paper["specific_force_sd"],
-    )
+    sds = motion_sds(settings)
     count = 20 * settings["scale"]["variance_realisations"]
 
     def rng(name):

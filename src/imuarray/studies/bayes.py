@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from imuarray.config import model_from
+from imuarray.config import model_from, motion_sds
 from imuarray.estimation.bcd import calibrate_bcd
 from imuarray.estimation.selection import disjoint, neighbours
 from imuarray.geometry import Array
@@ -27,13 +27,7 @@ def simulate_dataset(settings: dict, samples: int):
     """
     paper, model = settings["paper2021"], model_from(settings)
     seed = settings["seed"]
-    motion = normal_motion(
-        stream(seed, "motion", samples),
-        (samples,),
-        np.radians(paper["angular_rate_sd_dps"]),
-        np.radians(paper["angular_acceleration_sd_dps2"]),
-        paper["specific_force_sd"],
-    )
+    motion = normal_motion(stream(seed, "motion", samples), (samples,), *motion_sds(settings))
     nominal = prior_mean(model.array, paper["prior_mean_error"], stream(seed, "prior mean"))
     return simulate_samples(
         model, motion, model.array.positions, nominal, stream(seed, "noise", samples),

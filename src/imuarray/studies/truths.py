@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.config import model_from
+from imuarray.config import model_from, motion_sds
 from imuarray.errors import IdentifiabilityError
 from imuarray.estimation.newton import fisher_scoring
 from imuarray.geometry import positions_of, sub_array
@@ -61,18 +61,15 @@ def setting_from(settings: dict, name: str, samples: int) -> Setting:
 
     Noise is the configuration's where the setting has none of its own.
     """
-    paper, chosen = settings["paper2021"], settings["validation"]["settings"][name]
+    chosen = settings["validation"]["settings"][name]
     noise = {**settings["noise"], **chosen}
     array = sub_array(model_from(settings).array, chosen["triads"])
     model = ArrayModel.isotropic(
         array, noise["accelerometer_sd"], np.radians(noise["gyroscope_sd_dps"]),
         chosen.get("effects", ()),
     )  # fmt: skip
-    motion = (
-        np.radians(paper["angular_rate_sd_dps"]), np.radians(paper["angular_acceleration_sd_dps2"]),
-        paper["specific_force_sd"],
-    )  # fmt: skip
-    return Setting(name, model, paper["prior_sd"], motion, samples, settings["seed"])
+    prior_sd, seed = settings["paper2021"]["prior_sd"], settings["seed"]
+    return Setting(name, model, prior_sd, motion_sds(settings), samples, seed)
 
 
 class Replicate(NamedTuple):
