@@ -173,6 +173,14 @@ def test_nothing_and_unexplained_are_said(found):
     assert not answers(found)[1].loud
     alone = of(found, causes=[], unexplained=True, remaining=["outliers"])
     assert "no known cause was found" in verdict(alone)
+    smooth = {
+        "unexplained": False,
+        "accelerometer": {"residual": 0.8},
+        "gyroscope": {"residual": 2},
+    }
+    shaken = of(found, unexplained=True, remaining=["outliers"], smooth=smooth)
+    assert verdict(shaken).endswith(": in shocks; smooth samples are explained.")
+    assert "In smooth samples that turn fast the residual is 0.8" in answers(shaken)[1].lead
 
 
 def test_answers_hold_the_document_s_numbers(found):

@@ -89,6 +89,7 @@ def test_clocks_and_lag_are_found_beside_the_gyroscopes_errors(made):
     # products of filtered rates are not the filtered products: what no effect names is said
     others = {cause["effect"] for cause in document["causes"][4:]}
     assert document["unexplained"] or not others
+    assert document["smooth"]["gyroscope"]["residual"] < 2
     assert first == {
         "sensor_clock", "gyroscope_delay", "gyroscope_misalignment", "gyroscope_scale",
     }  # fmt: skip

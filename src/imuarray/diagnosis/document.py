@@ -16,6 +16,7 @@ from imuarray.diagnosis.procedure import Found, run_procedure
 from imuarray.diagnosis.replicates import Discrepancy, discrepancies
 from imuarray.diagnosis.scores import information_at
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.shocks import SHOCK
 from imuarray.diagnosis.special import placebo_gain
 from imuarray.diagnosis.words import cause_in_words, parameters_of, sensors_of
 from imuarray.engine.estimate import Estimate
@@ -121,6 +122,7 @@ def diagnose(
         "discrepancies": [d.as_dict() for d in base.discrepancies],
         "causes": causes_of(found, extended),
         "unexplained": bool(found.unexplained),
+        "smooth": smooth_samples(robust, found),
         "remaining": [c.name for c in found.checks if c.log_p < SETTINGS.check],
         "inflated": inflated.section(),
         "extended": extended.section(),
@@ -129,6 +131,25 @@ def diagnose(
         "gain": gains(base, inflated, extended),
     }
     return Diagnosis(document, found, base, inflated, extended)
+
+
+def smooth_samples(robust: Estimate, found: Found) -> dict | None:
+    """Residual over the declared noise of each triad in the smooth samples of rough motion.
+
+    ``unexplained``: more than shocks, which are among the causes, is left. The rms over the triads
+    of a kind counts, as they differ in noise.
+    """
+    ratios = robust.smooth_ratio()
+    if ratios is None:
+        return None
+    exists, labels = found.whole.exists, found.whole.labels
+    shaken = any(item.effect == SHOCK for item in found.in_noise)
+    sizes = [float(np.sqrt(np.mean(ratios[mine, k] ** 2))) for k, mine in enumerate(exists.T)]
+    out: dict = {"unexplained": not shaken or max(sizes) > SETTINGS.calm}
+    for k, kind in enumerate(KINDS):
+        mine = np.flatnonzero(exists[:, k])
+        out[kind] = {"residual": sizes[k], "of": {labels[i]: float(ratios[i, k]) for i in mine}}
+    return out
 
 
 def nats_beside(found: Found) -> np.ndarray:

@@ -76,6 +76,7 @@ class Settings:
     lasting: float = 0.5  # of a shaken sample's residual that the next one has: misfit, no shock
     apart: int = 5  # samples between two shaken ones that are of two stretches
     stated: int = 20  # stretches
+    calm: float = 1.5  # times the noise, up to which smooth samples of shaken motion are explained
 
     # Checks of what is left (`residual_checks`, `final_checks`, `words`)
     # of a feature's own information must survive the projection to count

@@ -57,11 +57,17 @@ def verdict(diagnosis: Diagnosis) -> str:
             return f"Unexplained: {left}, and no known cause was found."
         if len(named) > FEW:
             named = [words(c["effect"]) for c in document["causes"]]
-        return f"Unexplained: {left} after {counted(named)} ({', '.join(named)})."
+        where = ": in shocks; smooth samples are explained" if _shaken(document) else ""
+        return f"Unexplained: {left} after {counted(named)} ({', '.join(named)}){where}."
     if not named:
         return "Nothing: the papers' model simulates this recording as far as it can show."
     rest = "little else is left" if document["remaining"] else "nothing else is left"
     return f"{counted(named)}: {joined(named)}; {rest}."
+
+
+def _shaken(document: dict) -> bool:
+    """Whether smooth samples are explained, and shocks are what is left."""
+    return bool(document["smooth"] and not document["smooth"]["unexplained"])
 
 
 def counted(named) -> str:
@@ -131,6 +137,9 @@ def why(diagnosis: Diagnosis) -> Answer:
         return Answer("Why?", "No effect of the catalogue explains it.", [], loud)
     lead = f"{len(items)} causes, in the order in which they were found:"
     lead = lead if len(items) > 1 else "One cause:"
+    if document["smooth"]:
+        sizes = {kind: document["smooth"][kind]["residual"] for kind in KINDS}
+        lead = f"In smooth samples that turn fast the residual is {of_noise(sizes)}. {lead}"
     if document["remaining"] and not loud:
         share = 100 * diagnosis.found.explained
         lead = (
