@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
 import pandas as pd
 import xarray as xr
 
@@ -37,17 +36,13 @@ def left_out(
     corrected = [correct(one, first) for one, first in zip(others, firsts, strict=True)]
     own = calibrate_first_order(recording, gyroscopes="offset", **options)
     calibration = engine_dataset(corrected, settled(board_of([used(one) for one in corrected])))
-    return correct(recording, _of_board(own, firsts)), calibration
+    return correct(recording, _of_board(own, firsts[0])), calibration
 
 
-def _of_board(own: FirstOrder, others: Sequence[FirstOrder]) -> FirstOrder:
-    """A recording's first order, its maps the mean of other recordings'."""
-    forces = np.mean([other.triads.matrix for other in others], axis=0)
-    rates = np.mean([other.gyroscope_matrix for other in others], axis=0)
-    return replace(
-        own, triads=replace(own.triads, matrix=forces),
-        gyroscopes=replace(others[0].gyroscopes, matrix=rates),
-    )  # fmt: skip
+def _of_board(own: FirstOrder, other: FirstOrder) -> FirstOrder:
+    """A recording's first order, its maps another's of the same board."""
+    triads = replace(own.triads, matrix=other.triads.matrix)
+    return replace(own, triads=triads, gyroscopes=other.gyroscopes)
 
 
 def used(recording: Recording) -> Readings:
