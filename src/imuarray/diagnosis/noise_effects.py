@@ -203,9 +203,11 @@ def noise_scale(
     return Named(SCALES[kind], imus, log_p, numbers, *held_out(nats))
 
 
-def mixture(fit: Fit, imu: int, kind: int, steps=60) -> Mixture:
-    """EM for a triad's standardised residual, its three axes together."""
+def mixture(fit: Fit, imu: int, kind: int, steps=60, without=None) -> Mixture:
+    """EM for a triad's standardised residual, its three axes together; ``without`` (T,) bool."""
     unit = triad(fit, imu, kind)
+    if without is not None:
+        unit[without] = np.nan
     axes, square = np.sum(np.isfinite(unit), axis=1), np.nansum(unit**2, axis=1)
     plain = np.sqrt(np.sum(square) / max(np.sum(axes), 1))
     share, factor, core = 0.05, 3.0, float(np.nanmedian(np.abs(unit)) / QUARTILE)
@@ -238,6 +240,14 @@ def heavy_tails(fit: Fit, noise: Noise, limit: float):
     triads = np.argwhere(fit.readings.exists)
     tried = [(int(i), int(k), mixture(fit, i, k)) for i, k in triads]
     gains = np.array([_tail_gain(fit, noise, *item) for item in tried])
+    for place, (imu, kind, _) in enumerate(tried):
+        # motion takes a little of far readings along, into the residuals of all others
+        far = [m.outlier > 0.5 for (*_, m), gain in zip(tried, gains, strict=True)
+               if SETTINGS.leaks * gain > gains[place] > 0]  # fmt: skip
+        if far:
+            own = mixture(fit, imu, kind, without=np.any(far, axis=0))
+            tried[place] = imu, kind, own
+            gains[place] = _tail_gain(fit, noise, imu, kind, own)
     logs = np.array([log_chi_square(max(gain, 1e-9), 2) for gain in gains]) + np.log(len(triads))
     if logs.min() > limit:
         return None, [], []

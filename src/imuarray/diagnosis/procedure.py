@@ -20,7 +20,7 @@ from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.shocks import SHOCK, find_shocks
 from imuarray.diagnosis.state import Search
 from imuarray.engine.clock_scan import DELAY
-from imuarray.engine.fit import Fit, fit
+from imuarray.engine.fit import Fit, fit, flat_parameters
 from imuarray.engine.parameters import catalogue_effects, columns_of
 from imuarray.engine.readings import Readings, arrange, determined, few_at_once, part_of
 from imuarray.errors import InputError
@@ -168,15 +168,22 @@ def fit_heavy_tails(search: Search, without) -> tuple[Search, list, list]:
     named, hits, others = noise_effects.heavy_tails(search.fit, search.noise, limit)
     if named is None:
         return search, [], []
-    far = np.zeros((*search.readings.keep.shape[:2], 2), bool)
-    for imu, kind, mix in hits:
-        far[:, imu, kind] = mix.outlier > 0.5
-    lost = np.repeat(few_at_once(far), 3, axis=2)
-    before, search = len(search.causes), search.light()
-    search = adopt(replace(search, readings=search.readings.without(lost)).refit())
+    left, before, search = hits, len(search.causes), search.light()
+    for _ in range(SETTINGS.rounds if search.smooth else 1):
+        far = (search.allowed & ~search.readings.keep & ~search.jumps)[..., ::3]
+        for imu, kind, mix in left:
+            far[:, imu, kind] |= mix.outlier > 0.5
+        lost = np.repeat(few_at_once(far), 3, axis=2)
+        search = replace(search, readings=search.readings.without(lost)).refit()
+        # the farthest hide others, whose motion they have moved
+        left = noise_effects.heavy_tails(search.fit, search.noise, limit)[1]
+        if not left:
+            break
+    search = adopt(search)
     if len(search.causes) > before:
         search = eliminate(search)
-    return search, hits + others, [named]
+    tailed = [(i, k, noise_effects.mixture(search.fit, i, k)) for i, k, _ in hits + others]
+    return search, tailed, [named]
 
 
 def fit_coloured_noise(search: Search, without) -> Search:
@@ -228,9 +235,15 @@ def named_noise(search: Search, without, tailed, untied: bool) -> list[noise_eff
 
 
 def least_ratios(search: Search) -> np.ndarray:
-    """Log ratios of noise not to be believed (N,): delays carry the derivatives' own noise."""
+    """Log ratios of noise not to be believed (N,): delays carry the derivatives' own noise.
+
+    The less of it the shorter they are.
+    """
     least = np.zeros(len(search.readings.labels))
+    sizes = np.abs(flat_parameters(search.columns, search.fit.state)) / search.columns.prior_sd
     for cause in search.causes:
         if EFFECTS[cause.effect].shifts_time:
-            least[list(cause.imus)] = SETTINGS.delayed
+            delay, imus = search.columns.of(cause.effect)[0], list(cause.imus)
+            own = SETTINGS.delayed * np.minimum(sizes[imus, delay], 1.0)
+            least[imus] = np.maximum(least[imus], own)
     return least

@@ -63,11 +63,13 @@ class Settings:
     bands: tuple[float, float] = (0.2, 0.35)  # of the sampling rate, where the two bands begin
     coloured: float = 4.5  # sds of the spectrum's slope from which noise is not white
     few: int = 4  # outliers; so few are an accident, not a law
+    rounds: int = 3  # in which outliers that others hide are left out
+    leaks: float = 0.1  # of a triad's tails that the motion may pass on to others
     maybe: float = -3.0  # log p of one triad's tails, where another's are sure
     agree: float = 3.5  # sds within which two estimates are of one thing
     clear: float = 2.5  # sds of a triad's autocorrelation, where all together are beyond doubt
     tailed: float = 0.25  # log ratio by which a mixture's core may miss the noise
-    delayed: float = 0.1  # log ratio of noise that an adopted delay may bring with it
+    delayed: float = 0.1  # log ratio of noise that a delay of a prior sd may bring with it
 
     # Shocks (`shocks`)
     least_shaken: int = 4  # IMUs; with one of fewer left out, too little is there to agree
