@@ -14,7 +14,7 @@ from imuarray.diagnosis.special import SPECIAL
 from imuarray.diagnosis.state import Search
 from imuarray.engine.fit import Fit, flat_parameters, prior_means, scaled_solve
 from imuarray.engine.linearise import linearise
-from imuarray.engine.parameters import POSITION, columns_of
+from imuarray.engine.parameters import POSITION
 from imuarray.engine.widths import FIXED, mask_of_left, spread_of
 from imuarray.tails import log_normal
 
@@ -81,8 +81,7 @@ def outlier_checks(search: Search) -> list[Check]:
 def plausibility_checks(search: Search) -> list[Check]:
     """Causes whose parameters are larger than such sensors have: misattributed."""
     columns, found = search.columns, []
-    usual = columns_of(columns.model.array, columns.model.effects, columns.prior_sd[0]).prior_sd
-    whole = flat_parameters(columns, search.fit.state) / usual
+    whole = flat_parameters(columns, search.fit.state) / columns.usual_sd
     for cause in search.causes:
         free = search.active[:, columns.of(cause.effect)]
         sizes = np.where(free, np.abs(whole[:, columns.of(cause.effect)]), 0.0)

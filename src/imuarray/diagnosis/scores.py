@@ -81,8 +81,9 @@ class Information:
     """The quadratic form of the misfit around a fit, in all parameters at once.
 
     ``information`` (K, K), ``score`` (K,) at the fit, ``index`` (N, m) place of each parameter
-    (-1 where there is none), ``values`` (K,) of the parameters, ``ridge`` (K,) prior precision,
-    ``precision`` (K, K) that of what is fitted, gauges pinned.
+    (-1 where there is none), ``values`` (K,) of the parameters, ``ridge`` (K,) prior precision and
+    ``usual`` (K,) before sizes were estimated, which tests go by, ``precision`` (K, K) that of what
+    is fitted, gauges pinned.
     ``meat`` (K, K) is the score's covariance where noise is not white, else None.
     """
 
@@ -91,6 +92,7 @@ class Information:
     index: np.ndarray
     values: np.ndarray
     ridge: np.ndarray
+    usual: np.ndarray
     precision: np.ndarray
     meat: np.ndarray | None = None
 
@@ -129,7 +131,7 @@ class Information:
         block = information[np.ix_(chosen, chosen)]
         values, vectors, scale = scaled_eigh(block, self.scale[chosen])
         # a parameter stays within its prior: near a gauge, data alone would take it anywhere
-        ridge = vectors.T @ ((self.ridge[chosen] / scale**2)[:, None] * vectors)
+        ridge = vectors.T @ ((self.usual[chosen] / scale**2)[:, None] * vectors)
         seen = values > np.maximum(SETTINGS.seen, np.diag(ridge))
         along, ridge = vectors[:, seen].T @ (score[chosen] / scale), ridge[np.ix_(seen, seen)]
         if meat is information:
@@ -147,10 +149,13 @@ def information_at(fit: Fit) -> Information:
     information, score = fit.normal(owner)
     index = np.full(owner.shape, -1)
     index[owner] = np.arange(owner.sum())
-    ridge = 1.0 / np.broadcast_to(fit.columns.prior_sd, owner.shape)[owner] ** 2
+    ridge, usual = (
+        1.0 / np.broadcast_to(sd, owner.shape)[owner] ** 2
+        for sd in (fit.columns.prior_sd, fit.columns.usual_sd)
+    )
     precision, places = np.diag(ridge), index[fit.active]
     precision[np.ix_(places, places)] = prior_precision(fit.columns, fit.active)
-    return Information(information, score, index, flat[owner], ridge, precision)
+    return Information(information, score, index, flat[owner], ridge, usual, precision)
 
 
 def score_all(given: Information, fit: Fit, tried: list[Candidate], freed=()) -> list[Score]:

@@ -42,6 +42,11 @@ class Columns:
         return np.flatnonzero([name == effect for name in self.names])
 
     @property
+    def usual_sd(self) -> np.ndarray:
+        """`prior_sd` (m,) before any size was estimated."""
+        return columns_of(self.model.array, self.model.effects, self.prior_sd[0]).prior_sd
+
+    @property
     def size(self) -> int:
         """m."""
         return len(self.names)
