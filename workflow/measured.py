@@ -16,7 +16,7 @@ PLACES = {
     "blind_confusion": "results/blind/{scale}/figures",
     "blind_bars": "results/blind/{scale}/tables",
     "diagnosis_(positions|parameters|recordings)_.*": "results/measured/tables",
-    "added_.*|causes_table_.*|experiment_table_.*|left_out_.*": "results/measured/tables",
+    "added_.*|causes_table_.*|experiment_table_.*|left_out_.*|past_rail_table_.*": "results/measured/tables",
     "diagnosis_.*|past_rail_.*|causes_.*|experiment_.*": "results/measured/figures",
 }
 
@@ -135,10 +135,9 @@ class Measured:
         return sorted(set(paths))
 
     def diagnoses(self) -> list[str]:
-        """Diagnoses of all recordings, their agreement where a board has several, their use."""
+        """Diagnoses of all recordings, their agreement where a board has several."""
         folder = "results/measured"
         paths = [f"{folder}/diagnosis/{name}/diagnosis.json" for name in self.available()]
-        paths += [f"{folder}/figures/past_rail_{name}.png" for name in self.available()]
         for group in self.groups():
             paths += [f"{folder}/figures/diagnosis_{group}.{k}" for k in FIGURE]
         return paths
@@ -149,7 +148,7 @@ class Measured:
         paths = [f"{folder}/figures/causes_{group}.{k}" for group in self.groups() for k in FIGURE]
         names = [
             f"{name}_{group}.md"
-            for name in ("causes_table", "experiment_table", "left_out")
+            for name in ("causes_table", "experiment_table", "left_out", "past_rail_table")
             for group in self.groups()
         ]
         shown = self.config["experiment"]["recording"]

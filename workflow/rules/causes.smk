@@ -1,4 +1,5 @@
-# What each cause buys on a board of several recordings; its own target, `causes`.
+# What each cause buys on a board of several recordings, and what the others say of one that is left
+# out; its own target, `causes`.
 
 
 rule buy_causes:
@@ -205,3 +206,43 @@ rule table_experiment:
         "table II of 2021 once more, {wildcards.group}"
     script:
         "../scripts/table_experiment.py"
+
+
+rule figure_past_rail:
+    input:
+        recording="results/measured/left_out/{name}.nc",
+        calibration="results/measured/left_out/{name}_others.nc",
+    output:
+        **figure("past_rail_{name}", "Diagnosis", caption="past_rail", folder="results/measured"),
+    log:
+        "results/measured/logs/past_rail_{name}.log",
+    benchmark:
+        "results/measured/benchmarks/past_rail_{name}.tsv"
+    resources:
+        mem_mb=4000,
+    params:
+        code=CODE.digest("figure_past_rail"),
+    message:
+        "motion of {wildcards.name} past the rail"
+    script:
+        "../scripts/figure_past_rail.py"
+
+
+rule table_past_rail:
+    input:
+        tables=lambda wc: expand(
+            "results/measured/figures/past_rail_{name}.csv", name=MEASURED.board(wc.group)
+        ),
+    output:
+        **table("past_rail_table_{group}", folder="results/measured"),
+    log:
+        "results/measured/logs/tables/past_rail_{group}.log",
+    benchmark:
+        "results/measured/benchmarks/tables/past_rail_{group}.tsv"
+    params:
+        names=lambda wc: MEASURED.board(wc.group),
+        code=CODE.digest("table_past_rail"),
+    message:
+        "table: recordings of {wildcards.group} past the rail"
+    script:
+        "../scripts/table_past_rail.py"

@@ -50,31 +50,6 @@ rule diagnosis_agreement:
         "../scripts/diagnosis_agreement.py"
 
 
-rule figure_past_rail:
-    input:
-        recording=lambda wc: MEASURED.recording(wc.name),
-        diagnosis="results/measured/diagnosis/{name}/diagnosis.json",
-        elsewhere=lambda wc: [
-            f"results/measured/diagnosis/{other}/diagnosis.json"
-            for other in MEASURED.others(wc.name)[:1]
-        ],
-    output:
-        **figure("past_rail_{name}", "Diagnosis", caption="past_rail", folder="results/measured"),
-    log:
-        "results/measured/logs/past_rail_{name}.log",
-    benchmark:
-        "results/measured/benchmarks/past_rail_{name}.tsv"
-    resources:
-        mem_mb=4000,
-    params:
-        others=lambda wc: MEASURED.others(wc.name),
-        code=CODE.digest("figure_past_rail"),
-    message:
-        "motion of {wildcards.name} past the rail"
-    script:
-        "../scripts/figure_past_rail.py"
-
-
 rule add_effect:
     input:
         recording=lambda wc: MEASURED.recording(wc.name),

@@ -1,8 +1,10 @@
 """How well an array measures an angular rate beyond its gyroscopes' rail (2017, figure 3).
 
 On a measured recording nobody knows the rate past the gyroscopes' rail. So a lower rail is made
-up: readings beyond it are withheld from the estimate and compared with it.
+up: readings beyond it are withheld from all estimates and compared with them.
 """
+
+from __future__ import annotations
 
 from dataclasses import replace
 
@@ -10,8 +12,11 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from imuarray.analysis.motion import motion_under
+from imuarray.analysis.foresight import with_board
+from imuarray.analysis.model import model_of
 from imuarray.engine.fusion import fuse
+from imuarray.engine.readings import measured
+from imuarray.engine.rough_fusion import Rough, roughly
 from imuarray.errors import InputError
 from imuarray.model import ArrayModel
 from imuarray.recording import Recording, array_of
@@ -22,61 +27,81 @@ ASSUMED = 0.79  # m/s^2, the accelerometers' noise in paper 2021's experiment
 
 
 def past_rail(
-    recording: Recording, diagnosed: xr.Dataset, base, bins=BINS, per_bin: int = PER_BIN,
-    elsewhere=None,
-) -> pd.DataFrame:  # fmt: skip
+    recording: Recording, calibration: xr.Dataset, bins=BINS, per_bin: int = PER_BIN
+) -> pd.DataFrame:
     """Errors of withheld gyroscope readings, as several models predict them.
 
     Parameters
     ----------
     recording
         Whole and corrected; samples at a true rail are not used.
-    diagnosed
-        What `diagnosed` gives of the recording's diagnosis.
-    base : (A, 3) m
-        Positions by the papers' model, relative to the first triad.
+    calibration
+        Of the board, from other recordings. The recording's biases, clocks, noise and motion are
+        fitted without the withheld readings.
     bins
         Edges in deg/s of the withheld axis' rate; the first is the rail.
-    elsewhere : ((A, 3) m, s) or None
-        Positions as ``base`` and the gyroscopes' lead (`lead_of`) from another recording of the
-        board, which has seen nothing of this one.
 
     Returns
     -------
     DataFrame
-        A row per model (``clipped``, ``nominal``, ``calibrated``, ``delayed``: the same with the
-        gyroscopes' lead, ``transferred``: with both from ``elsewhere``, ``extended``) and bin of
+        A row per model (``clipped``; the papers' with ``nominal`` or ``calibrated`` positions and,
+        ``delayed``, the gyroscopes' lead (`lead_of`); ``board``, the whole calibration) and bin of
         the withheld axis' rate: mid ``rate_dps``, ``readings`` (of all gyroscopes, which share an
         error), ``rmse_dps``, ``median_dps`` of the absolute error, ``above_100`` the share beyond
-        100 deg/s, and for ``extended`` what noise alone claims: ``sd_dps`` (median),
-        ``rms_sd_dps`` and ``within_95``.
+        100 deg/s, and for ``board`` what it claims: ``sd_dps`` (median), ``rms_sd_dps`` and
+        ``within_95``.
 
     InputError where no sample is beyond the rail.
     """
-    chosen = _choose(recording, np.radians(bins), per_bin)
     lowest = np.radians(bins[0])
+    index = _choose(recording, np.radians(bins), per_bin)
+    chosen = recording.select(index)
     withheld = (np.abs(chosen.angular_rate) >= lowest).any(axis=1, keepdims=True)
     withheld = np.broadcast_to(withheld, chosen.angular_rate.shape)
-    clipped = replace(chosen, angular_rate=np.clip(chosen.angular_rate, -lowest, lowest))
-    errors, sds = {"clipped": clipped.angular_rate - chosen.angular_rate}, {}
+    hidden = _hidden(recording, index, withheld, lowest)
+    clipped = hidden.select(index)
+    found = {"clipped": clipped.angular_rate}
+    positions, lead = calibration["position"].to_numpy(), lead_of(calibration)
     ways = {
-        "nominal": (recording.relative_positions(), 0.0),
-        "calibrated": (base, 0.0),
-        "delayed": (base, lead_of(diagnosed)),
-    }
-    if elsewhere is not None:
-        ways["transferred"] = elsewhere
-    for name, (positions, lead) in ways.items():
-        errors[name] = _predicted(clipped, withheld, positions, lead) - chosen.angular_rate
-    model, found = motion_under(diagnosed, clipped, withheld)
-    predicted = _readings(model, diagnosed, found, chosen.time)
-    errors["extended"] = predicted - chosen.angular_rate
-    variance = np.einsum("tii->ti", found.covariance)[:, None, :3]
-    noise = np.diag(model.noise.gyroscope).reshape(1, -1, 3)
-    sds["extended"] = np.sqrt(variance + noise)
+        "nominal": (recording.relative_positions(), 0.0), "calibrated": (positions, 0.0),
+        "delayed": (positions, lead),
+    }  # fmt: skip
+    for name, way in ways.items():
+        found[name] = _predicted(clipped, withheld, *way)
+    fused = _fused(hidden, calibration, chosen.time)
+    values, sd = (part[:, : withheld.shape[1], 3:] for part in fused.foretold())
+    errors = {name: value - chosen.angular_rate for name, value in found.items()}
+    errors["board"] = values - chosen.angular_rate
     rates = np.abs(chosen.angular_rate.mean(axis=1, keepdims=True))
     rates = np.broadcast_to(rates, withheld.shape)
-    return _table(errors, sds, withheld, np.degrees(rates), bins)
+    return _table(errors, {"board": sd}, withheld, np.degrees(rates), bins)
+
+
+def _hidden(recording: Recording, index, withheld, rail: float) -> Recording:
+    """The recording with the ``withheld`` readings (T, G, 3) of some samples at a rail.
+
+    Of these their sides are left, and that the rate is as large as the rail.
+    """
+    rate, rails = recording.angular_rate.copy(), recording.saturated_gyroscopes().copy()
+    rate[index] = np.where(withheld, np.copysign(rail, rate[index]), rate[index])
+    rails[index] |= withheld
+    return replace(recording, angular_rate=rate, angular_rate_saturated=rails)
+
+
+def _fused(recording: Recording, calibration: xr.Dataset, time) -> Rough:
+    """The samples at ``time`` under the board's calibration and the recording's own parameters."""
+    _, own = with_board(recording, calibration)
+    since = recording.time - recording.time[0]
+    moving = np.isin(recording.time, time)
+    moving |= True if recording.stationary is None else ~recording.stationary
+    part, papers = recording.select(moving), model_of(recording)
+    rails, lost = part.saturated_gyroscopes(), part.saturated_accelerometers()
+    readings = measured(papers, part.specific_force, part.angular_rate, rails, since[moving])
+    readings = replace(readings, span=float(since[-1]))
+    railed = np.zeros(readings.keep.shape, bool)
+    railed[:, : lost.shape[1], :3] = lost
+    whole = roughly(readings.without(railed), own, papers, rails)
+    return whole.select(np.flatnonzero(np.isin(part.time, time))).fused()
 
 
 def _predicted(clipped: Recording, withheld, positions, lead: float) -> np.ndarray:
@@ -89,14 +114,14 @@ def _predicted(clipped: Recording, withheld, positions, lead: float) -> np.ndarr
     return (motion.angular_rate + lead * motion.angular_acceleration)[:, None]
 
 
-def lead_of(diagnosed: xr.Dataset) -> float:
+def lead_of(calibration: xr.Dataset) -> float:
     """By how much (s) the gyroscopes are ahead of the accelerometers, 0 where nobody found it."""
-    names = [str(name) for name in diagnosed["parameter"].to_numpy()]
+    names = [str(name) for name in calibration["parameter"].to_numpy()]
     lags = [name.startswith("gyroscope_delay ") for name in names]
-    return float(diagnosed["effect_parameter"].to_numpy()[lags].mean()) if any(lags) else 0.0
+    return float(calibration["effect_parameter"].to_numpy()[lags].mean()) if any(lags) else 0.0
 
 
-def _choose(recording: Recording, edges, per_bin: int) -> Recording:
+def _choose(recording: Recording, edges, per_bin: int) -> np.ndarray:
     """Samples off all true rails, spread evenly over time in each bin of their fastest axis."""
     fastest = np.abs(recording.angular_rate.mean(axis=1)).max(axis=1)
     lost = recording.saturated_gyroscopes()
@@ -110,17 +135,7 @@ def _choose(recording: Recording, edges, per_bin: int) -> Recording:
         raise InputError(
             f"recording: expected samples beyond {np.degrees(edges[0]):g} deg/s, found none"
         )
-    return recording.select(index)
-
-
-def _readings(model: ArrayModel, diagnosed: xr.Dataset, found, time) -> np.ndarray:
-    """What the gyroscopes read at the motion found, (T, G, 3) rad/s."""
-    since = time - diagnosed.attrs["time_origin"]
-    predicted = model.predict_many(
-        found.estimate.motion, diagnosed["position"].to_numpy(),
-        diagnosed["effect_parameter"].to_numpy(), since, span=diagnosed.attrs["span"],
-    )  # fmt: skip
-    return np.asarray(predicted.angular_rate)
+    return index
 
 
 def _table(errors, sds, withheld, rates, bins) -> pd.DataFrame:

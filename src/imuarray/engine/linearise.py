@@ -111,6 +111,27 @@ def reading(model, count, x, positions, parameters, extra, time, span):
     return stacked(count, model.predict(parameters=parameters, **when))
 
 
+def predicted(readings: Readings, model: ArrayModel, state: State, slopes=False):
+    """(T, N, 6) readings at a state; and (T, N, 6, D) their ``slopes`` by the motion, if wanted."""
+    extra = (*state.derivatives, readings.wandered)
+    given = state.positions, state.parameters
+    return jax.tree.map(np.asarray, _predicted(
+        model, readings.values.shape[1], slopes, state.motion, extra, readings.time, readings.span,
+        *given,
+    ))  # fmt: skip
+
+
+@partial(jax.jit, static_argnums=(0, 1, 2))
+def _predicted(model, count, slopes, x, extra, time, span, positions, parameters):
+    def one(x, extra, time):
+        def at(x):
+            return reading(model, count, x, positions, parameters, extra, time, span)
+
+        return (at(x), jax.jacfwd(at)(x)) if slopes else at(x)
+
+    return jax.vmap(one)(x, extra, time)
+
+
 @partial(jax.jit, static_argnums=(0, 1, 2))
 def _chunk(model, count, placed, x, extra, time, span, positions, parameters, data):
     """Whitened residual, its derivatives by the motion and by all columns, the motion's gram.
