@@ -9,7 +9,8 @@ import pytest
 import imuarray
 from imuarray.analysis.beyond import posterior_beyond
 from imuarray.analysis.fitting import fitted_beyond
-from imuarray.analysis.past_rail import _choose, _fused, _hidden, past_rail
+from imuarray.analysis.known import fused
+from imuarray.analysis.past_rail import _choose, _hidden, past_rail
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.figures.measured import figure_past_rail, table_past_rail
@@ -81,7 +82,7 @@ def test_the_withheld_readings_are_not_used(withheld, diagnosis):
     hidden[index] = (np.abs(recording.angular_rate[index]) > np.radians(300)).any(1, keepdims=True)
     rate = recording.angular_rate * np.where(hidden, 1.02, 1.0)
     predicted = [
-        _fused(_hidden(one, index, hidden[index], np.radians(300)), found, one.time[index])
+        fused(_hidden(one, index, hidden[index], np.radians(300)), found, hidden.any(axis=(1, 2)))
         for one in (recording, replace(recording, angular_rate=rate))
     ]
     np.testing.assert_array_equal(*(one.foretold()[0] for one in predicted))

@@ -16,7 +16,7 @@ PLACES = {
     "blind_confusion": "results/blind/{scale}/figures",
     "blind_bars": "results/blind/{scale}/tables",
     "diagnosis_(positions|parameters|recordings)_.*": "results/measured/tables",
-    "added_.*|causes_table_.*|experiment_table_.*|left_out_.*|past_rail_table_.*": "results/measured/tables",
+    "added_.*|(causes|experiment|past_rail)_table_.*|left_out_.*": "results/measured/tables",
     "diagnosis_.*|past_rail_.*|causes_.*|experiment_.*": "results/measured/figures",
 }
 

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis.calibration_dataset import places_among, positions_dataset
-from imuarray.analysis.leave_out import with_board
+from imuarray.analysis.known import with_board
 from imuarray.engine.estimate import Estimate, stepped
 from imuarray.engine.fit import flat_parameters, prior_means
 from imuarray.engine.ladder import mask_of

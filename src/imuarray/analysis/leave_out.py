@@ -7,14 +7,13 @@ import pandas as pd
 import xarray as xr
 
 from imuarray.analysis.calibration_dataset import engine_dataset
-from imuarray.analysis.model import model_of
+from imuarray.analysis.known import used, with_board
 from imuarray.engine.densities import block_scores
-from imuarray.engine.estimate import Estimate, Recorded, estimate
+from imuarray.engine.estimate import Recorded, estimate
 from imuarray.engine.heldout import gain
-from imuarray.engine.known_board import board_of, with_own
+from imuarray.engine.known_board import board_of
 from imuarray.engine.ladder import mask_of
 from imuarray.engine.parameters import POSITION, columns_of
-from imuarray.engine.readings import Readings, arrange, determined, most_informative
 from imuarray.engine.widths import settled
 from imuarray.firstorder.correct import FirstOrder, calibrate_first_order, correct
 from imuarray.model.effects import EFFECTS
@@ -43,19 +42,6 @@ def _of_board(own: FirstOrder, other: FirstOrder) -> FirstOrder:
     """A recording's first order, its maps another's of the same board."""
     triads = replace(own.triads, matrix=other.triads.matrix)
     return replace(own, triads=triads, gyroscopes=other.gyroscopes)
-
-
-def used(recording: Recording) -> Readings:
-    """The moving samples that a board is estimated from."""
-    readings = arrange(recording, sparse=True)
-    return most_informative(readings.select(determined(readings, 1)), lambda text: None)
-
-
-def with_board(recording: Recording, calibration: xr.Dataset) -> tuple[Readings, Estimate]:
-    """A recording's samples, and what is its own beside a calibration's positions and effects."""
-    readings, effects = used(recording), calibration.attrs["effects"].split(",")
-    values = model_of(recording, effects).split(calibration["effect_parameter"].to_numpy())
-    return readings, with_own(readings, effects, calibration["position"].to_numpy(), values)
 
 
 def predicted(recording: Recording, calibration: xr.Dataset) -> pd.DataFrame:

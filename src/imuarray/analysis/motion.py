@@ -13,6 +13,7 @@ from imuarray.model import ArrayModel
 from imuarray.model.effects import find_effects
 from imuarray.model.names import parameter_names
 from imuarray.model.noise import Noise
+from imuarray.motion import Motion
 from imuarray.motion.state import UNITS
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording
@@ -24,8 +25,9 @@ def apply(
     """Motion of the reference triad at each sample, with covariances.
 
     ``calibration``: what `calibrate` gave for a recording of the same IMUs, with effects or
-    without; where effects look at the time (drifts, clocks) it must be the same recording, or a
-    part of it. A gyroscope at its rail says on which side the rate is and what it is at least, no
+    without; where effects look at the time (drifts) it must be the same recording, or a part of
+    it. Where motion is rough and the IMUs have clocks of their own, biases and clocks are found
+    anew. A gyroscope at its rail says on which side the rate is and what it is at least, no
     more. ``accelerometer_noise``: assumed sd in m/s^2, by default what the recording declares, or
     with effects what the calibration assumed.
 
@@ -41,7 +43,7 @@ def apply(
     require_fit(calibration, recording)
     saturated = recording.saturated_gyroscopes()
     try:
-        _, found = motion_under(calibration, recording, saturated, accelerometer_noise)
+        found, anew = motion_under(calibration, recording, saturated, accelerometer_noise)
     except np.linalg.LinAlgError as error:
         raise InputError(f"expected a calibration that determines the motion: {error}") from None
     found = _with_common_map(found, calibration, recording)
@@ -57,7 +59,7 @@ def apply(
     dataset["accelerometer_at_rail"] = (("time",), railed)
     used = [calibration[name].to_numpy() for name in sorted(map(str, calibration.data_vars))]
     data = digest(recording.specific_force, recording.angular_rate, *used)
-    dataset.attrs |= stamp({"recording and calibration": data}, 0)
+    dataset.attrs |= stamp({"recording and calibration": data}, 0) | {"own_clocks": int(anew)}
     return dataset
 
 
@@ -97,7 +99,7 @@ def motion_under(
     calibration: xr.Dataset, recording: Recording, saturated,
     accelerometer_noise: float | None = None,
 ):  # fmt: skip
-    """(model, `Fused`) under a calibration's model, its parameters and noise as calibrated.
+    """(`Fused`, whether clocks are its own) under a calibration's model, its noise as calibrated.
 
     ``saturated`` (T, G, 3) bool: gyroscope axes to be left out.
     """
@@ -117,10 +119,34 @@ def motion_under(
         covariance = None if whole is None else whole.to_numpy()
         since, span = recording.time - attrs["time_origin"], attrs["span"]
     model = replace(model, noise=_noise(calibration, model.array, accelerometer_noise))
-    return model, fuse(
+    found = fuse(
         model, recording.specific_force, recording.angular_rate, parameters, covariance,
         saturated, since, span,
     )  # fmt: skip
+    return _with_own_clocks(found, calibration, recording, covariance)
+
+
+def _with_own_clocks(found, calibration: xr.Dataset, recording: Recording, covariance):
+    """`Fused` with rough motion anew, by the recording's own biases and clocks; whether it is."""
+    from imuarray.analysis.known import fused
+    from imuarray.engine.clock_scan import CLOCK
+
+    if CLOCK not in str(calibration.attrs.get("effects")).split(",") or covariance is None:
+        return found, False
+    still = recording.stationary
+    moving = np.ones(len(recording.time), bool) if still is None else ~still
+    rough = fused(recording, calibration, moving)
+    if rough.readings.wander is None:
+        return found, False
+    whole, shared = rough.covariances(covariance)
+    motion = [np.array(field) for field in found.estimate.motion[:3]]
+    for number, field in enumerate(motion):
+        field[moving] = rough.state.motion[:, 3 * number : 3 * number + 3]
+    parts = (found.covariance, whole), (found.from_calibration, shared)
+    for target, part in (*parts, (found.estimate.converged, rough.converged)):
+        target[moving] = part
+    estimate = replace(found.estimate, motion=Motion.of(*motion))
+    return found._replace(estimate=estimate), True
 
 
 def _require_parameters(calibration: xr.Dataset, recording: Recording, model: ArrayModel) -> None:

@@ -4,19 +4,14 @@ On a measured recording nobody knows the rate past the gyroscopes' rail. So a lo
 up: readings beyond it are withheld from all estimates and compared with them.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
-from imuarray.analysis.foresight import with_board
-from imuarray.analysis.model import model_of
+from imuarray.analysis.known import fused
 from imuarray.engine.fusion import fuse
-from imuarray.engine.readings import measured
-from imuarray.engine.rough_fusion import Rough, roughly
 from imuarray.errors import InputError
 from imuarray.model import ArrayModel
 from imuarray.recording import Recording, array_of
@@ -68,8 +63,8 @@ def past_rail(
     }  # fmt: skip
     for name, way in ways.items():
         found[name] = _predicted(clipped, withheld, *way)
-    fused = _fused(hidden, calibration, chosen.time)
-    values, sd = (part[:, : withheld.shape[1], 3:] for part in fused.foretold())
+    whole = fused(hidden, calibration, np.isin(recording.time, chosen.time))
+    values, sd = (part[:, : withheld.shape[1], 3:] for part in whole.foretold())
     errors = {name: value - chosen.angular_rate for name, value in found.items()}
     errors["board"] = values - chosen.angular_rate
     rates = np.abs(chosen.angular_rate.mean(axis=1, keepdims=True))
@@ -86,22 +81,6 @@ def _hidden(recording: Recording, index, withheld, rail: float) -> Recording:
     rate[index] = np.where(withheld, np.copysign(rail, rate[index]), rate[index])
     rails[index] |= withheld
     return replace(recording, angular_rate=rate, angular_rate_saturated=rails)
-
-
-def _fused(recording: Recording, calibration: xr.Dataset, time) -> Rough:
-    """The samples at ``time`` under the board's calibration and the recording's own parameters."""
-    _, own = with_board(recording, calibration)
-    since = recording.time - recording.time[0]
-    moving = np.isin(recording.time, time)
-    moving |= True if recording.stationary is None else ~recording.stationary
-    part, papers = recording.select(moving), model_of(recording)
-    rails, lost = part.saturated_gyroscopes(), part.saturated_accelerometers()
-    readings = measured(papers, part.specific_force, part.angular_rate, rails, since[moving])
-    readings = replace(readings, span=float(since[-1]))
-    railed = np.zeros(readings.keep.shape, bool)
-    railed[:, : lost.shape[1], :3] = lost
-    whole = roughly(readings.without(railed), own, papers, rails)
-    return whole.select(np.flatnonzero(np.isin(part.time, time))).fused()
 
 
 def _predicted(clipped: Recording, withheld, positions, lead: float) -> np.ndarray:

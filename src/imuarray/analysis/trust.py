@@ -69,16 +69,19 @@ def reasons_of_posterior(
     return found + _not_converged(posterior.attrs)
 
 
-def reasons_of_motion(recording: Recording, calibration: xr.Dataset) -> list[str]:
+def reasons_of_motion(
+    recording: Recording, calibration: xr.Dataset, own_clocks: bool = False
+) -> list[str]:
     """Why the motion that `imuarray.apply` gives for this recording is not to be trusted.
 
     A calibration that is not, or that this recording does not fit, as one of another board.
+    ``own_clocks``: whether `imuarray.apply` has found the recording's own.
     """
     said = json.loads(calibration.attrs.get("reasons", "[]"))
     places = _places(recording, calibration["position"].to_numpy(), _covariance(calibration))
     residual = _rigid(recording, places) if _is_papers(calibration) else {}
     found = _judged(recording, places, residual) + _elsewhere(kept(recording), places)
-    found += _other_clocks(recording, calibration)
+    found += [] if own_clocks else _other_clocks(recording, calibration)
     return [f"the calibration is not to be trusted: {reason}" for reason in said] + [
         reason for reason in found if reason not in said
     ]

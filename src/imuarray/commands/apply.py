@@ -26,7 +26,8 @@ def apply(arguments) -> None:
         dataset = applied(calibration, recording, arguments.accelerometer_noise)
     except InputError as error:
         raise InputError(f"{arguments.calibration}: {error}") from None
-    reasons = reasons_of_motion(assumed(recording, arguments.accelerometer_noise), calibration)
+    used, own = assumed(recording, arguments.accelerometer_noise), bool(dataset.attrs["own_clocks"])
+    reasons = reasons_of_motion(used, calibration, own)
     write_netcdf(dataset.assign_attrs(trust(reasons)), arguments.out)
     gyroscopes = recording.angular_rate.shape[1]
     average = recording.gyroscope_noise_sd / np.sqrt(gyroscopes)

@@ -114,7 +114,7 @@ def fuse(
     parts = np.split(found.motion, found.motion.shape[1] // 3, axis=1)
     motion = Motion(*parts) if len(parts) == 5 else Motion.of(*parts)
     estimate = MotionEstimate(motion, found.cost, found.steps, found.converged)
-    return Fused(estimate, *_covariances(readings, model, state, covariance))
+    return Fused(estimate, *covariances(readings, model, state, covariance))
 
 
 def _of_two(readings: Readings, model: ArrayModel, positions, effects, covariance) -> Fused:
@@ -135,7 +135,7 @@ def _of_two(readings: Readings, model: ArrayModel, positions, effects, covarianc
         found = descend(part, model, state, np.arange(len(seen)))
         state = state._replace(motion=found.motion)
     whole = [np.full((samples, *values.shape[1:]), np.nan) for values in (found.motion, found.cost)]
-    spreads = _covariances(part, model, state, covariance)
+    spreads = covariances(part, model, state, covariance)
     both = [np.full((samples, 9, 9), np.nan) for _ in spreads]
     steps, converged = np.zeros(samples, int), np.zeros(samples, bool)
     for target, values in zip(
@@ -236,7 +236,7 @@ def equations(readings: Readings, model: ArrayModel, state: State, index, rails=
     return [np.concatenate(part)[: len(index)] for part in zip(*parts, strict=True)]
 
 
-def _covariances(readings: Readings, model: ArrayModel, state: State, spread):
+def covariances(readings: Readings, model: ArrayModel, state: State, spread):
     """Of each sample's motion: the whole (T, 9, 9), and the parameters' share of it."""
     columns = columns_of(model.array, model.effects, np.inf)
     noise, shared = np.empty((2, len(readings.time), 9, 9))

@@ -1,6 +1,7 @@
 """A recording of a board that is known: its biases, clocks, noise and motion, fitted anew."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -44,15 +45,19 @@ def with_own(readings: Readings, effects, positions, values: dict) -> Estimate:
     if CLOCK not in own:
         return estimate([one], columns, free)
     one = estimate([one], columns, free, steps=SETTINGS.rung_steps).recorded[0]
-    return _with_own_clocks(one, readings.keep, columns, free)
-
-
-def _with_own_clocks(one: Recorded, keep, columns: Columns, free) -> Estimate:
-    """With the clocks that the recording shows; ``free`` (N, m): what is its own beside them."""
-    clocks = shown_clocks(one, columns)
+    clocks, keep = shown_clocks(one, columns), readings.keep
     imus = sorted(clocks)
     one = with_clocks(one, columns, clocks)
     one = timed(refined(one, keep, columns, imus), keep, columns, imus)
+    return _finished(one, columns, tuple(effects), [name for name in own if name != CLOCK], imus)
+
+
+def _finished(one: Recorded, columns: Columns, effects, own, imus) -> Estimate:
+    """All ``own`` effects and the clocks of some IMUs, no more than ``effects`` in the model."""
+    found = columns.model.split(one.state.parameters)
+    columns = columns_of(one.readings.array, effects, one.readings.position_prior_sd)
+    values = columns.model.join({name: found[name] for name in effects})
     mask = mask_of(columns, [CLOCK])
     mask[np.setdiff1d(np.arange(len(mask)), imus)] = False
-    return estimate([one], columns, free | mask)
+    one = replace(one, state=one.state._replace(parameters=values))
+    return estimate([one], columns, mask_of(columns, own) | mask)

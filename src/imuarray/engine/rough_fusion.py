@@ -17,7 +17,7 @@ from imuarray.engine.clock_scan import CLOCK
 from imuarray.engine.clocks import clocks_in
 from imuarray.engine.estimate import Estimate, Recorded
 from imuarray.engine.fit import with_derivatives, with_free_gyroscopes, with_rough_prior
-from imuarray.engine.fusion import descend, fuse, one_sided
+from imuarray.engine.fusion import covariances, descend, fuse, one_sided
 from imuarray.engine.linearise import CHUNK, State, chunk_at, no_derivatives, predicted
 from imuarray.engine.parameters import Columns
 from imuarray.engine.passes import normal_pass
@@ -121,15 +121,23 @@ class Rough(NamedTuple):
         cost = [np.sum((readings.weights * (readings.values - p)) ** 2, axis=-1) for p in read]
         return other, near * expit((cost[0] - cost[1]) / 2), read[1] - read[0]
 
+    @property
+    def lost(self) -> float:
+        """Normal noise's information over that of Student's t."""
+        return (LIGHT + 5) / (LIGHT + 3) if np.isfinite(self.freedoms).any() else 1.0
+
     def covariance(self) -> np.ndarray:
         """(T, D, D) of the motion: noise as `fused` weighs it, and what the prior leaves."""
         out = []
         for first in range(0, len(self.state.motion), CHUNK):
             seen = chunk_at(self.readings, self.columns, self.state, np.arange(0), first)
             out.append(np.swapaxes(seen.inverse, 1, 2) @ seen.inverse)
-        # normal noise's information over that of t
-        lost = (LIGHT + 5) / (LIGHT + 3) if np.isfinite(self.freedoms).any() else 1.0
-        return lost * np.concatenate(out)[: len(self.state.motion)]
+        return self.lost * np.concatenate(out)[: len(self.state.motion)]
+
+    def covariances(self, spread) -> tuple[np.ndarray, np.ndarray]:
+        """(T, 9, 9) of the motion, and what parameters of a covariance ``spread`` have of it."""
+        whole, shared = covariances(self.readings, self.columns.model, self.state, spread)
+        return self.lost * (whole - shared) + shared, shared
 
     def foretold(self) -> tuple[np.ndarray, np.ndarray]:
         """Readings (T, N, 6) at the motion, left out or not, and the sds of their noise and it."""
