@@ -8,12 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-import imuarray
-from imuarray.analysis.calibration_dataset import engine_dataset
-from imuarray.analysis.known import used, with_board
-from imuarray.analysis.past_rail import past_rail
 from imuarray.diagnosis.document import diagnose
-from imuarray.engine.known_board import board_of
 from imuarray.geometry import mimu4444_corners
 from imuarray.recording import Recording
 
@@ -113,19 +108,3 @@ def test_the_extended_model_s_positions_are_five_times_better_and_within_their_s
     assert error["extended"] < error["base"] / 5
     off = (np.array(document["extended"]["positions_m"]) - positions)[1:]
     assert np.mean(np.abs(off) < 1.96 * np.array(document["extended"]["positions_sd_m"])[1:]) > 0.8
-
-
-def test_clocks_are_found_anew_beside_a_known_board():
-    """Readings past a made-up rail are foretold, and `apply` has the recording's own clocks."""
-    recording, *_ = rough_recording(3)
-    board, other = recording.select(slice(0, 900)), recording.select(slice(900, None))
-    calibration = engine_dataset([board], board_of([used(board)]))
-    table = past_rail(other, calibration, (200, 1500), 30).set_index("model")
-    assert table.median_dps.board < 0.5 * table.median_dps.delayed
-    assert 0.88 < table.within_95.board <= 1.0
-    motion = imuarray.apply(calibration, other)
-    assert motion.attrs["own_clocks"] == 1 and motion["converged"].mean() > 0.99
-    own = with_board(other, calibration)[1].recorded[0]
-    same = np.isin(other.time - other.time[0], own.readings.time)
-    off = motion["angular_rate"].to_numpy()[same] - own.state.motion[:, :3]
-    assert np.median(np.abs(off) / motion["angular_rate_sd"].to_numpy()[same]) < 0.5
