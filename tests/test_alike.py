@@ -111,6 +111,11 @@ def test_the_common_part_of_drifts_is_no_larger_than_their_differences_say():
     assert np.all(columns.usual_sd[own[kind[own] == 1]] == 0.005)
     # those of the other kind were not looked at
     assert np.all(columns.prior_sd[own[kind[own] == 0]] == 0.1)
+    # a model that is far off: no larger than such sensors can have
+    for _ in range(30):
+        whole = told + prior_precision(columns, active)
+        columns = with_likely_spread(columns, active, 1e5 * drift, whole, place)
+    assert columns.prior_sd[own[kind[own] == 1]] == pytest.approx(30 * 0.005)
 
 
 def test_repeatability_is_that_of_pairs():

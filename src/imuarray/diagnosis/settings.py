@@ -49,6 +49,7 @@ class Settings:
     rough_share: float = 5.0  # factor of `share` where motion is rough
     steady_noise: float = 0.02  # relative change of a noise sd below which a fit is not repeated
     steady_size: float = 0.1  # relative change of an effect's size, likewise
+    sizings: int = 5  # times that sizes are estimated again after a fit
     likely_drift: float = -4.6  # log p of a drift beside an adopted bias
     changing: float = 0.05  # of a drift's chi-square that its change must gain
     steady_drift: float = -50.0  # log p of a drift that does not change: it is misattributed

@@ -137,7 +137,9 @@ class Search:
         """The same without the derivatives that its next fit makes anew."""
         return replace(self, fit=self.fit.only_active(), given=None)
 
-    def refit(self, state: State | None = None, turns=2, rough=True) -> Search:
+    def refit(
+        self, state: State | None = None, turns=2, rough=True, sizings=SETTINGS.sizings
+    ) -> Search:
         """Fit what is adopted, with the noise that the residual's fast part shows."""
         state = self.fit.state if state is None else state
         search, turns = self, turns + bool(self.clocks)
@@ -159,9 +161,10 @@ class Search:
         noise = noises.judge(made.readings, made.residual, made.basis)
         search = replace(search, fit=made, noise=noise).weighed()
         columns = likely_sizes(made)
-        if np.allclose(columns.prior_sd, search.columns.prior_sd, rtol=SETTINGS.steady_size):
+        steady = np.allclose(columns.prior_sd, search.columns.prior_sd, rtol=SETTINGS.steady_size)
+        if steady or not sizings:
             return search
-        return replace(search, columns=columns).refit(made.state, turns, rough)
+        return replace(search, columns=columns).refit(made.state, turns, rough, sizings - 1)
 
     @property
     def _with_jumps(self) -> Readings:

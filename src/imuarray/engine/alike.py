@@ -49,7 +49,9 @@ def with_likely_spread(columns: Columns, active, values, information, place) -> 
             off = values[mine] / sds[column[mine]]
             factor = np.sqrt(off @ own @ off / told)
             sds[groups == group] *= np.clip(factor, 1 / SETTINGS.widening, SETTINGS.widening)
-    return replace(columns, prior_sd=sds)
+    # where the model is far off sizes would grow without end
+    least, most = (size * columns.usual_sd for size in (SETTINGS.least_size, SETTINGS.most_size))
+    return replace(columns, prior_sd=np.clip(sds, least, most))
 
 
 def likely_sizes(fit: Fit) -> Columns:

@@ -32,6 +32,8 @@ class Settings:
     offset: float = 1e-4  # s, of what they see of omega, for each of that
     told: float = 0.03  # of these that readings must tell, for their sds to be estimated
     widening: float = 3.0  # factor by which an iteration may change such an sd
+    least_size: float = 1e-3  # of a size that is estimated, times what such sensors have
+    most_size: float = 30.0  # the same
     tied: float = 1e-5  # of that sd, as long as it is not free
     near: int = 9  # samples that give the size of the motion's third derivatives
     stiff: float = 1e-3  # of a parameter's prior sd: the sd that a pinned mean keeps
