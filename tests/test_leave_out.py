@@ -15,7 +15,7 @@ from imuarray.engine.densities import block_scores, log_densities
 from imuarray.engine.fit import at, flat_parameters
 from imuarray.engine.heldout import log_scores
 from imuarray.engine.linearise import linearise
-from imuarray.figures.measured import table_experiment, table_left_out
+from imuarray.figures.board import table_experiment, table_left_out
 from tests.test_engine import fitted, simulated
 
 

@@ -13,7 +13,7 @@ from imuarray.analysis.known import fused
 from imuarray.analysis.past_rail import _choose, _hidden, past_rail
 from imuarray.cli import main
 from imuarray.errors import InputError
-from imuarray.figures.measured import figure_past_rail, table_past_rail
+from imuarray.figures.board import figure_past_rail, table_past_rail
 from imuarray.model.names import parameter_names
 from tests.test_bound import model
 
@@ -85,7 +85,7 @@ def test_the_withheld_readings_are_not_used(withheld, diagnosis):
         fused(_hidden(one, index, hidden[index], np.radians(300)), found, hidden.any(axis=(1, 2)))
         for one in (recording, replace(recording, angular_rate=rate))
     ]
-    np.testing.assert_array_equal(*(one.foretold()[0] for one in predicted))
+    np.testing.assert_array_equal(*(one.predictions()[0] for one in predicted))
 
 
 def test_a_diagnosis_is_a_calibration_for_the_command(withheld, diagnosis, tmp_path):

@@ -3,7 +3,7 @@
 from job import job
 
 with job(snakemake):
-    from imuarray.figures.measured import figure_causes
+    from imuarray.figures.board import figure_causes
     from imuarray.figures.publish import publish
 
     publish(figure_causes, snakemake)

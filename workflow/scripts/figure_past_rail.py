@@ -4,7 +4,7 @@ from job import job
 
 with job(snakemake):
     from imuarray.analysis.past_rail import ASSUMED, BINS, past_rail
-    from imuarray.figures.measured import figure_past_rail
+    from imuarray.figures.board import figure_past_rail
     from imuarray.figures.style import write_figure
     from imuarray.recording import load_dataset, read_recording
 

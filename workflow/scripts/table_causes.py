@@ -3,7 +3,7 @@
 from job import job
 
 with job(snakemake):
-    from imuarray.figures.measured import table_causes
+    from imuarray.figures.board import table_causes
     from imuarray.figures.publish import publish
 
     publish(table_causes, snakemake)

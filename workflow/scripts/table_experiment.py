@@ -3,7 +3,7 @@
 from job import job
 
 with job(snakemake):
-    from imuarray.figures.measured import table_experiment
+    from imuarray.figures.board import table_experiment
     from imuarray.figures.publish import publish
     from imuarray.recording import load_dataset
 

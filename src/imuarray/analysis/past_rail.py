@@ -64,7 +64,7 @@ def past_rail(
     for name, way in ways.items():
         found[name] = _predicted(clipped, withheld, *way)
     whole = fused(hidden, calibration, np.isin(recording.time, chosen.time))
-    values, sd = (part[:, : withheld.shape[1], 3:] for part in whole.foretold())
+    values, sd = (part[:, : withheld.shape[1], 3:] for part in whole.predictions())
     errors = {name: value - chosen.angular_rate for name, value in found.items()}
     errors["board"] = values - chosen.angular_rate
     rates = np.abs(chosen.angular_rate.mean(axis=1, keepdims=True))

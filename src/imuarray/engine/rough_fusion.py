@@ -139,7 +139,7 @@ class Rough(NamedTuple):
         whole, shared = covariances(self.readings, self.columns.model, self.state, spread)
         return self.lost * (whole - shared) + shared, shared
 
-    def foretold(self) -> tuple[np.ndarray, np.ndarray]:
+    def predictions(self) -> tuple[np.ndarray, np.ndarray]:
         """Readings (T, N, 6) at the motion, left out or not, and the sds of their noise and it."""
         values, slopes = predicted(self.readings, self.columns.model, self.state, slopes=True)
         variance = np.einsum("tnri,tij,tnrj->tnr", slopes, self.covariance(), slopes)
