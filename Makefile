@@ -78,7 +78,7 @@ lint: $(READY)
 	$(BIN)/snakemake --lint
 
 lock:
-	uv pip compile pyproject.toml --universal --python-version 3.11 --extra test --extra build \
+	uv pip compile pyproject.toml --universal --python-version 3.11 --extra test --extra build --extra pipeline --extra ros \
 	    --generate-hashes --no-header --quiet -o requirements.lock
 	$(PYTHON) -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["docs"], sep="\n")' | \
 	    uv pip compile - --universal --python-version 3.11 --generate-hashes --no-header --quiet -o requirements-docs.lock
