@@ -4,6 +4,7 @@ from .analysis.extension import diagnosed as diagnosed
 from .analysis.files import read_calibration as read_calibration
 from .analysis.files import read_mimu as read_mimu
 from .analysis.files import read_posterior as read_posterior
+from .analysis.logs import open_logs as open_logs
 from .analysis.motion import apply as apply
 from .analysis.prepare import first_order as first_order
 from .analysis.prepare import select as select
