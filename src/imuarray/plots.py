@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from imuarray.diagnosis.document import Diagnosis
+    from imuarray.firstorder.noise import StillNoise
     from imuarray.recording import Recording
 
 MOTION = {
@@ -132,6 +133,13 @@ def residuals(recording: Recording, seed: int = 0) -> list[Axes]:
     moving = recording.select(select_dynamic(recording).usable)
     table, shape = compare(moving, np.random.default_rng(seed))
     return residual_figure(table, shape).axes
+
+
+def allan(noise: StillNoise) -> list[Axes]:
+    """Allan deviations and spectra of all axes, and the terms found; of `imuarray.allan`."""
+    from imuarray.figures.noise import noise_figure
+
+    return noise_figure(noise).axes
 
 
 def discrepancies(diagnosis: Diagnosis) -> list[Axes]:

@@ -3,7 +3,7 @@
 from job import job
 
 with job(snakemake):
-    from imuarray.figures.measured import figure_measured_noise
+    from imuarray.figures.noise import figure_measured_noise
     from imuarray.figures.publish import publish
 
     publish(figure_measured_noise, snakemake)

@@ -22,5 +22,5 @@ with job(snakemake):
     write_csv(report.parameter_table(found, recording), made.parameters)
     write_csv(report.residual_table(found, recording), made.residuals)
     write_csv(report.noise_table(found, recording), made.noise)
-    write_csv(report.allan_table(found, recording), made.allan)
+    write_csv(report.allan_table(found.poses, recording), made.allan)
     write_corrected(recording, found, made.recording)

@@ -209,6 +209,12 @@ COMMANDS = (
         ),
     ),
     Command(
+        "allan", "allan.run",
+        "Noise density, bias instability and random walk of each axis, from long still stretches.",
+        "still.nc --out noise/", "folder to write: allan.pdf, allan.png, tables (CSV)",
+        (RECORDING,), folder=True,
+    ),
+    Command(
         "diagnose", "diagnose.diagnose",
         "What does the simulation get wrong, why, and what does the extended model gain?",
         "corrected.nc --out diagnosis/", "folder to write: diagnosis.json, report.html, figures",

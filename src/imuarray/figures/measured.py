@@ -1,4 +1,4 @@
-"""Measured recordings: residuals beside the simulation's, agreement, first order, noise."""
+"""Measured recordings: residuals beside the simulation's, agreement, first order."""
 
 import numpy as np
 import pandas as pd
@@ -218,38 +218,3 @@ def _assumed(name, summary, most):
     if name == "residual":
         return f"$\\sigma_a$ from the residual ({row.accelerometer_sd:.2f} m/s²)"
     return f"$\\sigma_a$ = {name} m/s²"
-
-
-@styled
-def figure_measured_noise(allan: pd.DataFrame, name: str, settings: dict):
-    """Allan deviation of the still poses, every axis of every IMU, and the papers' white noise.
-
-    ``allan``: `firstorder.report.allan_table` of the recording ``name``. The papers' sd of one
-    reading is drawn as tau^(-1/2).
-    """
-    noise = settings["noise"]
-    papers = {
-        "specific_force": noise["accelerometer_sd"],
-        "angular_rate": np.radians(noise["gyroscope_sd_dps"]),
-    }
-    footer = [
-        f"Still poses of recording {name}. Black: the papers' σa ="
-        f" {noise['accelerometer_sd']:g} m/s² and σg = {noise['gyroscope_sd_dps']:g} deg/s."
-    ]
-    figure = new_figure(footer, PAGE, 2.8)
-    titles = {
-        "specific_force": (1e3, "accelerometers (mm/s²)"),
-        "angular_rate": (np.degrees(1.0), "gyroscopes (deg/s)"),
-    }
-    for axes, (sensor, (factor, title)) in zip(figure.subplots(1, 2), titles.items(), strict=True):
-        part = allan[allan.sensor == sensor]
-        for i, axis in enumerate("xyz"):
-            for number, (_, line) in enumerate(part[part.axis == axis].groupby("triad")):
-                axes.plot(line.tau_s, factor * line.deviation, linewidth=0.6,
-                          **look(i, "marker"), label=axis if number == 0 else None)  # fmt: skip
-        taus = np.sort(part.tau_s.unique())
-        white = factor * papers[sensor] * np.sqrt(taus[0] / taus)
-        axes.plot(taus, white, color=BLACK, linewidth=1.2, label="papers' σ, white")
-        logarithmic(axes, "averaging time τ (s)", f"Allan deviation, {title}")
-        axes.legend()
-    return figure, allan

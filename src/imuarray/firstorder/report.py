@@ -103,11 +103,21 @@ def residual_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
     })  # fmt: skip
 
 
-def _allan(found: FirstOrder, recording: Recording, sensor: str):
-    """Averaging times (S,) s, Allan deviations (S, K, 3) of the still poses, the K labels."""
+def _allan(poses, recording: Recording, sensor: str):
+    """Averaging times (S,) s, Allan deviations (S, K, 3) of the still poses and their sds."""
     step, readings = float(np.median(np.diff(recording.time))), getattr(recording, sensor)
-    labels = getattr(recording, f"{SENSORS[sensor]}_labels")
-    return *allan_deviation([readings[pose] for pose in found.poses], step), labels
+    taus, deviation = allan_deviation([readings[pose] for pose in poses], step)
+    lengths = np.array([[step * (pose.stop - pose.start)] for pose in poses])
+    apart = np.sum(np.maximum(lengths / taus - 1, 0), axis=0)[:, None, None]
+    return taus, deviation, deviation / np.sqrt(2 * apart)  # sds: IEEE Std 952, C.1
+
+
+def axes_of(recording: Recording, sensor: str, **first) -> pd.MultiIndex:
+    """Rows of every axis of every triad, for each of what ``first`` names and lists."""
+    (name, values), labels = *first.items(), getattr(recording, f"{SENSORS[sensor]}_labels")
+    return pd.MultiIndex.from_product(
+        [[sensor], values, labels, list("xyz")], names=["sensor", name, "triad", "axis"]
+    )
 
 
 def noise_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
@@ -118,7 +128,8 @@ def noise_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
     """
     parts = []
     for sensor, kind in SENSORS.items():
-        taus, deviation, labels = _allan(found, recording, sensor)
+        taus, deviation, _ = _allan(found.poses, recording, sensor)
+        labels = getattr(recording, f"{kind}_labels")
         declared = getattr(recording, f"{kind}_noise_sd")
         sd = getattr(found, f"{kind}_noise").ravel()
         index = pd.MultiIndex.from_product(
@@ -135,13 +146,12 @@ def noise_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def allan_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
-    """Allan deviations: sensor, triad, axis, tau_s, deviation (SI units)."""
+def allan_table(poses, recording: Recording) -> pd.DataFrame:
+    """Allan deviations of still poses: sensor, tau_s, triad, axis, deviation, sd (SI units)."""
     parts = []
     for sensor in SENSORS:
-        taus, deviation, labels = _allan(found, recording, sensor)
-        index = pd.MultiIndex.from_product(
-            [[sensor], taus, labels, list("xyz")], names=["sensor", "tau_s", "triad", "axis"]
-        )
-        parts.append(pd.DataFrame({"deviation": deviation.ravel()}, index).reset_index())
+        taus, deviation, sd = _allan(poses, recording, sensor)
+        columns = {"deviation": deviation.ravel(), "sd": sd.ravel()}
+        rows = axes_of(recording, sensor, tau_s=taus)
+        parts.append(pd.DataFrame(columns, rows).reset_index())
     return pd.concat(parts, ignore_index=True)
