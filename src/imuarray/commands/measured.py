@@ -12,12 +12,7 @@ from imuarray.recording import read_recording, write_recording
 def first_order(arguments) -> None:
     """Calibration of each triad from poses and moves; the corrected recording carries it."""
     from imuarray.firstorder.correct import calibrate_first_order
-    from imuarray.firstorder.report import (
-        gyroscope_lines,
-        noise_table,
-        residual_table,
-        turned_lines,
-    )
+    from imuarray.firstorder.report import noise_table, residual_table, summary_lines
     from imuarray.firstorder.store import write_corrected
 
     recording, output = read_recording(arguments.recording), Output(arguments)
@@ -26,24 +21,11 @@ def first_order(arguments) -> None:
         [read_recording(path) for path in arguments.others],
     )  # fmt: skip
     write_corrected(recording, found, arguments.out)
-    length = sum(pose.stop - pose.start for pose in found.poses)
     table, offsets = residual_table(found, recording), found.triads.offset
     ratios = noise_table(found, recording).groupby("sensor").ratio.median()
-    lines = [
-        f"{len(found.poses)} still poses, {length} samples, gravity {found.gravity:g} m/s^2",
-        "triad  residual mm/s^2  poses left out  offset mm/s^2",
-    ]
-    for row, offset in zip(table.itertuples(), offsets, strict=True):
-        shown = ", ".join(f"{1e3 * value:.0f}" for value in offset)
-        lines.append(f"{row.triad:>5}  {1e3 * row.residual_rms:15.2f}  {row.left_out:14d}  {shown}")
-    lines += turned_lines(found, recording) + gyroscope_lines(found.gyroscopes, recording)
-    lines += [
-        f"noise of {sensor}: {ratio:.2f} times the declared one (median over axes)"
-        for sensor, ratio in ratios.items()
-    ]
-    output.say("\n".join(lines))
+    output.say("\n".join(summary_lines(found, recording)))
     output.done({
-        "out": str(arguments.out), "poses": len(found.poses), "still_samples": length,
+        "out": str(arguments.out), "poses": len(found.poses), "still_samples": found.still_samples,
         "gravity_m_s2": found.gravity, "triads": list(table.triad),
         "residual_m_s2": table.residual_rms.to_numpy(), "offset_m_s2": offsets,
         "noise_over_declared": ratios.to_dict(), "gyroscopes": arguments.gyroscopes,

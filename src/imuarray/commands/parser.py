@@ -77,7 +77,22 @@ class Command(NamedTuple):
     folder: bool = False
 
 
+GRAVITY = _number("--gravity", "G", "magnitude of gravity where it was recorded, m/s^2 (default:"
+                  " 9.80665)", 9.80665)  # fmt: skip
+
 COMMANDS = (
+    Command(
+        "board", "board.board",
+        "From a log to positions, what the sensors do, and a page that says how good it is.",
+        "log.csv --columns columns.yaml --out answer/",
+        "folder to write: report.html, cal.nc, positions.csv, recording.nc",
+        (
+            _option("logs", "what a logger wrote (docs/convert.md), or a recording (NetCDF-4)",
+                    type=InputFile, nargs="+", metavar="log"),
+            _file("--columns", "YAML: columns, units, positions"), GRAVITY,
+        ),
+        folder=True,
+    ),
     Command(
         "simulate", "simulate.simulate",
         "Simulate a recording; its truth is stored in the group 'truth'.",
@@ -119,9 +134,7 @@ COMMANDS = (
         "rec.nc --gravity 9.818 --out corrected.nc",
         "corrected recording to write (NetCDF-4), with the calibration in group 'first_order'",
         (
-            RECORDING,
-            _number("--gravity", "G", "magnitude of gravity where it was recorded, m/s^2 (default:"
-                    " 9.80665)", 9.80665),
+            RECORDING, GRAVITY,
             _option("--gyroscopes", "calibrate: their scales, misalignments and turns, from moves"
                     " between poses (default); offset: only their offsets, as paper 2021",
                     choices=("calibrate", "offset"), default="calibrate"),

@@ -136,5 +136,5 @@ def first_up(text: str) -> str:
 
 
 def fixed(value: float, decimals: int) -> str:
-    """A number whose column lines up."""
-    return f"{value:.{decimals}f}".replace("-", "−")
+    """A number whose column lines up; zero has no sign."""
+    return f"{round(value, decimals) + 0.0:.{decimals}f}".replace("-", "−")

@@ -51,6 +51,11 @@ class FirstOrder:
     gyroscopes: Gyroscopes | None = None
 
     @property
+    def still_samples(self) -> int:
+        """In all of the poses."""
+        return sum(pose.stop - pose.start for pose in self.poses)
+
+    @property
     def gyroscope_matrix(self) -> np.ndarray:
         """Reading = matrix @ angular rate + offset, (G, 3, 3); identities where only offsets."""
         if self.gyroscopes is not None:

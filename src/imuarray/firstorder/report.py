@@ -45,6 +45,25 @@ def _rows(sensor: str, labels, parts, sds, offset_unit: str) -> list[tuple]:
     return rows
 
 
+def summary_lines(found: FirstOrder, recording: Recording) -> list[str]:
+    """For a person: poses, residuals and offsets, turned IMUs, gyroscopes, noise."""
+    lines = [
+        f"{len(found.poses)} still poses, {found.still_samples} samples, gravity"
+        f" {found.gravity:g} m/s^2",
+        "triad  residual mm/s^2  poses left out  offset mm/s^2",
+    ]
+    rows = residual_table(found, recording).itertuples()
+    for row, offset in zip(rows, found.triads.offset, strict=True):
+        shown = ", ".join(f"{1e3 * value:.0f}" for value in offset)
+        lines.append(f"{row.triad:>5}  {1e3 * row.residual_rms:15.2f}  {row.left_out:14d}  {shown}")
+    ratios = noise_table(found, recording).groupby("sensor").ratio.median()
+    lines += turned_lines(found, recording) + gyroscope_lines(found.gyroscopes, recording)
+    return lines + [
+        f"noise of {sensor}: {ratio:.2f} times the declared one (median over axes)"
+        for sensor, ratio in ratios.items()
+    ]
+
+
 def gyroscope_lines(maps: Gyroscopes | None, recording: Recording) -> list[str]:
     """For a person: what was done with the gyroscopes, and how each was turned and scaled."""
     if maps is None:

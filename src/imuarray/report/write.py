@@ -2,34 +2,19 @@
 
 from __future__ import annotations
 
-import base64
-import io
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from matplotlib.figure import Figure
 
-import imuarray
-from imuarray.diagnosis.quantities import (
-    fixed,
-    number,
-    plus_minus,
-    probability,
-    quantity,
-    symbols,
-    unit_shown,
-)
-from imuarray.diagnosis.words import part_in_words, sensors_of, split_name, whose, words
-from imuarray.figures.style import styled
+from imuarray.diagnosis.words import sensors_of, whose, words
 from imuarray.model import EFFECTS
 from imuarray.provenance import write_bytes
 from imuarray.report import drawings as drawn
 from imuarray.report import numbers
 from imuarray.report.answers import USUAL, answers, verdict
 from imuarray.report.drawings_model import ALIKE, cause_figure, position_figure, separability_figure
+from imuarray.report.page import Drawing, files, rendered
 from imuarray.report.panels import cause_table
 
 if TYPE_CHECKING:
@@ -81,24 +66,6 @@ BESIDE = {  # by what it is drawn against
     "time": "the axes that it changes most, against time",
     "angular acceleration": "the gyroscope along dω/dt against its size; the slope is the delay",
 }
-
-# What the template's tables call.
-IN_TABLES = (fixed, number, part_in_words, plus_minus, probability, quantity, split_name, symbols,
-             unit_shown, whose, words)  # fmt: skip
-
-
-class Drawing(NamedTuple):
-    """A figure's name, texts and files by suffix."""
-
-    name: str
-    title: str
-    caption: str
-    files: dict[str, bytes]
-
-    @property
-    def base64(self) -> str:
-        """The PNG as a page embeds it."""
-        return base64.b64encode(self.files["png"]).decode("ascii")
 
 
 def write_report(diagnosis: Diagnosis, folder: str | Path) -> None:
@@ -163,26 +130,11 @@ def shortened(path: str, most: int = 70) -> str:
     return text if len(text) <= most else f"…{text[1 - most :]}"
 
 
-@styled
-def files(figure: Figure, table: pd.DataFrame) -> dict[str, bytes]:
-    """A figure as PDF and PNG, the same bytes each time, and its numbers as CSV."""
-    found = {"csv": table.to_csv(index=False, lineterminator="\n").encode()}
-    for suffix, metadata in (("pdf", {"CreationDate": None}), ("png", {"Software": None})):
-        buffer = io.BytesIO()
-        figure.savefig(buffer, format=suffix, metadata=metadata)
-        figure.set_layout_engine("none")  # laid out once
-        found[suffix] = buffer.getvalue()
-    return found
-
-
 def html(diagnosis: Diagnosis, drawings: list[Drawing]) -> str:
     """report.html, every text escaped."""
     document = diagnosis.document
-    environment = Environment(
-        loader=PackageLoader("imuarray.report", "."), undefined=StrictUndefined, autoescape=True
-    )
-    environment.globals |= {function.__name__: function for function in IN_TABLES}
-    return environment.get_template("report.html.j2").render(
+    return rendered(
+        "report.html.j2",
         document=document,
         recording=str(document["recording"]) or "a recording",
         facts=facts(diagnosis),
@@ -197,7 +149,6 @@ def html(diagnosis: Diagnosis, drawings: list[Drawing]) -> str:
         positions=numbers.position_table(diagnosis),
         noise=numbers.noise_table(diagnosis),
         scores=numbers.score_table(diagnosis),
-        version=imuarray.__version__,
     )
 
 

@@ -1,0 +1,60 @@
+"""From logs to an answer on the defaults: first order, calibration, reasons to doubt it."""
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+
+from imuarray.analysis.calibration import calibrate
+from imuarray.analysis.logs import open_logs
+from imuarray.analysis.model import Say, silent
+from imuarray.analysis.trust import reasons_of_calibration
+from imuarray.errors import IdentifiabilityError, InputError
+from imuarray.firstorder.correct import FirstOrder, calibrate_first_order, correct
+from imuarray.firstorder.report import summary_lines
+from imuarray.firstorder.still import still_poses
+from imuarray.recording import Recording
+from imuarray.recording.units import GRAVITY
+from imuarray.report.board import Board
+
+
+def board(
+    logs: Sequence[str | PathLike], columns: str | PathLike | None = None,
+    gravity: float = GRAVITY, say: Say = silent,
+) -> Board:  # fmt: skip
+    """All that `imuarray board` finds of some logs, which `write_board` makes a page of.
+
+    ``gravity`` m/s^2; ``say`` is called with each remark on the work's course. InputError as of
+    `open_logs`, `first_order` and `calibrate`; a log without still poses is calibrated as it is.
+    """
+    opened = open_logs(logs, columns)
+    recording = opened.recording
+    say(f"{len(recording.time)} samples of {len(recording.accelerometer_labels)} IMUs")
+    for line in opened.lines:
+        say(line)
+    found = _first_order(recording, gravity)
+    corrected = recording
+    if isinstance(found, str):
+        say(f"first order left out: {found}")
+    else:
+        say("\n".join(summary_lines(found, recording)))
+        corrected = correct(recording, found)
+    calibration = calibrate(corrected, say=say)
+    reasons = reasons_of_calibration(corrected, calibration)
+    source = ", ".join(Path(path).name for path in logs)
+    return Board(
+        source, opened.lines, opened.groups, recording, found, corrected, calibration, reasons
+    )
+
+
+def _first_order(recording: Recording, gravity: float) -> FirstOrder | str:
+    """What still poses and moves say, or why they do not."""
+    if recording.accelerometer_map_covariance is not None:
+        return "the recording is corrected already"
+    try:
+        still_poses(recording)
+    except InputError as error:
+        return str(error)
+    try:
+        return calibrate_first_order(recording, gravity)
+    except IdentifiabilityError as error:
+        return str(error)

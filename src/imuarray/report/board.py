@@ -1,0 +1,108 @@
+"""The page of `imuarray board`: how good, to be trusted or not and why, and what to do next."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from imuarray.firstorder.correct import FirstOrder
+from imuarray.firstorder.report import parameter_table
+from imuarray.firstorder.store import write_corrected
+from imuarray.provenance import trust, write_bytes, write_csv, write_netcdf
+from imuarray.recording import Recording, write_recording
+from imuarray.report import board_words as said
+from imuarray.report.page import rendered
+
+SURE = 1.96  # sds: 95 %
+
+
+class Board(NamedTuple):
+    """All that was found of a log: what the page shows.
+
+    ``account``: what became of the logs; ``first_order``: or why there is none; ``corrected``: the
+    recording that was calibrated; ``reasons``: why the answer is not to be trusted.
+    """
+
+    source: str
+    account: list[str]
+    groups: dict[str, xr.Dataset]
+    recording: Recording
+    first_order: FirstOrder | str
+    corrected: Recording
+    calibration: xr.Dataset
+    reasons: list[str]
+
+
+def write_board(board: Board, folder: Path) -> None:
+    """recording.nc, cal.nc, positions.csv and, last, report.html: all of them or none."""
+    page = html(board).encode()
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".board.", dir=folder) as name:
+        made = Path(name)
+        if isinstance(board.first_order, str):
+            write_recording(board.corrected, made / "recording.nc", groups=board.groups)
+        else:
+            write_corrected(board.recording, board.first_order, made / "recording.nc", board.groups)
+        write_netcdf(board.calibration.assign_attrs(trust(board.reasons)), made / "cal.nc")
+        write_csv(position_table(board.calibration), made / "positions.csv")
+        write_bytes(page, made / "report.html")
+        for file in ("recording.nc", "cal.nc", "positions.csv", "report.html"):
+            os.replace(made / file, folder / file)
+
+
+def html(board: Board) -> str:
+    """report.html, every text escaped."""
+    return rendered(
+        "board.html.j2", board=board, verdict=said.verdict(board), facts=said.facts(board),
+        advice=said.advice(board), causes=said.causes(board.calibration),
+        turned=turn_table(board), positions=position_table(board.calibration), sure=SURE,
+        prior=board.corrected.position_prior_sd, noise=noises(board), figures=[],
+        weakest=said.weakest(board.calibration), before=said.before(board),
+        first_order=None if isinstance(board.first_order, str)
+        else parameter_table(board.first_order, board.recording),
+    )  # fmt: skip
+
+
+def position_table(calibration: xr.Dataset) -> pd.DataFrame:
+    """imu, then x, y, z in m: the position, its sd, the nominal one; relative to the first IMU."""
+    sds = np.sqrt(np.einsum("kaka->ka", calibration["position_covariance"].to_numpy()))
+    parts = {
+        "": calibration["position"].to_numpy(), "sd_": sds,
+        "nominal_": calibration["nominal_position"].to_numpy(),
+    }  # fmt: skip
+    columns = {
+        f"{name}{axis}_m": values[:, number]
+        for name, values in parts.items() for number, axis in enumerate("xyz")
+    }  # fmt: skip
+    return pd.DataFrame({"imu": calibration["accelerometer"].to_numpy()} | columns)
+
+
+def turn_table(board: Board) -> pd.DataFrame | None:
+    """How each triad is turned against the frame, deg: sensor, imu, x, y, z, sd_x, sd_y, sd_z."""
+    if isinstance(board.first_order, str):
+        return None
+    table = parameter_table(board.first_order, board.recording)
+    table = table[table.parameter == "orientation"]
+    wide = table.pivot(index=["sensor", "triad"], columns="component", values=["value", "sd"])
+    wide = np.degrees(wide.astype(float)).reindex(
+        table[["sensor", "triad"]].drop_duplicates().itertuples(index=False, name=None)
+    )
+    wide.columns = [axis if kind == "value" else f"sd_{axis}" for kind, axis in wide.columns]
+    return wide.rename_axis(["sensor", "imu"]).reset_index()
+
+
+def noises(board: Board) -> pd.DataFrame:
+    """sensor, imu: sd of a reading as declared and as the calibration finds it; in its unit."""
+    rows = []
+    for kind, unit in (("accelerometer", "m s-2"), ("gyroscope", "rad s-1")):
+        declared = getattr(board.recording, f"{kind}_noise_sd")
+        found = np.sqrt(np.mean(board.calibration[f"{kind}_sd"].to_numpy() ** 2, axis=1))
+        labels = board.calibration[kind].to_numpy()
+        rows += [(kind, str(k), declared, sd, unit) for k, sd in zip(labels, found, strict=True)]
+    return pd.DataFrame(rows, columns=["sensor", "imu", "declared", "found", "unit"])

@@ -1,0 +1,137 @@
+"""The page of `imuarray board` in words: the verdict, what to do next, causes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+
+from imuarray.diagnosis.plain import Sizes, plainly
+from imuarray.diagnosis.quantities import first_up, joined, number, quantity
+from imuarray.diagnosis.words import split_name
+from imuarray.estimation.informative import weak_directions
+from imuarray.firstorder.report import turned_lines
+
+if TYPE_CHECKING:
+    from imuarray.report.board import Board
+
+MISFIT = 1.5  # times the noise: a residual that is looked into
+
+
+def verdict(board: Board) -> str:
+    """How good, in a sentence."""
+    sds = np.sqrt(np.einsum("kaka->ka", board.calibration["position_covariance"].to_numpy()))[1:]
+    rms, worst = (size_in_words(size) for size in (np.sqrt(np.mean(sds**2)), sds.max()))
+    count = board.calibration.sizes["accelerometer"]
+    good = "The positions" if not board.reasons else "If the answer could be trusted: positions"
+    verb = "are known" if not board.reasons else "known"
+    return (
+        f"{good} of {count} IMUs {verb} to {rms} (rms of the standard deviations; the worst"
+        f" coordinate {worst})."
+    )
+
+
+def size_in_words(size: float) -> str:
+    """A length (m) to two digits."""
+    return quantity(float(f"{size:.2g}"), None, "m")
+
+
+def facts(board: Board) -> str:
+    """The log in a line."""
+    time, calibration = board.recording.time, board.calibration
+    rate, count = 1 / np.median(np.diff(time)), len(board.recording.accelerometer_labels)
+    poses = 0 if isinstance(board.first_order, str) else len(board.first_order.poses)
+    return (
+        f"{len(time)} samples of {count} IMUs at {rate:.4g} Hz, {time[-1] - time[0]:.1f} s;"
+        f" {poses} still poses; positions from {calibration.attrs['samples']} moving samples, whose"
+        f" residual is {calibration.attrs['residual_ratio']:.2f} times the noise."
+    )
+
+
+def advice(board: Board) -> list[str]:
+    """What to do next, the most urgent first."""
+    said = []
+    if isinstance(board.first_order, str):
+        said.append(
+            "Record again with still poses: a dozen or more directions, ten seconds each, the"
+            " logger on while the board is turned from one to the next, then a minute of hard"
+            " twisting. Without them offsets, scales and axes of the sensors are taken as read."
+        )
+    elif board.first_order.gyroscopes and isinstance(board.first_order.gyroscopes.common, str):
+        why = board.first_order.gyroscopes.common
+        said.append(
+            "Leave the logger on while the board is turned from pose to pose: the size of the"
+            f" array is as uncertain as the gyroscopes' scale, which is not known ({why})."
+        )
+    if board.reasons or board.calibration.attrs["residual_ratio"] > MISFIT:
+        said.append(
+            "Check units, signs, which IMU is which and the drawing in columns.yaml; then let"
+            " imuarray diagnose recording.nc --out diagnosis name what the model misses."
+        )
+    worst = _weakest(board.calibration)
+    if worst.sd > board.corrected.position_prior_sd:
+        said.append(f"Turn the board faster, and about all axes: {worst.words} is hardly known.")
+    if not said:
+        said = [
+            "Use it: imuarray apply cal.nc recording.nc --out motion.nc makes one sensor of the"
+            " array.",
+            "Record a second time and calibrate both (imuarray calibrate): what two recordings"
+            " agree on is what can be relied on.",
+        ]
+    return said
+
+
+def _weakest(calibration: xr.Dataset):
+    positions = calibration["position"].to_numpy()
+    size = 3 * (len(positions) - 1)
+    covariance = calibration["position_covariance"].to_numpy()[1:, :, 1:].reshape(size, size)
+    return weak_directions(positions, covariance, calibration["accelerometer"].to_numpy(), 1)[0]
+
+
+def weakest(calibration: xr.Dataset) -> str:
+    """What is known worst."""
+    worst = _weakest(calibration)
+    return f"{worst.words}, to {size_in_words(worst.sd)}"
+
+
+def causes(calibration: xr.Dataset) -> list[str]:
+    """What the sensors do beside measuring, from the calibration's own parameters."""
+    labels = [str(k) for k in calibration["accelerometer"].to_numpy()]
+    found: dict[str, dict] = {}
+    if "effect_parameter" in calibration:
+        columns = (
+            calibration[n].to_numpy() for n in ("parameter", "effect_parameter", "effect_sd")
+        )
+        for name, value, sd in zip(*columns, strict=True):
+            effect, part, _ = str(name).split(" ", 2)
+            found.setdefault(effect, {})[split_name(part, labels)] = value, sd
+    said = [line for effect, part in found.items() for line in plainly(effect, Sizes.of(part))]
+    return [f"{first_up(line)}." for line in said]
+
+
+def before(board: Board) -> list[str]:
+    """What first order found."""
+    if isinstance(board.first_order, str):
+        return [f"First order was left out: {board.first_order}."]
+    found, said = board.first_order, []
+    gyroscopes = found.gyroscopes
+    worst = 1e3 * float(np.max(found.triads.residual_rms))
+    said.append(
+        f"{len(found.poses)} still poses show gravity to {number(worst, 2)} mm/s² at the worst"
+        " accelerometer; its residual in good poses is some mm/s²."
+    )
+    said += [f"{line}." for line in turned_lines(found, board.recording)]
+    if gyroscopes is not None and not isinstance(gyroscopes.common, str):
+        common = gyroscopes.common
+        before_, after = (
+            number(np.degrees(x), 2) for x in (common.before, np.median(common.error))
+        )
+        said.append(
+            f"{len(common.first)} moves carry gravity from pose to pose to {after} degrees"
+            f" ({before_} before the gyroscopes were calibrated); together they read"
+            f" {number(100 * (1 / common.scale - 1), 3)} ± {number(100 * common.scale_sd, 2)} % of"
+            " the rate too much."
+        )
+    turned = joined(board.account)
+    return said + ([f"{turned}."] if turned else [])

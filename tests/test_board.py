@@ -1,0 +1,141 @@
+"""`imuarray board`: from a log to positions and a page; what the page says, and that it renders."""
+
+import re
+from functools import partial
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import imuarray
+from benchmarks.board import Options, draw_board, write
+from imuarray.analysis.board import board
+from imuarray.cli import main
+from imuarray.diagnosis.plain import Sizes, plain
+from imuarray.report.board import html, write_board
+
+LATE = 0.003
+FEW = Options(still=4.0, move=1.5, twisting=6.0, late=LATE)
+FILES = {"report.html", "cal.nc", "positions.csv", "recording.nc"}
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    return draw_board(1, FEW)
+
+
+@pytest.fixture(scope="module")
+def folder(drawn, tmp_path_factory):
+    """A log, and what `write_board` makes of it in `answer`."""
+    folder = tmp_path_factory.mktemp("board")
+    write(drawn.table(), drawn.columns(), folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def found(folder):
+    """With the model given: the search for it has tests of its own, and takes its time."""
+    with pytest.MonkeyPatch.context() as patch:
+        given = partial(imuarray.calibrate, effects=["sensor_delay"])
+        patch.setattr("imuarray.analysis.board.calibrate", given)
+        answer = board([folder / "log.csv"], folder / "columns.yaml", 9.81)
+    write_board(answer, folder / "answer")
+    return answer
+
+
+@pytest.fixture(scope="module")
+def page(found, folder):
+    return (folder / "answer" / "report.html").read_text(encoding="utf-8")
+
+
+def words(page: str) -> str:
+    return " ".join(re.sub("<style>.*?</style>|<[^>]*>", " ", page, flags=re.S).split())
+
+
+def test_positions_are_those_of_the_board(found, folder, drawn):
+    table = pd.read_csv(folder / "answer" / "positions.csv", dtype={"imu": str})
+    assert list(table.imu) == drawn.labels and not found.reasons
+    values = table[["x_m", "y_m", "z_m"]].to_numpy()
+    sds = table[["sd_x_m", "sd_y_m", "sd_z_m"]].to_numpy()[1:]
+    error = (values - drawn.truth.positions)[1:]
+    assert np.sqrt(np.mean((error / sds) ** 2)) < 2 and np.sqrt(np.mean(error**2)) < 40e-6
+
+
+def test_the_folder_has_what_other_commands_read(found, folder):
+    answer = folder / "answer"
+    assert {path.name for path in answer.iterdir()} == FILES
+    calibration = imuarray.read_calibration(answer / "cal.nc")
+    np.testing.assert_array_equal(calibration["position"], found.calibration["position"])
+    assert calibration.attrs["trusted"] == 1
+    assert imuarray.read_recording(answer / "recording.nc").stationary.any()
+
+
+def test_the_page_says_whose_delay_it_is(page):
+    text = words(page)
+    number = re.search(r"IMU 4 is read ([\d.]+)\s±\s([\d.]+) ms late", text)
+    value, sd = map(float, number.groups())
+    assert abs(value - 1e3 * LATE) < 4 * sd and sd < 0.05
+    assert "IMU 3 is read" not in text and "Not to be trusted" not in text
+
+
+def test_an_answer_not_to_be_trusted_says_so_first(found, tmp_path, monkeypatch, capsys):
+    odd = found._replace(reasons=["gyroscopes <b>2 %</b> too large?"], source="<i>log</i>")
+    monkeypatch.setattr("imuarray.commands.board.answered", lambda *_: odd)
+    status = main(["board", __file__, "--out", str(tmp_path / "new" / "answer"), "--quiet"])
+    assert status == 3 and "not to be trusted: gyroscopes" in capsys.readouterr().err
+    page = (tmp_path / "new" / "answer" / "report.html").read_text(encoding="utf-8")
+    assert page.index("Not to be trusted: gyroscopes") < page.index("What to do next")
+    assert "<b>2 %" not in page and "<i>log" not in page and "imuarray diagnose" in page
+    assert imuarray.read_calibration(tmp_path / "new/answer/cal.nc").attrs["trusted"] == 0
+
+
+def test_without_still_poses_the_page_says_what_is_missing(found):
+    page = words(html(found._replace(first_order="recording: expected still poses, found none")))
+    assert "Record again with still poses" in page and "found none" in page
+    assert "How each sensor is turned" not in page
+
+
+def test_an_error_leaves_the_folder_as_it_was(found, folder, tmp_path, monkeypatch):
+    (tmp_path / "report.html").write_text("mine")
+
+    def fails(*_):
+        raise RuntimeError
+
+    monkeypatch.setattr("imuarray.report.board.write_csv", fails)
+    with pytest.raises(RuntimeError):
+        write_board(found, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
+    assert (tmp_path / "report.html").read_text() == "mine"
+
+
+def sizes(rows, components=("value",), sd=1e-6):
+    """Parameters of IMUs 1, 2, ..., a row each, of one sd."""
+    return Sizes.of({
+        (name, str(k)): (value, sd)
+        for k, row in enumerate(rows, 1) for name, value in zip(components, row, strict=True)
+    })  # fmt: skip
+
+
+def test_plain_words_hold_one_against_the_others():
+    said = plain("sensor_delay", sizes([[0.5e-3], [0.5e-3], [-1.0e-3]]))
+    assert len(said) == 1 and re.match(r"IMU 3 is read 1.5000\s±\s0.0015 ms late", said[0])
+    assert "IMU 2 is read" in plain("sensor_delay", sizes([[1e-3], [-1e-3]]))[0]
+    many = plain("sensor_delay", sizes([[-2e-4], [1e-4], [3e-4], [-1e-4], [-1e-4]]))
+    assert many == [
+        "the IMUs are read at instants of their own, from 0.2 ms late to 0.3 ms early against"
+        " their mean"
+    ]
+    names = ("period", "frequency", "phase", "offset", "drift")
+    clocks = [[0, 0, 0, 0, 0], [0, 0, 0, 0, 0], [0, 0, 0, 2e-3, 0], [1e-3, 1.5, 0.2, 0, 0]]
+    said = plain("sensor_clock", sizes(clocks, names))
+    assert said[0].startswith("IMU 4 samples on a clock of its own: a reading is up to 1 ms old")
+    assert re.match(r"IMU 3 is read 2.0000\s±\s0.0010 ms late", said[1]) and len(said) == 2
+    # reading = (1 + M) rate: a turn about z by 0.6 degrees
+    turn = np.radians(0.6)
+    rows = np.zeros((4, 6))
+    rows[2, [0, 2]] = -turn, turn
+    names = ("xy", "xz", "yx", "yz", "zx", "zy")
+    said = plain("gyroscope_misalignment", sizes(rows, names, 1e-5))
+    assert re.match(r"gyroscope 3 is turned by 0.600\d*\s±\s0.000\d+ degrees", said[0])
+    said = plain("gyroscope_scale", sizes([[0, 0, 0], [0, 0, 0], [0.01] * 3], "xyz", 1e-5))
+    assert said[0].startswith("gyroscope 3 shows 1.000") and len(said) == 1
