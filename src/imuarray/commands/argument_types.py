@@ -6,9 +6,25 @@ from pathlib import Path
 from imuarray.analysis import methods
 from imuarray.errors import LARGEST, SMALLEST
 
+BAGS = (".bag", ".mcap", ".db3")
+
 
 class InputFile(type(Path())):  # type: ignore[misc]
     """A file that a command reads."""
+
+
+class InputBag(InputFile):
+    """A bag, a file or a folder of files, that a command reads."""
+
+
+def bag(text: str) -> InputBag:
+    """A ROS bag, by its ending where it is no folder."""
+    path = InputBag(text)
+    if path.suffix.lower() not in BAGS and not path.is_dir():
+        raise argparse.ArgumentTypeError(
+            f"expected a folder or a file of {', '.join(BAGS)}, found {text!r}"
+        )
+    return path
 
 
 def effects(text: str) -> tuple[str, ...]:

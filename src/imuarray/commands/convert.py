@@ -22,13 +22,14 @@ def convert_mimu(arguments) -> None:
     _report(arguments, recording, account.lines())
 
 
-def convert_csv(arguments) -> None:
-    """A table and its description to a recording."""
-    from imuarray.recording.table import read_csv
+def convert_logs(arguments) -> None:
+    """Tables or bags, and their description, to a recording."""
+    from imuarray.analysis.logs import open_logs
 
-    recording = read_csv(arguments.data, arguments.columns)
-    write_recording(recording, arguments.out, attrs=stamp({"source": str(arguments.data)}, 0))
-    _report(arguments, recording, [])
+    found = open_logs(arguments.data, arguments.columns, getattr(arguments, "topics", ()))
+    attrs = stamp({"source": ", ".join(map(str, arguments.data))}, 0)
+    write_recording(found.recording, arguments.out, attrs=attrs, groups=found.groups)
+    _report(arguments, found.recording, found.lines)
 
 
 def _report(arguments, recording: Recording, lines: list[str]) -> None:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, NoReturn
 
 import imuarray
 from imuarray.analysis import methods
-from imuarray.commands.argument_types import InputFile, count, effects, model, positive, seed
+from imuarray.commands.argument_types import InputFile, bag, count, effects, model, positive, seed
 from imuarray.errors import InputError
 
 
@@ -120,12 +120,27 @@ COMMANDS = (
         ),
     ),
     Command(
-        "convert csv", "convert.convert_csv",
-        "Read a table; a small YAML names its columns and units (docs/convert.md).",
+        "convert csv", "convert.convert_logs",
+        "Read a table, or several of a rig; a small YAML names columns and units"
+        " (docs/convert.md).",
         "log.csv --columns columns.yaml --out rec.nc", "recording to write (NetCDF-4)",
         (
-            _option("data", "CSV file with a header", type=InputFile),
+            _option("data", "CSV file with a header; several where IMUs logged each by itself",
+                    type=InputFile, nargs="+"),
             _file("--columns", "YAML: columns, units, positions", required=True),
+        ),
+    ),
+    Command(
+        "convert ros", "convert.convert_logs",
+        "Read the sensor_msgs/Imu of ROS 1 or ROS 2 bags; a small YAML has positions and noise"
+        " (docs/convert.md).",
+        "run.bag --columns rig.yaml --out rec.nc", "recording to write (NetCDF-4)",
+        (
+            _option("data", "ROS 1 bag, ROS 2 bag's folder or file (.db3, .mcap); several of a rig"
+                    " are joined in time", type=bag, nargs="+", metavar="bag"),
+            _file("--columns", "YAML: positions, noise, range"),
+            _option("--topics", "to use, the reference first (default: those of the YAML)",
+                    nargs="+", default=(), metavar="/imu0"),
         ),
     ),
     Command(

@@ -1,0 +1,180 @@
+"""The small YAML that says what a log holds: columns or topics, units, positions, axes, noise."""
+
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from imuarray.errors import LARGEST, SMALLEST, InputError
+from imuarray.recording.units import factor
+from imuarray.recording.validate import is_rotation
+
+WIDEST = 2.0  # m; beyond this, positions without a declared unit are taken to be in another
+PRIOR = 3e-3  # m, sd of nominal positions where none is declared
+KINDS = "accelerometers", "gyroscopes"
+QUANTITIES = {"accelerometers": "force", "gyroscopes": "rate"}
+# What may be in each section, and whether it has to be. A board's triads share one table's rows;
+# a rig's IMUs have each their own log, or topic, and stamps.
+_PLACES = {"position_unit": False, "position_prior": False}
+_TABLE = {"delimiter": False, "comment": False}
+_SENSORS = {"accelerometers": True, "gyroscopes": True}
+BOARD = {
+    **_TABLE, "time": True, "incomplete_rows": False, **_PLACES, "output_rate": False, **_SENSORS,
+}  # fmt: skip
+SENSOR = {"unit": True, "scale": False, "noise": True, "range": True}
+BOARD_SENSOR = SENSOR | {"triads": True}
+RIG = {**_TABLE, "time": False, "columns": False, **_PLACES, **_SENSORS, "imus": True}
+IMU = {"log": False, "columns": False, "time": False, "position": True, "axes": False}
+BAG = {**_PLACES, **_SENSORS, "imus": True}
+BAG_SENSOR = {"noise": True, "range": True}  # in the units of sensor_msgs/Imu
+BAG_IMU = {"topic": False, "position": True, "axes": False}
+_NAMES = "column", "columns", "log", "topic"
+
+
+class _Loader(yaml.SafeLoader):
+    """Safe YAML that refuses a key given twice: the second would silently replace the first.
+
+    Keys (labels among them) and the names of columns are text as it stands: 010 and yes, too.
+    """
+
+    def construct_mapping(self, node, deep=False):
+        scalars = [pair for pair in node.value if isinstance(pair[0], yaml.ScalarNode)]
+        keys = [key.value for key, _ in scalars]
+        for key, value in scalars:
+            names = value.value if isinstance(value, yaml.SequenceNode) else [value]
+            for name in [key] + names * (key.value in _NAMES):
+                if isinstance(name, yaml.ScalarNode) and not name.tag.endswith(":merge"):
+                    name.tag = "tag:yaml.org,2002:str"
+        twice = next((key for i, key in enumerate(keys) if key in keys[:i]), None)
+        if twice is not None:
+            line = node.start_mark.line + 1
+            raise yaml.YAMLError(f"the key {twice!r} twice in the section at line {line}")
+        return super().construct_mapping(node, deep)
+
+
+def read_layout(path: str | PathLike, bag: bool = False) -> dict[str, Any]:
+    """The YAML that describes a log; InputError for a missing file or a wrong key."""
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path}: expected a YAML file that describes the log, found none")
+    try:
+        layout = yaml.load(path.read_text(encoding="utf-8"), _Loader)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        # ValueError: bytes that are no UTF-8, a date with a 13th month
+        raise InputError(f"{path}: expected YAML, found {' '.join(str(error).split())}") from None
+    rig = bag or (isinstance(layout, dict) and "imus" in layout)
+    _require_keys(layout, BAG if bag else RIG if rig else BOARD, str(path))
+    for kind in KINDS:
+        keys = BAG_SENSOR if bag else SENSOR if rig else BOARD_SENSOR
+        _require_keys(layout[kind], keys, f"{path}: {kind}")
+        if not rig:
+            _require_sections(layout[kind]["triads"], f"{path}: {kind}", "triads", {
+                "columns": True, "position": kind == "accelerometers", "axes": False,
+            })  # fmt: skip
+    if rig:
+        _require_sections(layout["imus"], f"{path}: imus", "IMUs", BAG_IMU if bag else IMU)
+    return layout
+
+
+def _require_sections(sections: Any, where: str, what: str, keys: dict[str, bool]) -> None:
+    if not isinstance(sections, dict) or not sections:
+        raise InputError(f"{where}: expected {what} by label, found {sections!r}")
+    for label, section in sections.items():
+        _require_keys(section, keys, f"{where} {label!r}")
+
+
+def _require_keys(section: Any, keys: dict[str, bool], where: str) -> None:
+    if not isinstance(section, dict):
+        raise InputError(f"{where}: expected the keys {', '.join(keys)}, found {section!r}")
+    unknown = [key for key in section if key not in keys]
+    missing = [key for key, needed in keys.items() if needed and key not in section]
+    if unknown or missing:
+        found = f"an unknown key {unknown[0]!r}" if unknown else f"no {missing[0]!r}"
+        raise InputError(f"{where}: expected the keys {', '.join(keys)}, found {found}")
+
+
+def _is_number(value) -> bool:
+    """Of a size that can be computed with: YAML has .nan, .inf, integers of any length."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return abs(value) <= LARGEST
+
+
+def positive(value, where: str) -> float:
+    """A number above 0, or InputError."""
+    if not _is_number(value) or value < SMALLEST:
+        raise InputError(f"{where}: expected a positive number, found {value!r}")
+    return float(value)
+
+
+def _three(value, where: str) -> list[float]:
+    numbers = isinstance(value, list) and len(value) == 3
+    if not numbers or not all(map(_is_number, value)):
+        raise InputError(f"{where}: expected three numbers, found {value!r}")
+    return [float(x) for x in value]
+
+
+def numbers(layout, where: str) -> dict[str, float]:
+    """Noise and range of both kinds, and the positions' prior sd, in SI units."""
+    out = {}
+    for kind, quantity in QUANTITIES.items():
+        section, name = layout[kind], kind.removesuffix("s")
+        # a bag's are in SI units
+        unit = (
+            factor(quantity, section["unit"], f"{where}: {kind}: unit")
+            if "unit" in section
+            else 1.0
+        )
+        for key, attribute in (("noise", "noise_sd"), ("range", "range")):
+            value = positive(section[key], f"{where}: {kind}: {key}")
+            out[f"{name}_{attribute}"] = unit * value
+    length = factor("length", layout.get("position_unit", "m"), f"{where}: position_unit")
+    prior = positive(layout.get("position_prior", PRIOR / length), f"{where}: position_prior")
+    return out | {"position_prior_sd": length * prior}
+
+
+def positions(sections: dict[str, dict], layout, where: str) -> np.ndarray:
+    """Nominal positions (A, 3) m of triads or IMUs."""
+    length = factor("length", layout.get("position_unit", "m"), f"{where}: position_unit")
+    places = [
+        _three(section["position"], f"{where} {label!r}: position")
+        for label, section in sections.items()
+    ]
+    size = float(np.ptp(places, axis=0).max())
+    if "position_unit" not in layout and size > WIDEST:
+        raise InputError(
+            f"{where}: expected positions within {WIDEST:g} m of each other, found {size:g}:"
+            " name the position_unit, mm or m"
+        )
+    return length * np.array(places)
+
+
+def rotation(axes, where: str) -> np.ndarray:
+    """Rotation from the sensor's axes to the array's: [-y, -x, -z] or a 3 x 3 matrix.
+
+    The shorthand lists, for the array's x, y and z, the sensor's axis that points along it.
+    """
+    expected = "expected axes such as [-y, -x, -z] or a 3 x 3 rotation matrix"
+    if not isinstance(axes, list) or len(axes) != 3:
+        raise InputError(f"{where}: {expected}, found {axes!r}")
+    if all(isinstance(row, str) for row in axes):
+        matrix = np.zeros((3, 3))
+        for row, name in enumerate(axes):
+            letter = name.lstrip("+-")
+            if letter not in ("x", "y", "z"):
+                raise InputError(f"{where}: {expected}, found {axes!r}")
+            matrix[row, "xyz".index(letter)] = -1.0 if name.startswith("-") else 1.0
+    else:
+        matrix = np.array([_three(row, where) for row in axes])
+    if not is_rotation(matrix):
+        raise InputError(f"{where}: {expected}, found {axes!r}, which is no rotation")
+    return matrix
+
+
+def three_columns(names, where: str) -> list[str]:
+    """Three different names, or InputError."""
+    if not isinstance(names, list) or len(set(map(str, names))) != 3 or len(names) != 3:
+        raise InputError(f"{where}: expected three columns, found {names!r}")
+    return [str(name) for name in names]

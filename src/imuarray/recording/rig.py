@@ -1,0 +1,140 @@
+"""IMUs that logged each by itself: their readings in order, on one origin of time."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from imuarray.errors import LARGEST, InputError
+from imuarray.recording.layout import numbers, positions, rotation
+from imuarray.recording.log import Log
+from imuarray.recording.record import Recording
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """One kind of one IMU as logged: stamps (N,) of ``unit`` s, values (N, 3) in SI units.
+
+    Where either is NaN there is no reading; ``where`` is for messages.
+    """
+
+    stamps: np.ndarray
+    unit: float
+    values: np.ndarray
+    where: str
+
+
+class Rig(NamedTuple):
+    """Logs of one rig, the sd of its positions in m, and what was left out."""
+
+    logs: list[Log]
+    position_prior_sd: float
+    lines: list[str]
+    source: str
+
+
+def to_rig(imus: Mapping[str, dict], read: Mapping[str, list[Readings]], layout, where, source):
+    """The YAML's ``imus`` with what was ``read`` of each, accelerometer and gyroscope, as a `Rig`.
+
+    The first IMU's axes are the array's where the YAML says nothing else; the others' are then
+    unknown. Times are from the earliest stamp of all, of an IMU whose clock has another origin
+    from its own. InputError for stamps out of order.
+    """
+    given, places = numbers(layout, where), positions(imus, layout, f"{where}: imus")
+    prior, lines, whole = given.pop("position_prior_sd"), [], {}
+    for label, kinds in read.items():
+        whole[label] = []
+        for kind, readings in zip(("accelerometer", "gyroscope"), kinds, strict=True):
+            kept, said = _in_order(readings)
+            lines += [f"{label}: {kind}: {part}" for part in said]
+            whole[label].append(kept)
+    first, apart = _origins(list(whole.values()))
+    lines += [
+        f"{label}: its stamps are at no time those of {next(iter(whole))}: both are taken to begin"
+        " at once"
+        for label, alone in zip(whole, apart, strict=True) if alone
+    ]  # fmt: skip
+    logs = []
+    for place, origin, (label, kinds) in zip(places, first, whole.items(), strict=True):
+        axes = imus[label].get("axes", None if logs else list("xyz"))
+        force, rate = kinds
+        logs.append(Log(
+            label=label, accelerometer_time=_time(force, origin), specific_force=force.values,
+            gyroscope_time=_time(rate, origin), angular_rate=rate.values, position=place,
+            axes=None if axes is None else rotation(axes, f"{where}: imus {label!r}"), **given,
+        ))  # fmt: skip
+    return Rig(logs, prior, lines, source)
+
+
+def pair(value: Any) -> list:
+    """The accelerometer's and the gyroscope's: a list of two, or one for both."""
+    return value if isinstance(value, list) and len(value) == 2 else [value, value]
+
+
+def _origins(imus: list[list[Readings]]) -> tuple[list[Readings], list[bool]]:
+    """What begins each IMU's time, and whether that is another clock's than the first IMU's."""
+    begin = [min(kinds, key=lambda r: r.unit * r.stamps[0]) for kinds in imus]
+    start = np.array([r.unit * r.stamps[0] for r in begin])
+    end = np.array([max(r.unit * r.stamps[-1] for r in kinds) for kinds in imus])
+    apart = (start > end[0]) | (end < start[0])
+    shared = begin[np.argmin(np.where(apart, np.inf, start))]
+    return [own if alone else shared for own, alone in zip(begin, apart, strict=True)], list(apart)
+
+
+def _time(readings: Readings, first: Readings) -> np.ndarray:
+    """Seconds from the stamp that ``first`` begins with; integers of the same unit lose nothing."""
+    origin = first.stamps[0]
+    if first.unit != readings.unit:
+        origin = origin * (first.unit / readings.unit)
+    return readings.unit * (readings.stamps - origin)
+
+
+def _in_order(readings: Readings) -> tuple[Readings, list[str]]:
+    """Stamps that increase, and what was left out: blank readings, and those logged twice."""
+    stamps, values, where = readings.stamps, readings.values, readings.where
+    there = ~np.isnan(stamps) & ~np.isnan(values).any(axis=1)
+    if not there.any():
+        raise InputError(f"{where}: expected readings, found none")
+    rows = np.flatnonzero(there)
+    wild = np.abs(values[rows]).max(axis=1) > LARGEST
+    if wild.any():
+        at = rows[np.argmax(wild)]
+        raise InputError(
+            f"{where}: expected finite numbers, found {values[at]} in reading {at + 1}"
+        )
+    steps = np.diff(stamps[rows])
+    # a logger that runs faster than a sensor writes its last reading again
+    again = (steps == 0) & (values[rows[1:]] == values[rows[:-1]]).all(axis=1)
+    back = (steps <= 0) & ~again
+    if back.any():
+        i = int(np.argmax(back))
+        raise InputError(
+            f"{where}: expected stamps that increase, found {stamps[rows[i + 1]]} after"
+            f" {stamps[rows[i]]} in reading {rows[i + 1] + 1} ({back.sum()} such steps)"
+        )
+    kept = rows[np.concatenate([[True], ~again])]
+    counts = (("no reading", len(stamps) - len(rows)), ("the last one again", again.sum()))
+    lines = [f"{what} in {n} of {len(stamps)}" for what, n in counts if n]
+    return Readings(stamps[kept], readings.unit, values[kept], where), lines
+
+
+def recording_of(rig: Rig) -> Recording | None:
+    """The samples as they are where all IMUs share their stamps and all axes are known."""
+    logs = rig.logs
+    time = logs[0].accelerometer_time
+    shared = all(
+        np.array_equal(t, time) for x in logs for t in (x.accelerometer_time, x.gyroscope_time)
+    )
+    if not shared or any(log.axes is None for log in logs):
+        return None
+    labels = tuple(log.label for log in logs)
+    names = "accelerometer_noise_sd", "accelerometer_range", "gyroscope_noise_sd", "gyroscope_range"
+    return Recording(
+        time=time, specific_force=np.stack([x.specific_force @ x.axes.T for x in logs], axis=1),
+        angular_rate=np.stack([x.angular_rate @ x.axes.T for x in logs], axis=1),
+        accelerometer_position=np.array([x.position for x in logs]), accelerometer_labels=labels,
+        gyroscope_labels=labels, accelerometer_axes=np.array([x.axes for x in logs]),
+        position_prior_sd=rig.position_prior_sd, source=rig.source,
+        **{name: getattr(logs[0], name) for name in names},
+    )  # fmt: skip
