@@ -14,6 +14,7 @@ from imuarray.recording.bags import read_bags
 from imuarray.recording.record import MATRICES, NUMBERS, QUANTITIES
 from imuarray.recording.table import read_csv
 from tests.bag_writer import KINDS, write
+from tests.doc_pages import ROOT, blocks
 
 TOPICS = "/imu0", "/imu1", "/imu2", "/imu3"
 PLACES = [[0, 0, 0], [100, 0, 0], [0, 80, 0], [0, 0, 55.5]]
@@ -87,6 +88,15 @@ def test_a_bag_is_the_table_bit_for_bit(tmp_path, kind):
         np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), name)
     assert found.accelerometer_labels == found.gyroscope_labels == expected.gyroscope_labels
     assert found.source == bag.name
+
+
+def test_the_documented_bag(tmp_path):
+    page = {b.note: b.text for b in blocks(ROOT / "docs" / "convert.md") if b.kind == "file"}
+    topics = dict(zip(("/imu0", "/imu1", "/imu2"), readings(4).values(), strict=False))
+    topics |= {f"/camera/{kind}/sample": topics["/imu0"] for kind in ("accel", "gyro")}
+    (tmp_path / "bag.yaml").write_text(page["bag.yaml"])
+    logs = read_bags([write(tmp_path / "run", "mcap", topics)], tmp_path / "bag.yaml").logs
+    assert [log.label for log in logs] == ["/imu0", "/imu1", "/imu2", "camera"]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -202,6 +212,7 @@ def test_readings_that_are_missing_or_came_twice(tmp_path):
 )  # fmt: skip
 def test_what_is_no_bag(tmp_path, capsys, name, words):
     (tmp_path / "text.bag").write_text("no bag\n")
+    (tmp_path / "log.csv").write_text("t\n")
     (tmp_path / "empty").mkdir()
     write(tmp_path / "bare", "ros1", {})
     options = ["--columns", put(tmp_path, rig()), "--out", str(tmp_path / "rec.nc")]

@@ -8,6 +8,7 @@ from imuarray.errors import InputError
 from imuarray.recording import rig
 from imuarray.recording.csv_logs import read_tables
 from imuarray.recording.record import Recording
+from tests.doc_pages import ROOT, blocks
 from tests.test_convert_csv import HEADER, blank, layout, table
 from tests.test_convert_csv import read as read_board
 
@@ -78,6 +79,26 @@ def test_a_log_for_each_imu(tmp_path):
     np.testing.assert_allclose(found.logs[2].position, [0, 0, 0.08])
     assert found.position_prior_sd == 5e-3 and found.lines == []
     assert rig.recording_of(found) is None
+
+
+def test_the_documented_rigs(tmp_path):
+    page = {b.note: b.text for b in blocks(ROOT / "docs" / "convert.md") if b.kind == "file"}
+    columns = yaml.safe_load(page["rig.yaml"])
+    files = {f"{name}.csv": log(np.arange(3), numbers(0, 3)) for name in ("front", "rear")}
+    names = [imu.label for imu in put(tmp_path, files | {"logger3/imu.csv": log(
+        np.arange(3), numbers(1, 3))}, columns).logs]  # fmt: skip
+    assert names == ["front", "rear", "mast"]
+    phone, boards = (
+        yaml.safe_load(b.text)["imus"] for b in blocks(ROOT / "docs" / "convert.md")
+        if b.text.startswith("imus:")
+    )  # fmt: skip
+    both = {f"{name}.csv": log(np.arange(3), numbers(0, 3)[:, :3], "t,x,y,z")
+            for name in ("Accelerometer", "Gyroscope")}  # fmt: skip
+    assert put(tmp_path, both, columns | {"imus": phone}).logs[0].label == "phone"
+    head = "t,ax1,ay1,az1,gx1,gy1,gz1,ax2,ay2,az2,gx2,gy2,gz2,t_gyro2"
+    wide = log(np.arange(3), np.hstack([numbers(0, 3), numbers(1, 3), [[1], [2], [2.5]]]), head)
+    found = put(tmp_path, {"log.csv": wide}, columns | {"imus": boards}).logs[1]
+    np.testing.assert_allclose(found.gyroscope_time, [1e-6, 2e-6, 2.5e-6])
 
 
 def test_files_are_found_by_the_end_of_their_path(tmp_path):

@@ -35,6 +35,7 @@ def open_logs(
     from imuarray.recording import bags, csv_logs, rig
 
     logs = [Path(path) for path in paths]
+    found: Recording | rig.Rig
     if len(logs) == 1 and logs[0].suffix in RECORDINGS:
         return Opened(read_recording(logs[0]), [], {})
     if all(map(bags.is_bag, logs)):

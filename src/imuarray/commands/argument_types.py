@@ -20,7 +20,7 @@ class InputBag(InputFile):
 def bag(text: str) -> InputBag:
     """A ROS bag, by its ending where it is no folder."""
     path = InputBag(text)
-    if path.suffix.lower() not in BAGS and not path.is_dir():
+    if path.is_file() and path.suffix.lower() not in BAGS:
         raise argparse.ArgumentTypeError(
             f"expected a folder or a file of {', '.join(BAGS)}, found {text!r}"
         )
