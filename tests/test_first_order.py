@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.firstorder.allan import allan_deviation, lag_correlation, white_noise_sd
-from imuarray.firstorder.correct import calibrate_first_order, correct
+from imuarray.firstorder.correct import calibrate_first_order, correct, corrected
 from imuarray.firstorder.report import noise_table, parameter_table, residual_table
 from imuarray.firstorder.still import still_poses, window_spread
 from imuarray.firstorder.triads import fit_triads, parts_of
@@ -253,6 +253,31 @@ def test_corrected_readings_have_gravitys_size_and_keep_their_rails(tmp_path):
     assert again.stationary.sum() == sum(pose.stop - pose.start for pose in found.poses)
     assert again.accelerometer_noise_sd == pytest.approx(0.04, rel=0.03)
     assert again.gyroscope_noise_sd == pytest.approx(1e-3, rel=0.03)
+
+
+def test_the_correction_is_kept_and_gives_the_readings_bit_for_bit(tmp_path):
+    recording, *_ = board(np.random.default_rng(17))
+    found = calibrate_first_order(recording, GRAVITY, "offset")
+    done = correct(recording, found)
+    write_recording(done.select(slice(0, 700)), tmp_path / "part.nc")
+    part = read_recording(tmp_path / "part.nc")
+    for kind, name in (("accelerometer", "specific_force"), ("gyroscope", "angular_rate")):
+        inverse, offset = (part.correction[f"{kind}_{x}"].to_numpy() for x in ("inverse", "offset"))
+        x = getattr(recording, name)[:700] - offset
+        y = (
+            inverse[..., 0] * x[..., :1]
+            + inverse[..., 1] * x[..., 1:2]
+            + inverse[..., 2] * x[..., 2:]
+        )
+        np.testing.assert_array_equal(getattr(part, name), y)
+        np.testing.assert_allclose(y, np.einsum("kij,tkj->tki", inverse, x), rtol=1e-13, atol=1e-13)
+    # a second one, of what the first has corrected: both as one
+    twice = correct(done, calibrate_first_order(done, GRAVITY, "offset"))
+    both = corrected(
+        twice.correction.accelerometer_inverse.to_numpy(),
+        twice.correction.accelerometer_offset.to_numpy(), recording.specific_force,
+    )  # fmt: skip
+    np.testing.assert_allclose(both, twice.specific_force, atol=1e-12)
 
 
 def test_tables_have_a_row_for_each_number():

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis import methods
-from imuarray.analysis.calibration_dataset import engine_dataset, papers_dataset
+from imuarray.analysis.calibration_dataset import engine_dataset, papers_dataset, with_readings
 from imuarray.analysis.fitting import fitted
 from imuarray.analysis.model import Say, assumed, model_of, require_together, silent, usable
 from imuarray.errors import InputError, require_one_of
@@ -53,7 +53,8 @@ def calibrate(
         ``specific_force`` m/s^2; ``step``, the iterations' largest step in sds;
         ``accelerometer_sd`` m/s^2, ``gyroscope_sd`` rad/s; with effects ``effect_parameter`` and
         ``effect_sd``, whose coordinate ``scope`` is "imu" or "recording", and of several recordings
-        ``own_parameter``, ``own_sd`` (recording, own), the latter ones of each. Attributes
+        ``own_parameter``, ``own_sd`` (recording, own), the latter ones of each; how each recording
+        was corrected before (`Recording.correction`, recording first). Attributes
         ``converged`` (0 or 1), ``residual_ratio`` (rms residual over the declared noise),
         ``model``, ``parts`` (json), and the origin (config, seed, versions).
 
@@ -78,6 +79,7 @@ def calibrate(
         dataset = _engine(recordings, str(model), tuple(effects), say)
     if not all(np.isfinite(dataset[f"position{name}"]).all() for name in ("", "_covariance")):
         raise InputError("recording: expected one that determines the positions, found no solution")
+    dataset = with_readings(dataset, recordings)
     data = [part for one in recordings for part in (one.specific_force, one.angular_rate)]
     dataset.attrs |= {"model": str(model), **stamp({"recording": digest(*data)}, 0)}
     return dataset

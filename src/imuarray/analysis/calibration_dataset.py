@@ -1,5 +1,7 @@
 """A calibration as a labelled dataset, of the papers' estimators and of the engine."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import xarray as xr
 
@@ -12,6 +14,7 @@ from imuarray.model.effects import EFFECTS, KINDS
 from imuarray.model.names import parameter_ids, parameter_names
 from imuarray.motion.state import UNITS
 from imuarray.recording import Recording
+from imuarray.recording.record import COVARIANCES, DIMENSIONS
 
 PLACE = ("accelerometer", "axis")
 
@@ -34,6 +37,20 @@ def positions_dataset(recording: Recording, positions, covariance) -> xr.Dataset
         "axis_other": list("xyz"), "gyroscope": list(recording.gyroscope_labels),
     }  # fmt: skip
     return xr.Dataset(variables, coords, {"position_prior_sd": recording.position_prior_sd})
+
+
+def with_readings(dataset: xr.Dataset, recordings: Sequence[Recording]) -> xr.Dataset:
+    """A calibration that knows its readings: axes, corrections, what these left, and the rate."""
+    first = recordings[0]
+    names = "accelerometer_axes", *COVARIANCES
+    known = {name: getattr(first, name) for name in names if getattr(first, name) is not None}
+    dataset = dataset.assign({n: (DIMENSIONS[n], x, {"units": "1"}) for n, x in known.items()})
+    corrections = [one.correction for one in recordings if one.correction is not None]
+    if len(corrections) == len(recordings):
+        dataset = dataset.merge(xr.concat(corrections, "recording").reset_coords(drop=True))
+    if len(first.time) > 1 and not first.selected:
+        dataset.attrs["rate"] = 1 / float(np.median(np.diff(first.time)))
+    return dataset
 
 
 def noise_variables(noise: Noise) -> dict:

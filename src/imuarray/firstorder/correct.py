@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import xarray as xr
 from scipy.linalg import block_diag
 
 from imuarray.errors import InputError, require_one_of
@@ -12,8 +13,10 @@ from imuarray.firstorder.gyroscopes import Gyroscopes, Still, calibrate_gyroscop
 from imuarray.firstorder.still import SHORTEST, still_poses
 from imuarray.firstorder.triads import TriadFit, fit_triads
 from imuarray.firstorder.turns import nearest_orthogonal, shared_turn
+from imuarray.model.effects import KINDS
 from imuarray.recording import Recording
 from imuarray.recording.channels import require_apart, require_live, require_once
+from imuarray.recording.record import CORRECTION, NUMBERS
 from imuarray.recording.units import GRAVITY
 
 GYROSCOPES = ("calibrate", "offset")
@@ -171,22 +174,16 @@ def correct(recording: Recording, found: FirstOrder) -> Recording:
     the declared noise becomes the pooled noise found, the still poses become ``stationary``. All
     is in the axes of the first accelerometer, the drawing too.
     """
-    force, force_rails = _corrected(
-        found.triads.matrix, recording.specific_force - found.triads.offset,
-        recording.saturated_accelerometers(),
-    )  # fmt: skip
     maps = found.gyroscope_matrix
-    rate, rate_rails = _corrected(
-        maps, recording.angular_rate - found.gyroscope_offset, recording.saturated_gyroscopes()
-    )
+    back, turn_back = np.linalg.inv(found.triads.matrix), np.linalg.inv(maps)
     forces_left, rates_left = found.left()
     still = np.zeros(len(recording.time), bool)
     for pose in found.poses:
         still[pose] = True
     return replace(
         recording,
-        specific_force=force,
-        angular_rate=rate,
+        specific_force=corrected(back, found.triads.offset, recording.specific_force),
+        angular_rate=corrected(turn_back, found.gyroscope_offset, recording.angular_rate),
         accelerometer_position=recording.accelerometer_position @ found.drawing_turn,
         accelerometer_noise_sd=_noise(found.triads.matrix, found.accelerometer_noise),
         gyroscope_noise_sd=_noise(maps, found.gyroscope_noise),
@@ -198,9 +195,41 @@ def correct(recording: Recording, found: FirstOrder) -> Recording:
         gyroscope_map_covariance=rates_left,
         stationary=still,
         accelerometer_axes=_axes(recording, found),
-        specific_force_saturated=force_rails,
-        angular_rate_saturated=rate_rails,
+        specific_force_saturated=_shown(back, recording.saturated_accelerometers()),
+        angular_rate_saturated=_shown(turn_back, recording.saturated_gyroscopes()),
+        correction=_correction(recording, found, back, turn_back),
     )
+
+
+def corrected(inverse, offset, readings) -> np.ndarray:
+    """inverse (K, 3, 3) @ (readings (T, K, 3) - offset (K, 3)), summed from x to z.
+
+    Written out, so that whoever does the same gets the same bits.
+    """
+    x = readings - offset
+    return (
+        inverse[:, :, 0] * x[:, :, :1] + inverse[:, :, 1] * x[:, :, 1:2]
+        + inverse[:, :, 2] * x[:, :, 2:]
+    )  # fmt: skip
+
+
+def _correction(recording: Recording, found: FirstOrder, *inverses) -> xr.Dataset:
+    """What `Recording.correction` holds; after a former correction, both as one."""
+    offsets = (found.triads.offset, found.triads.parts_sd()["offset"]), (
+        found.gyroscope_offset, found.gyroscope_offset_sd,
+    )  # fmt: skip
+    variables, before = {}, recording.correction
+    for kind, inverse, (offset, sd) in zip(KINDS, inverses, offsets, strict=True):
+        if before is not None:
+            first = before[f"{kind}_inverse"].to_numpy()
+            offset = np.linalg.solve(first, offset[..., None])[..., 0]
+            offset, inverse = before[f"{kind}_offset"].to_numpy() + offset, inverse @ first
+        unit = {"units": NUMBERS[f"{kind}_noise_sd"]}
+        values = (inverse, {"units": "1"}), (offset, unit), (sd, unit)
+        for name, (value, attrs) in zip(("inverse", "offset", "offset_sd"), values, strict=True):
+            full = f"{kind}_{name}"
+            variables[full] = CORRECTION[full], value, attrs
+    return xr.Dataset(variables)
 
 
 def _axes(recording: Recording, found: FirstOrder) -> np.ndarray:
@@ -216,12 +245,10 @@ def _behind(matrix, covariance) -> np.ndarray:
     return back @ covariance @ back.T
 
 
-def _corrected(matrix, readings, rails) -> tuple[np.ndarray, np.ndarray]:
-    """Readings (T, K, 3) with matrices (K, 3, 3) taken out, and where rails (T, K, 3) show then."""
-    back = np.linalg.inv(matrix)
-    near = np.abs(back) > COUPLED
-    shown = np.einsum("kij,tkj->tki", near.astype(np.int8), rails.astype(np.int8)) > 0
-    return np.einsum("kij,tkj->tki", back, readings), shown
+def _shown(inverse, rails) -> np.ndarray:
+    """Where rails (T, K, 3) show when maps with an inverse (K, 3, 3) are taken out."""
+    near = np.abs(inverse) > COUPLED
+    return np.einsum("kij,tkj->tki", near.astype(np.int8), rails.astype(np.int8)) > 0
 
 
 def _noise(matrix, noise) -> float:

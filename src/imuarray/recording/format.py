@@ -12,6 +12,7 @@ from imuarray.errors import InputError
 from imuarray.provenance import is_damaged, write_netcdf
 from imuarray.recording import validate
 from imuarray.recording.record import (
+    CORRECTION,
     FLAGS,
     MATRICES,
     NUMBERS,
@@ -37,6 +38,7 @@ def from_dataset(dataset: xr.Dataset, where: str = "recording") -> Recording:
         gyroscope_labels=_labels(dataset["gyroscope"]),
         **flags,
         **matrices,
+        correction=dataset[list(CORRECTION)] if set(CORRECTION) & set(dataset) else None,
         **{name: float(np.asarray(dataset.attrs[name]).item()) for name in numbers},
         **{name: str(dataset.attrs.get(name, "")) for name in TEXTS},
     )

@@ -66,6 +66,15 @@ COVARIANCES = ("accelerometer_map_covariance", "gyroscope_map_covariance")
 # Optional variables without a unit.
 MATRICES = (*COVARIANCES, "accelerometer_axes")
 
+# Optional variables, all or none: how the readings were corrected, inverse @ (raw - offset).
+CORRECTION = {
+    f"{kind}_{name}": (kind, *dims)
+    for kind in ("accelerometer", "gyroscope")
+    for name, dims in (
+        ("inverse", ("axis", "axis_other")), ("offset", ("axis",)), ("offset_sd", ("axis",))
+    )
+}  # fmt: skip
+
 # A simulated sensor need not have a rail.
 MAY_BE_INFINITE = ("accelerometer_range", "gyroscope_range")
 
@@ -102,6 +111,10 @@ class Recording:
         were corrected: about the identity, row by row, triad by triad.
     accelerometer_axes : (A, 3, 3), or None
         Rotations from the accelerometers' own axes, those of their chips, to the array's.
+    correction : Dataset, or None
+        How the readings were corrected (first-order calibration): ``accelerometer_inverse``
+        (A, 3, 3) and ``accelerometer_offset`` (A, 3) m/s^2 with ``accelerometer_offset_sd``, the
+        same of the gyroscopes in rad/s; readings = inverse @ (raw - offset).
     output_period : float, s, NaN where not declared
         Between readings that the sensors make on clocks of their own, where the host takes the
         newest.
@@ -127,6 +140,7 @@ class Recording:
     accelerometer_map_covariance: np.ndarray | None = None
     gyroscope_map_covariance: np.ndarray | None = None
     accelerometer_axes: np.ndarray | None = None
+    correction: xr.Dataset | None = None
     output_period: float = np.nan
     title: str = ""
     source: str = ""
@@ -145,6 +159,8 @@ class Recording:
         for name in MATRICES:
             if getattr(self, name) is not None:
                 variables[name] = DIMENSIONS[name], getattr(self, name), {"units": "1"}
+        if self.correction is not None:
+            variables |= {name: self.correction[name].variable for name in CORRECTION}
         coordinates = {
             "time": variables.pop("time"),
             "accelerometer": ("accelerometer", np.array(self.accelerometer_labels, object)),

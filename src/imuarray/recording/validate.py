@@ -16,6 +16,7 @@ from imuarray.errors import LARGEST, SMALLEST, IdentifiabilityError, InputError
 from imuarray.geometry.array import require_apart, require_count
 from imuarray.recording.record import (
     AXES,
+    CORRECTION,
     COVARIANCES,
     DIMENSIONS,
     FLAGS,
@@ -78,6 +79,8 @@ def check_structure(dataset: xr.Dataset, where: str) -> None:
     for name in COVARIANCES:
         if name in dataset:
             _check_covariance(dataset, name, where)
+    for name in CORRECTION if set(CORRECTION) & set(dataset) else ():
+        _check_correction(dataset, name, where)
     if "accelerometer_axes" in dataset:
         _check_rotations(dataset, "accelerometer_axes", where)
 
@@ -100,7 +103,7 @@ def _check_present(dataset: xr.Dataset, name: str, where: str) -> None:
     if name not in dataset.variables:
         have = ", ".join(sorted(map(str, dataset.variables))) or "none"
         raise InputError(f"{where}: expected a variable '{name}', found {have}")
-    expected = DIMENSIONS.get(name, (name,))
+    expected = DIMENSIONS.get(name) or CORRECTION.get(name, (name,))
     if dataset[name].dims != expected:
         raise InputError(
             f"{where}: {name}: expected dimensions {_listed(expected)}, "
@@ -182,6 +185,15 @@ def _check_rotations(dataset: xr.Dataset, name: str, where: str) -> None:
     square = values.shape[1:] == (3, 3) and (np.abs(values) <= 2).all()
     if not square or not is_rotation(values).all():
         raise InputError(f"{where}: {name}: expected rotations, 3 x 3 each, found others")
+
+
+def _check_correction(dataset: xr.Dataset, name: str, where: str) -> None:
+    _check_present(dataset, name, where)
+    _check_numeric(dataset[name], where)
+    values = dataset[name].values.astype(float)
+    unknown = np.isnan(values) & name.endswith("_sd")  # of a single pose
+    if values.shape[-1] != 3 or not (unknown | (np.abs(values) <= LARGEST)).all():
+        raise InputError(f"{where}: {name}: expected finite numbers for each axis, found others")
 
 
 def is_rotation(matrices) -> np.ndarray:
