@@ -274,6 +274,10 @@ class Board:
             "gyroscopes": g,
         }  # fmt: skip
 
+    def write(self, folder: Path) -> None:
+        """log.csv and columns.yaml."""
+        write(self.table(), self.columns(), folder)
+
     def table(self) -> pd.DataFrame:
         """Counts by column, with the time in s."""
         table = pd.DataFrame({"t": np.round(self.time, 6)})
@@ -297,11 +301,18 @@ def _matrices(rng, options: Options, scale: float, skew: float, ideal: bool) -> 
     return np.eye(3) + (0.0 if ideal else 1.0) * errors
 
 
-def draw_board(seed: int, options: Options = Options()) -> Board:
-    """A board and its recording; the same seed and options give the same one."""
-    rng = np.random.default_rng([seed, 23])
-    hand, count = draw_hand(rng, options), options.imus
-    time = np.arange(round(hand.duration * options.sampling_rate)) / options.sampling_rate
+class Chips(NamedTuple):
+    """How IMUs read and where they sit: matrices (A, 3, 3), drawing and places (A, 3) m."""
+
+    accelerometers: np.ndarray
+    gyroscopes: np.ndarray
+    drawing: np.ndarray
+    places: np.ndarray
+
+
+def draw_chips(rng, options: Options) -> Chips:
+    """Scales, skews and mounts of each IMU, and how far the drawing is off."""
+    count = options.imus
     axes = rng.standard_normal((count, 3))
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
     angles = np.full(count, options.mount)
@@ -313,30 +324,48 @@ def draw_board(seed: int, options: Options = Options()) -> Board:
         g[1, options.flipped] *= -1
     drawing = np.array(PLACES[2 if count == 2 else 4][:count])
     error = options.drawing_error * rng.standard_normal((count, 3))
-    places = drawing + error - error[0]
-    late = np.zeros(count)
-    late[-1] = options.late
-    force, turn = _truths(hand, time, places, late, options.gyroscope_delay)
-    bias = (
+    return Chips(a, g, drawing, drawing + error - error[0])
+
+
+def draw_biases(rng, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Offsets (A, 3) of accelerometers, m/s^2, and of gyroscopes, rad/s."""
+    return (
         0.05 * GRAVITY * rng.standard_normal((count, 3)),
         np.radians(0.8 * rng.standard_normal((count, 3))),
     )
+
+
+def read_out(rng, chips: Chips, true, offsets, noise) -> list[np.ndarray]:
+    """Counts (T, A, 3) of both kinds from what there is to be read, (T, A, 3) each."""
+    readings = (
+        np.einsum("kij,tkj->tki", m, x) + b + sd * rng.standard_normal(x.shape)
+        for m, x, b, sd in zip(chips[:2], true, offsets, noise, strict=True)
+    )
+    return [
+        np.clip(np.round(x / limit * COUNTS), -COUNTS, COUNTS).astype(int)
+        for x, limit in zip(readings, RANGES, strict=True)
+    ]
+
+
+def draw_board(seed: int, options: Options = Options()) -> Board:
+    """A board and its recording; the same seed and options give the same one."""
+    rng = np.random.default_rng([seed, 23])
+    hand, count = draw_hand(rng, options), options.imus
+    time = np.arange(round(hand.duration * options.sampling_rate)) / options.sampling_rate
+    chips = draw_chips(rng, options)
+    late = np.zeros(count)
+    late[-1] = options.late
+    true = truths(hand, time, chips.places, late, options.gyroscope_delay)
+    bias = draw_biases(rng, count)
     walk = rng.standard_normal((len(time), count, 3)).cumsum(axis=0)
     walk *= options.gyroscope_walk / np.sqrt(options.sampling_rate)
     noise = np.array(NOISE) * rng.uniform(0.9, 1.1, 2)
-    readings = (
-        np.einsum("kij,tkj->tki", m, x) + b + sd * rng.standard_normal(x.shape)
-        for m, x, b, sd in zip((a, g), (force, turn), (bias[0], bias[1] + walk), noise, strict=True)
-    )
-    counts = (
-        np.clip(np.round(x / limit * COUNTS), -COUNTS, COUNTS).astype(int)
-        for x, limit in zip(readings, RANGES, strict=True)
-    )
-    truth = _in_frame(places - places[0], hand.rates(time)[0], a, g, bias[1])
-    return Board(options, time, *counts, drawing, truth)
+    counts = read_out(rng, chips, true, (bias[0], bias[1] + walk), noise)
+    truth = in_frame(chips, hand.rates(time)[0], bias[1])
+    return Board(options, time, *counts, chips.drawing, truth)
 
 
-def _truths(hand: Hand, time, places, late, delay):
+def truths(hand: Hand, time, places, late, delay):
     """Specific force and rate (T, A, 3) at each sensor's own instants."""
     force, turn, done = [], [], {}
     for place, age in zip(places - places[0], late, strict=True):
@@ -350,8 +379,10 @@ def _truths(hand: Hand, time, places, late, delay):
     return np.stack(force, axis=1), np.stack(turn, axis=1)
 
 
-def _in_frame(places, rate, a, g, offset) -> Truth:
+def in_frame(chips: Chips, rate, offset) -> Truth:
     """Turned so that the matrix of IMU 1's accelerometer is upper triangular."""
+    a, g, places = chips.accelerometers, chips.gyroscopes, chips.places
     upper, rotation = rq(a[0])
     rotation = np.sign(np.diag(upper))[:, None] * rotation
-    return Truth(places @ rotation.T, rate @ rotation.T, a @ rotation.T, g @ rotation.T, offset)
+    turned = (places - places[0]) @ rotation.T, rate @ rotation.T, a @ rotation.T, g @ rotation.T
+    return Truth(*turned, offset)

@@ -14,7 +14,8 @@ import json
 import os
 import tempfile
 import time
-from dataclasses import fields
+from dataclasses import fields, replace
+from functools import partial
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -23,7 +24,7 @@ import numpy as np  # noqa: E402
 import pandas as pd  # noqa: E402
 import xarray as xr  # noqa: E402
 
-from benchmarks.board import GRAVITY, Board, Options, draw_board, write  # noqa: E402
+from benchmarks.board import GRAVITY, Board, Options, draw_board  # noqa: E402
 from imuarray.cli import main as imuarray  # noqa: E402
 
 SWITCHES = [(0.3, 0.0), (2.0, 0.0), (0.3, 37.0), (0.3, 90.0), (0.3, 180.0)]  # mounts, last IMU
@@ -108,18 +109,23 @@ GRADES = {
 }  # fmt: skip
 
 
-def walk(board: Board, commands, folder: Path) -> list[dict]:
-    """A row a graded command; the last one is the command that failed, if one did."""
-    write(board.table(), board.columns(), folder)
+def walk(board, commands, folder: Path, lines=LINES, grades=GRADES) -> list[dict]:
+    """A row a graded command; the last one is the command that failed, if one did.
+
+    ``board`` writes itself into a folder and has a truth; ``lines`` are commands by name,
+    ``grades`` what (folder, board) makes a row.
+    """
+    board.write(folder)
     rows = []
     for name in commands:
         start = time.process_time()
-        status, said = run(LINES[name], folder)
+        line = lines[name]
+        status, said = line(folder, board) if callable(line) else run(line, folder)
         row = {"command": name, "status": status}
         if status not in (0, 3):
             return [*rows, row | {"says": said}]
-        if name in GRADES:
-            row |= GRADES[name](folder, board)
+        if name in grades:
+            row |= grades[name](folder, board)
             rows.append(row | {"cpu_s": time.process_time() - start})
     return rows
 
@@ -141,12 +147,15 @@ def summary(rows: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(found).T
 
 
-def _walks(boards, options: Options, commands, keep: Path | None, name: str) -> pd.DataFrame:
+def walks(
+    seeds, draw, commands, keep: Path | None, name: str, lines=LINES, grades=GRADES
+) -> pd.DataFrame:
+    """Rows of `walk` for what ``draw`` makes of each seed, printed as they come."""
     rows = []
-    for seed in boards:
+    for seed in seeds:
         with tempfile.TemporaryDirectory() as temporary:
             folder = Path(temporary) if keep is None else keep / f"{name}{seed}"
-            found = walk(draw_board(seed, options), commands, folder)
+            found = walk(draw(seed), commands, folder, lines, grades)
         for row in found:
             rows.append({"board": f"{name}{seed}"} | row)
             shown = (f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}"
@@ -161,16 +170,16 @@ def _columns(rows) -> list[str]:
     return list(dict.fromkeys([key for row in rows for key in row] + needed))
 
 
-def parser() -> argparse.ArgumentParser:
-    """The command line: what to do, how many boards, and every option of a board."""
-    found = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    found.add_argument("what", choices=["make", "walk", "mounts", "mistakes"])
-    found.add_argument("--boards", type=int, default=3)
-    found.add_argument("--first", type=int, default=1, help="seed of the first board")
+def parser(what, many: str, options=Options) -> argparse.ArgumentParser:
+    """The command line: what to do, how many boards or rigs, and every option of one."""
+    found = argparse.ArgumentParser()
+    found.add_argument("what", choices=what)
+    found.add_argument(f"--{many}", type=int, default=3)
+    found.add_argument("--first", type=int, default=1, help="seed of the first of them")
     commands = "convert,first-order,calibrate"
     found.add_argument("--commands", default=commands, help=f"of {', '.join(LINES)}")
     found.add_argument("--out", type=Path, help="folder to keep logs and results in")
-    for item in fields(Options):
+    for item in fields(options):
         kind = type(item.default) if item.default is not None else int
         name = "--" + item.name.replace("_", "-")
         if kind is bool:
@@ -182,20 +191,20 @@ def parser() -> argparse.ArgumentParser:
 
 def main() -> None:
     """Run what was asked for, and print."""
-    given = parser().parse_args()
+    given = parser(["make", "walk", "mounts", "mistakes"], "boards").parse_args()
     options = Options(**{item.name: getattr(given, item.name) for item in fields(Options)})
-    boards, commands = range(given.first, given.first + given.boards), given.commands.split(",")
+    seeds, commands = range(given.first, given.first + given.boards), given.commands.split(",")
     keep = None if given.out is None else given.out.resolve()
     if given.what == "make":
-        for seed in boards:
-            board = draw_board(seed, options)
-            write(board.table(), board.columns(), (keep or Path.cwd()) / f"board{seed}")
+        for seed in seeds:
+            draw_board(seed, options).write((keep or Path.cwd()) / f"board{seed}")
     elif given.what == "walk":
-        print(summary(_walks(boards, options, commands, keep, "board")).to_string())
+        found = walks(seeds, partial(draw_board, options=options), commands, keep, "board")
+        print(summary(found).to_string())
     elif given.what == "mounts":
         for mount, turned in SWITCHES:
-            own = Options(**{**vars(options), "mount": mount, "turned": turned})
-            found = _walks(boards, own, commands, keep, f"mount{mount:g}_turned{turned:g}_")
+            own = partial(draw_board, options=replace(options, mount=mount, turned=turned))
+            found = walks(seeds, own, commands, keep, f"mount{mount:g}_turned{turned:g}_")
             print(summary(found).to_string())
     else:
         from benchmarks.board_mistakes import try_all

@@ -12,9 +12,9 @@ PACKAGE = Path(imuarray.__file__).parent
 LAYERS = (
     ("errors", "caches", "linear", "tails"), ("compiled",), ("streams", "provenance", "geometry"),
     ("motion",), ("model", "config"),
-    ("recording",), ("simulation", "firstorder", "estimation"), ("engine",), ("posterior",),
-    ("studies", "measured"), ("blind", "diagnosis"), ("claims", "figures"), ("report",),
-    ("analysis",), ("plots",), ("commands",), ("cli",),
+    ("recording",), ("simulation", "firstorder", "estimation"), ("alignment", "engine"),
+    ("posterior",), ("studies", "measured"), ("blind", "diagnosis"), ("claims", "figures"),
+    ("report",), ("analysis",), ("plots",), ("commands",), ("cli",),
 )  # fmt: skip
 PLACE = {name: number for number, names in enumerate(LAYERS) for name in names}
 

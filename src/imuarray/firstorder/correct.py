@@ -195,8 +195,8 @@ def correct(recording: Recording, found: FirstOrder) -> Recording:
         gyroscope_map_covariance=rates_left,
         stationary=still,
         accelerometer_axes=_axes(recording, found),
-        specific_force_saturated=_shown(back, recording.saturated_accelerometers()),
-        angular_rate_saturated=_shown(turn_back, recording.saturated_gyroscopes()),
+        specific_force_saturated=rails_shown(back, recording.saturated_accelerometers()),
+        angular_rate_saturated=rails_shown(turn_back, recording.saturated_gyroscopes()),
         correction=_correction(recording, found, back, turn_back),
     )
 
@@ -245,7 +245,7 @@ def _behind(matrix, covariance) -> np.ndarray:
     return back @ covariance @ back.T
 
 
-def _shown(inverse, rails) -> np.ndarray:
+def rails_shown(inverse, rails) -> np.ndarray:
     """Where rails (T, K, 3) show when maps with an inverse (K, 3, 3) are taken out."""
     near = np.abs(inverse) > COUPLED
     return np.einsum("kij,tkj->tki", near.astype(np.int8), rails.astype(np.int8)) > 0

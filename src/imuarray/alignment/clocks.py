@@ -1,0 +1,240 @@
+"""How one gyroscope's clock and axes lie against another's, from the rates of one rigid body."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import correlate
+
+from imuarray.alignment.resample import Sensor, Splines
+from imuarray.errors import InputError
+from imuarray.firstorder.relative import BLOCK, FEWEST, FLATTEST, SLOWEST
+from imuarray.firstorder.turns import nearest_orthogonal, procrustes
+from imuarray.linear import scaled_inverse
+
+COARSE = 0.01  # s, of the grid on which speeds are compared
+WINDOW, HOP = 20.0, 5.0  # s: the piece of a log that is looked for, and further ones around it
+AHEAD = 0.05  # s, that a further piece may be off beside what the drift does
+FASTEST = 1e-3  # of a clock against another
+ALIKE = 0.9  # correlation of two speeds from which they are one motion
+NEARLY = 0.02  # of correlations, within which two places are equally good
+PIECES = 8  # that are tried
+SLACK = 0.05  # sd of the map's entries about a rotation
+STEPS, CLOSE = 20, 1e-9  # of Gauss-Newton, s
+
+
+class Clock(NamedTuple):
+    """A stamp t of the log is the instant t - offset - drift (t - middle) of the first's clock.
+
+    ``map`` (3, 3): rates of the log = map @ rates of the first + bias; ``covariance`` (14, 14) of
+    offset, drift, map row by row and bias. ``residual`` rad/s, rms of one axis, robust.
+    """
+
+    offset: float
+    drift: float
+    middle: float
+    map: np.ndarray
+    covariance: np.ndarray
+    residual: float
+
+    def instants(self, stamps) -> np.ndarray:
+        """On the first log's clock, s."""
+        return stamps - self.offset - self.drift * (stamps - self.middle)
+
+    def shifted(self, own: float, first: float) -> Clock:
+        """The same where its log's stamps are larger by ``own``, the first's by ``first`` s."""
+        return self._replace(offset=self.offset + own - first, middle=self.middle + own)
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """From the first's axes to the log's, (3, 3)."""
+        return nearest_orthogonal(self.map)
+
+    @property
+    def turn_covariance(self) -> np.ndarray:
+        """(3, 3) of a small rotation vector, rad, in the log's axes."""
+        # map = (1 + E) rotation; the antisymmetric part of E turns
+        signs = np.zeros((3, 9))
+        for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
+            signs[i, 3 * k + j], signs[i, 3 * j + k] = 0.5, -0.5
+        back = signs @ np.kron(np.eye(3), self.rotation)
+        return back @ self.covariance[2:11, 2:11] @ back.T
+
+
+def itself(stamps) -> Clock:
+    """The first log's clock."""
+    return Clock(0.0, 0.0, float(np.mean(stamps[[0, -1]])), np.eye(3), np.zeros((14, 14)), 0.0)
+
+
+def compare(first: Sensor, other: Sensor) -> Clock:
+    """Clock and map of a gyroscope against another by robust least squares.
+
+    InputError where they show no common motion, or a mirror image.
+    """
+    splines = Splines(first)
+    middle, offset, drift = _coarse(first, other)
+    clock = Clock(offset, drift, middle, np.eye(3), np.zeros((14, 14)), 0.0)
+    at = clock.instants(other.time)
+    base = splines(at)
+    used = ~(first.near_rail(at).any(axis=1) | other.railed.any(axis=1))
+    used &= np.linalg.norm(np.nan_to_num(base), axis=1) > SLOWEST
+    if used.sum() < FEWEST:
+        raise InputError(
+            f"{other.name}: expected {FEWEST} readings in turning motion off the rails to find"
+            f" rotation and clock from, found {used.sum()}"
+        )
+    turn = procrustes(other.values[used], base[used])
+    _require_turning(base[used], turn, other.name)
+    return _fit(splines, other, clock._replace(map=turn), used)
+
+
+def _require_turning(rate, turn, name: str) -> None:
+    """InputError for a mirror image, and for motion about one axis."""
+    if np.linalg.det(turn) < 0:
+        raise InputError(
+            f"{name}: expected right-handed axes, found those of a mirror image of the first's; is"
+            " the sign of one of its axes wrong, or of the first's?"
+        )
+    values = np.linalg.eigvalsh(rate.T @ rate)
+    if values[1] < FLATTEST * values[2]:
+        raise InputError(
+            f"{name}: expected motion about two axes at least, found one axis only: the rotation of"
+            " this IMU about it is not determined; turn the rig about other axes, too"
+        )
+
+
+def _fit(splines: Splines, other: Sensor, clock: Clock, used) -> Clock:
+    """Offset, drift, map and bias by Gauss-Newton with Student-t weights (4 degrees of freedom)."""
+    time, wanted, turn = other.time[used], other.values[used], clock.map
+    values = np.concatenate([[clock.offset, clock.drift], turn.ravel(), np.zeros(3)])
+    far = time - clock.middle
+    ridge = np.zeros(14)
+    for step in range(STEPS):
+        at = time - values[0] - values[1] * far
+        rate, slope = splines(at), splines(at, 1)
+        here = np.isfinite(rate).all(axis=1)
+        found, map_ = np.nan_to_num(rate), values[2:11].reshape(3, 3)
+        left = wanted - found @ map_.T - values[11:]
+        squares = np.sum(left**2, axis=1)
+        # 2.37 is the median of a chi-squared variable with three degrees of freedom
+        size = max(np.median(squares[here]) / 2.37, 1e-30)
+        weight = here * 7.0 / (4.0 + squares / size)
+        columns = np.zeros((len(time), 3, 14))
+        columns[..., 0] = -np.nan_to_num(slope) @ map_.T
+        columns[..., 1] = columns[..., 0] * far[:, None]
+        for i in range(3):
+            columns[:, i, 2 + 3 * i : 5 + 3 * i], columns[:, i, 11 + i] = found, 1.0
+        ridge[2:11] = size / SLACK**2
+        flat = (columns * weight[:, None, None]).reshape(-1, 14)
+        inverse = scaled_inverse(flat.T @ columns.reshape(-1, 14) + np.diag(ridge))
+        slope_ = flat.T @ left.ravel() - ridge * (values - np.r_[0, 0, turn.ravel(), 0, 0, 0])
+        change = inverse @ slope_
+        values = values + change
+        if step > 3 and abs(change[0]) + abs(change[1]) * np.ptp(far) < CLOSE:
+            break
+    covariance = _sandwich(columns, weight, left, time, inverse)
+    return Clock(
+        values[0], values[1], clock.middle, values[2:11].reshape(3, 3), covariance, np.sqrt(size)
+    )
+
+
+def _sandwich(columns, weight, left, time, inverse) -> np.ndarray:
+    """Covariance (14, 14) that allows residuals within one block of time to be alike."""
+    _, block = np.unique(time // BLOCK, return_inverse=True)
+    scores = np.zeros((block.max() + 1, 14))
+    np.add.at(scores, block, np.einsum("n,nim,ni->nm", weight, columns, left))
+    scores = scores @ inverse
+    count = len(scores)
+    return scores.T @ scores * count / max(count - 4, 1)
+
+
+def _coarse(first: Sensor, other: Sensor) -> tuple[float, float, float]:
+    """(middle, offset, drift) to some milliseconds, from the speeds' correlation."""
+    base, start = _speed(first)
+    speed, own = _speed(other)
+    length = min(round(WINDOW / COARSE), len(speed), len(base))
+    begin, lag = _placed(base, speed, length, start - own, other.name)
+    # further pieces of the same log, about where the first one lies
+    half = round(AHEAD / COARSE)
+    short = min(length, round(HOP / COARSE))
+    centre, found = begin + length // 2, []
+    for place in range(0, len(speed) - short + 1, short):
+        around = half + int(FASTEST * abs(place + short // 2 - centre))
+        low = place + lag - around
+        part = base[max(low, 0) : place + lag + short + around]
+        if low < 0 or len(part) < short + 2 * around:
+            continue
+        score = _match(part, speed[place : place + short])
+        best = int(np.argmax(score))
+        if score[best] > ALIKE and 0 < best < len(score) - 1:
+            a, b, c = score[best - 1 : best + 2]
+            peak = best + 0.5 * (a - c) / (a - 2 * b + c)
+            found.append((place + short / 2, low + peak - place))
+    if not found:
+        found = [(centre, lag)]
+    places, lags = np.array(found).T
+    middle, (drift, here) = places.mean(), _line(places - places.mean(), lags)
+    # a lag leads from the other's grid to the first's
+    offset = own + COARSE * middle - (start + COARSE * (middle + here))
+    return float(own + COARSE * middle), float(offset), float(-drift)
+
+
+def _line(x, y) -> tuple[float, float]:
+    """Slope and value at 0 of a line through most points."""
+    if np.ptp(x) == 0:
+        return 0.0, float(np.median(y))
+    weight = np.ones(len(x))
+    for _ in range(5):
+        slope, value = np.polyfit(x, y, 1, w=np.sqrt(weight))
+        left = np.abs(y - slope * x - value)
+        weight = 1 / (1 + (left / max(np.median(left), 1e-3)) ** 2)
+    return (slope, value) if abs(slope) < FASTEST else (0.0, float(np.median(y)))
+
+
+def _speed(sensor: Sensor) -> tuple[np.ndarray, float]:
+    """|rate| on the coarse grid, rad/s, and where that starts."""
+    start = float(sensor.time[0])
+    grid = start + COARSE * np.arange(int((sensor.time[-1] - start) / COARSE) + 1)
+    return np.interp(grid, sensor.time, np.linalg.norm(sensor.values, axis=1)), start
+
+
+def _match(base, part) -> np.ndarray:
+    """Correlation of ``part`` with each piece of ``base`` as long as it is."""
+    count, part = len(part), part - part.mean()
+    base = base - base.mean()
+    sums = np.cumsum(np.concatenate([[0.0], base]))
+    squares = np.cumsum(np.concatenate([[0.0], base**2]))
+    mean = (sums[count:] - sums[:-count]) / count
+    spread = np.maximum((squares[count:] - squares[:-count]) / count - mean**2, 1e-12)
+    product = correlate(base, part, "valid", "fft") / count
+    return product / np.sqrt(spread * max(np.mean(part**2), 1e-12))
+
+
+def _placed(base, speed, length: int, zero: float, name: str) -> tuple[int, int]:
+    """Where the piece of most motion that the first log shows, too, begins, and its lag.
+
+    Of places that fit equally well the one where the stamps agree best.
+    """
+    hop, best = max(length // 4, 1), 0.0
+    begins = np.arange(0, len(speed) - length + 1, hop)
+    spread = np.array([speed[b : b + length].std() for b in begins])
+    for begin in begins[np.argsort(-spread)][:PIECES]:
+        part = speed[begin : begin + length]
+        if part.std() < SLOWEST / 4:
+            break
+        score = _match(base, part)
+        best = max(best, score.max())
+        if best > ALIKE:
+            lags = _peaks(score, best - NEARLY) - begin
+            return int(begin), int(lags[np.argmin(np.abs(COARSE * lags + zero))])
+    raise InputError(
+        f"{name}: expected the turning motion that the first log shows, too, found none alike"
+        f" (correlation {best:.2f}); are both on one rigid body, and do the logs overlap?"
+    )
+
+
+def _peaks(score, least: float) -> np.ndarray:
+    """Where a sequence is at its highest nearby, and above ``least``."""
+    beside = np.concatenate([[-np.inf], score, [-np.inf]])
+    return np.flatnonzero((score >= beside[:-2]) & (score >= beside[2:]) & (score > least))

@@ -1,0 +1,133 @@
+"""Readings of one sensor at other instants: splines, what they leave out, and how far they err.
+
+Readings are carried over by splines of fifth degree (Unser, Sampling - 50 years after Shannon,
+2000, gives the error of a spline for a sinusoid that `interpolation_error` sums over a spectrum).
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.interpolate import BSpline, make_interp_spline, make_lsq_spline
+
+DEGREE = 5
+REACH = 6  # readings beside a rail or a run's end that show in the spline: 0.43^6 is 1 %
+WIDEST = 8  # readings that may be missing in a row where the motion is slow enough
+SEGMENT = 128  # readings in a piece of the spectrum
+NOISY = 3.0  # times the declared noise that a sensor's own may be
+MOVING = 10.0  # times the noise, from which a piece of the log shows motion
+SHOCKS = 0.1  # of these pieces, the worst, that do not count
+
+
+@dataclass(frozen=True, eq=False)
+class Sensor:
+    """Readings of one triad: time (N,) s, values (N, 3), railed (N, 3) bool, and its noise sd."""
+
+    name: str
+    time: np.ndarray
+    values: np.ndarray
+    railed: np.ndarray
+    noise_sd: float
+
+    @cached_property
+    def step(self) -> float:
+        """s, between readings where none is missing."""
+        steps = np.diff(self.time)
+        # a mean: stamps may be rounded
+        return float(np.mean(steps[steps < 1.5 * np.median(steps)]))
+
+    @cached_property
+    def spectrum(self) -> tuple[np.ndarray, np.ndarray]:
+        """Frequencies (F,) in cycles a reading, and the power of motion (S, F) in moving pieces.
+
+        In units of the readings squared, summed over axes; all frequencies add up to it.
+        """
+        whole = [part for part in self.runs(1.5) if len(self.time[part]) >= SEGMENT]
+        if not whole:
+            return np.zeros(0), np.zeros((0, 0))
+        window = np.kaiser(SEGMENT, 14.0)  # leaks less than 1e-10: fast motion beside little noise
+        pieces = np.concatenate([
+            np.lib.stride_tricks.sliding_window_view(self.values[part], SEGMENT, axis=0)
+            [:: SEGMENT // 2] for part in whole
+        ])  # fmt: skip
+        pieces = (pieces - pieces.mean(axis=-1, keepdims=True)) * window
+        power = 2 * np.sum(np.abs(np.fft.rfft(pieces)) ** 2, axis=1) / SEGMENT / np.sum(window**2)
+        frequency = np.fft.rfftfreq(SEGMENT)
+        noise = 6 * self.noise_sd**2 / SEGMENT
+        quiet = np.argsort(power.sum(axis=1))[: len(power) // 4 + 1]
+        level = np.clip(power[quiet][:, frequency > 0.4].mean(), noise, NOISY**2 * noise)
+        moving = power.sum(axis=1) > MOVING**2 * level * len(frequency)
+        return frequency, power[moving] - level
+
+    def runs(self, longest: float) -> list[slice]:
+        """Of readings no further apart than ``longest`` usual steps."""
+        cuts = np.flatnonzero(np.diff(self.time) > longest * self.step) + 1
+        ends = [0, *cuts, len(self.time)]
+        return [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+
+    def error(self, spacing: float) -> float:
+        """Rms of what a spline of knots ``spacing`` seconds apart misses, one axis, in motion."""
+        frequency, power = self.spectrum
+        if not len(power):
+            return 0.0
+        missed = power @ spline_error(frequency * spacing / self.step)
+        missed = np.sort(missed)[: len(missed) - int(SHOCKS * len(missed))]
+        return float(np.sqrt(max(missed.mean(), 0.0) / 3))
+
+    @cached_property
+    def longest(self) -> float:
+        """Usual steps between neighbours that the motion is slow enough to bridge."""
+        allowed = [n for n in range(2, WIDEST + 1) if self.error(n * self.step) < self.noise_sd]
+        return 0.5 + max(allowed, default=1)
+
+    def near_rail(self, at) -> np.ndarray:
+        """Where (T, 3) a railed reading shows in the spline at ``at`` (T,)."""
+        found = np.zeros((len(at), 3), bool)
+        for axis in range(3):
+            railed = self.time[self.railed[:, axis]]
+            if len(railed):
+                after = np.clip(np.searchsorted(railed, at), 1, max(len(railed) - 1, 1))
+                beside = railed[[after - 1, np.minimum(after, len(railed) - 1)]]
+                found[:, axis] = np.abs(beside - at).min(axis=0) < REACH * self.step
+        return found
+
+
+def spline_error(frequency) -> np.ndarray:
+    """Mean square error, over phases, of a sinusoid of power 1 at cycles a knot (F,)."""
+    inside = np.minimum(frequency, 0.5)
+    images = inside[:, None] + np.arange(-8, 9)
+    basis = np.sinc(images) ** (DEGREE + 1)
+    response = basis / basis.sum(axis=1, keepdims=True)
+    response[:, 8] -= 1.0
+    return np.where(frequency > 0.5, 1.0, np.sum(response**2, axis=1))
+
+
+class Splines:
+    """Through the runs of a sensor; by least squares on ``knots`` (K,) s where given."""
+
+    def __init__(self, sensor: Sensor, values=None, knots=None):
+        values = sensor.values if values is None else values
+        self.parts: list[tuple[float, float, BSpline]] = []
+        for run in sensor.runs(sensor.longest):
+            time = sensor.time[run]
+            if len(time) > 2 * DEGREE:
+                spline = _spline(time, values[run], knots)
+                self.parts.append((time[0], time[-1], spline))
+
+    def __call__(self, at, order: int = 0) -> np.ndarray:
+        """The ``order``-th derivative at ``at`` (T,), (T, 3), NaN where there is none."""
+        found = np.full((len(at), 3), np.nan)
+        for first, last, spline in self.parts:
+            inside = slice(*np.searchsorted(at, [first, np.nextafter(last, np.inf)]))
+            found[inside] = spline(at[inside], order)
+        return found
+
+
+def _spline(time, values, knots) -> BSpline:
+    if knots is not None:
+        inner = knots[(knots > time[0]) & (knots < time[-1])][2:-2]
+        if len(inner):
+            ends = [np.full(DEGREE + 1, end) for end in (time[0], time[-1])]
+            knots = np.concatenate([ends[0], inner, ends[1]])
+            return make_lsq_spline(time, values, knots, DEGREE, method="norm-eq")
+    return make_interp_spline(time, values, DEGREE)
