@@ -58,7 +58,7 @@ def test_descriptions(tmp_path, kind):
 
 
 def descriptions(folder, kind: str, count: int, seed: int) -> int:
-    """How many of ``count`` damaged descriptions of a rig's logs still describe them."""
+    """How many of ``count`` descriptions of a rig's logs, but the first damaged, describe them."""
     rng, read = np.random.default_rng(seed), 0
     if kind == "csv":
         stamps, files = three()
@@ -68,8 +68,8 @@ def descriptions(folder, kind: str, count: int, seed: int) -> int:
         put(folder, rig())
         logs, reader = [write(folder / "run", kind, readings(4))], read_bags
     content = (folder / "rig.yaml").read_bytes()
-    for _ in range(count):
-        (folder / "rig.yaml").write_bytes(damaged(rng, content))
+    for i in range(count):
+        (folder / "rig.yaml").write_bytes(damaged(rng, content) if i else content)
         found = outcome(lambda: reader(logs, folder / "rig.yaml"))
         if found is not None:
             read += 1
