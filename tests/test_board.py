@@ -1,8 +1,16 @@
 """`imuarray board`: from a log to positions and a page; what the page says, and that it renders."""
 
+import json
+import os
 import re
+import shutil
+import subprocess
+from dataclasses import replace
 from functools import partial
+from html import unescape as html_text
 
+import matplotlib
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -13,7 +21,9 @@ from imuarray.analysis.board import board
 from imuarray.cli import main
 from imuarray.diagnosis.plain import Sizes, plain
 from imuarray.report.board import html, write_board
+from imuarray.report.excitation import missing
 
+matplotlib.use("agg")
 LATE = 0.003
 FEW = Options(still=4.0, move=1.5, twisting=6.0, late=LATE)
 FILES = {"report.html", "cal.nc", "positions.csv", "recording.nc"}
@@ -48,6 +58,11 @@ def page(found, folder):
     return (folder / "answer" / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.fixture
+def no_pictures(monkeypatch):
+    monkeypatch.setattr("imuarray.report.board.draw", lambda _: [])
+
+
 def words(page: str) -> str:
     return " ".join(re.sub("<style>.*?</style>|<[^>]*>", " ", page, flags=re.S).split())
 
@@ -78,7 +93,9 @@ def test_the_page_says_whose_delay_it_is(page):
     assert "IMU 3 is read" not in text and "Not to be trusted" not in text
 
 
-def test_an_answer_not_to_be_trusted_says_so_first(found, tmp_path, monkeypatch, capsys):
+def test_an_answer_not_to_be_trusted_says_so_first(
+    found, tmp_path, monkeypatch, capsys, no_pictures
+):
     odd = found._replace(reasons=["gyroscopes <b>2 %</b> too large?"], source="<i>log</i>")
     monkeypatch.setattr("imuarray.commands.board.answered", lambda *_: odd)
     status = main(["board", __file__, "--out", str(tmp_path / "new" / "answer"), "--quiet"])
@@ -89,13 +106,13 @@ def test_an_answer_not_to_be_trusted_says_so_first(found, tmp_path, monkeypatch,
     assert imuarray.read_calibration(tmp_path / "new/answer/cal.nc").attrs["trusted"] == 0
 
 
-def test_without_still_poses_the_page_says_what_is_missing(found):
+def test_without_still_poses_the_page_says_what_is_missing(found, no_pictures):
     page = words(html(found._replace(first_order="recording: expected still poses, found none")))
     assert "Record again with still poses" in page and "found none" in page
     assert "How each sensor is turned" not in page
 
 
-def test_an_error_leaves_the_folder_as_it_was(found, folder, tmp_path, monkeypatch):
+def test_an_error_leaves_the_folder_as_it_was(found, tmp_path, monkeypatch, no_pictures):
     (tmp_path / "report.html").write_text("mine")
 
     def fails(*_):
@@ -106,6 +123,68 @@ def test_an_error_leaves_the_folder_as_it_was(found, folder, tmp_path, monkeypat
         write_board(found, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
     assert (tmp_path / "report.html").read_text() == "mine"
+
+
+def test_the_pictures_are_embedded_and_small(page):
+    ids = re.findall(r'<figure id="(\w+)">\s*<img src="data:image/png;base64,', page)
+    assert ids == ["board", "timeline", "sphere", "length", "residual"]
+    assert len(page) < 3e6 and "http" not in page and "url(" not in page and "<script" not in page
+
+
+BROWSER = shutil.which("chromium") or shutil.which("chromium-browser")
+SEEN = """<script>addEventListener("load", () => {
+const all = [...document.images], page = document.documentElement;
+const fetched = performance.getEntriesByType("resource").map(entry => entry.name);
+document.title = JSON.stringify({
+  widths: all.map(image => image.naturalWidth), tall: page.scrollHeight,
+  wide: page.scrollWidth <= innerWidth, fetched: fetched.filter(name => !name.startsWith("data:")),
+}); })</script>"""
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium")
+def test_a_browser_shows_the_page(page, tmp_path):
+    """Every picture is decoded, nothing is asked for elsewhere, nothing sticks out to the right."""
+    (tmp_path / "page.html").write_text(page.replace("</body>", f"{SEEN}</body>"))
+    options = "--headless --no-sandbox --disable-gpu --window-size=1000,800 --dump-dom".split()
+    home = {"HOME": str(tmp_path), "PATH": os.environ["PATH"]}
+    shown = subprocess.run(
+        [BROWSER, *options, (tmp_path / "page.html").as_uri()], capture_output=True, text=True,
+        timeout=60, env=home,
+    ).stdout  # fmt: skip
+    seen = json.loads(html_text(re.search("<title>(.*?)</title>", shown).group(1)))
+    assert len(seen["widths"]) == 5 and min(seen["widths"]) > 1000 and seen["tall"] > 2000
+    assert seen["fetched"] == [] and seen["wide"]
+
+
+def test_pictures_for_a_notebook(found):
+    """The page's own drawings, into axes of one's own."""
+    plots, seen = imuarray.plots, found.calibration
+    titles = [plots.board(seen, plane).get_title() for plane in ("xy", "yz")]
+    assert all(re.match(r"departures × \d+, ellipses", title) for title in titles)
+    axes = plots.timeline(found.corrected, seen)
+    assert "still poses" in [label.get_text() for label in axes.get_yticklabels()]
+    assert plots.sphere(found.corrected, seen).get_aspect() == 1.0
+    curve = plots.length(seen).lines[1].get_ydata()  # µm, rms
+    assert np.all(np.diff(curve) < 1e-9) and curve[0] > 5 * curve[-1]
+    sds = np.sqrt(np.einsum("kaka->ka", seen["position_covariance"].to_numpy()))[1:]
+    assert curve[-1] == pytest.approx(1e6 * np.sqrt(np.mean(sds**2)), rel=0.01)
+    assert plots.residual_course(seen, "gyroscope").get_title() == "gyroscopes"
+    usual = np.median(seen["accelerometer_residual"])
+    assert usual == pytest.approx(1.0, abs=0.2)
+    with pytest.raises(imuarray.InputError, match="plane"):
+        plots.board(seen, "zz")
+    plt.close("all")
+
+
+def test_what_has_not_been_excited_is_named(found):
+    assert missing(found.corrected, found.calibration) == []
+    seen = found.corrected
+    upper = seen.stationary & (np.median(seen.specific_force, axis=1)[:, 2] > -2)
+    flat = found.calibration.copy()
+    flat["angular_rate"] = flat["angular_rate"] * [1.0, 1.0, 0.1]
+    said = missing(replace(seen, stationary=upper), flat)
+    assert re.match(r"no still pose within \d+ degrees of \S+", said[0])
+    assert said[1].startswith("hardly any turning about +z: ") or "about −z" in said[1]
 
 
 def sizes(rows, components=("value",), sd=1e-6):

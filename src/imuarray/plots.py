@@ -9,6 +9,7 @@ import xarray as xr
 
 from imuarray.errors import require_one_of
 from imuarray.figures.style import GREY, look
+from imuarray.model.effects import KINDS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,24 +34,48 @@ def _axes(axes: Axes | None) -> Axes:
 
 
 def positions(calibration: xr.Dataset, axes: Axes | None = None) -> Axes:
-    """Each triad's displacement from its nominal position (mm), with 95 % intervals.
+    """Each triad's displacement from its nominal position, with 95 % intervals.
 
-    ``calibration``: what `imuarray.calibrate` gave.
+    ``calibration``: what `imuarray.calibrate` gave, here and in those that follow.
     """
+    return _drawn("positions", axes, calibration)
+
+
+def board(calibration: xr.Dataset, plane: str = "xy", axes: Axes | None = None) -> Axes:
+    """The board in a plane, nominal to found, departures and 95 % ellipses enlarged."""
+    require_one_of("plane", plane, ("xy", "xz", "yz"))
+    return _drawn("board", axes, calibration, plane)
+
+
+def timeline(recording: Recording, calibration: xr.Dataset, axes: Axes | None = None) -> Axes:
+    """The recording that was calibrated: speed, still poses, samples used, rails, shocks."""
+    return _drawn("timeline", axes, recording, calibration)
+
+
+def sphere(recording: Recording, calibration: xr.Dataset, axes: Axes | None = None) -> Axes:
+    """Directions of its still poses and axes of its rotation, from +z and from -z."""
+    return _drawn("sphere", axes, recording, calibration)
+
+
+def length(calibration: xr.Dataset, axes: Axes | None = None) -> Axes:
+    """Standard deviations of the positions, had the motion ended earlier."""
+    return _drawn("length", axes, calibration)
+
+
+def residual_course(
+    calibration: xr.Dataset, kind: str = "accelerometer", axes: Axes | None = None
+) -> Axes:
+    """Each triad's residual against time, in declared noise sds."""
+    require_one_of("kind", kind, KINDS)
+    return _drawn("residual_course", axes, calibration, kind)
+
+
+def _drawn(name: str, axes: Axes | None, *given) -> Axes:
+    """One of the pictures that the page of `imuarray board` has."""
+    from imuarray.report import pictures
+
     axes = _axes(axes)
-    moved = (calibration["position"] - calibration["nominal_position"]).to_numpy()[1:]
-    sds = np.sqrt(np.einsum("kaka->ka", calibration["position_covariance"].to_numpy()))[1:]
-    places = np.arange(len(moved))
-    for number, name in enumerate("xyz"):
-        axes.errorbar(
-            places + 0.2 * (number - 1), 1e3 * moved[:, number], 1.96e3 * sds[:, number],
-            label=name, **look(number, "linestyle") | {"linestyle": "none", "markersize": 3.5},
-        )  # fmt: skip
-    axes.axhline(0.0, color=GREY, linewidth=0.6)
-    axes.set_xticks(places, calibration["accelerometer"].to_numpy()[1:])
-    reference = calibration["accelerometer"].to_numpy()[0]
-    axes.set(xlabel=f"triad (relative to {reference})", ylabel="from its nominal position (mm)")
-    axes.legend(ncols=3)
+    getattr(pictures, name)(*given, axes)
     return axes
 
 

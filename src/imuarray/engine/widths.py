@@ -103,6 +103,16 @@ def widths(found: Estimate) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return formal * np.outer(wider, wider), sds, resampled
 
 
+def growing(found: Estimate) -> np.ndarray:
+    """Sds (B, n) had one recording ended with its first 1 ... B blocks of time, of the same values.
+
+    By the information of these blocks; as much wider than the formal ones as those of all of it.
+    """
+    sums = np.cumsum([inner for inner, _ in found.blocks], axis=0)
+    formal = np.sqrt([np.diag(_formal(replace(found, information=inner))) for inner in sums])
+    return formal * np.sqrt(np.diag(widths(found)[0])) / formal[-1]
+
+
 def _formal(found: Estimate) -> np.ndarray:
     """Gauges that the array's size takes up not pinned, but as large as they may well be."""
     known, gauges = np.isfinite(found.scale_sd), gauge_masks(found.columns, found.active)

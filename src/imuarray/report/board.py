@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,15 +12,47 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from imuarray.figures.style import PAGE, new_figure, styled
 from imuarray.firstorder.correct import FirstOrder
 from imuarray.firstorder.report import parameter_table
 from imuarray.firstorder.store import write_corrected
+from imuarray.model.effects import KINDS
 from imuarray.provenance import trust, write_bytes, write_csv, write_netcdf
 from imuarray.recording import Recording, write_recording
 from imuarray.report import board_words as said
-from imuarray.report.page import rendered
+from imuarray.report import pictures as pictured
+from imuarray.report.excitation import shown
+from imuarray.report.page import Drawing, rendered, saved
 
 SURE = 1.96  # sds: 95 %
+CAPTIONS = {
+    "board": (
+        "The board, drawn and found",
+        "Crosses: where the drawing has each IMU. Arrows: to where it was found. Ellipses: 95 %."
+        " Both are enlarged as the titles say, or they could not be seen.",
+    ),
+    "timeline": (
+        "The recording",
+        "Still poses calibrate each sensor, fast motion tells where it is. Samples at a rail are"
+        " left out of the positions; shocks are samples in which several IMUs are far off at once.",
+    ),
+    "sphere": (
+        "What the board has been shown",
+        "Directions in the board's frame, from +z (left) and from −z. Poses ought to be all over"
+        " the sphere, axes of rotation too.",
+    ),
+    "length": (
+        "Error against length",
+        "Claimed standard deviation, had the motion ended earlier. Where it still falls faster than"
+        " the dotted line, the motion is getting better; where it follows the line, four times as"
+        " long a motion halves the error.",
+    ),
+    "residual": (
+        "Residual against time",
+        "Of each IMU, in sds of the noise that was declared: 1 is noise. The three largest are"
+        " named. A rise that lasts is something that moved, warmed up or came loose.",
+    ),
+}
 
 
 class Board(NamedTuple):
@@ -62,11 +95,38 @@ def html(board: Board) -> str:
         "board.html.j2", board=board, verdict=said.verdict(board), facts=said.facts(board),
         advice=said.advice(board), causes=said.causes(board.calibration),
         turned=turn_table(board), positions=position_table(board.calibration), sure=SURE,
-        prior=board.corrected.position_prior_sd, noise=noises(board), figures=[],
+        prior=board.corrected.position_prior_sd, noise=noises(board), figures=draw(board),
         weakest=said.weakest(board.calibration), before=said.before(board),
         first_order=None if isinstance(board.first_order, str)
         else parameter_table(board.first_order, board.recording),
     )  # fmt: skip
+
+
+def draw(board: Board) -> list[Drawing]:
+    """The page's pictures in their order."""
+    found, corrected = board.calibration, board.corrected
+    pictures = (
+        ("board", 3.1, [partial(pictured.board, found, plane) for plane in ("xy", "xz")], ""),
+        ("timeline", 2.6, [partial(pictured.timeline, corrected, found)], ""),
+        ("sphere", 3.4, [partial(pictured.sphere, corrected, found)], shown(corrected, found)),
+        ("length", 2.5, [partial(pictured.length, found)], ""),
+        ("residual", 2.4, [partial(pictured.residual_course, found, kind) for kind in KINDS], ""),
+    )
+    return [
+        Drawing(
+            name, CAPTIONS[name][0], f"{CAPTIONS[name][1]} {more}", {"png": _png(height, parts)}
+        )
+        for name, height, parts, more in pictures
+    ]
+
+
+@styled
+def _png(height: float, parts) -> bytes:
+    """Pictures beside each other, each a function of the axes that it draws into."""
+    figure = new_figure((), PAGE, height)
+    for part, axes in zip(parts, figure.subplots(1, len(parts), squeeze=False)[0], strict=True):
+        part(axes)
+    return saved(figure)
 
 
 def position_table(calibration: xr.Dataset) -> pd.DataFrame:

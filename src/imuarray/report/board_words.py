@@ -12,6 +12,7 @@ from imuarray.diagnosis.quantities import first_up, joined, number, quantity
 from imuarray.diagnosis.words import split_name
 from imuarray.estimation.informative import weak_directions
 from imuarray.firstorder.report import turned_lines
+from imuarray.report.excitation import missing
 
 if TYPE_CHECKING:
     from imuarray.report.board import Board
@@ -69,11 +70,14 @@ def advice(board: Board) -> list[str]:
             "Check units, signs, which IMU is which and the drawing in columns.yaml; then let"
             " imuarray diagnose recording.nc --out diagnosis name what the model misses."
         )
+    said += [
+        f"Record what is missing: {item}." for item in missing(board.corrected, board.calibration)
+    ]
     worst = _weakest(board.calibration)
     if worst.sd > board.corrected.position_prior_sd:
         said.append(f"Turn the board faster, and about all axes: {worst.words} is hardly known.")
-    if not said:
-        said = [
+    if not board.reasons:
+        said += [
             "Use it: imuarray apply cal.nc recording.nc --out motion.nc makes one sensor of the"
             " array.",
             "Record a second time and calibrate both (imuarray calibrate): what two recordings"

@@ -43,15 +43,19 @@ class Drawing(NamedTuple):
 
 
 @styled
+def saved(figure: Figure, suffix: str = "png") -> bytes:
+    """A figure as a file, the same bytes each time."""
+    buffer = io.BytesIO()
+    metadata = {"pdf": {"CreationDate": None}, "png": {"Software": None}}[suffix]
+    figure.savefig(buffer, format=suffix, metadata=metadata)
+    figure.set_layout_engine("none")  # laid out once
+    return buffer.getvalue()
+
+
 def files(figure: Figure, table: pd.DataFrame) -> dict[str, bytes]:
-    """A figure as PDF and PNG, the same bytes each time, and its numbers as CSV."""
-    found = {"csv": table.to_csv(index=False, lineterminator="\n").encode()}
-    for suffix, metadata in (("pdf", {"CreationDate": None}), ("png", {"Software": None})):
-        buffer = io.BytesIO()
-        figure.savefig(buffer, format=suffix, metadata=metadata)
-        figure.set_layout_engine("none")  # laid out once
-        found[suffix] = buffer.getvalue()
-    return found
+    """A figure as PDF and PNG, and its numbers as CSV."""
+    table_bytes = table.to_csv(index=False, lineterminator="\n").encode()
+    return {"csv": table_bytes} | {suffix: saved(figure, suffix) for suffix in ("pdf", "png")}
 
 
 def rendered(template: str, **given) -> str:

@@ -1,0 +1,220 @@
+"""Drawings of a calibration and its recording, each into given axes: for pages and notebooks."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle, Ellipse
+
+from imuarray.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILLION, look
+from imuarray.recording import Recording
+from imuarray.recording.channels import runs
+from imuarray.report.excitation import poses_of
+
+SURE = 1.96  # sds: 95 %
+ELLIPSE = 5.991  # the same in a plane, squared
+BINS = 1200  # of time, that a page can show
+POINTS = 3000  # rotation axes that are drawn
+SIDE = 1.35  # radii, of a disc's centre from the middle
+WORST = 3  # IMUs whose residuals have colours
+ROOM, SMALL = 0.16, 0.08  # of the board's extent: the largest departure, an ellipse's half axis
+
+
+def plain(text) -> str:
+    """A recording's own text as matplotlib shows it: no mathematics in it."""
+    return str(text).replace("$", r"\$")
+
+
+def positions(calibration: xr.Dataset, axes: Axes) -> None:
+    """Each IMU's displacement from its nominal position with 95 % intervals."""
+    moved = (calibration["position"] - calibration["nominal_position"]).to_numpy()[1:]
+    sds = position_sds(calibration)[1:]
+    factor, unit = (1e3, "mm") if np.abs(moved).max() > 1e-3 else (1e6, "µm")
+    places = np.arange(len(moved))
+    for number, name in enumerate("xyz"):
+        axes.errorbar(
+            places + 0.2 * (number - 1), factor * moved[:, number], SURE * factor * sds[:, number],
+            label=name, **look(number, "linestyle") | {"linestyle": "none", "markersize": 3.5},
+        )  # fmt: skip
+    axes.axhline(0.0, color=GREY, linewidth=0.6)
+    labels = [plain(label) for label in calibration["accelerometer"].to_numpy()]
+    axes.set_xticks(places, labels[1:])
+    axes.set(xlabel=f"IMU (relative to {labels[0]})", ylabel=f"from the drawing ({unit})")
+    axes.legend(ncols=3)
+
+
+def position_sds(calibration: xr.Dataset) -> np.ndarray:
+    """(A, 3) m."""
+    return np.sqrt(np.einsum("kaka->ka", calibration["position_covariance"].to_numpy()))
+
+
+def board(calibration: xr.Dataset, plane: str, axes: Axes) -> None:
+    """The board in a plane ("xy", "xz" or "yz"), nominal to found, with 95 % ellipses.
+
+    Departures and ellipses are enlarged by factors that its title says.
+    """
+    i, j = ("xyz".index(name) for name in plane)
+    nominal = calibration["nominal_position"].to_numpy()
+    moved = calibration["position"].to_numpy() - nominal
+    covariance = calibration["position_covariance"].to_numpy()
+    extent = float(np.ptp(nominal, axis=0).max())
+    by = round_factor(ROOM * extent / max(np.abs(moved).max(), 1e-9))
+    wide = round_factor(SMALL * extent / max(SURE * position_sds(calibration).max(), 1e-9))
+    for k, label in enumerate(calibration["accelerometer"].to_numpy()):
+        start, end = 1e3 * nominal[k], 1e3 * (nominal[k] + by * moved[k])
+        axes.plot(*start[[i, j]], "+", color=GREY, markersize=7)
+        if k:
+            way = {"arrowstyle": "-|>", "color": BLUE, "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
+            axes.annotate("", end[[i, j]], start[[i, j]], arrowprops=way)
+            inner = covariance[k][:, k][np.ix_([i, j], [i, j])]
+            axes.add_patch(_ellipse(end[[i, j]], 1e6 * wide**2 * ELLIPSE * inner))
+        axes.annotate(plain(label), start[[i, j]], xytext=(-4, -4), textcoords="offset points",
+                      ha="right", va="top", size=8, weight="bold")  # fmt: skip
+    axes.set(xlabel=f"{plane[0]} (mm)", ylabel=f"{plane[1]} (mm)", aspect="equal")
+    axes.margins(0.18)
+    axes.set_title(f"departures × {by:g}, ellipses (95 %) × {wide:g}", size=7.5)
+
+
+def round_factor(value: float) -> float:
+    """The largest of 1, 2, 5, 10, 20, ... that is no more than ``value``, or 1."""
+    if value <= 1:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(power * max(step for step in (1, 2, 5) if step * power <= value))
+
+
+def _ellipse(centre, matrix) -> Ellipse:
+    """The boundary x' matrix^-1 x = 1."""
+    values, vectors = np.linalg.eigh(matrix)
+    size = 2 * np.sqrt(np.maximum(values, 0.0))
+    angle = np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1]))
+    return Ellipse(tuple(centre), size[1], size[0], angle=angle, facecolor=(*_RED, 0.15),
+                   edgecolor=VERMILLION, linewidth=0.9)  # fmt: skip
+
+
+_RED = (0.835, 0.369, 0.0)
+
+
+def timeline(recording: Recording, calibration: xr.Dataset, axes: Axes) -> None:
+    """Angular speed against time; beneath it still poses, samples used, rails and shocks."""
+    time = recording.time - recording.time[0]
+    edges = np.linspace(0, time[-1], min(BINS, len(time)) + 1)
+    bins = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, len(edges) - 2)
+    speed = np.degrees(np.linalg.norm(np.median(recording.angular_rate, axis=1), axis=1))
+    fastest = np.zeros(len(edges) - 1)
+    np.maximum.at(fastest, bins, speed)
+    axes.plot((edges[1:] + edges[:-1]) / 2, fastest, color=BLACK, linewidth=0.7)
+    top, names = float(fastest.max()), []
+    for number, (name, color, flags) in enumerate(_rows(recording, calibration)):
+        shown = np.bincount(bins, flags, len(edges) - 1) > 0
+        spans = [(edges[a], edges[b] - edges[a]) for a, b in runs(shown)]
+        place = -top * (0.1 + 0.11 * number)
+        axes.broken_barh(spans, (place - 0.035 * top, 0.07 * top), color=color, linewidth=0)
+        names.append((place, name if flags.any() else f"{name}: none"))
+    step = round_factor(top / 2)
+    speeds = np.arange(0, top, step)
+    axes.set_yticks([place for place, _ in names] + list(speeds),
+                    [name for _, name in names] + [f"{value:g}" for value in speeds])  # fmt: skip
+    axes.grid(False, axis="y")
+    axes.set(xlabel="time (s)", ylabel="angular speed (deg/s)", xlim=(0, time[-1]))
+    axes.set_ylim(-0.52 * top, 1.05 * top)
+
+
+def _rows(recording: Recording, calibration: xr.Dataset) -> list[tuple[str, str, np.ndarray]]:
+    """What a timeline shows: name, colour, (T,) bool."""
+    count = len(recording.time)
+    still = np.zeros(count, bool) if recording.stationary is None else recording.stationary
+    places = np.searchsorted(recording.time, calibration["time"].to_numpy() - 1e-9)
+    used, shaken = (np.zeros(count, bool) for _ in range(2))
+    used[np.clip(places, 0, count - 1)] = True
+    shaken[np.clip(places, 0, count - 1)] = calibration["shaken"].to_numpy() > 0
+    rails = recording.saturated_accelerometers().any(axis=(1, 2))
+    rails = rails | recording.saturated_gyroscopes().any(axis=(1, 2))
+    return [
+        ("still poses", SKY, still),
+        ("used for positions", GREEN, used),
+        ("at a rail", ORANGE, rails),
+        ("shocks", VERMILLION, shaken),
+    ]
+
+
+def sphere(recording: Recording, calibration: xr.Dataset, axes: Axes) -> None:
+    """Where up was in still poses, and about what axes the board turned, seen from +z and −z.
+
+    Equal areas of the discs are equal areas of the sphere.
+    """
+    rate = calibration["angular_rate"].to_numpy()
+    rate = rate[:: max(len(rate) // POINTS, 1)]
+    turn = rate / np.maximum(np.linalg.norm(rate, axis=1, keepdims=True), 1e-12)
+    size = np.linalg.norm(rate, axis=1) / np.linalg.norm(rate, axis=1).max()
+    for side, centre in ((1, -SIDE), (-1, SIDE)):
+        axes.add_patch(Circle((centre, 0), 1, facecolor="white", edgecolor=GREY, linewidth=0.8))
+        for half in (30, 60):
+            ring = np.sqrt(1 - np.cos(np.radians(half)))
+            axes.add_patch(Circle((centre, 0), ring, fill=False, edgecolor="0.85", linewidth=0.5))
+        seen = turn[:, 2] * side >= 0
+        points = _disc(turn[seen], side, centre)
+        axes.scatter(*points, s=14 * size[seen] ** 2, color=BLUE, alpha=0.3, linewidth=0)
+        poses = poses_of(recording)
+        seen = poses[:, 2] * side >= 0
+        axes.plot(*_disc(poses[seen], side, centre), "o", color=VERMILLION, markersize=6,
+                  markeredgecolor="white")  # fmt: skip
+        for vector in np.vstack([np.eye(3), -np.eye(3)]):
+            if vector[2] * side >= 0:
+                place = np.array(_disc(vector[None], side, centre))[:, 0]
+                out = place + (0.12 * (place - np.array([centre, 0])) if vector[2] == 0 else 0.1)
+                name = f"{'−' if vector.min() < 0 else '+'}{'xyz'[int(np.argmax(np.abs(vector)))]}"
+                axes.text(*out, name, ha="center", va="center", size=9, weight="bold")
+    axes.plot([], [], "o", color=VERMILLION, markersize=6, label="up in a still pose")
+    axes.plot(
+        [], [], "o", color=BLUE, alpha=0.5, markersize=3, label="axis of rotation (larger: faster)"
+    )
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, -0.14), ncols=2, frameon=False)
+    axes.set(xlim=(-2.65, 2.65), ylim=(-1.2, 1.2), aspect="equal")
+    axes.set_axis_off()
+
+
+def _disc(vectors, side: int, centre: float) -> tuple[np.ndarray, np.ndarray]:
+    """Lambert's azimuthal projection of (K, 3) on a hemisphere; mirrored from below."""
+    radius = 1 / np.sqrt(1 + np.abs(vectors[:, 2]))
+    return centre + side * radius * vectors[:, 0], radius * vectors[:, 1]
+
+
+def length(calibration: xr.Dataset, axes: Axes) -> None:
+    """Sds of the positions had the motion ended earlier, by the information until then."""
+    seconds = calibration["length"].to_numpy()
+    sds = 1e6 * calibration["position_sd_by_length"].to_numpy()[:, 1:]
+    rms, worst = np.sqrt(np.mean(sds**2, axis=(1, 2))), sds.max(axis=(1, 2))
+    axes.plot(seconds, worst, label="worst coordinate", **look(0) | {"markersize": 3})
+    axes.plot(seconds, rms, label="rms", **look(2) | {"markersize": 3.5})
+    ahead = seconds[-1] * np.array([1, 4])
+    less = rms[-1] * np.array([1, 0.5])
+    axes.plot(ahead, less, ":", color=GREY, label="with more of such motion: 1/√length")
+    axes.set(xscale="log", yscale="log", xlabel="recorded motion (s)")
+    axes.set_ylabel("sd of a coordinate (µm)")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(lambda value, _: f"{value:g}")
+        axis.set_minor_formatter(lambda value, _: "")
+    axes.legend()
+
+
+def residual_course(calibration: xr.Dataset, kind: str, axes: Axes) -> None:
+    """Residual of each "accelerometer" or "gyroscope" against time, over the declared noise."""
+    rms = calibration[f"{kind}_residual"].to_numpy()
+    time, labels = calibration["stretch"].to_numpy(), calibration[kind].to_numpy()
+    worst = np.argsort(-np.sqrt(np.mean(rms**2, axis=0)))[:WORST]
+    others = np.setdiff1d(np.arange(rms.shape[1]), worst)
+    axes.plot(time, rms[:, others], color="0.75", linewidth=0.8)
+    for number, k in enumerate(worst):
+        name = f"IMU {plain(labels[k])}"
+        style = look(number, "linestyle") | {"markersize": 2, "linewidth": 0.8}
+        axes.plot(time, rms[:, k], label=name, **style)
+    if len(others):
+        axes.plot([], [], color="0.75", label="others")
+    axes.axhline(1.0, color=BLACK, linewidth=0.6)
+    axes.set(xlabel="time (s)", ylabel="residual / declared noise", title=f"{kind}s")
+    axes.set_ylim(0, 1.15 * max(float(rms.max()), 1.0))
+    if rms.max() > 10:
+        axes.set(yscale="log", ylim=(0.5, None))
+    axes.legend(ncols=2, fontsize=6.5)
