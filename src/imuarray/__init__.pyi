@@ -1,5 +1,6 @@
 from . import plots as plots
 from .analysis.calibration import calibrate as calibrate
+from .analysis.export import export as export
 from .analysis.extension import diagnosed as diagnosed
 from .analysis.files import read_calibration as read_calibration
 from .analysis.files import read_mimu as read_mimu

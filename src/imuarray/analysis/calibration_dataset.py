@@ -50,7 +50,7 @@ def with_readings(dataset: xr.Dataset, recordings: Sequence[Recording]) -> xr.Da
     if len(corrections) == len(recordings):
         dataset = dataset.merge(xr.concat(corrections, "recording").reset_coords(drop=True))
     if len(first.time) > 1 and not first.selected:
-        dataset.attrs["rate"] = 1 / float(np.median(np.diff(first.time)))
+        dataset.attrs["rate"] = float(f"{1 / np.median(np.diff(first.time)):.10g}")
     return dataset
 
 

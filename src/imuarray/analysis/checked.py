@@ -10,9 +10,10 @@ import numpy as np
 import xarray as xr
 
 from imuarray.errors import LARGEST, SMALLEST, InputError
-from imuarray.model.effects import EFFECTS
+from imuarray.model.effects import EFFECTS, KINDS
 from imuarray.model.own import own_version
 from imuarray.recording import Recording
+from imuarray.recording.record import CORRECTION, COVARIANCES, DIMENSIONS
 
 _PLACE = ("accelerometer", "axis")
 # Variables by whether they are needed: always, with effects, or not at all.
@@ -23,27 +24,34 @@ _WITH_EFFECTS = {
     "effect_parameter": ("parameter",), "accelerometer_sd": _PLACE,
     "gyroscope_sd": ("gyroscope", "axis"),
 }  # fmt: skip
-_PERHAPS = {"nominal_position": _PLACE, "whole_covariance": ("unknown", "unknown_other")}
+_PERHAPS = {
+    "nominal_position": _PLACE, "whole_covariance": ("unknown", "unknown_other"),
+    "accelerometer_axes": DIMENSIONS["accelerometer_axes"],
+    **{name: DIMENSIONS[name] for name in COVARIANCES},
+    **{name: ("recording", *dims) for name, dims in CORRECTION.items() if name[-3:] != "_sd"},
+}  # fmt: skip
 SAME_BOARD = 5.0  # prior sds by which two drawings of one board may differ
 INDEFINITE = 1e-3  # of a correlation matrix' least eigenvalue; rounding leaves less
 
 
-def require_fit(calibration: xr.Dataset, recording: Recording) -> None:
-    """InputError unless this is a whole calibration of the recording's IMUs."""
+def require_fit(calibration: xr.Dataset, recording: Recording | None = None) -> None:
+    """InputError unless this is a whole calibration, of the IMUs of a recording if one is given."""
     needed = _ALWAYS | (_WITH_EFFECTS if "effect_parameter" in calibration else {})
     for name, dimensions in (needed | _PERHAPS).items():
         if name in calibration.variables:
             _require_numbers(calibration[name], dimensions)
         elif name in needed:
             raise InputError(f"expected a calibration (imuarray calibrate), found no {name}")
-    _require_labels(calibration, recording)
+    if recording is not None:
+        _require_labels(calibration, recording)
     if "effect_parameter" in calibration:
         _require_effects(calibration)
     _require_sizes(calibration)
     for name in ("position_covariance", "whole_covariance"):
         if name in calibration:
             _require_covariance(calibration[name])
-    _require_board(calibration, recording)
+    if recording is not None:
+        _require_board(calibration, recording)
 
 
 def _require_numbers(variable: xr.DataArray, dimensions: tuple[str, ...]) -> None:
@@ -82,6 +90,9 @@ def _require_sizes(calibration: xr.Dataset) -> None:
         "axis": 3, "axis_other": 3, "accelerometer_other": count, "unknown": unknown,
         "unknown_other": unknown,
     }  # fmt: skip
+    for kind in KINDS:
+        entries = 9 * calibration.sizes.get(kind, count)
+        expected |= {f"{kind}_entry": entries, f"{kind}_entry_other": entries}
     for name, size in expected.items():
         if calibration.sizes.get(name, size) != size:
             raise InputError(f"expected {size} of {name}, found {calibration.sizes[name]}")

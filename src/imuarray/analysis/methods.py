@@ -4,4 +4,5 @@ CALIBRATION = ("bcd", "gauss-newton")  # of the papers' model
 MODELS = ("sensors", "papers")  # or a diagnosis.json
 SAMPLING = ("auto", "nuts", "pmmh", "pcn")
 MOTION_PRIORS = ("proper", "flat")
+EXPORTS = ("json", "kalibr", "urdf", "csv")
 RATES = ("declared", "spread")  # what p(omega | y_g) is made from

@@ -237,6 +237,18 @@ COMMANDS = (
         ),
     ),
     Command(
+        "export", "export.run",
+        "A calibration in another tool's format, with sds and the formula that corrects readings.",
+        "cal.nc --format kalibr --out imu.yaml", "file to write",
+        (
+            _option("calibration", "what `imuarray calibrate` has written", type=InputFile),
+            _option("--format", "json: everything; kalibr: imu.yaml of several IMUs; urdf: links"
+                    " and fixed joints; csv: positions", choices=methods.EXPORTS, required=True),
+            _file("--noise", "still recording of the same IMUs, for noise and random walk"),
+            EFFECT_FILE,
+        ),
+    ),
+    Command(
         "allan", "allan.run",
         "Noise density, bias instability and random walk of each axis, from long still stretches.",
         "still.nc --out noise/", "folder to write: allan.pdf, allan.png, tables (CSV)",

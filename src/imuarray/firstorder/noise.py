@@ -54,7 +54,7 @@ def allan(recording: Recording) -> StillNoise:
     poses = still_poses(recording)
     longest = max(pose.stop - pose.start for pose in poses)
     poses = [pose for pose in poses if pose.stop - pose.start >= LONG * longest]
-    rate = 1 / float(np.median(np.diff(recording.time)))
+    rate = float(f"{1 / np.median(np.diff(recording.time)):.10g}")
     lengths = [pose.stop - pose.start for pose in poses]
     if sum(lengths) < LEAST * SLOWEST / 2:
         raise InputError(

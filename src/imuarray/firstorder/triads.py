@@ -99,7 +99,7 @@ def parts_sd_of(matrices, covariances) -> dict[str, np.ndarray]:
     return {name: np.array(value) for name, value in out.items()}
 
 
-def _upper_times_rotation(matrix) -> tuple[np.ndarray, np.ndarray]:
+def upper_times_rotation(matrix) -> tuple[np.ndarray, np.ndarray]:
     """matrix = U R, U upper triangular with a positive diagonal but for its first, R a rotation."""
     upper, rotation = rq(matrix)
     signs = np.sign(np.diag(upper))
@@ -111,7 +111,7 @@ def _parts(matrix) -> dict[str, np.ndarray]:
     """Scale, misalignment (xy, xz, yz) and rotation vector of one triad's matrix, (3,) each."""
     from scipy.spatial.transform import Rotation
 
-    upper, rotation = _upper_times_rotation(matrix)
+    upper, rotation = upper_times_rotation(matrix)
     scale = np.diag(upper)
     return {
         "scale": scale,
@@ -126,7 +126,7 @@ def _part_slopes(matrix) -> dict[str, np.ndarray]:
     U^-1 dM R' = U^-1 dU + dR R', upper triangular and skew-symmetric: the latter follows from what
     is beneath the diagonal.
     """
-    upper, rotation = _upper_times_rotation(matrix)
+    upper, rotation = upper_times_rotation(matrix)
     both = np.linalg.inv(upper) @ np.eye(9).reshape(9, 3, 3) @ rotation.T
     below = np.tril(both, -1)
     turn = below - np.swapaxes(below, 1, 2)

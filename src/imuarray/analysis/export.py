@@ -1,0 +1,287 @@
+"""A calibration as other tools want it: one plain document, of which the file formats are made."""
+
+import json
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from imuarray.analysis import methods
+from imuarray.analysis.checked import require_fit
+from imuarray.errors import InputError, one_line, require_one_of
+from imuarray.firstorder.noise import TERMS, StillNoise
+from imuarray.firstorder.triads import upper_times_rotation
+from imuarray.firstorder.turns import nearest_orthogonal
+from imuarray.geometry import Array
+from imuarray.model import ArrayModel
+from imuarray.model.effects import KINDS, Prediction
+from imuarray.recording.record import CORRECTION, NUMBERS
+
+BIASES = "accelerometer_bias", "gyroscope_bias"
+MATRICES = ("accelerometer_scale", "accelerometer_misalignment", "gyroscope_scale",
+            "gyroscope_misalignment")  # fmt: skip
+# Of a triad's row of parameters, the entry that is a delay, and its sign.
+TIMES = {"sensor_delay": (KINDS, (), 1), "sensor_clock": (KINDS, (3,), -1),
+         "gyroscope_delay": (KINDS[1:], (), 1)}  # fmt: skip
+FORMULAS = {
+    "corrections": "for each step in turn x = inverse @ (x - offset), each component summed as"
+    " (i0 x0 + i1 x1) + i2 x2; x begins as the recording's raw reading, which is axes @ the"
+    " chip's, and ends as specific force or angular rate in the array's frame",
+    "rotation": "from the array's frame to the IMU's: z along the accelerometer's z axis, y in the"
+    " plane of its y and z axes; rotation_sd_rad about the IMU's x, y, z",
+    "kalibr": "p_i = T_i_b p_b from the frame of IMU 0 to that of IMU i, which here have x along"
+    " the accelerometer's x axis, y in the plane of x and y; the chip reads M C u + bias, with C"
+    " the rotation of T_i_b, its gyroscope M C_gyro_i C omega + bias, u and omega in b",
+    "time_offset_s": "a reading stamped t is of the time t + time_offset_s on the clock of the"
+    " accelerometer of IMU 0",
+    "noise": "continuous: the sd of one reading is noise_density * sqrt(rate_hz)",
+}
+
+
+def export(calibration: xr.Dataset, format: str = "json", noise: StillNoise | None = None) -> str:
+    """A calibration as the text of a file for other tools (docs/export.md).
+
+    Parameters
+    ----------
+    calibration
+        What `calibrate` gave.
+    format
+        "json": everything, with the formulas; "kalibr": its imu.yaml of several IMUs; "urdf":
+        links and fixed joints; "csv": positions, turns and time offsets with sds.
+    noise
+        What `allan` found in a still recording of the same IMUs; without it the white noise is
+        that of the calibration, and random walks are left open.
+
+    InputError for another format, a calibration that is not whole, or noise of other IMUs.
+    """
+    from imuarray.analysis import formats
+
+    require_one_of("format", format, methods.EXPORTS)
+    return getattr(formats, format)(describe(calibration, noise))
+
+
+def reasons_of(calibration: xr.Dataset) -> list[str]:
+    """Why a calibration is not to be trusted, as its file says; none for one that is."""
+    try:
+        return [one_line(str(reason)) for reason in json.loads(calibration.attrs["reasons"])]
+    except KeyError:
+        return []
+    except (ValueError, TypeError):
+        raise InputError("expected the attribute reasons as a JSON list, found another") from None
+
+
+def describe(calibration: xr.Dataset, noise: StillNoise | None = None) -> dict[str, Any]:
+    """The document: plain data, None for what is not known; units in the keys or beside them."""
+    require_fit(calibration)
+    labels = {kind: [str(label) for label in calibration[kind].to_numpy()] for kind in KINDS}
+    if len(labels["gyroscope"]) > len(labels["accelerometer"]):
+        raise InputError("export: expected no more gyroscopes than accelerometers, found more")
+    attrs, positions = calibration.attrs, calibration["position"].to_numpy()
+    effects = [name for name in str(attrs.get("effects", "")).split(",") if name]
+    array = Array(positions, tuple(labels["accelerometer"]), len(labels["gyroscope"]), "export")
+    model = ArrayModel.isotropic(array, 1.0, 1.0, effects)
+    steps, times = _steps(calibration, model), _times(calibration, model)
+    try:
+        frames = _frames(calibration, steps, positions)
+    except np.linalg.LinAlgError:
+        raise InputError(
+            "expected corrections that can be inverted, found a singular one"
+        ) from None
+    rate = attrs.get("rate") or (noise.rate_hz if noise else None)
+    imus = []
+    for k, frame in enumerate(frames):
+        imu: dict[str, Any] = {"label": labels["accelerometer"][k]}
+        whole = {name: _plain(value) for name, value in frame.items() if name not in KINDS}
+        imu["kalibr"] = {name: whole.pop(name) for name in ("T_i_b", "T_i_b_turn_sd_rad")}
+        imu |= whole
+        for kind in KINDS:
+            if k < len(labels[kind]):
+                imu[kind] = {"label": labels[kind][k], "unit": NUMBERS[f"{kind}_noise_sd"]}
+                imu[kind]["corrections"] = [_step(step, k) for step in steps[kind]]
+                imu["kalibr"][kind] = {n: _plain(value) for n, value in frame[kind].items()}
+                value, sd = times[kind]
+                imu[kind] |= {"time_offset_s": _plain(value[k]), "time_offset_sd_s": _plain(sd[k])}
+                imu[kind]["noise"] = _noise(calibration, noise, kind, k, rate)
+        imus.append(imu | {"kalibr": imu.pop("kalibr")})
+    covariance = calibration["position_covariance"].to_numpy()
+    return {
+        "created_by": str(attrs.get("created_by", "")),
+        "trusted": bool(attrs["trusted"]) if "trusted" in attrs else None,
+        "reasons": reasons_of(calibration), "formulas": FORMULAS, "rate_hz": rate, "imus": imus,
+        "position_covariance_m2": _plain(covariance),
+        "parameters": _parameters(calibration),
+        "not_in_matrices": [name for name in effects if name not in (*MATRICES, *BIASES, *TIMES)],
+    }  # fmt: skip
+
+
+def _plain(values) -> Any:
+    """Lists and numbers, None for what is not finite."""
+    values = np.asarray(values, float)
+    return np.where(np.isfinite(values), values.astype(object), None).tolist()
+
+
+def _parameters(calibration: xr.Dataset) -> dict[str, dict]:
+    if "effect_parameter" not in calibration:
+        return {}
+    names = calibration["parameter"].to_numpy()
+    columns = (_plain(calibration[f"effect_{name}"]) for name in ("parameter", "sd"))
+    rows = zip(names, *columns, strict=True)
+    return {str(name): {"value": value, "sd": sd} for name, value, sd in rows}
+
+
+def _values(calibration: xr.Dataset, model: ArrayModel) -> dict:
+    found = calibration.get("effect_parameter")
+    return model.split(np.empty(0) if found is None else found.to_numpy())
+
+
+def _steps(calibration: xr.Dataset, model: ArrayModel) -> dict[str, list[dict]]:
+    """Of each kind the corrections in turn, arrays with triads first."""
+    out: dict[str, list[dict]] = {kind: [] for kind in KINDS}
+    if set(CORRECTION) <= set(calibration):
+        first = calibration[list(CORRECTION)].isel(recording=0)
+        for name, values in first.items():
+            kind, _, part = str(name).partition("_")
+            if not out[kind]:
+                out[kind].append({"from": "first-order"})
+            out[kind][0][part] = values.to_numpy()
+        for kind in KINDS:
+            left = calibration.get(f"{kind}_map_covariance")
+            if left is not None:
+                sds = np.sqrt(np.maximum(np.diag(left.to_numpy()), 0)).reshape(-1, 3, 3)
+                out[kind][0]["map_sd"] = sds
+    values = _values(calibration, model)
+    for number, kind in enumerate(KINDS):
+        if any(name.startswith(kind) for name in set(values) & {*MATRICES, *BIASES}):
+            matrix, offset = _linear(model, values, number)
+            step = {"from": "calibrate", "inverse": np.linalg.inv(matrix), "offset": offset}
+            out[kind].append(step)
+    return out
+
+
+def _linear(model: ArrayModel, values: dict, kind: int) -> tuple[np.ndarray, np.ndarray]:
+    """reading = matrix (n, 3, 3) @ truth + offset (n, 3) by the effects that are a matrix."""
+
+    def read(truth, names):
+        counts = model.array.accelerometers, model.array.gyroscopes
+        seen = Prediction(*(np.broadcast_to(truth, (count, 3)) for count in counts))
+        for item in model.chain:
+            if item.id in names:
+                seen = item.apply(values[item.id], None, seen)
+        return np.asarray(seen[kind])
+
+    columns = [read(unit, MATRICES) for unit in np.eye(3)]
+    return np.stack(columns, axis=2), read(np.zeros(3), (*MATRICES, *BIASES))
+
+
+def _step(step: dict, k: int) -> dict[str, Any]:
+    return {name: part if name == "from" else _plain(part[k]) for name, part in step.items()}
+
+
+def _times(calibration: xr.Dataset, model: ArrayModel) -> dict[str, tuple]:
+    """Of each kind time offsets (n,) s against the first accelerometer, and their sds."""
+    places, size = model.split(np.arange(model.effect_size)), model.effect_size
+    weights = {kind: np.zeros((calibration.sizes[kind], size)) for kind in KINDS}
+    for name in set(places) & set(TIMES):
+        kinds, inner, sign = TIMES[name]
+        for kind in kinds:
+            for k, row in enumerate(weights[kind]):
+                row[places[name][(k, *inner)]] += sign
+    found, covariance, out = np.zeros(size), np.zeros((size, size)), {}
+    if size:
+        found = calibration["effect_parameter"].to_numpy()
+        covariance = np.diag(calibration["effect_sd"].to_numpy() ** 2)
+    if size and "whole_covariance" in calibration:
+        covariance = calibration["whole_covariance"].to_numpy()[-size:, -size:]
+    for kind, rows in weights.items():
+        against = rows - weights[KINDS[0]][0]
+        variances = np.einsum("ki,ij,kj->k", against, covariance, against)
+        # what was held fixed has no sd
+        out[kind] = against @ found, np.sqrt(np.where(variances > 0, variances, np.nan))
+    return out
+
+
+def _frames(calibration: xr.Dataset, steps: dict, positions) -> list[dict]:
+    """Of each IMU its place, its turn, and what its chips read, in their own axes."""
+    sensed = {kind: _sensed(steps[kind], calibration.sizes[kind]) for kind in KINDS}
+    chips = calibration.get("accelerometer_axes")
+    axes = np.tile(np.eye(3), (len(positions), 1, 1)) if chips is None else chips.to_numpy()
+    if steps[KINDS[0]] and steps[KINDS[0]][0]["from"] == "first-order":
+        axes = nearest_orthogonal(np.linalg.inv(steps[KINDS[0]][0]["inverse"])) @ axes
+    axes = np.where(np.abs(axes - np.round(axes)) < 1e-9, np.round(axes), axes) + 0.0
+    matrices = np.swapaxes(axes, 1, 2) @ sensed[KINDS[0]][0]
+    turns = np.array([upper_times_rotation(matrix)[1] for matrix in matrices])
+    lower = [_lower_times_rotation(matrix) for matrix in matrices]
+    own, others = _turn_sds(calibration, turns, np.array([turn for _, turn in lower]))
+    sds = np.sqrt(np.einsum("kaka->ka", calibration["position_covariance"].to_numpy()))
+    frames: list[dict] = []
+    for k, (scale, turn) in enumerate(lower):
+        to = np.eye(4)
+        if k:
+            to[:3, :3], to[:3, 3] = turn @ lower[0][1].T, turn @ (positions[0] - positions[k])
+        frame: dict[str, Any] = {"position_m": positions[k], "position_sd_m": sds[k]}
+        frame |= {"rotation": turns[k], "rotation_sd_rad": own[k], "axes": axes[k]}
+        frame |= {"T_i_b": to, "T_i_b_turn_sd_rad": others[k]}
+        frame[KINDS[0]] = {"M": scale, "bias": axes[k].T @ sensed[KINDS[0]][1][k]}
+        if k < calibration.sizes[KINDS[1]]:
+            matrix, bias = (part[k] for part in sensed[KINDS[1]])
+            scale, whole = _lower_times_rotation(axes[k].T @ matrix)
+            frame[KINDS[1]] = {"M": scale, "C_gyro_i": whole @ turn.T, "bias": axes[k].T @ bias}
+        frames.append(frame)
+    return frames
+
+
+def _sensed(steps: list[dict], count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Reading = matrix (n, 3, 3) @ truth + bias (n, 3), of all corrections together."""
+    matrix, bias = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
+    for step in reversed(steps):
+        own = np.linalg.inv(step["inverse"])
+        matrix, bias = own @ matrix, (own @ bias[..., None])[..., 0] + step["offset"]
+    return matrix, bias
+
+
+def _lower_times_rotation(matrix) -> tuple[np.ndarray, np.ndarray]:
+    """matrix (3, 3) = L R: L lower triangular, R a rotation."""
+    return tuple(part[::-1, ::-1] + 0.0 for part in upper_times_rotation(matrix[::-1, ::-1]))
+
+
+def _turn_sds(calibration: xr.Dataset, turns, others) -> tuple[np.ndarray, np.ndarray]:
+    """Sds (A, 3) of turns about the IMUs' axes, and of ``others`` against the first's of these.
+
+    From the maps 1 + d that first order has left: of U R (1 + d) what is beneath the diagonal of
+    R d R' turns R, of L R (1 + d) what is above.
+    """
+    left, count = calibration.get("accelerometer_map_covariance"), len(turns)
+    if left is None:
+        return (np.full((count, 3), np.nan),) * 2
+    sds, places, signs = [], ([7, 6, 3], [5, 2, 1]), ([1, -1, 1], [-1, 1, -1])
+    for relative, (frames, place, sign) in enumerate(
+        zip((turns, others), places, signs, strict=True)
+    ):
+        slopes = np.zeros((count, 3, count, 9))
+        for k, turn in enumerate(frames):
+            slopes[k, :, k] = np.array(sign)[:, None] * np.kron(turn, turn)[place]
+        if relative:
+            apart = others @ others[0].T
+            slopes = slopes - np.einsum("kij,jlm->kilm", apart, slopes[0])
+        rows = slopes.reshape(3 * count, 9 * count)
+        variances = np.einsum("ri,ij,rj->r", rows, left.to_numpy(), rows)
+        sds.append(np.sqrt(np.maximum(variances, 0.0)).reshape(count, 3))
+    return sds[0], sds[1]
+
+
+def _noise(calibration: xr.Dataset, noise: StillNoise | None, kind: str, k: int, rate) -> dict:
+    """Terms of one triad, x, y, z each."""
+    if noise is None:
+        sds = calibration.get(f"{kind}_sd")
+        density = np.nan if sds is None or not rate else sds.to_numpy()[k] / np.sqrt(rate)
+        return {"from": "calibrate", TERMS[0]: {"value": _plain(np.broadcast_to(density, 3))}}
+    sensor = "specific_force" if kind == KINDS[0] else "angular_rate"
+    label = str(calibration[kind].to_numpy()[k])
+    table = noise.terms[(noise.terms.sensor == sensor) & (noise.terms.triad == label)]
+    if table.empty:
+        raise InputError(f"noise: expected that of {kind} {label}, found none")
+    out: dict[str, Any] = {"from": "allan"}
+    for term, part in table.groupby("term", sort=False):
+        out[str(term)] = {name: _plain(part[name]) for name in ("value", "sd", "below")}
+        out[str(term)]["unit"] = part.unit.iloc[0]
+    return out

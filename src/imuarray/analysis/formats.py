@@ -1,0 +1,159 @@
+"""Files of other tools, made of the document that `imuarray.analysis.export` describes."""
+
+import csv as tables
+import io
+from json import dumps
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from imuarray.errors import printable
+
+KALIBR = """\
+T_i_b: p_i = T_i_b p_b, from the frame b of imu0 to that of imu i (m); IMU i is at -C' t in b, with
+  C and t the rotation and the translation of T_i_b. A frame has x along its accelerometer's x axis,
+  y in the plane of its x and y axes.
+time_offset: a reading stamped t is of the time t + time_offset of imu0's clock (s); gyroscopes have
+  their own beside it, where their filters lag: kalibr has one for both, the accelerometers'.
+accelerometers: what the chip reads is M C u + bias, u the specific force at it in b (m/s^2), so
+  corrected, in the axes of IMU i: M^-1 (reading - bias).
+gyroscopes: M C_gyro_i C w + A C_gyro_i C u + bias, w the angular rate in b (rad/s), so corrected,
+  in the axes of IMU i: C_gyro_i' M^-1 (reading - bias). A is not estimated.
+bias: as in the recording that was calibrated; it is another after each start. kalibr has none.
+noise: continuous, rms over the axes: the sd of one reading is noise_density * sqrt(update_rate).
+A comment behind a number is its standard deviation."""
+
+
+def json(document: dict[str, Any]) -> str:
+    """Everything."""
+    return dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def csv(document: dict[str, Any]) -> str:
+    """A row for each IMU: place, turn (rotation vector, array to IMU) and times, with sds."""
+    out, rows = io.StringIO(), []
+    for imu in document["imus"]:
+        row = {"imu": imu["label"]}
+        turn = Rotation.from_matrix(imu["rotation"]).as_rotvec().tolist()
+        for name, unit, values, sds in (
+            ("", "m", imu["position_m"], imu["position_sd_m"]),
+            ("turn_", "rad", turn, imu["rotation_sd_rad"]),
+        ):
+            row |= {f"{name}{axis}_{unit}": x for axis, x in zip("xyz", values, strict=True)}
+            row |= {f"{name}{axis}_sd_{unit}": x for axis, x in zip("xyz", sds, strict=True)}
+        for kind in ("accelerometer", "gyroscope"):
+            for name in ("time_offset_s", "time_offset_sd_s"):
+                row[f"{kind}_{name}"] = imu.get(kind, {}).get(name)
+        rows.append(
+            row | {"trusted": document["trusted"], "reasons": "; ".join(document["reasons"])}
+        )
+    writer = tables.DictWriter(out, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return out.getvalue()
+
+
+def urdf(document: dict[str, Any]) -> str:
+    """A link for the array's frame, a link and a fixed joint for each IMU."""
+    robot = ElementTree.Element("robot", name="imuarray")
+    for line in _heads(document):
+        robot.append(ElementTree.Comment(f" {line.replace('--', '- -')} "))
+    ElementTree.SubElement(robot, "link", name="imuarray")
+    for imu in document["imus"]:
+        name = printable(f"imu_{imu['label']}")
+        sds = ", ".join(_text(1e6 * sd, ".3g") for sd in imu["position_sd_m"])
+        ElementTree.SubElement(robot, "link", name=name)
+        robot.append(ElementTree.Comment(f" {name.replace('--', '- -')}: sd {sds} um "))
+        joint = ElementTree.SubElement(robot, "joint", name=f"{name}_joint", type="fixed")
+        ElementTree.SubElement(joint, "parent", link="imuarray")
+        ElementTree.SubElement(joint, "child", link=name)
+        turn = Rotation.from_matrix(np.array(imu["rotation"]).T)
+        rpy = turn.as_euler("xyz", suppress_warnings=True)  # about the array's fixed x, y, z
+        ElementTree.SubElement(joint, "origin", xyz=_row(imu["position_m"]), rpy=_row(rpy))
+    ElementTree.indent(robot)
+    return ElementTree.tostring(robot, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def kalibr(document: dict[str, Any]) -> str:
+    """Kalibr's imu.yaml of several IMUs, model scale-misalignment."""
+    lines = [f"# {line}" for line in (*_heads(document), *KALIBR.splitlines())]
+    for number, imu in enumerate(document["imus"]):
+        label, force, own = printable(imu["label"]), imu["accelerometer"], imu["kalibr"]
+        lines += [f"imu{number}: # {label}", "  model: scale-misalignment"]
+        lines += _matrix("  T_i_b", own["T_i_b"])
+        lines[-1] += (
+            f" # C: {_sds(own['T_i_b_turn_sd_rad'])} rad; place: {_sds(imu['position_sd_m'])} m"
+        )
+        lines += [_scalar("  time_offset", force["time_offset_s"], force["time_offset_sd_s"])]
+        lines += [_scalar("  update_rate", document["rate_hz"])]
+        topic = label if label.startswith("/") else f"/imu{number}"
+        lines += [f"  rostopic: {dumps(topic)}"]
+        for kind in ("accelerometer", "gyroscope"):
+            if kind not in imu:
+                continue
+            for term in ("noise_density", "random_walk"):
+                lines.append(_noise(f"  {kind}_{term}", imu[kind]["noise"].get(term)))
+            lines += [f"  {kind}s:", *_matrix("    M", own[kind]["M"])]
+            if kind == "gyroscope":
+                lines += _matrix("    A", np.zeros((3, 3)))
+                lines += _matrix("    C_gyro_i", own[kind]["C_gyro_i"])
+                times = imu[kind]["time_offset_s"], imu[kind]["time_offset_sd_s"]
+                lines += [_scalar("    time_offset", *times)]
+            lines.append(f"    bias: [{', '.join(map(_number, own[kind]['bias']))}]")
+    return "\n".join(lines) + "\n"
+
+
+def _heads(document: dict[str, Any]) -> list[str]:
+    """Where a file comes from, and whether it is to be trusted."""
+    heads = [f"made by {document['created_by']}"] if document["created_by"] else []
+    heads += [f"NOT TO BE TRUSTED: {reason}" for reason in document["reasons"]]
+    if document["not_in_matrices"]:
+        names = ", ".join(document["not_in_matrices"])
+        heads.append(f"the calibration has more than this file can hold: {names}")
+    return [printable(line) for line in heads]
+
+
+def _number(value) -> str:
+    """A number as YAML 1.1 reads it back: an exponent wants a decimal point before it."""
+    text = repr(float(value))
+    return text.replace("e", ".0e") if "e" in text and "." not in text else text
+
+
+def _text(value, form: str) -> str:
+    return "?" if value is None else format(value, form)
+
+
+def _row(values) -> str:
+    return " ".join(repr(float(value)) for value in values)
+
+
+def _sds(values) -> str:
+    return ", ".join("?" if value is None else f"{value:.2g}" for value in values)
+
+
+def _matrix(name: str, rows) -> list[str]:
+    indent = " " * (len(name) - len(name.lstrip()) + 2)
+    text = (f"{indent}- [{', '.join(map(_number, row))}]" for row in np.asarray(rows))
+    return [f"{name}:", *text]
+
+
+def _scalar(name: str, value, sd=None) -> str:
+    if value is None:
+        return f"  # {name.strip()}: not known"
+    return f"{name}: {_number(value)}" + ("" if sd is None else f" # {sd:.2g}")
+
+
+def _noise(name: str, term: dict | None) -> str:
+    """Rms over the axes that have a value."""
+    values = np.array([np.nan] * 3 if term is None else term["value"], float)
+    shown = np.isfinite(values)
+    if shown.any():
+        size = np.sqrt(np.mean(values[shown] ** 2))
+        sds = np.array(term.get("sd", [np.nan] * 3), float)[shown]
+        sd = np.sqrt(np.sum((values[shown] * sds) ** 2)) / (size * shown.sum())
+        return _scalar(name, size, sd if np.isfinite(sd) else None)
+    below = np.array(term["below"], float) if term and "below" in term else np.array([np.nan])
+    why = f"below {np.nanmax(below):.2g}" if np.isfinite(below).any() else "not estimated"
+    return f"  # {name.strip()}: left open, {why}; kalibr wants a number: see docs/noise.md"

@@ -1,0 +1,24 @@
+"""The work behind `imuarray export`."""
+
+from imuarray.analysis.export import export, reasons_of
+from imuarray.commands.output import Output
+from imuarray.errors import InputError
+from imuarray.firstorder.noise import allan
+from imuarray.provenance import write_bytes
+from imuarray.recording import load_dataset, read_recording
+
+
+def run(arguments) -> None:
+    """A calibration in another tool's format; one that is not to be trusted says so in it."""
+    output = Output(arguments)
+    calibration = load_dataset(arguments.calibration)
+    noise = None if arguments.noise is None else allan(read_recording(arguments.noise))
+    try:
+        text = export(calibration, arguments.format, noise)
+        reasons = [f"the calibration is not to be trusted: {x}" for x in reasons_of(calibration)]
+    except InputError as error:
+        raise InputError(f"{arguments.calibration}: {error}") from None
+    write_bytes(text.encode(), arguments.out)
+    count = calibration.sizes["accelerometer"]
+    output.say(f"{arguments.out}: {count} IMUs, {arguments.format}")
+    output.done({"out": str(arguments.out), "format": arguments.format, "imus": count}, reasons)
