@@ -1,12 +1,27 @@
-"""Any logger's files as one recording: tables, recordings."""
+"""Any logger's files as one recording."""
 
 import numpy as np
 import pytest
+import yaml
 
 import imuarray
+from imuarray.alignment import align
+from imuarray.cli import main
 from imuarray.errors import InputError
+from imuarray.motion import hand_twisting
+from imuarray.recording import load_dataset
+from imuarray.recording.record import NUMBERS, QUANTITIES
+from tests.bag_writer import write
+from tests.mimu_writer import packets, readings
+from tests.test_alignment import logs
+from tests.test_bags import put, rig
+from tests.test_bags import readings as topics
+from tests.test_convert_cli import POSITIONS
+from tests.test_convert_csv import HEADER, blank, layout, table
 from tests.test_convert_csv import read as read_table
-from tests.test_convert_csv import table
+from tests.test_csv_logs import description
+from tests.test_csv_logs import log as lines_of
+from tests.test_csv_logs import put as put_tables
 
 
 def test_a_table_or_a_recording(tmp_path):
@@ -20,3 +35,111 @@ def test_a_table_or_a_recording(tmp_path):
     np.testing.assert_array_equal(again.angular_rate, expected.angular_rate)
     with pytest.raises(InputError, match="log.csv: expected a YAML that describes it"):
         imuarray.open_logs([log])
+
+
+def test_packets_bags_and_what_cannot_be_told(tmp_path):
+    counts = readings(np.random.default_rng(0), 20, 3)
+    (tmp_path / "data.bin").write_bytes(b"".join(packets(counts)))
+    (tmp_path / "positions.csv").write_text(POSITIONS)
+    found, lines, _ = imuarray.open_logs(tmp_path / "data.bin", tmp_path / "positions.csv")
+    assert found.specific_force.shape == (20, 3, 3) and "lost 0" in lines[0]
+    columns = put(tmp_path, rig())
+    bag = write(tmp_path / "run", "mcap", topics())
+    found, lines, _ = imuarray.open_logs(bag, columns, ["/imu1", "/imu0"])
+    assert found.gyroscope_labels == ("/imu1", "/imu0") and len(lines) == 2
+    imuarray.write_recording(found, tmp_path / "rec.nc")
+    for wrong in ([], [tmp_path / "rec.nc", bag]):
+        with pytest.raises(InputError, match="logs: expected one recording, or what loggers wrote"):
+            imuarray.open_logs(wrong, columns)
+
+
+@pytest.fixture(scope="module")
+def loose(tmp_path_factory):
+    """Logs of three IMUs as a bag and as tables, and what `align` makes of them."""
+    folder = tmp_path_factory.mktemp("loose")
+    motion = hand_twisting(np.random.default_rng(3), 8.0, 5.0, 4.0)
+    apart, bag, tables = logs(motion), {}, {}
+    for i, log in enumerate(apart):
+        # the second one's clock has another origin
+        stamps = np.round(1e9 * (log.gyroscope_time + 10 * (i != 1))).astype(int)
+        values = np.round(np.hstack([log.specific_force, log.angular_rate]), 6)
+        bag[f"/imu{i}"] = stamps, values[:, :3], values[:, 3:]
+        tables[f"imu{i}.csv"] = lines_of(stamps, values)
+    columns = description(position_unit="m", position_prior=1e-3, imus={
+        label: {"position": log.position.tolist()} for label, log in zip(bag, apart, strict=True)
+    })  # fmt: skip
+    for kind, log in (("accelerometers", "accelerometer"), ("gyroscopes", "gyroscope")):
+        columns[kind] = {
+            "noise": getattr(apart[0], f"{log}_noise_sd"),
+            "range": getattr(apart[0], f"{log}_range"),
+        }
+    for key in ("time", "columns"):
+        del columns[key]
+    write(folder / "run", "mcap", bag)
+    put(folder, columns)
+    return folder, apart, tables, columns
+
+
+def test_loose_imus_are_aligned(loose, capsys):
+    """By the command; what was found is printed, and kept beside the recording."""
+    folder, apart, _, _ = loose
+    out = folder / "rec.nc"
+    options = ["--columns", str(folder / "rig.yaml"), "--out", str(out)]
+    assert main(["convert", "ros", str(folder / "run"), *options]) == 0
+    text = capsys.readouterr().out
+    assert "rec.nc: " in text and "1: its stamps are at no time those of /imu0" in text
+    assert "ppm fast" in text and "degrees against IMU /imu0" in text
+    expected, alignment = align(apart, position_prior_sd=1e-3)
+    found, kept = imuarray.read_recording(out), load_dataset(out, "alignment")
+    assert found.source == "run" and found.position_prior_sd == 1e-3
+    inner = slice(20, -20)
+    np.testing.assert_allclose(found.angular_rate[inner], expected.angular_rate[inner], atol=2e-4)
+    np.testing.assert_allclose(kept.rotation, alignment.rotation, atol=1e-6)
+    np.testing.assert_allclose(kept.clock_drift, [c.drift for c in alignment.clocks], atol=1e-7)
+
+
+def test_tables_and_a_bag_agree_bit_for_bit(loose):
+    folder, _, tables, columns = loose
+    bag = imuarray.open_logs(folder / "run", folder / "rig.yaml")
+    units = {"accelerometers": "m/s^2", "gyroscopes": "rad/s"}
+    names = {"time": {"column": "t", "unit": "ns"}, "columns": ["ax", "ay", "az", "gx", "gy", "gz"]}
+    described = columns | names | {kind: columns[kind] | {"unit": u} for kind, u in units.items()}
+    described["imus"] = {
+        label: imu | {"log": f"{label[1:]}.csv"} for label, imu in columns["imus"].items()
+    }
+    put_tables(folder, tables, described)
+    found = imuarray.open_logs([folder / name for name in tables], folder / "rig.yaml")
+    for name in (*QUANTITIES, *NUMBERS, "accelerometer_axes"):
+        ours, theirs = (getattr(opened.recording, name) for opened in (found, bag))
+        np.testing.assert_array_equal(ours, theirs, name)
+    assert found.lines == bag.lines
+    put(folder, columns)
+
+
+def test_a_board_with_a_sensor_slower_than_its_log(tmp_path):
+    """Blank cells in half of the rows; all else is there at its time."""
+    motion = hand_twisting(np.random.default_rng(3), 8.0, 5.0, 4.0)
+    time = np.arange(1200) / 100
+    sensed = [motion.force.derivative(time), motion.rotation.derivative(time)]
+    noise = np.random.default_rng(0).normal(0, [[[0.04]], [[1e-3]]], (3, 2, 1200, 3))
+    cells = [list(map(repr, row)) for row in np.concatenate(
+        np.concatenate(sensed + noise, axis=0), axis=1).tolist()]  # fmt: skip
+    rows = [HEADER, *([repr(t), *row] for t, row in zip(time.tolist(), cells, strict=True))]
+    columns = layout() | {"time": {"column": "t", "unit": "s"}}
+    columns["accelerometers"] |= {"unit": "m/s^2", "noise": 0.04, "range": 160}
+    columns["gyroscopes"] |= {"unit": "rad/s", "noise": 1e-3, "range": 35}
+    slow = blank(rows, [f"a{axis}2" for axis in "xyz"], range(2, 1201, 2))
+    text = "\n".join(",".join(row) for row in slow) + "\n"
+    (tmp_path / "log.csv").write_text(text)
+    (tmp_path / "columns.yaml").write_text(yaml.safe_dump(columns))
+    found, lines, groups = imuarray.open_logs(tmp_path / "log.csv", tmp_path / "columns.yaml")
+    assert "2: accelerometer: no reading in 600 of 1200" in lines
+    np.testing.assert_allclose(groups["alignment"].rate[1], [50, 100], rtol=1e-4)
+    assert np.abs(groups["alignment"].clock_offset).max() < 5e-6
+    true = [motion.force.derivative(found.time), motion.rotation.derivative(found.time)]
+    inner = slice(20, -20)
+    for kind, (one, wanted) in enumerate(
+        zip((found.specific_force, found.angular_rate), true, strict=True)
+    ):
+        left = (one - wanted[:, None])[inner].std(axis=(0, 2))
+        assert (left < 1.1 * groups["alignment"].interpolated_noise[:, kind]).all()

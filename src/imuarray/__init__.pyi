@@ -26,7 +26,6 @@ from .model.own import read_effects as read_effects
 from .recording.format import read_recording as read_recording
 from .recording.format import write_recording as write_recording
 from .recording.record import Recording as Recording
-from .recording.table import read_csv as read_csv
 from .report.write import write_report as write_report
 
 __version__: str

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NoReturn
 
-from imuarray.commands.argument_types import InputBag, InputFile
+from imuarray.commands.argument_types import InputFile, InputLog
 from imuarray.commands.parser import make_parser
 from imuarray.errors import InputError, one_line
 
@@ -118,7 +118,7 @@ def _check_output(arguments: argparse.Namespace) -> None:
         if figure.resolve() == out.resolve():
             raise InputError(f"--figure {figure}: expected another file than --out, found the same")
     for source in _inputs(arguments):
-        bag = isinstance(source, InputBag) and source.is_dir()
+        bag = isinstance(source, InputLog) and source.is_dir()
         if not source.is_file() and not bag:
             found = "a folder" if source.is_dir() else "none"
             raise InputError(f"{source}: expected a file to read, found {found}")

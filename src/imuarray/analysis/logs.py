@@ -9,8 +9,10 @@ import xarray as xr
 
 from imuarray.errors import InputError
 from imuarray.recording import Recording, read_recording
+from imuarray.recording.rig import Rig, recording_of
 
 RECORDINGS = (".nc", ".nc4", ".h5")
+PACKETS = ".bin"
 
 
 class Opened(NamedTuple):
@@ -22,33 +24,46 @@ class Opened(NamedTuple):
 
 
 def open_logs(
-    paths: Sequence[str | PathLike],
+    paths: str | PathLike | Sequence[str | PathLike],
     columns: str | PathLike | None = None,
     topics: Sequence[str] = (),
 ) -> Opened:
-    """Logs of one rig as one recording: CSV files, ROS bags, or a recording (.nc).
+    """Logs of one rig as one recording: tables, ROS bags, a MIMU board's packets, a recording.
 
-    ``columns`` is the YAML of docs/convert.md, which a recording does not need; ``topics`` those
-    of bags to use, the reference first. IMUs that share their stamps, with known axes, become
-    samples as they are. InputError says what does not fit.
+    ``columns`` is the YAML of docs/convert.md, for packets (.bin) the CSV of positions, for a
+    recording (.nc) none; ``topics`` those of bags to use, the reference first. IMUs that share
+    their stamps, with known axes, become samples as they are; others are aligned (`alignment`),
+    which the lines say and the group of that name keeps. InputError says what does not fit.
     """
-    from imuarray.recording import bags, csv_logs, rig
+    from imuarray.recording import bags, csv_logs
+    from imuarray.recording.mimu_recording import read_board
 
-    logs = [Path(path) for path in paths]
-    found: Recording | rig.Rig
+    logs = [Path(path) for path in ([paths] if isinstance(paths, str | PathLike) else paths)]
     if len(logs) == 1 and logs[0].suffix in RECORDINGS:
         return Opened(read_recording(logs[0]), [], {})
+    if not logs or any(log.suffix in RECORDINGS for log in logs):
+        raise InputError(f"logs: expected one recording, or what loggers wrote, found {len(logs)}")
     if all(map(bags.is_bag, logs)):
-        found = bags.read_bags(logs, columns, topics)
-    elif columns is None:
+        return _together(bags.read_bags(logs, columns, topics))
+    if columns is None:
         raise InputError(f"{logs[0]}: expected a YAML that describes it, found none")
-    else:
-        found = csv_logs.read_tables(logs, columns)
+    if len(logs) == 1 and logs[0].suffix == PACKETS:
+        recording, account = read_board(logs[0], Path(columns))
+        return Opened(recording, account.lines(), {})
+    return _together(csv_logs.read_tables(logs, columns))
+
+
+def _together(found: Recording | Rig) -> Opened:
+    """Samples as they are, or brought to common instants and axes, which is kept."""
     if isinstance(found, Recording):
         return Opened(found, [], {})
-    recording = rig.recording_of(found)
-    if recording is None:
-        raise InputError(
-            f"{found.source}: expected IMUs with common stamps and known axes, found others"
-        )
-    return Opened(recording, found.lines, {})
+    recording = recording_of(found)
+    if recording is not None:
+        return Opened(recording, found.lines, {})
+    from imuarray.alignment import align
+
+    recording, alignment = align(
+        found.logs, position_prior_sd=found.position_prior_sd, source=found.source
+    )
+    lines = [*found.lines, *alignment.lines()]
+    return Opened(recording, lines, {"alignment": alignment.dataset()})

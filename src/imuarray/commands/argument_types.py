@@ -13,13 +13,13 @@ class InputFile(type(Path())):  # type: ignore[misc]
     """A file that a command reads."""
 
 
-class InputBag(InputFile):
-    """A bag, a file or a folder of files, that a command reads."""
+class InputLog(InputFile):
+    """What a logger wrote, a file or a folder of files, that a command reads."""
 
 
-def bag(text: str) -> InputBag:
+def bag(text: str) -> InputLog:
     """A ROS bag, by its ending where it is no folder."""
-    path = InputBag(text)
+    path = InputLog(text)
     if path.is_file() and path.suffix.lower() not in BAGS:
         raise argparse.ArgumentTypeError(
             f"expected a folder or a file of {', '.join(BAGS)}, found {text!r}"

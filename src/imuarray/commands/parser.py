@@ -8,7 +8,16 @@ from typing import Any, NamedTuple, NoReturn
 
 import imuarray
 from imuarray.analysis import methods
-from imuarray.commands.argument_types import InputFile, bag, count, effects, model, positive, seed
+from imuarray.commands.argument_types import (
+    InputFile,
+    InputLog,
+    bag,
+    count,
+    effects,
+    model,
+    positive,
+    seed,
+)
 from imuarray.errors import InputError
 
 
@@ -88,7 +97,7 @@ COMMANDS = (
         "folder to write: report.html, cal.nc, positions.csv, recording.nc",
         (
             _option("logs", "what a logger wrote (docs/convert.md), or a recording (NetCDF-4)",
-                    type=InputFile, nargs="+", metavar="log"),
+                    type=InputLog, nargs="+", metavar="log"),
             _file("--columns", "YAML: columns, units, positions"), GRAVITY,
         ),
         folder=True,
