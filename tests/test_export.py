@@ -260,7 +260,12 @@ DAMAGED = {
     "finite numbers": lambda data: data.assign(
         accelerometer_offset=np.nan * data.accelerometer_offset
     ),
-    "singular": lambda data: data.assign(gyroscope_inverse=0 * data.gyroscope_inverse),
+    "mirror nothing": lambda data: data.assign(gyroscope_inverse=0 * data.gyroscope_inverse),
+    "all of its parameters": lambda data: data.isel(
+        parameter=slice(0, 5), unknown=slice(0, 14), unknown_other=slice(0, 14)
+    ),
+    "rotations as axes": lambda data: data.assign(accelerometer_axes=-data.accelerometer_axes),
+    "a rate in Hz": lambda data: data.assign_attrs(rate="fast"),
     "JSON list": lambda data: data.assign_attrs(reasons="{"),
     "expected any of json": None,
 }

@@ -16,12 +16,13 @@ from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.model.effects import KINDS, Prediction
 from imuarray.recording.record import CORRECTION, NUMBERS
+from imuarray.recording.validate import is_rotation
 
 BIASES = "accelerometer_bias", "gyroscope_bias"
 MATRICES = ("accelerometer_scale", "accelerometer_misalignment", "gyroscope_scale",
             "gyroscope_misalignment")  # fmt: skip
 # Of a triad's row of parameters, the entry that is a delay, and its sign.
-TIMES = {"sensor_delay": (KINDS, (), 1), "sensor_clock": (KINDS, (3,), -1),
+TIMES: dict[str, tuple] = {"sensor_delay": (KINDS, (), 1), "sensor_clock": (KINDS, (3,), -1),
          "gyroscope_delay": (KINDS[1:], (), 1)}  # fmt: skip
 FORMULAS = {
     "corrections": "for each step in turn x = inverse @ (x - offset), each component summed as"
@@ -80,14 +81,13 @@ def describe(calibration: xr.Dataset, noise: StillNoise | None = None) -> dict[s
     effects = [name for name in str(attrs.get("effects", "")).split(",") if name]
     array = Array(positions, tuple(labels["accelerometer"]), len(labels["gyroscope"]), "export")
     model = ArrayModel.isotropic(array, 1.0, 1.0, effects)
-    steps, times = _steps(calibration, model), _times(calibration, model)
+    _require_whole(calibration, model)
     try:
+        steps, times = _steps(calibration, model), _times(calibration, model)
         frames = _frames(calibration, steps, positions)
     except np.linalg.LinAlgError:
-        raise InputError(
-            "expected corrections that can be inverted, found a singular one"
-        ) from None
-    rate = attrs.get("rate") or (noise.rate_hz if noise else None)
+        raise InputError("expected corrections that can be inverted, found singular ones") from None
+    rate = attrs.get("rate", noise.rate_hz if noise else None)
     imus = []
     for k, frame in enumerate(frames):
         imu: dict[str, Any] = {"label": labels["accelerometer"][k]}
@@ -114,10 +114,29 @@ def describe(calibration: xr.Dataset, noise: StillNoise | None = None) -> dict[s
     }  # fmt: skip
 
 
+def _require_whole(calibration: xr.Dataset, model: ArrayModel) -> None:
+    """InputError for numbers that are fit, but not those of rotations, or of the effects."""
+    turns = calibration.get("accelerometer_axes")
+    maps = [calibration[f"{kind}_inverse"] for kind in KINDS if f"{kind}_inverse" in calibration]
+    rate = np.asarray(calibration.attrs.get("rate", 1.0))
+    for right, what in (
+        (calibration.sizes.get("parameter", 0) == model.effect_size, "all of its parameters"),
+        (model.effect_size == 0 or {"effect_parameter", "effect_sd"} <= set(calibration), "values"),
+        (calibration.sizes.get("recording", 1) > 0, "a recording"),
+        (turns is None or is_rotation(turns.to_numpy()).all(), "rotations as axes"),
+        (all((np.linalg.det(one) > 0).all() for one in maps), "inverses that mirror nothing"),
+        (rate.dtype.kind == "f" and rate.size == 1 and rate > 0, "a rate in Hz"),
+    ):
+        if not right:
+            raise InputError(f"expected a calibration with {what}, found others, or none")
+
+
 def _plain(values) -> Any:
     """Lists and numbers, None for what is not finite."""
     values = np.asarray(values, float)
-    return np.where(np.isfinite(values), values.astype(object), None).tolist()
+    out = values.astype(object)
+    out[~np.isfinite(values)] = None
+    return out.tolist()
 
 
 def _parameters(calibration: xr.Dataset) -> dict[str, dict]:
@@ -139,11 +158,11 @@ def _steps(calibration: xr.Dataset, model: ArrayModel) -> dict[str, list[dict]]:
     out: dict[str, list[dict]] = {kind: [] for kind in KINDS}
     if set(CORRECTION) <= set(calibration):
         first = calibration[list(CORRECTION)].isel(recording=0)
-        for name, values in first.items():
+        for name, part_values in first.items():
             kind, _, part = str(name).partition("_")
             if not out[kind]:
                 out[kind].append({"from": "first-order"})
-            out[kind][0][part] = values.to_numpy()
+            out[kind][0][part] = part_values.to_numpy()
         for kind in KINDS:
             left = calibration.get(f"{kind}_map_covariance")
             if left is not None:
@@ -179,7 +198,8 @@ def _step(step: dict, k: int) -> dict[str, Any]:
 
 def _times(calibration: xr.Dataset, model: ArrayModel) -> dict[str, tuple]:
     """Of each kind time offsets (n,) s against the first accelerometer, and their sds."""
-    places, size = model.split(np.arange(model.effect_size)), model.effect_size
+    size = model.effect_size
+    places: dict[str, Any] = model.split(np.arange(size))
     weights = {kind: np.zeros((calibration.sizes[kind], size)) for kind in KINDS}
     for name in set(places) & set(TIMES):
         kinds, inner, sign = TIMES[name]
@@ -241,7 +261,8 @@ def _sensed(steps: list[dict], count: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _lower_times_rotation(matrix) -> tuple[np.ndarray, np.ndarray]:
     """matrix (3, 3) = L R: L lower triangular, R a rotation."""
-    return tuple(part[::-1, ::-1] + 0.0 for part in upper_times_rotation(matrix[::-1, ::-1]))
+    upper, turn = upper_times_rotation(matrix[::-1, ::-1])
+    return upper[::-1, ::-1] + 0.0, turn[::-1, ::-1] + 0.0
 
 
 def _turn_sds(calibration: xr.Dataset, turns, others) -> tuple[np.ndarray, np.ndarray]:

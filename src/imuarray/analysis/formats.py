@@ -147,13 +147,13 @@ def _scalar(name: str, value, sd=None) -> str:
 
 def _noise(name: str, term: dict | None) -> str:
     """Rms over the axes that have a value."""
-    values = np.array([np.nan] * 3 if term is None else term["value"], float)
+    values, sds, below = (
+        np.array((term or {}).get(part, [None] * 3), float) for part in ("value", "sd", "below")
+    )
     shown = np.isfinite(values)
     if shown.any():
         size = np.sqrt(np.mean(values[shown] ** 2))
-        sds = np.array(term.get("sd", [np.nan] * 3), float)[shown]
-        sd = np.sqrt(np.sum((values[shown] * sds) ** 2)) / (size * shown.sum())
+        sd = np.sqrt(np.sum((values * sds)[shown] ** 2)) / (size * shown.sum())
         return _scalar(name, size, sd if np.isfinite(sd) else None)
-    below = np.array(term["below"], float) if term and "below" in term else np.array([np.nan])
     why = f"below {np.nanmax(below):.2g}" if np.isfinite(below).any() else "not estimated"
     return f"  # {name.strip()}: left open, {why}; kalibr wants a number: see docs/noise.md"
