@@ -93,6 +93,8 @@ def draw_rig(seed: int, options: Loose = Loose()) -> Rig:
         instants = (stamps - offset[k]) / (1 + drift[k])
         stamps = stamps + options.jitter * rng.standard_normal(len(stamps))
         stamps = np.maximum.accumulate(np.round(stamps / options.resolution)) * options.resolution
+        # rounding may shift all stamps of a log alike
+        offset[k] = np.mean(stamps - (1 + drift[k]) * instants)
         logs.append(_log(rng, k, options, hand, chips, instants, stamps, bias, noise, rate))
     start = hand.duration - options.twisting
     truth = in_frame(chips, np.zeros((1, 3)), bias[1])
@@ -136,7 +138,7 @@ def _aligned(folder: Path, rig: Rig) -> dict[str, float]:
         stamps = rig.offset[k] + (1 + rig.drift[k]) * times
         late = stamps - float(part.clock_middle)
         instants = stamps - float(part.clock_offset) - float(part.clock_drift) * late
-        errors.append(instants - times)
+        errors.append(instants - times - rig.offset[0])
         sds.append(np.hypot(float(part.clock_offset_sd), float(part.clock_drift_sd) * late))
     g = rig.truth.gyroscopes
     seen = np.swapaxes(found.rotation.to_numpy(), 1, 2) @ found.rotation.to_numpy()[0]

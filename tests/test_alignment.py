@@ -179,5 +179,5 @@ def test_what_does_not_determine_it_is_refused(motion, change, words):
 
 def test_motion_at_the_limit_of_a_sensors_rate_is_refused():
     fast = hand_twisting(np.random.default_rng(5), 8.0, 5.0, 45.0)
-    with pytest.raises(InputError, match=r"'3': .* for 100 Hz .* log at a higher rate"):
+    with pytest.raises(InputError, match=r"'3': .* for 100 Hz: .* log at a higher rate"):
         align(logs(fast), position_prior_sd=1e-3)

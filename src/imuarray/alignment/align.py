@@ -147,6 +147,7 @@ def align(
     mirrored, and where the motion is too fast for a sensor's rate: naming it and the remedy.
     """
     sensors, origins = _sensors(logs)
+    _require_slow([sensor for pair in sensors for sensor in pair])
     gyroscopes = [pair[1] for pair in sensors]
     clocks = [itself(gyroscopes[0].time), *(compare(gyroscopes[0], g) for g in gyroscopes[1:])]
     frame = np.eye(3) if logs[0].axes is None else logs[0].axes
@@ -157,7 +158,6 @@ def align(
     ]
     grid, step = _grid([sensor for pair in sensors for sensor in pair])
     carried = [[_carry(sensor, grid, step) for sensor in pair] for pair in sensors]
-    _require_slow(sum(map(list, sensors), []), sum(carried, []))
     recording, whole = _recording(logs, rotation, grid, carried)
     rate, error, noise = (
         np.array([[value(sensor, one) for sensor, one in zip(*pairs, strict=True)]
@@ -233,16 +233,17 @@ def _carry(sensor: Sensor, grid, step: float) -> _Carried:
     return _Carried(Splines(sensor, None, knots)(grid), sensor.near_rail(grid), error, noise)
 
 
-def _require_slow(sensors: Sequence[Sensor], carried: Sequence[_Carried]) -> None:
+def _require_slow(sensors: Sequence[Sensor]) -> None:
     """InputError, naming the worst sensor, where the motion is too fast for one's rate."""
-    worst = max(range(len(sensors)), key=lambda i: carried[i].error / carried[i].noise_sd)
-    sensor, one = sensors[worst], carried[worst]
-    if one.error > one.noise_sd:
-        unit, scale = KINDS[sensor.name.split()[0]]
+    worst = max(sensors, key=lambda sensor: sensor.error(sensor.step) / sensor.noise_sd)
+    missed = worst.error(worst.step)
+    if missed > worst.noise_sd:
+        unit, scale = KINDS[worst.name.split()[0]]
         raise InputError(
-            f"{sensor.name}: expected readings that interpolation carries over within their noise"
-            f" of {scale * one.noise_sd:.2g} {unit}, found motion so fast for {1 / sensor.step:.4g}"
-            f" Hz that it misses {scale * one.error:.2g}: log at a higher rate, or move more slowly"
+            f"{worst.name}: expected readings that interpolation carries over within their noise of"
+            f" {scale * worst.noise_sd:.2g} {unit}, found motion too fast for {1 / worst.step:.4g}"
+            f" Hz: it misses {scale * missed:.2g}; log at a higher rate, move more slowly, or"
+            " declare the noise as it is"
         )
 
 

@@ -9,7 +9,7 @@ from scipy.signal import correlate
 
 from imuarray.alignment.resample import Sensor, Splines
 from imuarray.errors import InputError
-from imuarray.firstorder.relative import BLOCK, FEWEST, FLATTEST, SLOWEST
+from imuarray.firstorder.relative import FEWEST, FLATTEST, SLOWEST
 from imuarray.firstorder.turns import nearest_orthogonal, procrustes
 from imuarray.linear import scaled_inverse
 
@@ -21,6 +21,7 @@ ALIKE = 0.9  # correlation of two speeds from which they are one motion
 NEARLY = 0.02  # of correlations, within which two places are equally good
 PIECES = 8  # that are tried
 SLACK = 0.05  # sd of the map's entries about a rotation
+BLOCK = 0.5  # s, within which residuals may be alike
 STEPS, CLOSE = 20, 1e-9  # of Gauss-Newton, s
 
 
@@ -133,6 +134,10 @@ def _fit(splines: Splines, other: Sensor, clock: Clock, used) -> Clock:
         values = values + change
         if step > 3 and abs(change[0]) + abs(change[1]) * np.ptp(far) < CLOSE:
             break
+    # what the scores change by, as weights change with the residuals, too
+    bend = weight * (1 - 2 / 3 * squares / (4 * size + squares))
+    flat = (columns * bend[:, None, None]).reshape(-1, 14)
+    inverse = scaled_inverse(flat.T @ columns.reshape(-1, 14) + np.diag(ridge))
     covariance = _sandwich(columns, weight, left, time, inverse)
     return Clock(
         values[0], values[1], clock.middle, values[2:11].reshape(3, 3), covariance, np.sqrt(size)
@@ -146,7 +151,7 @@ def _sandwich(columns, weight, left, time, inverse) -> np.ndarray:
     np.add.at(scores, block, np.einsum("n,nim,ni->nm", weight, columns, left))
     scores = scores @ inverse
     count = len(scores)
-    return scores.T @ scores * count / max(count - 4, 1)
+    return scores.T @ scores * count / max(count - 14, 1)
 
 
 def _coarse(first: Sensor, other: Sensor) -> tuple[float, float, float]:
