@@ -12,9 +12,11 @@ from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
 
-from benchmarks.boards import GRADES, LINES, parser, summary, walks
+from benchmarks.boards import GRADES, LINES, parser, summary, walks  # before numpy's threads
 
 import numpy as np  # isort: skip
+import pandas as pd
+import yaml
 from scipy.spatial.transform import Rotation
 
 from benchmarks.board import (
@@ -31,13 +33,12 @@ from benchmarks.board import (
     read_out,
     truths,
 )
-from imuarray.alignment import align
-from imuarray.errors import InputError
-from imuarray.recording import load_dataset, write_recording
-from imuarray.recording.log import Log
+from imuarray.recording import load_dataset
 
+COLUMNS = [kind + axis for kind in "ag" for axis in "xyz"]
 PAIR = {"imus": 2, "rates": "200,200", "mount": 0.0, "turned": 37.0, "offset": 3e-3,
         "mounted": True}  # fmt: skip
+EXTRA = "clock_us", "clock_worst_us", "turn_deg", "a_deg", "g_deg"  # of which the worst is shown
 SHAKEN = 4.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0  # Hz, bandwidth of the twisting
 
 
@@ -60,18 +61,39 @@ class Loose(Options):
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """Logs and the truth: ``offset`` and ``drift`` (A,) of stamps = offset + (1 + drift) time."""
+    """Logs in counts and the truth: stamps = ``offset`` + (1 + ``drift``) time, (A,) each."""
 
     options: Loose
-    logs: list[Log]
+    tables: list[pd.DataFrame]
+    drawing: np.ndarray
     offset: np.ndarray
     drift: np.ndarray
     twisting: tuple[float, float]
     truth: Truth
 
+    def columns(self) -> dict:
+        """The description of the logs, in mm, m/s^2 and deg/s."""
+        a, g = (
+            ("m/s^2", NOISE[0], RANGES[0]),
+            ("deg/s", *np.degrees([NOISE[1], RANGES[1]]).tolist()),
+        )
+        a, g = (
+            {"unit": unit, "scale": limit / COUNTS, "noise": noise, "range": limit}
+            for unit, noise, limit in (a, g)
+        )
+        places = {f"imu{k + 1}": (1e3 * x).tolist() for k, x in enumerate(self.drawing)}
+        return {
+            "time": {"column": "t", "unit": "s"}, "columns": COLUMNS, "position_unit": "mm",
+            "position_prior": 1e3 * self.options.position_prior, "accelerometers": a,
+            "gyroscopes": g, "imus": {name: {"position": x} for name, x in places.items()},
+        }  # fmt: skip
+
     def write(self, folder: Path) -> None:
-        """The folder."""
+        """imu1.csv and so on, and rig.yaml."""
         folder.mkdir(parents=True, exist_ok=True)
+        for k, table in enumerate(self.tables):
+            table.to_csv(folder / f"imu{k + 1}.csv", index=False)
+        (folder / "rig.yaml").write_text(yaml.safe_dump(self.columns()), encoding="utf-8")
 
 
 def draw_rig(seed: int, options: Loose = Loose()) -> Rig:
@@ -86,7 +108,7 @@ def draw_rig(seed: int, options: Loose = Loose()) -> Rig:
     offset, drift = (size * rng.uniform(-1, 1, count) for size in (options.offset, options.drift))
     offset[0] = drift[0] = 0.0
     bias, noise = draw_biases(rng, count), np.array(NOISE) * rng.uniform(0.9, 1.1, 2)
-    logs = []
+    tables = []
     for k, rate in enumerate(map(float, options.rates.split(","))):
         # a first reading within the first two, so that none is before the hand's time
         stamps = 0.05 + (rng.uniform() + np.arange(int((hand.duration - 0.1) * rate))) / rate
@@ -95,32 +117,34 @@ def draw_rig(seed: int, options: Loose = Loose()) -> Rig:
         stamps = np.maximum.accumulate(np.round(stamps / options.resolution)) * options.resolution
         # rounding may shift all stamps of a log alike
         offset[k] = np.mean(stamps - (1 + drift[k]) * instants)
-        logs.append(_log(rng, k, options, hand, chips, instants, stamps, bias, noise, rate))
+        counts = _counts(rng, k, options, hand, chips, instants, bias, noise)
+        tables.append(pd.DataFrame(counts, columns=COLUMNS))
+        tables[-1].insert(0, "t", stamps)
     start = hand.duration - options.twisting
     truth = in_frame(chips, np.zeros((1, 3)), bias[1])
-    return Rig(options, logs, offset, drift, (start, hand.duration), truth)
+    twisting = start, hand.duration
+    return Rig(options, tables, chips.drawing, offset, drift, twisting, truth)
 
 
-def _log(rng, k, options, hand, chips, instants, stamps, bias, noise, rate) -> Log:
+def _counts(rng, k, options, hand, chips, instants, bias, noise) -> np.ndarray:
+    """What IMU k reads at ``instants`` (T,), (T, 6)."""
     one = Chips(*(part[k : k + 1] for part in chips))
     places = np.vstack([chips.places[:1], one.places])
     true = truths(hand, instants, places, np.zeros(2), options.gyroscope_delay)
-    walk = options.gyroscope_walk / np.sqrt(rate)
-    walk = walk * rng.standard_normal((len(instants), 1, 3)).cumsum(axis=0)
-    counts = read_out(
-        rng, one, [x[:, 1:] for x in true], (bias[0][k], bias[1][k] + walk), noise
-    )  # fmt: skip
-    force, turn = (limit / COUNTS * x[:, 0] for limit, x in zip(RANGES, counts, strict=True))
-    return Log(
-        str(k + 1), stamps, force, stamps, turn, chips.drawing[k], None,
-        NOISE[0], RANGES[0], NOISE[1], RANGES[1],
-    )  # fmt: skip
+    steps = options.gyroscope_walk * np.sqrt(np.diff(instants, prepend=instants[0]))
+    walk = (steps[:, None, None] * rng.standard_normal((len(instants), 1, 3))).cumsum(axis=0)
+    counts = read_out(rng, one, [x[:, 1:] for x in true], (bias[0][k], bias[1][k] + walk), noise)
+    return np.concatenate([x[:, 0] for x in counts], axis=1)
 
 
 def _apart(found, true) -> np.ndarray:
     """Degrees between the rotations nearest to matrices (A, 3, 3)."""
     turns = [Rotation.from_matrix(np.array(x)) for x in (_polar(found), _polar(true))]
     return np.degrees((turns[0] * turns[1].inv()).magnitude())
+
+
+def _rms(x) -> float:
+    return float(np.sqrt(np.mean(np.square(x))))
 
 
 def _polar(matrix) -> np.ndarray:
@@ -132,11 +156,12 @@ def _aligned(folder: Path, rig: Rig) -> dict[str, float]:
     """Clocks while the rig is twisted (us), turns of the gyroscopes against the first (degrees)."""
     found = load_dataset(folder / "rec.nc", "alignment")
     times = np.linspace(*rig.twisting, 100)
+    zero = min(table["t"].iloc[0] for table in rig.tables)  # from which the file's stamps count
     errors, sds = [], []
     for k in range(1, rig.options.imus):
         part = found.isel(imu=k)
         stamps = rig.offset[k] + (1 + rig.drift[k]) * times
-        late = stamps - float(part.clock_middle)
+        late = stamps - zero - float(part.clock_middle)
         instants = stamps - float(part.clock_offset) - float(part.clock_drift) * late
         errors.append(instants - times - rig.offset[0])
         sds.append(np.hypot(float(part.clock_offset_sd), float(part.clock_drift_sd) * late))
@@ -146,7 +171,7 @@ def _aligned(folder: Path, rig: Rig) -> dict[str, float]:
     errors, sds = 1e6 * np.array(errors), 1e6 * np.array(sds)
     return {
         "clock_us": np.sqrt(np.mean(errors**2)), "clock_worst_us": np.abs(errors).max(),
-        "clock_within": np.mean(np.abs(errors) < 1.96 * sds), "turn_deg": angles.max(),
+        "clock_within": np.mean(np.abs(errors) < 1.96 * sds), "turn_deg": _rms(angles),
     }  # fmt: skip
 
 
@@ -157,23 +182,11 @@ def _corrected(folder: Path, rig: Rig) -> dict[str, float]:
     maps = load_dataset(folder / "corrected.nc", "first_order").gyroscope_matrix.to_numpy()
     found = np.swapaxes(axes, 1, 2), np.swapaxes(turn, 1, 2) @ maps
     return {
-        f"{kind}_deg": _apart(one, true).max()
+        f"{kind}_deg": _rms(_apart(one, true))
         for kind, one, true in zip("ag", found, rig.truth[2:4], strict=True)
     }
 
 
-def _convert(folder: Path, rig: Rig) -> tuple[int, str]:
-    """The recording that the logs' alignment makes: exit status, and what is said."""
-    try:
-        recording, found = align(rig.logs, position_prior_sd=rig.options.position_prior)
-    except InputError as error:
-        return 2, str(error)
-    (folder / "lines.txt").write_text("\n".join(found.lines()), encoding="utf-8")
-    write_recording(recording, folder / "rec.nc", groups={"alignment": found.dataset()})
-    return 0, ""
-
-
-RIG_LINES = LINES | {"convert": _convert}
 RIG_GRADES = GRADES | {"convert": _aligned, "first-order": _corrected}
 
 
@@ -185,13 +198,17 @@ def main() -> None:
         options = replace(options, **PAIR)
     seeds, commands = range(given.first, given.first + given.rigs), given.commands.split(",")
     keep = None if given.out is None else given.out.resolve()
+    logs = " ".join(f"imu{k + 1}.csv" for k in range(options.imus))
+    lines = LINES | {"convert": f"convert csv {logs} --columns rig.yaml --out rec.nc"}
     cases = {given.what: options}
     if given.what == "shaken":
         cases = {f"{hz:g}Hz": replace(options, bandwidth=hz) for hz in SHAKEN}
     for name, own in cases.items():
         rigs = partial(draw_rig, options=own)
-        found = walks(seeds, rigs, commands, keep, name, RIG_LINES, RIG_GRADES)
-        print(summary(found).to_string())
+        found = walks(seeds, rigs, commands, keep, name, lines, RIG_GRADES)
+        print(summary(found).dropna(axis=1, how="all").to_string())
+        extra = [name for name in EXTRA if name in found]
+        print(found.groupby("command", sort=False)[extra].max().dropna(how="all").to_string())
 
 
 if __name__ == "__main__":
