@@ -170,6 +170,7 @@ def test_one_file_in_which_each_kind_has_its_clock(tmp_path):
     [
         (3, {0: 5}, "rear.csv: gx|rear.csv: ax, ay, az: .* increase, found 5 after .* reading 3 "),
         (3, {0: 1_700_000_000_005_000}, "found 1700000000005000 after 1700000000005000 in read"),
+        (5, {0: 2e15}, r"stamps of one day \(was .*, found 20{15}.0 after 17.* in reading 5 "),
         (2, {1: "x"}, "rear.csv: column 'ax': expected numbers, found 'x' in data row 2"),
         (2, {5: "inf"}, "rear.csv: column 'gy': expected numbers, found inf in data row 2"),
         (2, {5: "1e40"}, "rear.csv: gx, gy, gz: expected finite numbers, found .* reading 2"),

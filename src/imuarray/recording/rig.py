@@ -11,6 +11,8 @@ from imuarray.recording.layout import numbers, positions, rotation
 from imuarray.recording.log import Log
 from imuarray.recording.record import Recording
 
+LONGEST = 86400.0  # s, between two readings: beyond, nothing on common instants would fit in memory
+
 
 @dataclass(frozen=True, eq=False)
 class Readings:
@@ -106,13 +108,16 @@ def _in_order(readings: Readings) -> tuple[Readings, list[str]]:
     steps = np.diff(stamps[rows])
     # a logger that runs faster than a sensor writes its last reading again
     again = (steps == 0) & (values[rows[1:]] == values[rows[:-1]]).all(axis=1)
-    back = (steps <= 0) & ~again
-    if back.any():
-        i = int(np.argmax(back))
-        raise InputError(
-            f"{where}: expected stamps that increase, found {stamps[rows[i + 1]]} after"
-            f" {stamps[rows[i]]} in reading {rows[i + 1] + 1} ({back.sum()} such steps)"
-        )
+    for wrong, expected in (
+        ((steps <= 0) & ~again, "that increase"),
+        (readings.unit * steps > LONGEST, "of one day (was the clock set meanwhile?)"),
+    ):
+        if wrong.any():
+            i = int(np.argmax(wrong))
+            raise InputError(
+                f"{where}: expected stamps {expected}, found {stamps[rows[i + 1]]} after"
+                f" {stamps[rows[i]]} in reading {rows[i + 1] + 1} ({wrong.sum()} such steps)"
+            )
     kept = rows[np.concatenate([[True], ~again])]
     counts = (("no reading", len(stamps) - len(rows)), ("the last one again", again.sum()))
     lines = [f"{what} in {n} of {len(stamps)}" for what, n in counts if n]
