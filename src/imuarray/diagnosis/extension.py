@@ -182,7 +182,7 @@ def extended_estimate(readings: Readings, columns: Columns, active, state: State
 
     With columns for what the model has, and for maps that first order may have left.
     """
-    maps = MAPS if any(left is not None for left in readings.left) else ()
+    maps = MAPS if readings.left is not None else ()
     few, kept = in_use(columns, active, state, maps)
     state = from_flat(few, state, flat_parameters(columns, state)[:, kept])
     columns, active = few, active[:, kept]

@@ -18,7 +18,16 @@ from imuarray.engine.parameters import POSITION, Columns, columns_of
 from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.turning import turned
-from imuarray.engine.widths import FIXED, MAPS, SCALES, SKEWS, beside_maps, settled, spread_of
+from imuarray.engine.widths import (
+    FIXED,
+    MAPS,
+    SCALES,
+    SKEWS,
+    beside_maps,
+    mask_of_left,
+    settled,
+    spread_of,
+)
 from imuarray.errors import InputError
 from imuarray.linear import scaled_inverse
 from imuarray.model.effects import EFFECTS
@@ -79,7 +88,7 @@ def climb(readings: Sequence[Readings], bare: bool = True) -> tuple[Estimate, li
     """
     names = rungs_of(readings)
     effects = [effect for name in names for effect in RUNGS[name]]
-    if any(left is not None for one in readings for left in one.left):
+    if any(one.left is not None for one in readings):
         effects += [name for name in MAPS if name not in effects]
     columns = columns_of(readings[0].array, effects, readings[0].position_prior_sd)
     begun = [Recorded.of(one, columns) for one in readings]
@@ -194,11 +203,12 @@ def _left(found: Estimate) -> list[tuple[np.ndarray, np.ndarray]]:
 
     The first recording's stands for all.
     """
-    first, out = found.recorded[0].readings, []
-    for which, covariance in enumerate(first.left):
-        mask = mask_of(found.columns, [name[which] for name in (SCALES, SKEWS)])
-        if covariance is not None:
-            spread = spread_of(first.left, found.columns, mask)
+    left, out = found.recorded[0].readings.left, []
+    known = mask_of_left(left, found.columns, np.zeros_like(found.active))
+    for names in zip(SCALES, SKEWS, strict=True):
+        mask = known & mask_of(found.columns, names)
+        if mask.any():
+            spread = spread_of(left, found.columns, mask)
             out.append((mask, spread + FIXED**2 * np.eye(len(spread))))
     return out
 

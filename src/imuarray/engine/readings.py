@@ -31,8 +31,7 @@ class Readings:
     run : (T,) number of the gapless run a sample is in
     origin : s, where time begins in the recording's own
     scale_sd : of a scale common to all gyroscopes, NaN where nothing is known of it
-    left : of accelerometers and gyroscopes, covariances (9 A, 9 A) and (9 G, 9 G) of the maps that
-        a correction left in them, as a recording has them; or None
+    left : covariance of the maps that a correction left in them, as a recording has it; or None
     gapless : bool, whether samples have neighbours that say something of time derivatives
     trust : (T, N, 2) square roots of a robust loss' weights, or None for all one
     period : s, of the clocks of sensors that have one, NaN where it is not declared
@@ -54,7 +53,7 @@ class Readings:
     gapless: bool = True
     origin: float = 0.0
     scale_sd: float = np.nan
-    left: tuple[np.ndarray | None, np.ndarray | None] = (None, None)
+    left: np.ndarray | None = None
     trust: np.ndarray | None = None
     wander: np.ndarray | None = None
     period: float = np.nan
@@ -248,8 +247,7 @@ def arrange(recording: Recording, sparse: bool = False) -> Readings:
         ~lost & np.repeat(exists, 3, axis=1), exists, np.tile(noise, (count, 1)),
         np.tile(noise, (count, 1)), runs(time[used]), tuple(longer), recording.position_prior_sd,
         gapless, float(recording.time[0]), recording.gyroscope_common_scale_sd,
-        (recording.accelerometer_map_covariance, recording.gyroscope_map_covariance),
-        period=recording.output_period,
+        recording.map_covariance, period=recording.output_period,
     )  # fmt: skip
 
 

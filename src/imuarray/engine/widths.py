@@ -44,7 +44,7 @@ def beside_maps(found: Estimate) -> tuple[Estimate, dict[str, float]]:
 
     {"accelerometer" or "gyroscope": p} of the kinds whose maps were corrected and not estimated.
     """
-    if all(left is None for one in found.recorded for left in one.readings.left):
+    if all(one.readings.left is None for one in found.recorded):
         return found, {}
     wide = _with_maps(found)
     maps = mask_of_left(wide.recorded[0].readings.left, wide.columns, wide.active)
@@ -66,12 +66,12 @@ def beside_maps(found: Estimate) -> tuple[Estimate, dict[str, float]]:
     whole = scaled_solve(information + precision, slope)[0]
     step, off = whole[:count], whole[count:]
     names = np.array(wide.columns.names)[np.nonzero(maps)[1]]
-    likely = {}
+    spread, likely = np.linalg.inv(precision[count:, count:]), {}
     for kind in KINDS:
         own = np.tile(np.char.startswith(names, kind), len(wide.recorded))
         if own.any():
-            inner = precision[count:, count:][np.ix_(own, own)]
-            likely[kind] = float(chdtrc(own.sum(), off[own] @ inner @ off[own]))
+            distance = off[own] @ np.linalg.solve(spread[np.ix_(own, own)], off[own])
+            likely[kind] = float(chdtrc(own.sum(), distance))
     recorded = tuple(
         replace(one, state=stepped(one.state, found.columns, found.active, step[place]))
         for one, place in zip(found.recorded, found.places, strict=True)
@@ -146,21 +146,22 @@ def _lost(freedoms) -> float:
 
 def mask_of_left(left, columns: Columns, active) -> np.ndarray:
     """(N, m) bool of the maps that a correction left, where they are not estimated."""
-    named = [name for name in MAPS if left[name.startswith("gyroscope")] is not None]
-    return np.isin(columns.names, named) & columns.owner & ~active
+    known = () if left is None else MAPS if len(left) > _accelerometers(columns) else MAPS[::2]
+    return np.isin(columns.names, known) & columns.owner & ~active
+
+
+def _accelerometers(columns: Columns) -> int:
+    """How many entries the accelerometers' maps have."""
+    return 9 * columns.model.array.accelerometers
 
 
 def spread_of(left, columns: Columns, maps) -> np.ndarray:
     """Covariance of the parameters ``maps`` (N, m) bool, in their order, from those of the maps."""
     pairs = np.argwhere(maps)
-    kind = np.array([columns.names[c].startswith("gyroscope") for c in pairs[:, 1]], int)
-    entry = np.array([9 * imu + _entry(columns, column) for imu, column in pairs])
-    out = np.zeros((len(pairs), len(pairs)))
-    for which, covariance in enumerate(left):
-        rows = np.flatnonzero(kind == which)
-        if covariance is not None and len(rows):
-            out[np.ix_(rows, rows)] = covariance[np.ix_(entry[rows], entry[rows])]
-    return out
+    begin = np.array([columns.names[c].startswith("gyroscope") for c in pairs[:, 1]], int)
+    begin *= _accelerometers(columns)
+    entry = begin + np.array([9 * imu + _entry(columns, column) for imu, column in pairs], int)
+    return left[np.ix_(entry, entry)]
 
 
 def _entry(columns: Columns, column: int) -> int:

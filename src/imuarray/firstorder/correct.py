@@ -73,17 +73,20 @@ class FirstOrder:
         """
         return shared_turn(nearest_orthogonal(self.triads.matrix))
 
-    def left(self) -> tuple[np.ndarray, np.ndarray | None]:
-        """Covariances (9 A, 9 A) and (9 G, 9 G) of the maps left in the corrected readings.
+    def left(self) -> np.ndarray:
+        """Covariance (9 A + 9 G, 9 A + 9 G) of the maps left in the corrected readings.
 
-        None for gyroscopes without a common map: nothing is known of their scale.
+        (9 A, 9 A) for gyroscopes without a common map: nothing is known of their scale.
         """
-        count = len(self.triads.matrix)
+        count, own = len(self.triads.matrix), self.gyroscopes
         split = self.triads.covariance.reshape(count, 12, count, 12)[:, :9, :, :9]
-        forces = _behind(self.triads.matrix, split.reshape(9 * count, 9 * count))
-        if np.isnan(self.common_scale_sd):
-            return forces, None
-        return forces, _behind(self.gyroscope_matrix, self.gyroscopes.covariance)
+        spread, matrices = split.reshape(9 * count, 9 * count), self.triads.matrix
+        if not np.isnan(self.common_scale_sd):
+            spread = np.block([[spread, own.beside.T], [own.beside, own.covariance]])
+            matrices = np.concatenate([matrices, own.matrix])
+        # errors of the matrices, as those of what is left when they are taken out
+        back = block_diag(*(np.kron(one, np.eye(3)) for one in np.linalg.inv(matrices)))
+        return back @ spread @ back.T
 
     @property
     def common_scale_sd(self) -> float:
@@ -115,11 +118,10 @@ def calibrate_first_order(
     if others:
         require_apart([recording, *others])
     every = [_still(one, shortest_pose) for one in (recording, *others)]
-    triads = _triads(every, gravity)
-    found = _of_poses(every[0], triads.first(), gravity)
+    triads, maps = _triads(every, gravity), None
     if gyroscopes == "calibrate":
-        found = replace(found, gyroscopes=calibrate_gyroscopes(every, triads))
-    return found
+        maps, triads = calibrate_gyroscopes(every, triads)
+    return replace(_of_poses(every[0], triads.first(), gravity), gyroscopes=maps)
 
 
 def _labels(recording: Recording) -> tuple:
@@ -176,7 +178,6 @@ def correct(recording: Recording, found: FirstOrder) -> Recording:
     """
     maps = found.gyroscope_matrix
     back, turn_back = np.linalg.inv(found.triads.matrix), np.linalg.inv(maps)
-    forces_left, rates_left = found.left()
     still = np.zeros(len(recording.time), bool)
     for pose in found.poses:
         still[pose] = True
@@ -191,8 +192,7 @@ def correct(recording: Recording, found: FirstOrder) -> Recording:
             recording.accelerometer_range, found.triads.matrix, found.triads.offset
         ),
         gyroscope_range=_nearest_rail(recording.gyroscope_range, maps, found.gyroscope_offset),
-        accelerometer_map_covariance=forces_left,
-        gyroscope_map_covariance=rates_left,
+        map_covariance=found.left(),
         stationary=still,
         accelerometer_axes=_axes(recording, found),
         specific_force_saturated=rails_shown(back, recording.saturated_accelerometers()),
@@ -237,12 +237,6 @@ def _axes(recording: Recording, found: FirstOrder) -> np.ndarray:
     own = recording.accelerometer_axes
     back = np.swapaxes(nearest_orthogonal(found.triads.matrix), 1, 2)
     return back if own is None else back @ own
-
-
-def _behind(matrix, covariance) -> np.ndarray:
-    """Covariance of matrices (K, 3, 3) as that of what is left when they are taken out."""
-    back = block_diag(*(np.kron(inverse, np.eye(3)) for inverse in np.linalg.inv(matrix)))
-    return back @ covariance @ back.T
 
 
 def rails_shown(inverse, rails) -> np.ndarray:

@@ -24,11 +24,13 @@ class Gyroscopes:
     ----------
     matrix : (G, 3, 3), reading = matrix @ angular rate + offset
     covariance : (9 G, 9 G) of all, row by row
+    beside : (9 G, 9 A), covariance with the accelerometers' matrices
     relative, common : `Relative` and `CommonMap`, or the reason why there is none
     """
 
     matrix: np.ndarray
     covariance: np.ndarray
+    beside: np.ndarray
     relative: Relative | str
     common: CommonMap | str
 
@@ -73,8 +75,10 @@ class Still(NamedTuple):
         return free
 
 
-def calibrate_gyroscopes(every: Sequence[Still], triads: TriadFit) -> Gyroscopes:
+def calibrate_gyroscopes(every: Sequence[Still], triads: TriadFit) -> tuple[Gyroscopes, TriadFit]:
     """Maps of all gyroscopes: relative to their mean, and one common map from the moves.
+
+    And the accelerometers' fit, which learns of the moves what directions the poses have.
 
     An IMU's gyroscope starts turned as its accelerometer is. ``every``: recordings of one board,
     the one to be corrected first; ``triads`` are of all their poses, one recording after the other.
@@ -96,7 +100,14 @@ def calibrate_gyroscopes(every: Sequence[Still], triads: TriadFit) -> Gyroscopes
     else:
         turn, maps = relative.turn, relative.map
     common = _common([(one, _moves(one, turn @ maps)) for one in every], triads)
-    return Gyroscopes(*_together(turn, maps, relative, common), relative, common)
+    matrix, covariance, by_common = _together(turn, maps, relative, common)
+    maps_only = np.arange(12 * len(triads.matrix)).reshape(-1, 12)[:, :9].ravel()
+    beside = np.zeros((len(covariance), len(maps_only)))
+    if not isinstance(common, str):
+        own = triads.beside_directions()[maps_only]
+        beside = -by_common @ (own @ common.beside).T
+        triads = triads.carried(common.score, common.information)
+    return Gyroscopes(matrix, covariance, beside, relative, common), triads
 
 
 def _moves(one: Still, matrix) -> list[Move]:
@@ -129,8 +140,11 @@ def _start(recording: Recording, triads: TriadFit) -> np.ndarray:
     return np.array([own.get(label, np.eye(3)) for label in recording.gyroscope_labels])
 
 
-def _together(turn, maps, relative, common) -> tuple[np.ndarray, np.ndarray]:
-    """Matrices (G, 3, 3) and their covariance (9 G, 9 G); the prior's of what was not estimated."""
+def _together(turn, maps, relative, common) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Matrices (G, 3, 3) and their covariance (9 G, 9 G), the prior's of what was not estimated.
+
+    Also (9 G, 9), minus their derivatives in the common map.
+    """
     unknown = np.linalg.inv(prior_precision())
     axes, change, spread = np.eye(3), np.eye(3), unknown
     if not isinstance(common, str):
@@ -145,4 +159,4 @@ def _together(turn, maps, relative, common) -> tuple[np.ndarray, np.ndarray]:
     by_map = block_diag(*(np.kron(t, behind.T) for t in turn)) @ apart
     by_common = np.vstack([np.kron(m, back.T) for m in matrix])
     own = block_diag(*own)
-    return matrix, by_common @ spread @ by_common.T + by_map @ own @ by_map.T
+    return matrix, by_common @ spread @ by_common.T + by_map @ own @ by_map.T, by_common

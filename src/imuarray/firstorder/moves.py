@@ -52,6 +52,8 @@ class CommonMap:
     error : (n,) rad, between gravity carried and found, after the fit
     before : float, rad, the same before it, median
     weight : (n,) between 0 and 1
+    score, information : (3 P,), (3 P, 3 P) of the poses' directions, the map eliminated
+    beside : (3 P, 9), times the directions' covariance their covariance with the map
     """
 
     map: np.ndarray
@@ -61,6 +63,9 @@ class CommonMap:
     error: np.ndarray
     before: float
     weight: np.ndarray
+    score: np.ndarray
+    information: np.ndarray
+    beside: np.ndarray
 
     @property
     def scale(self) -> float:
@@ -125,9 +130,6 @@ def common_map(moves: list[Move], direction, covariance) -> CommonMap | str:
             return f"rates do not carry gravity from pose to pose ({np.degrees(before):.0f} deg)"
         turn = found
     moves = [move._replace(rate=move.rate @ turn.T) for move in moves]
-    # along a direction its covariance says nothing
-    across = block_diag(*(np.eye(3) - direction[..., None] * direction[:, None]))
-    covariance = across @ covariance @ across
     return _fit(moves, direction, covariance, turn, before)
 
 
@@ -225,22 +227,29 @@ def _fit(moves, direction, covariance, turn, before) -> CommonMap:
     """Gauss-Newton; a move that a shock has spoilt counts less, by a t distribution's weights."""
     change, prior = np.eye(3), prior_precision()
     inflation, size = np.ones(len(moves)), 1.0
+    # along a direction its covariance says nothing
+    across = block_diag(*(np.eye(3) - direction[..., None] * direction[:, None]))
     for _ in range(STEPS):
         errors, slopes, along, own = _linear(moves, direction, change)
+        along = along @ across
         given = along @ covariance @ along.T
         total = given + block_diag(*(size * inflation[:, None, None] * own))
-        normal = slopes.T @ np.linalg.solve(total, slopes) + prior
-        gradient = slopes.T @ np.linalg.solve(total, errors)
-        gradient -= prior @ (change - np.eye(3)).ravel()
+        solved = np.linalg.solve(total, slopes)
+        normal = slopes.T @ solved + prior
+        gradient = solved.T @ errors - prior @ (change - np.eye(3)).ravel()
         delta = np.linalg.solve(normal, gradient)
         change = change + delta.reshape(3, 3)
         inflation, size = _weights(errors - slopes @ delta, given, own, size)
         if np.abs(delta).max() < CLOSE:
             break
-    left = (errors - slopes @ delta).reshape(-1, 2)
+    left, spread = errors - slopes @ delta, np.linalg.inv(normal)
+    score, beside = -along.T @ np.linalg.solve(total, left), along.T @ solved @ spread
+    information = along.T @ np.linalg.solve(total, along) - beside @ normal @ beside.T
+    left = left + along @ covariance @ score
     return CommonMap(
-        change, np.linalg.inv(normal), turn, np.array([move.first for move in moves]),
-        np.linalg.norm(left, axis=1), before, 1 / inflation,
+        change, spread, turn, np.array([move.first for move in moves]),
+        np.linalg.norm(left.reshape(-1, 2), axis=1), before, 1 / inflation,
+        score, information, beside,
     )  # fmt: skip
 
 

@@ -6,9 +6,11 @@ triangular, which makes its axes the array frame (paper 2021, section IV-B, afte
 Several recordings of a board share the matrices, and have offsets b_k of their own.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from scipy.linalg import rq
@@ -24,6 +26,18 @@ OUTLIER = 5.0  # times the median size of a residual
 MOST_OFF = 0.5  # relative, of a pose's mean specific force from gravity
 MOST_LEFT_OUT = 0.2  # of a triad's poses
 SMALL = np.radians(20.0)  # a triad turned by less starts from the drawing
+
+
+class Fitted(NamedTuple):
+    """All n parameters of a fit as `_unpack` has them, their covariance (n, n), and of what.
+
+    ``mean`` (P, A, 3) m/s^2 in the poses; ``magnitude`` of gravity, m/s^2.
+    """
+
+    values: np.ndarray
+    covariance: np.ndarray
+    mean: np.ndarray
+    magnitude: float
 
 
 @dataclass(frozen=True)
@@ -44,6 +58,7 @@ class TriadFit:
         False where a triad's reading in a pose was left out as an outlier.
     direction_covariance : (3 P, 3 P), scaled like the other; along a direction it says nothing
     recording : (P,) int, the recording of each pose
+    fitted : what the poses of all recordings gave
     """
 
     matrix: np.ndarray
@@ -55,6 +70,25 @@ class TriadFit:
     used: np.ndarray
     direction_covariance: np.ndarray
     recording: np.ndarray
+    fitted: Fitted
+
+    def beside_directions(self) -> np.ndarray:
+        """Covariance (12 A, 3 P) of the matrices and offsets with all poses' directions."""
+        out = np.zeros((len(self.covariance), self.fitted.mean.shape[0] * 3))
+        place = _places(len(self.matrix))
+        out[place] = self.fitted.covariance[: len(place), -out.shape[1] :]
+        return out
+
+    def carried(self, score, information) -> TriadFit:
+        """What is left once rates have carried gravity from pose to pose.
+
+        ``score`` (3 P,) and ``information`` (3 P, 3 P) of the directions, as `CommonMap` has them.
+        """
+        own = self.fitted
+        along = own.covariance[:, -len(score) :]
+        values, spread = own.values + along @ score, along @ information @ along.T
+        own = own._replace(values=values, covariance=own.covariance - spread)
+        return _result(own, self.used, self.recording, self.residual_ratio)
 
     def first(self) -> Self:
         """The same with the poses of the first recording only."""
@@ -253,30 +287,32 @@ def _fit(mean, sd, magnitude, recording, used, start) -> tuple[TriadFit, np.ndar
     # a reading that alone determines something cannot be spared: its inverse is kept finite
     solved = np.linalg.solve(free + 1e-9 * np.eye(3), misfit[..., None])[..., 0]
     gain = np.einsum("pki,pki->pk", misfit, solved)
-    return _result(found, mean, used, magnitude, recording), gain
-
-
-def _result(found, mean, used, magnitude, recording) -> TriadFit:
-    poses, triads = used.shape
     freedom = 3 * int(used.sum()) + poses - found.x.size
-    matrices, offsets, directions = (np.asarray(x) for x in _unpack(found.x, triads, poses))
     ratio = np.sqrt(2 * found.cost / freedom) if freedom > 0 else np.nan
     scale = max(ratio, 1.0) if freedom > 0 else 1.0
-    shape = 12 * triads - 3
-    norm = np.linalg.norm(found.jac, axis=0)
-    scaled = found.jac / norm
-    small = np.linalg.inv(scaled.T @ scaled) / np.outer(norm, norm)
-    small *= scale**2
-    place = np.concatenate(
+    spread = scale**2 * np.linalg.inv(scaled.T @ scaled) / np.outer(norm, norm)
+    own = Fitted(found.x, spread, mean, magnitude)
+    return _result(own, used, recording, float(ratio)), gain
+
+
+def _places(triads: int) -> np.ndarray:
+    """Where the matrices' and the first recording's offsets' parameters are among (12 A,)."""
+    return np.concatenate(
         [3 * UPPER[0] + UPPER[1]]
         + [12 * k + np.arange(9) for k in range(1, triads)]
         + [12 * k + 9 + np.arange(3) for k in range(triads)]
     )
+
+
+def _result(own: Fitted, used, recording, ratio: float) -> TriadFit:
+    poses, triads = used.shape
+    matrices, offsets, directions = (np.asarray(x) for x in _unpack(own.values, triads, poses))
+    place = _places(triads)
     covariance = np.zeros((12 * triads, 12 * triads))
-    covariance[np.ix_(place, place)] = small[:shape, :shape]
+    covariance[np.ix_(place, place)] = own.covariance[: len(place), : len(place)]
     direction = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    residual = mean - np.asarray(_predict(found.x, triads, magnitude, recording))
+    residual = own.mean - np.asarray(_predict(own.values, triads, own.magnitude, recording))
     return TriadFit(
-        matrices, offsets[0], direction, residual, covariance, float(ratio), used,
-        small[-3 * poses :, -3 * poses :], recording,
+        matrices, offsets[0], direction, residual, covariance, ratio, used,
+        own.covariance[-3 * poses :, -3 * poses :], recording, own,
     )  # fmt: skip

@@ -28,8 +28,7 @@ DIMENSIONS = {
     "stationary": ("time",),
     "specific_force_saturated": ("time", "accelerometer", "axis"),
     "angular_rate_saturated": ("time", "gyroscope", "axis"),
-    "accelerometer_map_covariance": ("accelerometer_entry", "accelerometer_entry_other"),
-    "gyroscope_map_covariance": ("gyroscope_entry", "gyroscope_entry_other"),
+    "map_covariance": ("map_entry", "map_entry_other"),
     "accelerometer_axes": ("accelerometer", "axis", "axis_other"),
 }
 
@@ -60,11 +59,8 @@ NUMBERS = {
 # Attributes that need not be there.
 OPTIONAL_NUMBERS = {"output_period": "s"}
 
-# Optional variables: how well the maps are known by which the readings were corrected.
-COVARIANCES = ("accelerometer_map_covariance", "gyroscope_map_covariance")
-
 # Optional variables without a unit.
-MATRICES = (*COVARIANCES, "accelerometer_axes")
+MATRICES = ("map_covariance", "accelerometer_axes")
 
 # Optional variables, all or none: how the readings were corrected, inverse @ (raw - offset).
 CORRECTION = {
@@ -106,9 +102,10 @@ class Recording:
         Still poses.
     specific_force_saturated, angular_rate_saturated : ndarray (T, A or G, 3) bool, or None
         Readings at a rail, where a correction moved them off the range (first-order calibration).
-    accelerometer_map_covariance, gyroscope_map_covariance : (9 A, 9 A) and (9 G, 9 G), or None
-        Of the 3 x 3 maps, no unit, that are left between the truth and the readings where these
-        were corrected: about the identity, row by row, triad by triad.
+    map_covariance : (9 A + 9 G, 9 A + 9 G), or (9 A, 9 A), or None
+        Of the 3 x 3 maps, no unit, of accelerometers and gyroscopes that are left between the truth
+        and the readings where these were corrected: about the identity, row by row, triad by triad.
+        Without gyroscopes where nothing is known of their scale.
     accelerometer_axes : (A, 3, 3), or None
         Rotations from the accelerometers' own axes, those of their chips, to the array's.
     correction : Dataset, or None
@@ -137,8 +134,7 @@ class Recording:
     stationary: np.ndarray | None = None
     specific_force_saturated: np.ndarray | None = None
     angular_rate_saturated: np.ndarray | None = None
-    accelerometer_map_covariance: np.ndarray | None = None
-    gyroscope_map_covariance: np.ndarray | None = None
+    map_covariance: np.ndarray | None = None
     accelerometer_axes: np.ndarray | None = None
     correction: xr.Dataset | None = None
     output_period: float = np.nan
@@ -180,10 +176,11 @@ class Recording:
     @property
     def gyroscope_common_covariance(self) -> np.ndarray | None:
         """(9, 9) of the map that all gyroscopes share, their mean's; None if not known."""
-        if self.gyroscope_map_covariance is None:
+        count, before = len(self.gyroscope_labels), 9 * len(self.accelerometer_labels)
+        if self.map_covariance is None or len(self.map_covariance) == before:
             return None
-        count = len(self.gyroscope_labels)
-        return self.gyroscope_map_covariance.reshape(count, 9, count, 9).mean(axis=(0, 2))
+        own = self.map_covariance[before:, before:]
+        return own.reshape(count, 9, count, 9).mean(axis=(0, 2))
 
     @property
     def gyroscope_common_scale_sd(self) -> float:

@@ -17,7 +17,6 @@ from imuarray.geometry.array import require_apart, require_count
 from imuarray.recording.record import (
     AXES,
     CORRECTION,
-    COVARIANCES,
     DIMENSIONS,
     FLAGS,
     LABELS,
@@ -76,9 +75,8 @@ def check_structure(dataset: xr.Dataset, where: str) -> None:
     for name, unit in OPTIONAL_NUMBERS.items():
         if name in dataset.attrs:
             _check_number(dataset.attrs, name, unit, where)
-    for name in COVARIANCES:
-        if name in dataset:
-            _check_covariance(dataset, name, where)
+    if "map_covariance" in dataset:
+        _check_covariance(dataset, "map_covariance", where)
     for name in CORRECTION if set(CORRECTION) & set(dataset) else ():
         _check_correction(dataset, name, where)
     if "accelerometer_axes" in dataset:
@@ -166,10 +164,11 @@ def _check_covariance(dataset: xr.Dataset, name: str, where: str) -> None:
     _check_present(dataset, name, where)
     _check_numeric(dataset[name], where)
     values = dataset[name].values.astype(float)
-    count = 9 * dataset.sizes[name.partition("_")[0]]
-    if values.shape != (count, count) or not (np.abs(values) <= LARGEST).all():
+    first, second = (9 * dataset.sizes[kind] for kind in LABELS)
+    square = values.shape in ((first, first), (first + second, first + second))
+    if not square or not (np.abs(values) <= LARGEST).all():
         raise InputError(
-            f"{where}: {name}: expected {count} x {count} finite numbers, found"
+            f"{where}: {name}: expected {first} or {first + second} squared finite numbers, found"
             f" {' x '.join(map(str, values.shape))}, or others"
         )
     least, *_, most = np.linalg.eigvalsh((values + values.T) / 2)
