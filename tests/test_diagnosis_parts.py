@@ -208,8 +208,7 @@ def test_heldout_scores_are_those_of_refits_without_each_block(clean):
     for block in (0, 5):
         inside = np.zeros(len(made.residual), bool)
         inside[blocks[block]] = True
-        whole = [made.residual, made.whitened, made.basis]
-        information, score = normal(*(part[~inside] for part in whole), made.active)
+        information, score = normal(made, made.active, ~inside)
         values = flat_parameters(made.columns, made.state)[made.active]
         offset = values - nominal_of(made)[made.active]
         step = np.linalg.solve(information + ridge_of(made), score - ridge_of(made) @ offset)

@@ -38,6 +38,7 @@ class Fit:
     residual : (T, N, 6) in the units of the noise sd, the motion's share taken out
     whitened : (T, N, 6, w) derivative by the shared parameters, in those units
     basis : (T, 6 N, D) basis of what the motion can explain, orthonormal with its prior's
+    expected, unexpected, course : of omega_dot's prior, as `Eliminated` has them
     log_volume : (T,) log determinant of the motion's information
     misfits : (T,) sums of squared residuals, the motion's prior included
     """
@@ -50,6 +51,9 @@ class Fit:
     residual: np.ndarray
     whitened: np.ndarray
     basis: np.ndarray
+    expected: np.ndarray
+    unexpected: np.ndarray
+    course: np.ndarray
     log_volume: np.ndarray
     misfits: np.ndarray
     converged: bool
@@ -82,6 +86,7 @@ class Fit:
             self,
             wanted=self.wanted[kept],
             whitened=self.whitened[..., kept],
+            course=self.course[..., kept],
         )
 
     def along(self, step) -> np.ndarray:
@@ -98,7 +103,7 @@ class Fit:
             information, score = np.zeros((mask.sum(), mask.sum())), np.zeros(mask.sum())
             for start in starts:  # what is made of it is small
                 rows = slice(start, min(start + CHUNK, last))
-                inner, slope = normal(self.residual, self.whitened, self.basis, mask, rows)
+                inner, slope = normal(self, mask, rows)
                 information += inner
                 score += slope
             return information, score
@@ -148,16 +153,23 @@ def seen_through(whitened, basis, chosen):
     return through, blocks
 
 
-def normal(residual, whitened, basis, chosen, part=slice(None)):
-    """Information (n, n) and score (n,) of the chosen parameters, motion projected out."""
-    through, blocks = seen_through(whitened[part], basis[part], chosen)
-    flat = through.reshape(through.shape[0] * through.shape[1], -1)
-    information, score = -(flat.T @ flat), np.empty(flat.shape[1])
+def normal(seen, chosen, part=slice(None)):
+    """Information (n, n) and score (n,) of the chosen parameters, motion projected out.
+
+    ``seen``: an `Eliminated` or a `Fit`.
+    """
+    through, blocks = seen_through(seen.whitened[part], seen.basis[part], chosen)
+    course = np.empty((*seen.unexpected[part].shape, through.shape[2]))
+    for imu, places, _ in blocks:
+        course[..., places] = seen.course[part, :, imu][..., chosen[imu]]
+    through += seen.expected[part] @ course
+    flat, prior = (x.reshape(x.shape[0] * x.shape[1], x.shape[2]) for x in (through, course))
+    information, score = prior.T @ prior - flat.T @ flat, prior.T @ seen.unexpected[part].ravel()
     for imu, places, block in blocks:
         own = block.reshape(-1, block.shape[-1])
         information[places, places] += own.T @ own
         # the residual is orthogonal to the motion already
-        score[places] = own.T @ residual[part, imu].ravel()
+        score[places] += own.T @ seen.residual[part, imu].ravel()
     return information, score
 
 
@@ -190,7 +202,7 @@ def search_optimum(readings, columns, active, state, smooth, rough):
         state = with_derivatives(readings, state, smooth)
         seen = linearise(readings, columns, state, wanted, seen)
         misfit = float(np.sum(seen.misfit))
-        information, score = normal(seen.residual, seen.whitened, seen.basis, few)
+        information, score = normal(seen, few)
         offset = flat_parameters(columns, state)[active] - prior_mean
         score = score - precision @ offset
         step, sds = scaled_solve(information + precision, score)
@@ -241,7 +253,7 @@ def at(
     seen = linearise(readings, columns, state, wanted)
     return Fit(
         readings, columns, state, active, wanted, seen.residual, seen.whitened, seen.basis,
-        seen.log_volume, seen.misfit, converged,
+        seen.expected, seen.unexpected, seen.course, seen.log_volume, seen.misfit, converged,
     )  # fmt: skip
 
 
@@ -255,6 +267,7 @@ def advance(columns, state, active, step, few, seen: Eliminated, length) -> Stat
     blocks[few] = step
     along = np.einsum("tkim,km->tki", seen.whitened, blocks, optimize=True)
     moved = (along.reshape(len(along), 1, -1) @ seen.basis)[:, 0]
+    moved += np.einsum("tdi,tikm,km->td", seen.expected, seen.course, blocks, optimize=True)
     move = np.einsum("tji,tj->ti", seen.inverse, seen.taken - moved)
     whole = flat_parameters(columns, state)
     whole[active] += step

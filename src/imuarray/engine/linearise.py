@@ -82,13 +82,19 @@ class Eliminated(NamedTuple):
     basis: np.ndarray  # (T, 6 N, D) of what the motion can explain, orthonormal with its prior's
     inverse: np.ndarray  # (T, D, D) of the factor of the motion's information
     taken: np.ndarray  # (T, D) the residual's coordinates in the basis
+    expected: np.ndarray  # (T, D, 3) omega_dot's prior in that basis; (T, D, 0) where it has none
+    unexpected: np.ndarray  # (T, 3) what is left of it, in its sds
+    course: np.ndarray  # (T, 3, N, m) derivatives of its mean, their sign turned, as of readings
     log_volume: np.ndarray  # (T,) log determinant of the motion's information
     misfit: np.ndarray  # (T,) squared residuals, the prior's included
 
     @property
     def through(self) -> np.ndarray:
         """(T, N, D, m), the derivative's coordinates in that basis."""
-        return through_of(self.basis, self.whitened)
+        through = through_of(self.basis, self.whitened)
+        if self.expected.shape[2]:
+            through += np.einsum("tdi,tikm->tkdm", self.expected, self.course)
+        return through
 
 
 def _instant(x, positions, extra, time, span) -> Instant:
@@ -160,7 +166,22 @@ def _chunk(model, count, placed, x, extra, time, span, positions, parameters, da
     return weights * (values - predicted), motion, weights[..., None] * shared, gram
 
 
-def _eliminated(residual, motion, whitened, gram, bare, sd) -> Eliminated:
+def _course(readings: Readings, index, whitened, sd) -> np.ndarray:
+    """`Eliminated`'s, of the rate's own slope as the mean, with its ``sd`` (T, 3).
+
+    What a gyroscope's parameter changes in its reading, it changes in the rate with the sign
+    turned, and with the share that the gyroscope has in it.
+    """
+    weights = readings.weights_of(index)[..., 3:]
+    total = np.maximum(np.sum(weights**2, axis=1), np.finfo(float).tiny)
+    share = np.swapaxes(weights[..., None] * whitened[..., 3:, :], 1, 2) / total[..., None, None]
+    run = readings.run[index]
+    run[1:][np.diff(index) == 0] = run[-1] + 1  # the padding of a last chunk
+    slope = polynomial_derivative(readings.time, run, share, readings.window, 1)
+    return slope / sd[..., None, None]
+
+
+def _eliminated(residual, motion, whitened, gram, bare, sd, course) -> Eliminated:
     """A chunk, the motion projected out; ``bare`` (T, k) is what its prior expects, in sds.
 
     A prior of the motion's last k numbers, ``sd`` infinite where it has none.
@@ -178,8 +199,11 @@ def _eliminated(residual, motion, whitened, gram, bare, sd) -> Eliminated:
     unexpected = (bare[..., None] - np.swapaxes(expected, 1, 2) @ taken)[..., 0]
     misfit = np.sum(left**2, axis=1) + np.sum(unexpected**2, axis=1)
     volume = 2 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
-    left = left.reshape(residual.shape)
-    return Eliminated(left, whitened, basis, inverse, taken[..., 0], volume, misfit)
+    left, first = left.reshape(residual.shape), course.shape[1]
+    return Eliminated(
+        left, whitened, basis, inverse, taken[..., 0], expected[..., :first],
+        unexpected[:, :first], course, volume, misfit,
+    )  # fmt: skip
 
 
 def through_of(basis, whitened) -> np.ndarray:
@@ -222,11 +246,14 @@ def chunk_at(readings: Readings, columns: Columns, state: State, directions, sta
         (readings.values[index], readings.weights_of(index)),
     )  # fmt: skip
     bare = (mean - x[:, x.shape[1] - sd.shape[1] :]) / sd
+    whitened = np.asarray(whitened)[..., directions]
+    course = np.zeros((len(index), 0, whitened.shape[1], len(directions)))
+    if state.turning is not None:
+        course = _course(readings, index, whitened, sd[:, :3])
     # factorisations are LAPACK's, called from here (see `jax64`)
     return _eliminated(
-        np.asarray(residual), np.asarray(motion), np.asarray(whitened)[..., directions],
-        np.array(gram), bare, sd,
-    )  # fmt: skip
+        np.asarray(residual), np.asarray(motion), whitened, np.array(gram), bare, sd, course
+    )
 
 
 def _chunk_of(readings: Readings, state: State, start):

@@ -69,10 +69,7 @@ def normal_pass(
         squares[part], freedom[part] = _by_triad(residual**2), _by_triad(left)
         unit[part] = _by_triad(residual**2 / np.maximum(1.0 - leverage, LEAST_FREE))
         rough = _seen_of_prior(here, motion[part], seen.inverse[:used], part)
-        known = [
-            (block, *normal(seen.residual, seen.whitened, seen.basis, few, rows))
-            for block, rows in _inside(blocks, part)
-        ]
+        known = [(block, *normal(seen, few, rows)) for block, rows in _inside(blocks, part)]
         taken = float(np.sum(seen.taken[:used] ** 2))
         return known, float(np.sum(seen.misfit[:used])), taken, rough
 
