@@ -63,7 +63,7 @@ def made():
     root = 1e-4 * rng.standard_normal((36, 36))
     recording = replace(
         plain, correction=correction, accelerometer_axes=back @ chips,
-        accelerometer_map_covariance=root @ root.T,
+        map_covariance=root @ root.T,
     )  # fmt: skip
     model = model_of(recording, EFFECTS)
     values = 1e-5 + model.effect_prior_sd * rng.standard_normal(model.effect_size)
@@ -214,7 +214,7 @@ def test_the_turns_sds_are_those_of_drawn_maps(made, upper):
     matrices = np.linalg.inv(calibration["accelerometer_inverse"].to_numpy()[0])
     turns = np.array([part(matrix)[1] for matrix in matrices])
     own, others = _turn_sds(calibration, turns, turns)
-    left = calibration["accelerometer_map_covariance"].to_numpy()
+    left = calibration["map_covariance"].to_numpy()
     draws = np.random.default_rng(2).multivariate_normal(np.zeros(36), left, 1500)
     seen = []
     for draw in draws.reshape(-1, 4, 3, 3):

@@ -48,7 +48,7 @@ def board(
 
 def _first_order(recording: Recording, gravity: float) -> FirstOrder | str:
     """What still poses and moves say, or why they do not."""
-    if recording.accelerometer_map_covariance is not None:
+    if recording.map_covariance is not None:
         return "the recording is corrected already"
     try:
         still_poses(recording)

@@ -15,7 +15,7 @@ from imuarray.model.effects import EFFECTS, KINDS
 from imuarray.model.names import parameter_ids, parameter_names
 from imuarray.motion.state import UNITS
 from imuarray.recording import Recording
-from imuarray.recording.record import COVARIANCES, DIMENSIONS
+from imuarray.recording.record import DIMENSIONS, MATRICES
 
 PLACE = ("accelerometer", "axis")
 
@@ -43,8 +43,7 @@ def positions_dataset(recording: Recording, positions, covariance) -> xr.Dataset
 def with_readings(dataset: xr.Dataset, recordings: Sequence[Recording]) -> xr.Dataset:
     """A calibration that knows its readings: axes, corrections, what these left, and the rate."""
     first = recordings[0]
-    names = "accelerometer_axes", *COVARIANCES
-    known = {name: getattr(first, name) for name in names if getattr(first, name) is not None}
+    known = {name: getattr(first, name) for name in MATRICES if getattr(first, name) is not None}
     dataset = dataset.assign({n: (DIMENSIONS[n], x, {"units": "1"}) for n, x in known.items()})
     corrections = [one.correction for one in recordings if one.correction is not None]
     if len(corrections) == len(recordings):

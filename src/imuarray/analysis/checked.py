@@ -13,7 +13,7 @@ from imuarray.errors import LARGEST, SMALLEST, InputError
 from imuarray.model.effects import EFFECTS, KINDS
 from imuarray.model.own import own_version
 from imuarray.recording import Recording
-from imuarray.recording.record import CORRECTION, COVARIANCES, DIMENSIONS
+from imuarray.recording.record import CORRECTION, DIMENSIONS, MATRICES
 
 _PLACE = ("accelerometer", "axis")
 # Variables by whether they are needed: always, with effects, or not at all.
@@ -26,8 +26,7 @@ _WITH_EFFECTS = {
 }  # fmt: skip
 _PERHAPS = {
     "nominal_position": _PLACE, "whole_covariance": ("unknown", "unknown_other"),
-    "accelerometer_axes": DIMENSIONS["accelerometer_axes"],
-    **{name: DIMENSIONS[name] for name in COVARIANCES},
+    **{name: DIMENSIONS[name] for name in MATRICES},
     **{name: ("recording", *dims) for name, dims in CORRECTION.items() if name[-3:] != "_sd"},
 }  # fmt: skip
 SAME_BOARD = 5.0  # prior sds by which two drawings of one board may differ

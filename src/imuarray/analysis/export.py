@@ -15,7 +15,7 @@ from imuarray.firstorder.turns import nearest_orthogonal
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.model.effects import KINDS, Prediction
-from imuarray.recording.record import CORRECTION, NUMBERS
+from imuarray.recording.record import CORRECTION, NUMBERS, by_kind
 from imuarray.recording.validate import is_rotation
 
 BIASES = "accelerometer_bias", "gyroscope_bias"
@@ -163,11 +163,8 @@ def _steps(calibration: xr.Dataset, model: ArrayModel) -> dict[str, list[dict]]:
             if not out[kind]:
                 out[kind].append({"from": "first-order"})
             out[kind][0][part] = part_values.to_numpy()
-        for kind in KINDS:
-            left = calibration.get(f"{kind}_map_covariance")
-            if left is not None:
-                sds = np.sqrt(np.maximum(np.diag(left.to_numpy()), 0)).reshape(-1, 3, 3)
-                out[kind][0]["map_sd"] = sds
+        for kind, left in _left(calibration).items():
+            out[kind][0]["map_sd"] = np.sqrt(np.maximum(np.diag(left), 0)).reshape(-1, 3, 3)
     values = _values(calibration, model)
     for number, kind in enumerate(KINDS):
         if any(name.startswith(kind) for name in set(values) & {*MATRICES, *BIASES}):
@@ -175,6 +172,12 @@ def _steps(calibration: xr.Dataset, model: ArrayModel) -> dict[str, list[dict]]:
             step = {"from": "calibrate", "inverse": np.linalg.inv(matrix), "offset": offset}
             out[kind].append(step)
     return out
+
+
+def _left(calibration: xr.Dataset) -> dict[str, np.ndarray]:
+    """Covariances by kind of the maps that first order has left."""
+    left = calibration.get("map_covariance")
+    return by_kind(None if left is None else left.to_numpy(), calibration.sizes["accelerometer"])
 
 
 def _linear(model: ArrayModel, values: dict, kind: int) -> tuple[np.ndarray, np.ndarray]:
@@ -271,7 +274,7 @@ def _turn_sds(calibration: xr.Dataset, turns, others) -> tuple[np.ndarray, np.nd
     From the maps 1 + d that first order has left: of U R (1 + d) what is beneath the diagonal of
     R d R' turns R, of L R (1 + d) what is above.
     """
-    left, count = calibration.get("accelerometer_map_covariance"), len(turns)
+    left, count = _left(calibration).get("accelerometer"), len(turns)
     if left is None:
         return (np.full((count, 3), np.nan),) * 2
     sds, places, signs = [], ([7, 6, 3], [5, 2, 1]), ([1, -1, 1], [-1, 1, -1])
@@ -285,7 +288,7 @@ def _turn_sds(calibration: xr.Dataset, turns, others) -> tuple[np.ndarray, np.nd
             apart = others @ others[0].T
             slopes = slopes - np.einsum("kij,jlm->kilm", apart, slopes[0])
         rows = slopes.reshape(3 * count, 9 * count)
-        variances = np.einsum("ri,ij,rj->r", rows, left.to_numpy(), rows)
+        variances = np.einsum("ri,ij,rj->r", rows, left, rows)
         sds.append(np.sqrt(np.maximum(variances, 0.0)).reshape(count, 3))
     return sds[0], sds[1]
 

@@ -176,10 +176,10 @@ class Recording:
     @property
     def gyroscope_common_covariance(self) -> np.ndarray | None:
         """(9, 9) of the map that all gyroscopes share, their mean's; None if not known."""
-        count, before = len(self.gyroscope_labels), 9 * len(self.accelerometer_labels)
-        if self.map_covariance is None or len(self.map_covariance) == before:
+        own = by_kind(self.map_covariance, len(self.accelerometer_labels)).get("gyroscope")
+        if own is None:
             return None
-        own = self.map_covariance[before:, before:]
+        count = len(self.gyroscope_labels)
         return own.reshape(count, 9, count, 9).mean(axis=(0, 2))
 
     @property
@@ -213,6 +213,15 @@ class Recording:
         said = f"{len(left['time'])} of {whole}"
         unchanged = len(left["time"]) == len(self.time)
         return replace(self, **left, selected=self.selected if unchanged else said)
+
+
+def by_kind(map_covariance, accelerometers: int) -> dict[str, np.ndarray]:
+    """A recording's ``map_covariance``, or None, apart: of accelerometers, and of gyroscopes."""
+    if map_covariance is None:
+        return {}
+    split = 9 * accelerometers
+    parts = {"accelerometer": slice(split), "gyroscope": slice(split, None)}
+    return {kind: map_covariance[p, p] for kind, p in parts.items() if map_covariance[p].size}
 
 
 def array_of(recording: Recording, gyroscopes: int | None = None) -> Array:
