@@ -205,8 +205,8 @@ def test_readings_that_are_missing_or_came_twice(tmp_path):
 @pytest.mark.parametrize(
     ("name", "words"),
     [("gone.bag", "expected a file to read, found none"),
-     ("text.bag", "text.bag: expected a ROS bag, found ReaderError: File magic"),
-     ("empty", "empty: expected a ROS bag, found FileNotFoundError"),
+     ("text.bag", "text.bag: expected a whole ROS bag, found ReaderError: File magic"),
+     ("empty", "empty: expected a whole ROS bag, found FileNotFoundError"),
      ("log.csv", "expected a folder or a file of .bag, .mcap, .db3"),
      ("bare.bag", "bare.bag: expected messages of sensor_msgs/msg/Imu, found none")],
 )  # fmt: skip

@@ -106,7 +106,7 @@ def _read(path: Path) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     except Exception as error:
         # a damaged bag makes the library raise nearly anything
         what = f"{type(error).__name__}: {error}"
-        raise InputError(f"{path}: expected a ROS bag, found {what}") from error
+        raise InputError(f"{path}: expected a whole ROS bag, found {what}") from error
     if not stamps:
         raise InputError(f"{path}: expected messages of {MESSAGE}, found none")
     return {t: (np.array(stamps[t]), np.array(values[t]).reshape(-1, 6)) for t in stamps}
