@@ -15,10 +15,11 @@ SNAKEMAKE := $(BIN)/snakemake --cores $(CORES) $(SNAKEMAKE_ARGS)
 # Snakemake's jobs start `python` and `imuarray` by name.
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: help run quick paper test test-slurm bench docs lint lock clean
+.PHONY: help install run quick paper test test-slurm bench docs lint lock clean
 .DEFAULT_GOAL := help
 
 help:
+	@echo "make install the package alone, without the pipeline, for a board of your own"
 	@echo "make run     all results and figures at the default scale"
 	@echo "make quick   the same pipeline, smallest useful sizes"
 	@echo "make paper   the papers' own sizes (long)"
@@ -39,6 +40,13 @@ $(READY): requirements.lock pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $@
+
+# The versions of the lock; its hashes are for all of it. An environment that has the pipeline has the package.
+install:
+	@test -e $(READY) || { set -e; rm -rf $(VENV); $(PYTHON) -m venv $(VENV); \
+	  grep -oE '^[A-Za-z0-9_.-]+==[^\]*' requirements.lock > $(VENV)/versions.txt; \
+	  $(BIN)/python -m pip install --quiet --disable-pip-version-check -c $(VENV)/versions.txt '.[ros]'; }
+	@echo "$(CURDIR)/$(BIN)/imuarray board log.csv --columns columns.yaml --out answer/"
 
 run: $(READY)
 	$(SNAKEMAKE)

@@ -19,14 +19,14 @@ from imuarray.report.board import Board
 
 def board(
     logs: Sequence[str | PathLike], columns: str | PathLike | None = None,
-    gravity: float = GRAVITY, say: Say = silent,
+    gravity: float = GRAVITY, topics: Sequence[str] = (), say: Say = silent,
 ) -> Board:  # fmt: skip
     """All that `imuarray board` finds of some logs, which `write_board` makes a page of.
 
-    ``gravity`` m/s^2; ``say`` is called with each remark on the work's course. InputError as of
+    ``gravity`` m/s^2; ``topics`` of bags; ``say`` is called with each remark on the work's course. InputError as of
     `open_logs`, `first_order` and `calibrate`; a log without still poses is calibrated as it is.
     """
-    opened = open_logs(logs, columns)
+    opened = open_logs(logs, columns, topics)
     recording = opened.recording
     say(f"{len(recording.time)} samples of {len(recording.accelerometer_labels)} IMUs")
     for line in opened.lines:

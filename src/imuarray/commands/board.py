@@ -9,7 +9,9 @@ from imuarray.report.board import write_board
 def board(arguments) -> None:
     """From logs to positions, on the defaults, and a page of all that was found."""
     output = Output(arguments)
-    found = answered(arguments.logs, arguments.columns, arguments.gravity, output.say)
+    found = answered(
+        arguments.logs, arguments.columns, arguments.gravity, arguments.topics, output.say
+    )
     write_board(found, arguments.out)
     page = str(arguments.out / "report.html")
     output.say("\n".join([report(found.calibration), f"report: {page}"]))

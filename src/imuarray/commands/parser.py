@@ -86,6 +86,8 @@ class Command(NamedTuple):
     folder: bool = False
 
 
+TOPICS = _option("--topics", "of ROS bags, the reference first (default: those of the YAML)",
+                 nargs="+", default=(), metavar="/imu0")  # fmt: skip
 GRAVITY = _number("--gravity", "G", "magnitude of gravity where it was recorded, m/s^2 (default:"
                   " 9.80665)", 9.80665)  # fmt: skip
 
@@ -98,7 +100,7 @@ COMMANDS = (
         (
             _option("logs", "what a logger wrote (docs/convert.md), or a recording (NetCDF-4)",
                     type=InputLog, nargs="+", metavar="log"),
-            _file("--columns", "YAML: columns, units, positions"), GRAVITY,
+            _file("--columns", "YAML: columns, units, positions"), TOPICS, GRAVITY,
         ),
         folder=True,
     ),
@@ -147,9 +149,7 @@ COMMANDS = (
         (
             _option("data", "ROS 1 bag, ROS 2 bag's folder or file (.db3, .mcap); several of a rig"
                     " are joined in time", type=bag, nargs="+", metavar="bag"),
-            _file("--columns", "YAML: positions, noise, range"),
-            _option("--topics", "to use, the reference first (default: those of the YAML)",
-                    nargs="+", default=(), metavar="/imu0"),
+            _file("--columns", "YAML: positions, noise, range"), TOPICS,
         ),
     ),
     Command(

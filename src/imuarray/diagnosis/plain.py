@@ -26,11 +26,10 @@ class Sizes(NamedTuple):
     sds: np.ndarray
 
     @classmethod
-    def of(cls, found: dict[tuple[str, str], tuple[float, float | None]]) -> "Sizes":
-        """From {(component, IMU): (value, sd)}; NaN where one is missing."""
-        parts, labels = (list(dict.fromkeys(key)) for key in zip(*found, strict=True))
-        missing = (np.nan, np.nan)
-        table = [[found.get((part, label), missing) for part in parts] for label in labels]
+    def of(cls, found: dict[tuple[str, str], tuple[float, float | None]], labels) -> "Sizes":
+        """From {(component, IMU): (value, sd)}; zero where an IMU has none, NaN without an sd."""
+        parts, labels = list(dict.fromkeys(part for part, _ in found)), list(labels)
+        table = [[found.get((part, label), (0.0, 0.0)) for part in parts] for label in labels]
         values, sds = np.moveaxis(np.array(table, float), -1, 0)
         return cls(labels, parts, values, sds)
 
@@ -59,8 +58,9 @@ def standing_out(values, sds) -> tuple[np.ndarray, float]:
 
 def _late(sizes: Sizes) -> list[str]:
     values, sds = sizes.values[:, 0], sizes.sds[:, 0]
-    # the mean of all is zero, and a delay against the others' mean is so much larger, its sd too
-    return _read(sizes.labels, -values, sds * len(values) / max(len(values) - 1, 1))
+    # where the mean of all is zero, a delay against the others' mean is larger, its sd as well
+    larger = len(values) / max(len(values) - 1, 1) if np.all(sds > 0) else 1.0
+    return _read(sizes.labels, -values, larger * sds)
 
 
 def _read(labels, ages, sds) -> list[str]:
@@ -150,16 +150,22 @@ def _scaled(kind: str):
         out, usual = standing_out(means, sds) if len(means) > 2 else (np.ones(len(means), bool), 0)
         said = []
         for k in np.flatnonzero(out):
-            more = "too much" if means[k] > usual else "too little"
-            size = plus_minus(100 * abs(means[k] - usual), 100 * sds[k])
-            rows = zip(sizes.components, sizes.values[k] - usual, sizes.sds[k], strict=True)
-            axes = joined(f"{name} {plus_minus(100 * off, 100 * sd)}" for name, off, sd in rows)
-            said.append(f"{kind} {sizes.labels[k]} shows {size} % {more} ({axes})")
+            off = sizes.values[k] - usual
+            rows = zip(sizes.components, off, sizes.sds[k], strict=True)
+            size = float(np.nanmax(np.abs(off)))
+            axes = joined(f"{name} {quantity(v, sd, '%', size)}" for name, v, sd in rows)
+            mean = means[k] - usual
+            if np.ptp(off) < abs(mean):
+                more = "too much" if mean > 0 else "too little"
+                shown = quantity(abs(mean), sds[k], "%")
+                said.append(f"{kind} {sizes.labels[k]} shows {shown} {more} ({axes})")
+            else:
+                said.append(f"the axes of {kind} {sizes.labels[k]} are scaled by {axes}")
         rest = sizes.values[~out]
         if len(rest) and np.nanmax(np.abs(rest)) > OUT * np.nanmax(sizes.sds):
-            size = number(100 * float(np.nanmax(np.abs(rest))), 2)
+            size = quantity(float(np.nanmax(np.abs(rest))), None, "%")
             among = "the others'" if said else f"the {kind}s'"
-            said.append(f"{among} axes are scaled by up to {size} %")
+            said.append(f"{among} axes are scaled by up to {size}")
         return said
 
     return words
@@ -167,10 +173,13 @@ def _scaled(kind: str):
 
 def _offset(kind: str, unit: str):
     def words(sizes: Sizes) -> list[str]:
-        k, i = np.unravel_index(np.nanargmax(np.abs(sizes.values)), sizes.values.shape)
+        ratio = np.abs(sizes.values) / np.where(sizes.sds > 0, sizes.sds, np.inf)
+        k, i = np.unravel_index(np.argmax(ratio), ratio.shape)
+        if ratio[k, i] < SURE:
+            return [f"offsets of the {kind}s are allowed for, and none is surely there"]
         size = quantity(abs(sizes.values[k, i]), sizes.sds[k, i], unit)
         where = f"{kind} {sizes.labels[k]}, {sizes.components[i]}"
-        return [f"the {kind}s have offsets, the largest {size} ({where})"]
+        return [f"the {kind}s have offsets, the surest {size} ({where})"]
 
     return words
 
@@ -190,8 +199,8 @@ def _clocks(sizes: Sizes) -> list[str]:
         verb = f"{whose} sample on clocks of their own"
         if sure.sum() == 1:
             verb = f"IMU {sizes.labels[int(np.argmax(sure))]} samples on a clock of its own"
-        size = number(1e3 * float(np.median(periods[sure])))
-        said.append(f"{verb}: a reading is up to {size} ms old, in a sawtooth")
+        size = quantity(float(np.median(periods[sure])), None, "s")
+        said.append(f"{verb}: a reading is up to {size} old, in a sawtooth")
     return said + _read(sizes.labels, sizes.values[:, age], sizes.sds[:, age])
 
 

@@ -5,6 +5,7 @@ The sentences of `diagnosis.json` and of its page alike.
 
 import numpy as np
 
+from imuarray.diagnosis.plain import Sizes, plain
 from imuarray.diagnosis.quantities import (
     NARROW,
     first_up,
@@ -66,9 +67,10 @@ def words(effect: str) -> str:
 def cause_in_words(cause: dict, labels, says: str = "") -> str:
     """A cause of `diagnosis.json` with its size, or what was read (``says``), test and class."""
     effect, item = cause["effect"], known_effect(cause["effect"])
-    text = f"{words(effect)}, {whose(cause['sensors'])}: {item.meaning or words(effect)}"
-    size = says or sizes(cause, labels)
-    text += f"; {size}" if size else ""
+    found = plain(effect, _sizes_of(cause, labels)) if cause["parameters"] else []
+    told = [says or sizes(cause, labels)] if says or not found else []
+    parts = found or [item.meaning or words(effect)]
+    text = f"{words(effect)}, {whose(cause['sensors'])}: {'; '.join(filter(None, parts + told))}"
     if stretches := cause.get("stretches_s"):
         first = [f"{a:.4g} to {b:.4g}" for a, b in stretches[:FEW]]
         text += f"; longest at {', '.join(first)} s"
@@ -84,6 +86,13 @@ def cause_in_words(cause: dict, labels, says: str = "") -> str:
         rivals = joined(words(name) for name in cause["indistinguishable_from"])
         text += f" On this recording it cannot be distinguished from {rivals}: one class."
     return first_up(text)
+
+
+def _sizes_of(cause: dict, labels) -> Sizes:
+    rows = cause["parameters"].items()
+    return Sizes.of(
+        {split_name(name, labels): (item["value"], item["sd"]) for name, item in rows}, labels
+    )
 
 
 def split_name(name: str, labels) -> tuple[str, str]:

@@ -141,10 +141,10 @@ def why(diagnosis: Diagnosis) -> Answer:
         sizes = {kind: document["smooth"][kind]["residual"] for kind in KINDS}
         lead = f"In smooth samples that turn fast the residual is {of_noise(sizes)}. {lead}"
     if document["remaining"] and not loud:
-        share = 100 * diagnosis.found.explained
-        lead = (
-            f"{number(share, 4)} % of the excess misfit is explained, so these checks, which still"
-            f" fail, count little: {some(document['remaining'])}. {lead}"
+        left = number(100 * max(1 - diagnosis.found.explained, 0.0), 2)
+        items.append(
+            f"All of this leaves {left} % of the excess misfit. So little is within tolerance,"
+            f" though it still shows in: {some(document['remaining'])}."
         )
     return Answer("Why?", lead, items, loud)
 

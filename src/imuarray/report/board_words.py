@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.diagnosis.plain import Sizes, plainly
-from imuarray.diagnosis.quantities import first_up, joined, number, quantity
+from imuarray.diagnosis.quantities import first_up, joined, number, plus_minus, quantity
 from imuarray.diagnosis.words import split_name
 from imuarray.estimation.informative import weak_directions
 from imuarray.firstorder.report import turned_lines
@@ -110,7 +110,9 @@ def causes(calibration: xr.Dataset) -> list[str]:
         for name, value, sd in zip(*columns, strict=True):
             effect, part, _ = str(name).split(" ", 2)
             found.setdefault(effect, {})[split_name(part, labels)] = value, sd
-    said = [line for effect, part in found.items() for line in plainly(effect, Sizes.of(part))]
+    said = [
+        line for effect, part in found.items() for line in plainly(effect, Sizes.of(part, labels))
+    ]
     return [f"{first_up(line)}." for line in said]
 
 
@@ -131,11 +133,12 @@ def before(board: Board) -> list[str]:
         before_, after = (
             number(np.degrees(x), 2) for x in (common.before, np.median(common.error))
         )
+        scale = 1 / common.scale - 1
+        error = plus_minus(100 * abs(scale), 100 * common.scale_sd)
         said.append(
             f"{len(common.first)} moves carry gravity from pose to pose to {after} degrees"
-            f" ({before_} before the gyroscopes were calibrated); together they read"
-            f" {number(100 * (1 / common.scale - 1), 3)} ± {number(100 * common.scale_sd, 2)} % of"
-            " the rate too much."
+            f" ({before_} before the gyroscopes were calibrated); together the gyroscopes read"
+            f" {error} % too {'much' if scale > 0 else 'little'}."
         )
     turned = joined(board.account)
     return said + ([f"{turned}."] if turned else [])

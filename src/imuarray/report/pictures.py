@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Ellipse
+from matplotlib.ticker import LogLocator
 
 from imuarray.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILLION, look
 from imuarray.recording import Recording
@@ -17,6 +18,7 @@ ELLIPSE = 5.991  # the same in a plane, squared
 BINS = 1200  # of time, that a page can show
 POINTS = 3000  # rotation axes that are drawn
 SIDE = 1.35  # radii, of a disc's centre from the middle
+FLAT = 0.5  # of a board's other side
 WORST = 3  # IMUs whose residuals have colours
 ROOM, SMALL = 0.16, 0.08  # of the board's extent: the largest departure, an ellipse's half axis
 
@@ -69,11 +71,26 @@ def board(calibration: xr.Dataset, plane: str, axes: Axes) -> None:
             axes.annotate("", end[[i, j]], start[[i, j]], arrowprops=way)
             inner = covariance[k][:, k][np.ix_([i, j], [i, j])]
             axes.add_patch(_ellipse(end[[i, j]], 1e6 * wide**2 * ELLIPSE * inner))
-        axes.annotate(plain(label), start[[i, j]], xytext=(-4, -4), textcoords="offset points",
-                      ha="right", va="top", size=8, weight="bold")  # fmt: skip
+        # on the side that the arrow leaves free
+        way = -(end - start)[[i, j]] if k else np.array([-1.0, -1.0])
+        aside = 9 * way / max(np.linalg.norm(way), 1e-9)
+        axes.annotate(plain(label), start[[i, j]], xytext=aside, textcoords="offset points",
+                      ha="center", va="center", size=8, weight="bold")  # fmt: skip
     axes.set(xlabel=f"{plane[0]} (mm)", ylabel=f"{plane[1]} (mm)", aspect="equal")
     axes.margins(0.18)
+    _no_strip(axes)
     axes.set_title(f"departures × {by:g}, ellipses (95 %) × {wide:g}", size=7.5)
+
+
+def _no_strip(axes: Axes) -> None:
+    """No side shorter than FLAT of the other."""
+    spans = [np.subtract(*limits[::-1]) for limits in (axes.get_xlim(), axes.get_ylim())]
+    for span, other, get, put in (
+        (*spans, axes.get_xlim, axes.set_xlim),
+        (*spans[::-1], axes.get_ylim, axes.set_ylim),
+    ):
+        more = max(FLAT * other - span, 0.0) / 2
+        put(get()[0] - more, get()[1] + more)
 
 
 def round_factor(value: float) -> float:
@@ -194,6 +211,7 @@ def length(calibration: xr.Dataset, axes: Axes) -> None:
     axes.set(xscale="log", yscale="log", xlabel="recorded motion (s)")
     axes.set_ylabel("sd of a coordinate (µm)")
     for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         axis.set_major_formatter(lambda value, _: f"{value:g}")
         axis.set_minor_formatter(lambda value, _: "")
     axes.legend()
