@@ -23,8 +23,9 @@ def board(
 ) -> Board:  # fmt: skip
     """All that `imuarray board` finds of some logs, which `write_board` makes a page of.
 
-    ``gravity`` m/s^2; ``topics`` of bags; ``say`` is called with each remark on the work's course. InputError as of
-    `open_logs`, `first_order` and `calibrate`; a log without still poses is calibrated as it is.
+    ``gravity`` m/s^2; ``topics`` of bags; ``say`` is called with each remark on the work's course.
+    A log without still poses is calibrated as it is. InputError as of `open_logs`, `first_order`
+    and `calibrate`.
     """
     opened = open_logs(logs, columns, topics)
     recording = opened.recording
