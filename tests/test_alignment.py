@@ -82,7 +82,7 @@ def test_readings_are_those_at_the_common_instants(found, motion):
 def test_the_clock_is_that_of_a_plain_search(motion):
     """Offset and drift by Nelder and Mead, a map by least squares at each."""
     first, other = (
-        Sensor("", log.gyroscope_time, log.angular_rate, np.abs(log.angular_rate) > 35, 1e-3)
+        Sensor("", log.gyroscope_time, 0.0, log.angular_rate, np.abs(log.angular_rate) > 35, 1e-3)
         for log in (logs(motion)[0], logs(motion)[2])
     )
     clock = compare(first, other)
@@ -107,7 +107,7 @@ def test_a_splines_error_for_a_sinusoid_is_that_predicted():
     for frequency in (0.1, 0.2, 0.3, 0.4):
         turn = 2 * np.pi * frequency * time + 0.3
         waves = np.sqrt(2) * np.sin(np.column_stack([turn, turn, turn]))
-        sensor = Sensor("", time, waves, np.zeros((400, 3), bool), 1.0)
+        sensor = Sensor("", time, 0.0, waves, np.zeros((400, 3), bool), 1.0)
         true = np.sqrt(2) * np.sin(2 * np.pi * frequency * at + 0.3)
         left = np.mean((Splines(sensor)(np.sort(at))[:, 0] - true[np.argsort(at)]) ** 2)
         np.testing.assert_allclose(left, spline_error(np.array([frequency]))[0], rtol=0.1)
@@ -181,3 +181,30 @@ def test_motion_at_the_limit_of_a_sensors_rate_is_refused():
     fast = hand_twisting(np.random.default_rng(5), 8.0, 5.0, 45.0)
     with pytest.raises(InputError, match=r"'3': .* for 100 Hz: .* log at a higher rate"):
         align(logs(fast), position_prior_sd=1e-3)
+
+
+@pytest.mark.parametrize("rounding, jitter", [(1e-3, 0.0), (1e-6, 5e-4)])
+def test_stamps_that_are_rounded_or_late_cost_little(motion, found, rounding, jitter):
+    """Readings are even; sds allow for what stamps of so many readings say, within 4 of them."""
+    rng, made = np.random.default_rng(6), []
+    for log in logs(motion):
+        stamps = log.gyroscope_time + jitter * rng.standard_normal(len(log.gyroscope_time))
+        stamps = np.round(stamps / rounding) * rounding
+        made.append(replace(log, accelerometer_time=stamps, gyroscope_time=stamps))
+    alignment = align(made, position_prior_sd=1e-3)[1]
+    assert "ms off even readings" in "\n".join(alignment.lines())
+    np.testing.assert_allclose(alignment.agreement[1:], found[1].agreement[1:], atol=0.03)
+    clock, stamp = alignment.clocks[2], OFFSETS[2] + (1 + DRIFTS[2]) * LENGTH / 2
+    sd = np.sqrt(clock.covariance[0, 0])
+    assert abs(clock.instants(stamp) - LENGTH / 2) < 4 * sd + rounding / 2
+
+
+def test_stamps_that_are_wild_are_refused(motion):
+    """Shuffled by more than a reading, while the sensor's own pace is uneven, too."""
+    first, second = logs(motion, 2)
+    rng = np.random.default_rng(7)
+    keep = rng.uniform(size=len(second.gyroscope_time)) > 0.5
+    stamps = np.sort(second.gyroscope_time + 5e-3 * rng.standard_normal(len(keep)))[keep]
+    second = replace(second, gyroscope_time=stamps, angular_rate=second.angular_rate[keep])
+    with pytest.raises(InputError, match="gyroscope '2'"):
+        align([first, second], position_prior_sd=1e-3)

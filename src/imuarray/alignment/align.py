@@ -9,6 +9,7 @@ import xarray as xr
 
 from imuarray.alignment.clocks import Clock, compare, itself
 from imuarray.alignment.resample import Sensor, Splines
+from imuarray.alignment.stamps import steadied
 from imuarray.errors import InputError
 from imuarray.firstorder.correct import rails_shown
 from imuarray.firstorder.turns import TURNED, angle_of
@@ -20,6 +21,8 @@ KINDS = {"accelerometer": ("m/s^2", 1.0), "gyroscope": ("deg/s", 180 / np.pi)}  
 SLOWER = 1.5  # times the common rate, from which a sensor's readings are averaged
 LITTLE = 0.3  # of the noise that is left, what averaging may miss
 SHORTEST = 100  # readings of a sensor, and common instants
+NOISY = 3.0  # times the noise, from which the residual is explained
+SHOWN = 5e-6  # s of jitter
 RAIL = 1 - 1e-6  # of the range
 
 
@@ -34,6 +37,7 @@ class Alignment:
     declared : (K,) rad, between the rotation found and the one declared; NaN where none was
     clocks : K of `Clock`, each against the first log's
     rate : (K, 2) Hz, of accelerometer and gyroscope by the first log's clock
+    jitter : (K, 2) s, rms, of the stamps about the even instants that were taken for them
     error, noise : (K, 2) m/s^2 and rad/s
         Rms of what interpolation misses in motion, and the declared noise in an interpolated
         reading.
@@ -48,6 +52,7 @@ class Alignment:
     declared: np.ndarray
     clocks: tuple[Clock, ...]
     rate: np.ndarray
+    jitter: np.ndarray
     error: np.ndarray
     noise: np.ndarray
     agreement: np.ndarray
@@ -86,16 +91,23 @@ class Alignment:
             f" {1e6 * clock.drift:+.2f} +- {1e6 * faster:.2f} ppm fast; rates agree to"
             f" {self.agreement[k]:.2f} times the noise"
         )
+        if self.agreement[k] > NOISY:
+            text += f", as if its stamps were {1e3 * clock.stray:.2g} ms wrong"
         if self.declared[k] > TURNED:
             text += f"; {np.degrees(self.declared[k]):.1f} degrees off its declared axes"
         return text
 
     def _carried(self, k: int) -> str:
         shown = [
-            f"{kind} at {rate:.2f} Hz, interpolation misses {scale * error:.2g} {unit} where"
-            f" noise is {scale * noise:.2g}"
-            for (kind, (unit, scale)), rate, error, noise in zip(
-                KINDS.items(), self.rate[k], self.error[k], self.noise[k], strict=True
+            f"{kind} at {rate:.2f} Hz{_said(off)}, interpolation misses {scale * error:.2g} {unit}"
+            f" where noise is {scale * noise:.2g}"
+            for (kind, (unit, scale)), rate, off, error, noise in zip(
+                KINDS.items(),
+                self.rate[k],
+                self.jitter[k],
+                self.error[k],
+                self.noise[k],
+                strict=True,
             )
         ]
         return "; ".join(shown)
@@ -116,6 +128,7 @@ class Alignment:
                 "clock_drift_sd": (imu, sds[:, 1], ppm),
                 "clock_middle": (imu, np.array([c.middle for c in clocks]), s),
                 "rate": ((imu, "kind"), self.rate, {"units": "Hz"}),
+                "jitter": ((imu, "kind"), self.jitter, {"units": "s"}),
                 "interpolation_error": ((imu, "kind"), self.error, per_kind),
                 "interpolated_noise": ((imu, "kind"), self.noise, per_kind),
                 "agreement": (imu, self.agreement, {"units": "1"}),
@@ -127,6 +140,10 @@ class Alignment:
             },
             {"step": self.step, "origin": self.origin, "left_out": self.left_out},
         )
+
+
+def _said(jitter: float) -> str:
+    return f", its stamps {1e3 * jitter:.2g} ms off even readings" if jitter > SHOWN else ""
 
 
 def align(
@@ -159,17 +176,24 @@ def align(
     grid, step = _grid([sensor for pair in sensors for sensor in pair])
     carried = [[_carry(sensor, grid, step) for sensor in pair] for pair in sensors]
     recording, whole = _recording(logs, rotation, grid, carried)
-    rate, error, noise = (
+    rate, jitter, error, noise = (
         np.array([[value(sensor, one) for sensor, one in zip(*pairs, strict=True)]
                   for pairs in zip(sensors, carried, strict=True)])
-        for value in (lambda s, _: 1 / s.step, lambda _, c: c.error, lambda _, c: c.noise_sd)
+        for value in (lambda s, _: 1 / s.step, lambda s, _: s.jitter, lambda _, c: c.error,
+                      lambda _, c: c.noise_sd)
     )  # fmt: skip
-    own = [c.shifted(origin, origins[0]) for c, origin in zip(clocks, origins, strict=True)]
+    # the instants that stand for jittering stamps are means of them
+    unsure = np.array([g.jitter / np.sqrt(len(g.time)) for g in gyroscopes])
+    unsure = np.where(np.arange(len(logs)) > 0, np.hypot(unsure, unsure[0]), 0.0)
+    own = [
+        clock.of_stamps(origin, origins[0], sd)
+        for clock, origin, sd in zip(clocks, origins, unsure, strict=True)
+    ]
     both = np.hypot(gyroscopes[0].noise_sd, [g.noise_sd for g in gyroscopes])
     agreement = np.array([np.nan, *(clock.residual for clock in clocks[1:])]) / both
     return replace(recording, position_prior_sd=position_prior_sd, source=source), Alignment(
         recording.accelerometer_labels, rotation, _declared(logs, rotation), tuple(own), rate,
-        error, noise, agreement, step, origins[0], int(whole.sum()), int((~whole).sum()),
+        jitter, error, noise, agreement, step, origins[0], int(whole.sum()), int((~whole).sum()),
     )  # fmt: skip
 
 
@@ -201,7 +225,7 @@ def _sensors(logs: Sequence[Log]) -> tuple[list[tuple[Sensor, Sensor]], list[flo
                 )
         origins.append(float(min(part[0][0] for part in parts)))
         out.append(tuple(
-            Sensor(f"{kind} {log.label!r}", time - origins[-1], values,
+            Sensor(f"{kind} {log.label!r}", *steadied(time - origins[-1], values), values,
                    np.abs(values) >= RAIL * limit, noise)
             for kind, (time, values, limit, noise) in zip(KINDS, parts, strict=True)
         ))  # fmt: skip

@@ -21,6 +21,7 @@ ALIKE = 0.9  # correlation of two speeds from which they are one motion
 NEARLY = 0.02  # of correlations, within which two places are equally good
 PIECES = 8  # that are tried
 SLACK = 0.05  # sd of the map's entries about a rotation
+WILD = 0.25  # of the usual step, that stamps may be wrong
 BLOCK = 0.5  # s, within which residuals may be alike
 STEPS, CLOSE = 20, 1e-9  # of Gauss-Newton, s
 
@@ -29,7 +30,8 @@ class Clock(NamedTuple):
     """A stamp t of the log is the instant t - offset - drift (t - middle) of the first's clock.
 
     ``map`` (3, 3): rates of the log = map @ rates of the first + bias; ``covariance`` (14, 14) of
-    offset, drift, map row by row and bias. ``residual`` rad/s, rms of one axis, robust.
+    offset, drift, map row by row and bias. ``residual`` rad/s, rms of one axis, robust, and
+    ``stray`` s, how far off (rms) stamps would have to be that make it.
     """
 
     offset: float
@@ -38,14 +40,22 @@ class Clock(NamedTuple):
     map: np.ndarray
     covariance: np.ndarray
     residual: float
+    stray: float
 
     def instants(self, stamps) -> np.ndarray:
         """On the first log's clock, s."""
         return stamps - self.offset - self.drift * (stamps - self.middle)
 
-    def shifted(self, own: float, first: float) -> Clock:
-        """The same where its log's stamps are larger by ``own``, the first's by ``first`` s."""
-        return self._replace(offset=self.offset + own - first, middle=self.middle + own)
+    def of_stamps(self, own: float, first: float, unsure: float) -> Clock:
+        """The same for stamps that count from ``own`` and, the first's, from ``first`` s.
+
+        ``unsure`` s: sd of the whole log's stamps against its readings.
+        """
+        covariance = self.covariance.copy()
+        covariance[0, 0] += unsure**2
+        return self._replace(
+            offset=self.offset + own - first, middle=self.middle + own, covariance=covariance
+        )
 
     @property
     def rotation(self) -> np.ndarray:
@@ -65,7 +75,7 @@ class Clock(NamedTuple):
 
 def itself(stamps) -> Clock:
     """The first log's clock."""
-    return Clock(0.0, 0.0, float(np.mean(stamps[[0, -1]])), np.eye(3), np.zeros((14, 14)), 0.0)
+    return Clock(0.0, 0.0, float(np.mean(stamps[[0, -1]])), np.eye(3), np.zeros((14, 14)), 0.0, 0.0)
 
 
 def compare(first: Sensor, other: Sensor) -> Clock:
@@ -75,7 +85,7 @@ def compare(first: Sensor, other: Sensor) -> Clock:
     """
     splines = Splines(first)
     middle, offset, drift = _coarse(first, other)
-    clock = Clock(offset, drift, middle, np.eye(3), np.zeros((14, 14)), 0.0)
+    clock = Clock(offset, drift, middle, np.eye(3), np.zeros((14, 14)), 0.0, 0.0)
     at = clock.instants(other.time)
     base = splines(at)
     used = ~(first.near_rail(at).any(axis=1) | other.railed.any(axis=1))
@@ -87,7 +97,14 @@ def compare(first: Sensor, other: Sensor) -> Clock:
         )
     turn = procrustes(other.values[used], base[used])
     _require_turning(base[used], turn, other.name)
-    return _fit(splines, other, clock._replace(map=turn), used)
+    found = _fit(splines, other, clock._replace(map=turn), used)
+    if found.stray > WILD * max(first.step, other.step):
+        raise InputError(
+            f"{other.name}: expected stamps that tell when it was read, found rates as far from the"
+            f" first's as if stamps were {1e3 * found.stray:.2g} ms wrong; let the sensor or its"
+            " driver stamp the readings"
+        )
+    return found
 
 
 def _require_turning(rate, turn, name: str) -> None:
@@ -139,9 +156,10 @@ def _fit(splines: Splines, other: Sensor, clock: Clock, used) -> Clock:
     flat = (columns * bend[:, None, None]).reshape(-1, 14)
     inverse = scaled_inverse(flat.T @ columns.reshape(-1, 14) + np.diag(ridge))
     covariance = _sandwich(columns, weight, left, time, inverse)
-    return Clock(
-        values[0], values[1], clock.middle, values[2:11].reshape(3, 3), covariance, np.sqrt(size)
-    )
+    residual = float(np.sqrt(size))
+    stray = residual / np.sqrt(np.mean(columns[here, :, 0] ** 2))
+    found = values[2:11].reshape(3, 3)
+    return Clock(values[0], values[1], clock.middle, found, covariance, residual, float(stray))
 
 
 def _sandwich(columns, weight, left, time, inverse) -> np.ndarray:

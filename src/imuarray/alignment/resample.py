@@ -21,10 +21,14 @@ SHOCKS = 0.1  # of these pieces, the worst, that do not count
 
 @dataclass(frozen=True, eq=False)
 class Sensor:
-    """Readings of one triad: time (N,) s, values (N, 3), railed (N, 3) bool, and its noise sd."""
+    """Readings of one triad: values (N, 3) at time (N,) s, railed (N, 3) bool, and its noise sd.
+
+    ``jitter`` s: how far (rms) stamps are off these instants.
+    """
 
     name: str
     time: np.ndarray
+    jitter: float
     values: np.ndarray
     railed: np.ndarray
     noise_sd: float
