@@ -27,9 +27,9 @@ from tests.test_csv_logs import put as put_tables
 def test_a_table_or_a_recording(tmp_path):
     expected = read_table(tmp_path, table())
     log, columns = tmp_path / "log.csv", tmp_path / "columns.yaml"
-    found, lines, groups = imuarray.open_logs([log], columns)
+    found, lines = imuarray.open_logs([log], columns)
     np.testing.assert_array_equal(found.specific_force, expected.specific_force)
-    assert lines == [] and groups == {}
+    assert lines == [] and found.alignment is None
     imuarray.write_recording(found, tmp_path / "rec.nc")
     again = imuarray.open_logs([tmp_path / "rec.nc"]).recording
     np.testing.assert_array_equal(again.angular_rate, expected.angular_rate)
@@ -41,11 +41,11 @@ def test_packets_bags_and_what_cannot_be_told(tmp_path):
     counts = readings(np.random.default_rng(0), 20, 3)
     (tmp_path / "data.bin").write_bytes(b"".join(packets(counts)))
     (tmp_path / "positions.csv").write_text(POSITIONS)
-    found, lines, _ = imuarray.open_logs(tmp_path / "data.bin", tmp_path / "positions.csv")
+    found, lines = imuarray.open_logs(tmp_path / "data.bin", tmp_path / "positions.csv")
     assert found.specific_force.shape == (20, 3, 3) and "lost 0" in lines[0]
     columns = put(tmp_path, rig())
     bag = write(tmp_path / "run", "mcap", topics())
-    found, lines, _ = imuarray.open_logs(bag, columns, ["/imu1", "/imu0"])
+    found, lines = imuarray.open_logs(bag, columns, ["/imu1", "/imu0"])
     assert found.gyroscope_labels == ("/imu1", "/imu0") and len(lines) == 2
     imuarray.write_recording(found, tmp_path / "rec.nc")
     for wrong in ([], [tmp_path / "rec.nc", bag]):
@@ -132,14 +132,14 @@ def test_a_board_with_a_sensor_slower_than_its_log(tmp_path):
     text = "\n".join(",".join(row) for row in slow) + "\n"
     (tmp_path / "log.csv").write_text(text)
     (tmp_path / "columns.yaml").write_text(yaml.safe_dump(columns))
-    found, lines, groups = imuarray.open_logs(tmp_path / "log.csv", tmp_path / "columns.yaml")
+    found, lines = imuarray.open_logs(tmp_path / "log.csv", tmp_path / "columns.yaml")
     assert "2: accelerometer: no reading in 600 of 1200" in lines
-    np.testing.assert_allclose(groups["alignment"].rate[1], [50, 100], rtol=1e-4)
-    assert np.abs(groups["alignment"].clock_offset).max() < 5e-6
+    np.testing.assert_allclose(found.alignment.rate[1], [50, 100], rtol=1e-4)
+    assert np.abs(found.alignment.clock_offset).max() < 5e-6
     true = [motion.force.derivative(found.time), motion.rotation.derivative(found.time)]
     inner = slice(20, -20)
     for kind, (one, wanted) in enumerate(
         zip((found.specific_force, found.angular_rate), true, strict=True)
     ):
         left = (one - wanted[:, None])[inner].std(axis=(0, 2))
-        assert (left < 1.1 * groups["alignment"].interpolated_noise[:, kind]).all()
+        assert (left < 1.1 * found.alignment.interpolated_noise[:, kind]).all()

@@ -191,10 +191,13 @@ def align(
     ]
     both = np.hypot(gyroscopes[0].noise_sd, [g.noise_sd for g in gyroscopes])
     agreement = np.array([np.nan, *(clock.residual for clock in clocks[1:])]) / both
-    return replace(recording, position_prior_sd=position_prior_sd, source=source), Alignment(
+    found = Alignment(
         recording.accelerometer_labels, rotation, _declared(logs, rotation), tuple(own), rate,
         jitter, error, noise, agreement, step, origins[0], int(whole.sum()), int((~whole).sum()),
     )  # fmt: skip
+    return replace(
+        recording, position_prior_sd=position_prior_sd, source=source, alignment=found.dataset()
+    ), found
 
 
 class _Carried(NamedTuple):

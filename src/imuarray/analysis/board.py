@@ -42,9 +42,7 @@ def board(
     calibration = calibrate(corrected, say=say)
     reasons = reasons_of_calibration(corrected, calibration)
     source = ", ".join(Path(path).name for path in logs)
-    return Board(
-        source, opened.lines, opened.groups, recording, found, corrected, calibration, reasons
-    )
+    return Board(source, opened.lines, recording, found, corrected, calibration, reasons)
 
 
 def _first_order(recording: Recording, gravity: float) -> FirstOrder | str:

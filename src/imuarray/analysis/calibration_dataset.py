@@ -15,7 +15,7 @@ from imuarray.model.effects import EFFECTS, KINDS
 from imuarray.model.names import parameter_ids, parameter_names
 from imuarray.motion.state import UNITS
 from imuarray.recording import Recording
-from imuarray.recording.record import DIMENSIONS, MATRICES
+from imuarray.recording.record import CLOCKS, DIMENSIONS, MATRICES
 
 PLACE = ("accelerometer", "axis")
 
@@ -48,6 +48,10 @@ def with_readings(dataset: xr.Dataset, recordings: Sequence[Recording]) -> xr.Da
     corrections = [one.correction for one in recordings if one.correction is not None]
     if len(corrections) == len(recordings):
         dataset = dataset.merge(xr.concat(corrections, "recording").reset_coords(drop=True))
+    if first.alignment is not None:
+        clocks = {name: first.alignment[name].to_numpy() for name in (*CLOCKS, "rate")}
+        dataset = dataset.assign({n: ("accelerometer", clocks[n]) for n in CLOCKS})
+        dataset["log_rate"] = "accelerometer", clocks["rate"][:, 0]
     if len(first.time) > 1 and not first.selected:
         dataset.attrs["rate"] = float(f"{1 / np.median(np.diff(first.time)):.10g}")
     return dataset

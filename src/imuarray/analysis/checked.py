@@ -13,7 +13,7 @@ from imuarray.errors import LARGEST, SMALLEST, InputError
 from imuarray.model.effects import EFFECTS, KINDS
 from imuarray.model.own import own_version
 from imuarray.recording import Recording
-from imuarray.recording.record import CORRECTION, DIMENSIONS, MATRICES
+from imuarray.recording.record import CLOCKS, CORRECTION, DIMENSIONS, MATRICES
 
 _PLACE = ("accelerometer", "axis")
 # Variables by whether they are needed: always, with effects, or not at all.
@@ -27,6 +27,7 @@ _WITH_EFFECTS = {
 _PERHAPS = {
     "nominal_position": _PLACE, "whole_covariance": ("unknown", "unknown_other"),
     **{name: DIMENSIONS[name] for name in MATRICES},
+    **dict.fromkeys((*CLOCKS, "log_rate"), ("accelerometer",)),
     **{name: ("recording", *dims) for name, dims in CORRECTION.items() if name[-3:] != "_sd"},
 }  # fmt: skip
 SAME_BOARD = 5.0  # prior sds by which two drawings of one board may differ

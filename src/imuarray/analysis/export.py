@@ -34,7 +34,7 @@ FORMULAS = {
     " the accelerometer's x axis, y in the plane of x and y; the chip reads M C u + bias, with C"
     " the rotation of T_i_b, its gyroscope M C_gyro_i C omega + bias, u and omega in b",
     "time_offset_s": "a reading stamped t is of the time t + time_offset_s on the clock of the"
-    " accelerometer of IMU 0",
+    " accelerometer of IMU 0; with a clock of its own, t + time_offset_s - drift (t - at_s)",
     "noise": "continuous: the sd of one reading is noise_density * sqrt(rate_hz)",
 }
 
@@ -90,7 +90,7 @@ def describe(calibration: xr.Dataset, noise: StillNoise | None = None) -> dict[s
     rate = attrs.get("rate", noise.rate_hz if noise else None)
     imus = []
     for k, frame in enumerate(frames):
-        imu: dict[str, Any] = {"label": labels["accelerometer"][k]}
+        imu: dict[str, Any] = {"label": labels["accelerometer"][k], **_clock(calibration, k)}
         whole = {name: _plain(value) for name, value in frame.items() if name not in KINDS}
         imu["kalibr"] = {name: whole.pop(name) for name in ("T_i_b", "T_i_b_turn_sd_rad")}
         imu |= whole
@@ -99,8 +99,8 @@ def describe(calibration: xr.Dataset, noise: StillNoise | None = None) -> dict[s
                 imu[kind] = {"label": labels[kind][k], "unit": NUMBERS[f"{kind}_noise_sd"]}
                 imu[kind]["corrections"] = [_step(step, k) for step in steps[kind]]
                 imu["kalibr"][kind] = {n: _plain(value) for n, value in frame[kind].items()}
-                value, sd = times[kind]
-                imu[kind] |= {"time_offset_s": _plain(value[k]), "time_offset_sd_s": _plain(sd[k])}
+                value, sd = (_plain(part[k]) for part in times[kind])
+                imu[kind] |= {"time_offset_s": value, "time_offset_sd_s": sd}
                 imu[kind]["noise"] = _noise(calibration, noise, kind, k, rate)
         imus.append(imu | {"kalibr": imu.pop("kalibr")})
     covariance = calibration["position_covariance"].to_numpy()
@@ -215,12 +215,29 @@ def _times(calibration: xr.Dataset, model: ArrayModel) -> dict[str, tuple]:
         covariance = np.diag(calibration["effect_sd"].to_numpy() ** 2)
     if size and "whole_covariance" in calibration:
         covariance = calibration["whole_covariance"].to_numpy()[-size:, -size:]
+    own = np.zeros((2, calibration.sizes[KINDS[0]]))
+    if "clock_offset" in calibration:
+        own = np.array([calibration[f"clock_offset{part}"].to_numpy() for part in ("", "_sd")])
     for kind, rows in weights.items():
         against = rows - weights[KINDS[0]][0]
-        variances = np.einsum("ki,ij,kj->k", against, covariance, against)
+        variances = (
+            np.einsum("ki,ij,kj->k", against, covariance, against) + own[1][: len(rows)] ** 2
+        )
         # what was held fixed has no sd
-        out[kind] = against @ found, np.sqrt(np.where(variances > 0, variances, np.nan))
+        out[kind] = (
+            against @ found - own[0][: len(rows)],
+            np.sqrt(np.where(variances > 0, variances, np.nan)),
+        )
     return out
+
+
+def _clock(calibration: xr.Dataset, k: int) -> dict[str, Any]:
+    """An IMU's rate, and what its clock gains, where it logged by itself."""
+    if "clock_drift" not in calibration:
+        return {"rate_hz": _plain(calibration.attrs.get("rate", np.nan)), "clock": None}
+    names = {"drift": "clock_drift", "drift_sd": "clock_drift_sd", "at_s": "clock_middle"}
+    found = {name: _plain(calibration[own].to_numpy()[k]) for name, own in names.items()}
+    return {"rate_hz": _plain(calibration["log_rate"].to_numpy()[k]), "clock": found if k else None}
 
 
 def _frames(calibration: xr.Dataset, steps: dict, positions) -> list[dict]:

@@ -87,7 +87,12 @@ def kalibr(document: dict[str, Any]) -> str:
             f" # C: {_sds(own['T_i_b_turn_sd_rad'])} rad; place: {_sds(imu['position_sd_m'])} m"
         )
         lines += [_scalar("  time_offset", force["time_offset_s"], force["time_offset_sd_s"])]
-        lines += [_scalar("  update_rate", document["rate_hz"])]
+        if imu["clock"]:
+            drift, sd, at = (imu["clock"][name] for name in ("drift", "drift_sd", "at_s"))
+            lines += [
+                f"  # that is at the stamp {at:.6f}; it falls by {drift:.4g} (sd {sd:.2g}) a second"
+            ]
+        lines += [_scalar("  update_rate", imu["rate_hz"] or document["rate_hz"])]
         topic = label if label.startswith("/") else f"/imu{number}"
         lines += [f"  rostopic: {dumps(topic)}"]
         for kind in ("accelerometer", "gyroscope"):

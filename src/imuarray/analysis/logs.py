@@ -5,8 +5,6 @@ from os import PathLike
 from pathlib import Path
 from typing import NamedTuple
 
-import xarray as xr
-
 from imuarray.errors import InputError
 from imuarray.recording import Recording, read_recording
 from imuarray.recording.rig import Rig, recording_of
@@ -16,11 +14,10 @@ PACKETS = ".bin"
 
 
 class Opened(NamedTuple):
-    """A recording, lines that say what became of the logs, and groups to keep in its file."""
+    """A recording, and lines that say what became of the logs."""
 
     recording: Recording
     lines: list[str]
-    groups: dict[str, xr.Dataset]
 
 
 def open_logs(
@@ -33,14 +30,14 @@ def open_logs(
     ``columns`` is the YAML of docs/convert.md, for packets (.bin) the CSV of positions, for a
     recording (.nc) none; ``topics`` those of bags to use, the reference first. IMUs that share
     their stamps, with known axes, become samples as they are; others are aligned (`alignment`),
-    which the lines say and the group of that name keeps. InputError says what does not fit.
+    which the lines say and the recording keeps. InputError says what does not fit.
     """
     from imuarray.recording import bags, csv_logs
     from imuarray.recording.mimu_recording import read_board
 
     logs = [Path(path) for path in ([paths] if isinstance(paths, str | PathLike) else paths)]
     if len(logs) == 1 and logs[0].suffix in RECORDINGS:
-        return Opened(read_recording(logs[0]), [], {})
+        return Opened(read_recording(logs[0]), [])
     if not logs or any(log.suffix in RECORDINGS for log in logs):
         raise InputError(f"logs: expected one recording, or what loggers wrote, found {len(logs)}")
     if all(map(bags.is_bag, logs)):
@@ -49,21 +46,21 @@ def open_logs(
         raise InputError(f"{logs[0]}: expected a YAML that describes it, found none")
     if len(logs) == 1 and logs[0].suffix == PACKETS:
         recording, account = read_board(logs[0], Path(columns))
-        return Opened(recording, account.lines(), {})
+        return Opened(recording, account.lines())
     return _together(csv_logs.read_tables(logs, columns))
 
 
 def _together(found: Recording | Rig) -> Opened:
     """Samples as they are, or brought to common instants and axes, which is kept."""
     if isinstance(found, Recording):
-        return Opened(found, [], {})
+        return Opened(found, [])
     recording = recording_of(found)
     if recording is not None:
-        return Opened(recording, found.lines, {})
+        return Opened(recording, found.lines)
     from imuarray.alignment import align
 
     recording, alignment = align(
         found.logs, position_prior_sd=found.position_prior_sd, source=found.source
     )
     lines = [*found.lines, *alignment.lines()]
-    return Opened(recording, lines, {"alignment": alignment.dataset()})
+    return Opened(recording, lines)

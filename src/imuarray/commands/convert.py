@@ -28,7 +28,7 @@ def convert_logs(arguments) -> None:
 
     found = open_logs(arguments.data, arguments.columns, getattr(arguments, "topics", ()))
     attrs = stamp({"source": ", ".join(map(str, arguments.data))}, 0)
-    write_recording(found.recording, arguments.out, attrs=attrs, groups=found.groups)
+    write_recording(found.recording, arguments.out, attrs=attrs)
     _report(arguments, found.recording, found.lines)
 
 

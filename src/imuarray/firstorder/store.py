@@ -11,11 +11,11 @@ from imuarray.recording import Recording, write_recording
 from imuarray.recording.record import FIRST_ORDER
 
 
-def write_corrected(recording: Recording, found: FirstOrder, path, groups=None) -> None:
-    """The corrected recording, the calibration's numbers in a group of its own beside others."""
+def write_corrected(recording: Recording, found: FirstOrder, path) -> None:
+    """The corrected recording, with the calibration's numbers in a group of its own."""
     data = digest(recording.specific_force, recording.angular_rate)
     attrs = stamp({"recording": data, "gravity": found.gravity}, 0)
-    groups = (groups or {}) | {FIRST_ORDER: _first_order_dataset(recording, found)}
+    groups = {FIRST_ORDER: _first_order_dataset(recording, found)}
     write_recording(correct(recording, found), path, attrs=attrs, groups=groups)
 
 

@@ -1,6 +1,7 @@
 """The NetCDF-4 file of a recording, read with validation and written."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from imuarray.errors import InputError
 from imuarray.provenance import is_damaged, write_netcdf
 from imuarray.recording import validate
 from imuarray.recording.record import (
+    ALIGNMENT,
     CORRECTION,
     FLAGS,
     MATRICES,
@@ -67,13 +69,22 @@ def read_recording(path: str | Path) -> Recording:
     than three accelerometers or collinear ones. Large gaps in time are a warning.
     """
     path = _existing(path)
-    return from_dataset(_load(path, group=None), str(path))
+    recording = from_dataset(_load(path, group=None), str(path))
+    if not _has_group(path, ALIGNMENT):
+        return recording
+    alignment = _load(path, ALIGNMENT)
+    validate.check_alignment(alignment, recording, f"{path}: {ALIGNMENT}")
+    return replace(recording, alignment=alignment)
 
 
 def has_truth(path: str | Path) -> bool:
     """Whether a recording is simulated and says from what; InputError if it can not be read."""
-    with _hdf5(_existing(path)) as file:
-        return isinstance(file.get(TRUTH), h5py.Group)
+    return _has_group(_existing(path), TRUTH)
+
+
+def _has_group(path: Path, name: str) -> bool:
+    with _hdf5(path) as file:
+        return isinstance(file.get(name), h5py.Group)
 
 
 def read_truth(path: str | Path) -> xr.Dataset:
@@ -100,7 +111,8 @@ def write_recording(
     dataset = recording.to_dataset()
     dataset.attrs = {**(attrs or {}), **dataset.attrs}
     from_dataset(dataset, str(path))
-    write_netcdf(dataset, path, ({} if truth is None else {TRUTH: truth}) | (groups or {}))
+    known = {TRUTH: truth, ALIGNMENT: recording.alignment, **(groups or {})}
+    write_netcdf(dataset, path, {name: part for name, part in known.items() if part is not None})
 
 
 def load_dataset(path: str | Path, group: str | None = None) -> xr.Dataset:

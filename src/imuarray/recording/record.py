@@ -20,6 +20,9 @@ TRUTH = "truth"
 # Group with the per-triad calibration that a corrected recording went through.
 FIRST_ORDER = "first_order"
 
+# Group with how the logs of loose IMUs were brought together.
+ALIGNMENT = "alignment"
+
 DIMENSIONS = {
     "time": ("time",),
     "specific_force": ("time", "accelerometer", "axis"),
@@ -71,6 +74,9 @@ CORRECTION = {
     )
 }  # fmt: skip
 
+# Of `Recording.alignment`: a log's stamp t is t - offset - drift (t - middle) of the first's clock.
+CLOCKS = ("clock_offset", "clock_offset_sd", "clock_drift", "clock_drift_sd", "clock_middle")
+
 # A simulated sensor need not have a rail.
 MAY_BE_INFINITE = ("accelerometer_range", "gyroscope_range")
 
@@ -112,6 +118,8 @@ class Recording:
         How the readings were corrected (first-order calibration): ``accelerometer_inverse``
         (A, 3, 3) and ``accelerometer_offset`` (A, 3) m/s^2 with ``accelerometer_offset_sd``, the
         same of the gyroscopes in rad/s; readings = inverse @ (raw - offset).
+    alignment : Dataset, or None
+        How the logs of loose IMUs were brought together (`imuarray.alignment.Alignment.dataset`).
     output_period : float, s, NaN where not declared
         Between readings that the sensors make on clocks of their own, where the host takes the
         newest.
@@ -137,6 +145,7 @@ class Recording:
     map_covariance: np.ndarray | None = None
     accelerometer_axes: np.ndarray | None = None
     correction: xr.Dataset | None = None
+    alignment: xr.Dataset | None = None
     output_period: float = np.nan
     title: str = ""
     source: str = ""

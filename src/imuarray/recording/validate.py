@@ -16,6 +16,7 @@ from imuarray.errors import LARGEST, SMALLEST, IdentifiabilityError, InputError
 from imuarray.geometry.array import require_apart, require_count
 from imuarray.recording.record import (
     AXES,
+    CLOCKS,
     CORRECTION,
     DIMENSIONS,
     FLAGS,
@@ -81,6 +82,17 @@ def check_structure(dataset: xr.Dataset, where: str) -> None:
         _check_correction(dataset, name, where)
     if "accelerometer_axes" in dataset:
         _check_rotations(dataset, "accelerometer_axes", where)
+
+
+def check_alignment(dataset: xr.Dataset, recording: Recording, where: str) -> None:
+    """Clocks and rates of the recording's IMUs."""
+    count = len(recording.accelerometer_labels)
+    for name, shape in {**dict.fromkeys(CLOCKS, (count,)), "rate": (count, 2)}.items():
+        if name not in dataset or dataset[name].shape != shape:
+            raise InputError(f"{where}: expected {name} of each of {count} IMUs, found none")
+        _check_numeric(dataset[name], where)
+        if not (np.abs(dataset[name].values) <= LARGEST).all():
+            raise InputError(f"{where}: {name}: expected finite numbers, found others")
 
 
 def check_values(recording: Recording, where: str) -> None:

@@ -64,7 +64,6 @@ class Board(NamedTuple):
 
     source: str
     account: list[str]
-    groups: dict[str, xr.Dataset]
     recording: Recording
     first_order: FirstOrder | str
     corrected: Recording
@@ -79,9 +78,9 @@ def write_board(board: Board, folder: Path) -> None:
     with tempfile.TemporaryDirectory(prefix=".board.", dir=folder) as name:
         made = Path(name)
         if isinstance(board.first_order, str):
-            write_recording(board.corrected, made / "recording.nc", groups=board.groups)
+            write_recording(board.corrected, made / "recording.nc")
         else:
-            write_corrected(board.recording, board.first_order, made / "recording.nc", board.groups)
+            write_corrected(board.recording, board.first_order, made / "recording.nc")
         write_netcdf(board.calibration.assign_attrs(trust(board.reasons)), made / "cal.nc")
         write_csv(position_table(board.calibration), made / "positions.csv")
         write_bytes(page, made / "report.html")
