@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.errors import LARGEST, SMALLEST, InputError
-from imuarray.model.effects import EFFECTS, KINDS
+from imuarray.model.effects import EFFECTS
 from imuarray.model.own import own_version
 from imuarray.recording import Recording
 from imuarray.recording.record import CLOCKS, CORRECTION, DIMENSIONS, MATRICES
@@ -90,9 +90,9 @@ def _require_sizes(calibration: xr.Dataset) -> None:
         "axis": 3, "axis_other": 3, "accelerometer_other": count, "unknown": unknown,
         "unknown_other": unknown,
     }  # fmt: skip
-    for kind in KINDS:
-        entries = 9 * calibration.sizes.get(kind, count)
-        expected |= {f"{kind}_entry": entries, f"{kind}_entry_other": entries}
+    maps = 9 * count, 9 * (count + calibration.sizes.get("gyroscope", count))
+    entries = maps[calibration.sizes.get("map_entry") != maps[0]]
+    expected |= {"map_entry": entries, "map_entry_other": entries}
     for name, size in expected.items():
         if calibration.sizes.get(name, size) != size:
             raise InputError(f"expected {size} of {name}, found {calibration.sizes[name]}")
