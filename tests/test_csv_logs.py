@@ -200,6 +200,24 @@ def test_a_description_that_does_not_fit(tmp_path, change, words):
         put(tmp_path, three()[1], description(**change))
 
 
+def test_loggers_of_another_make(tmp_path):
+    """Their own units, noise and ranges; what is not said is as for all."""
+    columns = description()
+    columns["imus"]["top"] |= {
+        "accelerometers": {"unit": "m/s^2", "scale": 2, "noise": 0.01},
+        "gyroscopes": {"unit": "rad/s", "range": 40},
+    }
+    front, _, top = put(tmp_path, three()[1], columns).logs
+    np.testing.assert_allclose(top.specific_force, 2 * numbers(2)[:, :3])
+    np.testing.assert_allclose(top.angular_rate, numbers(2)[:, 3:])
+    assert (top.accelerometer_noise_sd, top.accelerometer_range) == (0.01, 16)
+    assert (top.gyroscope_noise_sd, top.gyroscope_range) == (0.06, 40)
+    assert front.accelerometer_noise_sd == pytest.approx(0.004 * G)
+    columns["imus"]["top"]["gyroscopes"] = {"units": "rad/s"}
+    with pytest.raises(InputError, match="'top': gyroscopes: .* unknown key 'units'"):
+        put(tmp_path, three()[1], columns)
+
+
 def test_shared_stamps_and_known_axes_are_samples_as_they_are(tmp_path):
     """Of one table that the YAML describes as a board, or as IMUs."""
     expected = read_board(tmp_path, table())
@@ -218,6 +236,8 @@ def test_shared_stamps_and_known_axes_are_samples_as_they_are(tmp_path):
         np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
     assert found.accelerometer_labels == expected.gyroscope_labels
     assert found.position_prior_sd == expected.position_prior_sd
+    columns["imus"]["2"]["gyroscopes"] = {"range": 500}
+    assert rig.recording_of(put(tmp_path, {"log.csv": table()}, columns)) is None
 
 
 def test_a_board_with_sensors_slower_than_its_log(tmp_path):
@@ -238,6 +258,10 @@ def test_a_board_with_sensors_slower_than_its_log(tmp_path):
             imu.specific_force @ imu.axes.T, whole.specific_force[kept, i]
         )
         np.testing.assert_array_equal(imu.angular_rate @ imu.axes.T, whole.angular_rate[:, i])
+    wrong = layout()
+    wrong["accelerometers"]["triads"]["1"]["columns"] = 5
+    with pytest.raises(InputError, match="'1': expected three columns, found '5'"):
+        put(tmp_path, {"log.csv": rows}, wrong)
     del columns["gyroscopes"]["triads"]["3"]
     with pytest.raises(InputError, match="blank, an accelerometer and a gyroscope of each label"):
         put(tmp_path, {"log.csv": rows}, columns)

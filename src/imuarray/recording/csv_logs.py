@@ -34,10 +34,10 @@ def read_tables(paths: Sequence[str | PathLike], columns: str | PathLike) -> Rec
 
 
 def _read(loaded, layout, imus: dict[str, dict], name: str) -> Rig:
-    units = [np.prod(tables.unit_of(layout[kind], kind, name)) for kind in KINDS]
     read, unused = {}, list(loaded)
     for label, imu in imus.items():
         where = f"{name}: imus {label!r}"
+        units = [np.prod(tables.unit_of(imu[kind], kind, where)) for kind in KINDS]
         paths = [_file(log, label, list(loaded), where) for log in pair(imu.get("log"))]
         times = pair(imu.get("time", layout.get("time")))
         six = imu.get("columns", layout.get("columns"))
@@ -91,6 +91,12 @@ def _imus(layout, where: str) -> dict[str, dict]:
                 f"{where}: {label!r}: expected, as some cells are blank, an accelerometer and a"
                 f" gyroscope of each label with the same axes, found others{tables.BLANK}"
             )
-        columns = [*triad["columns"], *other["columns"]]
-        found[label] = {"columns": columns, "position": triad["position"], "axes": axes[0]}
+        columns = [
+            name
+            for t in (triad, other)
+            for name in three_columns(t["columns"], f"{where}: {label!r}")
+        ]
+        found[label] = {"columns": columns, "position": triad["position"], "axes": axes[0]} | {
+            kind: layout[kind] for kind in KINDS
+        }
     return found

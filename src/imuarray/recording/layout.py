@@ -26,10 +26,11 @@ BOARD = {
 SENSOR = {"unit": True, "scale": False, "noise": True, "range": True}
 BOARD_SENSOR = SENSOR | {"triads": True}
 RIG = {**_TABLE, "time": False, "columns": False, **_PLACES, **_SENSORS, "imus": True}
-IMU = {"log": False, "columns": False, "time": False, "position": True, "axes": False}
+_OWN = {"position": True, "axes": False, "accelerometers": False, "gyroscopes": False}
+IMU = {"log": False, "columns": False, "time": False, **_OWN}
 BAG = {**_PLACES, **_SENSORS, "imus": True}
 BAG_SENSOR = {"noise": True, "range": True}  # in the units of sensor_msgs/Imu
-BAG_IMU = {"topic": False, "position": True, "axes": False}
+BAG_IMU = {"topic": False, **_OWN}
 _NAMES = "column", "columns", "log", "topic"
 
 
@@ -55,7 +56,10 @@ class _Loader(yaml.SafeLoader):
 
 
 def read_layout(path: str | PathLike, bag: bool = False) -> dict[str, Any]:
-    """The YAML that describes a log; InputError for a missing file or a wrong key."""
+    """The YAML that describes a log; InputError for a missing file or a wrong key.
+
+    Each of a rig's IMUs has both kinds' sections whole, its own keys in place of the common ones.
+    """
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path}: expected a YAML file that describes the log, found none")
@@ -66,15 +70,20 @@ def read_layout(path: str | PathLike, bag: bool = False) -> dict[str, Any]:
         raise InputError(f"{path}: expected YAML, found {' '.join(str(error).split())}") from None
     rig = bag or (isinstance(layout, dict) and "imus" in layout)
     _require_keys(layout, BAG if bag else RIG if rig else BOARD, str(path))
+    keys = BAG_SENSOR if bag else SENSOR if rig else BOARD_SENSOR
     for kind in KINDS:
-        keys = BAG_SENSOR if bag else SENSOR if rig else BOARD_SENSOR
-        _require_keys(layout[kind], keys, f"{path}: {kind}")
+        where = f"{path}: {kind}"
+        _require_keys(layout[kind], keys, where)
         if not rig:
-            _require_sections(layout[kind]["triads"], f"{path}: {kind}", "triads", {
-                "columns": True, "position": kind == "accelerometers", "axes": False,
-            })  # fmt: skip
+            triad = {"columns": True, "position": kind == "accelerometers", "axes": False}
+            _require_sections(layout[kind]["triads"], where, "triads", triad)
     if rig:
         _require_sections(layout["imus"], f"{path}: imus", "IMUs", BAG_IMU if bag else IMU)
+        for label, imu in layout["imus"].items():
+            for kind in KINDS:
+                own = imu.get(kind, {})
+                _require_keys(own, dict.fromkeys(keys, False), f"{path}: imus {label!r}: {kind}")
+                imu[kind] = layout[kind] | own
     return layout
 
 

@@ -43,8 +43,7 @@ def to_rig(imus: Mapping[str, dict], read: Mapping[str, list[Readings]], layout,
     unknown. Times are from the earliest stamp of all, of an IMU whose clock has another origin
     from its own. InputError for stamps out of order.
     """
-    given, places = numbers(layout, where), positions(imus, layout, f"{where}: imus")
-    prior, lines, whole = given.pop("position_prior_sd"), [], {}
+    places, lines, whole = positions(imus, layout, f"{where}: imus"), [], {}
     for label, kinds in read.items():
         whole[label] = []
         for kind, readings in zip(("accelerometer", "gyroscope"), kinds, strict=True):
@@ -59,12 +58,14 @@ def to_rig(imus: Mapping[str, dict], read: Mapping[str, list[Readings]], layout,
     ]  # fmt: skip
     logs = []
     for place, origin, (label, kinds) in zip(places, first, whole.items(), strict=True):
+        own = f"{where}: imus {label!r}"
         axes = imus[label].get("axes", None if logs else list("xyz"))
-        force, rate = kinds
+        given = numbers(layout | imus[label], own)
+        prior = given.pop("position_prior_sd")
+        times = [_time(kind, origin) for kind in kinds]
         logs.append(Log(
-            label=label, accelerometer_time=_time(force, origin), specific_force=force.values,
-            gyroscope_time=_time(rate, origin), angular_rate=rate.values, position=place,
-            axes=None if axes is None else rotation(axes, f"{where}: imus {label!r}"), **given,
+            label, times[0], kinds[0].values, times[1], kinds[1].values, place,
+            None if axes is None else rotation(axes, own), **given,
         ))  # fmt: skip
     return Rig(logs, prior, lines, source)
 
@@ -125,21 +126,23 @@ def _in_order(readings: Readings) -> tuple[Readings, list[str]]:
 
 
 def recording_of(rig: Rig) -> Recording | None:
-    """The samples as they are where all IMUs share their stamps and all axes are known."""
+    """The samples as they are, where all IMUs share stamps, noise, ranges, and axes are known."""
     logs = rig.logs
     time = logs[0].accelerometer_time
     shared = all(
         np.array_equal(t, time) for x in logs for t in (x.accelerometer_time, x.gyroscope_time)
     )
-    if not shared or any(log.axes is None for log in logs):
+    names = "accelerometer_noise_sd", "accelerometer_range", "gyroscope_noise_sd", "gyroscope_range"
+    given = {name: getattr(logs[0], name) for name in names}
+    alike = all(getattr(log, name) == value for log in logs for name, value in given.items())
+    if not (shared and alike) or any(log.axes is None for log in logs):
         return None
     labels = tuple(log.label for log in logs)
-    names = "accelerometer_noise_sd", "accelerometer_range", "gyroscope_noise_sd", "gyroscope_range"
     return Recording(
         time=time, specific_force=np.stack([x.specific_force @ x.axes.T for x in logs], axis=1),
         angular_rate=np.stack([x.angular_rate @ x.axes.T for x in logs], axis=1),
         accelerometer_position=np.array([x.position for x in logs]), accelerometer_labels=labels,
         gyroscope_labels=labels, accelerometer_axes=np.array([x.axes for x in logs]),
         position_prior_sd=rig.position_prior_sd, source=rig.source,
-        **{name: getattr(logs[0], name) for name in names},
+        **given,
     )  # fmt: skip
