@@ -15,6 +15,7 @@ from imuarray.analysis.rigid import slope, turning
 from imuarray.analysis.suspects import suspects, told
 from imuarray.blind.cases import Case, make
 from imuarray.cli import main
+from imuarray.errors import InputError
 from imuarray.geometry import mimu4444, mimu4444_corners
 
 CASE = Case("trust", duration=8.0)
@@ -388,3 +389,14 @@ def test_rough_motion_is_judged_by_its_smooth_samples(sound):
     )  # fmt: skip
     found = trust._residuals(sound, calibration, None)
     assert found[""] == pytest.approx(np.sqrt(2.5)) and found[f"gyroscope {labels[0]}"] == 2.0
+
+
+def test_a_search_that_diverges_is_bad_input(monkeypatch, sound):
+    """As of a raw pair, one of them turned by 37 degrees: its equations end in infinities."""
+
+    def diverge(*_, **__):
+        raise np.linalg.LinAlgError("Eigenvalues did not converge")
+
+    monkeypatch.setattr("imuarray.analysis.fitting.climb", diverge)
+    with pytest.raises(InputError, match="search that diverges.*imuarray first-order"):
+        imuarray.calibrate(sound)
