@@ -132,7 +132,7 @@ def test_a_file_and_a_clock_for_each_kind(tmp_path):
         "Acc.csv": log(stamps[0], force, "time,x,y,z"),
         "Gyro.csv": log(stamps[1], rate, "seconds,x,y,z"),
     }
-    (phone, other), _, lines, _ = put(tmp_path, files, columns)
+    (phone, other), _, lines, *_ = put(tmp_path, files, columns)
     assert phone.angular_rate.shape == (7, 3)
     np.testing.assert_allclose(np.diff(phone.accelerometer_time), 0.02, rtol=1e-12)
     np.testing.assert_allclose(np.diff(phone.gyroscope_time), 0.125, rtol=1e-6)
@@ -216,6 +216,18 @@ def test_loggers_of_another_make(tmp_path):
     columns["imus"]["top"]["gyroscopes"] = {"units": "rad/s"}
     with pytest.raises(InputError, match="'top': gyroscopes: .* unknown key 'units'"):
         put(tmp_path, three()[1], columns)
+
+
+def test_logs_without_stamps_share_none(tmp_path):
+    """Whoever logs by a rate of its own, and as many rows, began at another time."""
+    columns = description(time={"rate": 100.0})
+    for imu in columns["imus"].values():
+        imu["axes"] = ["x", "y", "z"]
+    files = three()[1]
+    assert rig.recording_of(put(tmp_path, files, columns)) is None
+    same = {name: log(range(5), numbers(i)) for i, name in enumerate(files)}
+    found = put(tmp_path, same, columns | {"time": {"column": "t", "unit": "ms"}})
+    assert rig.recording_of(found).specific_force.shape == (5, 3, 3)
 
 
 def test_shared_stamps_and_known_axes_are_samples_as_they_are(tmp_path):

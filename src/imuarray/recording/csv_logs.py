@@ -34,12 +34,13 @@ def read_tables(paths: Sequence[str | PathLike], columns: str | PathLike) -> Rec
 
 
 def _read(loaded, layout, imus: dict[str, dict], name: str) -> Rig:
-    read, unused = {}, list(loaded)
+    read, unused, stamped = {}, list(loaded), True
     for label, imu in imus.items():
         where = f"{name}: imus {label!r}"
         units = [np.prod(tables.unit_of(imu[kind], kind, where)) for kind in KINDS]
         paths = [_file(log, label, list(loaded), where) for log in pair(imu.get("log"))]
         times = pair(imu.get("time", layout.get("time")))
+        stamped &= len(loaded) == 1 or not any(isinstance(t, dict) and "rate" in t for t in times)
         six = imu.get("columns", layout.get("columns"))
         if not isinstance(six, list) or len(six) != 6:
             raise InputError(
@@ -53,7 +54,8 @@ def _read(loaded, layout, imus: dict[str, dict], name: str) -> Rig:
         ]
     if unused:
         raise InputError(f"{unused[0]}: expected an IMU of {name} to be in it, found none")
-    return to_rig(imus, read, layout, name, ", ".join(path.name for path in loaded))
+    rig = to_rig(imus, read, layout, name, ", ".join(path.name for path in loaded))
+    return rig._replace(stamped=stamped)
 
 
 def _file(log: Any, label: str, files: list[Path], where: str) -> Path:

@@ -28,12 +28,16 @@ class Readings:
 
 
 class Rig(NamedTuple):
-    """Logs of one rig, the sd of its positions in m, and what was left out."""
+    """Logs of one rig, the sd of its positions in m, what was left out, and from where.
+
+    ``stamped``: stamps were logged, so that equal ones are of one time.
+    """
 
     logs: list[Log]
     position_prior_sd: float
     lines: list[str]
     source: str
+    stamped: bool = True
 
 
 def to_rig(imus: Mapping[str, dict], read: Mapping[str, list[Readings]], layout, where, source):
@@ -135,7 +139,7 @@ def recording_of(rig: Rig) -> Recording | None:
     names = "accelerometer_noise_sd", "accelerometer_range", "gyroscope_noise_sd", "gyroscope_range"
     given = {name: getattr(logs[0], name) for name in names}
     alike = all(getattr(log, name) == value for log in logs for name, value in given.items())
-    if not (shared and alike) or any(log.axes is None for log in logs):
+    if not (rig.stamped and shared and alike) or any(log.axes is None for log in logs):
         return None
     labels = tuple(log.label for log in logs)
     return Recording(
