@@ -237,7 +237,8 @@ def _clock(calibration: xr.Dataset, k: int) -> dict[str, Any]:
         return {"rate_hz": _plain(calibration.attrs.get("rate", np.nan)), "clock": None}
     names = {"drift": "clock_drift", "drift_sd": "clock_drift_sd", "at_s": "clock_middle"}
     found = {name: _plain(calibration[own].to_numpy()[k]) for name, own in names.items()}
-    return {"rate_hz": _plain(calibration["log_rate"].to_numpy()[k]), "clock": found if k else None}
+    rate = float(f"{calibration['log_rate'].to_numpy()[k]:.10g}")
+    return {"rate_hz": rate, "clock": found if k else None}
 
 
 def _frames(calibration: xr.Dataset, steps: dict, positions) -> list[dict]:
