@@ -127,7 +127,7 @@ def test_an_error_leaves_the_folder_as_it_was(found, tmp_path, monkeypatch, no_p
 
 def test_the_pictures_are_embedded_and_small(page):
     ids = re.findall(r'<figure id="(\w+)">\s*<img src="data:image/png;base64,', page)
-    assert ids == ["board", "timeline", "sphere", "length", "residual"]
+    assert ids == ["board", "timeline", "sphere", "length", "course"]
     assert len(page) < 3e6 and "http" not in page and "url(" not in page and "<script" not in page
 
 

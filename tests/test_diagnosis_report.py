@@ -32,7 +32,7 @@ from imuarray.report.panels import abscissa, cause_table
 from imuarray.report.signals import binned, signal_of
 
 PATH = "a folder/<script>alert(1)</script> & $x$_{.nc"
-ALWAYS = {"discrepancies", "residual", "separability", "positions"}
+ALWAYS = {"discrepancies", "residual", "separability", "positions", "board", "length", "course"}
 VOID = {"meta", "img", "br", "link", "input", "hr"}
 
 
@@ -84,7 +84,7 @@ def test_page_is_whole_and_stands_alone(page, found):
     assert tags.count("h1") == 1 and "script" not in tags and "link" not in tags
     assert "http://" not in page and "https://" not in page and "url(" not in page
     sources = [attributes["src"] for tag, attributes in read.seen if tag == "img"]
-    assert len(sources) == 6 + len(found.found.search.causes) - 1
+    assert len(sources) == len(ALWAYS) + 1 + len(found.found.search.causes)
     for source in sources:
         head, _, data = source.partition(",")
         assert head == "data:image/png;base64"

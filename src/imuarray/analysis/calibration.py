@@ -50,7 +50,7 @@ def calibrate(
         ``nominal_position``, and ``position_covariance`` m^2, the larger of the formal one and a
         jackknife's over blocks of time (``position_sd_formal``, ``position_sd_jackknife``, m); the
         motion at each sample: ``angular_rate`` rad/s, ``angular_acceleration`` rad/s^2,
-        ``specific_force`` m/s^2; along one recording what `imuarray.analysis.course` says;
+        ``specific_force`` m/s^2; along one recording what `imuarray.engine.course` says;
         ``step``, the iterations' largest step in sds;
         ``accelerometer_sd`` m/s^2, ``gyroscope_sd`` rad/s; with effects ``effect_parameter`` and
         ``effect_sd``, whose coordinate ``scope`` is "imu" or "recording", and of several recordings

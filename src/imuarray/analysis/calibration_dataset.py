@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from imuarray.analysis.course import course_variables
 from imuarray.analysis.model import model_of
+from imuarray.engine.course import course
 from imuarray.engine.estimate import Estimate
 from imuarray.engine.parameters import POSITION
 from imuarray.engine.widths import widths
@@ -134,7 +134,8 @@ def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
         motion = found.recorded[0].state.motion[:, :9]
         variables |= _motion(np.split(motion, 3, axis=1))
         coords["time"] = readings.time + readings.origin
-        more = course_variables(first, found, lambda sd: _by_triad(place, sd, count))
+        still = first.stationary
+        more = course(found, first.time if still is None else first.time[~still])
         variables, coords = variables | more[0], coords | more[1]
     if effects:
         model = model_of(first, effects)

@@ -12,7 +12,6 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from imuarray.figures.style import PAGE, new_figure, styled
 from imuarray.firstorder.correct import FirstOrder
 from imuarray.firstorder.report import parameter_table
 from imuarray.firstorder.store import write_corrected
@@ -22,37 +21,9 @@ from imuarray.recording import Recording, write_recording
 from imuarray.report import board_words as said
 from imuarray.report import pictures as pictured
 from imuarray.report.excitation import shown
-from imuarray.report.page import Drawing, rendered, saved
+from imuarray.report.page import CAPTIONS, Drawing, beside, rendered, saved
 
 SURE = 1.96  # sds: 95 %
-CAPTIONS = {
-    "board": (
-        "The board, drawn and found",
-        "Crosses: where the drawing has each IMU. Arrows: to where it was found. Ellipses: 95 %."
-        " Both are enlarged as the titles say, or they could not be seen.",
-    ),
-    "timeline": (
-        "The recording",
-        "Still poses calibrate each sensor, fast motion tells where it is. Samples at a rail are"
-        " left out of the positions; shocks are samples in which several IMUs are far off at once.",
-    ),
-    "sphere": (
-        "What the board has been shown",
-        "Directions in the board's frame, from +z (left) and from −z. Poses ought to be all over"
-        " the sphere, axes of rotation too.",
-    ),
-    "length": (
-        "Error against length",
-        "Claimed standard deviation, had the motion ended earlier. Where it still falls faster than"
-        " the dotted line, the motion is getting better; where it follows the line, four times as"
-        " long a motion halves the error.",
-    ),
-    "residual": (
-        "Residual against time",
-        "Of each IMU, in sds of the noise that was declared: 1 is noise. The three largest are"
-        " named. A rise that lasts is something that moved, warmed up or came loose.",
-    ),
-}
 
 
 class Board(NamedTuple):
@@ -109,23 +80,13 @@ def draw(board: Board) -> list[Drawing]:
         ("timeline", 2.6, [partial(pictured.timeline, corrected, found)], ""),
         ("sphere", 3.4, [partial(pictured.sphere, corrected, found)], shown(corrected, found)),
         ("length", 2.5, [partial(pictured.length, found)], ""),
-        ("residual", 2.4, [partial(pictured.residual_course, found, kind) for kind in KINDS], ""),
+        ("course", 2.4, [partial(pictured.residual_course, found, kind) for kind in KINDS], ""),
     )
     return [
-        Drawing(
-            name, CAPTIONS[name][0], f"{CAPTIONS[name][1]} {more}", {"png": _png(height, parts)}
-        )
+        Drawing(name, CAPTIONS[name][0], f"{CAPTIONS[name][1]} {more}",
+                {"png": saved(beside(height, parts))})
         for name, height, parts, more in pictures
-    ]
-
-
-@styled
-def _png(height: float, parts) -> bytes:
-    """Pictures beside each other, each a function of the axes that it draws into."""
-    figure = new_figure((), PAGE, height)
-    for part, axes in zip(parts, figure.subplots(1, len(parts), squeeze=False)[0], strict=True):
-        part(axes)
-    return saved(figure)
+    ]  # fmt: skip
 
 
 def position_table(calibration: xr.Dataset) -> pd.DataFrame:

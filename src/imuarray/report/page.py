@@ -21,11 +21,40 @@ from imuarray.diagnosis.quantities import (
     unit_shown,
 )
 from imuarray.diagnosis.words import part_in_words, split_name, whose, words
-from imuarray.figures.style import styled
+from imuarray.figures.style import PAGE, new_figure, styled
 
 # What the templates' tables call.
 IN_TABLES = (fixed, number, part_in_words, plus_minus, probability, quantity, split_name, symbols,
              unit_shown, whose, words)  # fmt: skip
+# Titles and captions of the pictures that are not of one page alone.
+CAPTIONS = {
+    "board": (
+        "The board, drawn and found",
+        "Crosses: where the drawing has each IMU. Arrows: to where it was found. Ellipses: 95 %."
+        " Both are enlarged as the titles say, or they could not be seen.",
+    ),
+    "timeline": (
+        "The recording",
+        "Still poses calibrate each sensor, fast motion tells where it is. Samples at a rail are"
+        " left out of the positions; shocks are samples in which several IMUs are far off at once.",
+    ),
+    "sphere": (
+        "What the board has been shown",
+        "Directions in the board's frame, from +z (left) and from −z. Poses ought to be all over"
+        " the sphere, axes of rotation too.",
+    ),
+    "length": (
+        "Error against length",
+        "Claimed standard deviation, had the motion ended earlier. Where it still falls faster than"
+        " the dotted line, the motion is getting better; where it follows the line, four times as"
+        " long a motion halves the error.",
+    ),
+    "course": (
+        "Residual against time",
+        "Of each IMU, in sds of the noise that was declared: 1 is noise. The three largest are"
+        " named. A rise that lasts is something that moved, warmed up or came loose.",
+    ),
+}
 
 
 class Drawing(NamedTuple):
@@ -40,6 +69,16 @@ class Drawing(NamedTuple):
     def base64(self) -> str:
         """The PNG as a page embeds it."""
         return base64.b64encode(self.files["png"]).decode("ascii")
+
+
+@styled
+def beside(height: float, drawings, footer=()) -> Figure:
+    """Pictures beside each other, each a function of the axes that it draws into."""
+    figure = new_figure(footer, PAGE, height)
+    panels = figure.subplots(1, len(drawings), squeeze=False)[0]
+    for drawing, axes in zip(drawings, panels, strict=True):
+        drawing(axes)
+    return figure
 
 
 @styled

@@ -13,6 +13,7 @@ from imuarray.provenance import write_bytes
 from imuarray.report import drawings as drawn
 from imuarray.report import numbers
 from imuarray.report.answers import USUAL, answers, verdict
+from imuarray.report.diagnosed import drawn_alike
 from imuarray.report.drawings_model import ALIKE, cause_figure, position_figure, separability_figure
 from imuarray.report.page import Drawing, files, rendered
 from imuarray.report.panels import cause_table
@@ -113,8 +114,8 @@ def draw(diagnosis: Diagnosis) -> list[Drawing]:
             CAUSE_CAPTION.format(BESIDE.get(EFFECTS[cause.effect].against, PARAMETERS)),
             files(cause_figure(table, footer), table),
         ))  # fmt: skip
-    return [*found, _drawing("separability", diagnosis, footer),
-            _drawing("positions", diagnosis, footer)]  # fmt: skip
+    found += [_drawing(name, diagnosis, footer) for name in ("separability", "positions")]
+    return found + drawn_alike(diagnosis, footer)
 
 
 def _drawing(name: str, diagnosis: Diagnosis, footer) -> Drawing:

@@ -1,14 +1,14 @@
-"""A calibration along its recording: what more of it gains, residuals, what shakes the board."""
+"""An estimate along its recording: what more of it gains, residuals, what shakes the board."""
 
 import numpy as np
 from scipy.special import chdtri
 
 from imuarray.engine.estimate import Estimate
 from imuarray.engine.heldout import blocks_of
+from imuarray.engine.parameters import POSITION
 from imuarray.engine.robust import distances
 from imuarray.engine.widths import growing
 from imuarray.model.effects import KINDS
-from imuarray.recording import Recording
 
 STRETCHES = 60  # of time, at most, in which residuals are averaged
 FEWEST = 20  # samples of one
@@ -16,13 +16,13 @@ SHAKEN = 1e-7  # chance of a triad's residual in plain noise, from which it is f
 SEVERAL = 2  # IMUs off at once: motion faster than the samples, no single bad reading
 
 
-def course_variables(recording: Recording, found: Estimate, by_triad) -> tuple[dict, dict]:
-    """(variables, coordinates) of one recording's estimate.
+def course(found: Estimate, moving) -> tuple[dict, dict]:
+    """(variables, coordinates) of a dataset, of one recording; ``moving`` (M,) s, all its motion.
 
     ``position_sd_by_length`` (length, accelerometer, axis) m, the sds had the motion ended after
     ``length`` s of it; ``accelerometer_residual`` and ``gyroscope_residual`` (stretch, triad), rms
     over the declared noise around the instants ``stretch`` s; ``shaken`` (time), 1 where several
-    IMUs are far off at once. ``by_triad``: from a vector of all parameters to (A, 3).
+    IMUs are far off at once.
     """
     readings, seen = found.recorded[0].readings, found.passes[0]
     time = readings.time + readings.origin
@@ -39,23 +39,24 @@ def course_variables(recording: Recording, found: Estimate, by_triad) -> tuple[d
         for which, kind in enumerate(KINDS)
     }
     ends = [time[part.stop - 1] for part in blocks_of(len(time), len(found.blocks))]
-    sds = np.array([by_triad(sd) for sd in growing(found)])
     shaken = np.sum((far > chdtri(3, SHAKEN)).any(axis=2), axis=1) >= SEVERAL
     variables |= {
-        "position_sd_by_length": (("length", "accelerometer", "axis"), sds, {"units": "m"}),
+        "position_sd_by_length": (
+            ("length", "accelerometer", "axis"), position_sds(found), {"units": "m"},
+        ),
         "shaken": (("time",), shaken.astype(np.int8)),
-    }
+    }  # fmt: skip
+    seconds = np.median(np.diff(moving)) * np.searchsorted(moving, ends, side="right")
     coordinates = {
         "stretch": ("stretch", [time[part].mean() for part in blocks], {"units": "s"}),
-        "length": ("length", moving_seconds(recording, ends), {"units": "s"}),
+        "length": ("length", seconds, {"units": "s"}),
     }
     return variables, coordinates
 
 
-def moving_seconds(recording: Recording, ends) -> np.ndarray:
-    """Seconds of motion recorded until some instants (s)."""
-    moving = np.ones(len(recording.time), bool)
-    if recording.stationary is not None:
-        moving = ~recording.stationary
-    step = float(np.median(np.diff(recording.time)))
-    return step * np.cumsum(moving)[np.searchsorted(recording.time, ends, side="right") - 1]
+def position_sds(found: Estimate) -> np.ndarray:
+    """`growing`'s of the positions, (B, A, 3) m."""
+    sds, count = growing(found), found.recorded[0].readings.array.accelerometers
+    whole = np.zeros((len(sds), *found.active.shape))
+    whole[:, found.active] = sds[:, found.places[0]]
+    return whole[:, :count, found.columns.of(POSITION)]
