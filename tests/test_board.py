@@ -107,7 +107,9 @@ def test_an_answer_not_to_be_trusted_says_so_first(
 
 
 def test_without_still_poses_the_page_says_what_is_missing(found, no_pictures):
-    page = words(html(found._replace(first_order="recording: expected still poses, found none")))
+    odd = found._replace(first_order="recording: expected still poses, found none")
+    page = words(html(odd._replace(account=["IMU 2: turned by 162.1 +- 0.1 degrees"])))
+    assert "IMU 2: turned by 162.1 ± 0.1 degrees." in page
     assert "Record again with still poses" in page and "found none" in page
     assert "How each sensor is turned" not in page
 

@@ -142,9 +142,9 @@ def why(diagnosis: Diagnosis) -> Answer:
         lead = f"In smooth samples that turn fast the residual is {of_noise(sizes)}. {lead}"
     if document["remaining"] and not loud:
         left = number(100 * max(1 - diagnosis.found.explained, 0.0), 2)
-        items.append(
-            f"All of this leaves {left} % of the excess misfit. So little is within tolerance,"
-            f" though it still shows in: {some(document['remaining'])}."
+        lead = (
+            f"The causes below leave {left} % of the excess misfit: within tolerance, though it still"
+            f" shows in {some(document['remaining'])}. {lead}"
         )
     return Answer("Why?", lead, items, loud)
 

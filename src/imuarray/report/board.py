@@ -67,6 +67,7 @@ def html(board: Board) -> str:
         turned=turn_table(board), positions=position_table(board.calibration), sure=SURE,
         prior=board.corrected.position_prior_sd, noise=noises(board), figures=draw(board),
         weakest=said.weakest(board.calibration), before=said.before(board),
+        account=said.account(board),
         first_order=None if isinstance(board.first_order, str)
         else parameter_table(board.first_order, board.recording),
     )  # fmt: skip

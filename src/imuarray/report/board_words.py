@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.diagnosis.plain import Sizes, plainly
-from imuarray.diagnosis.quantities import first_up, joined, number, plus_minus, quantity
+from imuarray.diagnosis.quantities import first_up, number, plus_minus, quantity
 from imuarray.diagnosis.words import split_name
 from imuarray.estimation.informative import weak_directions
 from imuarray.firstorder.report import turned_lines
@@ -140,5 +140,12 @@ def before(board: Board) -> list[str]:
             f" ({before_} before the gyroscopes were calibrated); together the gyroscopes read"
             f" {error} % too {'much' if scale > 0 else 'little'}."
         )
-    turned = joined(board.account)
-    return said + ([f"{turned}."] if turned else [])
+    return said
+
+
+def account(board: Board) -> list[str]:
+    """What became of the logs, as a page has it."""
+    return [
+        f"{line.replace('+-', '±').replace('^2', '²').replace(' -', ' −')}."
+        for line in board.account
+    ]

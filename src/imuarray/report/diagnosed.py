@@ -48,16 +48,13 @@ def as_calibration(diagnosis: Diagnosis) -> xr.Dataset:
 
 
 def drawn_alike(diagnosis: Diagnosis, footer) -> list[Drawing]:
-    """The board, error against length and residual against time, as `imuarray board` has them."""
+    """The board and the residual against time, as `imuarray board` has them."""
     found = as_calibration(diagnosis)
     residuals = [f"{kind}_residual" for kind in KINDS]
     parts = {
         "board": (
             3.1, [partial(pictures.board, found, plane) for plane in ("xy", "xz")],
             found[["nominal_position", "position"]].to_dataframe(),
-        ),
-        "length": (
-            2.5, [partial(pictures.length, found)], found["position_sd_by_length"].to_dataframe(),
         ),
         "course": (
             2.4, [partial(pictures.residual_course, found, kind) for kind in KINDS],
