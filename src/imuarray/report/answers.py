@@ -143,8 +143,8 @@ def why(diagnosis: Diagnosis) -> Answer:
     if document["remaining"] and not loud:
         left = number(100 * max(1 - diagnosis.found.explained, 0.0), 2)
         lead = (
-            f"The causes below leave {left} % of the excess misfit: within tolerance, though it still"
-            f" shows in {some(document['remaining'])}. {lead}"
+            f"The causes below leave {left} % of the excess misfit: within tolerance, though it"
+            f" still shows in {some(document['remaining'])}. {lead}"
         )
     return Answer("Why?", lead, items, loud)
 
