@@ -1,5 +1,6 @@
 """Loose IMUs' own logs as one recording: rotations, clocks, readings on common instants."""
 
-from imuarray.alignment.align import Alignment, align
+from imuarray.alignment.align import align
+from imuarray.alignment.found import Alignment
 
 __all__ = ["Alignment", "align"]

@@ -4,10 +4,12 @@ Readings are carried over by splines of fifth degree (Unser, Sampling - 50 years
 2000, gives the error of a spline for a sinusoid that `interpolation_error` sums over a spectrum).
 """
 
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.interpolate import BSpline, make_interp_spline, make_lsq_spline
 
 DEGREE = 5
@@ -50,10 +52,13 @@ class Sensor:
         if not whole:
             return np.zeros(0), np.zeros((0, 0))
         window = np.kaiser(SEGMENT, 14.0)  # leaks less than 1e-10: fast motion beside little noise
-        pieces = np.concatenate([
-            np.lib.stride_tricks.sliding_window_view(self.values[part], SEGMENT, axis=0)
-            [:: SEGMENT // 2] for part in whole
-        ])  # fmt: skip
+        pieces, railed = (
+            np.concatenate([sliding_window_view(x[part], SEGMENT, axis=0)[:: SEGMENT // 2]
+                            for part in whole])
+            for x in (self.values, self.railed)
+        )  # fmt: skip
+        railed = railed.any(axis=(1, 2))  # a rail's corners are not the motion's
+        pieces = pieces[~railed | railed.all()]
         pieces = (pieces - pieces.mean(axis=-1, keepdims=True)) * window
         power = 2 * np.sum(np.abs(np.fft.rfft(pieces)) ** 2, axis=1) / SEGMENT / np.sum(window**2)
         frequency = np.fft.rfftfreq(SEGMENT)
@@ -128,10 +133,13 @@ class Splines:
 
 
 def _spline(time, values, knots) -> BSpline:
-    if knots is not None:
-        inner = knots[(knots > time[0]) & (knots < time[-1])][2:-2]
-        if len(inner):
-            ends = [np.full(DEGREE + 1, end) for end in (time[0], time[-1])]
-            knots = np.concatenate([ends[0], inner, ends[1]])
+    """Through a run, or by least squares on the knots that are within it."""
+    inner = np.zeros(0) if knots is None else knots[(knots > time[0]) & (knots < time[-1])][2:-2]
+    if len(inner):
+        # a reading between neighbours, or nothing determines the spline there
+        inner = inner[np.unique(np.searchsorted(time, inner), return_index=True)[1]]
+        ends = [np.full(DEGREE + 1, end) for end in (time[0], time[-1])]
+        knots = np.concatenate([ends[0], inner, ends[1]])
+        with suppress(np.linalg.LinAlgError):  # where readings are missing, too little still does
             return make_lsq_spline(time, values, knots, DEGREE, method="norm-eq")
     return make_interp_spline(time, values, DEGREE)

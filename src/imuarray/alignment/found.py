@@ -1,0 +1,131 @@
+"""What was found of logs that were aligned: in lines for a person, and as a file keeps it."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from imuarray.alignment.clocks import Clock
+from imuarray.firstorder.turns import TURNED, angle_of
+from imuarray.recording.record import AXES
+
+KINDS = {"accelerometer": ("m/s^2", 1.0), "gyroscope": ("deg/s", 180 / np.pi)}  # as lines show them
+NOISY = 3.0  # times the noise, from which a residual is explained
+JITTER = 5e-6  # s, that is said
+
+
+class Carried(NamedTuple):
+    """Of one sensor: ``rate`` Hz by the first log's clock, ``jitter`` s of its stamps.
+
+    ``error`` is the rms of what interpolation misses in motion, ``noise_sd`` the declared noise in
+    an interpolated reading, both m/s^2 or rad/s.
+    """
+
+    rate: float
+    jitter: float
+    error: float
+    noise_sd: float
+
+    def line(self, kind: str) -> str:
+        """For a person."""
+        unit, scale = KINDS[kind]
+        off = f", stamps {1e3 * self.jitter:.2g} ms off even readings"
+        return (
+            f"{kind} at {self.rate:.2f} Hz{off * (self.jitter > JITTER)}, interpolation misses"
+            f" {scale * self.error:.2g} {unit} where noise is {scale * self.noise_sd:.2g}"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Alignment:
+    """How K logs lie to one another.
+
+    Attributes
+    ----------
+    labels : K str
+    rotation : (K, 3, 3) from each chip's axes to the array's
+    declared : (K,) rad, between the rotation found and the one declared; NaN where none was
+    clocks : K of `Clock`, each against the first log's
+    agreement : (K,) residual of each gyroscope against the first, over the declared noise of both
+    carried : K pairs of `Carried`, accelerometer and gyroscope
+    step : s, between common instants
+    origin : s, the first log's stamp at the recording's instant zero
+    count, left_out : common instants, and those that gaps in the logs cost beside
+    """
+
+    labels: tuple[str, ...]
+    rotation: np.ndarray
+    declared: np.ndarray
+    clocks: tuple[Clock, ...]
+    agreement: np.ndarray
+    carried: tuple[tuple[Carried, Carried], ...]
+    step: float
+    origin: float
+    count: int
+    left_out: int
+
+    @property
+    def angle(self) -> np.ndarray:
+        """(K,) rad, between each chip's axes and the first's."""
+        return angle_of(np.swapaxes(self.rotation, 1, 2) @ self.rotation[0])
+
+    @property
+    def angle_sd(self) -> np.ndarray:
+        """(K,) rad, about one axis, mean over axes."""
+        return np.sqrt([np.trace(clock.turn_covariance) / 3 for clock in self.clocks])
+
+    def lines(self) -> list[str]:
+        """For a person: what was found of each log, and how well readings are carried over."""
+        gaps = f"; {self.left_out} more in gaps left out" if self.left_out else ""
+        rate = f"{1 / self.step:.2f} Hz, the slowest sensor's rate"
+        out = [f"{self.count} common instants at {rate}{gaps}"]
+        for k, (label, pair) in enumerate(zip(self.labels, self.carried, strict=True)):
+            out += [f"IMU {label}: {self._lies(k)}"] if k else []
+            shown = (one.line(kind) for kind, one in zip(KINDS, pair, strict=True))
+            out.append(f"IMU {label}: {'; '.join(shown)}")
+        return out
+
+    def _lies(self, k: int) -> str:
+        clock, (ahead, faster) = self.clocks[k], np.sqrt(np.diag(self.clocks[k].covariance)[:2])
+        text = (
+            f"turned by {_with(np.degrees(self.angle[k]), np.degrees(self.angle_sd[k]))} degrees"
+            f" against IMU {self.labels[0]}; its clock is {_with(1e3 * clock.offset, 1e3 * ahead)}"
+            f" ms ahead at its middle and {_with(1e6 * clock.drift, 1e6 * faster)} ppm fast; rates"
+            f" agree to {self.agreement[k]:.2f} times the noise"
+        )
+        if self.agreement[k] > NOISY:
+            text += f", as if its stamps were {1e3 * clock.stray:.2g} ms wrong"
+        if self.declared[k] > TURNED:
+            text += f"; {np.degrees(self.declared[k]):.1f} degrees off its declared axes"
+        return text
+
+    def dataset(self) -> xr.Dataset:
+        """The same as the recording's file keeps it: dimensions imu, axis, kind."""
+        sds = np.sqrt([np.diag(clock.covariance)[:2] for clock in self.clocks])
+        clocks = {"offset": "s", "drift": "1", "middle": "s"}
+        facts = {
+            f"clock_{name}": (np.array([getattr(clock, name) for clock in self.clocks]), unit)
+            for name, unit in clocks.items()
+        }
+        facts |= {"clock_offset_sd": (sds[:, 0], "s"), "clock_drift_sd": (sds[:, 1], "1")}
+        facts |= {"angle_sd": (self.angle_sd, "rad"), "agreement": (self.agreement, "1")}
+        made = {name: ("imu", values, {"units": unit}) for name, (values, unit) in facts.items()}
+        both = "m s-2 and rad s-1"
+        units = {
+            "rate": "Hz", "jitter": "s", "interpolation_error": both, "interpolated_noise": both
+        }  # fmt: skip
+        for name, values in zip(units, np.moveaxis(self.carried, -1, 0), strict=True):
+            made[name] = ("imu", "kind"), values, {"units": units[name]}
+        made["rotation"] = ("imu", "axis", "axis_other"), self.rotation, {"units": "1"}
+        named = {"imu": self.labels, "kind": KINDS, "axis": AXES}
+        return xr.Dataset(
+            made, {name: np.array(list(labels), object) for name, labels in named.items()},
+            {"step": self.step, "origin": self.origin, "left_out": self.left_out},
+        )  # fmt: skip
+
+
+def _with(value: float, sd: float) -> str:
+    """A value with its sd to two digits."""
+    digits = int(np.clip(1 - np.floor(np.log10(max(sd, 1e-9))), 0, 9))
+    return f"{value:.{digits}f} +- {sd:.{digits}f}"
