@@ -101,6 +101,8 @@ def kalibr(document: dict[str, Any]) -> str:
             for term in ("noise_density", "random_walk"):
                 lines.append(_noise(f"  {kind}_{term}", imu[kind]["noise"].get(term)))
             lines += [f"  {kind}s:", *_matrix("    M", own[kind]["M"])]
+            sds = [step["map_sd"] for step in imu[kind]["corrections"] if "map_sd" in step]
+            lines[-1] += f" # sd of entries up to {np.max(sds):.2g}" if sds else ""
             if kind == "gyroscope":
                 lines += _matrix("    A", np.zeros((3, 3)))
                 lines += _matrix("    C_gyro_i", own[kind]["C_gyro_i"])
