@@ -111,7 +111,7 @@ def test_positions_sds_and_noise_are_right():
 
 def with_turning(found):
     """The estimate again, the rate's slope as prior of the angular acceleration."""
-    begun = [replace(one, state=turned(one.readings, one.state)) for one in found.recorded]
+    begun = [replace(one, state=turned(one.readings, one.state, True)) for one in found.recorded]
     return estimate(begun, found.columns, found.active, robust=False)
 
 

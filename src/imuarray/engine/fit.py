@@ -287,7 +287,7 @@ def with_derivatives(readings, state, smooth) -> State:
     if not smooth:
         return state
     if state.turning is not None:
-        state = turned(readings, state)
+        state = turned(readings, state, bool(state.turning.follows.any()))
     found = derivatives(readings, state.motion, state.positions)
     return state._replace(derivatives=found)
 

@@ -114,7 +114,10 @@ def climb(readings: Sequence[Readings], bare: bool = True) -> tuple[Estimate, li
     late = any(_needs_neighbours(effect) for name in now.kept for effect in RUNGS[name])
     pair = readings[0].pair
     if all(one.smooth for one in found.recorded) and (pair or not late):
-        begun = [replace(one, state=turned(one.readings, one.state)) for one in found.recorded]
+        begun = [
+            replace(one, state=turned(one.readings, one.state, follows=True))
+            for one in found.recorded
+        ]
         better = estimate(begun, columns, found.active)
         if pair or better.residual_ratio() < AGREES * found.residual_ratio():
             found = better

@@ -48,6 +48,18 @@ class RoughPrior(NamedTuple):
         return bool(np.any(self.sd[:, 6:9] == self.own))
 
 
+class TurningPrior(NamedTuple):
+    """Normal prior of omega_dot, of which the rate's own slope is the mean; (T, 3) each.
+
+    ``follows`` (T,) bool: whether derivatives by parameters know that the mean moves with the rate.
+    They do near the optimum; far from it such steps lead astray.
+    """
+
+    mean: np.ndarray
+    sd: np.ndarray
+    follows: np.ndarray
+
+
 class State(NamedTuple):
     """Where the model is linearised."""
 
@@ -56,7 +68,7 @@ class State(NamedTuple):
     parameters: np.ndarray  # (P,) of the model with all effects
     derivatives: tuple  # omega double dot, s dot (T, 3); second, third of (force, rate)
     rough_prior: RoughPrior | None = None  # where the motion is rough
-    turning: tuple[np.ndarray, np.ndarray] | None = None  # omega_dot's prior: mean, sd (T, 3)
+    turning: TurningPrior | None = None
 
     @property
     def gyroscopes_free(self) -> bool:
@@ -248,7 +260,7 @@ def chunk_at(readings: Readings, columns: Columns, state: State, directions, sta
     bare = (mean - x[:, x.shape[1] - sd.shape[1] :]) / sd
     whitened = np.asarray(whitened)[..., directions]
     course = np.zeros((len(index), 0, whitened.shape[1], len(directions)))
-    if state.turning is not None:
+    if state.turning is not None and state.turning.follows.any():
         course = _course(readings, index, whitened, sd[:, :3])
     # factorisations are LAPACK's, called from here (see `jax64`)
     return _eliminated(
@@ -272,7 +284,7 @@ def _rows_of(readings: Readings, state: State, index):
         prior = state.rough_prior.mean[index], state.rough_prior.sd[index]
     if state.turning is not None:
         free = np.zeros((len(index), 3)), np.full((len(index), 3), np.inf)  # of s
-        parts = zip((part[index] for part in state.turning), free, prior, strict=True)
+        parts = zip((part[index] for part in state.turning[:2]), free, prior, strict=True)
         prior = tuple(np.hstack(part) for part in parts)
     return index, state.motion[index], extra, prior
 

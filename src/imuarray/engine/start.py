@@ -31,7 +31,7 @@ def start(readings: Readings, columns: Columns) -> State:
             " rate's change from sample to sample is their angular acceleration"
         )
     found = turned(readings, found)
-    return found._replace(motion=np.hstack([rate, found.turning[0], linear[:, 3:]]))
+    return found._replace(motion=np.hstack([rate, found.turning.mean, linear[:, 3:]]))
 
 
 def _linear_motion(readings, positions, rate) -> np.ndarray:

@@ -6,16 +6,21 @@ leave it open about the line that joins them.
 
 import numpy as np
 
-from imuarray.engine.linearise import State, polynomial_derivative, polynomial_taps
+from imuarray.engine.linearise import (
+    State,
+    TurningPrior,
+    polynomial_derivative,
+    polynomial_taps,
+)
 from imuarray.engine.readings import Readings
 
 
-def turned(readings: Readings, state: State) -> State:
+def turned(readings: Readings, state: State, follows: bool = False) -> State:
     """A state with the slope of its own rate as prior mean of omega_dot.
 
     The slope is a local sextic's, a quartic's in runs too short for that. The prior's sd is the
     gyroscopes' noise in it, and what a quartic leaves out, as the sextic shows it; in still shorter
-    runs all that is known is omega_dot's size.
+    runs all that is known is omega_dot's size. ``follows``: as `TurningPrior` has it.
     """
     rate, quartic = state.motion[:, :3], readings.window
     sextic = 3 * quartic // 4 * 2 + 1
@@ -32,7 +37,7 @@ def turned(readings: Readings, state: State) -> State:
     sd = np.sqrt((spread[:, None] * noise) ** 2 + left)
     alone = spread == 0.0  # in runs that are too short: as large as elsewhere
     sd[alone] = np.sqrt(np.mean(short[~alone] ** 2)) if not alone.all() else np.inf
-    return state._replace(turning=(short, sd))
+    return state._replace(turning=TurningPrior(short, sd, np.full(len(sd), follows)))
 
 
 def _taps(readings: Readings, window, degree, place=None) -> np.ndarray:
