@@ -38,7 +38,7 @@ def course(found: Estimate, moving) -> tuple[dict, dict]:
         f"{kind}_residual": (("stretch", kind), rms[:, : counts[which], which], {"units": "1"})
         for which, kind in enumerate(KINDS)
     }
-    ends = [time[part.stop - 1] for part in blocks_of(len(time), len(found.blocks))]
+    ends = [time[max(part.stop, 1) - 1] for part in blocks_of(len(time), len(found.blocks))]
     shaken = np.sum((far > chdtri(3, SHAKEN)).any(axis=2), axis=1) >= SEVERAL
     variables |= {
         "position_sd_by_length": (
