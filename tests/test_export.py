@@ -230,14 +230,14 @@ def test_joints_and_rows_are_the_document_s(made):
 @pytest.mark.parametrize("upper", [True, False])
 def test_the_turns_sds_are_those_of_drawn_maps(made, upper):
     """1500 draws of what first order left, seed 2: 5 sds of an sd are 9 %."""
-    from imuarray.analysis.export import _lower_times_rotation, _turn_sds
+    from imuarray.analysis.frames import lower_times_rotation, turn_sds
     from imuarray.firstorder.triads import upper_times_rotation
 
     calibration = made[0]
-    part = upper_times_rotation if upper else _lower_times_rotation
+    part = upper_times_rotation if upper else lower_times_rotation
     matrices = np.linalg.inv(calibration["accelerometer_inverse"].to_numpy()[0])
     turns = np.array([part(matrix)[1] for matrix in matrices])
-    own, others = _turn_sds(calibration, turns, turns)
+    own, others = turn_sds(calibration, turns, turns)
     left = calibration["map_covariance"].to_numpy()
     draws = np.random.default_rng(2).multivariate_normal(np.zeros(36), left, 1500)
     seen = []

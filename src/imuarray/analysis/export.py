@@ -8,14 +8,13 @@ import xarray as xr
 
 from imuarray.analysis import methods
 from imuarray.analysis.checked import require_fit
+from imuarray.analysis.frames import frames_of, left_of
 from imuarray.errors import InputError, one_line, require_one_of
 from imuarray.firstorder.noise import TERMS, StillNoise
-from imuarray.firstorder.triads import upper_times_rotation
-from imuarray.firstorder.turns import nearest_orthogonal
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.model.effects import KINDS, Prediction
-from imuarray.recording.record import CORRECTION, NUMBERS, by_kind
+from imuarray.recording.record import CORRECTION, NUMBERS
 from imuarray.recording.validate import is_rotation
 
 BIASES = "accelerometer_bias", "gyroscope_bias"
@@ -84,7 +83,7 @@ def describe(calibration: xr.Dataset, noise: StillNoise | None = None) -> dict[s
     _require_whole(calibration, model)
     try:
         steps, times = _steps(calibration, model), _times(calibration, model)
-        frames = _frames(calibration, steps, positions)
+        frames = frames_of(calibration, steps, positions)
     except np.linalg.LinAlgError:
         raise InputError("expected corrections that can be inverted, found singular ones") from None
     rate = attrs.get("rate", noise.rate_hz if noise else None)
@@ -163,7 +162,7 @@ def _steps(calibration: xr.Dataset, model: ArrayModel) -> dict[str, list[dict]]:
             if not out[kind]:
                 out[kind].append({"from": "first-order"})
             out[kind][0][part] = part_values.to_numpy()
-        for kind, left in _left(calibration).items():
+        for kind, left in left_of(calibration).items():
             out[kind][0]["map_sd"] = np.sqrt(np.maximum(np.diag(left), 0)).reshape(-1, 3, 3)
     values = _values(calibration, model)
     for number, kind in enumerate(KINDS):
@@ -172,12 +171,6 @@ def _steps(calibration: xr.Dataset, model: ArrayModel) -> dict[str, list[dict]]:
             step = {"from": "calibrate", "inverse": np.linalg.inv(matrix), "offset": offset}
             out[kind].append(step)
     return out
-
-
-def _left(calibration: xr.Dataset) -> dict[str, np.ndarray]:
-    """Covariances by kind of the maps that first order has left."""
-    left = calibration.get("map_covariance")
-    return by_kind(None if left is None else left.to_numpy(), calibration.sizes["accelerometer"])
 
 
 def _linear(model: ArrayModel, values: dict, kind: int) -> tuple[np.ndarray, np.ndarray]:
@@ -239,76 +232,6 @@ def _clock(calibration: xr.Dataset, k: int) -> dict[str, Any]:
     found = {name: _plain(calibration[own].to_numpy()[k]) for name, own in names.items()}
     rate = float(f"{calibration['log_rate'].to_numpy()[k]:.10g}")
     return {"rate_hz": rate, "clock": found if k else None}
-
-
-def _frames(calibration: xr.Dataset, steps: dict, positions) -> list[dict]:
-    """Of each IMU its place, its turn, and what its chips read, in their own axes."""
-    sensed = {kind: _sensed(steps[kind], calibration.sizes[kind]) for kind in KINDS}
-    chips = calibration.get("accelerometer_axes")
-    axes = np.tile(np.eye(3), (len(positions), 1, 1)) if chips is None else chips.to_numpy()
-    if steps[KINDS[0]] and steps[KINDS[0]][0]["from"] == "first-order":
-        axes = nearest_orthogonal(np.linalg.inv(steps[KINDS[0]][0]["inverse"])) @ axes
-    axes = np.where(np.abs(axes - np.round(axes)) < 1e-9, np.round(axes), axes) + 0.0
-    matrices = np.swapaxes(axes, 1, 2) @ sensed[KINDS[0]][0]
-    turns = np.array([upper_times_rotation(matrix)[1] for matrix in matrices])
-    lower = [_lower_times_rotation(matrix) for matrix in matrices]
-    own, others = _turn_sds(calibration, turns, np.array([turn for _, turn in lower]))
-    sds = np.sqrt(np.einsum("kaka->ka", calibration["position_covariance"].to_numpy()))
-    frames: list[dict] = []
-    for k, (scale, turn) in enumerate(lower):
-        to = np.eye(4)
-        if k:
-            to[:3, :3], to[:3, 3] = turn @ lower[0][1].T, turn @ (positions[0] - positions[k])
-        frame: dict[str, Any] = {"position_m": positions[k], "position_sd_m": sds[k]}
-        frame |= {"rotation": turns[k], "rotation_sd_rad": own[k], "axes": axes[k]}
-        frame |= {"T_i_b": to, "T_i_b_turn_sd_rad": others[k]}
-        frame[KINDS[0]] = {"M": scale, "bias": axes[k].T @ sensed[KINDS[0]][1][k]}
-        if k < calibration.sizes[KINDS[1]]:
-            matrix, bias = (part[k] for part in sensed[KINDS[1]])
-            scale, whole = _lower_times_rotation(axes[k].T @ matrix)
-            frame[KINDS[1]] = {"M": scale, "C_gyro_i": whole @ turn.T, "bias": axes[k].T @ bias}
-        frames.append(frame)
-    return frames
-
-
-def _sensed(steps: list[dict], count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Reading = matrix (n, 3, 3) @ truth + bias (n, 3), of all corrections together."""
-    matrix, bias = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
-    for step in reversed(steps):
-        own = np.linalg.inv(step["inverse"])
-        matrix, bias = own @ matrix, (own @ bias[..., None])[..., 0] + step["offset"]
-    return matrix, bias
-
-
-def _lower_times_rotation(matrix) -> tuple[np.ndarray, np.ndarray]:
-    """matrix (3, 3) = L R: L lower triangular, R a rotation."""
-    upper, turn = upper_times_rotation(matrix[::-1, ::-1])
-    return upper[::-1, ::-1] + 0.0, turn[::-1, ::-1] + 0.0
-
-
-def _turn_sds(calibration: xr.Dataset, turns, others) -> tuple[np.ndarray, np.ndarray]:
-    """Sds (A, 3) of turns about the IMUs' axes, and of ``others`` against the first's of these.
-
-    From the maps 1 + d that first order has left: of U R (1 + d) what is beneath the diagonal of
-    R d R' turns R, of L R (1 + d) what is above.
-    """
-    left, count = _left(calibration).get("accelerometer"), len(turns)
-    if left is None:
-        return (np.full((count, 3), np.nan),) * 2
-    sds, places, signs = [], ([7, 6, 3], [5, 2, 1]), ([1, -1, 1], [-1, 1, -1])
-    for relative, (frames, place, sign) in enumerate(
-        zip((turns, others), places, signs, strict=True)
-    ):
-        slopes = np.zeros((count, 3, count, 9))
-        for k, turn in enumerate(frames):
-            slopes[k, :, k] = np.array(sign)[:, None] * np.kron(turn, turn)[place]
-        if relative:
-            apart = others @ others[0].T
-            slopes = slopes - np.einsum("kij,jlm->kilm", apart, slopes[0])
-        rows = slopes.reshape(3 * count, 9 * count)
-        variances = np.einsum("ri,ij,rj->r", rows, left, rows)
-        sds.append(np.sqrt(np.maximum(variances, 0.0)).reshape(count, 3))
-    return sds[0], sds[1]
 
 
 def _noise(calibration: xr.Dataset, noise: StillNoise | None, kind: str, k: int, rate) -> dict:
