@@ -37,7 +37,7 @@ UNTRUSTED = "# status 3"  # what a command of such a block gives is not to be tr
 FILE = re.compile(r"^`([\w.-]+)`$")
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
-# The README says to set these in a copy of config.yaml for a quick look.
+# docs/recording.md says to set these in a copy of config.yaml for a quick look.
 QUICK = (("board: mimu4444 ", "board: mimu4444_corners "), ("duration: 100.0", "duration: 5.0"))
 
 

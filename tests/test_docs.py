@@ -22,7 +22,7 @@ from imuarray.model import EFFECTS
 from tests.doc_pages import FENCE, PAGES, ROOT, Block, blocks, commands, compare
 
 DOCS = ROOT / "docs"
-SLOW = ("README.md", "effects.md", "tutorial_recording.md", "tutorial_simulated.md")
+SLOW = ("recording.md", "effects.md", "tutorial_recording.md", "tutorial_simulated.md")
 COMMAND = re.compile(r"`(imuarray [^`]+)`")
 CODE = re.compile(r"`([^`]+)`")
 
@@ -151,7 +151,7 @@ def test_links_as_the_site_has_them():
     )
     assert mkdocs_hooks.rewritten("[a](docs/b.md)", "README.md") == "[a](../b.md)"
     assert mkdocs_hooks.source_of("repository/config/README.md") == "config/README.md"
-    taken = mkdocs_hooks.linked_files(["docs/index.md"])
+    taken = mkdocs_hooks.linked_files(["docs/index.md", "docs/pipeline.md"])
     assert {"README.md", "config/README.md", "paper_figures/claims.md"} <= set(taken)
 
 
