@@ -39,7 +39,7 @@ COLUMNS = [kind + axis for kind in "ag" for axis in "xyz"]
 PAIR = {"imus": 2, "rates": "200,200", "mount": 0.0, "turned": 37.0, "offset": 3e-3,
         "mounted": True}  # fmt: skip
 EXTRA = "clock_us", "clock_worst_us", "turn_deg", "a_deg", "g_deg"  # of which the worst is shown
-SHAKEN = 4.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0  # Hz, bandwidth of the twisting
+SHAKEN = 4.0, 8.0, 12.0, 16.0, 20.0, 24.0, 48.0  # Hz, bandwidth of the twisting
 
 
 @dataclass(frozen=True)
