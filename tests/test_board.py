@@ -1,13 +1,8 @@
 """`imuarray board`: from a log to positions and a page; what the page says, and that it renders."""
 
-import json
-import os
 import re
-import shutil
-import subprocess
 from dataclasses import replace
 from functools import partial
-from html import unescape as html_text
 
 import matplotlib
 import matplotlib.pyplot as plt
@@ -22,6 +17,7 @@ from imuarray.cli import main
 from imuarray.diagnosis.plain import Sizes, plain
 from imuarray.report.board import html, write_board
 from imuarray.report.excitation import missing
+from tests.browser import in_browser, needs_browser
 
 matplotlib.use("agg")
 LATE = 0.003
@@ -133,27 +129,9 @@ def test_the_pictures_are_embedded_and_small(page):
     assert len(page) < 3e6 and "http" not in page and "url(" not in page and "<script" not in page
 
 
-BROWSER = shutil.which("chromium") or shutil.which("chromium-browser")
-SEEN = """<script>addEventListener("load", () => {
-const all = [...document.images], page = document.documentElement;
-const fetched = performance.getEntriesByType("resource").map(entry => entry.name);
-document.title = JSON.stringify({
-  widths: all.map(image => image.naturalWidth), tall: page.scrollHeight,
-  wide: page.scrollWidth <= innerWidth, fetched: fetched.filter(name => !name.startsWith("data:")),
-}); })</script>"""
-
-
-@pytest.mark.skipif(BROWSER is None, reason="no Chromium")
+@needs_browser
 def test_a_browser_shows_the_page(page, tmp_path):
-    """Every picture is decoded, nothing is asked for elsewhere, nothing sticks out to the right."""
-    (tmp_path / "page.html").write_text(page.replace("</body>", f"{SEEN}</body>"))
-    options = "--headless --no-sandbox --disable-gpu --window-size=1000,800 --dump-dom".split()
-    home = {"HOME": str(tmp_path), "PATH": os.environ["PATH"]}
-    shown = subprocess.run(
-        [BROWSER, *options, (tmp_path / "page.html").as_uri()], capture_output=True, text=True,
-        timeout=60, env=home,
-    ).stdout  # fmt: skip
-    seen = json.loads(html_text(re.search("<title>(.*?)</title>", shown).group(1)))
+    seen = in_browser(page, tmp_path)
     assert len(seen["widths"]) == 5 and min(seen["widths"]) > 1000 and seen["tall"] > 2000
     assert seen["fetched"] == [] and seen["wide"]
 

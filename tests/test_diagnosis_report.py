@@ -30,6 +30,7 @@ from imuarray.report.answers import answers, verdict
 from imuarray.report.drawings_model import cause_figure
 from imuarray.report.panels import abscissa, cause_table
 from imuarray.report.signals import binned, signal_of
+from tests.browser import in_browser, needs_browser
 
 PATH = "a folder/<script>alert(1)</script> & $x$_{.nc"
 ALWAYS = {"discrepancies", "residual", "separability", "positions", "board", "course"}
@@ -94,6 +95,13 @@ def test_page_is_whole_and_stands_alone(page, found):
     assert len(ids) == len(set(ids))
     table = [len([t for t in row.split("<td")]) for row in page.split("<tr")[1:] if "<td" in row]
     assert min(table) > 3
+
+
+@needs_browser
+def test_a_browser_shows_the_page(page, tmp_path):
+    seen = in_browser(page, tmp_path)
+    assert len(seen["widths"]) == page.count("<img ") and min(seen["widths"]) > 1000
+    assert seen["fetched"] == [] and seen["wide"]
 
 
 def test_page_answers_the_four_questions(page):

@@ -79,7 +79,7 @@ def advice(board: Board) -> list[str]:
     if not board.reasons:
         said += [
             "Use it: imuarray apply cal.nc recording.nc --out motion.nc makes one sensor of the"
-            " array.",
+            " array, imuarray export cal.nc --format kalibr --out imu.yaml a file for other tools.",
             "Record a second time and calibrate both (imuarray calibrate): what two recordings"
             " agree on is what can be relied on.",
         ]
