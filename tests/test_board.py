@@ -156,6 +156,22 @@ def test_pictures_for_a_notebook(found):
     plt.close("all")
 
 
+def test_what_limits_is_said_and_shocks_are_not_misfit(found, no_pictures):
+    level, rough = found.calibration.copy(deep=True), found.calibration.copy()
+    level["position_sd_by_length"][:] = level["position_sd_by_length"][-1].to_numpy()
+    assert [len(imuarray.plots.length(seen).lines) for seen in (rough, level)] == [3, 2]
+    page = words(html(found._replace(calibration=level)))
+    assert "More motion of this kind gains little" in page
+    plt.close("all")
+    rough.attrs["residual_ratio"] = 11.0
+    assert "imuarray diagnose" in words(html(found._replace(calibration=rough)))
+    for kind in ("accelerometer", "gyroscope"):
+        rough[f"{kind}_smooth_residual"] = (kind,), np.array([0.9, 0.9, 0.9, 2.0])
+    page = words(html(found._replace(calibration=rough)))
+    assert "residual is 0.90 times the declared noise where the motion is smooth (11 times" in page
+    assert "imuarray diagnose" not in page
+
+
 def test_what_has_not_been_excited_is_named(found):
     assert missing(found.corrected, found.calibration) == []
     seen = found.corrected

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from imuarray.estimation.informative import position_sds
 from imuarray.firstorder.triads import upper_times_rotation
 from imuarray.firstorder.turns import nearest_orthogonal
 from imuarray.model.effects import KINDS
@@ -29,7 +30,7 @@ def frames_of(calibration: xr.Dataset, steps: dict, positions) -> list[dict]:
     turns = np.array([upper_times_rotation(matrix)[1] for matrix in matrices])
     lower = [lower_times_rotation(matrix) for matrix in matrices]
     own, others = turn_sds(calibration, turns, np.array([turn for _, turn in lower]))
-    sds = np.sqrt(np.einsum("kaka->ka", calibration["position_covariance"].to_numpy()))
+    sds = position_sds(calibration)
     frames: list[dict] = []
     for k, (scale, turn) in enumerate(lower):
         to = np.eye(4)

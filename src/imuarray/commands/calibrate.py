@@ -7,7 +7,7 @@ from imuarray.analysis.calibration import calibrate as calibrated
 from imuarray.analysis.model import assumed
 from imuarray.analysis.trust import reasons_of_calibration
 from imuarray.commands.output import Output
-from imuarray.estimation.informative import weak_directions
+from imuarray.estimation.informative import position_sds, weakest_of
 from imuarray.model.effects import KINDS
 from imuarray.provenance import trust, write_netcdf
 from imuarray.recording import read_recording
@@ -39,9 +39,9 @@ def document(dataset: xr.Dataset) -> dict:
         "residual_ratio": dataset.attrs["residual_ratio"],
         "accelerometers": labels,
         "position_m": dataset["position"].to_numpy(),
-        "position_sd_m": _sds(dataset),
+        "position_sd_m": position_sds(dataset),
         "weakest_directions": [
-            {"direction": item.words, "sd_m": item.sd} for item in _weakest(dataset)
+            {"direction": item.words, "sd_m": item.sd} for item in weakest_of(dataset)
         ],
     }
     if "effect_parameter" in dataset:
@@ -59,15 +59,15 @@ def report(dataset: xr.Dataset) -> str:
         f"{state} after {count} iterations, {samples} samples",
         "triad   x mm      y mm      z mm    (sd um)",
     ]
-    rows = dataset["accelerometer"].to_numpy(), dataset["position"].to_numpy(), _sds(dataset)
+    rows = (
+        dataset["accelerometer"].to_numpy(),
+        dataset["position"].to_numpy(),
+        position_sds(dataset),
+    )
     for label, row, sd in zip(*rows, strict=True):
         values = "  ".join(f"{1e3 * value:8.4f}" for value in row)
         lines.append(f"{label:>5} {values}    {', '.join(f'{1e6 * value:.2g}' for value in sd)}")
     return "\n".join([*lines, *_effects(dataset), *_informative(dataset), *_misfit(dataset)])
-
-
-def _sds(dataset: xr.Dataset) -> np.ndarray:
-    return np.sqrt(np.einsum("kaka->ka", dataset["position_covariance"].to_numpy()))
 
 
 def _effects(dataset: xr.Dataset) -> list[str]:
@@ -81,17 +81,10 @@ def _effects(dataset: xr.Dataset) -> list[str]:
     ]
 
 
-def _weakest(dataset: xr.Dataset):
-    positions = dataset["position"].to_numpy()
-    size = 3 * (len(positions) - 1)
-    covariance = dataset["position_covariance"].to_numpy()[1:, :, 1:, :].reshape(size, size)
-    return weak_directions(positions, covariance, dataset["accelerometer"].to_numpy())
-
-
 def _informative(dataset: xr.Dataset) -> list[str]:
     """How well the recording determines the positions, and which combinations of them worst."""
-    worst, prior = _weakest(dataset), dataset.attrs["position_prior_sd"]
-    rms = np.sqrt(np.mean(_sds(dataset)[1:] ** 2))
+    worst, prior = weakest_of(dataset), dataset.attrs["position_prior_sd"]
+    rms = np.sqrt(np.mean(position_sds(dataset)[1:] ** 2))
     said = ", ".join(f"{item.words} ({1e6 * item.sd:.2g} um)" for item in worst)
     bound = " by the Cramer-Rao bound" if dataset.attrs["model"] == "papers" else ""
     lines = [f"positions to {1e6 * rms:.2g} um rms{bound}; worst determined: {said}"]

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 
 AXES = "xyz"
 NAMED = 0.5  # share of a direction that a pattern must make up to give it its name
@@ -54,3 +55,16 @@ def weak_directions(positions, covariance, labels, count: int = 3) -> list[Direc
                 best = f"IMU {labels[1 + place // 3]} along {AXES[place % 3]}, mostly"
         found.append(Direction(float(np.sqrt(max(value, 0.0))), vector.reshape(-1, 3), best))
     return found
+
+
+def position_sds(calibration: xr.Dataset) -> np.ndarray:
+    """Of what `imuarray.calibrate` gave, (A, 3) m."""
+    return np.sqrt(np.einsum("kaka->ka", calibration["position_covariance"].to_numpy()))
+
+
+def weakest_of(calibration: xr.Dataset) -> list[Direction]:
+    """`weak_directions` of what `imuarray.calibrate` gave."""
+    positions = calibration["position"].to_numpy()
+    size = 3 * (len(positions) - 1)
+    covariance = calibration["position_covariance"].to_numpy()[1:, :, 1:].reshape(size, size)
+    return weak_directions(positions, covariance, calibration["accelerometer"].to_numpy())

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from imuarray.estimation.informative import position_sds
 from imuarray.firstorder.correct import FirstOrder
 from imuarray.firstorder.report import parameter_table
 from imuarray.firstorder.store import write_corrected
@@ -92,9 +93,8 @@ def draw(board: Board) -> list[Drawing]:
 
 def position_table(calibration: xr.Dataset) -> pd.DataFrame:
     """imu, then x, y, z in m: the position, its sd, the nominal one; relative to the first IMU."""
-    sds = np.sqrt(np.einsum("kaka->ka", calibration["position_covariance"].to_numpy()))
     parts = {
-        "": calibration["position"].to_numpy(), "sd_": sds,
+        "": calibration["position"].to_numpy(), "sd_": position_sds(calibration),
         "nominal_": calibration["nominal_position"].to_numpy(),
     }  # fmt: skip
     columns = {

@@ -10,9 +10,11 @@ import xarray as xr
 from imuarray.diagnosis.plain import Sizes, plainly
 from imuarray.diagnosis.quantities import first_up, number, plus_minus, quantity
 from imuarray.diagnosis.words import split_name
-from imuarray.estimation.informative import weak_directions
+from imuarray.estimation.informative import position_sds, weakest_of
 from imuarray.firstorder.report import turned_lines
+from imuarray.model.effects import KINDS
 from imuarray.report.excitation import missing
+from imuarray.report.pictures import levelled
 
 if TYPE_CHECKING:
     from imuarray.report.board import Board
@@ -22,7 +24,7 @@ MISFIT = 1.5  # times the noise: a residual that is looked into
 
 def verdict(board: Board) -> str:
     """How good, in a sentence."""
-    sds = np.sqrt(np.einsum("kaka->ka", board.calibration["position_covariance"].to_numpy()))[1:]
+    sds = position_sds(board.calibration)[1:]
     rms, worst = (size_in_words(size) for size in (np.sqrt(np.mean(sds**2)), sds.max()))
     count = board.calibration.sizes["accelerometer"]
     good = "The positions" if not board.reasons else "If the answer could be trusted: positions"
@@ -46,7 +48,23 @@ def facts(board: Board) -> str:
     return (
         f"{len(time)} samples of {count} IMUs at {rate:.4g} Hz, {time[-1] - time[0]:.1f} s;"
         f" {poses} still poses; positions from {calibration.attrs['samples']} moving samples, whose"
-        f" residual is {calibration.attrs['residual_ratio']:.2f} times the noise."
+        f" residual is {misfit(calibration):.2f} times the declared noise{_shaken(calibration)}."
+    )
+
+
+def misfit(calibration: xr.Dataset) -> float:
+    """Residual over the declared noise, where motion is rough that of smooth samples."""
+    if "gyroscope_smooth_residual" not in calibration:
+        return float(calibration.attrs["residual_ratio"])
+    return max(float(np.median(calibration[f"{kind}_smooth_residual"])) for kind in KINDS)
+
+
+def _shaken(calibration: xr.Dataset) -> str:
+    if "gyroscope_smooth_residual" not in calibration:
+        return ""
+    whole = number(calibration.attrs["residual_ratio"])
+    return (
+        f" where the motion is smooth ({whole} times over all: shocks are faster than the samples)"
     )
 
 
@@ -65,7 +83,7 @@ def advice(board: Board) -> list[str]:
             "Leave the logger on while the board is turned from pose to pose: the size of the"
             f" array is as uncertain as the gyroscopes' scale, which is not known ({why})."
         )
-    if board.reasons or board.calibration.attrs["residual_ratio"] > MISFIT:
+    if board.reasons or misfit(board.calibration) > MISFIT:
         said.append(
             "Check units, signs, which IMU is which and the drawing in columns.yaml; then let"
             " imuarray diagnose recording.nc --out diagnosis name what the model misses."
@@ -73,9 +91,14 @@ def advice(board: Board) -> list[str]:
     said += [
         f"Record what is missing: {item}." for item in missing(board.corrected, board.calibration)
     ]
-    worst = _weakest(board.calibration)
+    worst = weakest_of(board.calibration)[0]
     if worst.sd > board.corrected.position_prior_sd:
         said.append(f"Turn the board faster, and about all axes: {worst.words} is hardly known.")
+    if levelled(board.calibration):
+        said.append(
+            "More motion of this kind gains little: what first order leaves of the sensors' scales"
+            " limits the positions. More still poses, and moves between them, would help."
+        )
     if not board.reasons:
         said += [
             "Use it: imuarray apply cal.nc recording.nc --out motion.nc makes one sensor of the"
@@ -86,16 +109,9 @@ def advice(board: Board) -> list[str]:
     return said
 
 
-def _weakest(calibration: xr.Dataset):
-    positions = calibration["position"].to_numpy()
-    size = 3 * (len(positions) - 1)
-    covariance = calibration["position_covariance"].to_numpy()[1:, :, 1:].reshape(size, size)
-    return weak_directions(positions, covariance, calibration["accelerometer"].to_numpy(), 1)[0]
-
-
 def weakest(calibration: xr.Dataset) -> str:
     """What is known worst."""
-    worst = _weakest(calibration)
+    worst = weakest_of(calibration)[0]
     return f"{worst.words}, to {size_in_words(worst.sd)}"
 
 

@@ -17,6 +17,7 @@ from imuarray.figures.style import (
     styled,
 )
 from imuarray.model.effects import KINDS
+from imuarray.report.pictures import plain
 
 MODELS = {
     "base": {"color": VERMILLION, "marker": "o"},
@@ -24,11 +25,6 @@ MODELS = {
 }
 NAMES = {"base": "papers' model", "extended": "extended model"}
 PLAIN = 0.05  # p-value below which a mark is filled
-
-
-def plain(text) -> str:
-    """A recording's own text as matplotlib shows it: no mathematics in it."""
-    return str(text).replace("$", r"\$")
 
 
 def imu_ticks(axes, labels, most=16) -> float:

@@ -45,9 +45,9 @@ CAPTIONS = {
     ),
     "length": (
         "Error against length",
-        "Claimed standard deviation, had the motion ended earlier. Where it still falls faster than"
-        " the dotted line, the motion is getting better; where it follows the line, four times as"
-        " long a motion halves the error.",
+        "Claimed standard deviation, had the motion ended earlier. Where it falls faster than"
+        " 1/√length, the motion is getting better; where as fast, four times as long a motion"
+        " halves the error; where it is level, noise is not what limits it.",
     ),
     "course": (
         "Residual against time",

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Ellipse
 from matplotlib.ticker import LogLocator
 
+from imuarray.estimation.informative import position_sds
 from imuarray.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILLION, look
 from imuarray.recording import Recording
 from imuarray.recording.channels import runs
@@ -18,7 +19,10 @@ ELLIPSE = 5.991  # the same in a plane, squared
 BINS = 1200  # of time, that a page can show
 POINTS = 3000  # rotation axes that are drawn
 SIDE = 1.35  # radii, of a disc's centre from the middle
+CLOSE = 0.06  # of the extent: IMUs that are named together
 FLAT = 0.5  # of a board's other side
+LEVEL = 0.1  # of the length, a power: below it an error has levelled off; noise has 0.5
+APART = 10.0  # times the usual distance of stretches: no line across
 WORST = 3  # IMUs whose residuals have colours
 ROOM, SMALL = 0.16, 0.08  # of the board's extent: the largest departure, an ellipse's half axis
 
@@ -46,11 +50,6 @@ def positions(calibration: xr.Dataset, axes: Axes) -> None:
     axes.legend(ncols=3)
 
 
-def position_sds(calibration: xr.Dataset) -> np.ndarray:
-    """(A, 3) m."""
-    return np.sqrt(np.einsum("kaka->ka", calibration["position_covariance"].to_numpy()))
-
-
 def board(calibration: xr.Dataset, plane: str, axes: Axes) -> None:
     """The board in a plane ("xy", "xz" or "yz"), nominal to found, with 95 % ellipses.
 
@@ -63,7 +62,7 @@ def board(calibration: xr.Dataset, plane: str, axes: Axes) -> None:
     extent = float(np.ptp(nominal, axis=0).max())
     by = round_factor(ROOM * extent / max(np.abs(moved).max(), 1e-9))
     wide = round_factor(SMALL * extent / max(SURE * position_sds(calibration).max(), 1e-9))
-    for k, label in enumerate(calibration["accelerometer"].to_numpy()):
+    for k in range(len(nominal)):
         start, end = 1e3 * nominal[k], 1e3 * (nominal[k] + by * moved[k])
         axes.plot(*start[[i, j]], "+", color=GREY, markersize=7)
         if k:
@@ -71,15 +70,29 @@ def board(calibration: xr.Dataset, plane: str, axes: Axes) -> None:
             axes.annotate("", end[[i, j]], start[[i, j]], arrowprops=way)
             inner = covariance[k][:, k][np.ix_([i, j], [i, j])]
             axes.add_patch(_ellipse(end[[i, j]], 1e6 * wide**2 * ELLIPSE * inner))
+    for alike in _together(nominal[:, [i, j]], CLOSE * extent):
         # on the side that the arrow leaves free
-        way = -(end - start)[[i, j]] if k else np.array([-1.0, -1.0])
-        aside = 9 * way / max(np.linalg.norm(way), 1e-9)
-        axes.annotate(plain(label), start[[i, j]], xytext=aside, textcoords="offset points",
-                      ha="center", va="center", size=8, weight="bold")  # fmt: skip
+        way = -moved[alike[-1], [i, j]] if alike[-1] else np.array([-1.0, -1.0])
+        aside = 10 * way / max(np.linalg.norm(way), 1e-9)
+        names = plain(", ".join(map(str, calibration["accelerometer"].to_numpy()[alike])))
+        axes.annotate(names, 1e3 * nominal[alike[0], [i, j]], xytext=aside, size=8, weight="bold",
+                      textcoords="offset points", ha="center", va="center")  # fmt: skip
     axes.set(xlabel=f"{plane[0]} (mm)", ylabel=f"{plane[1]} (mm)", aspect="equal")
     axes.margins(0.18)
     _no_strip(axes)
     axes.set_title(f"departures × {by:g}, ellipses (95 %) × {wide:g}", size=7.5)
+
+
+def _together(places, close: float) -> list[list[int]]:
+    """Numbers of places (A, 2), those near an earlier one with it."""
+    found: list[list[int]] = []
+    for k, place in enumerate(places):
+        near = [one for one in found if np.linalg.norm(places[one[0]] - place) < close]
+        if near:
+            near[0].append(k)
+        else:
+            found.append([k])
+    return found
 
 
 def _no_strip(axes: Axes) -> None:
@@ -205,9 +218,9 @@ def length(calibration: xr.Dataset, axes: Axes) -> None:
     rms, worst = np.sqrt(np.mean(sds**2, axis=(1, 2))), sds.max(axis=(1, 2))
     axes.plot(seconds, worst, label="worst coordinate", **look(0) | {"markersize": 3})
     axes.plot(seconds, rms, label="rms", **look(2) | {"markersize": 3.5})
-    ahead = seconds[-1] * np.array([1, 4])
-    less = rms[-1] * np.array([1, 0.5])
-    axes.plot(ahead, less, ":", color=GREY, label="with more of such motion: 1/√length")
+    if not levelled(calibration):
+        ahead, less = seconds[-1] * np.array([1, 4]), rms[-1] * np.array([1, 0.5])
+        axes.plot(ahead, less, ":", color=GREY, label="with more of such motion: 1/√length")
     axes.set(xscale="log", yscale="log", xlabel="recorded motion (s)")
     axes.set_ylabel("sd of a coordinate (µm)")
     for axis in (axes.xaxis, axes.yaxis):
@@ -217,12 +230,24 @@ def length(calibration: xr.Dataset, axes: Axes) -> None:
     axes.legend()
 
 
+def levelled(calibration: xr.Dataset) -> bool:
+    """Whether the second half of the motion has gained next to nothing: noise is not the limit."""
+    seconds = calibration["length"].to_numpy()
+    sds = calibration["position_sd_by_length"].to_numpy()[:, 1:]
+    rms = np.log(np.sqrt(np.mean(sds**2, axis=(1, 2))))
+    half = max(seconds[-1] / 2, seconds[0])
+    gained = np.interp(half, seconds, rms) - rms[-1]
+    return bool(gained < LEVEL * np.log(seconds[-1] / half))
+
+
 def residual_course(calibration: xr.Dataset, kind: str, axes: Axes) -> None:
     """Residual of each "accelerometer" or "gyroscope" against time, over the declared noise."""
     rms = calibration[f"{kind}_residual"].to_numpy()
     time, labels = calibration["stretch"].to_numpy(), calibration[kind].to_numpy()
     worst = np.argsort(-np.sqrt(np.mean(rms**2, axis=0)))[:WORST]
-    others = np.setdiff1d(np.arange(rms.shape[1]), worst)
+    others, top = np.setdiff1d(np.arange(rms.shape[1]), worst), max(float(rms.max()), 1.0)
+    gaps = np.flatnonzero(np.diff(time) > APART * np.median(np.diff(time))) + 1
+    time, rms = np.insert(time, gaps, np.nan), np.insert(rms, gaps, np.nan, axis=0)
     axes.plot(time, rms[:, others], color="0.75", linewidth=0.8)
     for number, k in enumerate(worst):
         name = f"IMU {plain(labels[k])}"
@@ -232,7 +257,8 @@ def residual_course(calibration: xr.Dataset, kind: str, axes: Axes) -> None:
         axes.plot([], [], color="0.75", label="others")
     axes.axhline(1.0, color=BLACK, linewidth=0.6)
     axes.set(xlabel="time (s)", ylabel="residual / declared noise", title=f"{kind}s")
-    axes.set_ylim(0, 1.15 * max(float(rms.max()), 1.0))
-    if rms.max() > 10:
-        axes.set(yscale="log", ylim=(0.5, None))
+    axes.set_ylim(0, 1.15 * top)
+    if top > 10:
+        axes.set(yscale="log", ylim=(0.5, 1.5 * top))
+        axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.legend(ncols=2, fontsize=6.5)
