@@ -90,8 +90,11 @@ class Alignment:
         clock, (ahead, faster) = self.clocks[k], np.sqrt(np.diag(self.clocks[k].covariance)[:2])
         text = (
             f"turned by {_with(np.degrees(self.angle[k]), np.degrees(self.angle_sd[k]))} degrees"
-            f" against IMU {self.labels[0]}; its clock is {_with(1e3 * clock.offset, 1e3 * ahead)}"
-            f" ms ahead at its middle and {_with(1e6 * clock.drift, 1e6 * faster)} ppm fast; rates"
+            f" against IMU {self.labels[0]}; its clock is"
+            f" {_with(1e3 * abs(clock.offset), 1e3 * ahead)}"
+            f" ms {'behind' if clock.offset < 0 else 'ahead'} at its middle and"
+            f" {_with(1e6 * abs(clock.drift), 1e6 * faster)} ppm"
+            f" {'slow' if clock.drift < 0 else 'fast'}; rates"
             f" agree to {self.agreement[k]:.2f} times the noise"
         )
         if self.agreement[k] > NOISY:

@@ -41,6 +41,11 @@ def board(
         corrected = correct(recording, found)
     calibration = calibrate(corrected, say=say)
     reasons = reasons_of_calibration(corrected, calibration)
+    if isinstance(found, str) and recording.map_covariance is None:
+        reasons = [
+            f"first order was left out ({found}): offsets, scales and axes of the sensors are taken"
+            " as read, and the sds do not know how far these are off", *reasons,
+        ]  # fmt: skip
     source = ", ".join(Path(path).name for path in logs)
     return Board(source, opened.lines, recording, found, corrected, calibration, reasons)
 

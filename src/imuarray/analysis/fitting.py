@@ -65,7 +65,15 @@ def fitted_beyond(
 def _arranged(recordings, say: Say) -> list[Readings]:
     arranged = [arrange(one, sparse=True) for one in recordings]
     whole = [one.select(determined(one, 1)) for one in arranged]
-    return [most_informative(one, say) for one in whole]
+    found = [most_informative(one, say) for one in whole]
+    for recording, one in zip(recordings, found, strict=True):
+        if not len(one.time):
+            rate = 1 / np.median(np.diff(recording.time)) if len(recording.time) > 1 else 0.0
+            raise InputError(
+                f"recording: expected samples that determine the motion, found none, at {rate:.4g}"
+                " samples a second; is the unit of time right?"
+            )
+    return found
 
 
 def _tell(rungs: Sequence[Rung], say: Say) -> None:

@@ -43,7 +43,9 @@ def open_logs(
     if all(map(bags.is_bag, logs)):
         return _together(bags.read_bags(logs, columns, topics))
     if columns is None:
-        raise InputError(f"{logs[0]}: expected a YAML that describes it, found none")
+        raise InputError(
+            f"{logs[0]}: expected a YAML that describes it, found none: name it by --columns"
+        )
     if len(logs) == 1 and logs[0].suffix == PACKETS:
         recording, account = read_board(logs[0], Path(columns))
         return Opened(recording, account.lines())

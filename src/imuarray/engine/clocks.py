@@ -24,7 +24,9 @@ def shown_clocks(one: Recorded, columns: Columns) -> dict[int, np.ndarray]:
     score, information = delay_of(one.readings, columns, one.state)
     imus = np.flatnonzero(one.readings.exists.any(axis=1))
     each = sawtooths(one.readings.time, score, information, imus, {})
-    return {int(imu): values for imu, (_, values) in each.items()}
+    return {
+        int(imu): values for imu, (_, values) in each.items() if values[0] > SETTINGS.least_period
+    }
 
 
 def with_clocks(one: Recorded, columns: Columns, clocks: dict) -> Recorded:

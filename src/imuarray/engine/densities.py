@@ -52,4 +52,6 @@ def log_densities(one: Recorded, columns: Columns, freedoms) -> np.ndarray:
     if state.rough_prior is not None:
         sd = state.rough_prior.sd
         nats -= np.sum(np.log(sd), axis=1) + sd.shape[1] / 2 * np.log(2 * np.pi)
+    if state.turning is not None:
+        nats -= state.turning.log_norm
     return nats - (seen.misfit - weighted) / 2

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from imuarray.engine import turning
 from imuarray.engine.fit import flat_parameters, pick, with_derivatives
 from imuarray.engine.linearise import (
     CHUNK,
@@ -135,7 +136,8 @@ def _of_two(readings: Readings, model: ArrayModel, positions, effects, covarianc
         found = descend(part, model, state, np.arange(len(seen)))
         state = state._replace(motion=found.motion)
     whole = [np.full((samples, *values.shape[1:]), np.nan) for values in (found.motion, found.cost)]
-    spreads = covariances(part, model, state, covariance)
+    # the parameters' share: the prior's mean moves with them
+    spreads = covariances(part, model, turning.turned(part, state, follows=True), covariance)
     both = [np.full((samples, 9, 9), np.nan) for _ in spreads]
     steps, converged = np.zeros(samples, int), np.zeros(samples, bool)
     for target, values in zip(

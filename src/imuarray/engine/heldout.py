@@ -47,6 +47,8 @@ def log_scores(fit: Fit, ridge) -> Scores:
     constant += np.log(2 * np.pi) / 2 * (readings.keep.sum(axis=(1, 2)) - 9)
     if fit.state.rough_prior is not None:
         constant += np.log(fit.state.rough_prior.sd).sum(axis=1)
+    if fit.state.turning is not None:
+        constant += fit.state.turning.log_norm
     better = trained_elsewhere(parts, ridge)
     nats = [
         -np.sum(fit.misfits[part]) / 2 - constant[part].sum() + more

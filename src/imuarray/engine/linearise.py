@@ -59,6 +59,12 @@ class TurningPrior(NamedTuple):
     sd: np.ndarray
     follows: np.ndarray
 
+    @property
+    def log_norm(self) -> np.ndarray:
+        """(T,) minus its log density at the mean; none of it where the prior is flat."""
+        known = np.isfinite(self.sd)
+        return np.sum(np.log(np.where(known, self.sd * np.sqrt(2 * np.pi), 1.0)), axis=1)
+
 
 class State(NamedTuple):
     """Where the model is linearised."""

@@ -57,6 +57,7 @@ class Settings:
     sawtooth: float = -10.0  # log p of a sawtooth beyond a constant delay
     many: float = 2.6  # log of the independent sawtooths per sample, from simulated white scores
     fair: float = 0.05  # of the constant delay's chi-square that a sawtooth must add
+    least_period: float = 3e-5  # s, of a clock: no IMU samples faster than 32 kHz
     least_turns: int = 3  # of a clock against the host's; fewer are a drift of the delay
     edge: float = 0.03  # of a turn: how near to a clock's jump a reading is left out
 

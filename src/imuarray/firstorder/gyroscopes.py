@@ -158,5 +158,6 @@ def _together(turn, maps, relative, common) -> tuple[np.ndarray, np.ndarray, np.
     apart = np.kron(np.eye(count) - 1 / count, np.eye(9))
     by_map = block_diag(*(np.kron(t, behind.T) for t in turn)) @ apart
     by_common = np.vstack([np.kron(m, back.T) for m in matrix])
-    own = block_diag(*own)
+    # residuals against a mean that they are part of are smaller than the noise
+    own = block_diag(*own) * (1.0 if isinstance(relative, str) else count / max(count - 1, 1))
     return matrix, by_common @ spread @ by_common.T + by_map @ own @ by_map.T, by_common

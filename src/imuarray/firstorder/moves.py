@@ -239,7 +239,8 @@ def _fit(moves, direction, covariance, turn, before) -> CommonMap:
         gradient = solved.T @ errors - prior @ (change - np.eye(3)).ravel()
         delta = np.linalg.solve(normal, gradient)
         change = change + delta.reshape(3, 3)
-        inflation, size = _weights(errors - slopes @ delta, given, own, size)
+        free = _free_share(total, total - slopes @ np.linalg.solve(normal, slopes.T))
+        inflation, size = _weights(errors - slopes @ delta, given, own, size, free)
         if np.abs(delta).max() < CLOSE:
             break
     left, spread = errors - slopes @ delta, np.linalg.inv(normal)
@@ -253,13 +254,20 @@ def _fit(moves, direction, covariance, turn, before) -> CommonMap:
     )  # fmt: skip
 
 
-def _weights(left, given, own, size):
+def _free_share(total, left) -> np.ndarray:
+    """(n,) share of each move's variance, of all (2 n, 2 n), that the map has left in its error."""
+    count = len(total) // 2
+    whole, rest = (
+        part.reshape(count, 2, count, 2)[range(count), :, range(count)] for part in (total, left)
+    )
+    return np.clip(np.einsum("nii->n", np.linalg.solve(whole, rest)) / 2, 0.05, 1.0)
+
+
+def _weights(left, given, own, size, free):
     """Inflation of each move's variance by its own error, and of all by the typical one."""
     count = len(own)
     left = left.reshape(count, 2)
     blocks = given.reshape(count, 2, count, 2)[range(count), :, range(count)]
-    # nine unknowns have taken their share of the errors
-    free = max(1 - 9 / (2 * count), 0.2)
 
     def squares(size):
         solved = np.linalg.solve(blocks + size * own, left[..., None])[..., 0]

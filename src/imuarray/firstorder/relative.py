@@ -115,7 +115,11 @@ def _regress(columns, wanted, block) -> tuple[np.ndarray, np.ndarray]:
         left = wanted - columns @ rows.T
         squares = np.sum(left**2, axis=1)
         # 2.37 is the median of a chi-squared variable with three degrees of freedom
-        weight = 7.0 / (4.0 + squares / (np.median(squares) / 2.37))
+        size = np.median(squares) / 2.37
+        weight = 7.0 / (4.0 + squares / size)
+    # the scores' slope: weights fall as residuals grow
+    bend = weight * (1 - 2 / 3 * squares / (4 * size + squares))
+    inverse = np.linalg.pinv((columns * bend[:, None]).T @ columns, hermitian=True)
     _, block = np.unique(block, return_inverse=True)
     scores = np.zeros((block.max() + 1, 3, columns.shape[1]))
     np.add.at(scores, block, weight[:, None, None] * left[:, :, None] * columns[:, None])

@@ -53,7 +53,8 @@ def missing(recording: Recording, calibration: xr.Dataset) -> list[str]:
     if len(poses):
         angle, where = gap_of(poses)
         if angle > GAP:
-            said.append(f"no still pose within {angle:.0f} degrees of {direction(where)} up")
+            components = ", ".join(fixed(value, 1) for value in where)
+            said.append(f"no still pose within {angle:.0f} degrees of ({components}) up")
     shares, axes = turning_of(calibration)
     if shares[0] < LITTLE:
         share = number(100 * shares[0], 2)
