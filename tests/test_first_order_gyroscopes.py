@@ -176,6 +176,16 @@ def test_mistakes_are_refused_by_name(recording, name):
         calibrate_first_order(recording, GRAVITY)
 
 
+def test_rates_in_degrees_declared_rad_are_refused(recording):
+    """All moves are farther then than any is."""
+    declared = {
+        name: getattr(recording, name) * 180 / np.pi
+        for name in ("angular_rate", "gyroscope_noise_sd", "gyroscope_range")
+    }
+    with pytest.raises(InputError, match="57.3 times smaller; are they in deg/s"):
+        calibrate_first_order(replace(recording, **declared), GRAVITY)
+
+
 def test_gyroscopes_on_other_axes_than_the_accelerometers_are_turned(recording):
     """All of them: x and y exchanged and z reversed, a half turn about the diagonal."""
     turned = recording.angular_rate[..., [1, 0, 2]] * [1, 1, -1]

@@ -73,7 +73,8 @@ def report(found: dict, average: float) -> list[str]:
     ]
     if "off_the_rail" in found:
         lines.append(
-            f"gyroscopes averaged, off the rail: sd {np.degrees(average):.3g} deg/s (angular rate)"
+            f"gyroscopes averaged, off the rail: sd {np.degrees(average):.3g} deg/s (angular rate,"
+            " noise alone; the fused sds have what the calibration leaves uncertain as well)"
         )
     for name in ("off_the_rail", "at_the_rail"):
         if name in found:

@@ -104,9 +104,7 @@ def gather(rate, time, poses, offsets, good, noise_sd: float) -> list[Move]:
         share = ((own - middles[0]) / (middles[1] - middles[0]))[:, None]
         bias = (1 - share) * offsets[p] + share * offsets[p + 1]
         sd = np.sqrt((stray * length) ** 2 + len(own) * (noise_sd * usual) ** 2)
-        move = Move(p, own, rate[part] - bias, sd)
-        if move.angle < FARTHEST:
-            moves.append(move)
+        moves.append(Move(p, own, rate[part] - bias, sd))
     return moves
 
 
@@ -120,7 +118,10 @@ def common_map(moves: list[Move], direction, covariance) -> CommonMap | str:
 
     InputError where the rates carry gravity only if their sign or unit is another.
     """
+    every, moves = moves, [move for move in moves if move.angle < FARTHEST]
     if len(moves) < FEWEST:
+        if len(every) >= FEWEST:
+            _require_unit(every, direction)
         return f"{len(moves)} moves between still poses off the rails, {FEWEST} are needed"
     turn = np.eye(3)
     before = _typical(moves, direction, turn)
@@ -143,8 +144,8 @@ def _typical(moves, direction, change) -> float:
     return float(np.median(errors))
 
 
-def _other_axes(moves, direction) -> np.ndarray | None:
-    """A turn that maps axes onto axes and does what the identity did not; else the mistake."""
+def _require_unit(moves, direction) -> None:
+    """InputError where the rates carry gravity once they are in the other unit."""
     degree = np.pi / 180
     for factor, words in (
         (1 / degree, "as large; are they in rad/s, declared deg/s?"),
@@ -155,6 +156,11 @@ def _other_axes(moves, direction) -> np.ndarray | None:
                 "gyroscopes: expected rates that carry gravity from pose to pose, found that they"
                 f" had to be 57.3 times {words}"
             )
+
+
+def _other_axes(moves, direction) -> np.ndarray | None:
+    """A turn that maps axes onto axes and does what the identity did not; else the mistake."""
+    _require_unit(moves, direction)
     turns = Rotation.create_group("O").as_matrix()
     errors = [_typical(moves, direction, turn) for turn in (*turns, *-turns)]
     best = int(np.argmin(errors))

@@ -19,6 +19,7 @@ from imuarray.report.pictures import levelled
 if TYPE_CHECKING:
     from imuarray.report.board import Board
 
+SLOW = np.radians(300.0)  # rad/s rms, of motion that says little of positions
 MISFIT = 1.5  # times the noise: a residual that is looked into
 
 
@@ -91,6 +92,12 @@ def advice(board: Board) -> list[str]:
     said += [
         f"Record what is missing: {item}." for item in missing(board.corrected, board.calibration)
     ]
+    speed = np.sqrt(np.mean(np.sum(board.calibration["angular_rate"].to_numpy() ** 2, axis=1)))
+    if speed < SLOW:
+        said.append(
+            f"Twist it harder: {np.degrees(speed):.0f} deg/s (rms) is slow, and what is said of the"
+            " positions grows with the square of the angular rate."
+        )
     worst = weakest_of(board.calibration)[0]
     if worst.sd > board.corrected.position_prior_sd:
         said.append(f"Turn the board faster, and about all axes: {worst.words} is hardly known.")
