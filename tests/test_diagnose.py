@@ -138,7 +138,7 @@ def test_what_first_order_says_it_left_is_no_fault_of_the_model():
     readings = arrange(replace(recording, angular_rate=rate))
     columns = columns_of(readings.array, catalogue_effects(), readings.position_prior_sd)
     search = Search(readings, columns, (), str).fitted()
-    corrected = replace(readings, left=(None, 1e-6 * np.eye(72)))
+    corrected = replace(readings, left=np.diag(np.repeat([0.0, 1e-6], 72)))
     least = [
         min(c.log_p for c in all_checks(*beside_left(found), found.noise) if "residual" in c.name)
         for found in (search, replace(search, readings=corrected))
