@@ -17,7 +17,8 @@ LEAST = 16  # coefficients; fewer say nothing of a spectrum
 GAIN = 4.5  # nats, those of three sds, from which a term is there
 CLOSE = 2.0  # nats, up to which flicker and walk are not told apart
 LINE = 1e-6  # chance of a power from which it is a line's
-ONE_SIDED = 1.645  # sds of a limit of 95 %
+ONE_SIDED = 1.645**2 / 2  # nats by which a limit of 95 % is less likely
+FARTHEST, HALVINGS = 1e4, 24  # of a limit's square over the least that is looked at
 WHITE, FLICKER, WALK = range(3)
 
 
@@ -109,10 +110,24 @@ def _one(power, count, shape) -> np.ndarray:
     value, sd, below = np.full((3, 3), np.nan)
     size = np.sqrt(best.squares[terms])
     value[terms], sd[terms] = size, best.sd[terms] / (2 * size)
+    whole = _fit(power, count, shape, [WHITE, FLICKER, WALK])
+    # a term that is left open may be a part of those that are not
+    sd[terms] = np.maximum(sd[terms], whole.sd[terms] / (2 * size))
     for term in {FLICKER, WALK} - set(terms):
-        fit = _fit(power, count, shape, sorted([*terms, term]))
-        below[term] = np.sqrt(fit.squares[term] + ONE_SIDED * fit.sd[term])
+        below[term] = np.sqrt(_limit(power, count, shape, term, whole))
     return np.array([value, sd, below])
+
+
+def _limit(power, count, shape, term, whole) -> float:
+    """The square that a term stays below: larger ones, the others refitted, are too unlikely."""
+    others = [other for other in (WHITE, FLICKER, WALK) if other != term]
+    least = whole.nats - ONE_SIDED * max(whole.scatter, 1.0)
+    low, high = whole.squares[term], whole.squares[term] + FARTHEST * whole.sd[term]
+    for _ in range(HALVINGS):
+        middle = np.sqrt(max(low, high / FARTHEST**2) * high)
+        fit = _fit(power, count, shape, others, middle * shape[:, term])
+        low, high = (middle, high) if fit.nats > least else (low, middle)
+    return high
 
 
 def _without_lines(power, count, shape) -> np.ndarray:
@@ -127,15 +142,19 @@ def _without_lines(power, count, shape) -> np.ndarray:
     return kept
 
 
-def _fit(power, count, shape, terms) -> _Fit:
-    """Squares of ``terms`` that are not negative: scoring, each step weighted least squares."""
+def _fit(power, count, shape, terms, beside=0.0) -> _Fit:
+    """Squares of ``terms`` that are not negative: scoring, each step weighted least squares.
+
+    ``beside`` (F,): power that is there in any case.
+    """
     unit = np.median(power)  # nothing of the readings' own unit is left
     powers, design = power / unit, shape[:, terms] / shape[:, terms].max(axis=0)
     model, best = np.ones_like(powers), (-np.inf, np.zeros(len(terms)), powers)
+    beside = beside / unit * np.ones_like(powers)
     for _ in range(100):
         weight = np.sqrt(count / 2) / model
-        squares, _ = nnls(design * weight[:, None], powers * weight)
-        model = np.maximum(design @ squares, 1e-9)
+        squares, _ = nnls(design * weight[:, None], (powers - beside) * weight)
+        model = np.maximum(design @ squares + beside, 1e-9)
         nats = -np.sum(count * (np.log(model) + powers / model)) / 2
         gained = nats - best[0]
         if gained > 0:
