@@ -119,6 +119,15 @@ class Noise:
             return mean, information
         lost = np.asarray(saturated, bool).reshape(samples, -1)
         affected = np.flatnonzero(lost.any(axis=1))
+        if np.count_nonzero(self.gyroscope) == len(self.gyroscope):
+            part = angular_rate[affected]
+            seen = np.where(lost[affected], 0.0, 1.0 / np.diag(self.gyroscope)).reshape(part.shape)
+            total = seen.sum(axis=1)
+            information[affected] = total[:, None] * np.eye(3)
+            seen[np.broadcast_to((total == 0.0)[:, None], seen.shape)] = 1.0  # the plain average
+            mean[affected] = np.einsum("tgc,tgc->tc", seen, part) / seen.sum(axis=1)
+            return mean, information
+        # noise that axes share: one gain for each set of axes
         patterns, which = np.unique(lost[affected], axis=0, return_inverse=True)
         for number, pattern in enumerate(patterns):
             rows = affected[which.ravel() == number]
