@@ -15,7 +15,7 @@ SNAKEMAKE := $(BIN)/snakemake --cores $(CORES) $(SNAKEMAKE_ARGS)
 # Snakemake's jobs start `python` and `imuarray` by name.
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: help install run quick paper test test-slurm bench docs lint lock clean
+.PHONY: help install run quick paper publish stale test test-slurm bench docs lint lock clean
 .DEFAULT_GOAL := help
 
 help:
@@ -23,6 +23,8 @@ help:
 	@echo "make run     all results and figures at the default scale"
 	@echo "make quick   the same pipeline, smallest useful sizes"
 	@echo "make paper   the papers' own sizes (long)"
+	@echo "make publish all of paper_figures/ from one commit (hours), with what made it: published.csv"
+	@echo "make stale   which of paper_figures/ rest on code that has changed since; says so in published.csv"
 	@echo "make test    the tests"
 	@echo "make test-slurm   the quick run through a Slurm of one node, brought up here (root, a container)"
 	@echo "make bench   the benchmarks"
@@ -56,6 +58,12 @@ quick: $(READY)
 
 paper: $(READY)
 	$(SNAKEMAKE) --config scale=paper
+
+publish: $(READY)
+	$(SNAKEMAKE) publish
+
+stale: $(READY)
+	$(BIN)/python workflow/published.py stale
 
 test: $(READY)
 	$(BIN)/python -m pytest -q -n $(CORES) --dist loadfile --no-loadscope-reorder $(PYTEST_ARGS)

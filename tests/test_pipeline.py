@@ -137,7 +137,8 @@ def test_a_changed_source_reruns_what_rests_on_it(quick, tmp_path):
         texts = {tmp_path / "src" / "imuarray" / name: "" for name in names}
         for path in texts:
             texts[path] = path.read_text(encoding="utf-8")
-            path.write_text(texts[path] + "\n", encoding="utf-8")
+            added = "\nADDED = 1\n" if path.suffix == ".py" else "\n"
+            path.write_text(texts[path] + added, encoding="utf-8")
         assert rerun(quick.parents[1], tmp_path / "src") == rules, names
         for path, text in texts.items():
             path.write_text(text, encoding="utf-8")

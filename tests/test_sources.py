@@ -78,18 +78,34 @@ def test_a_script_rests_on_all_that_it_loads(sources, script):
         env={**os.environ, "PYTHONPATH": f"{WORKFLOW / 'scripts'}:{':'.join(sys.path)}"},
         capture_output=True, text=True, check=True,
     )  # fmt: skip
-    files = sources.files(*{script, *([script, "chains"] if script in SAMPLING else [])})
-    assert set(done.stdout.split()) <= {str(path) for path in files.values()}
+    assert set(done.stdout.split()) <= {str(path) for path in sources.files(script).values()}
 
 
-def test_a_digest_follows_the_texts(sources, monkeypatch):
+def test_a_script_rests_on_its_siblings(sources):
+    for name in SAMPLING:
+        assert {"scripts/chains.py", f"scripts/{name}.py"} <= set(sources.files(name))
+
+
+def test_a_digest_follows_what_the_code_does(sources, monkeypatch, tmp_path):
+    """Not its remarks, layout and docstrings."""
     before, other = sources.digest("claims"), sources.digest("tune")
-    place = sources.files("claims")["imuarray/claims/registry.py"]
-    text = place.read_text(encoding="utf-8")
-    monkeypatch.setitem(type(sources).digest.__globals__, "_text", lambda path: (
-        text + "\n" if path == place else path.read_text(encoding="utf-8")
+    place, changed = (
+        sources.files("claims")["imuarray/claims/registry.py"],
+        tmp_path / "registry.py",
+    )
+    scope, text = type(sources).digest.__globals__, place.read_text(encoding="utf-8")
+    content = scope["_content"].__wrapped__
+    monkeypatch.setitem(scope, "_content", lambda path: (
+        content(changed if path == place else path)
     ))  # fmt: skip
-    assert sources.digest("claims") != before and sources.digest("tune") == other
+    for altered, same in (
+        (text + "\n# a remark\n", True),
+        (text.replace('"""', '"""Otherwise: ', 1), True),
+        (text + "\nADDED = 1\n", False),
+    ):
+        changed.write_text(altered, encoding="utf-8")
+        assert (sources.digest("claims") == before) is same
+        assert sources.digest("tune") == other
 
 
 def test_rules_take_the_digest_of_the_script_they_run():

@@ -7,17 +7,19 @@ from pathlib import Path
 STANDIN = "standin"
 FIGURE = ("pdf", "png", "csv")  # endings of what a drawing rule writes
 TABLE = ("csv", "tex", "md")
+DIAGNOSED = ("positions", "parameters", "recordings")  # tables of a board's diagnoses
 
-# By pattern of its name, the folder of what paper_figures/ shows; the first that fits counts.
+# By pattern of its name, what a file of paper_figures/ copies; the first that fits counts.
 PLACES = {
-    r"\d{4}_fig\d|theory_(efficiency|convergence|size)|validation_ranks": "results/{scale}/figures",
-    r"\d{4}_table\d|theory_ranks|validation_(coverage|joint)": "results/{scale}/tables",
-    "claims": "results/{scale}/claims",
-    "blind_confusion": "results/blind/{scale}/figures",
-    "blind_bars": "results/blind/{scale}/tables",
-    "diagnosis_(positions|parameters|recordings)_.*": "results/measured/tables",
-    "added_.*|(causes|experiment|past_rail)_table_.*|left_out_.*": "results/measured/tables",
-    "diagnosis_.*|past_rail_.*|causes_.*|experiment_.*": "results/measured/figures",
+    r"\d{4}_fig\d|theory_(efficiency|convergence|size)|validation_ranks": "{scale}/figures/{name}",
+    r"\d{4}_table\d|theory_ranks|validation_(coverage|joint)": "{scale}/tables/{name}",
+    "claims": "{scale}/claims/claims",
+    "claims_paper": "paper/claims/claims",
+    "blind_confusion": "blind/{scale}/figures/{name}",
+    "blind_bars": "blind/{scale}/tables/{name}",
+    "diagnosis_(positions|parameters|recordings)_.*": "measured/tables/{name}",
+    "added_.*|(causes|experiment|past_rail)_table_.*|left_out_.*": "measured/tables/{name}",
+    "diagnosis_.*|past_rail_.*|causes_.*|experiment_.*": "measured/figures/{name}",
 }
 
 
@@ -185,10 +187,25 @@ class Measured:
             for kind in kinds
         ]
 
+    def studied(self) -> list[str]:
+        """Files in paper_figures/ of what is not in the default target: diagnoses and causes."""
+        name = self.config["experiment"]["recording"]
+        if name not in self.available():
+            return []
+        group = self.config["recordings"][name].get("group", name)
+        last = self.board(group)[-1]
+        kinds = {f"diagnosis_{part}_{group}": ["csv"] for part in DIAGNOSED}
+        kinds |= {f"{part}_{group}": FIGURE for part in ("causes", "diagnosis")}
+        kinds |= {f"{part}_{name}": FIGURE for part in ("experiment", "past_rail")}
+        kinds |= {f"{part}_table_{group}": TABLE for part in ("causes", "experiment", "past_rail")}
+        kinds |= {f"left_out_{group}": TABLE, f"added_{last}": TABLE}
+        kinds |= {f"cause_sensor_clock_{last}": FIGURE}
+        return [f"paper_figures/{stem}.{kind}" for stem, ends in kinds.items() for kind in ends]
+
     def origin(self, name: str) -> str:
         """What paper_figures/<name> copies, but for the ending."""
         scale = self.config["scale"]
-        for pattern, folder in PLACES.items():
+        for pattern, place in PLACES.items():
             if re.fullmatch(pattern, name):
-                return f"{folder.format(scale=scale)}/{name}"
+                return f"results/{place.format(scale=scale, name=name)}"
         return f"results/measured/{self.published(scale)[name]}"

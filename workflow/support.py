@@ -1,10 +1,12 @@
 """What the rules share: effective settings, digests of the sources a rule rests on, outputs."""
 
+import ast
 import hashlib
 import json
 import time
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import grimp
 from snakemake.io import report
@@ -15,6 +17,7 @@ from imuarray.provenance import digest
 ROOTS = {"imuarray": Path(imuarray.__file__).parents[1], "scripts": Path(__file__).parent}
 
 APART = ("blind_", "theory_", "validation_")  # sizes of targets that nothing else rests on
+DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 SHARING = ("threads", "parts")  # how work is shared: no result depends on it
 
 
@@ -26,6 +29,10 @@ class Sources:
         self.graph = grimp.build_graph(*ROOTS, exclude_type_checking_imports=True, cache_dir=None)
         for module in self.graph.find_descendants("imuarray"):  # its packages run before it
             self.graph.add_import(importer=module, imported=module.rpartition(".")[0])
+        siblings = self.graph.find_descendants("scripts") - {"scripts.job"}  # which only logs
+        for module in siblings:  # they import each other by bare names
+            for imported in siblings & _bare_imports(*_places(module).values()):
+                self.graph.add_import(importer=module, imported=imported)
 
     def files(self, *scripts: str) -> dict[str, Path]:
         """By name, ``scripts`` and all that they import, and the data beside those modules."""
@@ -34,25 +41,48 @@ class Sources:
         return {name: path for module in modules for name, path in _places(module).items()}
 
     def digest(self, *scripts: str) -> str:
-        """SHA-256 of the files' names and texts: a parameter that changes when one of them does."""
-        return digest({name: _text(path) for name, path in self.files(*scripts).items()})
+        """SHA-256 of the files' names and contents: a parameter that changes when one does.
+
+        Of Python counts what it does: comments, layout and docstrings make no difference.
+        """
+        return digest({name: _content(path) for name, path in self.files(*scripts).items()})
 
 
 @cache
 def _places(module: str) -> dict[str, Path]:
-    """A module's file; of a package in the package, also the data in its folder."""
+    """A module's file; with a package, the data in its folder; with a script, its Typst page."""
     root = ROOTS[module.partition(".")[0]]
     place = root.joinpath(*module.split("."))
     files = [place / "__init__.py" if place.is_dir() else place.with_suffix(".py")]
+    files += [page for page in [place.with_suffix(".typ")] if page.is_file()]
     if place.is_dir() and module not in ROOTS:
         found = (path for path in place.rglob("*.*") if "__pycache__" not in path.parts)
         files += [path for path in found if path.is_file() and path.suffix != ".py"]
     return {path.relative_to(root).as_posix(): path for path in files}
 
 
+def _bare_imports(path: Path) -> set[str]:
+    """Modules of scripts/, and others, that a script imports from."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    found = (node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom))
+    return {f"scripts.{node.module}" for node in found}
+
+
 @cache
-def _text(path: Path) -> str:
-    return path.read_text(encoding="utf-8")
+def _content(path: Path) -> str:
+    """A file's text; of Python, its syntax tree without docstrings."""
+    text = path.read_text(encoding="utf-8")
+    return json.dumps(_shape(ast.parse(text))) if path.suffix == ".py" else text
+
+
+def _shape(node: Any) -> Any:
+    """A syntax tree as lists, the same from every version of Python."""
+    if isinstance(node, ast.AST):
+        fields = {name: value for name, value in ast.iter_fields(node) if value not in (None, [])}
+        if isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
+            fields["body"] = node.body[1:]
+        return [type(node).__name__, *([name, _shape(value)] for name, value in fields.items())]
+    return [_shape(item) for item in node] if isinstance(node, list) else repr(node)
 
 
 def figure(name: str, category: str, caption: str = "", folder: str = "results/{scale}") -> dict:

@@ -14,7 +14,7 @@ rule sample_experiment:
         runtime=60,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017", "paper2021", "experiment"),
-        code=CODE.digest("sample_experiment", "chains"),
+        code=CODE.digest("sample_experiment"),
     message:
         "chains of the experiment: {wildcards.kind} ({wildcards.scale})"
     script:

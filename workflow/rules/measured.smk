@@ -161,7 +161,7 @@ rule sample_measured:
         runtime=60,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017", "paper2021", "experiment"),
-        code=CODE.digest("sample_measured", "chains"),
+        code=CODE.digest("sample_measured"),
     message:
         "chains of {wildcards.kind} ({wildcards.scale})"
     script:

@@ -1,5 +1,5 @@
 # paper_figures/ holds the configured scale's figures; every scale keeps its own in results/.
-rule publish:
+rule copy_published:
     input:
         lambda wc: "{}.{}".format(MEASURED.origin(wc.name), wc.kind),
     output:
@@ -16,7 +16,7 @@ rule publish:
 
 
 # Drawings of one cause of a diagnosis, asked for by name.
-rule publish_cause:
+rule copy_cause:
     input:
         "results/measured/diagnosis/{name}/diagnosis.json",
     output:

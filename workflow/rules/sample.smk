@@ -15,7 +15,7 @@ rule sample_posterior:
         runtime=90,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2021"),
-        code=CODE.digest("sample_posterior", "chains"),
+        code=CODE.digest("sample_posterior"),
     message:
         "chains, T = {wildcards.samples} ({wildcards.scale})"
     script:

@@ -14,7 +14,7 @@ HOW_MANY = ("one", "all")
 # Repeats of each set: "one" per effect, size and number of IMUs; "gauge" per gauge; "outside" per
 # effect, size and number of IMUs; "struck" per effect and number of IMUs.
 REPEATS = {
-    "default": {"clean": 80, "one": 1, "pair": 70, "gauge": 4, "outside": 1, "struck": 1},
+    "default": {"clean": 400, "one": 2, "pair": 120, "gauge": 4, "outside": 2, "struck": 1},
     "paper": {"clean": 600, "one": 8, "pair": 800, "gauge": 20, "outside": 6, "struck": 4},
 }
 # The quick scale takes so many of the default one, evenly spread.
@@ -31,7 +31,7 @@ SETTINGS = (
 
 
 def matrix(scale: str = "default") -> list[Case]:
-    """The cases of a scale, always the same: "quick" (30), "default" or "paper" (some 4000).
+    """The cases of a scale, always the same: "quick" (30), "default" (1200), "paper" (4068).
 
     Raises ValueError for another scale.
     """

@@ -1,0 +1,153 @@
+"""What made each file of paper_figures/, and whether its code is still the tree's.
+
+``python workflow/published.py stale`` lists the files whose code has changed since they were made,
+and says so in published.csv; ``write`` FILE... states what has just made these files.
+"""
+
+import argparse
+import csv
+import hashlib
+import io
+import re
+import subprocess
+import sys
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from support import Sources
+
+from imuarray.errors import InputError
+from imuarray.provenance import write_bytes
+
+ROOT = Path(__file__).parents[1]
+MANIFEST = "paper_figures/published.csv"
+CODE = ("src", "workflow", "config.yaml", "Snakefile")
+COLUMNS = ("file", "current", "commit", "command", "scale", "sha256", "code", "scripts")
+SCALES = {"quick", "default", "paper"}
+
+
+def ancestry(summary: str) -> dict[str, tuple[str, list[str]]]:
+    """By file, its rule and its inputs, from what ``snakemake --detailed-summary`` prints."""
+    table = csv.DictReader(io.StringIO(summary), delimiter="\t", quoting=csv.QUOTE_NONE)
+    return {row["output_file"]: (row["rule"], row["input-file(s)"].split(",")) for row in table}
+
+
+def origin(file: str, made: Mapping[str, tuple[str, list[str]]]) -> set[str]:
+    """A file and all that it was made from, however far back, of what rules have made."""
+    found, ahead = set(), {file}
+    while ahead:
+        found |= ahead
+        ahead = {name for one in ahead for name in made[one][1] if name in made} - found
+    return found
+
+
+def scripts() -> dict[str, str]:
+    """By rule, the script that it runs."""
+    rules = "".join(
+        path.read_text(encoding="utf-8") for path in sorted((ROOT / "workflow/rules").glob("*.smk"))
+    )
+    found = {}
+    for block in re.split(r"(?m)^(?:rule|checkpoint|use rule) ", rules)[1:]:
+        name, _, heir = block.partition(":")[0].removesuffix(" with").partition(" as ")
+        if script := re.search(r"scripts/(\w+)\.py", block):
+            found[name] = script[1]
+        if heir and name in found:
+            found[heir] = found[name]
+    return found
+
+
+def entry(file: str, made: Mapping, by_rule: Mapping[str, str], sources: Sources) -> dict:
+    """A file's row, but for the commit; ``by_rule`` as from `scripts`."""
+    back = origin(file, made)
+    names = sorted({by_rule[made[name][0]] for name in back if made[name][0] in by_rule})
+    return {
+        "file": Path(file).name,
+        "current": "yes",
+        "command": f"snakemake --cores 2 -- {file}",
+        "scale": " ".join(sorted(SCALES & {part for name in back for part in name.split("/")})),
+        "sha256": hashlib.sha256(Path(file).read_bytes()).hexdigest(),
+        "code": sources.digest(*names),
+        "scripts": " ".join(names),
+    }
+
+
+def commit() -> str:
+    """The tree's commit; InputError where the code has changes that are in none."""
+    if _run("git", "status", "--porcelain", "--", *CODE, cwd=ROOT):
+        raise InputError("published: expected code as committed, found changes: git status")
+    return _run("git", "rev-parse", "HEAD", cwd=ROOT).strip()
+
+
+def summary(snakefile: str, scale: str, files: Iterable[str]) -> str:
+    """What Snakemake knows of the files and of all that they rest on."""
+    options = ["--workflow-profile", "none", "--cores", "1", "--config", f"scale={scale}"]
+    return _run("snakemake", "-s", snakefile, *options, "--detailed-summary", "--", *files)
+
+
+def _run(*command: str, **options) -> str:
+    return subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, **options).stdout
+
+
+def read(text: str) -> list[dict]:
+    """The manifest's rows."""
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def write(rows: Iterable[Mapping], path: str | Path) -> None:
+    """The manifest."""
+    text = io.StringIO()
+    table = csv.DictWriter(text, COLUMNS, lineterminator="\n")
+    table.writeheader()
+    table.writerows(sorted(rows, key=lambda row: row["file"]))
+    write_bytes(text.getvalue().encode(), path)
+
+
+def changed(rows: Iterable[Mapping], sources: Sources) -> list[str]:
+    """Files that the manifest calls current, and whose code is not what it says."""
+    rows = [row for row in rows if row["current"] == "yes"]
+    digests = {names: sources.digest(*names.split()) for names in {row["scripts"] for row in rows}}
+    return [row["file"] for row in rows if digests[row["scripts"]] != row["code"]]
+
+
+def mark() -> None:
+    """Say in the manifest which files are stale, and list all that are."""
+    rows = read((ROOT / MANIFEST).read_text(encoding="utf-8"))
+    found = changed(rows, Sources())
+    for row in rows:
+        row["current"] = "no" if row["file"] in found else row["current"]
+        if row["current"] == "no":
+            print(f"{row['file']}: of commit {row['commit'][:7]}, its code has changed since")
+    write(rows, ROOT / MANIFEST)
+
+
+def state(files: Iterable[str], made_at: str, made: Mapping) -> None:
+    """Write the rows of ``files``; those of other files that are there stay."""
+    path, sources, by_rule = Path(MANIFEST), Sources(), scripts()
+    rows = read(path.read_text(encoding="utf-8")) if path.exists() else []
+    found = {row["file"]: row for row in rows if path.with_name(row["file"]).exists()}
+    found |= {
+        Path(file).name: entry(file, made, by_rule, sources) | {"commit": made_at} for file in files
+    }
+    write(found.values(), path)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    verbs = parser.add_subparsers(dest="verb", required=True)
+    verbs.add_parser("stale")
+    writing = verbs.add_parser("write")
+    writing.add_argument("--snakefile", default=str(ROOT / "Snakefile"))
+    writing.add_argument("--scale", default="default")
+    writing.add_argument("files", nargs="+")
+    given = parser.parse_args()
+    if given.verb == "stale":
+        return mark()
+    state(given.files, commit(), ancestry(summary(given.snakefile, given.scale, given.files)))
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except InputError as error:
+        print(f"imuarray: {error}", file=sys.stderr)
+        sys.exit(2)
