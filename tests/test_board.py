@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import matplotlib
 import matplotlib.pyplot as plt
@@ -13,7 +14,9 @@ import pytest
 import imuarray
 from benchmarks.board import Options, draw_board, write
 from imuarray.analysis.board import board
+from imuarray.analysis.trust import reasons_of_calibration
 from imuarray.cli import main
+from imuarray.commands.board import answer
 from imuarray.diagnosis.plain import Sizes, plain
 from imuarray.report.board import html, write_board
 from imuarray.report.excitation import missing
@@ -100,6 +103,22 @@ def test_an_answer_not_to_be_trusted_says_so_first(
     assert page.index("Not to be trusted: gyroscopes") < page.index("What to do next")
     assert "<b>2 %" not in page and "<i>log" not in page and "imuarray diagnose" in page
     assert imuarray.read_calibration(tmp_path / "new/answer/cal.nc").attrs["trusted"] == 0
+
+
+def test_a_terminal_has_the_answer_first_in_few_lines(found):
+    lines = answer(found, Path("answer"))
+    assert lines[0].startswith("The positions of 4 IMUs are known to") and len(lines) <= 15
+    assert any(re.match(r"IMU 4 is read [\d.]+\s±\s[\d.]+ ms late", line) for line in lines)
+    assert "imuarray apply answer/cal.nc answer/recording.nc" in "".join(lines)
+    assert lines[-1] == "Page: answer/report.html"
+    odd = answer(found._replace(reasons=["odd"]), Path("answer"))
+    assert odd[0].startswith("If the answer could be trusted") and "is read" not in "".join(odd)
+
+
+def test_a_log_that_says_little_says_that_first(found):
+    slow = replace(found.corrected, angular_rate=1e-3 * found.corrected.angular_rate)
+    reasons = reasons_of_calibration(slow, found.calibration, ["no still poses"])
+    assert "says little of the positions" in reasons[0] and reasons[1] == "no still poses"
 
 
 def test_without_still_poses_the_page_says_what_is_missing(found, no_pictures):

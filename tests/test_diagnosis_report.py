@@ -33,7 +33,16 @@ from imuarray.report.signals import binned, signal_of
 from tests.browser import in_browser, needs_browser
 
 PATH = "a folder/<script>alert(1)</script> & $x$_{.nc"
-ALWAYS = {"discrepancies", "residual", "separability", "positions", "board", "course"}
+ALWAYS = {
+    "discrepancies",
+    "residual",
+    "separability",
+    "positions",
+    "board",
+    "course",
+    "timeline",
+    "sphere",
+}
 VOID = {"meta", "img", "br", "link", "input", "hr"}
 
 

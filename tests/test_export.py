@@ -19,6 +19,7 @@ from imuarray.analysis.calibration_dataset import (
     positions_dataset,
     with_readings,
 )
+from imuarray.analysis.formats import _link_names
 from imuarray.analysis.model import model_of
 from imuarray.cli import main
 from imuarray.errors import InputError
@@ -205,6 +206,11 @@ def test_a_clock_of_its_own_is_in_the_time(made):
         assert yaml.safe_load(text)[f"imu{k}"]["time_offset"] == found
         assert yaml.safe_load(text)[f"imu{k}"]["update_rate"] == known["log_rate"][k]
     assert "at the stamp 40.000000; it falls by 3e-05" in text
+
+
+def test_links_have_names_that_a_urdf_may_have():
+    labels = ["1", "/imu1", "imu1", "front left", "imuarray"]
+    assert _link_names(labels) == ["imu_1", "imu1", "imu1_3", "imu_front_left", "imuarray_5"]
 
 
 def test_joints_and_rows_are_the_document_s(made):

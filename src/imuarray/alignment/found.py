@@ -13,6 +13,7 @@ from imuarray.recording.record import AXES
 KINDS = {"accelerometer": ("m/s^2", 1.0), "gyroscope": ("deg/s", 180 / np.pi)}  # as lines show them
 NOISY = 3.0  # times the noise, from which a residual is explained
 JITTER = 5e-6  # s, that is said
+SMALLEST = 1e-4  # degrees, ms or ppm: an sd that is shown
 
 
 class Carried(NamedTuple):
@@ -129,6 +130,8 @@ class Alignment:
 
 
 def _with(value: float, sd: float) -> str:
-    """A value with its sd to two digits."""
-    digits = int(np.clip(1 - np.floor(np.log10(max(sd, 1e-9))), 0, 9))
+    """A value with its sd to two digits; a bound where that is less than SMALLEST."""
+    if sd < SMALLEST:
+        return f"{value:.4f} +- < {SMALLEST:.4f}" if value >= SMALLEST else f"< {SMALLEST:.4f}"
+    digits = int(np.clip(1 - np.floor(np.log10(sd)), 0, 4))
     return f"{value:.{digits}f} +- {sd:.{digits}f}"

@@ -10,7 +10,6 @@ from imuarray.analysis.model import Say, silent
 from imuarray.analysis.trust import reasons_of_calibration
 from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.firstorder.correct import FirstOrder, calibrate_first_order, correct
-from imuarray.firstorder.report import summary_lines
 from imuarray.firstorder.still import still_poses
 from imuarray.recording import Recording
 from imuarray.recording.units import GRAVITY
@@ -29,23 +28,23 @@ def board(
     """
     opened = open_logs(logs, columns, topics)
     recording = opened.recording
-    say(f"{len(recording.time)} samples of {len(recording.accelerometer_labels)} IMUs")
-    for line in opened.lines:
-        say(line)
+    count = len(recording.accelerometer_labels)
+    say(f"{len(recording.time)} samples of {count} IMUs; each sensor from still poses")
     found = _first_order(recording, gravity)
     corrected = recording
     if isinstance(found, str):
         say(f"first order left out: {found}")
     else:
-        say("\n".join(summary_lines(found, recording)))
         corrected = correct(recording, found)
-    calibration = calibrate(corrected, say=say)
-    reasons = reasons_of_calibration(corrected, calibration)
+    say("positions from the motion")
+    calibration = calibrate(corrected)
+    known = []
     if isinstance(found, str) and recording.map_covariance is None:
-        reasons = [
+        known = [
             f"first order was left out ({found}): offsets, scales and axes of the sensors are taken"
-            " as read, and the sds do not know how far these are off", *reasons,
-        ]  # fmt: skip
+            " as read, and the sds do not know how far these are off"
+        ]
+    reasons = reasons_of_calibration(corrected, calibration, known)
     source = ", ".join(Path(path).name for path in logs)
     return Board(source, opened.lines, recording, found, corrected, calibration, reasons)
 

@@ -2,6 +2,7 @@
 
 import csv as tables
 import io
+import re
 from json import dumps
 from typing import Any
 from xml.etree import ElementTree
@@ -61,11 +62,11 @@ def urdf(document: dict[str, Any]) -> str:
     for line in _heads(document):
         robot.append(ElementTree.Comment(f" {line.replace('--', '- -')} "))
     ElementTree.SubElement(robot, "link", name="imuarray")
-    for imu in document["imus"]:
-        name = printable(f"imu_{imu['label']}")
+    names = _link_names([imu["label"] for imu in document["imus"]])
+    for name, imu in zip(names, document["imus"], strict=True):
         sds = ", ".join(_text(1e6 * sd, ".3g") for sd in imu["position_sd_m"])
         ElementTree.SubElement(robot, "link", name=name)
-        robot.append(ElementTree.Comment(f" {name.replace('--', '- -')}: sd {sds} um "))
+        robot.append(ElementTree.Comment(f" {name}: sd {sds} um "))
         joint = ElementTree.SubElement(robot, "joint", name=f"{name}_joint", type="fixed")
         ElementTree.SubElement(joint, "parent", link="imuarray")
         ElementTree.SubElement(joint, "child", link=name)
@@ -74,6 +75,16 @@ def urdf(document: dict[str, Any]) -> str:
         ElementTree.SubElement(joint, "origin", xyz=_row(imu["position_m"]), rpy=_row(rpy))
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _link_names(labels: list[str]) -> list[str]:
+    """A link's name for each IMU: letters, digits and underscores, no two alike."""
+    names = ["imuarray"]
+    for label in labels:
+        name = re.sub(r"\W+", "_", label, flags=re.ASCII).strip("_")
+        name = name if name.lower().startswith("imu") else f"imu_{name}"
+        names.append(f"{name}_{len(names)}" if name in names else name)
+    return names[1:]
 
 
 def kalibr(document: dict[str, Any]) -> str:

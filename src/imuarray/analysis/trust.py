@@ -28,17 +28,21 @@ SAME = 0.1  # relative difference of rates, up to which they are those of one re
 
 
 def reasons_of_calibration(
-    recordings: Recording | Sequence[Recording], calibration: xr.Dataset
+    recordings: Recording | Sequence[Recording], calibration: xr.Dataset, known: Sequence[str] = ()
 ) -> list[str]:
-    """Why `imuarray.calibrate`'s answer for these recordings is not to be trusted."""
+    """Why `imuarray.calibrate`'s answer for these recordings is not to be trusted.
+
+    The root first: what a recording that says little ends in is no cause; then what is ``known``
+    already, then what it may lead to.
+    """
     several = [recordings] if isinstance(recordings, Recording) else list(recordings)
     found: dict[str, list[str]] = {}
     limit = RESIDUAL if _is_papers(calibration) else TRIAD
     for number, recording in enumerate(several, 1):
         places = _places(recording, calibration["position"].to_numpy(), _covariance(calibration))
         residual = _residuals(recording, calibration, places)
-        reasons = _judged(recording, places, residual, limit)
-        for reason in reasons + (_little(recording, places) if len(several) == 1 else []):
+        little = _little(recording, places) if len(several) == 1 else []
+        for reason in [*little, *known, *_judged(recording, places, residual, limit)]:
             found.setdefault(reason, []).append(str(number))
     return [
         reason if len(whose) == len(several) else f"recording {', '.join(whose)}: {reason}"
@@ -59,7 +63,7 @@ def reasons_of_posterior(
     places = _places(recording, np.vstack([np.zeros(3), draws.mean(0).reshape(-1, 3)]), covariance)
     plain = "effect_parameter" not in posterior["posterior"]
     residual = _rigid(recording, places, rates == "spread") if plain else {}
-    found = _judged(recording, places, residual) + _little(recording, places)
+    found = _little(recording, places) + _judged(recording, places, residual)
     shrunk = posterior.attrs.get("shrunk_by_sds", 0.0)
     if shrunk > SHRUNK:
         found.append(
@@ -94,7 +98,7 @@ def reasons_of_diagnosis(recording: Recording, document: dict) -> list[str]:
     """
     found, sds = (np.array(document["extended"][f"positions_{name}"]) for name in ("m", "sd_m"))
     places = _places(recording, found, np.diag(sds.ravel() ** 2))
-    return _judged(recording, places, {}) + _little(recording, places)
+    return _little(recording, places) + _judged(recording, places, {})
 
 
 def _is_papers(calibration: xr.Dataset) -> bool:

@@ -1,18 +1,37 @@
 """The work behind `imuarray board`."""
 
+from pathlib import Path
+
 from imuarray.analysis.board import board as answered
-from imuarray.commands.calibrate import document, report
+from imuarray.commands.calibrate import document, position_lines
 from imuarray.commands.output import Output
-from imuarray.report.board import write_board
+from imuarray.report import board_words as said
+from imuarray.report.board import Board, write_board
+
+TABLE = 8  # IMUs whose positions are printed; of more they are in positions.csv
+CAUSES, STEPS = 3, 2  # at most, of what the page says
 
 
 def board(arguments) -> None:
     """From logs to positions, on the defaults, and a page of all that was found."""
     output = Output(arguments)
     found = answered(
-        arguments.logs, arguments.columns, arguments.gravity, arguments.topics, output.say
+        arguments.logs, arguments.columns, arguments.gravity, arguments.topics, output.step
     )
     write_board(found, arguments.out)
-    page = str(arguments.out / "report.html")
-    output.say("\n".join([report(found.calibration), f"report: {page}"]))
+    output.say("\n".join(answer(found, arguments.out)))
     output.done(document(found.calibration) | {"out": str(arguments.out)}, found.reasons)
+
+
+def answer(found: Board, folder: Path) -> list[str]:
+    """The page's beginning for a terminal: the answer, what it rests on, what to do next."""
+    calibration = found.calibration
+    lines = [said.verdict(found)]
+    if calibration.sizes["accelerometer"] <= TABLE:
+        lines += position_lines(calibration)
+    causes = [] if found.reasons else said.causes(calibration)
+    lines += [f"Known worst: {said.weakest(calibration)}.", said.facts(found), *causes[:CAUSES]]
+    if len(causes) > CAUSES:
+        lines.append(f"What else the sensors do ({len(causes) - CAUSES} more) is on the page.")
+    lines += [f"Next: {step}" for step in said.advice(found, folder)[:STEPS]]
+    return [*lines, f"Page: {folder / 'report.html'}"]

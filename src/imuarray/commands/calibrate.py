@@ -55,10 +55,13 @@ def report(dataset: xr.Dataset) -> str:
     """The same for a person."""
     state = "converged" if dataset.attrs["converged"] else "NOT converged"
     count, samples = dataset.sizes["iteration"], dataset.attrs["samples"]
-    lines = [
-        f"{state} after {count} iterations, {samples} samples",
-        "triad   x mm      y mm      z mm    (sd um)",
-    ]
+    lines = [f"{state} after {count} iterations, {samples} samples", *position_lines(dataset)]
+    return "\n".join([*lines, *_effects(dataset), *_informative(dataset), *_misfit(dataset)])
+
+
+def position_lines(dataset: xr.Dataset) -> list[str]:
+    """A line for each triad under a head."""
+    lines = ["triad   x mm      y mm      z mm    (sd um)"]
     rows = (
         dataset["accelerometer"].to_numpy(),
         dataset["position"].to_numpy(),
@@ -67,7 +70,7 @@ def report(dataset: xr.Dataset) -> str:
     for label, row, sd in zip(*rows, strict=True):
         values = "  ".join(f"{1e3 * value:8.4f}" for value in row)
         lines.append(f"{label:>5} {values}    {', '.join(f'{1e6 * value:.2g}' for value in sd)}")
-    return "\n".join([*lines, *_effects(dataset), *_informative(dataset), *_misfit(dataset)])
+    return lines
 
 
 def _effects(dataset: xr.Dataset) -> list[str]:

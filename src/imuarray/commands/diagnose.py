@@ -1,8 +1,5 @@
 """The work behind `imuarray diagnose`."""
 
-import sys
-import time
-
 from imuarray.analysis.trust import reasons_of_diagnosis
 from imuarray.commands.output import Output
 from imuarray.diagnosis.document import diagnose as diagnosed
@@ -19,13 +16,9 @@ def diagnose(arguments) -> None:
         if name not in known:
             raise InputError(f"--without: expected any of {', '.join(sorted(known))}, found {name}")
     recording, output = read_recording(arguments.recording), Output(arguments)
-    start = time.monotonic()
-
-    def progress(text):
-        if output.progress:
-            print(f"{time.monotonic() - start:6.1f} s  {text}", file=sys.stderr, flush=True)
-
-    found = diagnosed(recording, arguments.seed, arguments.without, arguments.recording, progress)
+    found = diagnosed(
+        recording, arguments.seed, arguments.without, arguments.recording, output.step
+    )
     reasons = reasons_of_diagnosis(recording, found.document)
     found.document.update(trusted=not reasons, reasons=reasons)
     write_report(found, arguments.out)

@@ -2,6 +2,8 @@
 
 import json
 import math
+import sys
+import time
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,7 +17,7 @@ class Output:
     """
 
     def __init__(self, arguments):
-        self._arguments = arguments
+        self._arguments, self._start = arguments, time.monotonic()
         self.json = bool(getattr(arguments, "json", False))
         self.progress = not arguments.quiet
         self.text = self.progress and not self.json
@@ -24,6 +26,12 @@ class Output:
         """One remark, at once."""
         if self.text:
             print(printable(text), flush=True)
+
+    def step(self, text: str) -> None:
+        """What is done next, with the seconds so far; on standard error."""
+        if self.progress:
+            seconds = time.monotonic() - self._start
+            print(f"{seconds:6.1f} s  {printable(text)}", file=sys.stderr, flush=True)
 
     def done(self, document: dict[str, Any], reasons: Sequence[str] = ()) -> None:
         """The numbers of the result; SI units, named in the keys.

@@ -76,6 +76,7 @@ class Diagnosis:
     """
 
     document: dict
+    recording: Recording
     found: Found
     base: Fitted
     inflated: Fitted
@@ -130,7 +131,7 @@ def diagnose(
         "noise_sd": noise_of(found),
         "gain": gains(base, inflated, extended),
     }
-    return Diagnosis(document, found, base, inflated, extended)
+    return Diagnosis(document, recording, found, base, inflated, extended)
 
 
 def smooth_samples(robust: Estimate, found: Found) -> dict | None:

@@ -277,9 +277,8 @@ def _fit(mean, sd, magnitude, recording, used, start) -> tuple[TriadFit, np.ndar
     rank = int(np.sum(values > 1e-7 * values[0]))
     if rank < start.size:
         raise IdentifiabilityError(
-            f"still poses: expected enough different ones to determine {start.size} unknowns,"
-            f" found {poses} poses that determine {rank} (turn the array to about twelve or more"
-            " directions)"
+            f"still poses: expected about twelve or more directions, found {poses}, which determine"
+            f" {rank} of {start.size} unknowns"
         )
     rows = left[: mean.size].reshape(poses, triads, 3, -1)
     free = np.eye(3) - np.einsum("pkin,pkjn->pkij", rows, rows)

@@ -64,7 +64,6 @@ def html(board: Board) -> str:
     """report.html, every text escaped."""
     return rendered(
         "board.html.j2", board=board, verdict=said.verdict(board), facts=said.facts(board),
-        misfit=said.misfit(board.calibration) > said.MISFIT,
         advice=said.advice(board), causes=said.causes(board.calibration),
         turned=turn_table(board), positions=position_table(board.calibration), sure=SURE,
         prior=board.corrected.position_prior_sd, noise=noises(board), figures=draw(board),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 SLOW = np.radians(300.0)  # rad/s rms, of motion that says little of positions
 MISFIT = 1.5  # times the noise: a residual that is looked into
+NOTHING = " Nothing speaks against them."
 
 
 def verdict(board: Board) -> str:
@@ -33,6 +35,7 @@ def verdict(board: Board) -> str:
     return (
         f"{good} of {count} IMUs {verb} to {rms} (rms of the standard deviations; the worst"
         f" coordinate {worst})."
+        + ("" if board.reasons or misfit(board.calibration) > MISFIT else NOTHING)
     )
 
 
@@ -69,8 +72,9 @@ def _shaken(calibration: xr.Dataset) -> str:
     )
 
 
-def advice(board: Board) -> list[str]:
-    """What to do next, the most urgent first."""
+def advice(board: Board, folder: Path = Path()) -> list[str]:
+    """What to do next, the most urgent first; ``folder``: where the files are."""
+    corrected, found = folder / "recording.nc", folder / "cal.nc"
     said = []
     if isinstance(board.first_order, str):
         said.append(
@@ -87,7 +91,7 @@ def advice(board: Board) -> list[str]:
     if board.reasons or misfit(board.calibration) > MISFIT:
         said.append(
             "Check units, signs, which IMU is which and the drawing in columns.yaml; then let"
-            " imuarray diagnose recording.nc --out diagnosis name what the model misses."
+            f" imuarray diagnose {corrected} --out diagnosis name what the model misses."
         )
     said += [
         f"Record what is missing: {item}." for item in missing(board.corrected, board.calibration)
@@ -108,8 +112,9 @@ def advice(board: Board) -> list[str]:
         )
     if not board.reasons:
         said += [
-            "Use it: imuarray apply cal.nc recording.nc --out motion.nc makes one sensor of the"
-            " array, imuarray export cal.nc --format kalibr --out imu.yaml a file for other tools.",
+            f"Use it: imuarray apply {found} {corrected} --out motion.nc makes one sensor of the"
+            f" array, imuarray export {found} --format kalibr --out imu.yaml a file for other"
+            " tools.",
             "Record a second time and calibrate both (imuarray calibrate): what two recordings"
             " agree on is what can be relied on.",
         ]

@@ -14,6 +14,7 @@ from imuarray.engine.parameters import POSITION
 from imuarray.engine.widths import widths
 from imuarray.model.effects import KINDS
 from imuarray.report import pictures
+from imuarray.report.excitation import shown
 from imuarray.report.page import CAPTIONS, Drawing, beside, files
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ def as_calibration(diagnosis: Diagnosis) -> xr.Dataset:
     covariance[np.ix_(free, free)] = widths(found)[0][np.ix_(mine[free], mine[free])]
     time = readings.time + readings.origin
     variables, coordinates = course(found, time)
+    variables["angular_rate"] = ("time", "axis"), found.recorded[0].state.motion[:, :3]
     own, other = ("accelerometer", "axis"), ("accelerometer_other", "axis_other")
     shape = (array.accelerometers, 3) * 2
     variables |= {
@@ -48,20 +50,29 @@ def as_calibration(diagnosis: Diagnosis) -> xr.Dataset:
 
 
 def drawn_alike(diagnosis: Diagnosis, footer) -> list[Drawing]:
-    """The board and the residual against time, as `imuarray board` has them."""
-    found = as_calibration(diagnosis)
+    """The board, the recording and the residual in time, as `imuarray board` has them."""
+    found, recording = as_calibration(diagnosis), diagnosis.recording
     residuals = [f"{kind}_residual" for kind in KINDS]
     parts = {
         "board": (
             3.1, [partial(pictures.board, found, plane) for plane in ("xy", "xz")],
             found[["nominal_position", "position"]].to_dataframe(),
         ),
+        "timeline": (
+            2.6, [partial(pictures.timeline, recording, found)], found["shaken"].to_dataframe(),
+        ),
+        "sphere": (
+            3.4, [partial(pictures.sphere, recording, found)],
+            found["angular_rate"].to_dataframe(),
+        ),
         "course": (
             2.4, [partial(pictures.residual_course, found, kind) for kind in KINDS],
             pd.concat([found[name].to_dataframe() for name in residuals]),
         ),
     }  # fmt: skip
+    more = {"sphere": f" {shown(recording, found)}"}
     return [
-        Drawing(name, *CAPTIONS[name], files(beside(height, drawings, footer), table.reset_index()))
+        Drawing(name, CAPTIONS[name][0], CAPTIONS[name][1] + more.get(name, ""),
+                files(beside(height, drawings, footer), table.reset_index()))
         for name, (height, drawings, table) in parts.items()
-    ]
+    ]  # fmt: skip
