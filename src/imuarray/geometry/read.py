@@ -9,6 +9,9 @@ from imuarray.geometry.array import Array, require_count, require_planar_extent
 from imuarray.geometry.mimu4444 import mimu4444, mimu4444_corners
 
 
+BOARDS = {"mimu4444": mimu4444, "mimu4444_corners": mimu4444_corners}
+
+
 def array_from_csv(path: str, gyroscopes: int | None = None) -> Array:
     """Read positions in metres from a CSV file with a header ``label,x,y,z``.
 
@@ -42,7 +45,6 @@ def array_from_config(section: dict) -> Array:
     or ``positions``: a list of [x, y, z] in metres. ``gyroscopes`` defaults to A.
     """
     count = section.get("gyroscopes")
-    boards = {"mimu4444": mimu4444, "mimu4444_corners": mimu4444_corners}
     if "positions" in section:
         try:
             values = np.asarray(section["positions"], float)
@@ -54,11 +56,11 @@ def array_from_config(section: dict) -> Array:
         return _checked(values, section.get("labels", labels), count, "array.positions")
     if "file" in section:
         return array_from_csv(section["file"], count)
-    if section.get("board") not in boards:
+    if section.get("board") not in BOARDS:
         raise InputError(
-            f"array: expected board ({', '.join(boards)}), file or positions, found {section}"
+            f"array: expected board ({', '.join(BOARDS)}), file or positions, found {section}"
         )
-    board = boards[section["board"]]()
+    board = BOARDS[section["board"]]()
     checked = _checked(board.positions, board.labels, count, board.name)
     return board if count is None else checked
 
