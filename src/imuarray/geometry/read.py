@@ -8,7 +8,6 @@ from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.geometry.array import Array, require_count, require_planar_extent
 from imuarray.geometry.mimu4444 import mimu4444, mimu4444_corners
 
-
 BOARDS = {"mimu4444": mimu4444, "mimu4444_corners": mimu4444_corners}
 
 
