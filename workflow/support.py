@@ -3,6 +3,7 @@
 import ast
 import hashlib
 import json
+import re
 import time
 from functools import cache
 from pathlib import Path
@@ -14,6 +15,7 @@ from snakemake.io import report
 import imuarray
 from imuarray.provenance import digest
 
+ROOT = Path(__file__).parents[1]
 ROOTS = {"imuarray": Path(imuarray.__file__).parents[1], "scripts": Path(__file__).parent}
 
 APART = ("blind_", "theory_", "validation_")  # sizes of targets that nothing else rests on
@@ -31,7 +33,7 @@ class Sources:
             self.graph.add_import(importer=module, imported=module.rpartition(".")[0])
         siblings = self.graph.find_descendants("scripts") - {"scripts.job"}  # which only logs
         for module in siblings:  # they import each other by bare names
-            for imported in siblings & _bare_imports(*_places(module).values()):
+            for imported in siblings & _bare_imports(module):
                 self.graph.add_import(importer=module, imported=imported)
 
     def files(self, *scripts: str) -> dict[str, Path]:
@@ -50,19 +52,20 @@ class Sources:
 
 @cache
 def _places(module: str) -> dict[str, Path]:
-    """A module's file; with a package, the data in its folder; with a script, its Typst page."""
+    """A module's file; with a package, the data in its folder; with a script, its Typst pages."""
     root = ROOTS[module.partition(".")[0]]
     place = root.joinpath(*module.split("."))
     files = [place / "__init__.py" if place.is_dir() else place.with_suffix(".py")]
-    files += [page for page in [place.with_suffix(".typ")] if page.is_file()]
+    files += place.parent.glob(f"{place.name}*.typ")
     if place.is_dir() and module not in ROOTS:
         found = (path for path in place.rglob("*.*") if "__pycache__" not in path.parts)
         files += [path for path in found if path.is_file() and path.suffix != ".py"]
     return {path.relative_to(root).as_posix(): path for path in files}
 
 
-def _bare_imports(path: Path) -> set[str]:
+def _bare_imports(script: str) -> set[str]:
     """Modules of scripts/, and others, that a script imports from."""
+    path = ROOT.joinpath("workflow", *script.split(".")).with_suffix(".py")
     tree = ast.parse(path.read_text(encoding="utf-8"))
     found = (node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom))
     return {f"scripts.{node.module}" for node in found}
@@ -131,6 +134,14 @@ def contents(*paths: str) -> list[str]:
     """SHA-256 of files outside the pipeline: a parameter that changes when one does."""
     files = [Path(path) for path in paths]
     return [hashlib.sha256(f.read_bytes()).hexdigest() if f.is_file() else "" for f in files]
+
+
+def read_by(page: str) -> list[str]:
+    """The files that a Typst page reads: published ones, the configuration, the citation."""
+    folders = {"csv": "paper_figures/", "pdf": "paper_figures/", "yaml": "", "cff": f"{ROOT}/"}
+    text = Path(page).read_text(encoding="utf-8")
+    found = sorted(set(re.findall(r'"(\w+)\.(csv|pdf|yaml|cff)"', text)))
+    return [f"{folders[kind]}{name}.{kind}" for name, kind in found]
 
 
 def own_files(entry: dict) -> list[str]:

@@ -7,6 +7,7 @@ rule manifest:
         rules.validate.input,
         rules.blind.input,
         expand("paper_figures/claims_paper.{kind}", kind=["csv", "md"]),
+        "paper_figures/findings.pdf",
         lambda wc: MEASURED.studied(),
     output:
         "paper_figures/published.csv",
@@ -15,7 +16,7 @@ rule manifest:
     benchmark:
         "results/benchmarks/publish/published.tsv"
     params:
-        tool=f"{workflow.basedir}/published.py",
+        tool=f"{ROOT}/workflow/published.py",
         snakefile=workflow.main_snakefile,
         scale=config["scale"],
         files=lambda wc, input: [name for name in input if name.startswith("paper_figures/")],
