@@ -122,6 +122,20 @@ def test_a_rule_reruns_alone(quick):
     assert (quick / "tuning" / "acceptance_T50.csv").stat().st_mtime_ns == upstream.st_mtime_ns
 
 
+def test_the_manifest_knows_what_made_a_file(quick, monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "workflow"))
+    monkeypatch.chdir(quick.parents[1])
+    import published
+
+    table = "results/quick/tables/2021_table1.csv"
+    made = published.ancestry(published.summary(str(ROOT / "Snakefile"), "quick", [table]))
+    row = published.entry(table, made, published.scripts(), published.Sources())
+    assert row["scale"] == "quick" and row["scripts"].split() == [
+        "judge_chains", "sample_posterior", "simulate_samples", "sweep_acceptance",
+        "sweep_variance", "table_2021_table1", "tune",
+    ]  # fmt: skip
+
+
 def test_a_changed_source_reruns_what_rests_on_it(quick, tmp_path):
     """One file of each stage, by dry runs with a copy of the package."""
     shutil.copytree(ROOT / "src", tmp_path / "src", ignore=shutil.ignore_patterns("__pycache__"))

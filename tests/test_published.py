@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from imuarray.errors import InputError
+
 ROOT = Path(__file__).parents[1]
 
 
@@ -73,11 +75,11 @@ def test_a_changed_source_makes_stale_what_rests_on_it(published, sources, monke
 
 def test_a_file_rests_on_all_that_made_what_it_was_made_from(published, sources, tmp_path):
     table = [
-        ("output_file", "date", "rule", "log-file(s)", "input-file(s)", "status"),
-        ("a.csv", "-", "tune", "-", "-", "ok"),
-        (f"{tmp_path}/results/paper/b.csv", "-", "claims", "-", "a.csv,not_made.csv", "ok"),
-        (f"{tmp_path}/c.csv", "-", "copy", "-", f"{tmp_path}/results/paper/b.csv", "ok"),
-        ("other.csv", "-", "rate_error", "-", "-", "ok"),
+        ("output_file", "date", "rule", "log-file(s)", "input-file(s)", "plan"),
+        ("a.csv", "-", "tune", "-", "-", "no update"),
+        (f"{tmp_path}/results/paper/b.csv", "-", "claims", "-", "a.csv,not_made.csv", "no update"),
+        (f"{tmp_path}/c.csv", "-", "copy", "-", f"{tmp_path}/results/paper/b.csv", "no update"),
+        ("other.csv", "-", "rate_error", "-", "-", "update pending"),
     ]
     made = published.ancestry("\n".join(map("\t".join, table)))
     file, scripts = tmp_path / "c.csv", {name: name for name in ("tune", "claims", "rate_error")}
@@ -86,5 +88,8 @@ def test_a_file_rests_on_all_that_made_what_it_was_made_from(published, sources,
     assert (row["scripts"], row["scale"]) == ("claims tune", "paper")
     assert row["sha256"] == hashlib.sha256(b"1\n").hexdigest()
     published.write([row | {"commit": "0"}], tmp_path / "published.csv")
+    made["a.csv"] = made["a.csv"]._replace(outdated=True)
+    with pytest.raises(InputError, match="found a.csv to be made again"):
+        published.entry(str(file), made, scripts, sources)
     [again] = published.read((tmp_path / "published.csv").read_text(encoding="utf-8"))
     assert again == row | {"commit": "0"}

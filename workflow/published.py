@@ -13,6 +13,7 @@ import subprocess
 import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 from support import Sources
 
@@ -26,18 +27,31 @@ COLUMNS = ("file", "current", "commit", "command", "scale", "sha256", "code", "s
 SCALES = {"quick", "default", "paper"}
 
 
-def ancestry(summary: str) -> dict[str, tuple[str, list[str]]]:
-    """By file, its rule and its inputs, from what ``snakemake --detailed-summary`` prints."""
+class Made(NamedTuple):
+    """How a file was made: by which rule, from which files; whether it is to be made again."""
+
+    rule: str
+    inputs: list[str]
+    outdated: bool
+
+
+def ancestry(summary: str) -> dict[str, Made]:
+    """By file, how it was made, from what ``snakemake --detailed-summary`` prints."""
     table = csv.DictReader(io.StringIO(summary), delimiter="\t", quoting=csv.QUOTE_NONE)
-    return {row["output_file"]: (row["rule"], row["input-file(s)"].split(",")) for row in table}
+    return {
+        row["output_file"]: Made(
+            row["rule"], row["input-file(s)"].split(","), row["plan"] == "update pending"
+        )
+        for row in table
+    }
 
 
-def origin(file: str, made: Mapping[str, tuple[str, list[str]]]) -> set[str]:
+def origin(file: str, made: Mapping[str, Made]) -> set[str]:
     """A file and all that it was made from, however far back, of what rules have made."""
     found, ahead = set(), {file}
     while ahead:
         found |= ahead
-        ahead = {name for one in ahead for name in made[one][1] if name in made} - found
+        ahead = {name for one in ahead for name in made[one].inputs if name in made} - found
     return found
 
 
@@ -56,10 +70,17 @@ def scripts() -> dict[str, str]:
     return found
 
 
-def entry(file: str, made: Mapping, by_rule: Mapping[str, str], sources: Sources) -> dict:
-    """A file's row, but for the commit; ``by_rule`` as from `scripts`."""
+def entry(
+    file: str, made: Mapping[str, Made], by_rule: Mapping[str, str], sources: Sources
+) -> dict:
+    """A file's row, but for the commit; ``by_rule`` as from `scripts`.
+
+    Raises InputError where the tree's code would make something else of what it rests on.
+    """
     back = origin(file, made)
-    names = sorted({by_rule[made[name][0]] for name in back if made[name][0] in by_rule})
+    if outdated := sorted(name for name in back if made[name].outdated):
+        raise InputError(f"{file}: expected it up to date, found {outdated[0]} to be made again")
+    names = sorted({by_rule[made[name].rule] for name in back if made[name].rule in by_rule})
     return {
         "file": Path(file).name,
         "current": "yes",
