@@ -1,5 +1,6 @@
 """`imuarray board`: from a log to positions and a page; what the page says, and that it renders."""
 
+import errno
 import re
 from dataclasses import replace
 from functools import partial
@@ -133,11 +134,12 @@ def test_an_error_leaves_the_folder_as_it_was(found, tmp_path, monkeypatch, no_p
     (tmp_path / "report.html").write_text("mine")
 
     def fails(*_):
-        raise RuntimeError
+        raise OSError(errno.ENOSPC, "full", "a folder made meanwhile")
 
     monkeypatch.setattr("imuarray.report.board.write_csv", fails)
-    with pytest.raises(RuntimeError):
+    with pytest.raises(OSError) as error:
         write_board(found, tmp_path)
+    assert error.value.filename == str(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
     assert (tmp_path / "report.html").read_text() == "mine"
 

@@ -47,17 +47,20 @@ def write_board(board: Board, folder: Path) -> None:
     """recording.nc, cal.nc, positions.csv and, last, report.html: all of them or none."""
     page = html(board).encode()
     folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".board.", dir=folder) as name:
-        made = Path(name)
-        if isinstance(board.first_order, str):
-            write_recording(board.corrected, made / "recording.nc")
-        else:
-            write_corrected(board.recording, board.first_order, made / "recording.nc")
-        write_netcdf(board.calibration.assign_attrs(trust(board.reasons)), made / "cal.nc")
-        write_csv(position_table(board.calibration), made / "positions.csv")
-        write_bytes(page, made / "report.html")
-        for file in ("recording.nc", "cal.nc", "positions.csv", "report.html"):
-            os.replace(made / file, folder / file)
+    try:
+        with tempfile.TemporaryDirectory(prefix=".board.", dir=folder) as name:
+            made = Path(name)
+            if isinstance(board.first_order, str):
+                write_recording(board.corrected, made / "recording.nc")
+            else:
+                write_corrected(board.recording, board.first_order, made / "recording.nc")
+            write_netcdf(board.calibration.assign_attrs(trust(board.reasons)), made / "cal.nc")
+            write_csv(position_table(board.calibration), made / "positions.csv")
+            write_bytes(page, made / "report.html")
+            for file in ("recording.nc", "cal.nc", "positions.csv", "report.html"):
+                os.replace(made / file, folder / file)
+    except OSError as error:  # the folder made meanwhile is nobody's concern
+        raise OSError(error.errno, os.strerror(error.errno or 0), str(folder)) from error
 
 
 def html(board: Board) -> str:
