@@ -27,18 +27,18 @@ COMMANDS = {
 }
 
 
-def cost(name: str, recording: Path, folder: Path) -> tuple[float, float]:
-    """(core seconds, peak memory in GB) of a command, the second time that it runs."""
-    words = [word.format(recording=recording, out=folder) for word in COMMANDS[name]]
+def cost(words, recording: Path, folder: Path, times: int = 2) -> tuple[float, float]:
+    """(core seconds, peak memory in GB) of a command's last run of ``times``."""
+    words = [word.format(recording=recording, out=folder) for word in words]
     environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    for _ in range(2):
+    for _ in range(times):
         job = subprocess.Popen(
             [Path(sys.executable).with_name("imuarray"), *words, "--quiet"], env=environment
         )
         _, status, used = os.wait4(job.pid, 0)
         job.returncode = os.waitstatus_to_exitcode(status)
         if job.returncode not in (0, 3):
-            raise RuntimeError(f"{name}: expected exit status 0 or 3, found {job.returncode}")
+            raise RuntimeError(f"{words[0]}: expected exit status 0 or 3, found {job.returncode}")
     return used.ru_utime + used.ru_stime, used.ru_maxrss / 2**20
 
 
@@ -69,7 +69,9 @@ def rows(folder: Path):
     for name in COMMANDS:
         samples = [round(duration * RATE) for duration in DURATIONS]
         for what, sizes, paths in (("samples", samples, longer), ("IMUs", IMUS, larger)):
-            seconds, memory = zip(*(cost(name, path, folder) for path in paths), strict=True)
+            seconds, memory = zip(
+                *(cost(COMMANDS[name], path, folder) for path in paths), strict=True
+            )
             exponent = np.log(seconds[-1] / seconds[-2]) / np.log(sizes[-1] / sizes[-2])
             listed = ", ".join(
                 f"{n}: {s:.1f} s, {m:.2f} GB"

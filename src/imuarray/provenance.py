@@ -11,11 +11,13 @@ import io
 import json
 import os
 import platform
+import shutil
 import stat
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib import metadata
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +28,8 @@ import imuarray
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+
+ROWS = 2**15  # of an array, digested at a time
 
 _LIBRARIES = ("numpy", "scipy", "jax", "numba", "emcee", "arviz")
 
@@ -69,9 +73,14 @@ def digest(*objects: Any) -> str:
 
 def _fingerprint(value: Any) -> Any:
     """What JSON does not know, as it does; of an array type, shape and SHA-256."""
-    if isinstance(value, np.ndarray) and value.dtype.kind in "biufcUS":
-        array = np.ascontiguousarray(value.astype(value.dtype.newbyteorder("<"), copy=False))
-        return {"array": [array.dtype.str, value.shape, hashlib.sha256(array.data).hexdigest()]}
+    array = isinstance(value, np.ndarray) or getattr(value, "left_in_file", False)
+    if array and value.dtype.kind in "biufcUS":
+        found, kind, shape = hashlib.sha256(), value.dtype.newbyteorder("<"), value.shape
+        value = value if value.shape else value[None]
+        for first in range(0, len(value), ROWS):
+            part = value[first : first + ROWS]
+            found.update(np.ascontiguousarray(part, kind).data)
+        return {"array": [kind.str, shape, found.hexdigest()]}
     if isinstance(value, np.generic | Path):
         return _plain(value)
     raise TypeError(f"digest: no stable bytes for an object of type {type(value).__name__}")
@@ -194,8 +203,63 @@ def write_netcdf(
     data.to_netcdf(image, engine="h5netcdf")
     for name, dataset in (groups or {}).items():
         dataset.to_netcdf(image, mode="a", group=name, engine="h5netcdf")
-    content = image.getvalue()
-    write_bytes(content + SEAL + hashlib.sha256(content).digest(), path)
+    content = image.getbuffer()
+    with atomic_write(path) as temporary, open(temporary, "wb") as handle:
+        handle.write(content)
+        handle.write(SEAL + hashlib.sha256(content).digest())
+
+
+def write_netcdf_parts(
+    parts: Iterable[xr.Dataset], length: int, path: str | Path,
+    groups: Mapping[str, xr.Dataset] | None = None,
+) -> None:  # fmt: skip
+    """The same of a dataset that comes in ``parts`` along time, ``length`` samples in all.
+
+    Attributes and what has no time are the first part's. The room is taken on the disk before HDF5
+    writes to it: OSError where there is too little.
+    """
+    parts = iter(parts)
+    first = next(parts)
+    if first.sizes["time"] == length:
+        write_netcdf(first, path, groups)
+        return
+    import h5netcdf
+    import xarray as xr
+
+    along = [name for name, item in first.variables.items() if item.dims[:1] == ("time",)]
+    encoded = {n: xr.conventions.encode_cf_variable(first.variables[n], name=n) for n in along}
+    room = sum(one.nbytes for one in encoded.values()) * length // first.sizes["time"]
+    with atomic_write(path) as temporary:
+        _require_room(temporary.parent, room)
+        first.drop_vars(along).to_netcdf(temporary, engine="h5netcdf")
+        for name, dataset in (groups or {}).items():
+            dataset.to_netcdf(temporary, mode="a", group=name, engine="h5netcdf")
+        with h5netcdf.File(temporary, "a") as file:
+            file.dimensions["time"] = length
+            for name, one in encoded.items():
+                made = file.create_variable(name, one.dims, one.dtype)
+                made.attrs.update({key: x for key, x in one.attrs.items() if key != "_FillValue"})
+        with open(temporary, "r+b") as handle:
+            os.posix_fallocate(handle.fileno(), 0, os.fstat(handle.fileno()).st_size + room)
+        with h5netcdf.File(temporary, "a") as file:
+            start = 0
+            for part in chain((first,), parts):
+                stop = start + part.sizes["time"]
+                for name in along:
+                    file[name][start:stop] = part[name].to_numpy()
+                start = stop
+        _seal(temporary)
+
+
+def _require_room(folder: Path, size: int) -> None:
+    if shutil.disk_usage(folder).free < size:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def _seal(path: Path) -> None:
+    content = _sha256(path, path.stat().st_size)
+    with open(path, "ab") as handle:
+        handle.write(SEAL + content)
 
 
 SEAL = b"imuarray sha-256"  # before the digest, at a file's end, where HDF5 does not look
@@ -221,5 +285,14 @@ def is_damaged(path: str | Path) -> bool:
     found = seal_of(path)
     if found is None:
         return False
-    content = Path(path).read_bytes()[: -len(SEAL) - len(found)]
-    return hashlib.sha256(content).digest() != found
+    return _sha256(path, os.stat(path).st_size - len(SEAL) - len(found)) != found
+
+
+def _sha256(path: str | Path, size: int) -> bytes:
+    """Of a file's first ``size`` bytes."""
+    found = hashlib.sha256()
+    with open(path, "rb") as handle:
+        while size and (part := handle.read(min(size, 2**20))):
+            found.update(part)
+            size -= len(part)
+    return found.digest()

@@ -13,7 +13,7 @@ from imuarray.analysis.fitting import fitted
 from imuarray.analysis.model import Say, assumed, model_of, require_together, silent, usable
 from imuarray.errors import InputError, require_one_of
 from imuarray.provenance import digest, stamp
-from imuarray.recording import Recording
+from imuarray.recording import Recording, stored
 from imuarray.recording.channels import require_apart, require_live
 
 
@@ -34,8 +34,9 @@ def calibrate(
         with noise estimated for each triad; ``"papers"``: that of paper 2017, by ``method``, with
         the declared noise; or the path of a ``diagnosis.json``: what a diagnosis found.
     method
-        Of the papers' model. ``"bcd"`` (default): block coordinate descent, algorithm 1 of paper
-        2017; ``"gauss-newton"``: the same optimum in a few iterations.
+        Of the papers' model. ``"gauss-newton"`` (default): the most likely positions in a few
+        iterations, of any number of samples; ``"bcd"``: the same by block coordinate descent,
+        algorithm 1 of paper 2017, all samples in memory.
     effects
         Names of effects (docs/effects.md) to have in the model instead of those of ``model``.
     accelerometer_noise
@@ -90,17 +91,25 @@ def _papers(recording: Recording, method: str, accelerometer_noise, say: Say) ->
     """By maximum likelihood with the declared noise (paper 2017)."""
     from imuarray.estimation.bcd import calibrate_bcd
     from imuarray.estimation.gauss_newton import calibrate_gauss_newton
+    from imuarray.estimation.streamed import calibrate_parts
 
     recording = assumed(usable(recording, say), accelerometer_noise)
-    model, saturated = model_of(recording), recording.saturated_gyroscopes()
-    data = recording.specific_force, recording.angular_rate
-    if method == "bcd":
-        found = calibrate_bcd(model, *data, saturated=saturated, tolerance=1e-9)
+    model = model_of(recording)
+    if method == "gauss-newton" and len(recording.time) > stored.PART:
+        found = calibrate_parts(model, lambda: map(_readings, recording.parts()))
     else:
-        found = calibrate_gauss_newton(model, *data, saturated=saturated)
-    dataset = papers_dataset(recording, model, found, saturated)
+        *data, saturated = _readings(recording.in_memory())
+        if method == "bcd":
+            found = calibrate_bcd(model, *data, saturated=saturated, tolerance=1e-9)
+        else:
+            found = calibrate_gauss_newton(model, *data, saturated=saturated)
+    dataset = papers_dataset(recording, model, found)
     dataset.attrs["method"] = method
     return dataset
+
+
+def _readings(part: Recording):
+    return part.specific_force, part.angular_rate, part.saturated_gyroscopes()
 
 
 def _engine(recordings, model: str, effects, say: Say) -> xr.Dataset:

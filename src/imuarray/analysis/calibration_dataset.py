@@ -76,13 +76,13 @@ def _motion(fields) -> dict:
     }
 
 
-def papers_dataset(recording: Recording, model: ArrayModel, found, saturated) -> xr.Dataset:
+def papers_dataset(recording: Recording, model: ArrayModel, found) -> xr.Dataset:
     """Of an estimator of the papers' model."""
     from imuarray.estimation.gauss_newton import parameter_covariance
 
     covariance = found.covariance
     if covariance is None:
-        covariance = parameter_covariance(model, found, saturated)
+        covariance = parameter_covariance(model, found, recording.saturated_gyroscopes())
     dataset = positions_dataset(recording, found.positions, covariance)
     variables = _motion(found.motion.motion[:3]) | noise_variables(model.noise)
     variables |= {
@@ -92,22 +92,23 @@ def papers_dataset(recording: Recording, model: ArrayModel, found, saturated) ->
     }
     dataset = dataset.assign(variables).assign_coords(time=recording.time)
     dataset.attrs |= {"converged": int(found.converged), "samples": len(recording.time)}
-    dataset.attrs["residual_ratio"] = residual_ratio(recording, model, found, saturated)
+    dataset.attrs["residual_ratio"] = residual_ratio(recording, model, found)
     return dataset
 
 
-def residual_ratio(recording: Recording, model: ArrayModel, found, saturated) -> float:
+def residual_ratio(recording: Recording, model: ArrayModel, found) -> float:
     """Rms residual over the declared noise, degrees of freedom allowed for; NaN without any."""
     samples, count = recording.specific_force.shape[:2]
-    values = 3 * samples * (count + recording.angular_rate.shape[1]) - int(saturated.sum())
-    freedom = values - 9 * samples - 3 * (count - 1)
-    if freedom <= 0:
-        return float("nan")
-    force, rate = model.predict_many(found.motion.motion, found.positions)
-    misfit = model.noise.misfit(
-        recording.specific_force - force, recording.angular_rate - rate, saturated
-    )
-    return float(np.sqrt(misfit / freedom))
+    freedom, misfit, start = 3 * samples * (count + recording.angular_rate.shape[1]), 0.0, 0
+    freedom -= 9 * samples + 3 * (count - 1)
+    for part in recording.parts():
+        motion = found.motion.motion.select(slice(start, start + len(part.time)))
+        force, rate = model.predict_many(motion, found.positions)
+        saturated = part.saturated_gyroscopes()
+        off = part.specific_force - force, part.angular_rate - rate
+        misfit += model.noise.misfit(*off, saturated)
+        freedom, start = freedom - int(saturated.sum()), start + len(part.time)
+    return float(np.sqrt(misfit / freedom)) if freedom > 0 else float("nan")
 
 
 def engine_dataset(recordings, found: Estimate) -> xr.Dataset:

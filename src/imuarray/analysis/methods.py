@@ -1,6 +1,6 @@
 """Ways to calibrate and to sample; nothing heavy loads here, so that the command line can look."""
 
-CALIBRATION = ("bcd", "gauss-newton")  # of the papers' model
+CALIBRATION = ("gauss-newton", "bcd")  # of the papers' model
 MODELS = ("sensors", "papers")  # or a diagnosis.json
 SAMPLING = ("auto", "nuts", "pmmh", "pcn")
 MOTION_PRIORS = ("proper", "flat")

@@ -48,7 +48,7 @@ def usable(recording: Recording, say: Say = silent) -> Recording:
     """
     require_live(recording)
     require_planar_extent(recording.accelerometer_position, "recording")
-    lost = recording.saturated_accelerometers().any(axis=(1, 2))
+    lost = recording.at_rail("accelerometer")
     if lost.all():
         raise InputError("recording: expected samples off the rail, found every one at a rail")
     if lost.any():

@@ -1,5 +1,6 @@
 """The calibrated array as one sensor: what calibration is for."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -39,15 +40,42 @@ def apply(
     motion is NaN where an accelerometer is, and of two IMUs where an axis has no gyroscope off its
     rail). InputError says what does not fit together.
     """
+    parts = list(motion_parts(calibration, recording, accelerometer_noise))
+    return parts[0] if len(parts) == 1 else xr.concat(
+        parts, "time", data_vars="minimal", coords="minimal", compat="override", join="override",
+        combine_attrs="override",
+    )  # fmt: skip
+
+
+def motion_parts(
+    calibration: xr.Dataset, recording: Recording, accelerometer_noise: float | None = None
+) -> Iterator[xr.Dataset]:
+    """`apply` of one part of the recording's samples after the other.
+
+    Where samples depend on each other (two IMUs, IMUs on clocks of their own) there is one part.
+    """
+    from imuarray.engine.clock_scan import CLOCK
+
     recording = assumed(recording, accelerometer_noise)
     require_fit(calibration, recording)
+    used = [calibration[name].to_numpy() for name in sorted(map(str, calibration.data_vars))]
+    data = digest(recording.specific_force, recording.angular_rate, *used)
+    origin, effects = recording.time[0], str(calibration.attrs.get("effects")).split(",")
+    together = len(recording.accelerometer_labels) < 3 or CLOCK in effects
+    for part in [recording.in_memory()] if together else recording.parts():
+        dataset = _motion_of(calibration, part, accelerometer_noise, origin)
+        dataset.attrs |= stamp({"recording and calibration": data}, 0)
+        yield dataset
+
+
+def _motion_of(calibration, recording: Recording, accelerometer_noise, origin) -> xr.Dataset:
     saturated = recording.saturated_gyroscopes()
     try:
-        found, anew = motion_under(calibration, recording, saturated, accelerometer_noise)
+        found, anew = motion_under(calibration, recording, saturated, accelerometer_noise, origin)
     except np.linalg.LinAlgError as error:
         raise InputError(f"expected a calibration that determines the motion: {error}") from None
     found = _with_common_map(found, calibration, recording)
-    railed = recording.saturated_accelerometers().any(axis=(1, 2))
+    railed = recording.at_rail("accelerometer")
     lost = railed | np.isnan(found.estimate.cost)
     if not (np.einsum("tii->ti", found.covariance)[~lost] > 0).all():  # NaN, too
         raise InputError("expected a calibration that gives the motion variances, found none")
@@ -57,10 +85,7 @@ def apply(
             dataset[f"{name}_sd_from_calibration"][:] = np.nan
     dataset["gyroscope_at_rail"] = (("time",), saturated.any(axis=(1, 2)))
     dataset["accelerometer_at_rail"] = (("time",), railed)
-    used = [calibration[name].to_numpy() for name in sorted(map(str, calibration.data_vars))]
-    data = digest(recording.specific_force, recording.angular_rate, *used)
-    dataset.attrs |= stamp({"recording and calibration": data}, 0) | {"own_clocks": int(anew)}
-    return dataset
+    return dataset.assign_attrs(own_clocks=int(anew))
 
 
 def _with_common_map(found, calibration: xr.Dataset, recording: Recording):
@@ -97,17 +122,17 @@ def _noise(calibration: xr.Dataset, array: Array, accelerometer_noise: float | N
 
 def motion_under(
     calibration: xr.Dataset, recording: Recording, saturated,
-    accelerometer_noise: float | None = None,
+    accelerometer_noise: float | None, origin: float,
 ):  # fmt: skip
     """(`Fused`, whether clocks are its own) under a calibration's model, its noise as calibrated.
 
-    ``saturated`` (T, G, 3) bool: gyroscope axes to be left out.
+    ``saturated`` (T, G, 3) bool: gyroscope axes to be left out; ``origin`` (s): of the recording.
     """
     from imuarray.engine.fusion import fuse
 
     positions, attrs = calibration["position"].to_numpy(), calibration.attrs
     parameters = (positions - positions[0])[1:].ravel()
-    since, span = recording.time - recording.time[0], None
+    since, span = recording.time - origin, None
     block = calibration["position_covariance"].to_numpy()[1:, :, 1:, :]
     covariance: np.ndarray | None = block.reshape((parameters.size,) * 2)
     extended = "effect_parameter" in calibration

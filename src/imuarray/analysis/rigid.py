@@ -139,12 +139,11 @@ def elsewhere(recording: Recording, positions) -> tuple[float, float]:
 
 def kept(recording: Recording) -> Recording:
     """Moving samples off the rails; of a long recording, stretches spread over it."""
-    lost = recording.saturated_accelerometers().any(axis=(1, 2))
-    lost |= recording.saturated_gyroscopes().any(axis=(1, 2))
+    lost = recording.at_rail("accelerometer") | recording.at_rail("gyroscope")
     if recording.stationary is not None:
         lost |= recording.stationary
     index = np.flatnonzero(~lost)
     if len(index) > MOST:
         stretches = np.array_split(index, len(index) // STRETCH)
         index = np.concatenate(stretches[:: -(-len(index) // MOST)])
-    return recording.select(index) if len(index) < lost.size else recording
+    return recording.select(index).in_memory()

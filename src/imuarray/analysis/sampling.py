@@ -179,7 +179,7 @@ def shrinkage(posterior: Posterior) -> float:
 
 def _off_rails(recording: Recording, say: Say) -> Recording:
     """Without samples whose gyroscopes' spread a rail has cut."""
-    lost = recording.saturated_gyroscopes().any(axis=(1, 2))
+    lost = recording.at_rail("gyroscope")
     if lost.all():
         raise InputError(
             "--rates spread: expected samples with all gyroscopes off their rail, found none"

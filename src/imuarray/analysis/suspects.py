@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from imuarray.analysis.drawing import DEGREE, angle_words
 from imuarray.analysis.rigid import COHERENT, FEWEST, runs, slope, turning
 from imuarray.recording import Recording
+from imuarray.recording.stored import few
 from imuarray.recording.units import GRAVITY
 
 FAR = 4.0  # times the median triad's error, and the declared noise
@@ -241,7 +242,8 @@ def gravity(recording: Recording) -> list[str]:
     still = recording.stationary
     if still is None or not still.any():
         return []
-    size = float(np.median(np.linalg.norm(recording.specific_force[still], axis=2)))
+    force = recording.specific_force[few(np.flatnonzero(still))]
+    size = float(np.median(np.linalg.norm(force, axis=2)))
     if abs(size / GRAVITY - 1) < STILL:
         return []
     unit = ": in g declared m/s^2?" if abs(size - 1) < STILL else ""

@@ -164,7 +164,8 @@ def _little(recording: Recording, places: Places) -> list[str]:
     By their sds, and by what centrifugal forces alone could tell: what noise is taken for
     angular acceleration makes sds that are too small.
     """
-    speed = np.linalg.norm(np.median(recording.angular_rate, axis=1), axis=1)
+    rates = [np.median(part.angular_rate, axis=1) for part in recording.parts()]
+    speed = np.linalg.norm(np.concatenate(rates), axis=1)
     bound = recording.accelerometer_noise_sd / np.sqrt(max(np.sum(speed**4), 1e-300))
     size, prior = 3 * (len(places.found) - 1), places.prior_sd
     rms = max(np.sqrt(np.trace(places.covariance) / size), bound)

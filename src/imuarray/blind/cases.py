@@ -134,8 +134,8 @@ def _draw_effect(scene: Scene, case: Case, effect: str, sensors, rng) -> Change:
 
 
 def _truth(scene: Scene, case: Case, seed: int, changes, recording: Recording) -> Truth:
-    gone = recording.saturated_accelerometers().any(axis=(1, 2))
-    gone |= recording.saturated_gyroscopes().any(axis=(1, 2))
+    gone = recording.at_rail("accelerometer")
+    gone |= recording.at_rail("gyroscope")
     return Truth(
         case=asdict(case),
         seed=int(seed),

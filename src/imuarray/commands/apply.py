@@ -1,5 +1,6 @@
 """The work behind `imuarray apply`."""
 
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -8,30 +9,34 @@ import xarray as xr
 
 from imuarray.analysis.extension import diagnosed
 from imuarray.analysis.model import assumed
-from imuarray.analysis.motion import apply as applied
+from imuarray.analysis.motion import motion_parts
 from imuarray.analysis.trust import reasons_of_motion
 from imuarray.commands.output import Output
 from imuarray.errors import InputError
 from imuarray.motion.state import UNITS
-from imuarray.provenance import trust, write_netcdf
+from imuarray.provenance import trust, write_netcdf_parts
 from imuarray.recording import Recording, load_dataset, read_recording
 
 
 def apply(arguments) -> None:
     """The calibrated array's motion with covariances; see `imuarray.apply` for the output."""
     output = Output(arguments)
-    recording = read_recording(arguments.recording)
+    recording = read_recording(arguments.recording, stored=True)
     calibration = _calibration(arguments.calibration, recording)
+    noise, sums = arguments.accelerometer_noise, Sums()
+    parts = motion_parts(calibration, recording, noise)
     try:
-        dataset = applied(calibration, recording, arguments.accelerometer_noise)
+        first = next(parts)
     except InputError as error:
         raise InputError(f"{arguments.calibration}: {error}") from None
-    used, own = assumed(recording, arguments.accelerometer_noise), bool(dataset.attrs["own_clocks"])
-    reasons = reasons_of_motion(used, calibration, own)
-    write_netcdf(dataset.assign_attrs(trust(reasons)), arguments.out)
-    gyroscopes = recording.angular_rate.shape[1]
-    average = recording.gyroscope_noise_sd / np.sqrt(gyroscopes)
-    found = document(dataset)
+    own = bool(first.attrs["own_clocks"])
+    reasons = reasons_of_motion(assumed(recording, noise), calibration, own)
+    first = first.assign_attrs(trust(reasons))
+    write_netcdf_parts(
+        (sums.add(part) for part in chain((first,), parts)), len(recording.time), arguments.out
+    )
+    average = recording.gyroscope_noise_sd / np.sqrt(recording.angular_rate.shape[1])
+    found = sums.document()
     output.say("\n".join(report(found, average)))
     found |= {"gyroscopes_averaged_sd_rad_s": average, "out": str(arguments.out)}
     output.done(found, reasons)
@@ -44,25 +49,37 @@ def _calibration(path: Path, recording: Recording) -> xr.Dataset:
     return load_dataset(path)
 
 
-def document(dataset: xr.Dataset) -> dict:
-    """The motion's main numbers; sds are rms over samples."""
-    lost = np.isnan(dataset["angular_rate"].to_numpy()).any(axis=1)
-    railed = dataset["gyroscope_at_rail"].to_numpy() & ~lost
-    found: dict[str, Any] = {
-        "samples": lost.size,
-        "left_out": int(lost.sum()),
-        "gyroscope_at_rail": int(railed.sum()),
-        "not_converged": int(np.sum(~dataset["converged"].to_numpy() & ~lost)),
-    }
-    for name, where in (("off_the_rail", ~railed & ~lost), ("at_the_rail", railed)):
-        if where.any():
-            found[name] = {
-                f"{field}_sd": float(
-                    np.sqrt(np.mean(dataset[f"{field}_sd"].to_numpy()[where] ** 2))
-                )
-                for field in UNITS
+class Sums:
+    """The motion's main numbers, added part by part; sds are rms over samples."""
+
+    def __init__(self):
+        self.counts = dict.fromkeys(
+            ("samples", "left_out", "gyroscope_at_rail", "not_converged"), 0
+        )
+        self.squares = {name: [0, np.zeros(len(UNITS))] for name in ("off_the_rail", "at_the_rail")}
+
+    def add(self, part: xr.Dataset) -> xr.Dataset:
+        """The same part, counted."""
+        lost = np.isnan(part["angular_rate"].to_numpy()).any(axis=1)
+        railed = part["gyroscope_at_rail"].to_numpy() & ~lost
+        missed = ~part["converged"].to_numpy() & ~lost
+        own = lost.size, lost.sum(), railed.sum(), missed.sum()
+        for name, count in zip(self.counts, own, strict=True):
+            self.counts[name] += int(count)
+        for total, where in zip(self.squares.values(), (~railed & ~lost, railed), strict=True):
+            total[0] += 3 * int(where.sum())
+            total[1] += [np.sum(part[f"{name}_sd"].to_numpy()[where] ** 2) for name in UNITS]
+        return part
+
+    def document(self) -> dict[str, Any]:
+        """For the JSON line."""
+        return self.counts | {
+            name: {
+                f"{field}_sd": float(np.sqrt(x / n)) for field, x in zip(UNITS, sums, strict=True)
             }
-    return found
+            for name, (n, sums) in self.squares.items()
+            if n
+        }
 
 
 def report(found: dict, average: float) -> list[str]:

@@ -18,7 +18,8 @@ MISFIT = 1.5  # residual over declared noise from which it is spoken of
 def calibrate(arguments) -> None:
     """Positions and motion by maximum likelihood; see `imuarray.calibrate` for the output."""
     output = Output(arguments)
-    recordings = [read_recording(path) for path in arguments.recordings]
+    papers = arguments.model == "papers"
+    recordings = [read_recording(path, papers) for path in arguments.recordings]
     noise = arguments.accelerometer_noise
     dataset = calibrated(
         recordings, arguments.model, arguments.method, arguments.effects, noise, output.say

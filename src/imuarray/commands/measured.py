@@ -38,7 +38,7 @@ def select(arguments) -> None:
     """Select moving, unsaturated, informative samples."""
     from imuarray.estimation.selection import select_dynamic
 
-    recording, output = read_recording(arguments.recording), Output(arguments)
+    recording, output = read_recording(arguments.recording, stored=True), Output(arguments)
     found = select_dynamic(recording)
     index = found.spread(arguments.samples)
     data = digest(recording.specific_force, recording.angular_rate)

@@ -187,8 +187,9 @@ COMMANDS = (
             _option("recordings", "recording to read (NetCDF-4), or several of one board",
                     type=InputFile, nargs="+", metavar="recording"),
             *MODEL,
-            _option("--method", "of the papers' model. bcd: block coordinate descent (default);"
-                    " gauss-newton: the same in fewer iterations", choices=methods.CALIBRATION),
+            _option("--method", "of the papers' model. gauss-newton (default), of any number"
+                    " of samples; bcd: the same by block coordinate descent, in memory",
+                    choices=methods.CALIBRATION),
             NOISE,
         ),
     ),

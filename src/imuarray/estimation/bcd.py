@@ -1,5 +1,6 @@
 """ML-BCD: positions and motion by block coordinate descent (2017, Algorithm 1)."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -121,7 +122,7 @@ def arranged(model: ArrayModel, specific_force, angular_rate, start=None, satura
     positions = np.ascontiguousarray(positions - positions[0])
     require_planar_extent(positions, "positions")
     data = Collapsed.of(model, specific_force, angular_rate, saturated)
-    require_rotation(data, positions)
+    require_rotation([data], positions)
     return data, positions
 
 
@@ -177,30 +178,33 @@ def calibrate_bcd(
         data.arrays, positions, float(tolerance), float(cost_tolerance), limit, marks
     )
     explain(status)
-    require_rotation(data, positions)  # again: the start's errors no longer blur the motion
+    require_rotation([data], positions)  # again: the start's errors no longer blur the motion
     motion = motion_from(data, positions)
     cost, step, snapshots = path
     return Calibration(positions, motion, cost, step, status == 1, snapshots)
 
 
-def require_rotation(data: Collapsed, positions) -> None:
+def require_rotation(parts: Iterable[Collapsed], positions) -> None:
     """Raise IdentifiabilityError where omega and omega_dot stay on one axis throughout.
 
     Every A_n = Omega(omega)^2 + Omega(omega_dot) is then blind along that axis (Lemma 1).
     The same where there is no angular rate: omega_dot alone leaves the scale free. Noise
     and the start's wrong positions would hide this from a plain rank test, so the motion
     off the common axis is compared with what they can feign: 5 sigma of noise, and a tenth
-    of the centrifugal and Euler terms (positions wrong by a tenth of the array).
+    of the centrifugal and Euler terms (positions wrong by a tenth of the array). ``parts``: the
+    samples, which are gone through twice.
     """
-    axis = np.linalg.svd(data.mean.T, full_matrices=False)
-    spread = axis[1] / np.sqrt(data.samples)
-    informed = data.gyroscope_information[[0, 1, 2], [0, 1, 2]]
-    if not np.any(informed > 0.0):
+    sums = [(one.samples, one.mean @ one.mean.T, _informed(one)) for one in parts]
+    samples, gram = sum(one[0] for one in sums), sum(one[1] for one in sums)
+    values, axes = np.linalg.eigh(gram / samples)
+    spread = np.sqrt(np.maximum(values[::-1], 0.0))
+    informed = np.array([one[2] for one in sums if one[2] > 0.0])
+    if not informed.size:
         raise IdentifiabilityError(
             "gyroscopes: expected readings off their rails, found all of them at a rail throughout:"
             " the array's scale is then undetermined"
         )
-    noise = np.sqrt(1.0 / np.median(informed[informed > 0.0]))
+    noise = np.sqrt(1.0 / np.median(informed))
     if spread[0] <= 5 * noise:
         raise IdentifiabilityError(
             "motion: expected rotation, found no angular rate above the gyroscopes' noise: the"
@@ -208,10 +212,20 @@ def require_rotation(data: Collapsed, positions) -> None:
         )
     if spread[1] > max(1e-3 * spread[0], 5 * noise):
         return
-    acceleration = motion_from(data, positions).motion.angular_acceleration
-    along = acceleration @ axis[2][0]
-    across = np.sqrt(np.mean(np.sum(acceleration**2, axis=1) - along**2))
-    inverse = data.reduce(positions)[0].inverse
-    feigned = 0.1 * np.hypot(np.sqrt(np.mean(along**2)), np.mean(data.mean**2) * 3)
-    if across <= max(feigned, 5 * np.sqrt(2 * np.max(np.diag(inverse)[:3]))):
+    whole = along = fast = 0.0
+    for one in parts:
+        turn = motion_from(one, positions).motion.angular_acceleration
+        whole, along = whole + np.sum(turn**2), along + np.sum((turn @ axes[:, 2]) ** 2)
+        fast += np.sum(one.mean**2)
+        inverse = one.reduce(positions)[0].inverse
+    across, along, fast = np.sqrt((whole - along) / samples), along / samples, fast / samples
+    if across <= max(
+        0.1 * np.hypot(np.sqrt(along), fast), 5 * np.sqrt(2 * np.max(np.diag(inverse)[:3]))
+    ):
         explain(-1)
+
+
+def _informed(data: Collapsed) -> float:
+    """Median information of an axis' rate where there is any, 0 where there is none."""
+    informed = data.gyroscope_information[[0, 1, 2], [0, 1, 2]]
+    return float(np.median(informed[informed > 0.0])) if np.any(informed > 0.0) else 0.0

@@ -6,6 +6,7 @@ import numpy as np
 
 from imuarray.errors import IdentifiabilityError
 from imuarray.estimation.bcd import Calibration, arranged, require_rotation
+from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.information import information_at
 from imuarray.estimation.newton import fisher_scoring
 from imuarray.linear import FLOOR, scaled_eigh, scaled_inverse
@@ -47,11 +48,15 @@ def calibrate_gauss_newton(
         data if rate_covariance is None else data.with_rates(rate_covariance), positions,
         position_prior, tolerance, limit,
     )  # fmt: skip
-    # the collapsed cost leaves out how the gyroscopes differ among themselves
+    require_rotation([data], found.positions)
+    return replace(found, cost=found.cost + apart(model, data, angular_rate, saturated))
+
+
+def apart(model: ArrayModel, data: Collapsed, angular_rate, saturated=None) -> float:
+    """How the gyroscopes differ among themselves, which the collapsed cost leaves out."""
     spread = angular_rate - data.mean.T[:, None]
-    apart = model.noise.misfit(np.zeros((len(spread), 3 * len(positions))), spread, saturated)
-    require_rotation(data, found.positions)
-    return replace(found, cost=found.cost + apart)
+    nothing = np.zeros((len(spread), 3 * model.array.accelerometers))
+    return model.noise.misfit(nothing, spread, saturated)
 
 
 def parameter_covariance(model: ArrayModel, found: Calibration, saturated=None) -> np.ndarray:

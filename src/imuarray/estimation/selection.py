@@ -11,6 +11,7 @@ from imuarray.geometry.array import require_planar_extent
 from imuarray.model import ArrayModel
 from imuarray.recording import Recording, array_of
 from imuarray.recording.channels import require_once
+from imuarray.recording.stored import few
 
 SLOWEST = np.radians(100.0)  # rad/s; slower samples say nearly nothing of the positions
 SHAKEN = 3.0  # m/s^2, sd; a board in a hand that does not turn it has less
@@ -75,9 +76,13 @@ def information(recording: Recording) -> np.ndarray:
     sds = recording.accelerometer_noise_sd, recording.gyroscope_noise_sd
     array = array_of(recording)
     model = ArrayModel.isotropic(array, *sds)
-    data = Collapsed.of(model, recording.specific_force, recording.angular_rate)
-    turn = motion_from(data, array.relative).motion.angular_acceleration
-    rate = recording.angular_rate.mean(axis=1)
+    return np.concatenate([_information(part, model) for part in recording.parts()])
+
+
+def _information(part: Recording, model: ArrayModel) -> np.ndarray:
+    data = Collapsed.of(model, part.specific_force, part.angular_rate)
+    turn = motion_from(data, model.array.relative).motion.angular_acceleration
+    rate = part.angular_rate.mean(axis=1)
     # |Omega(w)^2|_F^2 = 2 |w|^4, |Omega(w')|_F^2 = 2 |w'|^2, and the two are orthogonal
     return np.sqrt(2 * np.sum(rate**2, axis=1) ** 2 + 2 * np.sum(turn**2, axis=1))
 
@@ -89,10 +94,10 @@ def select_dynamic(recording: Recording) -> Selection:
     """
     require_once(recording)
     require_planar_extent(recording.accelerometer_position, "recording")
-    speed = np.linalg.norm(recording.angular_rate.mean(axis=1), axis=1)
+    rates = [part.angular_rate.mean(axis=1) for part in recording.parts()]
+    speed = np.linalg.norm(np.concatenate(rates), axis=1)
     still = np.zeros(speed.shape, bool) if recording.stationary is None else recording.stationary
-    force, rate = recording.saturated_accelerometers(), recording.saturated_gyroscopes()
-    rails = force.any(axis=(1, 2)), rate.any(axis=(1, 2))
+    rails = recording.at_rail("accelerometer"), recording.at_rail("gyroscope")
     criteria = {
         "still pose": still,
         f"slower than {np.degrees(SLOWEST):g} deg/s": speed < SLOWEST,
@@ -119,7 +124,7 @@ def select_dynamic(recording: Recording) -> Selection:
 
 def _shaken(recording: Recording, still, speed) -> str:
     """A hint where the forces say that the array turns and no rate does."""
-    moving = recording.specific_force[~still]
+    moving = recording.specific_force[few(np.flatnonzero(~still))]
     if speed.max() > SLOWEST or not len(moving) or moving.std(axis=0).max() < SHAKEN:
         return ""
     return (

@@ -65,7 +65,7 @@ class Still(NamedTuple):
 
     def good(self) -> np.ndarray:
         """(T,) bool: no gyroscope is at its rail."""
-        return ~self.recording.saturated_gyroscopes().any(axis=(1, 2))
+        return ~self.recording.at_rail("gyroscope")
 
     def free(self) -> np.ndarray:
         """(T,) bool: nor is the board still."""

@@ -40,9 +40,12 @@ def require_apart(recordings: Sequence[Recording]) -> None:
     """InputError for no recording, and for turning samples that two of them share."""
     if not recordings:
         raise InputError("recordings: expected at least one, found none")
+    if len(recordings) == 1:
+        return
     before: list[np.ndarray] = []
     for number, recording in enumerate(recordings, 1):
-        marks = np.unique(_marks(_rows(recording)[_turning(recording)]))
+        turning = recording.select(_turning(recording))
+        marks = np.unique(np.concatenate([_marks(_rows(part)) for part in turning.parts()]))
         for other, known in enumerate(before, 1):
             shared = len(np.intersect1d(marks, known, assume_unique=True))
             if shared >= LEAST:
@@ -77,48 +80,59 @@ def repeated(recording: Recording) -> list[str]:
     return dead(recording.select(turning)) + held + _twice(recording, turning)
 
 
-def _readings(recording: Recording, kind: str):
-    """(T, K, 3) readings, labels, and which are at a rail, where they are constant by right."""
-    return (
-        getattr(recording, _KINDS[kind]), getattr(recording, f"{kind}_labels"),
-        getattr(recording, f"saturated_{kind}s")(),
-    )  # fmt: skip
+def _parts(recording: Recording, kind: str):
+    """(n, K, 3) readings in turn, and which are at a rail, where they are constant by right."""
+    for part in recording.parts():
+        yield getattr(part, _KINDS[kind]), getattr(part, f"saturated_{kind}s")()
 
 
 def _constant(recording: Recording, kind: str) -> list[str]:
-    values, labels, railed = _readings(recording, kind)
-    count = _different(values)
-    least = np.where(len(values) < MANY, 1, COARSE)
+    labels = getattr(recording, f"{kind}_labels")
+    count = _different(values for values, _ in _parts(recording, kind))
+    first = next(recording.parts(1))
+    least = np.where(len(recording.time) < MANY, 1, COARSE)
+    few = count <= least
+    if few.any():
+        few &= ~np.all([rail.all(axis=0) for _, rail in _parts(recording, kind)], axis=0)
     return [
         f"{kind} {labels[k]!r}, axis {AXES[axis]}: "
-        + (f"{values[0, k, axis]:g}" if count[k, axis] == 1 else f"{count[k, axis]} values")
+        + (f"{getattr(first, _KINDS[kind])[0, k, axis]:g}" if count[k, axis] == 1
+           else f"{count[k, axis]} values")
         + " in all samples"
-        for k, axis in np.argwhere((count <= least) & ~railed.all(axis=0))
-    ]
+        for k, axis in np.argwhere(few)
+    ]  # fmt: skip
 
 
-def _different(values) -> np.ndarray:
+def _different(parts) -> np.ndarray:
     """(K, 3) how many different values each axis has, at most one more than `COARSE`."""
-    count, left = np.zeros(values.shape[1:], int), np.ones(values.shape, bool)
-    for _ in range(COARSE + 1):
-        count += left.any(axis=0)
-        first = np.take_along_axis(values, left.argmax(axis=0)[None], axis=0)
-        left &= values != first
-    return count
+    known: list[np.ndarray] = []
+    for values in parts:
+        left = np.ones(values.shape, bool)
+        for one in known:
+            left &= values != one
+        while True:
+            count = np.sum([~np.isnan(one) for one in known], axis=0) + np.zeros(values.shape[1:])
+            fresh = left.any(axis=0) & (count <= COARSE)
+            if not fresh.any():
+                break
+            first = np.take_along_axis(values, left.argmax(axis=0)[None], axis=0)[0]
+            known.append(np.where(fresh, first, np.nan))
+            left &= values != first
+        if (count > COARSE).all():
+            break
+    return count.astype(int)
 
 
 def _copied(recording: Recording, kind: str) -> list[str]:
     """Triads that are another's up to turn and scale, and single axes up to their sign."""
-    values, labels, railed = _readings(recording, kind)
-    live = (~railed).sum(axis=0) >= LEAST
-    source = _source(values, live.all(axis=1))
+    labels = getattr(recording, f"{kind}_labels")
+    live, size, gram, marks = _sums(recording, kind)
+    source = _source(gram, size, live.reshape(-1, 3).all(axis=1))
     found = [
         f"{kind} {label!r} reads what {labels[source[k]]!r} reads"
         for k, label in enumerate(labels) if source[k] >= 0
     ]  # fmt: skip
-    columns = values.reshape(len(values), -1).T
-    marks = _marks(columns * np.where(columns[:, :1] < 0, -1.0, 1.0) + 0.0)
-    other = (np.ptp(columns, axis=1) == 0) | ~live.ravel() | np.repeat(source >= 0, 3)
+    other = (size == 0) | ~live | np.repeat(source >= 0, 3)
     marks[other] = np.arange(1, 1 + other.sum())  # named already, or alike for another reason
     first: dict[int, int] = {}
     of = [first.setdefault(int(mark), place) for place, mark in enumerate(marks)]
@@ -130,14 +144,34 @@ def _copied(recording: Recording, kind: str) -> list[str]:
     ]
 
 
-def _source(values, live) -> np.ndarray:
-    """(K,) the first triad of which each is a linear copy, or -1; only of ``live`` (K,) ones."""
-    count, source = values.shape[1], np.full(values.shape[1], -1)
-    columns = values.reshape(len(values), -1)
-    columns = columns - columns.mean(axis=0)
-    size = np.sqrt(np.mean(columns**2, axis=0))
-    columns = columns / np.where(size > 0, size, 1.0)
-    gram = (columns.T @ columns / len(columns)).reshape(count, 3, count, 3).swapaxes(1, 2)
+def _sums(recording: Recording, kind: str):
+    """Of each axis (3 K,): whether it is live, its sd, correlations, and a mark up to its sign."""
+    middle, sign, rng = None, None, np.random.default_rng(0)
+    total, square, mark, free, low, high = 0.0, 0.0, np.uint64(0), 0, np.inf, -np.inf
+    for values, railed in _parts(recording, kind):
+        columns = values.reshape(len(values), -1)
+        if middle is None:  # close to that of all, or sums of squares lose digits
+            middle, sign = columns.mean(axis=0), np.where(columns[0] < 0, -1.0, 1.0)
+        off = columns - middle
+        total, square = total + off.sum(axis=0), square + off.T @ off
+        odd = rng.integers(1, 2**63, (len(values), 1), dtype=np.uint64) * 2 + 1
+        mark = mark + np.sum((columns * sign + 0.0).view(np.uint64) * odd, axis=0)
+        free = free + (~railed).sum(axis=0).ravel()
+        low, high = np.minimum(low, columns.min(axis=0)), np.maximum(high, columns.max(axis=0))
+    mean = total / len(recording.time)
+    covariance = square / len(recording.time) - np.outer(mean, mean)
+    size = np.where(high > low, np.sqrt(np.abs(np.diag(covariance))), 0.0)
+    scale = np.where(size > 0, size, 1.0)
+    return free >= LEAST, size, covariance / np.outer(scale, scale), mark
+
+
+def _source(gram, size, live) -> np.ndarray:
+    """(K,) the first triad of which each is a linear copy, or -1; only of ``live`` (K,) ones.
+
+    ``gram`` (3 K, 3 K) are the axes' correlations, ``size`` (3 K,) their sds.
+    """
+    count, source = len(live), np.full(len(live), -1)
+    gram = gram.reshape(count, 3, count, 3).swapaxes(1, 2)
     live = live & (size.reshape(count, 3) > 0).all(axis=1)
     for i in range(count):
         later = np.flatnonzero(live & (source < 0))
@@ -151,13 +185,20 @@ def _source(values, live) -> np.ndarray:
 
 
 def _held(recording: Recording, kind: str, turning) -> list[str]:
-    values, labels, railed = _readings(recording, kind)
-    judged = turning[1:, None] & ~railed[1:].any(axis=2)
-    again = judged & np.all(values[1:] == values[:-1], axis=2)
-    found = []
+    labels, again, judged, start = getattr(recording, f"{kind}_labels"), [], 0, 0
+    last = None
+    for values, railed in _parts(recording, kind):
+        before = values[:1] + np.nan if last is None else last
+        moved = turning[start : start + len(values), None] & ~railed.any(axis=2)
+        moved[0] &= last is not None
+        same = np.concatenate([before, values[:-1]]) == values
+        again.append(moved & same.all(axis=2))
+        judged = judged + moved.sum(axis=0)
+        start, last = start + len(values), values[-1:]
+    repeats, found = np.concatenate(again), []
     for k, label in enumerate(labels):
-        share = again[:, k].sum() / max(judged[:, k].sum(), 1)
-        begin, end = max(runs(again[:, k]), key=lambda run: run[1] - run[0], default=(0, 0))
+        share = repeats[:, k].sum() / max(judged[k], 1)
+        begin, end = max(runs(repeats[:, k]), key=lambda run: run[1] - run[0], default=(1, 1))
         if share > HELD:
             found.append(
                 f"{kind} {label!r} repeats {100 * share:.0f} % of its readings while the array"
@@ -165,7 +206,7 @@ def _held(recording: Recording, kind: str, turning) -> list[str]:
             )
         elif end - begin >= FROZEN:
             found.append(
-                f"{kind} {label!r} is frozen at {recording.time[begin]:g} s, for"
+                f"{kind} {label!r} is frozen at {recording.time[begin - 1]:g} s, for"
                 f" {end - begin + 1} samples in which the array turns: leave them out"
             )
     return found
@@ -173,7 +214,8 @@ def _held(recording: Recording, kind: str, turning) -> list[str]:
 
 def _twice(recording: Recording, turning) -> list[str]:
     """Whole samples that came before, other than just before."""
-    samples, marks = len(recording.time), _marks(_rows(recording))
+    samples = len(recording.time)
+    marks = np.concatenate([_marks(_rows(part)) for part in recording.parts()])
     _, first, inverse = np.unique(marks, return_index=True, return_inverse=True)
     source = first[inverse]
     again = turning & (source < np.arange(samples))
@@ -190,7 +232,8 @@ def _twice(recording: Recording, turning) -> list[str]:
 
 def _turning(recording: Recording) -> np.ndarray:
     """(T,) bool"""
-    return np.sqrt(np.mean(np.sum(recording.angular_rate**2, axis=2), axis=1)) > TURNING
+    squares = [np.mean(np.sum(p.angular_rate**2, axis=2), axis=1) for p in recording.parts()]
+    return np.sqrt(np.concatenate(squares)) > TURNING
 
 
 def _rows(recording: Recording) -> np.ndarray:

@@ -10,7 +10,8 @@ import numpy as np
 import xarray as xr
 
 from imuarray.errors import InputError
-from imuarray.provenance import is_damaged, write_netcdf
+from imuarray.provenance import is_damaged, write_netcdf_parts
+from imuarray.recording import stored as parts_of
 from imuarray.recording import validate
 from imuarray.recording.record import (
     ALIGNMENT,
@@ -20,20 +21,33 @@ from imuarray.recording.record import (
     NUMBERS,
     OPTIONAL_NUMBERS,
     QUANTITIES,
+    SAMPLED,
     TEXTS,
     TRUTH,
     Recording,
 )
+from imuarray.recording.stored import Stored
 from imuarray.recording.units import factor
 
 
-def from_dataset(dataset: xr.Dataset, where: str = "recording") -> Recording:
-    """Turn the file's dataset into a recording; InputError, naming `where`, if it is not one."""
+def from_dataset(dataset: xr.Dataset, where: str = "recording", stored: bool = False) -> Recording:
+    """Turn the file's dataset into a recording; InputError, naming `where`, if it is not one.
+
+    With ``stored`` readings of more than a part stay in the file.
+    """
     validate.check_structure(dataset, where)
-    arrays = {name: _in_si_units(dataset[name], where) for name in QUANTITIES}
+    stored = stored and dataset.sizes["time"] > parts_of.PART
+    arrays = {
+        name: _in_si_units(dataset[name], where, stored and name in SAMPLED[1:])
+        for name in QUANTITIES
+    }
     matrices = {name: dataset[name].values.astype(float) for name in MATRICES if name in dataset}
     numbers = [*NUMBERS, *(name for name in OPTIONAL_NUMBERS if name in dataset.attrs)]
-    flags = {name: dataset[name].values.astype(bool) for name in FLAGS if name in dataset}
+    flags = {
+        name: Stored(dataset[name].variable) if stored and dataset[name].ndim > 1
+        else dataset[name].values.astype(bool)
+        for name in FLAGS if name in dataset
+    }  # fmt: skip
     recording = Recording(
         **arrays,
         accelerometer_labels=_labels(dataset["accelerometer"]),
@@ -48,10 +62,12 @@ def from_dataset(dataset: xr.Dataset, where: str = "recording") -> Recording:
     return recording
 
 
-def _in_si_units(variable: xr.DataArray, where: str) -> np.ndarray:
-    """Values as float64, by the attribute `units`; InputError for an unknown one."""
+def _in_si_units(variable: xr.DataArray, where: str, stored: bool) -> np.ndarray | Stored:
+    """Values as float64, or left in the file, by the attribute `units`; InputError if unknown."""
     place = f"{where}: {variable.name}: units"
     scale = factor(QUANTITIES[str(variable.name)], variable.attrs.get("units"), place)
+    if stored:
+        return Stored(variable.variable, scale)
     return scale * np.asarray(variable.values, dtype=float)
 
 
@@ -61,15 +77,17 @@ def _labels(coordinate: xr.DataArray) -> tuple[str, ...]:
     return tuple(v.decode(errors="replace") if isinstance(v, bytes) else v for v in values)
 
 
-def read_recording(path: str | Path) -> Recording:
+def read_recording(path: str | Path, stored: bool = False) -> Recording:
     """Read and validate a recording; angular rates come out in rad/s.
+
+    With ``stored`` the readings of a long one stay in the file (`recording.stored`).
 
     Raises InputError, with one line that says what was expected, what was found and where, if the
     file is missing, is not NetCDF-4 or is not a recording; raises IdentifiabilityError for fewer
     than three accelerometers or collinear ones. Large gaps in time are a warning.
     """
     path = _existing(path)
-    recording = from_dataset(_load(path, group=None), str(path))
+    recording = from_dataset(_load(path, None, stored), str(path), stored)
     if not _has_group(path, ALIGNMENT):
         return recording
     alignment = _load(path, ALIGNMENT)
@@ -108,11 +126,19 @@ def write_recording(
     `attrs` (such as `provenance.stamp` gives) join the recording's own attributes, which win. The
     file reads back, or it is not written: InputError as in `read_recording`.
     """
-    dataset = recording.to_dataset()
-    dataset.attrs = {**(attrs or {}), **dataset.attrs}
-    from_dataset(dataset, str(path))
+    whole = next(recording.parts()).to_dataset()
+    if whole.sizes["time"] == len(recording.time):
+        from_dataset(whole, str(path))
+    else:
+        validate.check_structure(whole, str(path))
+        validate.check_values(recording, str(path))
+    datasets = (part.to_dataset() for part in recording.parts())
+    parts = (one.assign_attrs({**(attrs or {}), **one.attrs}) for one in datasets)
     known = {TRUTH: truth, ALIGNMENT: recording.alignment, **(groups or {})}
-    write_netcdf(dataset, path, {name: part for name, part in known.items() if part is not None})
+    write_netcdf_parts(
+        parts, len(recording.time), path,
+        {name: part for name, part in known.items() if part is not None},
+    )  # fmt: skip
 
 
 def load_dataset(path: str | Path, group: str | None = None) -> xr.Dataset:
@@ -136,17 +162,22 @@ def _hdf5(path: Path) -> h5py.File:
         raise InputError(f"{path}: expected a NetCDF-4 file, found another: {error}") from None
 
 
-def _load(path: Path, group: str | None) -> xr.Dataset:
-    """Read one group into memory, after looking at what sizes it declares."""
+def _load(path: Path, group: str | None, stored: bool = False) -> xr.Dataset:
+    """Read one group into memory, after looking at what sizes it declares.
+
+    With ``stored`` its variables are read when they are asked for.
+    """
     try:
         if is_damaged(path):
             raise InputError(f"{path}: expected a file as it was written, found it damaged")
         with _hdf5(path) as file:
-            validate.check_sizes(file, str(path))
+            validate.check_sizes(file, str(path), not stored)
         # "s" is a number of seconds here, not a date or a time span
         options = {"engine": "h5netcdf", "decode_times": False, "decode_timedelta": False}
         # HDF5 without named dimensions is for `validate` to refuse, not for the library to warn of
         options["phony_dims"] = "access"
+        if stored:
+            return xr.open_dataset(path, group=group, cache=False, **options)
         with xr.open_dataset(path, group=group, **options) as dataset:
             return dataset.load()
     except InputError:

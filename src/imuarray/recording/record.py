@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,6 +11,7 @@ import xarray as xr
 
 from imuarray.errors import InputError
 from imuarray.geometry import Array
+from imuarray.recording import stored
 from imuarray.recording.units import UNITS
 
 AXES = ("x", "y", "z")
@@ -83,6 +85,9 @@ MAY_BE_INFINITE = ("accelerometer_range", "gyroscope_range")
 # Optional attributes that are text.
 TEXTS = ("title", "source", "license", "selected")
 
+# Variables with a value for each sample.
+SAMPLED = ("time", "specific_force", "angular_rate", *FLAGS)
+
 # A rail is a count; turning counts into SI units and back may cost the last digits.
 _RAIL_TOLERANCE = 1e-6
 
@@ -90,6 +95,9 @@ _RAIL_TOLERANCE = 1e-6
 @dataclass(frozen=True, eq=False)
 class Recording:
     """What the triads of one rigid array measured, in one array frame.
+
+    The readings of a long one may have stayed in its file (`recording.stored.Stored`): `parts` are
+    in memory.
 
     Attributes
     ----------
@@ -213,15 +221,32 @@ class Recording:
             return self.specific_force_saturated
         return np.abs(self.specific_force) >= self.accelerometer_range * (1 - _RAIL_TOLERANCE)
 
+    def at_rail(self, kind: str) -> np.ndarray:
+        """Samples (T,) with a reading at its rail of a ``kind``, accelerometer or gyroscope."""
+        method = f"saturated_{kind}s"
+        return np.concatenate([getattr(p, method)().any(axis=(1, 2)) for p in self.parts()])
+
     def select(self, index: Any) -> Recording:
         """The samples that `index` picks: a slice, a (T,) mask or an array of time indices."""
-        names = ("time", "specific_force", "angular_rate", *FLAGS)
-        parts = {name: getattr(self, name) for name in names}
-        left = {n: x[index] for n, x in parts.items() if x is not None}
+        left = self._at(index)
+        if len(left.time) == len(self.time):
+            return left
         whole = self.selected.partition(" of ")[2] or f"{len(self.time)} samples"
-        said = f"{len(left['time'])} of {whole}"
-        unchanged = len(left["time"]) == len(self.time)
-        return replace(self, **left, selected=self.selected if unchanged else said)
+        return replace(left, selected=f"{len(left.time)} of {whole}")
+
+    def parts(self, size: int | None = None) -> Iterator[Recording]:
+        """The samples in turn, `PART` or ``size`` at a time, in memory."""
+        size = size or stored.PART
+        for first in range(0, max(len(self.time), 1), size):
+            yield self._at(slice(first, first + size))
+
+    def in_memory(self) -> Recording:
+        """The same with its readings read; InputError where they are too many."""
+        return self._at(slice(None))
+
+    def _at(self, index: Any) -> Recording:
+        parts = {name: getattr(self, name) for name in SAMPLED}
+        return replace(self, **{n: x[index] for n, x in parts.items() if x is not None})
 
 
 def by_kind(map_covariance, accelerometers: int) -> dict[str, np.ndarray]:

@@ -25,12 +25,14 @@ from imuarray.recording.record import (
     NUMBERS,
     OPTIONAL_NUMBERS,
     QUANTITIES,
+    SAMPLED,
     SI,
     Recording,
 )
+from imuarray.recording.stored import MAX_VALUES, blocks
 
-# 1.6 GB as float64. A file of a few bytes can declare far more than any memory holds.
-MAX_VALUES = 200_000_000
+# A file of a few bytes can declare far more than any memory or disk holds; deflate makes 1032 of 1.
+INFLATED = 1032
 
 # A pause this many times the usual step is reported: estimators that smooth would bridge it.
 GAP_FACTOR = 5.0
@@ -40,14 +42,19 @@ GAP_FACTOR = 5.0
 BEYOND_RANGE = 1.8
 
 
-def check_sizes(file: h5py.File, where: str) -> None:
-    """Refuse a file that declares an absurd size, before any of it is read."""
+def check_sizes(file: h5py.File, where: str, whole: bool = True) -> None:
+    """Refuse a file that declares an absurd size, before any of it is read.
+
+    Unless it is read as a ``whole``, readings may be as many as the file has room for.
+    """
     found: list[tuple[str, tuple[int, ...]]] = []
 
     def visit(name: str, item: Any) -> None:
         # Python's integers: the declared sizes may overflow 64 bits
         shape = tuple(int(n) for n in getattr(item, "shape", None) or ())
-        if math.prod(shape) > MAX_VALUES:
+        stays = not whole and name in SAMPLED and len(shape) > 1
+        room = INFLATED * item.id.get_storage_size() if stays else 0
+        if math.prod(shape) > MAX_VALUES and not math.prod(shape) <= room:
             found.append((name, shape))
 
     file.visititems(visit)
@@ -100,12 +107,13 @@ def check_values(recording: Recording, where: str) -> None:
     _check_counts(recording, where)
     _check_labels("accelerometer", recording.accelerometer_labels, where)
     _check_labels("gyroscope", recording.gyroscope_labels, where)
+    limits = {
+        "specific_force": recording.accelerometer_range, "angular_rate": recording.gyroscope_range
+    }  # fmt: skip
     for name in QUANTITIES:
-        _check_finite(recording, name, where)
+        _check_finite(recording, name, limits.get(name, np.inf), where)
     _check_time(recording.time, where, declared=bool(recording.selected))
     require_apart(recording.accelerometer_position, f"{where}: accelerometer_position")
-    _check_range(recording, "specific_force", recording.accelerometer_range, where)
-    _check_range(recording, "angular_rate", recording.gyroscope_range, where)
 
 
 def _check_present(dataset: xr.Dataset, name: str, where: str) -> None:
@@ -148,11 +156,11 @@ def _check_axis(coordinate: xr.DataArray, where: str) -> None:
 
 
 def _check_boolean(variable: xr.DataArray, where: str) -> None:
-    values = variable.values
-    if values.dtype.kind not in "biu" or not np.isin(values, (0, 1)).all():
+    parts = (part.values for _, part in blocks(variable))
+    if variable.dtype.kind not in "biu" or not all(np.isin(part, (0, 1)).all() for part in parts):
         raise InputError(
             f"{where}: {variable.name}: expected true or false (1 or 0), "
-            f"found type {values.dtype} with other values"
+            f"found type {variable.dtype} with other values"
         )
 
 
@@ -231,27 +239,31 @@ def _check_labels(kind: str, labels: tuple[str, ...], where: str) -> None:
         )
 
 
-def _check_finite(recording: Recording, name: str, where: str) -> None:
+def _check_finite(recording: Recording, name: str, limit: float, where: str) -> None:
+    """Finite numbers; and within a declared range."""
     values = getattr(recording, name)
-    bad = ~(np.abs(values) <= LARGEST)  # NaN, too
-    if bad.any():
-        index = _first(bad)
+    sizes = ((first, np.abs(part)) for first, part in blocks(values))
+    marks = [
+        (first, int(np.sum(~(size <= LARGEST))), int(np.sum(size > BEYOND_RANGE * limit)))
+        for first, size in sizes
+    ]  # NaN is not finite, too
+    strange, beyond = sum(mark[1] for mark in marks), sum(mark[2] for mark in marks)
+    if not strange and not beyond:
+        return
+    start = next(mark[0] for mark in marks if mark[1 if strange else 2])
+    part = next(part for first, part in blocks(values) if first == start)
+    size = np.abs(part)
+    index = _first(~(size <= LARGEST) if strange else size > BEYOND_RANGE * limit)
+    place = _place(recording, name, (start + index[0], *index[1:]))
+    if strange:
         raise InputError(
-            f"{where}: {name}: expected finite numbers, at most {LARGEST:g}, found {values[index]}"
-            f" at {_place(recording, name, index)} ({bad.sum()} of {bad.size} values)"
+            f"{where}: {name}: expected finite numbers, at most {LARGEST:g}, found {part[index]}"
+            f" at {place} ({strange} of {math.prod(values.shape)} values)"
         )
-
-
-def _check_range(recording: Recording, name: str, limit: float, where: str) -> None:
-    values = getattr(recording, name)
-    beyond = np.abs(values) > BEYOND_RANGE * limit
-    if beyond.any():
-        index = _first(beyond)
-        raise InputError(
-            f"{where}: {name}: expected values within the declared range of {limit:g} "
-            f"{SI[name]}, found {values[index]:g} at {_place(recording, name, index)}; "
-            "is the units attribute right?"
-        )
+    raise InputError(
+        f"{where}: {name}: expected values within the declared range of {limit:g} "
+        f"{SI[name]}, found {part[index]:g} at {place}; is the units attribute right?"
+    )
 
 
 def _first(mask: np.ndarray) -> tuple[int, ...]:

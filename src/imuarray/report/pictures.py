@@ -159,8 +159,8 @@ def _rows(recording: Recording, calibration: xr.Dataset) -> list[tuple[str, str,
     used, shaken = (np.zeros(count, bool) for _ in range(2))
     used[np.clip(places, 0, count - 1)] = True
     shaken[np.clip(places, 0, count - 1)] = calibration["shaken"].to_numpy() > 0
-    rails = recording.saturated_accelerometers().any(axis=(1, 2))
-    rails = rails | recording.saturated_gyroscopes().any(axis=(1, 2))
+    rails = recording.at_rail("accelerometer")
+    rails = rails | recording.at_rail("gyroscope")
     return [
         ("still poses", SKY, still),
         ("used for positions", GREEN, used),

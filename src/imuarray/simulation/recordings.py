@@ -9,7 +9,7 @@ from imuarray.model.names import parameter_names
 from imuarray.motion import Motion
 from imuarray.motion.state import HIGHER_UNITS, UNITS
 from imuarray.recording import Recording
-from imuarray.recording.validate import MAX_VALUES
+from imuarray.recording.stored import MAX_VALUES
 from imuarray.simulation.measure import clip, measure
 
 

@@ -82,7 +82,7 @@ def select_disjoint(recording: Recording, counts) -> dict[int, np.ndarray]:
     A sample is used when nothing saturates in it or next to it and it rotates faster than
     the median; the sets are spread evenly over the recording.
     """
-    near = neighbours(recording.saturated_gyroscopes().any(axis=(1, 2)))
+    near = neighbours(recording.at_rail("gyroscope"))
     speed = np.linalg.norm(recording.angular_rate.mean(axis=1), axis=1)
     return disjoint(np.flatnonzero(~near & (speed >= np.median(speed))), counts)
 
