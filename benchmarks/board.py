@@ -28,7 +28,8 @@ RANGES = 16 * 9.80665, np.radians(2000.0)  # m/s^2, rad/s
 NOISE = 0.04, np.radians(0.06)  # of one reading, as the datasheet says
 PLACES = {  # m, as drawn; of other numbers of IMUs the first ones
     4: [[0, 0, 0], [20e-3, 0, 0], [0, 20e-3, 3e-3], [20e-3, 20e-3, -2e-3],
-        [10e-3, 0, 2e-3], [0, 10e-3, -3e-3], [20e-3, 10e-3, 1e-3], [10e-3, 20e-3, 0]],
+        [10e-3, 0, 2e-3], [0, 10e-3, -3e-3], [20e-3, 10e-3, 1e-3], [10e-3, 20e-3, 0],
+        *([x * 1e-2, y * 1e-2, (x + y) % 3 * 2e-3] for x in range(3, 9) for y in range(4))],
     2: [[0, 0, 0], [100e-3, 0, 0]],
 }  # fmt: skip
 

@@ -1,9 +1,12 @@
-"""What `calibrate` and `diagnose` cost as recordings get longer and boards larger.
+"""What every command costs as recordings get longer and boards larger: one table and one figure.
 
-`python -m benchmarks.growth [--out results/growth.md]`, from the project's root: core seconds (user
-and system) and peak memory of each command on simulated recordings, compiled code cached, with the
+`python -m benchmarks.growth [--commands ...] [--out results/growth.md] [--figure growth.png]`, from
+the project's root: boards of `benchmarks.board` go through the commands from their log to the
+answers; core seconds (user and system) and peak memory of each, compiled code cached, with the
 growth's exponent between the two largest sizes. Other jobs change core seconds little.
 """
+
+from __future__ import annotations
 
 import argparse
 import os
@@ -13,80 +16,121 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
+from benchmarks.board import GRAVITY, Options, draw_board
 from benchmarks.written import publish
-from imuarray.blind.cases import Case, make
-from imuarray.recording import write_recording
+from imuarray.figures.style import PAGE, look, new_figure, styled
+from imuarray.provenance import atomic_write
 
-RATE = 125.0  # Hz
-DURATIONS, IMUS = (24.0, 48.0, 96.0), (8, 16, 32)
+LENGTHS, IMUS = (0.5, 1.0, 2.0), (4, 8, 16, 32)  # times a minute and a half; 4 IMUs grow longer
+DRAWN = 100  # samples that are sampled from, times length: more need another sampler
 COMMANDS = {
-    "calibrate": ("calibrate", "{recording}", "--out", "{out}/cal.nc"),
-    "diagnose": ("diagnose", "{recording}", "--out", "{out}/diagnosis"),
+    "convert": "convert csv log.csv --columns columns.yaml --out rec.nc",
+    "first-order": f"first-order rec.nc --gravity {GRAVITY} --out corrected.nc",
+    "select": "select corrected.nc --out moving.nc",
+    "calibrate --model papers": "calibrate corrected.nc --model papers --out papers.nc",
+    "calibrate": "calibrate corrected.nc --out cal.nc",
+    "apply": "apply cal.nc corrected.nc --out motion.nc",
+    "sample": "sample few.nc --out posterior.nc",
+    "diagnose": "diagnose corrected.nc --out diagnosis",
 }
 
 
-def cost(words, recording: Path, folder: Path, times: int = 2) -> tuple[float, float]:
-    """(core seconds, peak memory in GB) of a command's last run of ``times``."""
-    words = [word.format(recording=recording, out=folder) for word in words]
+def cost(line: str, folder: Path) -> tuple[float, float]:
+    """(core seconds, peak memory in GB) of a command in a folder."""
     environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    for _ in range(times):
-        job = subprocess.Popen(
-            [Path(sys.executable).with_name("imuarray"), *words, "--quiet"], env=environment
-        )
-        _, status, used = os.wait4(job.pid, 0)
-        job.returncode = os.waitstatus_to_exitcode(status)
-        if job.returncode not in (0, 3):
-            raise RuntimeError(f"{words[0]}: expected exit status 0 or 3, found {job.returncode}")
+    words = [Path(sys.executable).with_name("imuarray"), *line.split(), "--quiet"]
+    job = subprocess.Popen(words, env=environment, cwd=folder)
+    _, status, used = os.wait4(job.pid, 0)
+    job.returncode = os.waitstatus_to_exitcode(status)
+    if job.returncode not in (0, 3):
+        raise RuntimeError(f"{line}: expected exit status 0 or 3, found {job.returncode}")
     return used.ru_utime + used.ru_stime, used.ru_maxrss / 2**20
 
 
-def simulated(folder: Path, imus: int, duration: float) -> Path:
-    """A board of 8 or 32 IMUs, one gyroscope of them scaled."""
-    case = Case(
-        "growth", (("gyroscope_scale", (2,)),), 20.0, kind="one", imus=imus, duration=duration
-    )
-    path = folder / f"{imus}_{duration:g}.nc"
-    write_recording(make(case, 5)[0], path)
-    return path
+def board(imus: int, length: float, commands, folder: Path) -> list[dict]:
+    """A row for each command, on one board's recording."""
+    options = Options(imus=imus, still=5 * length, move=1 + length / 2, twisting=15 * length)
+    draw_board(5, options).write(folder)
+    rows = []
+    for name, line in COMMANDS.items():
+        if name not in commands:
+            continue
+        if name == "sample":
+            cost(f"select corrected.nc --samples {round(DRAWN * length)} --out few.nc", folder)
+        for _ in range(2):  # the first one may have to compile
+            seconds, memory = cost(line, folder)
+        with xr.open_dataset(folder / "rec.nc") as recording:
+            samples = recording.sizes["time"]
+        samples = round(DRAWN * length) if name == "sample" else samples
+        rows.append({"command": name, "imus": imus, "length": length, "samples": samples,
+                     "seconds": seconds, "memory": memory})  # fmt: skip
+    return rows
 
 
-def smaller(path: Path, imus: int) -> Path:
-    """The same recording of its first IMUs."""
-    made = path.with_name(f"first_{imus}.nc")
-    with xr.open_dataset(path) as whole:
-        part = slice(imus)
-        whole.isel(accelerometer=part, gyroscope=part).to_netcdf(made)
-    return made
+def measured(commands, folder: Path) -> pd.DataFrame:
+    """Rows of all boards."""
+    sizes = [(IMUS[0], length) for length in LENGTHS] + [(imus, LENGTHS[0]) for imus in IMUS[1:]]
+    found = []
+    for imus, length in sizes:
+        (folder / f"{imus}_{length:g}").mkdir()
+        found += board(imus, length, commands, folder / f"{imus}_{length:g}")
+    return pd.DataFrame(found)
 
 
-def rows(folder: Path):
-    """A line of the table for each command and kind of growth."""
-    longer = [simulated(folder, 8, duration) for duration in DURATIONS]
-    largest = simulated(folder, IMUS[-1], DURATIONS[0])
-    larger = [*(smaller(largest, imus) for imus in IMUS[:-1]), largest]
-    for name in COMMANDS:
-        samples = [round(duration * RATE) for duration in DURATIONS]
-        for what, sizes, paths in (("samples", samples, longer), ("IMUs", IMUS, larger)):
-            seconds, memory = zip(
-                *(cost(COMMANDS[name], path, folder) for path in paths), strict=True
-            )
-            exponent = np.log(seconds[-1] / seconds[-2]) / np.log(sizes[-1] / sizes[-2])
+def growing(rows: pd.DataFrame):
+    """(what grows, its rows) of both kinds."""
+    yield "samples", rows[rows.imus == IMUS[0]]
+    yield "imus", rows[rows.length == LENGTHS[0]]
+
+
+def table(rows: pd.DataFrame) -> str:
+    """A line for each command and kind of growth."""
+    lines = ["| what | core seconds, peak memory | last exponent |", "|---|---|---|"]
+    for name, own in rows.groupby("command", sort=False):
+        for what, part in growing(own):
+            n, s, m = (part[key].to_numpy() for key in (what, "seconds", "memory"))
+            exponent = np.log(s[-1] / s[-2]) / np.log(n[-1] / n[-2])
             listed = ", ".join(
-                f"{n}: {s:.1f} s, {m:.2f} GB"
-                for n, s, m in zip(sizes, seconds, memory, strict=True)
+                f"{size}: {seconds:.1f} s, {memory:.2f} GB"
+                for size, seconds, memory in zip(n, s, m, strict=True)
             )
-            yield f"| {name}, growth in {what} | {listed} | {exponent:.2f} |"
+            words = what.replace("imus", "IMUs")
+            lines.append(f"| `{name}`, growth in {words} | {listed} | {exponent:.2f} |")
+    return "\n".join(lines) + "\n"
+
+
+@styled
+def draw(rows: pd.DataFrame):
+    """Core seconds and peak memory over samples and over IMUs."""
+    figure = new_figure(["benchmarks/growth.py: a line for each command"],
+                        width=PAGE, height=4.6)  # fmt: skip
+    grid = figure.subplots(2, 2, sharey="row", sharex="col")
+    kinds = ("seconds", "core seconds"), ("memory", "peak memory [GB]")
+    for column, (what, part) in enumerate(growing(rows)):
+        for line, (key, words) in enumerate(kinds):
+            axes = grid[line, column]
+            for place, (name, own) in enumerate(part.groupby("command", sort=False)):
+                axes.loglog(own[what], own[key], label=name, **look(place))
+            axes.set_ylabel(words if column == 0 else "")
+        axes.set_xlabel(what.replace("imus", "IMUs"))
+    grid[0, 1].legend(fontsize=6)
+    return figure
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("results/growth.md"))
-    out = parser.parse_args().out
-    lines = ["| what | core seconds, peak memory | last exponent |", "|---|---|---|"]
+    parser.add_argument("--figure", type=Path, default=Path("results/growth.png"))
+    parser.add_argument("--commands", nargs="+", choices=COMMANDS, default=list(COMMANDS))
+    chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        publish("\n".join([*lines, *rows(Path(folder))]) + "\n", out)
+        rows = measured(chosen.commands, Path(folder))
+    publish(table(rows), chosen.out)
+    with atomic_write(chosen.figure) as temporary:
+        draw(rows).savefig(temporary)
 
 
 if __name__ == "__main__":

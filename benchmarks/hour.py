@@ -22,16 +22,9 @@ from imuarray.simulation.measure import measure
 
 RATE = 1000.0  # Hz
 COMMANDS = {
-    "calibrate --model papers": (
-        "calibrate",
-        "{recording}",
-        "--model",
-        "papers",
-        "--out",
-        "{out}/cal.nc",
-    ),
-    "select": ("select", "{recording}", "--out", "{out}/few.nc"),
-    "apply": ("apply", "{out}/cal.nc", "{recording}", "--out", "{out}/motion.nc"),
+    "calibrate --model papers": "calibrate recording.nc --model papers --out cal.nc",
+    "select": "select recording.nc --out few.nc",
+    "apply": "apply cal.nc recording.nc --out motion.nc",
 }
 
 
@@ -56,8 +49,8 @@ def rows(folder: Path, minutes: float):
     recording, samples = folder / "recording.nc", round(60 * minutes * RATE)
     write_netcdf_parts(parts(samples, 1), samples, recording)
     size = recording.stat().st_size / 1e9
-    for name, words in COMMANDS.items():
-        seconds, memory = cost(words, recording, folder, times=1)
+    for name, line in COMMANDS.items():
+        seconds, memory = cost(line, folder)
         yield f"| `{name}` | {minutes:g} min, {size:.2g} GB | {seconds:.0f} | {memory:.2f} |"
 
 

@@ -98,11 +98,11 @@ def _papers(recording: Recording, method: str, accelerometer_noise, say: Say) ->
     if method == "gauss-newton" and len(recording.time) > stored.PART:
         found = calibrate_parts(model, lambda: map(_readings, recording.parts()))
     else:
-        *data, saturated = _readings(recording.in_memory())
+        force, rate, saturated = _readings(recording.in_memory())
         if method == "bcd":
-            found = calibrate_bcd(model, *data, saturated=saturated, tolerance=1e-9)
+            found = calibrate_bcd(model, force, rate, saturated=saturated, tolerance=1e-9)
         else:
-            found = calibrate_gauss_newton(model, *data, saturated=saturated)
+            found = calibrate_gauss_newton(model, force, rate, saturated=saturated)
     dataset = papers_dataset(recording, model, found)
     dataset.attrs["method"] = method
     return dataset
