@@ -173,6 +173,27 @@ def test_termination_leaves_nothing_half_written(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_an_interrupt_that_python_drops_comes_again(tmp_path):
+    """In a destructor nothing can be raised."""
+    code = (
+        "import os, signal, sys, time, types; from imuarray.cli import script\n"
+        "class Deaf:\n"
+        "    def __del__(self):\n"
+        "        os.kill(os.getpid(), signal.SIGINT)\n"
+        "        time.sleep(0.01)\n"
+        "def command(arguments):\n"
+        "    Deaf()\n"
+        "    time.sleep(20)\n"
+        "m = sys.modules['imuarray.commands.calibrate'] = types.ModuleType('m')\n"
+        "m.calibrate = command\n"
+        "sys.argv = ['imuarray', 'calibrate', sys.executable, '--out', 'cal.nc']\n"
+        "script()"
+    )
+    call = [sys.executable, "-c", code]
+    run = subprocess.run(call, capture_output=True, text=True, cwd=tmp_path, timeout=15)
+    assert (run.returncode, run.stderr) == (130, "imuarray: interrupted\n")
+
+
 def test_no_message_reaches_the_terminal_as_a_command(calls, capsys, monkeypatch):
     fail_with(monkeypatch, InputError("found a column 'a\x1b[2J\x07\x9b\udc80'"))
     assert main("calibrate rec.nc --out cal.nc".split()) == 2

@@ -19,6 +19,19 @@ from imuarray.errors import InputError, one_line
 NETCDF = (".nc", ".nc4", ".h5")
 FIGURES = (".png", ".pdf")
 OK, UNFORESEEN, BAD_INPUT, UNTRUSTED, INTERRUPTED, CLOSED = 0, 1, 2, 3, 130, 141
+AGAIN = 0.05  # s, after which an interrupt that was dropped comes again
+
+
+def script() -> NoReturn:
+    """`imuarray` in a shell.
+
+    Interrupted, it does not wait for threads of compiled code: Python's shutdown would fault.
+    """
+    status = main()
+    if status == INTERRUPTED:
+        sys.stderr.flush()
+        os._exit(status)
+    sys.exit(status)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -32,7 +45,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     arguments = argparse.Namespace()
     try:
-        with _warnings_in_one_line(), _termination_interrupts():
+        with _warnings_in_one_line(), _interruptions():
             make_parser().parse_args(argv, arguments)
             _check_output(arguments)
             _read_effects(arguments)
@@ -89,20 +102,35 @@ def _warnings_in_one_line() -> Iterator[None]:
 
 
 @contextmanager
-def _termination_interrupts() -> Iterator[None]:
-    """SIGTERM ends a command as Ctrl-C does: what it has begun to write is removed."""
+def _interruptions() -> Iterator[None]:
+    """SIGTERM ends a command as Ctrl-C does: what it has begun to write is removed.
 
-    def interrupt(*_: object) -> NoReturn:
-        raise KeyboardInterrupt("(SIGTERM)")
+    An interrupt that Python drops, as it comes in a destructor or a callback, comes again.
+    """
+
+    def interrupt(number: int, _: object) -> NoReturn:
+        raise KeyboardInterrupt(*["(SIGTERM)"] * (number == signal.SIGTERM))
+
+    def dropped(unraisable) -> None:
+        if not issubclass(unraisable.exc_type, KeyboardInterrupt):
+            return hook(unraisable)
+        number = signal.SIGTERM if unraisable.exc_value.args else signal.SIGINT
+        signal.signal(signal.SIGALRM, lambda *_: interrupt(number, None))
+        signal.setitimer(signal.ITIMER_REAL, AGAIN)
 
     if threading.current_thread() is not threading.main_thread():  # signals are not for it
         yield
         return
-    before = signal.signal(signal.SIGTERM, interrupt)
+    hook, sys.unraisablehook = sys.unraisablehook, dropped
+    before = {n: signal.getsignal(n) for n in (signal.SIGTERM, signal.SIGALRM)}
+    signal.signal(signal.SIGTERM, interrupt)
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        sys.unraisablehook = hook
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _check_output(arguments: argparse.Namespace) -> None:
@@ -178,4 +206,4 @@ def _inputs(arguments: argparse.Namespace) -> list[InputFile]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script()
