@@ -232,7 +232,7 @@ def test_bars_count_the_recordings_they_are_set_for():
     rows += [graded("one", one, [], size=4.0), graded("one", one, [], imus=32)]
     found = bars_of(rows)
     assert (found["one_found"]["recordings"], found["one_found"]["count"]) == (10, 8)
-    assert found["one_found"]["verdict"] == "short by 10.0 points"
+    assert found["one_found"]["verdict"] == "short by 17.0 points"
     assert found["one_found"]["sure"] is False
     # the crash is no wrong name, and not counted among the others
     assert (found["one_wrong"]["recordings"], found["one_wrong"]["count"]) == (9, 1)
@@ -246,7 +246,7 @@ def test_bars_count_the_recordings_they_are_set_for():
 
 
 def test_bars_of_the_other_sets():
-    rows = [graded("clean", [], []) for _ in range(38)]
+    rows = [graded("clean", [], []) for _ in range(98)]
     rows += [graded("clean", [], [cause(BIAS)]), graded("clean", [], [], True)]
     rows += [graded("pair", [BIAS, SCALE], [cause(BIAS), cause(SCALE)], size=12.0)] * 6
     rows += [graded("pair", [BIAS, SCALE], [cause(BIAS)], size=12.0)]
@@ -255,7 +255,7 @@ def test_bars_of_the_other_sets():
     rows += [graded("outside", ["outside_cubic"], [cause(BIAS)], True, seconds=61.0)]
     rows += [graded("struck", [BIAS], [cause(SCALE)])]
     found = bars_of(rows)
-    assert found["false_alarms"]["share"] == pytest.approx(1 / 40)
+    assert found["false_alarms"]["share"] == pytest.approx(1 / 100)
     assert found["false_alarms"]["verdict"] == "pass" and not found["false_alarms"]["sure"]
     assert found["clean_unexplained"]["count"] == 1 and found["clean_unexplained"]["verdict"] == ""
     assert found["false_alarms_limit"]["verdict"] == "needs 400"
@@ -263,10 +263,10 @@ def test_bars_of_the_other_sets():
     assert found["gauge"]["verdict"] == "short by 100.0 points"
     assert found["outside"]["verdict"] == "pass" and found["struck"]["count"] == 1
     assert found["time"]["count"] == 1 and found["time"]["verdict"].startswith("short")
-    many = bars_of([graded("clean", [], [cause(BIAS)] if i < 24 else []) for i in range(400)])
-    # 24 of 400: 6 %, upper limit 8.8 %
+    many = bars_of([graded("clean", [], [cause(BIAS)] if i < 12 else []) for i in range(400)])
+    # 12 of 400: 3 %, upper limit 5.2 %
     assert many["false_alarms"]["verdict"] == "short by 1.0 points"
-    assert many["false_alarms_limit"]["verdict"] == "short by 1.3 points"
+    assert many["false_alarms_limit"]["verdict"] == "short by 1.2 points"
 
 
 def test_coverage_is_judged_between_recordings():

@@ -12,7 +12,7 @@ from imuarray.blind.summary import LARGE, REACHED, coverage_limits, share_limits
 
 COVERAGE = (0.92, 0.98)  # of 95 % intervals
 LONGEST = 60.0  # s for a recording
-UPPER_LIMIT, UPPER_COUNT = 0.075, 400  # of the false alarms' share, over so many recordings
+UPPER_LIMIT, UPPER_COUNT = 0.04, 400  # of the false alarms' share, over so many recordings
 PASS, NONE = "pass", "no recordings"
 
 
@@ -66,31 +66,31 @@ class Criterion:
 ONE = {"kinds": ("one",), "size": ("sigma", REACHED * LARGE)}
 FULL_PAIRS = {"kinds": ("pair",), "size": ("least_sigma", REACHED * PAIR_SIZE)}
 CRITERIA = (
-    Criterion("false_alarms", "clean: any cause named", ("clean",), "named", 0.05),
+    Criterion("false_alarms", "clean: any cause named", ("clean",), "named", 0.02),
     Criterion("clean_unexplained", "clean: unexplained raised", ("clean",), "unexplained", None),
     Criterion(
-        "one_found", "one effect, 8 sigma or more: right class", hit="found", limit=0.90,
+        "one_found", "one effect, 8 sigma or more: right class", hit="found", limit=0.97,
         least=True, **ONE,
     ),
     Criterion(
-        "one_wrong", "one effect, 8 sigma or more: a wrong name", hit="wrong", limit=0.02, **ONE
+        "one_wrong", "one effect, 8 sigma or more: a wrong name", hit="wrong", limit=0.01, **ONE
     ),
     Criterion(
         "one_sensors", "one effect, 8 sigma or more: right class and right sensors",
-        hit="sensors_right", limit=None, least=True, **ONE,
+        hit="sensors_right", limit=0.95, least=True, **ONE,
     ),
     Criterion(
         "pair_set", "two effects, 12 sigma each: exactly the right set", hit="right_set",
-        limit=0.85, least=True, **FULL_PAIRS,
+        limit=0.90, least=True, **FULL_PAIRS,
     ),
     Criterion("gauge", "gauges: a single confident name", ("gauge",), "confident", 0.0),
     Criterion(
         "outside", "outside the catalogue: named, unexplained not raised",
-        ("outside",), "confident", 0.05,
+        ("outside",), "confident", 0.03,
     ),
     Criterion(
         "struck", "struck from the catalogue: named, unexplained not raised",
-        ("struck",), "confident", 0.05,
+        ("struck",), "confident", 0.03,
     ),
     Criterion("time", "longer than 60 s", KINDS, "long", 0.0),
     Criterion("crashes", "no answer at all", KINDS, "crash", 0.0),
