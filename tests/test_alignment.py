@@ -178,6 +178,14 @@ def test_what_does_not_determine_it_is_refused(motion, change, words):
         align(two, position_prior_sd=1e-3)
 
 
+def test_stamps_that_lie_years_apart_are_refused(motion):
+    """Instants at a sensor's rate would fill any memory."""
+    first, second = logs(motion, 2)
+    second.gyroscope_time[len(second.gyroscope_time) // 2 :] += 1e9
+    with pytest.raises(InputError, match=r"'2': expected stamps of one .* 1.16e\+04 days"):
+        align([first, second], position_prior_sd=1e-3)
+
+
 def test_motion_at_the_limit_of_a_sensors_rate_is_refused():
     fast = hand_twisting(np.random.default_rng(5), 8.0, 5.0, 45.0)
     with pytest.raises(InputError, match=r"'3': .* for 100 Hz: .* log at a higher rate"):

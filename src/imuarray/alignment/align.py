@@ -18,6 +18,7 @@ from imuarray.recording.log import Log
 SLOWER = 1.5  # times the common rate, from which a sensor's readings are averaged
 LITTLE = 0.3  # of the noise that is left, what averaging may miss
 SHORTEST = 100  # readings of a sensor, and common instants
+PAUSED = 100  # times as long as its readings take, which a log may last
 RAIL = 1 - 1e-6  # of the range
 
 
@@ -83,6 +84,12 @@ def _sensors(logs: Sequence[Log]) -> tuple[list[tuple[Sensor, Sensor]], list[flo
                 raise InputError(
                     f"{kind} {log.label!r}: expected {SHORTEST} readings at least, found"
                     f" {len(time)}"
+                )
+            step, lasts = np.quantile(np.diff(time), 0.99), time[-1] - time[0]
+            if step > 0 and lasts > PAUSED * len(time) * step:
+                raise InputError(
+                    f"{kind} {log.label!r}: expected stamps of one recording, found {len(time)}"
+                    f" readings {step:.3g} s apart or less within {lasts / 86400:.3g} days"
                 )
         origins.append(float(min(part[0][0] for part in parts)))
         out.append(tuple(
