@@ -1,6 +1,6 @@
 """What every command costs as recordings get longer and boards larger: one table and one figure.
 
-`python -m benchmarks.growth [--commands ...] [--out results/growth.md] [--figure growth.png]`, from
+`python -m benchmarks.growth [results/growth.png] [--commands ...] [--out results/growth.md]`, from
 the project's root: boards of `benchmarks.board` go through the commands from their log to the
 answers; core seconds (user and system) and peak memory of each, compiled code cached, with the
 growth's exponent between the two largest sizes. Other jobs change core seconds little.
@@ -122,8 +122,8 @@ def draw(rows: pd.DataFrame):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("figure", type=Path, nargs="?", default=Path("results/growth.png"))
     parser.add_argument("--out", type=Path, default=Path("results/growth.md"))
-    parser.add_argument("--figure", type=Path, default=Path("results/growth.png"))
     parser.add_argument("--commands", nargs="+", choices=COMMANDS, default=list(COMMANDS))
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
