@@ -1,6 +1,7 @@
 """The NetCDF-4 file of a recording, read with validation and written."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -87,7 +88,8 @@ def read_recording(path: str | Path, stored: bool = False) -> Recording:
     than three accelerometers or collinear ones. Large gaps in time are a warning.
     """
     path = _existing(path)
-    recording = from_dataset(_load(path, None, stored), str(path), stored)
+    with _readable(path):
+        recording = from_dataset(_load(path, None, stored), str(path), stored)
     if not _has_group(path, ALIGNMENT):
         return recording
     alignment = _load(path, ALIGNMENT)
@@ -167,7 +169,7 @@ def _load(path: Path, group: str | None, stored: bool = False) -> xr.Dataset:
 
     With ``stored`` its variables are read when they are asked for.
     """
-    try:
+    with _readable(path):
         if is_damaged(path):
             raise InputError(f"{path}: expected a file as it was written, found it damaged")
         with _hdf5(path) as file:
@@ -176,13 +178,20 @@ def _load(path: Path, group: str | None, stored: bool = False) -> xr.Dataset:
         options = {"engine": "h5netcdf", "decode_times": False, "decode_timedelta": False}
         # HDF5 without named dimensions is for `validate` to refuse, not for the library to warn of
         options["phony_dims"] = "access"
-        if stored:
-            return xr.open_dataset(path, group=group, cache=False, **options)
-        with xr.open_dataset(path, group=group, **options) as dataset:
+        dataset = xr.open_dataset(path, group=group, cache=False, **options)
+        if stored and dataset.sizes.get("time", 0) > parts_of.PART:
+            return dataset
+        with dataset:
             return dataset.load()
+
+
+@contextmanager
+def _readable(path: Path) -> Iterator[None]:
+    """InputError for whatever the libraries below raise of a damaged file: nearly anything."""
+    try:
+        yield
     except InputError:
         raise
     except Exception as error:
-        # a damaged file makes the libraries below raise nearly anything
         what = f"{type(error).__name__}: {error}"
         raise InputError(f"{path}: expected a readable NetCDF-4 file, found {what}") from error
