@@ -239,25 +239,6 @@ def test_version(capsys):
     assert capsys.readouterr().out == f"imuarray {imuarray.__version__}\n"
 
 
-def test_a_wrong_recording_end_to_end(tmp_path):
-    """The real script on a text file, up to where the estimators begin."""
-    (tmp_path / "rec.nc").write_text("not a recording")
-    code = (
-        "import sys, types; from imuarray.cli import main\n"
-        "from imuarray.recording import read_recording\n"
-        "m = sys.modules['imuarray.commands.calibrate'] = types.ModuleType('m')\n"
-        "m.calibrate = lambda arguments: read_recording(arguments.recordings[0])\n"
-        "sys.exit(main(sys.argv[1:]))"
-    )
-    recording, out = tmp_path / "rec.nc", tmp_path / "cal.nc"
-    command = [sys.executable, "-c", code, "calibrate", recording, "--out", out]
-    run = subprocess.run(command, capture_output=True, text=True)
-    assert run.returncode == 2 and run.stdout == ""
-    assert run.stderr.startswith(f"imuarray: {recording}: expected a NetCDF-4 file")
-    assert run.stderr.count("\n") == 1 and "Traceback" not in run.stderr
-    assert [path.name for path in tmp_path.iterdir()] == ["rec.nc"]
-
-
 def test_start_is_fast():
     """Help and refusals need neither numpy nor JAX."""
     code = "import sys, imuarray.cli; print([m for m in ('numpy', 'jax') if m in sys.modules])"

@@ -47,7 +47,7 @@ def injected(*effects, kind="one", realistic=False, **setting):
 def found_in(case, seed=SEED):
     """(diagnosis.json as a dict, the truth), the diagnosis made without looking at the truth."""
     recording, truth = make(case, seed)
-    return diagnose(recording, seed, tuple(truth.struck), replicates=REPLICATES).document, truth
+    return diagnose(recording, seed, tuple(truth["struck"]), replicates=REPLICATES).document, truth
 
 
 def named(document):
@@ -87,13 +87,13 @@ def test_one_effect_is_named_with_its_sensors(case):
     gain = document["gain"]["heldout_log_score_nats_per_sample"]
     # outliers are in no model's score: what the tails gain on them stands with the cause alone
     assert abs(gain) < 0.1 if name in ("heavy_tails", "shock") else gain > 0
-    assert truth.effects[0]["effect"] == name
+    assert truth["effects"][0]["effect"] == name
 
 
 @pytest.mark.parametrize("case", ONE[:3], ids=lambda case: case.effects[0][0])
 def test_parameters_are_within_the_widths_they_claim(case):
     document, truth = found_in(case)
-    value = np.array(truth.effects[0]["parameters"][parameter_of(truth)]["value"]).ravel()
+    value = np.array(truth["effects"][0]["parameters"][parameter_of(truth)]["value"]).ravel()
     items = list(document["causes"][0]["parameters"].values())
     z = [(item["value"] - v) / item["sd"] for item, v in zip(items, value, strict=True)]
     assert np.max(np.abs(z)) < 4.5
@@ -101,7 +101,7 @@ def test_parameters_are_within_the_widths_they_claim(case):
 
 def parameter_of(truth):
     """The first parameter whose size is that of the effect's."""
-    names = truth.effects[0]["parameters"]
+    names = truth["effects"][0]["parameters"]
     return max(names, key=lambda name: np.size(names[name]["value"]))
 
 
@@ -169,7 +169,7 @@ def test_the_others_of_those_far_off_are_not_at_zero_where_that_is_unlikely():
 def test_a_clock_is_found_where_the_host_reads_unevenly():
     """What is a period off beside the clock's jumps passes for heavy tails, or is unexplained."""
     document, truth = found_in(injected(("sensor_clock", (2,)), realistic=True, duration=4), 44)
-    assert truth.effects[0]["parameters"]["host_latency"]["value"] > 0
+    assert truth["effects"][0]["parameters"]["host_latency"]["value"] > 0
     clock = next(cause for cause in document["causes"] if cause["effect"] == "sensor_clock")
     assert clock["sensors"] == ["3"]
     assert named(document) <= {"sensor_clock", "heavy_tails"} or document["unexplained"]
@@ -177,7 +177,7 @@ def test_a_clock_is_found_where_the_host_reads_unevenly():
 
 def test_axes_at_the_same_places_in_all_chips_are_found():
     document, truth = found_in(injected(("size_effect", ALL)), 42)
-    assert truth.effects[0]["parameters"]["alike"]["value"]
+    assert truth["effects"][0]["parameters"]["alike"]["value"]
     assert named(document) == {"size_effect"} and not document["unexplained"]
 
 
@@ -229,7 +229,7 @@ def test_what_is_outside_the_catalogue_is_unexplained_until_it_is_added():
 def test_an_effect_struck_from_the_catalogue_leaves_something_unexplained():
     case = injected(("gyroscope_g_sensitivity", ALL), kind="struck")
     document, truth = found_in(case)
-    assert truth.struck == ["gyroscope_g_sensitivity"]
+    assert truth["struck"] == ["gyroscope_g_sensitivity"]
     assert "gyroscope_g_sensitivity" not in named(document)
     assert document["unexplained"] or not document["causes"]
 

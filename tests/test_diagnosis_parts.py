@@ -268,7 +268,7 @@ def test_a_noisy_triad_is_found_and_the_others_are_not():
     named = variance.noise_scale(search.fit, search.noise, 0, -7.5, np.zeros(8))
     assert named.imus == (5,)
     ratio, error, _ = named.parameters["ratio_6"]
-    factor = truth.effects[0]["parameters"]["factor"]["value"][0]
+    factor = truth["effects"][0]["parameters"]["factor"]["value"][0]
     assert abs(ratio - factor) < 4 * error
     assert variance.noise_scale(search.fit, search.noise, 1, -7.5, np.zeros(8)) is None
 

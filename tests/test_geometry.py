@@ -38,12 +38,6 @@ def test_board_is_a_grid_of_pairs():
     np.testing.assert_allclose(positions.mean(axis=0), 0, atol=1e-15)
 
 
-def test_underside_are_the_even_imus():
-    board = mimu4444()
-    even = [int(label) % 2 == 0 for label in board.labels]
-    np.testing.assert_array_equal(even, board.positions[:, 2] < 0)
-
-
 def test_corner_board():
     board = mimu4444_corners()
     expected = [[x, y, z] for x, y in CORNERS for z in (1e-3, -1e-3)]

@@ -49,17 +49,6 @@ IDENTIFIABLE = [
 NOT = ["one axis", "one axis, steady", "no rotation", "omega zero"]
 
 
-def condition(motion, array) -> float:
-    """Reciprocal condition number of the joint information on the positions."""
-    jacobian = oracles.joint_jacobian(
-        np.hstack(motion[:3]), array.relative, array.gyroscopes, 0.04, 0.02
-    )
-    values = np.linalg.eigvalsh(
-        oracles.position_information(jacobian, 3 * (array.accelerometers - 1))
-    )
-    return 0.0 if values[-1] < 1e-6 else values[0] / values[-1]
-
-
 def problem(kind, start_error=1e-3, seed=2):
     """Noisy measurements, and a model whose nominal positions are wrong."""
     rng = np.random.default_rng(seed)
@@ -72,21 +61,12 @@ def problem(kind, start_error=1e-3, seed=2):
 
 
 @pytest.mark.parametrize("kind", IDENTIFIABLE)
-def test_full_rank(kind):
-    """Lemma 1 of paper 2017 needs one axis for all samples: omega and omega_dot parallel in
-    each sample do determine the positions as long as the axes vary."""
-    assert condition(motions(kind), small_array()) > 1e-4
-
-
-@pytest.mark.parametrize("kind", NOT)
-def test_rank_deficient(kind):
-    """The last (omega zero, omega_dot not) leaves the array's scale free."""
-    assert condition(motions(kind), small_array()) < 1e-12
-
-
-@pytest.mark.parametrize("kind", IDENTIFIABLE)
 def test_calibrates(kind):
-    """Within six sds of the Cramer-Rao bound (12 unknowns: false alarm 1e-7 each kind)."""
+    """Within six sds of the Cramer-Rao bound (12 unknowns: false alarm 1e-7 each kind).
+
+    Lemma 1 of paper 2017 needs one axis for all samples: omega and omega_dot parallel in each
+    sample do determine the positions as long as the axes vary.
+    """
     model, truth, motion, force, rate = problem(kind)
     found = calibrate_bcd(model, force, rate, tolerance=1e-12, limit=200_000)
     jacobian = oracles.joint_jacobian(np.hstack(motion[:3]), truth, 4, 0.04, 0.02)
@@ -98,6 +78,7 @@ def test_calibrates(kind):
 @pytest.mark.parametrize("kind", NOT)
 @pytest.mark.parametrize("start_error", [0.0, 1e-3])
 def test_refuses_motion(kind, start_error):
+    """The last (omega zero, omega_dot not) leaves the array's scale free."""
     model, _, _, force, rate = problem(kind, start_error)
     with pytest.raises(IdentifiabilityError):
         calibrate_bcd(model, force, rate)
@@ -122,9 +103,7 @@ def test_gyroscopes_at_their_rails_give_no_scale():
 
 
 def test_one_sample_is_not_enough():
-    model, _, motion, force, rate = problem("general")
-    assert condition(motion.select(slice(0, 1)), small_array()) < 1e-12
-    assert condition(motion.select(slice(0, 2)), small_array()) > 1e-4
+    model, _, _, force, rate = problem("general")
     with pytest.raises(IdentifiabilityError, match="at least 2"):
         calibrate_bcd(model, force[:1], rate[:1])
 

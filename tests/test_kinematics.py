@@ -9,7 +9,6 @@ from scipy.integrate import solve_ivp
 
 from imuarray.estimation import reference
 from imuarray.model import ArrayModel, kinematics, structure_tensor
-from imuarray.model.jax64 import jax, jnp
 from imuarray.model.structure import design, products
 from imuarray.motion import Motion, hand_twisting, normal_motion, sphere_motion
 from tests.cases import small_array
@@ -136,12 +135,6 @@ SETTINGS = settings(max_examples=50, deadline=None)
 
 
 @SETTINGS
-@given(vectors, vectors)
-def test_skew_matrix_is_the_cross_product(a, b):
-    np.testing.assert_allclose(reference.skew(a) @ b, np.cross(a, b), atol=1e-9)
-
-
-@SETTINGS
 @given(vectors, vectors, vectors, arrays(float, (4, 3), elements=st.floats(-0.1, 0.1)))
 def test_specific_force_is_h_plus_H_phi(rate, acceleration, force, positions):
     """The forward function against (5a) in its direct form."""
@@ -160,31 +153,6 @@ def test_design_is_B_and_H(rate, positions):
     np.testing.assert_allclose(
         both[:, :6] @ products(rate), reference.nonlinear_part(rate, positions), atol=1e-9
     )
-
-
-@SETTINGS
-@given(vectors, vectors, arrays(float, 3, elements=st.floats(-1, 1)))
-def test_force_at_a_triad_depends_only_on_the_lever_arm(rate, acceleration, shift):
-    """Differences between triads do not change when the reference force does."""
-    r = small_array().relative
-    one = kinematics.specific_force(Motion.of(rate, acceleration, np.zeros(3)), r)
-    two = kinematics.specific_force(Motion.of(rate, acceleration, shift), r)
-    np.testing.assert_allclose(np.asarray(two - one), np.tile(shift, (5, 1)), atol=1e-9)
-
-
-def test_structure_tensor_is_the_models_derivatives():
-    """The coefficients of omega_i omega_j are halves and wholes of the second ones."""
-    positions = small_array().relative
-
-    def force(rate, linear):
-        motion = Motion(rate, linear[:3], linear[3:], jnp.zeros(3), jnp.zeros(3))
-        return kinematics.specific_force(motion, positions).ravel()
-
-    second = np.asarray(jax.jit(jax.hessian(force))(jnp.zeros(3), jnp.zeros(6)))
-    first = np.asarray(jax.jit(jax.jacfwd(force, argnums=1))(jnp.zeros(3), jnp.zeros(6)))
-    squares = second[:, [0, 1, 2], [0, 1, 2]] / 2
-    both = np.hstack([squares, second[:, [0, 0, 1], [1, 2, 2]], first])
-    np.testing.assert_allclose(design(positions), both, rtol=1e-14, atol=1e-15)
 
 
 def test_structure_tensor_cannot_be_written_to():

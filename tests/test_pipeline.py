@@ -84,11 +84,6 @@ def test_figure_2_variance_is_inverse_in_the_draws(quick):
         assert -1.2 < slope < -0.8
 
 
-def test_figure_1_is_the_board(quick):
-    table = pd.read_csv(quick / "figures" / "2021_fig1.csv")
-    assert len(table) == 32
-
-
 def test_results_carry_config_seed_and_versions(quick):
     with xr.open_datatree(quick / "chains" / "T5.nc", engine="h5netcdf") as tree:
         assert {"config", "seed", "versions", "thin", "step_length_m"} <= set(tree.attrs)

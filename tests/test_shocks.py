@@ -45,7 +45,7 @@ def test_shocks_are_found_where_they_are():
     made, truth = fitted("shock")
     named, shaken = find_shocks(made, SETTINGS.limit(SHOCK))
     assert named.effect == SHOCK and named.imus == ALL
-    begin = np.array(truth.effects[0]["parameters"]["begin"]["value"])
+    begin = np.array(truth["effects"][0]["parameters"]["begin"]["value"])
     time = made.readings.time[shaken]
     since = (time[:, None] - begin)[np.arange(len(time)), np.searchsorted(begin, time) - 1]
     assert np.all((since > -0.01) & (since < 0.2))

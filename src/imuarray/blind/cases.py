@@ -1,6 +1,5 @@
 """A case by name, and the recording and the truth that a seed makes of it."""
 
-import json
 from dataclasses import asdict, dataclass
 
 from imuarray.blind.change import Change, noisy_readings
@@ -58,49 +57,17 @@ class Case:
         return tuple(names) if self.kind == "struck" else ()
 
 
-@dataclass(frozen=True)
-class Truth:
-    """What is in a recording, in plain numbers, texts and lists.
+def make(case: Case, seed: int) -> tuple[Recording, dict]:
+    """Simulate a case; the same case and seed give the same recording, to the last digit.
 
-    Attributes
-    ----------
-    case : dict
-        The fields of the `Case`.
-    seed : int
-    effects : list of dict
-        ``effect``; ``sensors``: labels, or ["all"]; ``amplitude`` and each of ``parameters``:
-        {"value", "unit"}, with a row for each affected sensor; ``sigma``: size of the effect alone,
-        linear at the truth; ``sigma_exact``: the same minimised over motion and positions.
-    sigma, sigma_exact : float
-        Sizes of all effects together.
-    struck : list of str
-        Effects that the diagnosis is to be run without.
-    positions_m : list (A) of [x, y, z]
-        True positions relative to the reference triad.
-    at_rail : float
-        Share of samples with any reading at a declared rail.
+    And what is in it, in plain numbers, texts and lists: ``case`` (the fields of the `Case`) and
+    ``seed``; ``effects``, a dict each: ``effect``; ``sensors``: labels, or ["all"]; ``amplitude``
+    and each of ``parameters``: {"value", "unit"}, with a row for each affected sensor; ``sigma``:
+    size of the effect alone, linear at the truth; ``sigma_exact``: the same minimised over motion
+    and positions. ``sigma``, ``sigma_exact`` of all effects together; ``struck``: effects that the
+    diagnosis is to be run without; ``positions_m`` (A, 3) relative to the reference triad;
+    ``at_rail``: share of samples with any reading at a declared rail.
     """
-
-    case: dict
-    seed: int
-    effects: list[dict]
-    sigma: float
-    sigma_exact: float
-    struck: list[str]
-    positions_m: list[list[float]]
-    at_rail: float
-
-    def as_dict(self) -> dict:
-        """Everything as dicts, lists, numbers and texts."""
-        return asdict(self)
-
-    def to_json(self) -> str:
-        """Everything as JSON."""
-        return json.dumps(self.as_dict(), allow_nan=False)
-
-
-def make(case: Case, seed: int) -> tuple[Recording, Truth]:
-    """Simulate a case; the same case and seed give the same recording, to the last digit."""
     rng = stream(seed, "blind", case.id)
     scene = Scene.draw(rng, case.imus, case.sampling_rate, case.duration, case.rails)
     changes = [_draw_effect(scene, case, *effect, rng) for effect in case.effects]
@@ -133,23 +100,20 @@ def _draw_effect(scene: Scene, case: Case, effect: str, sensors, rng) -> Change:
     return draw_seeded(scene, effect, sensors, directions, amplitude)
 
 
-def _truth(scene: Scene, case: Case, seed: int, changes, recording: Recording) -> Truth:
+def _truth(scene: Scene, case: Case, seed: int, changes, recording: Recording) -> dict:
     gone = recording.at_rail("accelerometer")
     gone |= recording.at_rail("gyroscope")
-    return Truth(
-        case=asdict(case),
-        seed=int(seed),
-        effects=[_described(scene, change) for change in changes],
-        sigma=size_of(scene, changes),
-        sigma_exact=size_of(scene, changes, EXACT_STEPS),
-        struck=list(case.struck),
-        positions_m=scene.positions.tolist(),
-        at_rail=float(gone.mean()),
-    )
+    return {
+        "case": asdict(case), "seed": int(seed),
+        "effects": [_described(scene, change) for change in changes],
+        "sigma": size_of(scene, changes), "sigma_exact": size_of(scene, changes, EXACT_STEPS),
+        "struck": list(case.struck), "positions_m": scene.positions.tolist(),
+        "at_rail": float(gone.mean()),
+    }  # fmt: skip
 
 
 def _described(scene: Scene, change: Change) -> dict:
-    """An effect as `Truth` holds it."""
+    """An effect as `make` gives it."""
     labels = [scene.array.labels[k] for k in change.sensors]
     return {
         "effect": change.effect,

@@ -39,7 +39,7 @@ def diagnosed(case: Case, seed: int, diagnose: Callable) -> dict:
     Returns
     -------
     dict
-        ``case`` (id), ``truth`` (`Truth.as_dict`), ``diagnosis`` (see `ask`; None after a crash),
+        ``case`` (id), ``truth`` (see `make`), ``diagnosis`` (see `ask`; None after a crash),
         ``error`` (text of a crash, or None); ``seconds`` of wall time and ``cpu_seconds`` of all
         threads that it took.
     """
@@ -53,7 +53,7 @@ def diagnosed(case: Case, seed: int, diagnose: Callable) -> dict:
         traceback.print_exc()
     return {
         "case": case.id,
-        "truth": truth.as_dict(),
+        "truth": truth,
         "diagnosis": answer,
         "error": error,
         "seconds": time.perf_counter() - start,

@@ -33,7 +33,7 @@ def structure_tensor() -> np.ndarray:
 
     A quadratic form's coefficients are its values at unit vectors e_i, and those at e_i + e_j
     less them: small integers here, so nothing is rounded, and each process compiles less than
-    for its second derivative. Tests differentiate.
+    for its second derivative.
     """
     unit, nothing = np.eye(3), np.zeros((6, 3))
     rates = np.vstack([*(unit[i] if i == j else unit[i] + unit[j] for i, j in PAIRS), nothing])
