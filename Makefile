@@ -15,7 +15,7 @@ SNAKEMAKE := $(BIN)/snakemake --cores $(CORES) $(SNAKEMAKE_ARGS)
 # Snakemake's jobs start `python` and `imuarray` by name.
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: help install run quick paper publish stale test test-slurm bench docs lint lock clean
+.PHONY: help install run quick paper publish stale test test-slurm bench docs dist lint lock clean
 .DEFAULT_GOAL := help
 
 help:
@@ -29,6 +29,7 @@ help:
 	@echo "make test-slurm   the quick run through a Slurm of one node, brought up here (root, a container)"
 	@echo "make bench   the benchmarks"
 	@echo "make docs    the documentation as a site to open without a network: site/index.html"
+	@echo "make dist    a wheel and a source archive in dist/"
 	@echo "make lint    ruff, mypy, snakefmt and snakemake --lint"
 	@echo "make lock    resolve pyproject.toml into the two lock files anew (needs uv)"
 	@echo "make clean   remove the environment and the caches, not the results"
@@ -85,6 +86,10 @@ $(DOCS)/.installed: requirements-docs.lock
 
 docs: $(DOCS)/.installed
 	NO_MKDOCS_2_WARNING=1 $(DOCS)/bin/mkdocs build --strict --quiet
+
+dist: $(READY)
+	rm -rf build dist
+	$(BIN)/python -c "from setuptools import build_meta as made; made.build_sdist('dist'); made.build_wheel('dist')"
 
 lint: $(READY)
 	$(BIN)/ruff check .

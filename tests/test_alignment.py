@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from imuarray.alignment import align
 from imuarray.alignment.clocks import compare
+from imuarray.alignment.found import _with
 from imuarray.alignment.resample import Sensor, Splines, spline_error
 from imuarray.errors import InputError
 from imuarray.motion import hand_twisting
@@ -217,3 +218,8 @@ def test_stamps_that_are_wild_are_refused(motion):
     second = replace(second, gyroscope_time=stamps, angular_rate=second.angular_rate[keep])
     with pytest.raises(InputError, match="gyroscope '2'"):
         align([first, second], position_prior_sd=1e-3)
+
+
+def test_an_sd_too_small_to_show_is_a_bound():
+    assert _with(1.2345, 0.056) == "1.234 +- 0.056" and _with(3.0, 4e-4) == "3.0000 +- 0.0004"
+    assert _with(0.0123, 1e-6) == "0.0123 +- < 0.0001" and _with(2e-5, 1e-6) == "< 0.0001"

@@ -33,5 +33,5 @@ def answer(found: Board, folder: Path) -> list[str]:
     lines += [f"Known worst: {said.weakest(calibration)}.", said.facts(found), *causes[:CAUSES]]
     if len(causes) > CAUSES:
         lines.append(f"What else the sensors do ({len(causes) - CAUSES} more) is on the page.")
-    lines += [f"Next: {step}" for step in said.advice(found, folder)[:STEPS]]
-    return [*lines, f"Page: {folder / 'report.html'}"]
+    steps = [f"- {step}" for step in said.advice(found, folder)[:STEPS]]
+    return [*lines, "Next:", *steps, f"Page: {folder / 'report.html'}"]
