@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from imuarray.compiled import njit
 from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS
 from imuarray.model.timing import clock_turns
@@ -161,20 +162,15 @@ def turned(seen: Gyroscopes, maps, motion, clocks, reach) -> np.ndarray:
     )
     bare = seen.values - maps[..., 3] - rate
     turns = clock_turns(clocks.T, seen.time[:, None], seen.span)
-    period, most = clocks[:, 0], np.abs(clocks[:, 0]) * np.abs(turn).sum(axis=2)
-
-    def cost(some, shift, taken):
-        age = period[some] * (np.mod(turns[:, some] + shift[:, None], 1) - 0.5 - taken[:, None])
-        # sums of sizes, none beyond what a wrong turn costs: outliers count little
-        off = np.abs(bare[:, some] + age[..., None] * turn[:, some]).sum(axis=2)
-        return np.minimum(off, most[:, some]).sum()
-
-    every, out = np.arange(len(clocks)), clocks.copy()
-    together = _searched(lambda s: cost(every, s, s), along, reach)
-    turns = turns + (along @ together)[:, None]
+    most = np.abs(clocks[:, 0]) * np.abs(turn).sum(axis=2)
+    whole = bare, turn, turns, most
+    out, start = clocks.copy(), np.zeros(len(turns))
+    together = _searched(*whole, clocks[:, 0], along, start, True, reach)
     taken = along @ together
-    for k in every:
-        place = _searched(lambda s, k=k: cost([k], s, taken), along, reach)
+    turns += taken[:, None]
+    for k in range(len(clocks)):
+        own = (np.ascontiguousarray(part[:, [k]]) for part in whole)
+        place = _searched(*own, clocks[[k], 0], along, taken, False, reach)
         out[k, [2, 1, 4]] += exact @ (place + together)
     return out
 
@@ -194,16 +190,40 @@ def polynomials(seen: Gyroscopes) -> tuple[np.ndarray, np.ndarray]:
     return powers @ exact, exact
 
 
-def _searched(cost, along, reach) -> np.ndarray:
+@njit
+def _searched(bare, turn, turns, most, period, along, taken, together, reach):
     """Coefficients (3,) of ``along`` with the least cost of their sum, within a reach of zero."""
     place = np.zeros(3)
-    best = cost(along @ place)
+    best = _cost(bare, turn, turns, most, period, along, place, taken, together)
     for order in (1, 2, 1):
         centre = place.copy()
-        for shift in reach * np.linspace(-1, 1, 9):
-            for phase in reach * np.linspace(-1, 1, 11):
-                trial = centre + shift * np.eye(3)[order] + phase * np.eye(3)[0]
-                found = cost(along @ trial)
+        for i in range(9):
+            for j in range(11):
+                trial = centre.copy()
+                trial[order] += reach * (i / 4 - 1)
+                trial[0] += reach * (j / 5 - 1)
+                found = _cost(bare, turn, turns, most, period, along, trial, taken, together)
                 if found < best:
                     best, place = found, trial
     return place
+
+
+@njit
+def _cost(bare, turn, turns, most, period, along, trial, taken, together):
+    """Sum of the sizes of what is left, none beyond what a wrong turn costs: outliers count little.
+
+    By clocks (K,) shifted along (T, 3); ``together``: an age common to all is the motion's then,
+    else ``taken`` (T,) is.
+    """
+    total = 0.0
+    for t in range(len(turns)):
+        shift = along[t, 0] * trial[0] + along[t, 1] * trial[1] + along[t, 2] * trial[2]
+        common = 0.5 + (shift if together else taken[t])
+        for k in range(turns.shape[1]):
+            place = turns[t, k] + shift
+            age = period[k] * (place - np.floor(place) - common)
+            off = 0.0
+            for axis in range(3):
+                off += abs(bare[t, k, axis] + age * turn[t, k, axis])
+            total += min(off, most[t, k])
+    return total
