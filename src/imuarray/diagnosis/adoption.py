@@ -13,6 +13,7 @@ from imuarray.diagnosis.special import SPECIAL, scans
 from imuarray.diagnosis.state import Adoption, Cause, Search
 from imuarray.engine.alike import likely_sizes
 from imuarray.engine.fit import at
+from imuarray.engine.heldout import normal_blocks
 from imuarray.model.effects import EFFECTS
 
 
@@ -109,8 +110,9 @@ def predicted_gain(search: Search, candidate: Candidate, values) -> tuple[float,
     if not np.array_equal(state.parameters, made.state.parameters):
         made = at(search.readings, search.columns, search.active, state, False, all_columns=False)
     made = replace(made, active=search.active)
-    columns = likely_sizes(made)
-    return heldout_gain(replace(search, fit=made, columns=columns), candidate.effect)
+    parts = normal_blocks(made, made.active)
+    columns = likely_sizes(made, [sum(part) for part in zip(*parts, strict=True)])
+    return heldout_gain(replace(search, fit=made, columns=columns), candidate.effect, parts)
 
 
 def label(search: Search, candidate) -> str:

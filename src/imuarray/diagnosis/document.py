@@ -10,11 +10,11 @@ import numpy as np
 import imuarray
 from imuarray.diagnosis.elimination import heldout_gain, need
 from imuarray.diagnosis.extension import extended_estimate
-from imuarray.diagnosis.noise import coloured_meat, per_triad, standardised
+from imuarray.diagnosis.noise import per_triad, standardised
 from imuarray.diagnosis.noise_effects import held_out
 from imuarray.diagnosis.procedure import Found, run_procedure
 from imuarray.diagnosis.replicates import Discrepancy, discrepancies
-from imuarray.diagnosis.scores import information_at
+from imuarray.diagnosis.scores import Information, information_at
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.shocks import SHOCK
 from imuarray.diagnosis.special import placebo_gain
@@ -101,7 +101,7 @@ def diagnose(
     found = run_procedure(recording, without, say)
     search = found.search
     say("fitting the papers' model to the same readings")
-    extended = fitted(search.fit, search.noise.correlation)
+    extended = fitted(search.fit, search.given)
     nats = extended.scores.nats + nats_beside(found)
     say("estimating the extended model's positions")
     robust = extended_estimate(found.whole, search.columns, search.active, search.fit.state)
@@ -173,21 +173,19 @@ def precision_of(made: Fit) -> np.ndarray:
     return prior_precision(made.columns, made.active)
 
 
-def fitted(made: Fit, correlation=None) -> Fitted:
+def fitted(made: Fit, given: Information | None = None) -> Fitted:
     """A fit with its held-out score and the sds of its parameters.
 
-    Where noise is coloured (``correlation`` (N, 2)) the sds are those of the sandwich.
+    ``given``: the information there, if it is known; where it has the covariance of a score under
+    coloured noise the sds are those of the sandwich.
     """
-    given = information_at(made)
+    given = information_at(made) if given is None else given
     # gauges are pinned for the fit; what is known of them is what the priors say
     places, ridge = given.places(made.active), np.diag(given.ridge[given.places(made.active)])
     inner = given.information[np.ix_(places, places)]
     covariance = scaled_inverse(inner + ridge)
-    meat = None
-    if correlation is not None:
-        meat = coloured_meat(made, given.information, correlation)
-    if meat is not None:
-        middle = meat[np.ix_(places, places)] + ridge
+    if given.meat is not None:
+        middle = given.meat[np.ix_(places, places)] + ridge
         covariance = covariance @ middle @ covariance
     sds = np.zeros(made.active.shape)
     sds[made.active] = np.sqrt(np.maximum(np.diag(covariance), 0.0))

@@ -33,12 +33,15 @@ def need(search: Search, effect: str, imus=None, among=None) -> tuple[float, int
     return search.given.test(conditional, freed)
 
 
-def heldout_gain(search: Search, effect: str) -> tuple[float, float]:
-    """Nats gained on held-out blocks of time by an adopted effect, with standard error."""
+def heldout_gain(search: Search, effect: str, parts=None) -> tuple[float, float]:
+    """Nats gained on held-out blocks of time by an adopted effect, with standard error.
+
+    ``parts``: the blocks' equations, if they are known.
+    """
     columns, mask = search.columns, search.active
     freed = np.isin(columns.names, effect) & mask
     values = flat_parameters(columns, search.fit.state)[mask]
-    parts = normal_blocks(search.fit, mask)
+    parts = normal_blocks(search.fit, mask) if parts is None else parts
     return gain_of(parts, prior_precision(columns, mask), values, freed[mask])
 
 

@@ -12,9 +12,15 @@ from imuarray.diagnosis.scores import Information
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL
 from imuarray.diagnosis.state import Search
-from imuarray.engine.fit import Fit, flat_parameters, prior_means, scaled_solve
+from imuarray.engine.fit import (
+    Fit,
+    flat_parameters,
+    from_flat,
+    in_use,
+    prior_means,
+    scaled_solve,
+)
 from imuarray.engine.linearise import linearise
-from imuarray.engine.parameters import POSITION
 from imuarray.engine.widths import FIXED, mask_of_left, spread_of
 from imuarray.tails import log_normal
 
@@ -63,8 +69,13 @@ def outlier_checks(search: Search) -> list[Check]:
     away = search.allowed & ~search.readings.keep & ~search.jumps
     whole = replace(search.readings, keep=search.allowed)
     # by the motion that was fitted without them: an outlier would be part of its own prediction
-    column = search.columns.of(POSITION)[:1]
-    seen = linearise(whole, search.columns, search.fit.state, column)
+    state, (columns, kept) = (
+        search.fit.state,
+        in_use(search.columns, search.active, search.fit.state),
+    )
+    state = from_flat(columns, state, flat_parameters(search.columns, state)[:, kept])
+    # derivatives as the fit had them: compiled already
+    seen = linearise(whole, columns, state, np.flatnonzero(search.active[:, kept].any(axis=0)))
     missed = seen.residual + np.einsum("tri,ti->tr", seen.basis, seen.taken).reshape(away.shape)
     predicted = np.nan_to_num(whole.values) / np.repeat(whole.sd, 3, axis=1) - missed
     change = np.diff(predicted, axis=0, prepend=predicted[:1])

@@ -208,7 +208,7 @@ def fit_coloured_noise(search: Search, without) -> Search:
     readings = search.readings.with_sd(sd)
     made = fit(readings, search.columns, search.active, search.fit.state, search.smooth)
     noise = search.noise._replace(correlation=correlation, sd=sd)
-    return replace(search, readings=readings, fit=made, noise=noise).weighed()
+    return replace(search, readings=readings).ending(made, noise)
 
 
 def named_noise(search: Search, without, tailed, untied: bool) -> list[noise_effects.Named]:

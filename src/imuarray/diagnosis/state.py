@@ -55,6 +55,24 @@ class Adoption(NamedTuple):
 
 
 @dataclass(frozen=True)
+class Weighed:
+    """Score and information at a fit, made when asked for: not every fit is tested.
+
+    ``correlation`` (N, 2) of the noise in time.
+    """
+
+    fit: Fit
+    correlation: np.ndarray
+
+    @cached_property
+    def given(self) -> Information:
+        """Of all parameters that the fit has derivatives by."""
+        plain = information_at(self.fit)
+        meat = noises.coloured_meat(self.fit, plain.information, self.correlation)
+        return plain if meat is None else replace(plain, meat=meat)
+
+
+@dataclass(frozen=True)
 class Search:
     """The state of a diagnosis.
 
@@ -65,7 +83,7 @@ class Search:
     say : is told of every step
     smooth : whether the motion's derivatives may be had from neighbouring samples
     causes : what is adopted, in order; ``refused`` what was and did not gain, ``trace`` adoptions
-    fit, noise, given : the fit of what is adopted, the noise and the information there
+    fit, noise, weighed : the fit of what is adopted, the noise and the information there
     excess : of the misfit over its degrees of freedom, before any cause
     jumps : (T, N, 6) bool, readings left out near a clock's jump
     allowed : (T, N, 6) bool, readings that count, outliers included
@@ -79,7 +97,7 @@ class Search:
     causes: tuple[Cause, ...] = ()
     fit: Fit | None = None
     noise: noises.Noise | None = None
-    given: Information | None = None
+    weighed: Weighed | None = None
     refused: frozenset[Candidate] = frozenset()
     excess: float = 0.0
     jumps: np.ndarray | bool = False
@@ -95,6 +113,11 @@ class Search:
             for variant in cause.variants:
                 mask |= mask_of(self.columns, Candidate(cause.effect, cause.imus, variant))
         return mask & self.columns.owner
+
+    @property
+    def given(self) -> Information:
+        """Score and information at the present fit."""
+        return self.weighed.given
 
     def imus_with(self, effect: str) -> tuple[int, ...]:
         """IMUs for which an effect is adopted."""
@@ -135,7 +158,7 @@ class Search:
 
     def light(self) -> Search:
         """The same without the derivatives that its next fit makes anew."""
-        return replace(self, fit=self.fit.only_active(), given=None)
+        return replace(self, fit=self.fit.only_active(), weighed=None)
 
     def refit(
         self, state: State | None = None, turns=2, rough=True, sizings=SETTINGS.sizings
@@ -159,7 +182,7 @@ class Search:
             search = replace(search, readings=readings.with_sd(judged.sd))
         made = at(search.readings, search.columns, search.active, state, converged)
         noise = noises.judge(made.readings, made.residual, made.basis)
-        search = replace(search, fit=made, noise=noise).weighed()
+        search = search.ending(made, noise)
         columns = likely_sizes(made)
         steady = np.allclose(columns.prior_sd, search.columns.prior_sd, rtol=SETTINGS.steady_size)
         if steady or not sizings:
@@ -177,11 +200,9 @@ class Search:
         readings, jumps = without_jumps(self._with_jumps, self.columns, state, self.clocks, width)
         return replace(self, readings=readings, jumps=jumps)
 
-    def weighed(self) -> Search:
-        """With score and information at the present fit."""
-        plain = information_at(self.fit)
-        meat = noises.coloured_meat(self.fit, plain.information, self.noise.correlation)
-        return replace(self, given=plain if meat is None else replace(plain, meat=meat))
+    def ending(self, made: Fit, noise: noises.Noise) -> Search:
+        """With a fit, and the noise there."""
+        return replace(self, fit=made, noise=noise, weighed=Weighed(made, noise.correlation))
 
     def started(self, effect: str = "", values: dict | None = None) -> State:
         """The present state, dropped effects at zero, an adopted ``effect`` where a scan found it.

@@ -54,14 +54,17 @@ def with_likely_spread(columns: Columns, active, values, information, place) -> 
     return replace(columns, prior_sd=np.clip(sds, least, most))
 
 
-def likely_sizes(fit: Fit) -> Columns:
-    """The columns of a fit, its sized effects as large as is likeliest, all else quadratic."""
+def likely_sizes(fit: Fit, equations=None) -> Columns:
+    """The columns of a fit, its sized effects as large as is likeliest, all else quadratic.
+
+    ``equations``: information and score of its active parameters, if they are known.
+    """
     columns, active = fit.columns, fit.active
     if not np.any(sized_groups(columns)[active.any(axis=0)] != ""):
         return columns
     every = np.arange(active.sum())
     values, means = flat_parameters(columns, fit.state)[active], prior_means(fit.readings, columns)
-    inner, score = fit.normal(active)
+    inner, score = equations or fit.normal(active)
     right = score + inner @ values
     for _ in range(SETTINGS.iterations):
         precision, last = prior_precision(columns, active), columns.prior_sd

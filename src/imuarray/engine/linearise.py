@@ -145,13 +145,24 @@ def predicted(readings: Readings, model: ArrayModel, state: State, slopes=False)
     ))  # fmt: skip
 
 
+def _with_slopes(function, x):
+    """A function's value, and its derivatives by (D,) numbers last; traced once for both."""
+
+    def twice(x):
+        value = function(x)
+        return value, value
+
+    slopes, value = jax.jacfwd(twice, has_aux=True)(x)
+    return value, slopes
+
+
 @partial(jax.jit, static_argnums=(0, 1, 2))
 def _predicted(model, count, slopes, x, extra, time, span, positions, parameters):
     def one(x, extra, time):
         def at(x):
             return reading(model, count, x, positions, parameters, extra, time, span)
 
-        return (at(x), jax.jacfwd(at)(x)) if slopes else at(x)
+        return _with_slopes(at, x) if slopes else at(x)
 
     return jax.vmap(one)(x, extra, time)
 
@@ -175,7 +186,7 @@ def _chunk(model, count, placed, x, extra, time, span, positions, parameters, da
         if not placed:
             when = _instant(x, positions, extra, time, span)
             along = jnp.concatenate([along, by_effects(model, count, when, parameters)], axis=-1)
-        return flat(x, positions), jax.jacfwd(flat)(x, positions), along
+        return *_with_slopes(lambda x: flat(x, positions), x), along
 
     predicted, motion, shared = jax.vmap(one)(x, extra, time)
     values, weights = data
@@ -331,7 +342,7 @@ def _motion(model, count, x, extra, time, span, positions, parameters, data):
         def flat(x):
             return reading(model, count, x, positions, parameters, extra, time, span)
 
-        return flat(x), jax.jacfwd(flat)(x)
+        return _with_slopes(flat, x)
 
     predicted, motion = jax.vmap(one)(x, extra, time)
     values, weights, rails = data
