@@ -161,9 +161,10 @@ def estimate(
     places = places_of(columns, active, len(recorded))
     recorded, nu, length, last, moved = tuple(recorded), NORMAL, 1.0, np.inf, []
     for number in range(steps):
-        recorded, passes = _passed(recorded, columns, active)
+        far = number < SETTINGS.robust_first
+        recorded, passes = _passed(recorded, columns, active, int(far))
         if robust:
-            nu = ROBUST if number < SETTINGS.robust_first else _freedoms(recorded, passes)
+            nu = ROBUST if far else _freedoms(recorded, passes)
         noisy = _judged(recorded, passes, columns, active, nu)
         change = _noise_change(recorded, noisy)
         information, score, blocks = _summed(passes, places)
@@ -206,12 +207,12 @@ def places_of(columns: Columns, active, recordings: int) -> tuple[np.ndarray, ..
     return tuple(found)
 
 
-def _passed(recorded, columns, active):
+def _passed(recorded, columns, active, improved: int = 1):
     """Each recording linearised, its motion improved."""
     seen, moved = [], []
     for one in recorded:
         state = with_derivatives(one.readings, one.state, one.smooth)
-        seen.append(normal_pass(one.readings, columns, state, active))
+        seen.append(normal_pass(one.readings, columns, state, active, improved))
         state = state._replace(motion=seen[-1].motion)
         moved.append(replace(one, state=_sized(state, seen[-1].rough)))
     return tuple(moved), tuple(seen)

@@ -47,6 +47,9 @@ def normal_pass(
 ) -> Pass:
     """The normal equations at a state, after ``improved`` Gauss-Newton steps of the motion.
 
+    Where that is none, the motion takes the step that they are linearised for: half the work, and
+    as good where it is small.
+
     LinAlgError where the readings do not determine the motion.
     """
     samples, count = readings.values.shape[:2]
@@ -68,6 +71,9 @@ def normal_pass(
         left = np.where(readings.keep[part], 1.0 - leverage, 0.0)
         squares[part], freedom[part] = _by_triad(residual**2), _by_triad(left)
         unit[part] = _by_triad(residual**2 / np.maximum(1.0 - leverage, LEAST_FREE))
+        if not improved:
+            step = np.swapaxes(seen.inverse[:used], 1, 2) @ seen.taken[:used, :, None]
+            motion[part] += step[..., 0]
         rough = _seen_of_prior(here, motion[part], seen.inverse[:used], part)
         known = [(block, *normal(seen, few, rows)) for block, rows in _inside(blocks, part)]
         taken = float(np.sum(seen.taken[:used] ** 2))
