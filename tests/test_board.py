@@ -140,6 +140,8 @@ def test_an_error_leaves_the_folder_as_it_was(found, tmp_path, monkeypatch, no_p
     with pytest.raises(OSError) as error:
         write_board(found, tmp_path)
     assert error.value.filename == str(tmp_path)
+    with pytest.raises(OSError):
+        write_board(found, tmp_path / "new")
     assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
     assert (tmp_path / "report.html").read_text() == "mine"
 

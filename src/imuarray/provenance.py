@@ -131,6 +131,30 @@ def _json(value: Any, **options: Any) -> str:
 
 
 @contextmanager
+def atomic_folder(folder: str | Path, last: str) -> Iterator[Path]:
+    """Give a temporary folder, whose files go to ``folder`` if the block ends without an error.
+
+    The one named ``last`` says that all others are there. A failure leaves ``folder`` as it was, or
+    away, a process that is killed the hidden folder; an OSError names ``folder``.
+    """
+    folder = Path(folder)
+    there = folder.exists()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=f".{Path(last).stem}.", dir=folder) as name:
+            yield Path(name)
+            for path in sorted(Path(name).iterdir(), key=lambda path: (path.name == last, path)):
+                os.replace(path, folder / path.name)
+    except BaseException as error:
+        if not there:
+            with suppress(OSError):
+                folder.rmdir()
+        if isinstance(error, OSError):
+            raise OSError(error.errno, error.strerror or str(error), str(folder)) from error
+        raise
+
+
+@contextmanager
 def atomic_write(path: str | Path) -> Iterator[Path]:
     """Give a temporary path, which becomes `path` if the block ends without an error.
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -17,7 +15,7 @@ from imuarray.firstorder.correct import FirstOrder
 from imuarray.firstorder.report import parameter_table
 from imuarray.firstorder.store import write_corrected
 from imuarray.model.effects import KINDS
-from imuarray.provenance import trust, write_bytes, write_csv, write_netcdf
+from imuarray.provenance import atomic_folder, trust, write_bytes, write_csv, write_netcdf
 from imuarray.recording import Recording, write_recording
 from imuarray.report import board_words as said
 from imuarray.report import pictures as pictured
@@ -46,21 +44,14 @@ class Board(NamedTuple):
 def write_board(board: Board, folder: Path) -> None:
     """recording.nc, cal.nc, positions.csv and, last, report.html: all of them or none."""
     page = html(board).encode()
-    folder.mkdir(parents=True, exist_ok=True)
-    try:
-        with tempfile.TemporaryDirectory(prefix=".board.", dir=folder) as name:
-            made = Path(name)
-            if isinstance(board.first_order, str):
-                write_recording(board.corrected, made / "recording.nc")
-            else:
-                write_corrected(board.recording, board.first_order, made / "recording.nc")
-            write_netcdf(board.calibration.assign_attrs(trust(board.reasons)), made / "cal.nc")
-            write_csv(position_table(board.calibration), made / "positions.csv")
-            write_bytes(page, made / "report.html")
-            for file in ("recording.nc", "cal.nc", "positions.csv", "report.html"):
-                os.replace(made / file, folder / file)
-    except OSError as error:  # the folder made meanwhile is nobody's concern
-        raise OSError(error.errno, os.strerror(error.errno or 0), str(folder)) from error
+    with atomic_folder(folder, last="report.html") as made:
+        if isinstance(board.first_order, str):
+            write_recording(board.corrected, made / "recording.nc")
+        else:
+            write_corrected(board.recording, board.first_order, made / "recording.nc")
+        write_netcdf(board.calibration.assign_attrs(trust(board.reasons)), made / "cal.nc")
+        write_csv(position_table(board.calibration), made / "positions.csv")
+        write_bytes(page, made / "report.html")
 
 
 def html(board: Board) -> str:

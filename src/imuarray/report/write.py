@@ -9,7 +9,7 @@ import numpy as np
 
 from imuarray.diagnosis.words import sensors_of, whose, words
 from imuarray.model import EFFECTS
-from imuarray.provenance import write_bytes
+from imuarray.provenance import atomic_folder, write_bytes
 from imuarray.report import drawings as drawn
 from imuarray.report import numbers
 from imuarray.report.answers import USUAL, answers, verdict
@@ -72,19 +72,17 @@ BESIDE = {  # by what it is drawn against
 def write_report(diagnosis: Diagnosis, folder: str | Path) -> None:
     """Write figures (PDF, PNG and the numbers as CSV), report.html and, last, diagnosis.json.
 
-    Everything is made before the first file is written, so that an error leaves the folder as it
-    was; it is made if it does not exist.
+    An error leaves the folder as it was; it is made if it does not exist.
     """
     drawings = draw(diagnosis)
     page, document = html(diagnosis, drawings), diagnosis.to_json() + "\n"
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    for drawing in drawings:
-        for suffix, content in drawing.files.items():
-            write_bytes(content, folder / f"{drawing.name}.{suffix}")
-    _remove_former(folder, {drawing.name for drawing in drawings})
-    write_bytes(page.encode(), folder / "report.html")
-    write_bytes(document.encode(), folder / "diagnosis.json")
+    with atomic_folder(folder, last="diagnosis.json") as made:
+        for drawing in drawings:
+            for suffix, content in drawing.files.items():
+                write_bytes(content, made / f"{drawing.name}.{suffix}")
+        write_bytes(page.encode(), made / "report.html")
+        write_bytes(document.encode(), made / "diagnosis.json")
+    _remove_former(Path(folder), {drawing.name for drawing in drawings})
 
 
 def _remove_former(folder: Path, names) -> None:
