@@ -21,20 +21,25 @@ DRAWN = {f"figure_{name}" for name in (
 pytestmark = pytest.mark.slow
 
 
-def snakemake(directory, *arguments, timeout=1500, source=ROOT / "src"):
-    """Run the workflow with ``directory`` as its working directory; fail with its output."""
-    shutil.copy(ROOT / "config.yaml", directory)
+def started(directory, *arguments, options="", profile="none", **environment):
+    """The workflow with ``directory`` as its working directory, as it came to its end."""
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     command = [
         *(sys.executable, "-m", "snakemake", "-s", str(ROOT / "Snakefile")),
-        *("--directory", str(directory), "--configfile", "config.yaml", "--quiet", "rules"),
-        *("--workflow-profile", "none", *arguments),
+        *("--directory", str(directory), *options.split()),
+        *("--workflow-profile", profile, *arguments),
     ]
-    done = subprocess.run(
-        command, cwd=directory, env={**os.environ, "PATH": path, "PYTHONPATH": str(source)},
-        timeout=timeout,
+    return subprocess.run(
+        command, cwd=directory, env={**os.environ, "PATH": path, **environment}, timeout=1500,
         capture_output=True, text=True,
     )  # fmt: skip
+
+
+def snakemake(directory, *arguments, source=ROOT / "src"):
+    """It ends as it should, with the project's configuration; fail with its output."""
+    shutil.copy(ROOT / "config.yaml", directory)
+    options = "--configfile config.yaml --quiet rules"
+    done = started(directory, *arguments, options=options, PYTHONPATH=str(source))
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-6000:]
     return done
 
@@ -161,12 +166,8 @@ def rerun(directory, source):
 
 def test_what_is_printed_is_short(tmp_path):
     shutil.copy(ROOT / "config.yaml", tmp_path)
-    done = subprocess.run(
-        [sys.executable, "-m", "snakemake", "-s", str(ROOT / "Snakefile"), "--cores", "2",
-         "--directory", str(tmp_path), "-n", "quick", "--workflow-profile",
-         str(ROOT / "profiles" / "default")],
-        capture_output=True, text=True, timeout=600,
-    )  # fmt: skip
+    profile = str(ROOT / "profiles" / "default")
+    done = started(tmp_path, "--cores", "2", "-n", "quick", profile=profile)
     assert done.returncode == 0 and len(done.stdout) + len(done.stderr) < 10_000
     assert "figure 3 of 2017 (quick)" in done.stdout + done.stderr
 
@@ -174,11 +175,7 @@ def test_what_is_printed_is_short(tmp_path):
 def test_bad_configuration_is_one_clear_line(tmp_path):
     text = (ROOT / "config.yaml").read_text().replace("gyroscope_sd_dps: 0.06", "gyroscope_sd: 1")
     (tmp_path / "config.yaml").write_text(text)
-    done = subprocess.run(
-        [sys.executable, "-m", "snakemake", "-s", str(ROOT / "Snakefile"), "--cores", "1",
-         "--directory", str(tmp_path), "--workflow-profile", "none", "-n"],
-        capture_output=True, text=True, timeout=600,
-    )  # fmt: skip
+    done = started(tmp_path, "--cores", "1", "-n")
     said = done.stdout + done.stderr
     assert done.returncode == 2 and "gyroscope_sd" in said and "Traceback" not in said
     assert not (tmp_path / "results").exists()
@@ -186,9 +183,5 @@ def test_bad_configuration_is_one_clear_line(tmp_path):
 
 def test_lint_is_clean(tmp_path):
     shutil.copy(ROOT / "config.yaml", tmp_path)
-    done = subprocess.run(
-        [sys.executable, "-m", "snakemake", "-s", str(ROOT / "Snakefile"), "--lint",
-         "--directory", str(tmp_path), "--workflow-profile", "none"],
-        capture_output=True, text=True, timeout=600,
-    )  # fmt: skip
+    done = started(tmp_path, "--lint")
     assert "Congratulations" in done.stdout + done.stderr, done.stdout + done.stderr

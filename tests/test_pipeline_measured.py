@@ -1,10 +1,6 @@
 """A user's own recording through the pipeline, and what happens without the published ones."""
 
 import json
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -16,8 +12,8 @@ from imuarray.model import ArrayModel
 from imuarray.motion import Motion, hand_twisting
 from imuarray.recording import write_recording
 from imuarray.simulation.recordings import simulate_samples
+from tests.test_pipeline import ROOT, started
 
-ROOT = Path(__file__).parents[1]
 RATE, GRAVITY = 50.0, 9.81
 
 pytestmark = pytest.mark.slow
@@ -46,16 +42,8 @@ def own_recording(rng):
 
 
 def snakemake(directory, *arguments, **environment):
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    command = [
-        *(sys.executable, "-m", "snakemake", "-s", str(ROOT / "Snakefile"), "--cores", "2"),
-        *("--directory", str(directory), "--configfile", "config.yaml", "--quiet", "all"),
-        *("--workflow-profile", "none", *arguments),
-    ]
-    variables = {**os.environ, "PATH": path, **environment}
-    return subprocess.run(
-        command, cwd=directory, env=variables, timeout=900, capture_output=True, text=True
-    )
+    options = "--cores 2 --configfile config.yaml --quiet all"
+    return started(directory, *arguments, options=options, **environment)
 
 
 def configure(directory, recordings):

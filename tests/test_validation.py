@@ -103,8 +103,7 @@ def test_the_printed_determinant_does_not_keep_the_prior(monkeypatch):
     assert joint.joint_test(1, 8000, ["walk"]).p[0] < 1e-3
 
 
-@pytest.mark.parametrize(("name", "rounds"), [("pcn", 6000), ("nuts", 3000)])
-def test_noise_that_is_not_the_declared_one_does_not_either(monkeypatch, name, rounds):
+def test_noise_that_is_not_the_declared_one_does_not_either(monkeypatch):
     """Half as large again."""
     measure = joint.measure
 
@@ -113,7 +112,7 @@ def test_noise_that_is_not_the_declared_one_does_not_either(monkeypatch, name, r
         return measure(type(model)(model.array, noise), *arguments)
 
     monkeypatch.setattr(joint, "measure", louder)
-    assert joint.joint_test(1, rounds, [name]).p[0] < 1e-3
+    assert joint.joint_test(1, 6000, ["pcn"]).p[0] < 1e-3
 
 
 def test_a_sampler_that_does_not_look_at_the_data_is_seen(monkeypatch):
