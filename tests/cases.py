@@ -59,3 +59,22 @@ def measure(rng, model, motion, noise=True):
         first, second = model.noise.draw(rng, (len(force),))
         return force + first, turning + second
     return force, turning
+
+
+def diagnosis(effect, parameters, positions, noise, span, sd=0.0, origin=0.0) -> dict:
+    """A diagnosis.json that says so: ``parameters`` {name: (value, sd)} of one effect.
+
+    ``positions`` (A, 3) m of IMUs 1, 2, ... with one ``sd``; ``noise`` sds (m/s^2, rad/s); s.
+    """
+    labels = [str(k + 1) for k in range(len(positions))]
+    kinds = zip(("accelerometer", "gyroscope"), noise, strict=True)
+    named = {k: {"value": value, "sd": sd, "unit": "1"} for k, (value, sd) in parameters.items()}
+    return {
+        "extended": {
+            "positions_m": positions.tolist(),
+            "positions_sd_m": np.full(positions.shape, sd).tolist(),
+        },
+        "causes": [{"effect": effect, "parameters": named}],
+        "noise_sd": {kind: {label: {"sd": size} for label in labels} for kind, size in kinds},
+        "clock": {"origin_s": origin, "span_s": span},
+    }

@@ -9,6 +9,7 @@ import pytest
 import imuarray
 from imuarray.errors import InputError
 from imuarray.model.names import parameter_names
+from tests.cases import diagnosis
 from tests.test_bound import model
 
 
@@ -23,20 +24,11 @@ def drifting(tmp_path):
     labels = recording.accelerometer_labels, recording.gyroscope_labels
     names = [name.split(" ")[1] for name in parameter_names(own, labels)]
     values = truth["effect_parameter"].to_numpy()
-    parameters = {
-        name: {"value": value, "sd": None, "unit": "1"}
-        for name, value in zip(names, values, strict=True)
-    }
-    sds = ("accelerometer", recording.accelerometer_noise_sd), (
-        "gyroscope", recording.gyroscope_noise_sd,
-    )  # fmt: skip
+    parameters = {name: (value, None) for name, value in zip(names, values, strict=True)}
+    noise = recording.accelerometer_noise_sd, recording.gyroscope_noise_sd
+    span = float(recording.time[-1] - 100.0)
     places = recording.relative_positions()
-    document = {
-        "extended": {"positions_m": places.tolist(), "positions_sd_m": (0 * places).tolist()},
-        "causes": [{"effect": "bias_drift", "parameters": parameters}],
-        "noise_sd": {kind: {label: {"sd": sd} for label in labels[0]} for kind, sd in sds},
-        "clock": {"origin_s": 100.0, "span_s": float(recording.time[-1] - 100.0)},
-    }
+    document = diagnosis("bias_drift", parameters, places, noise, span, origin=100.0)
     path = tmp_path / "diagnosis.json"
     path.write_text(json.dumps(document))
     return recording, path

@@ -16,6 +16,7 @@ from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.provenance import write_netcdf
 from imuarray.recording import read_recording, write_recording
+from tests.cases import diagnosis
 from tests.test_bound import model
 from tests.test_fuzz import damaged
 
@@ -31,19 +32,11 @@ def board(tmp_path_factory):
     write_recording(recording, folder / "rec.nc")
     plain = imuarray.calibrate(recording, "papers", "gauss-newton")
     extended = imuarray.calibrate(recording, effects=("gyroscope_bias",))
-    labels = recording.gyroscope_labels
-    sds = {"accelerometer": 0.04, "gyroscope": 0.001}
-    places = recording.relative_positions()
     parameters = {
-        f"{axis}_{label}": {"value": 1e-3, "sd": 1e-4, "unit": "rad s-1"}
-        for label in labels for axis in "xyz"
-    }  # fmt: skip
-    document = {
-        "extended": {"positions_m": places.tolist(), "positions_sd_m": (0 * places).tolist()},
-        "causes": [{"effect": "gyroscope_bias", "parameters": parameters}],
-        "noise_sd": {kind: {label: {"sd": sd} for label in labels} for kind, sd in sds.items()},
-        "clock": {"origin_s": 0.0, "span_s": 0.3},
+        f"{axis}_{label}": (1e-3, 1e-4) for label in recording.gyroscope_labels for axis in "xyz"
     }
+    places = recording.relative_positions()
+    document = diagnosis("gyroscope_bias", parameters, places, (0.04, 0.001), 0.3)
     return folder, extended, plain, document
 
 

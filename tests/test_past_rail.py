@@ -15,6 +15,7 @@ from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.figures.board import figure_past_rail, table_past_rail
 from imuarray.model.names import parameter_names
+from tests import cases
 from tests.test_bound import model
 
 
@@ -37,20 +38,9 @@ def diagnosis(withheld, tmp_path):
     labels = recording.accelerometer_labels, recording.gyroscope_labels
     names = [name.split(" ")[1] for name in parameter_names(own, labels)]
     values = truth["effect_parameter"].to_numpy()
-    parameters = {
-        name: {"value": value, "sd": 1e-4, "unit": "1"}
-        for name, value in zip(names, values, strict=True)
-    }
-    noise = {
-        kind: {label: {"sd": sd} for label in labels[0]}
-        for kind, sd in (("accelerometer", 0.04), ("gyroscope", 0.005))
-    }
-    section = {"positions_m": truth["position"].to_numpy().tolist()}
-    section["positions_sd_m"] = np.full((5, 3), 1e-6).tolist()
-    document = {
-        "causes": [{"effect": "gyroscope_scale", "parameters": parameters}],
-        "noise_sd": noise, "extended": section, "clock": {"origin_s": 0.0, "span_s": 2.99},
-    }  # fmt: skip
+    parameters = {name: (value, 1e-4) for name, value in zip(names, values, strict=True)}
+    places = truth["position"].to_numpy()
+    document = cases.diagnosis("gyroscope_scale", parameters, places, (0.04, 0.005), 2.99, 1e-6)
     path = tmp_path / "diagnosis.json"
     path.write_text(json.dumps(document))
     return path
