@@ -241,6 +241,7 @@ def test_version(capsys):
 
 def test_start_is_fast():
     """Help and refusals need neither numpy nor JAX."""
-    code = "import sys, imuarray.cli; print([m for m in ('numpy', 'jax') if m in sys.modules])"
+    heavy = "('numpy', 'jax', 'xarray')"
+    code = f"import sys, imuarray.cli; print([m for m in {heavy} if m in sys.modules])"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout == "[]\n"

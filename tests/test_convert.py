@@ -41,14 +41,6 @@ def test_the_documented_example(example):
     assert found.gyroscope_labels == ("1", "2")
 
 
-def test_a_rate_instead_of_a_time_column(example):
-    layout = yaml.safe_load((example / "columns.yaml").read_text())
-    layout["time"] = {"rate": 100.0}
-    (example / "columns.yaml").write_text(yaml.safe_dump(layout))
-    found = read_csv(example / "log.csv", example / "columns.yaml")
-    np.testing.assert_allclose(found.time, [0, 0.01, 0.02])
-
-
 def set_key(layout, path, value):
     *way, last = path.split("/")
     for step in way:
@@ -86,21 +78,6 @@ def test_a_wrong_layout_is_one_line(example, path, value, words):
     with pytest.raises(InputError, match=words) as caught:
         read_csv(example / "log.csv", example / "columns.yaml")
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ("0.02,-0.02", "broken,-0.02", "'ax1': expected numbers, found 'broken' in data row 2"),
-        ("0.02,-0.02", ",-0.02", "data row 2"),
-        ("0.02,-0.02", "inf,-0.02", "data row 2"),
-    ],
-)
-def test_a_wrong_cell_is_named_by_row(example, old, new, words):
-    text = (example / "log.csv").read_text().replace(old, new, 1)
-    (example / "log.csv").write_text(text)
-    with pytest.raises(InputError, match=words):
-        read_csv(example / "log.csv", example / "columns.yaml")
 
 
 def test_convert_csv_on_the_command_line(example, capsys):

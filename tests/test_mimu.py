@@ -53,36 +53,12 @@ def test_a_flipped_byte_costs_one_packet(tmp_path):
     assert np.diff(found.time).max() == pytest.approx(0.032)
 
 
-def test_garbage_between_packets_is_skipped_and_located(tmp_path):
-    counts = readings(np.random.default_rng(1), 30, 8)
-    parts = packets(counts)
-    content = b"".join(parts[:10]) + b"\x00\xaa\x07" * 5 + b"".join(parts[10:])
-    found = read_mimu(stored(tmp_path, content))
-    np.testing.assert_array_equal(found.counts, counts)
-    assert found.account.garbage == [(1060, 15)] and found.account.lost == []
-
-
-def test_cut_off_at_both_ends(tmp_path):
-    counts = readings(np.random.default_rng(2), 30, 8)
-    found = read_mimu(stored(tmp_path, b"".join(packets(counts))[17:-23]))
-    np.testing.assert_array_equal(found.counts, counts[1:-1])
-    assert found.account.garbage_bytes == 2 * 106 - 40 and found.account.bad == []
-
-
 def test_a_gap_longer_than_the_clocks_turn_keeps_the_time(tmp_path):
     counts = readings(np.random.default_rng(3), 10_000, 1)
     parts = packets(counts)
     found = read_mimu(stored(tmp_path, b"".join(parts[:100] + parts[9000:])))
     assert found.account.lost == [(100, 8900)]
     assert found.time[100] == pytest.approx(9000 * 0.016)
-
-
-def test_a_repeated_block_is_dropped(tmp_path):
-    counts = readings(np.random.default_rng(4), 300, 2)
-    parts = packets(counts)
-    found = read_mimu(stored(tmp_path, b"".join(parts[:150] + parts[148:150] + parts[150:])))
-    np.testing.assert_array_equal(found.counts, counts)
-    assert len(found.account.out_of_sequence) == 2 and adds_up(found.account)
 
 
 def test_a_time_stamp_that_contradicts_its_number_is_dropped(tmp_path):
@@ -127,15 +103,6 @@ def test_units_rails_and_the_underside(tmp_path):
     assert found.saturated_accelerometers()[0, 0].tolist() == [False, False, True]
     assert found.saturated_gyroscopes()[0, 0].tolist() == [False, False, True]
     assert found.saturated_gyroscopes().sum() == 1
-
-
-def test_as_many_positions_as_imus(tmp_path):
-    stream = read_mimu(
-        stored(tmp_path, b"".join(packets(readings(np.random.default_rng(8), 9, 4))))
-    )
-    board = mimu4444_corners()
-    with pytest.raises(InputError, match="expected 4 IMUs.*found 8"):
-        to_recording(stream, board.positions, board.labels)
 
 
 @pytest.mark.parametrize(

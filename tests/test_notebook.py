@@ -123,14 +123,6 @@ def test_files_of_another_kind_are_refused(simulated, tmp_path):
         imuarray.read_calibration(path)
 
 
-def test_importing_loads_nothing_heavy():
-    code = (
-        "import sys, imuarray; print([m for m in ('numpy', 'jax', 'xarray') if m in sys.modules])"
-    )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert run.stdout == "[]\n"
-
-
 def test_the_surface_is_typed():
     """As `make lint` has it; pyproject.toml says which files."""
     root = Path(__file__).parents[1]

@@ -11,7 +11,6 @@ from imuarray.analysis.beyond import posterior_beyond
 from imuarray.analysis.fitting import fitted_beyond
 from imuarray.analysis.known import fused
 from imuarray.analysis.past_rail import _choose, _hidden, past_rail
-from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.figures.board import figure_past_rail, table_past_rail
 from imuarray.model.names import parameter_names
@@ -76,13 +75,6 @@ def test_the_withheld_readings_are_not_used(withheld, diagnosis):
         for one in (recording, replace(recording, angular_rate=rate))
     ]
     np.testing.assert_array_equal(*(one.predictions()[0] for one in predicted))
-
-
-def test_a_diagnosis_is_a_calibration_for_the_command(withheld, diagnosis, tmp_path):
-    recording, _ = withheld
-    imuarray.write_recording(recording, tmp_path / "rec.nc")
-    out = tmp_path / "motion.nc"
-    assert main(["apply", str(diagnosis), str(tmp_path / "rec.nc"), "--out", str(out)]) == 0
 
 
 def test_what_is_never_fast_is_refused(withheld, diagnosis):

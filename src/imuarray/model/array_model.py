@@ -172,22 +172,17 @@ class ArrayModel:
         rate = jnp.broadcast_to(seen[0], (self.array.gyroscopes, 3))
         return Prediction(kinematics.specific_force(instant.motion, instant.positions), rate)
 
-    def predict_many(
-        self, motion: Motion, positions, parameters=(), time=None, span: float | None = None
-    ) -> Prediction:
+    def predict_many(self, motion: Motion, positions, parameters=(), time=None) -> Prediction:
         """`predict` over leading sample axes, compiled; returns numpy arrays (..., n, 3).
 
         ``positions`` is (A, 3), or (realisations, A, 3) with motion (realisations, T, 3);
-        ``time`` (T,) s matters to drifts, shifts and clocks only, zero if not given; with
-        ``span`` (s) it counts from the beginning of a recording of that length.
+        ``time`` (T,) s matters to drifts, shifts and clocks only, zero if not given.
         """
         fields = Motion(*(jnp.asarray(field) for field in motion))
         positions = jnp.asarray(positions)
         parameters = jnp.asarray(np.asarray(parameters, float))
-        samples = fields.angular_rate.shape[-2]
-        if span is None:
-            time, span = self.since(samples, time)
-        out = _predict_many(self, fields, positions, parameters, np.asarray(time, float), span)
+        since, span = self.since(fields.angular_rate.shape[-2], time)
+        out = _predict_many(self, fields, positions, parameters, since, span)
         return Prediction(*(np.asarray(part) for part in out))
 
     def since(self, samples: int, time=None) -> tuple[np.ndarray, float]:

@@ -6,7 +6,6 @@ own: it is handed a recording, and knows neither the noise nor the size of the m
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -26,16 +25,8 @@ RATE = 1e9  # samples a second: instants tell the model nothing
 BEYOND = 1e6  # m/s^2, rad/s: a rail that nothing reaches
 
 
-class Drawn(NamedTuple):
-    """A truth (P,), positions and effects, and what was measured of it."""
-
-    number: int
-    truth: np.ndarray
-    recording: Recording
-
-
-def drawn(setting: Setting, number: int) -> Drawn:
-    """Number ``number``; its effects from their priors."""
+def drawn(setting: Setting, number: int) -> tuple[np.ndarray, Recording]:
+    """Truth (P,) ``number``, positions and effects from their priors, and what was measured of it."""
     rng = stream(setting.seed, "calibrated", METHOD, setting.name, setting.samples, number)
     model, prior = setting.model, setting.prior
     positions = prior.mean + prior.sd * rng.standard_normal(prior.mean.size)
@@ -47,7 +38,7 @@ def drawn(setting: Setting, number: int) -> Drawn:
         BEYOND, BEYOND, setting.prior_sd,
     )  # fmt: skip
     recording = replace(recording, gyroscope_labels=model.array.labels)
-    return Drawn(number, np.concatenate([positions, effects]), recording)
+    return np.concatenate([positions, effects]), recording
 
 
 def pit_values(
@@ -62,12 +53,10 @@ def pit_values(
     names += [f"effect_{place}" for place in range(setting.model.effect_size)]
 
     def one(number: int) -> pd.DataFrame:
-        made = drawn(setting, number)
-        tree = sample(
-            made.recording, steps=STEPS, seed=number, effects=setting.model.effects
-        )  # fmt: skip
+        truth, recording = drawn(setting, number)
+        tree = sample(recording, steps=STEPS, seed=number, effects=setting.model.effects)
         draws = chains_of(tree).draws[..., : len(names)]
-        both = np.vstack([made.truth, draws.reshape(-1, len(names))])
+        both = np.vstack([truth, draws.reshape(-1, len(names))])
         both = np.column_stack([both, both[:, : size.size] @ size])
         rank = np.sum(both[1:] < both[0], axis=0)
         where = setting.name, setting.samples, number

@@ -11,23 +11,17 @@ from imuarray.studies.batches import root_mean_square
 REPEATS = 20  # motions averaged over; the bound varies little between them
 
 
-def bound_squares(rng, model, samples: int, motion_sizes) -> np.ndarray:
-    """Mean bound variance (m^2) over coordinates for ``REPEATS`` random motions, (REPEATS,)."""
-    out = []
-    for _ in range(REPEATS):
-        motion = sphere_motion(rng, (samples,), *motion_sizes)
-        values = np.linalg.eigvalsh(information_at(model, motion, model.array.relative))
-        floor = 1e-14 * values[-1]
-        out.append(np.mean(1.0 / np.maximum(values, floor)))
-    return np.array(out)
-
-
 def bound_table(model, seed, cases) -> pd.DataFrame:
     """RMSE bound for each (samples, |omega|, |omega_dot|, |s|) in ``cases`` (SI units)."""
     rows = []
     for number, (samples, *sizes) in enumerate(cases):
         rng = stream(seed, "position bound", number)
-        bound, error = root_mean_square(bound_squares(rng, model, samples, sizes))
+        squares = []  # mean variance over coordinates for each of the motions
+        for _ in range(REPEATS):
+            motion = sphere_motion(rng, (samples,), *sizes)
+            values = np.linalg.eigvalsh(information_at(model, motion, model.array.relative))
+            squares.append(np.mean(1.0 / np.maximum(values, 1e-14 * values[-1])))
+        bound, error = root_mean_square(squares)
         rows.append(
             {
                 "samples": samples,
