@@ -26,7 +26,7 @@ BEYOND = 1e6  # m/s^2, rad/s: a rail that nothing reaches
 
 
 def drawn(setting: Setting, number: int) -> tuple[np.ndarray, Recording]:
-    """Truth (P,) ``number``, positions and effects from their priors, and what was measured of it."""
+    """Truth (P,) ``number``: positions and effects from their priors; what was measured of it."""
     rng = stream(setting.seed, "calibrated", METHOD, setting.name, setting.samples, number)
     model, prior = setting.model, setting.prior
     positions = prior.mean + prior.sd * rng.standard_normal(prior.mean.size)
