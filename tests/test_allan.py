@@ -23,6 +23,14 @@ def noise(rng, shape, white=WHITE, walk=WALK):
     return white * np.sqrt(RATE) * rng.standard_normal(shape) + walk / np.sqrt(RATE) * drift
 
 
+def flicker(rng, size, samples, axes):
+    """Noise whose power falls as 1 / f, (samples, axes)."""
+    frequency = np.fft.rfftfreq(2 * samples, 1 / RATE)[1:]
+    shape = np.concatenate([[0.0], np.sqrt(size**2 / (2 * np.pi * frequency) * RATE)])
+    whole = np.fft.rfft(rng.standard_normal((2 * samples, axes)), axis=0)
+    return np.fft.irfft(whole * shape[:, None], axis=0)[:samples]
+
+
 def still(count=2, samples=60000, seed=0):
     """A recording of a board that lies still."""
     rng = np.random.default_rng(seed)
@@ -65,10 +73,8 @@ def test_terms_of_known_size_are_found_and_others_left_open():
 def test_what_is_left_open_is_within_its_limit():
     """A walk beside flicker that it is mistaken for, 24 axes, seed 4."""
     rng, size, walk = np.random.default_rng(4), 2e-4, 1e-5
-    frequency = np.fft.rfftfreq(240000, 1 / RATE)[1:]
-    shape = np.concatenate([[0.0], np.sqrt(size**2 / (2 * np.pi * frequency) * RATE)])
-    whole = np.fft.rfft(rng.standard_normal((240000, 24)), axis=0)
-    x = noise(rng, (120000, 24), 1e-3, walk) + np.fft.irfft(whole * shape[:, None], axis=0)[:120000]
+    x = flicker(rng, size, 120000, 24)
+    x += noise(rng, (120000, 24), 1e-3, walk)
     found = noise_terms(spectrum([x], 1 / RATE), RATE)
     open_ = np.isnan(found.value[2])
     assert open_.sum() > 10 and np.mean(found.below[2][open_] > walk) > 0.8
@@ -79,10 +85,8 @@ def test_what_is_left_open_is_within_its_limit():
 
 def test_flicker_is_told_from_a_walk():
     rng, size = np.random.default_rng(3), 5e-4
-    frequency = np.fft.rfftfreq(120000, 1 / RATE)[1:]
-    shape = np.concatenate([[0.0], np.sqrt(size**2 / (2 * np.pi * frequency) * RATE)])
-    whole = np.fft.rfft(rng.standard_normal((120000, 10)), axis=0)
-    x = noise(rng, (60000, 10), 1e-3, 0.0) + np.fft.irfft(whole * shape[:, None], axis=0)[:60000]
+    x = flicker(rng, size, 60000, 10)
+    x += noise(rng, (60000, 10), 1e-3, 0.0)
     found = noise_terms(spectrum([x], 1 / RATE), RATE)
     assert np.isnan(found.value[2]).all()
     assert np.mean(found.value[1]) == pytest.approx(size, rel=0.1)
