@@ -198,15 +198,6 @@ def common_mean(shape, axes=None) -> list[np.ndarray]:
     return [np.ones(shape, bool)]
 
 
-def common_means(shape, axes=None) -> list[np.ndarray]:
-    """A gauge: the mean over all triads, of each of a triad's parameters."""
-    masks = []
-    for place in np.ndindex(*shape[1:]):
-        masks.append(np.zeros(shape, bool))
-        masks[-1][(slice(None), *place)] = True
-    return masks
-
-
 def _again(old, new) -> bool:
     """Whether a notebook's cell is run once more: its new effect replaces the old one."""
     return old.__module__ == new.__module__ == "__main__"
