@@ -34,10 +34,10 @@ from imuarray.streams import stream
 
 STEPS = {"pmmh": (200_000, 10_000), "pcn": (40_000, 4_000)}  # compiled, any effects
 # 1000 left the worst of 93 R-hats above 1.01 now and then; with effects a step costs ten times more
-NUTS_STEPS, NUTS_WARMUP = (1250, 500), 300
+NUTS_STEPS, NUTS_WARMUP = (1250, 750), 300
 APART = 2.0  # posterior sds by which the starts differ
 STORED = 2000
-RHAT_THRESHOLD = 1.05
+FEW = 400  # effective draws; fewer tell neither quantiles nor R-hat (Vehtari and others, 2021)
 FLAT = 0.03  # of the mode's distance from a line: nearer the flat prior has its hole
 
 
@@ -60,8 +60,10 @@ class Made(NamedTuple):
     chains: Chains
     posterior: Posterior
     key: str  # digest of everything that they depend on
-    settings: dict
+    told: dict  # attributes: the sampler, Pareto's k, what else was tried
+    settings: dict = {}
     checkpoint: Path | None = None
+    short: str = ""  # why they are not enough, where the sampler itself says so
 
 
 def sample(
@@ -71,7 +73,7 @@ def sample(
     motion_prior: str = "proper", progress: bool = False, say: Say = silent,
     beside: str | PathLike | None = None,
 ) -> xr.DataTree:  # fmt: skip
-    """Two chains of the posterior of the accelerometers' positions.
+    """Chains of the posterior of the accelerometers' positions.
 
     Parameters
     ----------
@@ -82,13 +84,17 @@ def sample(
         recording's held-out time, with what they do not determine left out; where none gains, and
         where there are too few samples to tell, the papers' model.
     method
-        ``"nuts"``, what ``"auto"`` takes: the no-U-turn sampler on the exact marginal likelihood;
+        ``"independent"``: Metropolis-Hastings on the exact marginal likelihood with independent
+        proposals from the normal density about the mode, in four chains; ``"nuts"``: the no-U-turn
+        sampler on the same; ``"auto"``: the former where Pareto's k of its weights is 0.7 at most,
+        R-hat 1.01 and ESS 1000 are reached and the motion's prior is proper, else NUTS;
         ``"pmmh"``: pseudo-marginal Metropolis-Hastings (paper 2021), N and the step length tuned
         as in section III-C; ``"pcn"``: the same with preconditioned Crank-Nicolson proposals
         shaped by the mode. The latter two take noise and the motion's size at their estimates
         unless there are effects.
     steps
-        Transitions of each chain, after the warm-up in NUTS' case.
+        Transitions of each chain, after the warm-up in NUTS' case; by default as many as
+        independent proposals need.
     seed
         Of the random numbers.
     rates
@@ -114,8 +120,9 @@ def sample(
     xarray.DataTree
         ``posterior/position`` (chain, draw, accelerometer, axis) m, with effects
         ``posterior/effect_parameter``, and ``posterior/sd`` of noise and motion where unknown
-        (SI); ``sample_stats``, ``prior``. Attributes: the chains' verdict (``converged``,
-        ``rhat_max``, ``ess_min``, burn-in), ``shrunk_by_sds`` and the origin.
+        (SI); ``sample_stats``, ``prior``. Attributes: ``sampler``, ``pareto_k`` and ``instead_of``
+        (why not the other sampler); the chains' verdict (``converged``, ``rhat_max``, ``ess_min``,
+        burn-in), ``shrunk_by_sds`` and the origin.
 
     Raises
     ------
@@ -148,7 +155,7 @@ def sample(
             " (docs/findings.md)")  # fmt: skip
     beside = None if beside is None else Path(beside)
     asked = Asked(method, motion_prior, steps, seed, rates, progress, beside, say)
-    made = (_pmmh if method in STEPS else _nuts)(posterior, asked)
+    made = (_pmmh if method in STEPS else _exact)(posterior, asked)
     tree = _tree(made, seed, pull)
     if tree.attrs["on_a_line"]:
         say("a chain went to where the triads lie on one line: the flat motion prior has no bound"
@@ -192,25 +199,26 @@ def _off_rails(recording: Recording, say: Say) -> Recording:
 def summary(posterior: xr.DataTree) -> pd.DataFrame:
     """One row per coordinate of what `sample` gave: mean, sd and quantiles (m), R-hat, ESS."""
     from imuarray.posterior.chains import chains_of
-    from imuarray.posterior.diagnostics import summarise
+    from imuarray.posterior.diagnostics import RHAT, summarise
 
     labels = [str(label) for label in posterior["posterior"]["accelerometer"].to_numpy()]
-    return summarise(chains_of(posterior), labels, RHAT_THRESHOLD)[1]
+    return summarise(chains_of(posterior), labels, RHAT)[1]
 
 
 def _tree(made: Made, seed: int, pull: float) -> xr.DataTree:
     from imuarray.posterior.chains import chain_tree
-    from imuarray.posterior.diagnostics import summarise
+    from imuarray.posterior.diagnostics import RHAT, summarise
 
     recording, model = made.posterior.recording, made.posterior.model
     labels = recording.accelerometer_labels[1:]
     names = parameter_names(model, (recording.accelerometer_labels, recording.gyroscope_labels))
-    verdict, _, _ = summarise(made.chains, labels, RHAT_THRESHOLD)
+    verdict, _, _ = summarise(made.chains, labels, RHAT)
     attrs: dict[str, Any] = {**stamp({"recording": made.key, **made.settings}, seed)}
     kept = "burn_in_draws", "burn_in_steps", "steps", "rhat_max", "ess_min"
-    attrs |= {name: verdict[name] for name in kept}
+    attrs |= {name: verdict[name] for name in kept} | made.told
     fallen = made.posterior.flat and flattest(made.chains.draws, recording) < FLAT
-    attrs["converged"] = int(verdict["converged"] and not fallen)
+    sound = verdict["converged"] and verdict["ess_min"] >= FEW and not made.short
+    attrs["converged"] = int(sound and not fallen)
     attrs |= {"divergent": made.chains.divergent, "on_a_line": int(fallen)}
     attrs |= {"shrunk_by_sds": pull, **_noise(model)}
     if made.checkpoint is not None:
@@ -277,7 +285,8 @@ def _pmmh(posterior: Posterior, asked: Asked) -> Made:
         target, starts, step, max(4, steps // thin), thin, asked.seed, checkpoint=checkpoint,
         key=key, quiet=not asked.progress,
     )  # fmt: skip
-    return Made(chains, posterior, key, {"draws_per_sample": draws}, checkpoint)
+    told, settings = {"sampler": asked.method}, {"draws_per_sample": draws}
+    return Made(chains, posterior, key, told, settings, checkpoint)
 
 
 def _apart(posterior: Posterior, rng) -> np.ndarray:
@@ -297,21 +306,47 @@ def _checkpoint(asked: Asked, key: str) -> Path | None:
     return checkpoint
 
 
-def _nuts(posterior: Posterior, asked: Asked) -> Made:
-    """NUTS on the marginal likelihood, whitened at the mode."""
+def _exact(posterior: Posterior, asked: Asked) -> Made:
+    """On the marginal likelihood: independent proposals, or NUTS where these are not enough."""
+    density, told = traced(posterior, asked.rates, asked.say), {}
+    # towards a line the flat prior's density has no bound, which proposals at the mode do not see
+    if asked.method == "independent" or (asked.method == "auto" and not posterior.flat):
+        made = _independent(posterior, asked, *density)
+        if asked.method == "independent" or not made.short:
+            return made
+        told = {"pareto_k": made.told["pareto_k"], "instead_of": made.short}
+        asked.say(f"{made.short}: NUTS instead")
+    steps = asked.steps or NUTS_STEPS[bool(posterior.model.effects)]
+    chains = _nuts(posterior, asked, steps, *density)
+    return Made(chains, posterior, _key(posterior, asked, steps), {"sampler": "nuts"} | told)
+
+
+def _independent(posterior: Posterior, asked: Asked, log_density, data) -> Made:
+    from imuarray.posterior.diagnostics import ENOUGH, RHAT, ess, rhat
+    from imuarray.posterior.independent import UNRELIABLE, run_independent
+
+    chains, k = run_independent(
+        log_density, posterior.mode, posterior.covariance, asked.steps, asked.seed,
+        ("sample", "independent"), not asked.progress, data,
+    )  # fmt: skip
+    told = {"sampler": "independent", "pareto_k": k}
+    worst, least, short = rhat(chains.draws).max(), ess(chains.draws).min(), ""
+    if not k <= UNRELIABLE or (asked.steps is None and (worst > RHAT or least < ENOUGH)):
+        short = f"independent proposals: Pareto's k {k:.2f}, R-hat {worst:.3f}, ESS {least:.0f}"
+    return Made(chains, posterior, _key(posterior, asked, asked.steps), told, short=short)
+
+
+def _nuts(posterior: Posterior, asked: Asked, steps: int, log_density, data) -> Chains:
+    """NUTS, whitened at the mode."""
     from imuarray.posterior.nuts import run_nuts
 
-    log_density, data = traced(posterior, asked.rates, asked.say)
     rng, prior = _stream(asked, "starts"), posterior.prior
     wide = posterior.flat and not posterior.model.effects
     starts = spread_starts(prior.mean, prior.sd, rng) if wide else _apart(posterior, rng)
-    steps = asked.steps or NUTS_STEPS[bool(posterior.model.effects)]
-    found = run_nuts(
+    return run_nuts(
         log_density, posterior.mode, posterior.covariance, starts, NUTS_WARMUP, steps, asked.seed,
         quiet=not asked.progress, data=data,
     )  # fmt: skip
-    key = _key(posterior, asked, steps)
-    return Made(found, posterior, key, {"divergent": found.divergent})
 
 
 def _stream(asked: Asked, name: str):

@@ -211,9 +211,11 @@ COMMANDS = (
         "posterior to write (NetCDF-4)",
         (
             RECORDING, *MODEL, NOISE,
-            _option("--method", "nuts, which auto takes (default): the no-U-turn sampler on the"
-                    " exact marginal likelihood; pmmh: pseudo-marginal Metropolis-Hastings, as"
-                    " paper 2021; pcn: the same with preconditioned Crank-Nicolson proposals",
+            _option("--method", "independent: proposals from the normal density about the mode, on"
+                    " the exact marginal likelihood; nuts: the no-U-turn sampler on the same; auto"
+                    " (default): the former where it is enough, else the latter; pmmh:"
+                    " pseudo-marginal Metropolis-Hastings, as paper 2021; pcn: the same with"
+                    " preconditioned Crank-Nicolson proposals",
                     choices=methods.SAMPLING, default="auto"),
             _option("--motion-prior", "proper (default): angular rate and acceleration are normal,"
                     " of the recording's own size; flat: as paper 2021, of the papers' model, which"

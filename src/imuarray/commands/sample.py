@@ -15,13 +15,14 @@ from imuarray.provenance import trust, write_netcdf
 from imuarray.recording import read_recording
 
 VERDICT = (
-    "converged", "rhat_max", "ess_min", "burn_in_steps", "steps", "divergent", "on_a_line",
-    "shrunk_by_sds", "accelerometer_noise_sd", "gyroscope_noise_sd",
+    "sampler", "converged", "rhat_max", "ess_min", "burn_in_steps", "steps", "divergent",
+    "on_a_line", "shrunk_by_sds", "accelerometer_noise_sd", "gyroscope_noise_sd",
 )  # fmt: skip
+TOLD = "pareto_k", "instead_of"  # by samplers that have them
 
 
 def sample(arguments) -> None:
-    """Two chains of the positions' posterior; see `imuarray.sample`."""
+    """Chains of the positions' posterior; see `imuarray.sample`."""
     output = Output(arguments)
     recording = read_recording(arguments.recording)
     posterior = sampled(
@@ -45,6 +46,7 @@ def document(posterior: xr.DataTree, table: pd.DataFrame) -> dict:
     """The chains' verdict, and mean and sd of each coordinate."""
     found = {name: posterior.attrs[name] for name in VERDICT}
     found |= {name: bool(found[name]) for name in ("converged", "on_a_line")}
+    found |= {name: posterior.attrs[name] for name in TOLD if name in posterior.attrs}
     columns = ["accelerometer", "axis", "mean_m", "sd_m", "rhat", "ess"]
     return found | {"coordinates": table[columns].to_dict(orient="records")}
 
@@ -64,8 +66,8 @@ def report(posterior: xr.DataTree, table: pd.DataFrame) -> str:
     if attrs["on_a_line"]:
         state = "NOT converged: a chain is where the triads lie on one line (docs/findings.md)"
     lines.append(
-        f"{state}: R-hat {attrs['rhat_max']:.3f}, smallest ESS {attrs['ess_min']:.0f},"
-        f" burn-in {attrs['burn_in_steps']} of {attrs['steps']} steps"
+        f"{attrs['sampler']}, {state}: R-hat {attrs['rhat_max']:.3f}, smallest ESS"
+        f" {attrs['ess_min']:.0f}, burn-in {attrs['burn_in_steps']} of {attrs['steps']} steps"
     )
     if attrs["divergent"]:
         lines.append(

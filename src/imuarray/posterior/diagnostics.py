@@ -8,6 +8,7 @@ import pandas as pd
 from imuarray.posterior.chains import Chains
 
 QUANTILES = (0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975)
+RHAT, ENOUGH = 1.01, 1000  # largest R-hat, smallest effective size that a sampler aims at
 
 
 def _arviz(name, draws, **options) -> np.ndarray:
@@ -33,6 +34,15 @@ def ess(draws) -> np.ndarray:
 def ess_of_mean(draws) -> np.ndarray:
     """The same for the plain mean: how many independent draws would estimate it as well."""
     return _arviz("ess", draws, method="mean")
+
+
+def pareto_k(log_weights) -> float:
+    """Shape of the tail of importance weights: their moments up to 1 / k exist; inf if none do."""
+    import arviz
+
+    if not np.all(np.isfinite(log_weights)):
+        return np.inf
+    return float(arviz.psislw(np.ravel(log_weights))[1])
 
 
 def agreement(draws) -> np.ndarray:

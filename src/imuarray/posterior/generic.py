@@ -30,6 +30,7 @@ SCALES = (
     "accelerometer_noise", "gyroscope_noise", "angular_rate", "angular_acceleration",
     "specific_force",
 )  # fmt: skip
+CHUNK = 1000  # samples whose densities are in memory at a time, with their derivatives
 
 
 def _mode(flat, x, steps):
@@ -137,7 +138,11 @@ def log_laplace(model, steps, parameters, given: Unknown):
         inner = solve_upper(still(factor), solve_lower(still(factor), bend))
         return -0.5 * (value @ value + log_determinant(factor) + jnp.trace(inner))
 
-    return jnp.sum(jax.vmap(one)(given.start, given.readings) - volume)
+    samples = given.start, given.readings
+    if len(given.start) <= CHUNK:
+        return jnp.sum(jax.vmap(one)(*samples) - volume)
+    parts = jax.lax.map(jax.checkpoint(lambda s: one(*s)), samples, batch_size=CHUNK)
+    return jnp.sum(parts - volume)
 
 
 class GenericLikelihood:

@@ -20,7 +20,7 @@ from imuarray.streams import stream
 from imuarray.studies.batches import run_batches
 from imuarray.studies.truths import Setting
 
-METHOD, STEPS = "sample", 100  # name in tables; transitions of each of the two chains
+METHOD = "sample"  # name in tables
 RATE = 1e9  # samples a second: instants tell the model nothing
 BEYOND = 1e6  # m/s^2, rad/s: a rail that nothing reaches
 
@@ -54,7 +54,7 @@ def pit_values(
 
     def one(number: int) -> pd.DataFrame:
         truth, recording = drawn(setting, number)
-        tree = sample(recording, steps=STEPS, seed=number, effects=setting.model.effects)
+        tree = sample(recording, seed=number, effects=setting.model.effects)
         draws = chains_of(tree).draws[..., : len(names)]
         both = np.vstack([truth, draws.reshape(-1, len(names))])
         both = np.column_stack([both, both[:, : size.size] @ size])
