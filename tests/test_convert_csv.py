@@ -65,7 +65,7 @@ def test_two_columns_of_one_name_are_refused_where_they_are_asked_for(tmp_path):
     columns = layout()
     columns["gyroscopes"]["triads"].pop("3")
     assert read(tmp_path, rows, columns).angular_rate.shape == (4, 2, 3)
-    with pytest.raises(InputError, match="expected a column 'gx3', found t, ax1"):
+    with pytest.raises(InputError, match="expected a column 'gx3', found none; did you mean gz3"):
         read(tmp_path, rows)
     columns = layout()
     columns["gyroscopes"]["triads"]["3"]["columns"] = ["gy3", "ax1", "gz3"]
@@ -218,3 +218,27 @@ def test_units_are_spelled_as_in_recordings(tmp_path, kind, unit, known):
     found = read(tmp_path, table(), columns)
     np.testing.assert_array_equal(found.specific_force, expected.specific_force)
     np.testing.assert_array_equal(found.angular_rate, expected.angular_rate)
+
+
+@pytest.mark.parametrize(
+    ("factor", "unit", "words"),
+    [
+        (1, "s", "found 0.1 over 4.83 minutes; are they in ms, declared s"),
+        (1e-3, "ms", "found 1e.05 over 0.00029 s; are they in s, declared ms"),
+        (1e3, "ms", "are they in us, declared ms"),
+    ],
+)
+def test_stamps_of_another_unit_are_one_line(tmp_path, factor, unit, words):
+    rows = table(30)
+    for row in rows[1:]:
+        row[0] = repr(factor * float(row[0]))
+    columns = layout()
+    columns["time"]["unit"] = unit
+    with pytest.raises(InputError, match=f"log.csv: column 't': .* {words}"):
+        read(tmp_path, rows, columns)
+
+
+def test_a_misspelt_key_names_its_neighbour(tmp_path):
+    columns = layout() | {"postion_prior": 1.5}
+    with pytest.raises(InputError, match="the keys time, .* optionally .*; did you mean position_"):
+        read(tmp_path, table(), columns)

@@ -96,8 +96,10 @@ def test_nothing_still_is_one_line():
     waved = recording.angular_rate + rng.standard_normal((len(recording.time), 1, 3))
     with pytest.raises(InputError, match="expected still poses"):
         still_poses(replace(recording, angular_rate=waved))
-    with pytest.raises(InputError, match="expected at least 2 s"):
+    with pytest.raises(InputError, match="expected at least 2 s .*, found 0.78 s"):
         still_poses(recording.select(slice(0, 40)))
+    with pytest.raises(InputError, match="found 0.05 over .*; are they in ms"):
+        still_poses(replace(recording, time=1000 * recording.time))
 
 
 def test_the_truth_is_within_the_claimed_widths():

@@ -5,6 +5,7 @@ import numpy as np
 from imuarray.errors import InputError
 from imuarray.recording import Recording
 from imuarray.recording.channels import runs
+from imuarray.recording.units import require_plausible_rate
 
 WINDOW = 1.0  # s, over which a reading's spread is judged
 SHORTEST = 3.0  # s, of a pose by default, its ends included
@@ -46,12 +47,13 @@ def still_poses(recording: Recording, window=WINDOW, shortest=SHORTEST) -> list[
         Where nothing is still: no run long enough (with the longest found), or a floor far above
         the declared noise.
     """
+    require_plausible_rate(recording.time, "recording: time")
     step = float(np.median(np.diff(recording.time))) if len(recording.time) > 1 else np.inf
     width = max(int(round(window / step)), 2)
     if len(recording.time) < 2 * width:
         raise InputError(
             f"recording: expected at least {2 * window:g} s to look for still poses in,"
-            f" found {len(recording.time)} samples"
+            f" found {np.ptp(recording.time) if len(recording.time) else 0.0:.3g} s"
         )
     if recording.stationary is not None:
         still, half = (recording.stationary & ~_steps(recording, step)), 0

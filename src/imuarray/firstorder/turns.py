@@ -42,7 +42,7 @@ def require_rotations(maps, labels, kind: str) -> None:
     axis = "xyz"[int(np.argmin(np.diag(seen)))]
     raise InputError(
         f"{kind} {labels[k]!r}: expected right-handed axes, found those of a mirror image; is the"
-        f" sign of its {axis} axis wrong?"
+        f" sign of its {axis} axis wrong, or are two axes exchanged?"
     )
 
 

@@ -1,5 +1,6 @@
 """The small YAML that says what a log holds: columns or topics, units, positions, axes, noise."""
 
+from difflib import get_close_matches
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -96,12 +97,21 @@ def _require_sections(sections: Any, where: str, what: str, keys: dict[str, bool
 
 def _require_keys(section: Any, keys: dict[str, bool], where: str) -> None:
     if not isinstance(section, dict):
-        raise InputError(f"{where}: expected the keys {', '.join(keys)}, found {section!r}")
+        raise InputError(f"{where}: expected {_listed(keys)}, found {section!r}")
     unknown = [key for key in section if key not in keys]
     missing = [key for key, needed in keys.items() if needed and key not in section]
     if unknown or missing:
         found = f"an unknown key {unknown[0]!r}" if unknown else f"no {missing[0]!r}"
-        raise InputError(f"{where}: expected the keys {', '.join(keys)}, found {found}")
+        near = get_close_matches(str(unknown[0]), keys, 1) if unknown else []
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise InputError(f"{where}: expected {_listed(keys)}, found {found}{hint}")
+
+
+def _listed(keys: dict[str, bool]) -> str:
+    """The keys that have to be there, and those that may."""
+    kinds = ("the keys", True), ("optionally", False)
+    parts = [(word, [key for key in keys if keys[key] is needed]) for word, needed in kinds]
+    return ", ".join(f"{word} {', '.join(names)}" for word, names in parts if names)
 
 
 def _is_number(value) -> bool:

@@ -1,5 +1,6 @@
 """Anybody's logger: a CSV file, and a small YAML that names its columns and units."""
 
+from difflib import get_close_matches
 from os import PathLike
 from pathlib import Path
 
@@ -18,9 +19,10 @@ from imuarray.recording.layout import (
     three_columns,
 )
 from imuarray.recording.record import Recording
-from imuarray.recording.units import factor
+from imuarray.recording.units import factor, require_plausible_rate
 
 LEAVE_OUT = "leave out"  # what `incomplete_rows` may be
+FEW = 20  # stamps, of which a rate is worth looking at
 OFTEN = 0.1  # share of blank cells from which a sensor is slower than the log
 BLANK = "; `incomplete_rows: leave out` keeps the rows that are whole"
 WHITESPACE = r"\s+"  # the one delimiter longer than a character
@@ -96,11 +98,17 @@ def _whole(table, layout, columns: str) -> tuple[pd.DataFrame, str]:
     return table[whole], f"{whole.sum()} of {len(table)} samples"
 
 
+def _alike(name: str, table) -> str:
+    """The table's columns of nearly that name, or all."""
+    have = [str(column) for column in table.columns]
+    near = get_close_matches(str(name), list(dict.fromkeys(have)))
+    return f"none; did you mean {' or '.join(near)}?" if near else ", ".join(have)
+
+
 def column(table, name, where, blank: bool = False) -> np.ndarray:
     """A column's numbers, integers where all are; InputError unless finite, or ``blank`` (NaN)."""
     if name not in table.columns:
-        have = ", ".join(map(str, table.columns))
-        raise InputError(f"{where}: expected a column {name!r}, found {have}")
+        raise InputError(f"{where}: expected a column {name!r}, found {_alike(name, table)}")
     if list(table.columns).count(name) > 1:
         raise InputError(f"{where}: expected one column {name!r}, found several of that name")
     values = pd.to_numeric(table[name], errors="coerce").to_numpy()
@@ -150,7 +158,12 @@ def stamps_of(table, section, where, layout_name, blank: bool = False) -> tuple[
             f"{layout_name}: time: expected 'column' and 'unit', or 'rate' in Hz, found {section!r}"
         )
     unit = factor("time", section["unit"], f"{layout_name}: time: unit")
-    return column(table, str(section["column"]), where, blank), unit
+    stamps = column(table, str(section["column"]), where, blank)
+    known = stamps[np.isfinite(stamps)]
+    if len(known) >= FEW:
+        place = f"{where}: column {section['column']!r}"
+        require_plausible_rate(unit * (known - known[0]), place, section["unit"])
+    return stamps, unit
 
 
 def _time(table, section, where, layout_name) -> np.ndarray:

@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from imuarray.errors import InputError
 
 GRAVITY = 9.80665  # m/s^2, the unit g of data sheets
@@ -17,6 +19,34 @@ UNITS = {
         "mdeg/s": 1e-3 * _DEGREE,
     },
 }  # fmt: skip
+
+
+SLOWEST, FASTEST = 5.0, 5e4  # Hz, of an IMU that is to show a motion of the hand
+
+
+def require_plausible_rate(time, where: str, declared: object = "") -> None:
+    """InputError for stamps (T,) s that no IMU makes: a unit; ``declared``: theirs, if known."""
+    steps = np.abs(np.diff(time))
+    steps = steps[steps > 0]
+    if not steps.size or 1 / FASTEST <= (step := float(np.median(steps))) <= 1 / SLOWEST:
+        return
+    # the unit in which they would be plausible, from the last one that they were taken to be in
+    units = UNITS["time"]
+    right = [u for u, size in units.items() if 1e-4 <= step * size / units.get(declared, 1.0) < 0.2]
+    hint = f"are they in {right[0]}" if right else "is their unit right"
+    hint += f", declared {declared}?" if declared and right else "?"
+    raise InputError(
+        f"{where}: expected stamps of {SLOWEST:g} to {FASTEST:g} samples a second, found"
+        f" {1 / step:.3g} over {_long(float(np.ptp(time)))}; {hint}"
+    )
+
+
+def _long(seconds: float) -> str:
+    """A time in the largest unit of which it has one."""
+    for unit, size in (("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):
+        if seconds > 2 * size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds:.3g} s"
 
 
 def factor(quantity: str, unit: object, where: str) -> float:
