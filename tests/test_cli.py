@@ -173,6 +173,24 @@ def test_termination_leaves_nothing_half_written(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_termination_does_not_wait_for_compiled_code(tmp_path):
+    code = (
+        "import ctypes, os, signal, sys, threading, types; from imuarray.cli import script\n"
+        "def command(arguments):\n"
+        "    kill = lambda: os.kill(os.getpid(), signal.SIGTERM)\n"
+        "    threading.Timer(0.1, kill).start()\n"
+        "    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})\n"  # would end the sleep
+        "    ctypes.CDLL(None).sleep(60)\n"
+        "m = sys.modules['imuarray.commands.calibrate'] = types.ModuleType('m')\n"
+        "m.calibrate = command\n"
+        "sys.argv = ['imuarray', 'calibrate', sys.executable, '--out', 'cal.nc']\n"
+        "script()"
+    )
+    call = [sys.executable, "-c", code]
+    run = subprocess.run(call, capture_output=True, text=True, cwd=tmp_path, timeout=15)
+    assert (run.returncode, run.stderr) == (130, "imuarray: interrupted (SIGTERM)\n")
+
+
 def test_an_interrupt_that_python_drops_comes_again(tmp_path):
     """In a destructor nothing can be raised."""
     code = (

@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 import threading
+import time
 import traceback
 import warnings
 from collections.abc import Iterator, Sequence
@@ -20,6 +21,7 @@ NETCDF = (".nc", ".nc4", ".h5")
 FIGURES = (".png", ".pdf")
 OK, UNFORESEEN, BAD_INPUT, UNTRUSTED, INTERRUPTED, CLOSED = 0, 1, 2, 3, 130, 141
 AGAIN = 0.05  # s, after which an interrupt that was dropped comes again
+PATIENCE = 1.0  # s, in which an interrupted command may tidy up
 
 
 def script() -> NoReturn:
@@ -27,11 +29,30 @@ def script() -> NoReturn:
 
     Interrupted, it does not wait for threads of compiled code: Python's shutdown would fault.
     """
+    _end_soon()
     status = main()
     if status == INTERRUPTED:
         sys.stderr.flush()
         os._exit(status)
     sys.exit(status)
+
+
+def _end_soon() -> None:
+    """A thread that ends an interrupted process: Python waits for compiled code to return."""
+
+    def watch() -> None:
+        while (number := os.read(read, 1)[0]) not in (signal.SIGINT, signal.SIGTERM):
+            pass  # SIGALRM
+        time.sleep(PATIENCE)
+        said = "interrupted (SIGTERM)" if number == signal.SIGTERM else "interrupted"
+        os.write(2, f"imuarray: {said}\n".encode())
+        os._exit(INTERRUPTED)
+
+    read, write = os.pipe()
+    os.set_blocking(write, False)
+    signal.set_wakeup_fd(write, warn_on_full_buffer=False)
+    os.register_at_fork(after_in_child=lambda: signal.set_wakeup_fd(-1))  # theirs are not ours
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def main(argv: Sequence[str] | None = None) -> int:
