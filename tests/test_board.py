@@ -20,6 +20,7 @@ from imuarray.cli import main
 from imuarray.commands.board import answer
 from imuarray.diagnosis.plain import Sizes, plain
 from imuarray.report.board import html, write_board
+from imuarray.report.board_words import advice
 from imuarray.report.excitation import missing
 from tests.browser import in_browser, needs_browser
 
@@ -117,9 +118,25 @@ def test_a_terminal_has_the_answer_first_in_few_lines(found):
 
 
 def test_a_log_that_says_little_says_that_first(found):
-    slow = replace(found.corrected, angular_rate=1e-3 * found.corrected.angular_rate)
-    reasons = reasons_of_calibration(slow, found.calibration, ["no still poses"])
+    surely = replace(found.corrected, position_prior_sd=1e-6)
+    reasons = reasons_of_calibration(surely, found.calibration, ["no still poses"])
     assert "says little of the positions" in reasons[0] and reasons[1] == "no still poses"
+
+
+def test_a_unit_is_the_first_reason_and_the_first_step(found):
+    """Whatever else follows from it: sds that exceed the drawing's, advice on the motion found."""
+    metres = replace(
+        found.corrected, position_prior_sd=1e-6,
+        accelerometer_position=1e3 * found.corrected.accelerometer_position,
+    )  # fmt: skip
+    unknown = found.calibration.assign_attrs(converged=0)
+    reasons = reasons_of_calibration(metres, unknown, ["no still poses"])
+    assert "in mm declared m" in reasons[0] and reasons[1:] == ["no still poses"]
+    slow = found.calibration.copy()
+    slow["angular_rate"] = 0.1 * slow["angular_rate"]
+    assert "Twist it harder" in "".join(advice(found._replace(calibration=slow)))
+    steps = advice(found._replace(calibration=slow, reasons=reasons))
+    assert "in mm declared m" in steps[0] and "Twist" not in "".join(steps)
 
 
 def test_without_still_poses_the_page_says_what_is_missing(found, no_pictures):

@@ -6,6 +6,7 @@ and that still poses show gravity.
 """
 
 import json
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -24,6 +25,7 @@ LEARNT = 0.5  # of the drawing's sd: positions known worse are hardly known from
 OTHER = 1.2  # times less residual elsewhere; 1.003 at most for the right board, 2 for another
 SHRUNK = 1.0  # sds: 95 % intervals then cover 83 %
 FEW = 20  # samples
+UNIT = re.compile(r"\bin \S+ declared ")  # in a reason that names a unit
 SAME = 0.1  # relative difference of rates, up to which they are those of one recording
 
 
@@ -32,8 +34,8 @@ def reasons_of_calibration(
 ) -> list[str]:
     """Why `imuarray.calibrate`'s answer for these recordings is not to be trusted.
 
-    The root first: what a recording that says little ends in is no cause; then what is ``known``
-    already, then what it may lead to.
+    The root first. A unit that is named is the root of the rest, which is left out but for what is
+    ``known`` already; else a recording that says little, then what is known, then what follows.
     """
     several = [recordings] if isinstance(recordings, Recording) else list(recordings)
     found: dict[str, list[str]] = {}
@@ -42,12 +44,14 @@ def reasons_of_calibration(
         places = _places(recording, calibration["position"].to_numpy(), _covariance(calibration))
         residual = _residuals(recording, calibration, places)
         little = _little(recording, places) if len(several) == 1 else []
-        for reason in [*little, *known, *_judged(recording, places, residual, limit)]:
+        judged = _judged(recording, places, residual, limit)
+        units = [reason for reason in judged if UNIT.search(reason)]
+        for reason in [*units, *known] if units else [*little, *known, *judged]:
             found.setdefault(reason, []).append(str(number))
     return [
         reason if len(whose) == len(several) else f"recording {', '.join(whose)}: {reason}"
         for reason, whose in found.items()
-    ] + _not_converged(calibration.attrs)
+    ] + ([] if any(map(UNIT.search, found)) else _not_converged(calibration.attrs))
 
 
 def reasons_of_posterior(

@@ -73,51 +73,61 @@ def _shaken(calibration: xr.Dataset) -> str:
 
 
 def advice(board: Board, folder: Path = Path()) -> list[str]:
-    """What to do next, the most urgent first; ``folder``: where the files are."""
+    """What to do next, the most urgent first; ``folder``: where the files are.
+
+    The motion of an answer that is not to be trusted is no ground for advice.
+    """
     corrected, found = folder / "recording.nc", folder / "cal.nc"
-    said = []
+    said = [f"Mend this first: {reason}" for reason in board.reasons[:1]]
     if isinstance(board.first_order, str):
         said.append(
             "Record again with still poses: a dozen or more directions, ten seconds each, the"
             " logger on while the board is turned from one to the next, then a minute of hard"
             " twisting. Without them offsets, scales and axes of the sensors are taken as read."
         )
-    elif board.first_order.gyroscopes and isinstance(board.first_order.gyroscopes.common, str):
-        why = board.first_order.gyroscopes.common
-        said.append(
-            "Leave the logger on while the board is turned from pose to pose: the size of the"
-            f" array is as uncertain as the gyroscopes' scale, which is not known ({why})."
-        )
     if board.reasons or misfit(board.calibration) > MISFIT:
         said.append(
             "Check units, signs, which IMU is which and the drawing in columns.yaml; then let"
             f" imuarray diagnose {corrected} --out diagnosis name what the model misses."
         )
-    said += [
-        f"Record what is missing: {item}." for item in missing(board.corrected, board.calibration)
+    if board.reasons:
+        return said
+    return [
+        *said,
+        *_wanting(board),
+        f"Use it: imuarray apply {found} {corrected} --out motion.nc makes one sensor of the"
+        f" array, imuarray export {found} --format kalibr --out imu.yaml a file for other tools.",
+        "Record a second time and calibrate both (imuarray calibrate): what two recordings"
+        " agree on is what can be relied on.",
     ]
-    speed = np.sqrt(np.mean(np.sum(board.calibration["angular_rate"].to_numpy() ** 2, axis=1)))
+
+
+def _wanting(board: Board) -> list[str]:
+    """What a better recording would have, by the motion that was found."""
+    said, calibration = [], board.calibration
+    gyroscopes = None if isinstance(board.first_order, str) else board.first_order.gyroscopes
+    if gyroscopes and isinstance(gyroscopes.common, str):
+        said.append(
+            "Leave the logger on while the board is turned from pose to pose: the size of the"
+            " array is as uncertain as the gyroscopes' scale, which is not known"
+            f" ({gyroscopes.common})."
+        )
+    said += [f"Record what is missing: {item}." for item in missing(board.corrected, calibration)]
+    speed = np.sqrt(np.mean(np.sum(calibration["angular_rate"].to_numpy() ** 2, axis=1)))
     if speed < SLOW:
         said.append(
-            f"Twist it harder: {np.degrees(speed):.0f} deg/s (rms) is slow, and what is said of the"
-            " positions grows with the square of the angular rate."
+            f"Twist it harder: {np.degrees(speed):.0f} deg/s (rms) is slow, aim for"
+            f" {np.degrees(SLOW):.0f}; what is said of the positions grows with the square of the"
+            " angular rate."
         )
-    worst = weakest_of(board.calibration)[0]
+    worst = weakest_of(calibration)[0]
     if worst.sd > board.corrected.position_prior_sd:
         said.append(f"Turn the board faster, and about all axes: {worst.words} is hardly known.")
-    if levelled(board.calibration):
+    if levelled(calibration):
         said.append(
             "More motion of this kind gains little: what first order leaves of the sensors' scales"
             " limits the positions. More still poses, and moves between them, would help."
         )
-    if not board.reasons:
-        said += [
-            f"Use it: imuarray apply {found} {corrected} --out motion.nc makes one sensor of the"
-            f" array, imuarray export {found} --format kalibr --out imu.yaml a file for other"
-            " tools.",
-            "Record a second time and calibrate both (imuarray calibrate): what two recordings"
-            " agree on is what can be relied on.",
-        ]
     return said
 
 
