@@ -1,5 +1,7 @@
 """Independence Metropolis-Hastings against laws whose moments and quantiles are known."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -24,13 +26,12 @@ def skewed(theta):
     return (-(theta**2) / 2 + theta**3 / 3 - theta**4 / 4).sum()
 
 
-def test_a_normal_target_is_drawn_from_wherever_the_search_ended():
+def test_a_normal_target_is_drawn_from_wherever_the_search_ended(capsys):
     """The centre is looked for: three sds off, nearly every proposal is taken all the same."""
     off = MEAN + FACTOR @ np.array([3.0, -2.0, 1.0])
-    chains, k = run_independent(
-        normal, off, FACTOR @ FACTOR.T, None, seed=1, quiet=True, data=(MEAN,)
-    )
+    chains, k = run_independent(normal, off, FACTOR @ FACTOR.T, None, seed=1, data=(MEAN,))
     assert chains.acceptance.min() > 0.8 and k < 0.3
+    assert re.search(r"100%.* (\d+)/\1 ", capsys.readouterr().err)  # all that was announced
     assert rhat(chains.draws).max() <= 1.01 and ess(chains.draws).min() >= 1000
     z = np.linalg.solve(FACTOR, (chains.draws - MEAN).reshape(-1, 3).T)
     # of standard normal z, four standard errors of 1000 draws

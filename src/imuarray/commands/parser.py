@@ -206,7 +206,8 @@ COMMANDS = (
     ),
     Command(
         "sample", "sample.sample",
-        "Sample the posterior distribution of the accelerometer positions.",
+        "Sample the posterior distribution of the accelerometer positions: about a minute, several"
+        " where NUTS is needed.",
         "rec.nc --seed 1 --out posterior.nc",
         "posterior to write (NetCDF-4)",
         (

@@ -40,7 +40,7 @@ def run_independent(
     seldom = 0.2 if sys.stderr.isatty() else 15.0
     with (
         ThreadPoolExecutor(threads) as pool,
-        tqdm(disable=quiet, unit="draw", mininterval=seldom) as bar,
+        tqdm(total=0, disable=quiet, unit="draw", mininterval=seldom) as bar,
     ):
         weigh = partial(_weights, log_density, pool, bar)
         white = centred(white, weigh, stream(seed, *names, "centre"))
@@ -110,6 +110,8 @@ def centred(white: White, weigh: Callable, rng) -> White:
 
 def _weights(log_density, pool, bar, white: White, z) -> np.ndarray:
     """Log density (n,) over the standard normal's at z (n, size), -inf where not a number."""
+    bar.total = (bar.total or 0) + -(-len(z) // BLOCK) * BLOCK  # as far as is known by now
+    bar.refresh()
     theta = white.theta(z)
     padded = np.concatenate([theta, np.repeat(theta[:1], -len(z) % BLOCK, axis=0)])
     parts = []
