@@ -336,6 +336,26 @@ def test_a_recording_that_says_little(sound):
     assert trust.reasons_of_motion(slow, found) == []
 
 
+def test_positions_known_worse_than_drawn(sound):
+    """Neither their size nor where the search ended is a reason then."""
+    drawn = replace(sound, accelerometer_position=4.2 * sound.accelerometer_position)
+    found = xr.Dataset(
+        {"position": (("accelerometer", "axis"), sound.relative_positions())},
+        attrs={"model": "papers", "residual_ratio": 1.0, "converged": 0},
+    )
+    one = np.eye(3 * len(sound.accelerometer_labels)) * sound.position_prior_sd**2
+    known, little = (
+        trust.reasons_of_calibration(
+            drawn, found.assign(position_covariance=(("row", "column"), share * one))
+        )
+        for share in (0.01, 4.0)
+    )
+    assert "the array comes out 4.2 times too small" in known[0] and "converged" in known[1]
+    assert "8 s are too short: record a dozen still poses and a minute" in little[0]
+    # the drawn places, taken for found ones here, leave a residual
+    assert len(little) == 2 and "most at accelerometer" in little[1]
+
+
 def test_several_recordings_of_a_board(sound):
     found = imuarray.calibrate(sound, "papers", "gauss-newton")
     assert trust.reasons_of_calibration([sound, sound], found) == []

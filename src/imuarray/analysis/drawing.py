@@ -49,6 +49,11 @@ class Places(NamedTuple):
     prior_sd: float
     hand: int = 0
 
+    def learnt(self) -> bool:
+        """Whether the positions are known better than by the drawing."""
+        coordinates = 3 * (len(self.found) - 1)
+        return float(np.trace(self.covariance)) < coordinates * self.prior_sd**2
+
     def size(self) -> float:
         """Extent found over the nominal one."""
         return float(np.linalg.norm(centred(self.found)) / np.linalg.norm(centred(self.nominal)))
@@ -106,7 +111,9 @@ def departures(places: Places) -> str | None:
              chdtrc(3, turned), *chdtrc(3, alone)]  # fmt: skip
     if len(tests) * min(tests) >= ALARM:
         return None
-    return another_size(places) or _explained(places) or _unnamed(places, alone, tests[0])
+    if (size := another_size(places)) or not places.learnt():
+        return size  # of what is known worse than by the drawing, only a unit's factor tells
+    return _explained(places) or _unnamed(places, alone, tests[0])
 
 
 def _each(weight, off) -> np.ndarray:
@@ -117,11 +124,16 @@ def _each(weight, off) -> np.ndarray:
 
 
 def another_size(places: Places) -> str | None:
-    """One sentence where the array is the drawn one at quite another size, or None."""
+    """One sentence where the array is the drawn one at quite another size, or None.
+
+    Positions that the recording hardly tells may have any size: then only that of a mistake.
+    """
     size, drawn = places.size(), centred(places.nominal)
     off = np.linalg.norm(centred(places.found) / size - drawn) / np.linalg.norm(drawn)
     far = abs(size_of(places)[0] - 1) > FAR * size_of(places)[1]
-    return size_words(size) if far and off < ALIKE and not SIZES[0] < size < SIZES[1] else None
+    if not (far and off < ALIKE) or SIZES[0] < size < SIZES[1]:
+        return None
+    return size_words(size) if places.learnt() or _mistake(size) else None
 
 
 def size_words(size: float) -> str:
@@ -129,10 +141,13 @@ def size_words(size: float) -> str:
     small = size < 1
     said = f"the array comes out {(1 / size if small else size):.4g} times too "
     said += "small" if small else "large"
-    for factor, cause, power in MISTAKES:
-        if abs(np.log(size / factor)) < 0.2:
-            return f"{said} ({power}): {cause}"
+    if found := _mistake(size):
+        return f"{said} ({found[2]}): {found[1]}"
     return f"{said}: a unit of the rates, of the specific force or of the nominal positions?"
+
+
+def _mistake(size: float) -> tuple[float, str, str] | None:
+    return next((one for one in MISTAKES if abs(np.log(size / one[0])) < 0.2), None)
 
 
 def _explained(places: Places) -> str | None:

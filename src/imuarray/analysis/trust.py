@@ -26,6 +26,7 @@ OTHER = 1.2  # times less residual elsewhere; 1.003 at most for the right board,
 SHRUNK = 1.0  # sds: 95 % intervals then cover 83 %
 FEW = 20  # samples
 UNIT = re.compile(r"\bin \S+ declared ")  # in a reason that names a unit
+SHORT = 60.0  # s
 SAME = 0.1  # relative difference of rates, up to which they are those of one recording
 
 
@@ -36,14 +37,17 @@ def reasons_of_calibration(
 
     The root first. A unit that is named is the root of the rest, which is left out but for what is
     ``known`` already; else a recording that says little, then what is known, then what follows.
+    That the search ends nowhere follows from either.
     """
     several = [recordings] if isinstance(recordings, Recording) else list(recordings)
     found: dict[str, list[str]] = {}
+    little: list[str] = []
     limit = RESIDUAL if _is_papers(calibration) else TRIAD
     for number, recording in enumerate(several, 1):
         places = _places(recording, calibration["position"].to_numpy(), _covariance(calibration))
         residual = _residuals(recording, calibration, places)
-        little = _little(recording, places) if len(several) == 1 else []
+        if len(several) == 1:
+            little = _little(recording, places)
         judged = _judged(recording, places, residual, limit)
         units = [reason for reason in judged if UNIT.search(reason)]
         for reason in [*units, *known] if units else [*little, *known, *judged]:
@@ -51,7 +55,7 @@ def reasons_of_calibration(
     return [
         reason if len(whose) == len(several) else f"recording {', '.join(whose)}: {reason}"
         for reason, whose in found.items()
-    ] + ([] if any(map(UNIT.search, found)) else _not_converged(calibration.attrs))
+    ] + ([] if little or any(map(UNIT.search, found)) else _not_converged(calibration.attrs))
 
 
 def reasons_of_posterior(
@@ -177,8 +181,15 @@ def _little(recording: Recording, places: Places) -> list[str]:
         return []
     return [
         f"the recording says little of the positions: they are known to {1e3 * rms:.2g} mm by it,"
-        f" to {1e3 * prior:.2g} mm by the drawing; turn the array faster, and about all axes"
+        f" to {1e3 * prior:.2g} mm by the drawing; {_more(recording)}"
     ]
+
+
+def _more(recording: Recording) -> str:
+    seconds = float(np.ptp(recording.time))
+    if seconds < SHORT:
+        return f"{seconds:.2g} s are too short: record a dozen still poses and a minute of twisting"
+    return "turn the array faster, and about all axes"
 
 
 def _elsewhere(moving: Recording, places: Places) -> list[str]:

@@ -48,10 +48,11 @@ def facts(board: Board) -> str:
     """The log in a line."""
     time, calibration = board.recording.time, board.calibration
     rate, count = 1 / np.median(np.diff(time)), len(board.recording.accelerometer_labels)
-    poses = 0 if isinstance(board.first_order, str) else len(board.first_order.poses)
+    found = board.first_order
+    still = "" if isinstance(found, str) else f" {len(found.poses)} still poses;"
     return (
         f"{len(time)} samples of {count} IMUs at {rate:.4g} Hz, {time[-1] - time[0]:.1f} s;"
-        f" {poses} still poses; positions from {calibration.attrs['samples']} moving samples, whose"
+        f"{still} positions from {calibration.attrs['samples']} moving samples, whose"
         f" residual is {misfit(calibration):.2f} times the declared noise{_shaken(calibration)}."
     )
 
