@@ -18,9 +18,10 @@ from imuarray.analysis.board import board
 from imuarray.analysis.trust import reasons_of_calibration
 from imuarray.cli import main
 from imuarray.commands.board import answer
+from imuarray.commands.calibrate import position_lines
 from imuarray.diagnosis.plain import Sizes, plain
 from imuarray.report.board import html, write_board
-from imuarray.report.board_words import advice
+from imuarray.report.board_words import advice, facts, turned, verdict
 from imuarray.report.excitation import missing
 from tests.browser import in_browser, needs_browser
 
@@ -147,6 +148,28 @@ def test_without_still_poses_the_page_says_what_is_missing(found, no_pictures):
     assert "How each sensor is turned" not in page
 
 
+def test_an_accelerometer_with_other_axes_than_declared_is_told_from_its_gyroscope(found):
+    matrix = found.first_order.triads.matrix.copy()
+    matrix[1] = matrix[1] @ np.diag([-1.0, -1.0, 1.0])
+    odd = found.first_order
+    odd = found._replace(first_order=replace(odd, triads=replace(odd.triads, matrix=matrix)))
+    (said,) = turned(odd)
+    assert re.match(r"Accelerometer 2 is turned by 1(79|80)\.\d degrees .*gyroscope 2 is not", said)
+    assert said in answer(odd, Path()) and "Nothing speaks" not in verdict(odd)
+    assert turned(found) == [] and "Nothing speaks" in verdict(found)
+
+
+def test_sds_have_a_unit_that_fits_and_the_frame_its_cost(found, page):
+    wide = found.calibration.copy()
+    wide["position_covariance"] = 1e6 * wide["position_covariance"]
+    lines = position_lines(wide)
+    assert "(sd mm)" in lines[0] and "e+" not in "".join(lines)
+    assert "(sd um)" in position_lines(found.calibration)[0]
+    far = np.linalg.norm(found.calibration["position"], axis=1).max()
+    size = re.search(r"not the board\S+s edges: .* away by ([\d.]+)\sµm", words(page)).group(1)
+    assert float(size) == pytest.approx(1e6 * np.radians(0.1) * far, rel=0.05)
+
+
 def test_an_error_leaves_the_folder_as_it_was(found, tmp_path, monkeypatch, no_pictures):
     (tmp_path / "report.html").write_text("mine")
 
@@ -207,6 +230,8 @@ def test_what_limits_is_said_and_shocks_are_not_misfit(found, no_pictures):
     assert "imuarray diagnose" in words(html(found._replace(calibration=rough)))
     for kind in ("accelerometer", "gyroscope"):
         rough[f"{kind}_smooth_residual"] = (kind,), np.array([0.9, 0.9, 0.9, 2.0])
+    quiet = rough.assign_attrs(residual_ratio=0.91)
+    assert "shocks" not in facts(found._replace(calibration=quiet))
     page = words(html(found._replace(calibration=rough)))
     assert "residual is 0.90 times the declared noise where the motion is smooth (11 times" in page
     assert "imuarray diagnose" not in page
@@ -229,6 +254,13 @@ def sizes(rows, components=("value",), sd=1e-6):
         (name, str(k)): (value, sd)
         for k, row in enumerate(rows, 1) for name, value in zip(components, row, strict=True)
     }, [str(k + 1) for k in range(len(rows))])  # fmt: skip
+
+
+def test_a_lag_within_two_sds_is_none():
+    (none,) = plain("gyroscope_delay", sizes([[1.4e-5]] * 3, sd=1.7e-5))
+    assert none.startswith("no lag seen") and "0.017 ms" in none
+    (some,) = plain("gyroscope_delay", sizes([[1.4e-5]] * 3, sd=1e-6))
+    assert "run ahead of" in some
 
 
 def test_plain_words_hold_one_against_the_others():

@@ -91,7 +91,7 @@ def report(found: dict, average: float) -> list[str]:
     if "off_the_rail" in found:
         lines.append(
             f"gyroscopes averaged, off the rail: sd {np.degrees(average):.3g} deg/s (angular rate,"
-            " noise alone; the fused sds have what the calibration leaves uncertain as well)"
+            " noise alone)"
         )
     for name in ("off_the_rail", "at_the_rail"):
         if name in found:
@@ -101,6 +101,10 @@ def report(found: dict, average: float) -> list[str]:
                 f" {np.degrees(acceleration):.3g} deg/s^2, {force:.3g} m/s^2"
                 " (angular rate, angular acceleration, force)"
             )
+    lines.append(
+        "use angular_rate and specific_force, the fused ones, even where the average's sd is less:"
+        " theirs count what the calibration leaves uncertain; the average has that error uncounted"
+    )
     if found["not_converged"]:
         lines.append(f"NOT converged at {found['not_converged']} samples")
     return lines

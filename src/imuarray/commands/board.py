@@ -29,8 +29,10 @@ def answer(found: Board, folder: Path) -> list[str]:
     lines = [said.verdict(found)]
     if calibration.sizes["accelerometer"] <= TABLE:
         lines += position_lines(calibration)
-    causes = [] if found.reasons else said.causes(calibration)
-    lines += [f"Known worst: {said.weakest(calibration)}.", said.facts(found), *causes[:CAUSES]]
+    turned = said.turned(found)
+    causes = turned if found.reasons else turned + said.causes(calibration)
+    lines += [f"Least well known direction: {said.weakest(calibration)}.", said.facts(found)]
+    lines += causes[:CAUSES]
     if len(causes) > CAUSES:
         lines.append(f"What else the sensors do ({len(causes) - CAUSES} more) is on the page.")
     steps = [f"- {step}" for step in said.advice(found, folder)[:STEPS]]

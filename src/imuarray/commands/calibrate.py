@@ -7,6 +7,7 @@ from imuarray.analysis.calibration import calibrate as calibrated
 from imuarray.analysis.model import assumed
 from imuarray.analysis.trust import reasons_of_calibration
 from imuarray.commands.output import Output
+from imuarray.diagnosis.quantities import number
 from imuarray.estimation.informative import position_sds, weakest_of
 from imuarray.model.effects import KINDS
 from imuarray.provenance import trust, write_netcdf
@@ -62,15 +63,13 @@ def report(dataset: xr.Dataset) -> str:
 
 def position_lines(dataset: xr.Dataset) -> list[str]:
     """A line for each triad under a head."""
-    lines = ["triad   x mm      y mm      z mm    (sd um)"]
-    rows = (
-        dataset["accelerometer"].to_numpy(),
-        dataset["position"].to_numpy(),
-        position_sds(dataset),
-    )
+    sds = position_sds(dataset)
+    unit, factor = ("um", 1e6) if sds.max() < 1e-3 else ("mm", 1e3)
+    lines = [f"triad   x mm      y mm      z mm    (sd {unit})"]
+    rows = dataset["accelerometer"].to_numpy(), dataset["position"].to_numpy(), sds
     for label, row, sd in zip(*rows, strict=True):
         values = "  ".join(f"{1e3 * value:8.4f}" for value in row)
-        lines.append(f"{label:>5} {values}    {', '.join(f'{1e6 * value:.2g}' for value in sd)}")
+        lines.append(f"{label:>5} {values}    {', '.join(number(factor * x, 2) for x in sd)}")
     return lines
 
 

@@ -14,6 +14,7 @@ from imuarray.model.effects import known_effect
 
 OUT = 5.0  # sds, and times the usual distance from the median, from which one stands out
 SURE = 3.0  # sds of a single turn that is spoken of
+SEEN = 2.0  # sds of a lag
 FEW = 4  # IMUs that are spoken of one by one
 
 
@@ -93,8 +94,10 @@ def _lag(sizes: Sizes) -> list[str]:
     usual = float(np.mean(values[~out]))
     side = "run ahead of" if usual > 0 else "lag behind"
     error = float(np.sqrt(np.mean(sds[~out] ** 2)))
-    size = plus_minus(1e3 * abs(usual), 1e3 * error)
-    said = [f"the gyroscopes {side} the accelerometers by {size} ms"]
+    size = f"{plus_minus(1e3 * abs(usual), 1e3 * error)} ms"
+    said = [f"the gyroscopes {side} the accelerometers by {size}"]
+    if abs(usual) < SEEN * error:
+        said = [f"no lag seen between gyroscopes and accelerometers ({size})"]
     for k in np.flatnonzero(out):
         own = plus_minus(1e3 * abs(values[k]), 1e3 * sds[k])
         side = "ahead of" if values[k] > 0 else "behind"

@@ -99,17 +99,40 @@ def gyroscope_lines(maps: Gyroscopes | None, recording: Recording) -> list[str]:
 
 
 def turned_lines(found: FirstOrder, recording: Recording) -> list[str]:
-    """One line for each IMU that is turned against the others by more than a mount's error."""
+    """One line for each IMU or sensor whose axes are off those declared by more than a mount is."""
     against, labels = found.drawing_turn, recording.accelerometer_labels
-    angles = angle_of(nearest_orthogonal(found.triads.matrix) @ against.T)
-    lines = [
-        f"IMU {label} is turned by {np.degrees(angle):.1f} degrees"
-        for label, angle in zip(labels, angles, strict=True)
-        if angle > TURNED
-    ]
+    maps = {"accelerometer": found.triads.matrix}
+    if found.gyroscopes is not None:
+        maps["gyroscope"] = found.gyroscopes.matrix
+    angles = {
+        (kind, label): float(angle)
+        for kind, matrices in maps.items()
+        for label, angle in zip(
+            getattr(recording, f"{kind}_labels"),
+            angle_of(nearest_orthogonal(matrices) @ against.T), strict=True,
+        )
+    }  # fmt: skip
+    lines = [_turned_words(kind, k, angle, angles) for (kind, k), angle in angles.items()]
+    lines = list(dict.fromkeys(filter(None, lines)))
     if angle_of(against) > TURNED:
         lines.append(f"the drawing was turned into the axes of IMU {labels[0]}")
     return lines
+
+
+def _turned_words(kind: str, label: str, angle: float, angles: dict) -> str:
+    """Empty where it is not; an IMU's where both of its sensors are turned alike."""
+    if angle < TURNED:
+        return ""
+    other = "gyroscope" if kind == "accelerometer" else "accelerometer"
+    beside, whose, end = angles.get((other, label)), f"{kind} {label}", ""
+    if beside is not None and abs(beside - angle) < TURNED:
+        whose, angle = f"IMU {label}", angles["accelerometer", label]
+    elif beside is not None and beside < TURNED:
+        end = f" ({other} {label} is not)"
+    return (
+        f"{whose} is turned by {np.degrees(angle):.1f} degrees against its declared axes{end}:"
+        " taken out; mend `axes` where they are declared"
+    )
 
 
 def residual_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:

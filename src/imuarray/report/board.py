@@ -61,8 +61,8 @@ def html(board: Board) -> str:
         advice=said.advice(board), causes=said.causes(board.calibration),
         turned=turn_table(board), positions=position_table(board.calibration), sure=SURE,
         prior=board.corrected.position_prior_sd, noise=noises(board), figures=draw(board),
-        weakest=said.weakest(board.calibration), before=said.before(board),
-        account=said.account(board),
+        weakest=said.weakest(board.calibration), frame=said.frame(board.calibration),
+        before=said.before(board), account=said.account(board),
         first_order=None if isinstance(board.first_order, str)
         else parameter_table(board.first_order, board.recording),
     )  # fmt: skip

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 SLOW = np.radians(300.0)  # rad/s rms, of motion that says little of positions
 MISFIT = 1.5  # times the noise: a residual that is looked into
+SHAKEN = 1.2  # times the smooth samples' residual: that of all is clearly above
 NOTHING = " Nothing speaks against them."
 
 
@@ -32,10 +33,28 @@ def verdict(board: Board) -> str:
     count = board.calibration.sizes["accelerometer"]
     good = "The positions" if not board.reasons else "If the answer could be trusted: positions"
     verb = "are known" if not board.reasons else "known"
+    doubted = board.reasons or misfit(board.calibration) > MISFIT or turned(board)
     return (
         f"{good} of {count} IMUs {verb} to {rms} (rms of the standard deviations; the worst"
-        f" coordinate {worst})."
-        + ("" if board.reasons or misfit(board.calibration) > MISFIT else NOTHING)
+        f" coordinate {worst})." + ("" if doubted else NOTHING)
+    )
+
+
+def turned(board: Board) -> list[str]:
+    """Sensors whose axes are not those declared."""
+    if isinstance(board.first_order, str):
+        return []
+    return [f"{first_up(line)}." for line in turned_lines(board.first_order, board.recording)]
+
+
+def frame(calibration: xr.Dataset) -> str:
+    """Whose axes positions are in, and what taking the board's edges for them would cost."""
+    far = float(np.linalg.norm(calibration["position"].to_numpy(), axis=1).max())
+    first = calibration["accelerometer"].to_numpy()[0]
+    return (
+        f"The axes are those of IMU {first}'s accelerometer (its z, then the plane of its y and z),"
+        f" not the board's edges: 0.1 degrees between them moves the IMU that is"
+        f" {size_in_words(far)} away by {size_in_words(far * np.radians(0.1))}."
     )
 
 
@@ -65,11 +84,12 @@ def misfit(calibration: xr.Dataset) -> float:
 
 
 def _shaken(calibration: xr.Dataset) -> str:
-    if "gyroscope_smooth_residual" not in calibration:
+    whole = float(calibration.attrs["residual_ratio"])
+    if "gyroscope_smooth_residual" not in calibration or whole < SHAKEN * misfit(calibration):
         return ""
-    whole = number(calibration.attrs["residual_ratio"])
     return (
-        f" where the motion is smooth ({whole} times over all: shocks are faster than the samples)"
+        f" where the motion is smooth ({number(whole)} times over all: shocks are faster than the"
+        " samples)"
     )
 
 
@@ -167,7 +187,7 @@ def before(board: Board) -> list[str]:
         " accelerometer; a few mm/s² is what good poses leave. Gravity is taken as"
         f" {found.gravity:.6g} m/s²: 0.1 % off, it makes the array 0.1 % off."
     )
-    said += [f"{line}." for line in turned_lines(found, board.recording)]
+    said += turned(board)
     if gyroscopes is not None and not isinstance(gyroscopes.common, str):
         common = gyroscopes.common
         before_, after = (
