@@ -210,7 +210,7 @@ def test_laplace_of_the_generic_likelihood(monkeypatch):
     model = ArrayModel(array, model.noise, model.effects, motion_sd=(10.0, 300.0, 20.0))
     start = np.zeros((6, 15))
     start[:, :3], start[:, 6:9] = rate.mean(axis=1), force.mean(axis=1)
-    generic = GenericLikelihood(model, measured(model, force, rate), start, draws=400, steps=8)
+    generic = GenericLikelihood(model, measured(model, force, rate), start, draws=400, steps=4)
     p = np.concatenate([array.parameters, 1e-3 * model.effect_prior_sd])
     values, density = [generic(p, rng) for _ in range(8)], jax.jit(generic.log_density)
     error = np.std(values, ddof=1) / np.sqrt(8)
