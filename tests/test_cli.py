@@ -154,49 +154,51 @@ def test_an_answer_not_to_be_trusted(calls, capsys, monkeypatch):
     assert json.loads(capsys.readouterr().out) == {"x": 1.0, "trusted": True, "reasons": []}
 
 
-def test_termination_leaves_nothing_half_written(tmp_path):
-    code = (
-        "import os, signal, sys, types; from imuarray.cli import main\n"
+def run_as_calibrate(code: str, tmp_path) -> tuple[int, str]:
+    """Status and standard error of the console script, ``code`` having defined its `command`."""
+    around = (
+        "import ctypes, os, signal, sys, threading, time, types, warnings\n"
+        "from imuarray.cli import script\n"
         "from imuarray.provenance import atomic_write\n"
-        "def command(arguments):\n"
-        "    with atomic_write(arguments.out) as temporary:\n"
-        "        temporary.write_text('half')\n"
-        "        os.kill(os.getpid(), signal.SIGTERM)\n"
-        "        signal.pause()\n"
-        "m = sys.modules['imuarray.commands.calibrate'] = types.ModuleType('m')\n"
-        "m.calibrate = command\n"
-        "sys.exit(main(['calibrate', sys.executable, '--out', 'cal.nc']))"
-    )
-    call = [sys.executable, "-c", code]
-    run = subprocess.run(call, capture_output=True, text=True, cwd=tmp_path)
-    assert (run.returncode, run.stderr) == (130, "imuarray: interrupted (SIGTERM)\n")
-    assert not list(tmp_path.iterdir())
-
-
-def test_termination_does_not_wait_for_compiled_code(tmp_path):
-    code = (
-        "import ctypes, os, signal, sys, threading, types; from imuarray.cli import script\n"
-        "def command(arguments):\n"
-        "    kill = lambda: os.kill(os.getpid(), signal.SIGTERM)\n"
-        "    threading.Timer(0.1, kill).start()\n"
-        "    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})\n"  # would end the sleep
-        "    ctypes.CDLL(None).sleep(60)\n"
+        # a job in a shell's background ignores it
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        f"{code}"
         "m = sys.modules['imuarray.commands.calibrate'] = types.ModuleType('m')\n"
         "m.calibrate = command\n"
         "sys.argv = ['imuarray', 'calibrate', sys.executable, '--out', 'cal.nc']\n"
         "script()"
     )
-    call = [sys.executable, "-c", code]
+    call = [sys.executable, "-c", around]
     run = subprocess.run(call, capture_output=True, text=True, cwd=tmp_path, timeout=15)
-    assert (run.returncode, run.stderr) == (130, "imuarray: interrupted (SIGTERM)\n")
+    return run.returncode, run.stderr
+
+
+def test_termination_leaves_nothing_half_written(tmp_path):
+    code = (
+        "def command(arguments):\n"
+        "    with atomic_write(arguments.out) as temporary:\n"
+        "        temporary.write_text('half')\n"
+        "        os.kill(os.getpid(), signal.SIGTERM)\n"
+        "        signal.pause()\n"
+    )
+    assert run_as_calibrate(code, tmp_path) == (130, "imuarray: interrupted (SIGTERM)\n")
+    assert not list(tmp_path.iterdir())
+
+
+def test_termination_does_not_wait_for_compiled_code(tmp_path):
+    code = (
+        "def command(arguments):\n"
+        "    kill = lambda: os.kill(os.getpid(), signal.SIGTERM)\n"
+        "    threading.Timer(0.1, kill).start()\n"
+        "    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})\n"  # would end the sleep
+        "    ctypes.CDLL(None).sleep(60)\n"
+    )
+    assert run_as_calibrate(code, tmp_path) == (130, "imuarray: interrupted (SIGTERM)\n")
 
 
 def test_an_interrupt_that_python_drops_comes_again(tmp_path):
     """In a destructor nothing can be raised."""
     code = (
-        "import os, signal, sys, time, types; from imuarray.cli import script\n"
-        # a job in a shell's background ignores it
-        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "class Deaf:\n"
         "    def __del__(self):\n"
         "        os.kill(os.getpid(), signal.SIGINT)\n"
@@ -204,14 +206,8 @@ def test_an_interrupt_that_python_drops_comes_again(tmp_path):
         "def command(arguments):\n"
         "    Deaf()\n"
         "    time.sleep(20)\n"
-        "m = sys.modules['imuarray.commands.calibrate'] = types.ModuleType('m')\n"
-        "m.calibrate = command\n"
-        "sys.argv = ['imuarray', 'calibrate', sys.executable, '--out', 'cal.nc']\n"
-        "script()"
     )
-    call = [sys.executable, "-c", code]
-    run = subprocess.run(call, capture_output=True, text=True, cwd=tmp_path, timeout=15)
-    assert (run.returncode, run.stderr) == (130, "imuarray: interrupted\n")
+    assert run_as_calibrate(code, tmp_path) == (130, "imuarray: interrupted\n")
 
 
 def test_no_message_reaches_the_terminal_as_a_command(calls, capsys, monkeypatch):
@@ -220,16 +216,10 @@ def test_no_message_reaches_the_terminal_as_a_command(calls, capsys, monkeypatch
     assert "'a\\x1b[2J\\x07\\x9b\\udc80'" in error_line(capsys)
 
 
-def test_a_warning_is_one_line():
+def test_a_warning_is_one_line(tmp_path):
     """In a process of its own: pytest collects warnings before they are printed."""
-    code = (
-        "import sys, types, warnings; from imuarray.cli import main\n"
-        "m = sys.modules['imuarray.commands.calibrate'] = types.ModuleType('m')\n"
-        "m.calibrate = lambda a: warnings.warn('a gap\\nin time', stacklevel=1)\n"
-        "sys.exit(main(['calibrate', sys.executable, '--out', 'cal.nc']))"
-    )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert (run.returncode, run.stderr) == (0, "imuarray: warning: a gap in time\n")
+    code = "def command(arguments):\n    warnings.warn('a gap\\nin time', stacklevel=1)\n"
+    assert run_as_calibrate(code, tmp_path) == (0, "imuarray: warning: a gap in time\n")
 
 
 def test_warnings_are_left_as_they_were(calls):
