@@ -21,7 +21,7 @@ UNITS = {
 }  # fmt: skip
 
 
-SLOWEST, FASTEST = 5.0, 5e4  # Hz, of an IMU that is to show a motion of the hand
+SLOWEST, FASTEST = 2.0, 5e4  # Hz, of an IMU that is to show a motion of the hand
 
 
 def require_plausible_rate(time, where: str, declared: object = "") -> None:
