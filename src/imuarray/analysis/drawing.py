@@ -111,8 +111,8 @@ def departures(places: Places) -> str | None:
              chdtrc(3, turned), *chdtrc(3, alone)]  # fmt: skip
     if len(tests) * min(tests) >= ALARM:
         return None
-    if (size := another_size(places)) or not places.learnt():
-        return size  # of what is known worse than by the drawing, only a unit's factor tells
+    if (unit := another_size(places)) or not places.learnt():
+        return unit  # of what is known worse than by the drawing, only a unit's factor tells
     return _explained(places) or _unnamed(places, alone, tests[0])
 
 
