@@ -13,8 +13,8 @@ from imuarray.diagnosis.reading_effects import Structural
 LIMIT = -7.5
 
 
-def peak(imu, kind=0, inward=0.0, others=4.0, apart=0.0):
-    return Peak(imu, kind, None, 30.0, inward, others, apart)
+def peak(imu, kind=0, inward=0.0, others=4.0, apart=0.0, ties=1):
+    return Peak(imu, kind, np.arange(9).reshape(3, 3) < ties, 30.0, inward, others, apart)
 
 
 def quiet(rng):
@@ -28,6 +28,13 @@ def test_one_that_falls_short_far_more_than_any_other_reading():
     found[3] = peak(3, 0, 9.0, 4.0, 9.0)
     hit, log_p = clipped(found, LIMIT)
     assert [p.imu for p in hit] == [3] and log_p < -30
+
+
+def test_two_at_one_value_need_not_stand_out_as_far():
+    found = quiet(np.random.default_rng(1))
+    for ties, hits in (1, []), (2, [3]):
+        found[3] = peak(3, 0, 5.0, 4.0, 5.0, ties)
+        assert [p.imu for p in clipped(found, LIMIT)[0]] == hits
 
 
 @pytest.mark.parametrize(

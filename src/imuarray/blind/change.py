@@ -123,6 +123,8 @@ EFFECTS: dict[str, Effect] = {}
 def effect(unit: str, low: float, high: float, everywhere: bool = False, **entry):
     """Register a function under its own name; it returns the keyword arguments of a Change.
 
+    ``sensors`` among them where not all that were asked for are affected.
+
     ``everywhere``: the effect is on all IMUs, whatever sensors are asked for; ``entry``: other
     fields of `Effect`.
     """
@@ -137,7 +139,7 @@ def effect(unit: str, low: float, high: float, everywhere: bool = False, **entry
                 )
             chosen = tuple(known) if everywhere else chosen
             parts = function(scene, rng, chosen, float(size))
-            return Change(function.__name__, chosen, float(size), **parts)
+            return Change(function.__name__, **{"sensors": chosen, "size": float(size)} | parts)
 
         draw.__doc__, draw.__name__ = function.__doc__, function.__name__
         EFFECTS[function.__name__] = Effect(draw, unit, low, high, **entry)

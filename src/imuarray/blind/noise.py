@@ -127,9 +127,12 @@ def coloured_noise(scene, rng, sensors, size):
 
 @effect("1", 0.05, 0.4, limit=0.95)
 def saturation(scene, rng, sensors, size):
-    """Clipped at (1 - size) times the largest reading, below the declared range."""
+    """Clipped at (1 - size) times the largest reading, below the declared range.
+
+    The others of the sensors, which never come to that rail, are not affected.
+    """
     kinds = which_kinds(rng)
-    rules, said = [], {}
+    rules, said, beyond = [], {}, set()
     names = (("accelerometer_rail", UNIT_FORCE), ("gyroscope_rail", UNIT_RATE))
     known = zip(scene.ideal(), scene.limits, kinds, names, strict=True)
     for values, limit, chosen, (name, unit) in known:
@@ -138,7 +141,10 @@ def saturation(scene, rng, sensors, size):
         rules.append((lambda x, rail=rail: np.clip(x, -rail, rail)) if chosen else None)
         if chosen:
             said[name] = Parameter(rail, unit)
-    return {"parameters": said, "after": altered(sensors, Pair(*rules))}
+            beyond |= {k for k in sensors if np.abs(values[:, k]).max() > rail}
+    clipped = tuple(k for k in sensors if k in beyond) or sensors
+    after = altered(clipped, Pair(*rules))
+    return {"sensors": clipped, "parameters": said, "after": after}
 
 
 @effect("1", 1e-3, 0.1, limit=1.0, scalable=False)

@@ -52,7 +52,9 @@ def peaks(search: Search) -> list[Peak]:
 def clipped(found: list[Peak], limit: float) -> tuple[list[Peak], float]:
     """Those that fall short far more than anything else does, or all of a kind together."""
     logs = {id(p): float(log_normal(p.inward) + np.log(len(found))) for p in found}
-    hit = [p for p in found if logs[id(p)] < limit and p.inward > SETTINGS.alone * p.others]
+    # two at one value are more than an outlier
+    least_off = {id(p): p.others * (SETTINGS.alone if p.at.sum() == 1 else 1.0) for p in found}
+    hit = [p for p in found if logs[id(p)] < limit and p.inward > least_off[id(p)]]
     least = min((logs[id(p)] for p in hit), default=0.0)
     for kind in range(len(KINDS)):
         own = [p for p in found if p.kind == kind]

@@ -71,8 +71,8 @@ def judge(readings: Readings, residual, basis) -> Noise:
     fast = fast_part(unit, readings.run)
     values = np.where(readings.exists[..., None], per_triad(fast), 1.0)
     counts = np.maximum(np.sum(np.isfinite(values), axis=-1), 1)
-    core = np.nanmedian(np.abs(values), axis=-1) / QUARTILE
-    scale = np.sqrt(np.nanmean(values**2, axis=-1))
+    core = np.maximum(np.nanmedian(np.abs(values), axis=-1) / QUARTILE, 1e-12)
+    scale = np.maximum(np.sqrt(np.nanmean(values**2, axis=-1)), 1e-12)
     far = _outliers(fast, core)
     expected = 2 * np.exp(log_normal(SETTINGS.far)) * counts
     slope, correlation = _colour(np.nan_to_num(unit), readings)
@@ -82,6 +82,8 @@ def judge(readings: Readings, residual, basis) -> Noise:
     tails = np.nanmean(values**4, axis=-1) / scale**4 - 3.0
     error = np.sqrt(np.maximum(2 + tails, 1.0) * INFLATION / counts) / 2
     sd = readings.sd * np.where(readings.exists, scale / np.sqrt(passed), 1.0)
+    # beside readings that fit nothing, a triad may come to have the motion for itself
+    sd = np.fmax(sd, SETTINGS.least_noise * readings.declared)
     return Noise(sd, error, far.sum(axis=0), expected, slope, correlation, far)
 
 

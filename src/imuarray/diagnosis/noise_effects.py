@@ -249,15 +249,20 @@ def heavy_tails(fit: Fit, noise: Noise, limit: float):
             tried[place] = imu, kind, own
             gains[place] = _tail_gain(fit, noise, imu, kind, own)
     logs = np.array([log_chi_square(max(gain, 1e-9), 2) for gain in gains]) + np.log(len(triads))
-    if logs.min() > limit:
+    pooled = {kind: _all_tails(gains[triads[:, 1] == kind]) for kind in {k for _, k, _ in tried}}
+    least = min(logs.min(), *pooled.values())
+    if least > limit:
         return None, [], []
     hits = [item for item, log_p in zip(tried, logs, strict=True) if log_p < limit]
     maybe = logs - np.log(len(triads)) < SETTINGS.maybe
-    for kind in {k for _, k, _ in hits}:
+    for kind, together in pooled.items():
         rest = (triads[:, 1] == kind) & (logs >= limit)
-        # one that has none gains nothing half the times, and one degree's chi-square else
-        less = np.sort(gains[rest])[:-1]
-        if len(less) and log_chi_square(max(less.sum(), 1e-9), len(less)) < SETTINGS.others:
+        if rest.sum() == sum(triads[:, 1] == kind):
+            alike = together < SETTINGS.others
+        else:
+            # less the largest, which the motion may have taken along from a hit
+            alike = rest.sum() > 1 and _all_tails(np.sort(gains[rest])[:-1]) < SETTINGS.others
+        if alike:
             hits += [item for item, also in zip(tried, rest, strict=True) if also]
         elif rest.any() and log_chi_square(max(gains[rest].sum(), 1e-9), 2 * rest.sum()) < limit:
             hits += [item for item, also in zip(tried, rest & maybe, strict=True) if also]
@@ -265,7 +270,15 @@ def heavy_tails(fit: Fit, noise: Noise, limit: float):
     there = {item[:2] for item in hits}
     others = [m for m, may in zip(tried, maybe, strict=True) if may and m[:2] not in there]
     imus = tuple(sorted({imu for imu, *_ in hits}))
-    return Named(TAILS, imus, float(logs.min()), *_numbers(fit, hits)), hits, others
+    return Named(TAILS, imus, float(least), *_numbers(fit, hits)), hits, others
+
+
+def _all_tails(gains) -> float:
+    """log p of several triads' tails together.
+
+    One that has none gains nothing half the times, and one degree's chi-square else.
+    """
+    return log_chi_square(max(float(gains.sum()), 1e-9), len(gains)) + np.log(len(KINDS))
 
 
 def _numbers(fit: Fit, hits):
@@ -311,33 +324,40 @@ def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Named | None
     hits, nats, numbers, logs = [], np.zeros(len(fit.residual)), {}, []
     step = float(np.median(np.diff(readings.time)))
     triads = np.argwhere(readings.exists)
-    lagged = [autocorrelation(fit, *pair) for pair in triads]
+    lagged = np.array([autocorrelation(fit, *pair) for pair in triads])
     # the common motion passes a little of one triad's autocorrelation on to the others
-    loudest = max(abs(rho) for rho, _ in lagged)
-    for (imu, kind), (rho, pairs) in zip(triads, lagged, strict=True):
+    passed = max(SETTINGS.flat, np.abs(lagged[:, 0]).max() / 5)
+    far = np.zeros(len(triads), bool)
+    for place, ((imu, kind), (rho, pairs)) in enumerate(zip(triads, lagged, strict=True)):
         slope = noise.slope[imu, kind]
         sharp = log_normal(abs(slope)) + np.log(2 * number)
         plain = log_normal(abs(rho) * np.sqrt(pairs)) + np.log(2 * number)
         log_p = min(sharp, plain if untied and alike(fit, noise, imu, kind) else 0.0)
         marked = noise.correlation[imu, kind] != 0
-        if (log_p > limit and not marked) or (
-            sharp > limit and abs(rho) < max(SETTINGS.flat, loudest / 5)
-        ):
-            continue
+        far[place] = (log_p <= limit or marked) and (sharp <= limit or abs(rho) >= passed)
+        if far[place]:
+            logs.append(float(log_p))
+    if not far.any():
+        return None
+    for kind in set(triads[far, 1]):
+        rest = (triads[:, 1] == kind) & ~far
+        own = lagged[rest]
+        pooled = log_chi_square(float(np.sum(own[:, 0] ** 2 * own[:, 1])), max(len(own), 1))
+        if len(own) and pooled < SETTINGS.others and np.median(np.abs(own[:, 0])) > passed:
+            far |= rest
+    for (imu, kind), (rho, pairs) in zip(triads[far], lagged[far], strict=True):
         hits.append((int(imu), int(kind)))
-        logs.append(float(log_p))
         name = f"{KINDS[kind]}_{readings.labels[imu]}"
         error = float(np.sqrt((1 - rho**2) / pairs))
-        numbers[f"correlation_{name}"] = (rho, error, "1")
+        numbers[f"correlation_{name}"] = (float(rho), error, "1")
         if rho > 0:
             late = -step / np.log(rho)
-            numbers[f"correlation_time_{name}"] = (late, late * error / -(rho * np.log(rho)), "s")
+            took = late * error / -(rho * np.log(rho))
+            numbers[f"correlation_time_{name}"] = (float(late), float(took), "s")
         unit = np.nan_to_num(triad(fit, imu, kind))
         unit = unit / max(unit.std(), 1e-9)
         jump = (unit[1:] - rho * unit[:-1]) ** 2 / (1 - rho**2)
         nats[1:] += np.sum(unit[1:] ** 2 - jump - np.log1p(-(rho**2)), axis=1) / 2
-    if not hits:
-        return None
     imus = tuple(sorted({imu for imu, _ in hits}))
     best = min(*logs, pooled_autocorrelation(fit, noise, lagged), 0.0)
     return Named(COLOURED, imus, best, numbers, *held_out(nats), True, ("whiteness",))

@@ -87,6 +87,9 @@ def run_procedure(
         raw = raw.select(used)
         search, base = without_shocks(search, used)
     search, tailed, in_noise = fit_heavy_tails(search, without)
+    if tailed:  # whose outliers may have hidden them
+        search, more = leave_out_clips(search, without)
+        clips = together(clips, more)
     search = fit_coloured_noise(search, without)
     say("testing what is left")
     checks = final_checks(search, tailed)

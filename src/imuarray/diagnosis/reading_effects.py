@@ -15,6 +15,8 @@ from imuarray.tails import log_poisson
 
 RAILS = "saturation"
 UNITS = ("m s-2", "rad s-1")  # of the two kinds
+SAME = 1e-9  # relative difference of equal readings
+LEAST_LOG = -700.0  # of a tail that a double holds
 TURNS = [
     np.array(signs)[:, None] * np.eye(3)[list(order)]
     for order in permutations(range(3)) for signs in product((1.0, -1.0), repeat=3)
@@ -64,22 +66,50 @@ def find_repeats(readings: Readings):
 
 
 def find_rails(readings: Readings):
-    """Readings that pile up at a value below the declared range: (causes, lost)."""
+    """Readings that pile up at a value below the declared range: (causes, lost).
+
+    In one triad, or in several of a kind that come to the same value.
+    """
     lost = np.zeros(readings.values.shape, bool)
     found, logs = [], []
-    for imu, kind in np.argwhere(readings.exists):
-        values = part(readings, kind)[:, imu]
-        kept = readings.keep[:, imu, 3 * kind : 3 * kind + 3]
-        rail, at = _pile(values, kept)
-        if rail is None:
+    for kind in range(len(KINDS)):
+        there = np.flatnonzero(readings.exists[:, kind])
+        if not len(there):
             continue
-        lost[:, imu, 3 * kind : 3 * kind + 3] = at
-        found.append((int(imu), int(kind), rail))
-        logs.append(-9.0 * (at.sum() - 1))
+        chance = len(there) * _tied(readings, kind)
+        tops, at = zip(*(_largest(_sizes(readings, imu, kind)) for imu in there), strict=True)
+        counts = np.array([here.sum() for here in at])
+        for imu, top, here in zip(there, tops, at, strict=True):
+            count = counts[np.isclose(tops, top, rtol=SAME, atol=0.0)].sum()
+            log_p = float(log_poisson(count - 1, chance) + np.log(len(there)))
+            if log_p < SETTINGS.check or _piles(_sizes(readings, imu, kind), here):
+                lost[:, imu, 3 * kind : 3 * kind + 3] = here
+                found.append((int(imu), kind, top))
+                logs.append(float(np.clip(log_p, LEAST_LOG, SETTINGS.check)))
     if not found:
         return [], lost
     says = "readings pile up at a rail that the declared range does not give"
-    return [rails_cause(found, float(min(logs)), says)], lost
+    return [rails_cause(found, min(logs), says)], lost
+
+
+def _sizes(readings: Readings, imu: int, kind: int) -> np.ndarray:
+    """(T, 3) of a triad's readings, 0 where they do not count."""
+    kept = readings.keep[:, imu, 3 * kind : 3 * kind + 3]
+    return np.where(kept, np.abs(part(readings, kind)[:, imu]), 0.0)
+
+
+def _largest(size) -> tuple[float, np.ndarray]:
+    """The largest of sizes, and which of them are at it."""
+    top = float(size.max())
+    return top, (size >= top * (1 - SAME)) & (size > 0)
+
+
+def _tied(readings: Readings, kind: int) -> float:
+    """Share of a kind's readings that another equals: a coarse converter's are, by chance."""
+    every = max(len(readings.time) // SETTINGS.searched, 1)
+    block = np.s_[::every, :, 3 * kind : 3 * kind + 3]
+    some = np.abs(readings.values[block][readings.keep[block]])
+    return (1 + some.size - np.unique(some).size) / max(some.size, 1)
 
 
 def rails_cause(found, log_p: float, says: str) -> Structural:
@@ -94,19 +124,15 @@ def rails_cause(found, log_p: float, says: str) -> Structural:
     return Structural(RAILS, imus, log_p, numbers, f"{says} ({where})")
 
 
-def _pile(values, kept):
-    """(rail, at (T, 3)) of a triad whose largest sizes are one value over and over, or Nones."""
-    size = np.where(kept, np.abs(values), 0.0)
-    top = size.max()
-    at = size >= top * (1 - 1e-9)
+def _piles(size, at) -> bool:
+    """Whether so many of a triad's sizes (T, 3) are ``at`` the largest that it is no chance."""
     count = int(at.sum())
-    if count < SETTINGS.least_clipped or top == 0:
-        return None, None
+    if count < SETTINGS.least_clipped:
+        return False
     # a coarse converter has ties by chance: the next values below must have far fewer
-    below = np.unique(size[size < top * (1 - 1e-9)])[-5:]
-    rivals = [int(np.sum(size == value)) for value in below]
-    most = max(rivals, default=0)
-    return (top, at) if most <= 1 or count > 3 * most + 1 else (None, None)
+    below = np.unique(size[~at])[-5:]
+    most = max((int(np.sum(size == value)) for value in below), default=0)
+    return most <= 1 or count > 3 * most + 1
 
 
 def find_swaps(readings: Readings):

@@ -59,6 +59,7 @@ class Settings:
     cuts: int = 24  # instants tried at first
 
     # Noise (`noise`, `noise_effects`, `procedure`)
+    least_noise: float = 1e-3  # of the declared sd
     far: float = 4.0  # sds of a difference; beyond is an outlier's
     flat: float = 0.02  # autocorrelation too small to speak of
     bands: tuple[float, float] = (0.2, 0.35)  # of the sampling rate, where the two bands begin

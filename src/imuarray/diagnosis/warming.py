@@ -86,8 +86,8 @@ class Courses:
 def scan_warming(fit: Fit, given: Information, imus, _=None) -> list[Scanned]:
     """All IMUs' biases along the course where they gain most.
 
-    Biases of both kinds must follow it, and gain more by it than as constants: else it is no
-    thermometer.
+    Biases of both kinds must follow it, those of more than one IMU, and gain more by it than as
+    constants: else it is no thermometer.
     """
     biases = all(len(fit.columns.of(f"{kind}_bias")) for kind in KINDS)
     few = len(fit.residual) < 2 * SETTINGS.cuts or len(imus) < fit.readings.exists.all(axis=1).sum()
@@ -105,6 +105,12 @@ def scan_warming(fit: Fit, given: Information, imus, _=None) -> list[Scanned]:
         sure = log_chi_square(max(alone, 1e-9), own.sum()) < SETTINGS.likely_drift
         if not sure or alone < courses.gain(steady, own)[0]:
             return []
+    # one alone that drifts, and not the board, would do for all of it
+    owners = np.repeat(imus, len(values) // len(imus))
+    alone = max(courses.gain(course, owners == imu)[0] for imu in imus)
+    rest = max(len(values) - len(values) // len(imus), 1)
+    if log_chi_square(max(gain - alone, 1e-9), rest) > SETTINGS.likely_drift:
+        return []
     freedom = len(values) + 2
     log_p = min(log_chi_square(gain, freedom) + np.log(2 * len(PACES)), 0.0)
     each = values.reshape(len(imus), 6)
@@ -117,9 +123,12 @@ def scan_warming(fit: Fit, given: Information, imus, _=None) -> list[Scanned]:
 
 
 def maybe_warming(search, cause, own: float) -> bool:
-    """Whether the biases of all sensors may as well follow one course as be constant."""
+    """Whether the biases of all sensors of a kind may as well follow one course as be constant.
+
+    Those of the other kind, found or not, follow it as well.
+    """
     imus = [int(k) for k in np.flatnonzero(search.readings.exists.all(axis=1))]
-    if any(len(search.imus_with(f"{kind}_bias")) < len(imus) for kind in KINDS):
+    if len(search.imus_with(cause.effect)) < len(imus):
         return False
     courses = Courses(search.fit, search.given, imus, back=True)
     gain, steady = (

@@ -84,11 +84,12 @@ def gain_of(parts, ridge, values, freed, spare=None) -> tuple[float, float]:
 
     ``parts`` [(information (n, n), score (n,))] of the blocks at ``values`` (n,), ``ridge`` (n, n)
     the prior's precision. Both rivals are trained without the block, the freed parameters shrunk
-    as their score in the training blocks deserves (positive-part James-Stein). ``spare`` (n,) bool:
-    parameters that both rivals have beside the others.
+    as their score in the training blocks deserves (positive-part James-Stein, of as many as data
+    and not the prior determine). ``spare`` (n,) bool: parameters that both rivals have beside.
     """
     information, score = sum(p[0] for p in parts), sum(p[1] for p in parts)
     spare = np.zeros(len(freed), bool) if spare is None else spare
+    prior = ridge[np.ix_(freed & ~spare, freed & ~spare)]
     freed, values, gains = freed[~spare], values[~spare], []
     for part in parts:
         trained = information - part[0] + ridge, score - part[1]
@@ -98,7 +99,8 @@ def gain_of(parts, ridge, values, freed, spare=None) -> tuple[float, float]:
         found = (full + values)[freed]
         effective = _schur(trained[0], freed)
         statistic = found @ effective @ found
-        shrink = max(0.0, 1 - freed.sum() / max(statistic, 1e-300))
+        determined = freed.sum() - np.trace(np.linalg.solve(effective, prior))
+        shrink = max(0.0, 1 - determined / max(statistic, 1e-300))
         kept = _solve(*trained, values, freed, shrink * found)
         gains.append(_predicted(kept, block, slope) - _predicted(without, block, slope))
     return float(np.sum(gains)), float(np.std(gains, ddof=1) * np.sqrt(len(gains)))

@@ -1,0 +1,128 @@
+"""What all IMUs have a little of: seen together, and not as one's; and the other way round."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from imuarray.blind.cases import Case, make
+from imuarray.diagnosis import noise as noises
+from imuarray.diagnosis import noise_effects
+from imuarray.diagnosis.reading_effects import find_rails
+from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.shifts import scan_shifts
+from imuarray.diagnosis.state import Cause, Search
+from imuarray.diagnosis.warming import maybe_warming, scan_warming
+from imuarray.engine.heldout import gain_of
+from imuarray.engine.parameters import catalogue_effects, columns_of
+from imuarray.engine.readings import arrange
+
+EVERY, LIMIT = tuple(range(8)), -7.5
+
+
+def searched(effect="", imus=EVERY, sigma=None, duration=6.0):
+    """(a search with the papers' model fitted, the truth of the case)."""
+    effects = ((effect, imus),) if effect else ()
+    recording, truth = make(Case(f"all-{effect}", effects, sigma, duration=duration), 4)
+    readings, effects = arrange(recording), catalogue_effects()
+    columns = columns_of(readings.array, effects, readings.position_prior_sd)
+    return Search(readings, columns, effects, lambda text: None).fitted(), truth
+
+
+@pytest.fixture(scope="module")
+def clean():
+    return searched()[0]
+
+
+def residual_of(search, noise):
+    """(the fit with what is left of a noise (T, N, 6), what is judged of it)."""
+    made = replace(search.fit, residual=search.fit.less_motion(noise))
+    return made, noises.judge(made.readings, made.residual, made.basis)
+
+
+def test_a_rail_that_each_gyroscope_reaches_once():
+    recording, _ = make(Case("all-rail", duration=4.0), 4)
+    rail = np.sort(np.abs(recording.angular_rate).max(axis=(0, 2)))[0] * (1 - 1e-3)
+    rate = np.clip(recording.angular_rate, -rail, rail)
+    readings = arrange(replace(recording, angular_rate=rate))
+    (cause,), lost = find_rails(readings)
+    assert cause.imus == EVERY
+    assert cause.parameters["gyroscope_rail"][0] == pytest.approx(rail)
+    assert np.array_equal(lost[..., 3:], np.isclose(np.abs(rate), rail)) and not lost[..., :3].any()
+    coarse = np.round(recording.angular_rate / 0.05) * 0.05  # all gyroscopes read much the same
+    assert find_rails(arrange(replace(recording, angular_rate=coarse)))[0] == []
+
+
+def test_triads_that_move_at_one_instant():
+    search, truth = searched("position_shift", sigma=8.0)
+    (*single, whole) = scan_shifts(search.fit, search.given, list(EVERY))
+    assert whole.score.candidate.whole and whole.score.candidate.imus == EVERY
+    assert whole.score.log_p < min(LIMIT, *(one.score.log_p for one in single))
+    instant = truth["effects"][0]["parameters"]["instant"]["value"]
+    assert whole.values[3][3] == pytest.approx(instant, abs=2 * 6.0 / SETTINGS.cuts)
+
+
+def test_a_position_shift_of_none(clean):
+    found = scan_shifts(clean.fit, clean.given, list(EVERY))
+    assert all(one.score.log_p > -4.0 for one in found)
+
+
+def test_tails_of_all_accelerometers(clean):
+    rng = np.random.default_rng(3)
+    noise = rng.standard_normal(clean.fit.residual.shape)
+    assert noise_effects.heavy_tails(*residual_of(clean, noise), LIMIT)[0] is None
+    wild = rng.random(noise.shape[:2]) < 0.05
+    noise[..., :3] *= np.where(wild, 1.7, 1.0)[..., None]
+    named, hits, _ = noise_effects.heavy_tails(*residual_of(clean, noise), LIMIT)
+    assert named.imus == EVERY and {kind for _, kind, _ in hits} == {0}
+
+
+def test_a_little_colour_of_all_gyroscopes(clean):
+    rng = np.random.default_rng(5)
+    noise = rng.standard_normal(clean.fit.residual.shape)
+    noise[1:, :, 3:] += 0.08 * noise[:-1, :, 3:]
+    noise[1:, 2, 3:] += 0.06 * noise[:-1, 2, 3:]
+    named = noise_effects.coloured(*residual_of(clean, noise), LIMIT, untied=True)
+    assert named.imus == EVERY
+    assert all("gyroscope" in name for name in named.parameters)
+
+
+def test_one_that_drifts_is_no_warm_up():
+    search, _ = searched("bias_drift", (4,), 40.0)
+    assert scan_warming(search.fit, search.given, list(EVERY)) == []
+    search, _ = searched("warm_up", EVERY, 60.0)
+    (found,) = scan_warming(search.fit, search.given, list(EVERY))
+    assert found.score.candidate.imus == EVERY
+
+
+def test_small_biases_of_all_may_be_a_warm_up():
+    for sigma, may in (8.0, True), (60.0, False):
+        search, _ = searched("gyroscope_bias", EVERY, sigma)
+        cause = Cause("gyroscope_bias", EVERY, frozenset({""}), -20.0)
+        assert maybe_warming(replace(search, causes=(cause,)).refit(), cause, 0.0) is may
+
+
+def test_parameters_of_which_nothing_is_known_cost_no_gain():
+    rng = np.random.default_rng(1)
+    parts = []
+    for _ in range(6):
+        slopes = rng.standard_normal((40, 3))
+        parts.append((slopes.T @ slopes, slopes.T @ (0.05 * slopes[:, 0] + rng.normal(size=40))))
+    inner, score = (sum(part) for part in zip(*parts, strict=True))
+    values = np.linalg.solve(inner + np.eye(3), score)
+    left = [(block, slope - block @ values) for block, slope in parts]
+    wanted = gain_of(left, np.eye(3), values, np.array([True, True, False]))
+    more = [(np.pad(block, (0, 2)), np.pad(slope, (0, 2))) for block, slope in left]
+    found = gain_of(
+        more, np.eye(5), np.pad(values, (0, 2)), np.array([True, True, False, True, True])
+    )
+    assert found == pytest.approx(wanted, rel=1e-9)
+
+
+def test_a_triad_that_the_motion_follows_keeps_some_noise(clean):
+    residual = clean.fit.residual.copy()
+    residual[:, 0, :3] = 0.0
+    judged = noises.judge(clean.readings, residual, clean.fit.basis)
+    declared = clean.readings.declared
+    assert judged.sd[0, 0] == pytest.approx(SETTINGS.least_noise * declared[0, 0])
+    assert np.all(np.isfinite(judged.sd[clean.readings.exists]))
