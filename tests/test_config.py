@@ -1,6 +1,7 @@
 """The configuration: the shipped one is valid, its schema documented, mistakes one clear line."""
 
 import copy
+import re
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,7 @@ import yaml
 
 from imuarray.config import check_config, describe_schema, model_from, read_config
 from imuarray.errors import InputError
+from imuarray.geometry.read import BOARDS
 from imuarray.studies.bayes import simulate_twisting
 
 ROOT = Path(__file__).parents[1]
@@ -29,6 +31,18 @@ def test_every_leaf_of_the_shipped_config_is_described(config):
 
 def test_documentation_agrees_with_the_schema():
     assert (ROOT / "config" / "README.md").read_text() == describe_schema()
+
+
+def test_schema_knows_every_board():
+    schema = yaml.safe_load((ROOT / "src/imuarray/schemas/config.schema.yaml").read_text())
+    assert schema["properties"]["array"]["properties"]["board"]["enum"] == list(BOARDS)
+
+
+def test_cluster_groups_are_of_rules():
+    rules = "".join(path.read_text() for path in (ROOT / "workflow/rules").glob("*.smk"))
+    known = set(re.findall(r"(?m)^(?:rule|checkpoint|use rule \w+ as) (\w+)", rules))
+    profile = yaml.safe_load((ROOT / "profiles/slurm/config.yaml").read_text())
+    assert {group.partition("=")[0] for group in profile["groups"]} <= known
 
 
 def test_schema_gives_each_key_a_description():

@@ -245,7 +245,7 @@ def test_the_api_has_every_effect():
             name, *cells = line.strip("| ").split(" | ")
             rows[name.strip("`")] = cells
     # a page that ran before in this process cannot have added one: pages run in their own
-    assert set(rows) == set(EFFECTS)
+    assert set(rows) == set(EFFECTS), "docs/api.md: the table of effects"
     for name, (equation, unit, prior) in rows.items():
         effect = EFFECTS[name]
         written = effect.apply.__doc__.splitlines()[0].replace("``", "`")

@@ -6,7 +6,8 @@ import pytest
 from imuarray.engine.readings import measured
 from imuarray.errors import InputError
 from imuarray.geometry import mimu4444_corners
-from imuarray.model import ArrayModel, Noise
+from imuarray.model import EFFECTS, ArrayModel, Noise
+from imuarray.model.effects import effect
 from imuarray.motion import Motion, hand_twisting
 from imuarray.posterior.generic import GenericLikelihood
 from imuarray.posterior.likelihood import Likelihood
@@ -97,6 +98,13 @@ def test_no_reward_along_a_gauge_with_a_proper_motion_prior():
         change[name] = values[1] - values[0]
     assert change["flat"] == pytest.approx(-9 * 60 * np.log(0.97), rel=0.02)
     assert abs(change["proper"]) < 3.0
+
+
+def test_an_effect_is_drawn_against_what_there_is():
+    register = effect("far", unit="m", prior_sd=1.0, shape=lambda a, g: (a,), against="distance")
+    with pytest.raises(ValueError, match="effect far: .*'distance'"):
+        register(lambda far, instant, predicted: predicted)
+    assert "far" not in EFFECTS
 
 
 def test_unknown_effect_is_an_input_error():

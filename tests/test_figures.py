@@ -378,3 +378,5 @@ def test_captions_and_gallery():
         assert f"]({name}.png)" in page and f"[PDF]({name}.pdf)" in page and captions[name] in page
     assert "(claims.md)" in page and "## Paper 2021, table II" in page and "- T=5: ..." in page
     assert title("2017_fig3") == "Paper 2017, figure 3"
+    assert title("2017_fig10") == "Paper 2017, figure 10"
+    assert title("2017_gain") == "Paper 2017, gain"

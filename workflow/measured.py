@@ -11,7 +11,7 @@ DIAGNOSED = ("positions", "parameters", "recordings")  # tables of a board's dia
 
 # By pattern of its name, what a file of paper_figures/ copies; the first that fits counts.
 PLACES = {
-    r"\d{4}_fig\d|theory_(efficiency|convergence|size)|validation_ranks": "{scale}/figures/{name}",
+    r"\d{4}_fig\d+|theory_(efficiency|convergence|size)|validation_ranks": "{scale}/figures/{name}",
     r"\d{4}_table\d|theory_ranks|validation_(coverage|joint)": "{scale}/tables/{name}",
     "claims": "{scale}/claims/claims",
     "claims_paper": "paper/claims/claims",

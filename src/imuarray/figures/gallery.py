@@ -1,5 +1,6 @@
 """`paper_figures/README.md`: every figure and table with its caption and its parameters."""
 
+import re
 from collections.abc import Sequence
 from types import SimpleNamespace
 
@@ -34,9 +35,10 @@ def title(name: str) -> str:
     year, *words = name.split("_")
     if year == "measured":
         return f"Measured data: {' '.join(words)}"
-    kind, number = words[0][:-1], words[0][-1]
-    words = {"fig": f"figure {number}", "table": f"table {'I' * int(number)}"}
-    return f"Paper {year}, {words[kind]}"
+    if found := re.fullmatch(r"(fig|table)(\d+)", words[0]):
+        kind, number = found.groups()
+        words = ["figure", number] if kind == "fig" else ["table", "I" * int(number)]
+    return f"Paper {year}, {' '.join(words)}"
 
 
 def gallery(

@@ -162,6 +162,10 @@ class Effect:
         return [0, 1] if self.sensors == "imu" else [KINDS.index(self.sensors)]
 
 
+AGAINST = (
+    "", "specific force", "angular rate", "reading", "lever arm", "time", "angular acceleration",
+    "age", "place",
+)  # fmt: skip
 EFFECTS: dict[str, Effect] = {}  # of the mean: a model can have them
 DATA_EFFECTS: dict[str, Effect] = {}  # of the readings themselves, and of their noise
 KINDS = ("accelerometer", "gyroscope")
@@ -175,6 +179,8 @@ def effect(id, *, unit, prior_sd, shape, sensors=None, **fields):
             raise ValueError(f"effect {id!r}: expected an id without commas and spaces")
         if id in EFFECTS and not _again(EFFECTS[id].apply, function):
             raise ValueError(f"effect {id}: expected a new id, found it registered already")
+        if (what := fields.get("against", "")) not in AGAINST:
+            raise ValueError(f"effect {id}: expected against one of {AGAINST[1:]}, found {what!r}")
         prior = tuple(prior_sd) if isinstance(prior_sd, list) else prior_sd
         whose = sensors or (id.split("_")[0] if id.split("_")[0] in KINDS else "imu")
         EFFECTS[id] = Effect(id, unit, prior, shape, function, sensors=whose, **fields)

@@ -246,7 +246,8 @@ def residual_course(calibration: xr.Dataset, kind: str, axes: Axes) -> None:
     time, labels = calibration["stretch"].to_numpy(), calibration[kind].to_numpy()
     worst = np.argsort(-np.sqrt(np.mean(rms**2, axis=0)))[:WORST]
     others, top = np.setdiff1d(np.arange(rms.shape[1]), worst), max(float(rms.max()), 1.0)
-    gaps = np.flatnonzero(np.diff(time) > APART * np.median(np.diff(time))) + 1
+    steps = np.diff(time)
+    gaps = np.flatnonzero(steps > APART * np.median(steps)) + 1 if len(steps) else []
     time, rms = np.insert(time, gaps, np.nan), np.insert(rms, gaps, np.nan, axis=0)
     axes.plot(time, rms[:, others], color="0.75", linewidth=0.8)
     for number, k in enumerate(worst):
