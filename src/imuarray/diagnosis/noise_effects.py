@@ -302,16 +302,22 @@ def _tail_gain(fit: Fit, noise: Noise, imu: int, kind: int, mix: Mixture) -> flo
 
 
 def pooled_autocorrelation(fit: Fit, noise: Noise, lagged) -> float:
-    """log p of all triads' lag-one correlations (n, 2: value, pairs), 0 where spectra disagree."""
-    rho, pairs = np.asarray(lagged).T
-    statistic = float(np.sum(rho**2 * pairs))
-    slopes = noise.slope[fit.readings.exists]
-    implied = np.array([expected_ratio(value, len(fit.residual)) for value in rho])
-    root = np.sqrt(len(rho))
-    signed = np.sign(rho)
-    apart = abs(np.sum(signed * (slopes - implied))) / root
-    there = -np.sum(signed * slopes) / root
-    return log_chi_square(statistic, len(rho)) if apart < SETTINGS.agree < there else 0.0
+    """log p of lag-one correlations (n, 2: value, pairs) of a kind's triads, or of all, together.
+
+    0 where their spectra disagree.
+    """
+    kind, exists = np.argwhere(fit.readings.exists)[:, 1], fit.readings.exists
+    implied = np.array([expected_ratio(value, len(fit.residual)) for value, _ in lagged])
+    found = [0.0]
+    for chosen in (np.ones(len(kind), bool), kind == 0, kind == 1):
+        if chosen.any():
+            (rho, pairs), slopes = np.asarray(lagged)[chosen].T, noise.slope[exists][chosen]
+            signed, root = np.sign(rho), np.sqrt(len(rho))
+            apart = abs(np.sum(signed * (slopes - implied[chosen]))) / root
+            there = -np.sum(signed * slopes) / root
+            if apart < SETTINGS.agree < there:
+                found.append(log_chi_square(float(np.sum(rho**2 * pairs)), len(rho)) + np.log(3))
+    return min(found)
 
 
 def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Named | None:
@@ -337,14 +343,17 @@ def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Named | None
         far[place] = (log_p <= limit or marked) and (sharp <= limit or abs(rho) >= passed)
         if far[place]:
             logs.append(float(log_p))
-    if not far.any():
+    together = pooled_autocorrelation(fit, noise, lagged)
+    if not far.any() and together > limit:
         return None
-    for kind in set(triads[far, 1]):
+    for kind in set(triads[far, 1]) or range(len(KINDS)):
         rest = (triads[:, 1] == kind) & ~far
         own = lagged[rest]
         pooled = log_chi_square(float(np.sum(own[:, 0] ** 2 * own[:, 1])), max(len(own), 1))
         if len(own) and pooled < SETTINGS.others and np.median(np.abs(own[:, 0])) > passed:
             far |= rest
+    if not far.any():
+        return None
     for (imu, kind), (rho, pairs) in zip(triads[far], lagged[far], strict=True):
         hits.append((int(imu), int(kind)))
         name = f"{KINDS[kind]}_{readings.labels[imu]}"
@@ -359,5 +368,5 @@ def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Named | None
         jump = (unit[1:] - rho * unit[:-1]) ** 2 / (1 - rho**2)
         nats[1:] += np.sum(unit[1:] ** 2 - jump - np.log1p(-(rho**2)), axis=1) / 2
     imus = tuple(sorted({imu for imu, _ in hits}))
-    best = min(*logs, pooled_autocorrelation(fit, noise, lagged), 0.0)
+    best = min(*logs, together, 0.0)
     return Named(COLOURED, imus, best, numbers, *held_out(nats), True, ("whiteness",))

@@ -52,7 +52,8 @@ def find_repeats(readings: Readings):
         alone = np.prod((same & ~every[:, None]).mean(axis=0))
         log_p = log_poisson(every.sum(), max(min(chance, alone), 1e-9) * together.sum())
         if every.sum() >= SETTINGS.least_repeats and log_p < SETTINGS.rare_repeats:
-            lost[1:, imu, 3 * kind : 3 * kind + 3] = every[:, None]
+            # after a gap, the sample before is not at hand
+            lost[1:, imu, 3 * kind : 3 * kind + 3] = (every | ~together)[:, None]
             hit.append(int(imu))
             shares.append(every.mean())
             logs.append(log_p)
