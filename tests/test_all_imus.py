@@ -8,7 +8,7 @@ import pytest
 from imuarray.blind.cases import Case, make
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects
-from imuarray.diagnosis.reading_effects import find_rails
+from imuarray.diagnosis.reading_effects import find_rails, find_repeats
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.shifts import scan_shifts
 from imuarray.diagnosis.state import Cause, Search
@@ -51,6 +51,20 @@ def test_a_rail_that_each_gyroscope_reaches_once():
     assert np.array_equal(lost[..., 3:], np.isclose(np.abs(rate), rail)) and not lost[..., :3].any()
     coarse = np.round(recording.angular_rate / 0.05) * 0.05  # all gyroscopes read much the same
     assert find_rails(arrange(replace(recording, angular_rate=coarse)))[0] == []
+
+
+def test_a_sample_after_a_gap_may_repeat_the_one_that_is_gone():
+    recording, _ = make(Case("all-gap", duration=4.0), 4)
+    rate, force = recording.angular_rate.copy(), recording.specific_force.copy()
+    for at in (50, 120, 250, 300):  # the third just after the gap
+        rate[at, 2], force[at, 2] = rate[at - 1, 2], force[at - 1, 2]
+    readings = arrange(replace(recording, angular_rate=rate, specific_force=force))
+    there = np.ones(len(readings.time), bool)
+    there[240:250] = False
+    (cause,), lost = find_repeats(readings.select(there))
+    assert cause.imus == (2,)
+    assert list(np.flatnonzero(lost[:, 2].all(axis=1))) == [50, 120, 240, 290]
+    assert not lost[:, [0, 1, 3, 4, 5, 6, 7]].any()
 
 
 def test_triads_that_move_at_one_instant():
