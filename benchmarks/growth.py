@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
@@ -20,6 +18,7 @@ import pandas as pd
 import xarray as xr
 
 from benchmarks.board import GRAVITY, Options, draw_board
+from benchmarks.cost import cost
 from benchmarks.written import publish
 from imuarray.figures.style import PAGE, look, new_figure, styled
 from imuarray.provenance import atomic_write
@@ -38,16 +37,11 @@ COMMANDS = {
 }
 
 
-def cost(line: str, folder: Path) -> tuple[float, float]:
-    """(core seconds, peak memory in GB) of a command in a folder."""
-    environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    words = [Path(sys.executable).with_name("imuarray"), *line.split(), "--quiet"]
-    job = subprocess.Popen(words, env=environment, cwd=folder)
-    _, status, used = os.wait4(job.pid, 0)
-    job.returncode = os.waitstatus_to_exitcode(status)
-    if job.returncode not in (0, 3):
-        raise RuntimeError(f"{line}: expected exit status 0 or 3, found {job.returncode}")
-    return used.ru_utime + used.ru_stime, used.ru_maxrss / 2**20
+def spent(line: str, folder: Path) -> tuple[float, float]:
+    """(core seconds, peak memory in GB) of a command in a folder, BLAS with one thread."""
+    alone = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    found = cost(line.split(), folder, os.environ | alone)
+    return found.cores, found.memory
 
 
 def board(imus: int, length: float, commands, folder: Path) -> list[dict]:
@@ -59,9 +53,9 @@ def board(imus: int, length: float, commands, folder: Path) -> list[dict]:
         if name not in commands:
             continue
         if name == "sample":
-            cost(f"select corrected.nc --samples {round(DRAWN * length)} --out few.nc", folder)
+            spent(f"select corrected.nc --samples {round(DRAWN * length)} --out few.nc", folder)
         for _ in range(2 if length == LENGTHS[0] else 1):  # the first one may have to compile
-            seconds, memory = cost(line, folder)
+            seconds, memory = spent(line, folder)
         with xr.open_dataset(folder / "rec.nc") as recording:
             samples = recording.sizes["time"]
         samples = round(DRAWN * length) if name == "sample" else samples

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.growth import cost
+from benchmarks.growth import spent
 from benchmarks.written import publish
 from imuarray.config import model_from, read_config
 from imuarray.motion.smooth import hand_twisting
@@ -50,7 +50,7 @@ def rows(folder: Path, minutes: float):
     write_netcdf_parts(parts(samples, 1), samples, recording)
     size = recording.stat().st_size / 1e9
     for name, line in COMMANDS.items():
-        seconds, memory = cost(line, folder)
+        seconds, memory = spent(line, folder)
         yield f"| `{name}` | {minutes:g} min, {size:.2g} GB | {seconds:.0f} | {memory:.2f} |"
 
 

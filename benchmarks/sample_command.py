@@ -1,6 +1,6 @@
 """`imuarray sample` as a whole: seconds, memory and effective draws over the samples.
 
-`python benchmarks/sample_command.py [--samples 500 5000 50000] [--model papers] [--out FILE]`.
+`python -m benchmarks.sample_command [--samples 500 5000 50000] [--model papers] [--out FILE]`.
 Data of section IV-A of paper 2021, 32 triads. Each command runs twice, in a process of its own; the
 second time is taken, compiled code at hand. Core seconds are those of all threads, start-up
 included.
@@ -10,48 +10,33 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import subprocess
-import sys
 import tempfile
-import time
 from pathlib import Path
 
-from written import publish
-
+from benchmarks.cost import cost
+from benchmarks.written import publish
 from imuarray.config import read_config
 from imuarray.recording import write_recording
 from imuarray.studies.bayes import simulate_dataset
 
 HEAD = (
-    "| T | sampler | core seconds | s | MB | ESS | R-hat | Pareto's k |\n"
+    "| T | sampler | core seconds | s | GB | ESS | R-hat | Pareto's k |\n"
     "|---|---|---|---|---|---|---|---|"
 )
-
-
-def run(recording: Path, model: str) -> tuple[dict, float, float, float]:
-    """(what the command says, core seconds, seconds, MB at most) of one run."""
-    command = [sys.executable, "-m", "imuarray.cli", "sample", recording, "--model", model]
-    command += ["--json", "--quiet", "--out", recording.with_suffix(".posterior.nc")]
-    start = time.perf_counter()
-    with subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE) as process:
-        said = process.stdout.read()
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-    seconds = time.perf_counter() - start
-    if process.returncode not in (0, 3):
-        raise SystemExit(f"imuarray sample: exit status {process.returncode}")
-    return json.loads(said), usage.ru_utime + usage.ru_stime, seconds, usage.ru_maxrss / 1024
 
 
 def row(folder: Path, config, samples: int, model: str, runs: int) -> str:
     """A line of the table."""
     recording = folder / f"{samples}.nc"
     write_recording(simulate_dataset(config, samples)[0], recording)
-    said, cores, seconds, memory = [run(recording, model) for _ in range(runs)][-1]
+    words = ["sample", recording, "--model", model, "--json"]
+    words += ["--out", recording.with_suffix(".posterior.nc")]
+    used = [cost(words) for _ in range(runs)][-1]
+    said = json.loads(used.said)
     k = said.get("pareto_k")
     return (
-        f"| {samples} | {said['sampler']} | {cores:.0f} | {seconds:.0f} | {memory:.0f}"
+        f"| {samples} | {said['sampler']} | {used.cores:.0f} | {used.seconds:.0f}"
+        f" | {used.memory:.2f}"
         f" | {said['ess_min']:.0f} | {said['rhat_max']:.3f} | {'' if k is None else f'{k:.2f}'} |"
     )
 
