@@ -102,7 +102,7 @@ def sample(
         of each sample (equation (30)), with the papers' flat prior and the declared noise.
     accelerometer_noise
         Of the papers' model: sd (m/s^2) that is taken for known; by default the noise of both
-        kinds is unknown, as log-normal about what restricted maximum likelihood gives.
+        kinds is unknown, log-normal about the declared one.
     motion_prior
         ``"proper"``: angular rate and acceleration are normal of the recording's own size;
         ``"flat"``, of the papers' model: paper 2021's, which shrinks the array (docs/findings.md),

@@ -2,7 +2,7 @@
 
 For the papers' model with isotropic triads. A residual's derivative by r_k is Omega_t =
 Omega(omega)^2 + Omega(omega_dot), the same at each triad; its derivatives by the motion are affine
-in (1, r_k). So the information is Lambda (x) sum_t Omega_t Omega_t' less a matrix of rank 12, that
+in (1, r_k). So the information is Lambda (x) sum_t Omega_t' Omega_t less a matrix of rank 12, that
 of what the motion takes up: sums over samples of 12 x 12, however many triads there are.
 """
 
