@@ -11,7 +11,7 @@ from imuarray.analysis.calibration_dataset import engine_dataset
 from imuarray.engine.estimate import Recorded, estimate
 from imuarray.engine.fit import flat_parameters
 from imuarray.engine.ladder import climb, mask_of
-from imuarray.engine.linearise import reading
+from imuarray.engine.linearise import linearise, reading, seen_again
 from imuarray.engine.parameters import POSITION, columns_of
 from imuarray.engine.passes import normal_pass
 from imuarray.engine.readings import arrange, most_informative
@@ -93,6 +93,25 @@ def test_normal_equations_are_the_dense_ones():
     np.testing.assert_allclose(score / scale, slope / scale, rtol=0, atol=1e-6)
     freedom = seen.freedom.sum()
     assert freedom == pytest.approx(readings.keep.sum() - cut)
+
+
+def test_another_state_is_seen_by_the_derivatives_of_one_near_by():
+    """Where they are the same, as `linearise` sees it; where not, the residual less that motion."""
+    recording, _ = simulated(2.0)
+    readings = arrange(recording, sparse=True)
+    columns = columns_of(readings.array, ("gyroscope_scale",), readings.position_prior_sd)
+    state = Recorded.of(readings, columns).state
+    seen = linearise(readings, columns, state)
+    for field, again in zip(seen, seen_again(readings, columns, state, seen), strict=True):
+        np.testing.assert_allclose(again, field, rtol=1e-9, atol=1e-9)
+    rate, scale = state.motion[0, :3], np.full(4, 1e-3)
+    moved = state._replace(parameters=np.repeat(scale, 3))
+    again = seen_again(readings, columns, moved, seen)
+    change = np.zeros((4, 6))
+    change[:, 3:] = -1e-3 * rate / readings.sd[:, 1:]
+    basis = seen.basis[0]
+    expected = seen.residual[0].ravel() + change.ravel() - basis @ (basis.T @ change.ravel())
+    np.testing.assert_allclose(again.residual[0].ravel(), expected, rtol=1e-9, atol=1e-9)
 
 
 def test_positions_sds_and_noise_are_right():

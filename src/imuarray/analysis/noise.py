@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.analysis.model import Say, silent
+from imuarray.engine.derivatives import no_derivatives
 from imuarray.engine.fit import pick
 from imuarray.engine.linearise import (
     CHUNK,
@@ -13,7 +14,6 @@ from imuarray.engine.linearise import (
     State,
     chunk_at,
     directions_of,
-    no_derivatives,
 )
 from imuarray.engine.parameters import Columns, columns_of
 from imuarray.engine.readings import Readings, measured

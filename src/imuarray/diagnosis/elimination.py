@@ -29,7 +29,7 @@ def need(search: Search, effect: str, imus=None, among=None) -> tuple[float, int
     """(chi-square, degrees of freedom) of an adopted effect against zero, all else refitted."""
     freed = freed_places(search, effect, imus, among)
     active = np.setdiff1d(search.given.places(search.active), freed)
-    conditional = search.given.conditional(active, freed)
+    conditional = search.given.conditional(active, freed, freed)
     return search.given.test(conditional, freed)
 
 

@@ -41,6 +41,18 @@ class Scanned(NamedTuple):
     values: dict[int, np.ndarray]
 
 
+class Conditional(NamedTuple):
+    """What is left of an `Information` at the places ``of`` (k,), in order, others refitted.
+
+    ``information`` (k, k), ``score`` (k,) and the score's covariance ``meat`` (k, k).
+    """
+
+    information: np.ndarray
+    score: np.ndarray
+    meat: np.ndarray
+    of: np.ndarray
+
+
 def variants(effect: str) -> tuple[str, ...]:
     """The forms an effect is tested in."""
     return tuple(name for name, _ in EFFECTS[effect].forms) or ("",)
@@ -106,38 +118,39 @@ class Information:
         found = self.index[mask]
         return found[found >= 0]
 
-    def conditional(self, active, freed=None):
-        """Information, score and score covariance of all, given the active ones refitted.
+    def conditional(self, active, freed=None, of=None) -> Conditional:
+        """Information, score and its covariance of the places ``of``, or all, the active refitted.
 
         ``freed``: places of parameters set back to zero before.
         """
-        score = self.score
+        of = np.arange(len(self.score)) if of is None else of
+        score, square = self.score, np.ix_(active, active)
         if freed is not None and len(freed):
             score = score + self.information[:, freed] @ self.values[freed]
-        cross = self.information[:, active]
-        inner = cross[active] + self.precision[np.ix_(active, active)]
-        gain = cross @ scaled_inverse(inner)
-        left = self.information - gain @ cross.T
-        score = score - gain @ score[active]
+        cross = self.information[np.ix_(of, active)]
+        gain = cross @ scaled_inverse(self.information[square] + self.precision[square])
+        left = self.information[np.ix_(of, of)] - gain @ cross.T
+        score = score[of] - gain @ score[active]
         if self.meat is None:
-            return left, score, left
-        side = gain @ self.meat[active]
-        meat = self.meat - side - side.T + gain @ self.meat[np.ix_(active, active)] @ gain.T
-        return left, score, meat
+            return Conditional(left, score, left, of)
+        side = gain @ self.meat[np.ix_(active, of)]
+        meat = self.meat[np.ix_(of, of)] - side - side.T + gain @ self.meat[square] @ gain.T
+        return Conditional(left, score, meat, of)
 
-    def test(self, conditional, chosen):
+    def test(self, conditional: Conditional, chosen):
         """(chi-square, degrees of freedom) of the parameters at ``chosen`` places."""
-        information, score, meat = conditional
-        block = information[np.ix_(chosen, chosen)]
+        information, score, meat, of = conditional
+        mine = np.searchsorted(of, chosen)
+        block = information[np.ix_(mine, mine)]
         values, vectors, scale = scaled_eigh(block, self.scale[chosen])
         # a parameter stays within its prior: near a gauge, data alone would take it anywhere
         ridge = vectors.T @ ((self.usual[chosen] / scale**2)[:, None] * vectors)
         seen = values > np.maximum(SETTINGS.seen, np.diag(ridge))
-        along, ridge = vectors[:, seen].T @ (score[chosen] / scale), ridge[np.ix_(seen, seen)]
+        along, ridge = vectors[:, seen].T @ (score[mine] / scale), ridge[np.ix_(seen, seen)]
         if meat is information:
             spread = np.diag(values[seen])
         else:
-            spread = vectors[:, seen].T @ (meat[np.ix_(chosen, chosen)] / np.outer(scale, scale))
+            spread = vectors[:, seen].T @ (meat[np.ix_(mine, mine)] / np.outer(scale, scale))
             spread = spread @ vectors[:, seen]
         return float(along @ scaled_inverse(spread + ridge) @ along), int(seen.sum())
 

@@ -115,7 +115,7 @@ def rivals(search: Search, cause: Cause) -> list[str]:
     own_log = log_chi_square(own, len(freed))
     scores = {s.candidate.effect: s for s in reversed(score_all(given, fit_, tried, freed))}
     active = np.setdiff1d(given.places(search.active), freed)
-    left, _, _ = given.conditional(active, freed)
+    left = given.conditional(active, freed).information
     signal = left[:, freed] @ given.values[freed]
     power = given.values[freed] @ left[np.ix_(freed, freed)] @ given.values[freed]
     found = []

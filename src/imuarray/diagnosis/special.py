@@ -107,8 +107,7 @@ def placebo_gain(search, cause) -> tuple[float, float]:
     moved[rows] = flat[np.roll(rows, 1)]
     places = given.places(every)
     active = np.setdiff1d(given.places(search.active), places)
-    information, score, _ = given.conditional(active)
-    block, slope = information[np.ix_(places, places)], score[places]
+    block, slope, *_ = given.conditional(active, of=places)
 
     def nats(values):
         step = values - flat[every]

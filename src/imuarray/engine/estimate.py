@@ -159,7 +159,7 @@ def estimate(
     """
     active = movable(columns, active, [one.state for one in recorded])
     places = places_of(columns, active, len(recorded))
-    recorded, nu, length, last, moved = tuple(recorded), NORMAL, 1.0, np.inf, []
+    recorded, nu, length, last, moved = tuple(recorded), NORMAL, 1.0, None, []
     for number in range(steps):
         far = number < SETTINGS.robust_first
         recorded, passes = _passed(recorded, columns, active, int(far))
@@ -181,8 +181,10 @@ def estimate(
         moved.append(float(np.max(np.abs(step) / sds, initial=0.0)))
         if moved[-1] < SETTINGS.settled and change < SETTINGS.same_noise and number > 4:
             break
-        length = max(length / 2, SETTINGS.shortest) if moved[-1] > last else min(1.0, 1.5 * length)
-        last = moved[-1]
+        # full steps may alternate across a valley: half of them lead into it
+        back = last is not None and np.sum(step * last / sds**2) < 0
+        length = max(length / 2, SETTINGS.shortest) if back else min(1.0, 1.5 * length)
+        last = step
         recorded = tuple(
             replace(one, state=stepped(one.state, columns, active, length * step[place]))
             for one, place in zip(noisy, places, strict=True)

@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from imuarray.engine.derivatives import derivatives, no_derivatives
 from imuarray.engine.linearise import (
     CHUNK,
     THREADS,
     Eliminated,
     RoughPrior,
     State,
-    derivatives,
     directions_of,
     linearise,
-    no_derivatives,
+    seen_again,
     through_of,
 )
 from imuarray.engine.parameters import POSITION, Columns, columns_of, prior_precision
@@ -97,20 +97,7 @@ class Fit:
 
     def normal(self, chosen, part=slice(None)) -> tuple[np.ndarray, np.ndarray]:
         """Information (n, n) and score (n,) of the ``chosen`` (N, m) bool, of some samples."""
-        mask, (first, last, _) = chosen[:, self.wanted], part.indices(len(self.residual))
-
-        def over(starts):
-            information, score = np.zeros((mask.sum(), mask.sum())), np.zeros(mask.sum())
-            for start in starts:  # what is made of it is small
-                rows = slice(start, min(start + CHUNK, last))
-                inner, slope = normal(self, mask, rows)
-                information += inner
-                score += slope
-            return information, score
-
-        with ThreadPoolExecutor(THREADS) as pool:
-            found = list(pool.map(over, np.array_split(np.arange(first, last, CHUNK), THREADS)))
-        return sum(inner for inner, _ in found), sum(slope for _, slope in found)
+        return summed_normal(self, chosen[:, self.wanted], part)
 
     def through(self, columns) -> np.ndarray:
         """(T, N, D, n) some columns' coordinates in the motion's basis."""
@@ -148,12 +135,31 @@ def seen_through(whitened, basis, chosen):
             block = block[..., chosen[imu]]
         places = slice(counts[:imu].sum(), counts[: imu + 1].sum())
         own = np.swapaxes(basis[:, 6 * imu : 6 * imu + 6], 1, 2)
-        np.matmul(own, block, out=through[..., places])
+        through[..., places] = (
+            own @ block
+        )  # straight into a part, the product is eight times slower
         blocks.append((imu, places, block))
     return through, blocks
 
 
-def normal(seen, chosen, part=slice(None)):
+def summed_normal(seen, chosen, part=slice(None)):
+    """What `normal` gives of many samples, chunk by chunk: what is made of each is small."""
+    first, last, _ = part.indices(len(seen.residual))
+
+    def over(starts):
+        information, score = np.zeros((chosen.sum(), chosen.sum())), np.zeros(chosen.sum())
+        for start in starts:
+            inner, slope = normal(seen, chosen, slice(start, min(start + CHUNK, last)))
+            information += inner
+            score += slope
+        return information, score
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        found = list(pool.map(over, np.array_split(np.arange(first, last, CHUNK), THREADS)))
+    return sum(inner for inner, _ in found), sum(slope for _, slope in found)
+
+
+def normal(seen, chosen, part):
     """Information (n, n) and score (n,) of the chosen parameters, motion projected out.
 
     ``seen``: an `Eliminated` or a `Fit`.
@@ -162,15 +168,21 @@ def normal(seen, chosen, part=slice(None)):
     course = np.empty((*seen.unexpected[part].shape, through.shape[2]))
     for imu, places, _ in blocks:
         course[..., places] = seen.course[part, :, imu][..., chosen[imu]]
-    through += seen.expected[part] @ course
+    if course.shape[1]:
+        through += seen.expected[part] @ course
     flat, prior = (x.reshape(x.shape[0] * x.shape[1], x.shape[2]) for x in (through, course))
-    information, score = prior.T @ prior - flat.T @ flat, prior.T @ seen.unexpected[part].ravel()
-    for imu, places, block in blocks:
+    information = prior.T @ prior - flat.T @ flat
+    for _, places, block in blocks:
         own = block.reshape(-1, block.shape[-1])
         information[places, places] += own.T @ own
-        # the residual is orthogonal to the motion already
-        score[places] += own.T @ seen.residual[part, imu].ravel()
-    return information, score
+    return information, score_of(seen, chosen, part)
+
+
+def score_of(seen, chosen, part=slice(None)):
+    """Score (n,) of the chosen parameters; the residual is orthogonal to the motion already."""
+    score = np.einsum("tkim,tki->km", seen.whitened[part], seen.residual[part])
+    score += np.einsum("tdkm,td->km", seen.course[part], seen.unexpected[part])
+    return score[chosen]
 
 
 def fit(
@@ -196,13 +208,17 @@ def search_optimum(readings, columns, active, state, smooth, rough):
     precision = prior_precision(columns, active)
     wanted = np.flatnonzero(active.any(axis=0))
     few = active[:, wanted]
-    converged, last, length, seen = False, np.inf, 1.0, None
+    converged, last, length, seen, near, predicted = False, np.inf, 1.0, None, False, np.inf
     enough = SETTINGS.rough_gain if rough else SETTINGS.fine_gain
     for number in range(SETTINGS.steps):
         state = with_derivatives(readings, state, smooth)
-        seen = linearise(readings, columns, state, wanted, seen)
-        misfit = float(np.sum(seen.misfit))
-        information, score = normal(seen, few)
+        if near:
+            seen = seen_again(readings, columns, state, seen)
+            score = score_of(seen, few)
+        else:
+            seen = linearise(readings, columns, state, wanted, seen)
+            information, score = summed_normal(seen, few)
+        misfit, former = float(np.sum(seen.misfit)), predicted
         offset = flat_parameters(columns, state)[active] - prior_mean
         score = score - precision @ offset
         step, sds = scaled_solve(information + precision, score)
@@ -214,6 +230,7 @@ def search_optimum(readings, columns, active, state, smooth, rough):
             state = advance(columns, state, active, step, few, seen, 1.0)
             converged = True
             break
+        near = predicted < SETTINGS.near_by * (former if near else misfit)
         cost = misfit + in_motion + float(offset @ precision @ offset)
         if number > 3 and abs(cost - last) < 0.3 * enough * last:
             break  # it stays around the optimum, by less than anything distinguished here

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.engine import turning
+from imuarray.engine.derivatives import no_derivatives
 from imuarray.engine.fit import flat_parameters, pick, with_derivatives
 from imuarray.engine.linearise import (
     CHUNK,
@@ -19,7 +20,6 @@ from imuarray.engine.linearise import (
     chunk_at,
     directions_of,
     motion_equations,
-    no_derivatives,
 )
 from imuarray.engine.parameters import Columns, columns_of
 from imuarray.engine.readings import Readings, by_imu, measured

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from math import factorial
 from typing import NamedTuple
 
 import numpy as np
 
+from imuarray.engine.derivatives import polynomial_derivative
 from imuarray.engine.parameters import POSITION, Columns
 from imuarray.engine.readings import Readings
 from imuarray.model import ArrayModel
-from imuarray.model.effects import Instant, Prediction, Turning
+from imuarray.model.effects import Instant, Turning
 from imuarray.model.jax64 import jax, jnp
 from imuarray.model.slopes import by_effects, stacked
 from imuarray.motion.state import Motion
@@ -215,24 +215,30 @@ def _eliminated(residual, motion, whitened, gram, bare, sd, course) -> Eliminate
 
     A prior of the motion's last k numbers, ``sd`` infinite where it has none.
     """
-    samples, count = residual.shape[:2]
     free = np.arange(gram.shape[1] - sd.shape[1], gram.shape[1])
     gram[:, free, free] += sd**-2.0
     factor = np.linalg.cholesky(gram)
     inverse = np.linalg.inv(factor)
     basis = motion @ np.swapaxes(inverse, 1, 2)
-    expected = inverse[:, :, free] / sd[:, None]
-    flat = residual.reshape(samples, -1, 1)
+    left, taken, unexpected, misfit = _less_motion(residual, basis, inverse, bare, sd)
+    volume = 2 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+    first = course.shape[1]
+    expected = (inverse[:, :, free] / sd[:, None])[..., :first]
+    return Eliminated(
+        left, whitened, basis, inverse, taken, expected, unexpected[:, :first], course, volume,
+        misfit,
+    )  # fmt: skip
+
+
+def _less_motion(residual, basis, inverse, bare, sd):
+    """(residual left, what the motion takes, what is left of its prior, misfit) of samples."""
+    expected = inverse[:, :, inverse.shape[1] - sd.shape[1] :] / sd[:, None]
+    flat = residual.reshape(len(residual), -1, 1)
     taken = np.swapaxes(basis, 1, 2) @ flat + expected @ bare[..., None]
     left = (flat - basis @ taken)[..., 0]
     unexpected = (bare[..., None] - np.swapaxes(expected, 1, 2) @ taken)[..., 0]
     misfit = np.sum(left**2, axis=1) + np.sum(unexpected**2, axis=1)
-    volume = 2 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
-    left, first = left.reshape(residual.shape), course.shape[1]
-    return Eliminated(
-        left, whitened, basis, inverse, taken[..., 0], expected[..., :first],
-        unexpected[:, :first], course, volume, misfit,
-    )  # fmt: skip
+    return left.reshape(residual.shape), taken[..., 0], unexpected, misfit
 
 
 def through_of(basis, whitened) -> np.ndarray:
@@ -258,6 +264,33 @@ def linearise(
         return chunk_at(readings, columns, state, directions, start)
 
     return _joined(one, len(readings.values), spare)
+
+
+def seen_again(readings: Readings, columns: Columns, state: State, seen: Eliminated) -> Eliminated:
+    """The residual at another state by the derivatives of one near by: a chord's, not a tangent's.
+
+    A tenth of the work of `linearise`.
+    """
+    count, first = readings.values.shape[1], seen.unexpected.shape[1]
+
+    def one(start):
+        index, x, extra, (mean, sd) = _chunk_of(readings, state, start)
+        values = np.asarray(_predicted(
+            columns.model, count, False, x, extra, readings.time[index], readings.span,
+            state.positions, state.parameters,
+        ))  # fmt: skip
+        residual = readings.weights_of(index) * (readings.values[index] - values)
+        bare = (mean - x[:, x.shape[1] - sd.shape[1] :]) / sd
+        basis, inverse = (part[start : start + CHUNK] for part in (seen.basis, seen.inverse))
+        used = len(basis)  # less than a chunk, at last
+        return _less_motion(residual[:used], basis, inverse, bare[:used], sd[:used])
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        parts = zip(*pool.map(one, range(0, len(seen.residual), CHUNK)), strict=True)
+        left, taken, unexpected, misfit = (np.concatenate(part) for part in parts)
+    return seen._replace(
+        residual=left, taken=taken, unexpected=unexpected[:, :first], misfit=misfit
+    )
 
 
 def directions_of(columns: Columns, wanted=None) -> np.ndarray:
@@ -369,65 +402,3 @@ def _joined(one, samples, spare) -> Eliminated:
     with ThreadPoolExecutor(THREADS) as pool:
         list(pool.map(put, range(CHUNK, samples, CHUNK)))
     return out
-
-
-def derivatives(readings: Readings, motion, positions) -> tuple:
-    """omega double dot, s dot and the readings' second and third derivatives, by polynomials.
-
-    Quartics over a short window of the fitted motion, whose noise is independent of the
-    residual's; the ideal readings are those of the papers' model.
-    """
-    rate, turn, force = motion[:, :3], motion[:, 3:6], motion[:, 6:9]
-    ideal = (
-        np.cross(rate[:, None], np.cross(rate[:, None], positions))
-        + np.cross(turn[:, None], positions)
-        + force[:, None]
-    )
-
-    def along(values, order):
-        return polynomial_derivative(readings.time, readings.run, values, readings.window, order)
-
-    second = Prediction(along(ideal, 2), along(rate, 2)[:, None])
-    third = Prediction(along(ideal, 3), along(rate, 3)[:, None])
-    return along(rate, 2), along(force, 1), second, third
-
-
-def polynomial_derivative(time, run, values, window, order, degree=4) -> np.ndarray:
-    """The order-th derivative by local quartics, within runs; the ends use the end's polynomial.
-
-    Zero in runs shorter than the window; ``degree``: of other polynomials.
-    """
-    step = np.median(np.diff(time))
-    taps = [polynomial_taps(window, place, order, degree) / step**order for place in range(window)]
-    out = np.zeros_like(values)
-    half = window // 2
-    edges = np.flatnonzero(np.concatenate([[True], np.diff(run) > 0, [True]]))
-    for first, last in zip(edges[:-1], edges[1:], strict=True):
-        if last - first < window:
-            continue
-        middle = last - window + 1
-        out[first + half : last - half] = sum(
-            tap * values[first + i : middle + i] for i, tap in enumerate(taps[half])
-        )
-        for pos in range(half):
-            out[first + pos] = np.tensordot(taps[pos], values[first : first + window], 1)
-            out[last - half + pos] = np.tensordot(
-                taps[half + 1 + pos], values[last - window : last], 1
-            )
-    return out
-
-
-def polynomial_taps(window, place, order, degree) -> np.ndarray:
-    """(window,) weights that give a least-squares polynomial's derivative at a place, unit steps.
-
-    Savitzky and Golay's; scipy.signal has them, and is slow to import.
-    """
-    powers = np.vander(np.arange(window) - place, degree + 1, increasing=True)
-    return factorial(order) * np.linalg.pinv(powers)[order]
-
-
-def no_derivatives(samples, accelerometers) -> tuple:
-    """All zero: a motion of which no derivative is known."""
-    nothing = np.zeros((samples, 3))
-    flat = Prediction(np.zeros((samples, accelerometers, 3)), np.zeros((samples, 1, 3)))
-    return nothing, nothing, flat, flat

@@ -24,6 +24,8 @@ class Settings:
     least_step: float = 0.02  # nats; a step predicted to gain less ends the search
     rough_gain: float = 1e-4  # of the misfit that a step must gain while causes are looked for
     fine_gain: float = 3e-6  # the same at the end
+    # of the misfit, or the last step's gain: a step that gains less leaves derivatives as they are
+    near_by: float = 0.1
     converged: float = 0.02  # of a parameter's own sd: steps below it end the search
     shortest: float = 0.2  # share of a Gauss-Newton step
     wide: float = 10.0  # prior sd of the third derivatives, in sizes of the differences near by

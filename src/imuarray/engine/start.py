@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from imuarray.engine.linearise import State, no_derivatives, polynomial_derivative
+from imuarray.engine.derivatives import no_derivatives, polynomial_derivative
+from imuarray.engine.linearise import State
 from imuarray.engine.parameters import Columns
 from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS

@@ -6,11 +6,10 @@ leave it open about the line that joins them.
 
 import numpy as np
 
+from imuarray.engine.derivatives import polynomial_derivative, polynomial_taps
 from imuarray.engine.linearise import (
     State,
     TurningPrior,
-    polynomial_derivative,
-    polynomial_taps,
 )
 from imuarray.engine.readings import Readings
 
