@@ -73,9 +73,10 @@ def run_procedure(
         return Found(
             search, base, scores, base_checks, structural, [], base_checks, 0.0, True, raw, whole
         )
-    cleaned = drop_outliers(search)
-    search = adopt(cleaned, first if cleaned is search else None).light()
-    del cleaned  # it has derivatives of its own
+    before, search = search.fit, drop_outliers(search)
+    first = first if search.fit is before else None
+    del before  # it has derivatives of its own
+    search = adopt(search, first).light()
     say("fitting to the end")
     search = eliminate(search.refit(rough=False))
     search, clips = leave_out_clips(search, without)

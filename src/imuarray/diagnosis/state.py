@@ -173,6 +173,7 @@ class Search:
             )
             readings = search.readings
             judged = noises.judge(readings, seen.residual, seen.basis)
+            del seen  # large
             change = np.max(np.abs(judged.sd / readings.sd - 1)[readings.exists])
             enough = turn > 0 or not search.clocks
             limit = SETTINGS.steady_noise
