@@ -177,7 +177,9 @@ class Search:
             change = np.max(np.abs(judged.sd / readings.sd - 1)[readings.exists])
             enough = turn > 0 or not search.clocks
             limit = SETTINGS.steady_noise
-            if (change < limit and enough) or (turn + 1 >= turns and change < 5 * limit):
+            # the noise beside a model that is far off would never be steady
+            near = change < 5 * limit or not converged
+            if (change < limit and enough) or (turn + 1 >= turns and near):
                 break
             state = estimated_again(search._with_jumps, search.columns, state, search.clocks)
             search = replace(search, readings=readings.with_sd(judged.sd))
@@ -186,7 +188,7 @@ class Search:
         search = search.ending(made, noise)
         columns = likely_sizes(made)
         steady = np.allclose(columns.prior_sd, search.columns.prior_sd, rtol=SETTINGS.steady_size)
-        if steady or not sizings:
+        if steady or not sizings or not converged:
             return search
         return replace(search, columns=columns).refit(made.state, turns, rough, sizings - 1)
 
