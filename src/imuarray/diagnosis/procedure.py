@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.ndimage import binary_dilation
 
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects
@@ -134,8 +135,9 @@ def unshaken(search: Search, without) -> tuple[list, np.ndarray]:
     shock, shaken = find_shocks(search.fit, SETTINGS.limit(SHOCK))
     if shock is None or not search.smooth:
         return [shock] if shock else [], every
+    left = binary_dilation(shaken, iterations=SETTINGS.beside_shocks)
     try:
-        return [shock], determined(search.readings.without(shaken[:, None, None]))
+        return [shock], determined(search.readings.without(left[:, None, None]))
     except InputError:  # too few are left
         return [shock], every
 
