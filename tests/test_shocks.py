@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from imuarray.blind.cases import Case, make
+from imuarray.diagnosis.procedure import unshaken
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.shocks import SHOCK, find_shocks, misfits
 from imuarray.diagnosis.state import Search
@@ -16,13 +17,18 @@ ALL = tuple(range(8))
 
 
 @cache
-def fitted(effect="", imus=ALL, size=None):
+def searched(effect="", imus=ALL, size=None):
     case = Case(f"shocks-{effect}", ((effect, imus),) if effect else (), size, duration=3.0,
                 kind="one" if effect else "clean")  # fmt: skip
     recording, truth = make(case, 3)
     readings = arrange(recording)
     columns = columns_of(readings.array, (), readings.position_prior_sd)
-    return Search(readings, columns, (), lambda text: None).fitted().fit, truth
+    return Search(readings, columns, (), lambda text: None).fitted(), truth
+
+
+def fitted(*case):
+    search, truth = searched(*case)
+    return search.fit, truth
 
 
 def test_misfit_is_that_of_the_motion_fitted_without_an_imu():
@@ -51,6 +57,14 @@ def test_shocks_are_found_where_they_are():
     assert np.all((since > -0.01) & (since < 0.2))
     assert named.parameters["share"][0] == shaken.mean() and named.gain > 0
     assert all(any(a <= t <= b for a, b in named.where) for t in time)
+
+
+def test_what_rings_beside_a_shock_is_left_out_with_it():
+    search, _ = searched("shock")
+    (named,), used = unshaken(search, ())
+    _, shaken = find_shocks(search.fit, SETTINGS.limit(SHOCK))
+    near = np.abs(np.arange(len(shaken))[:, None] - np.flatnonzero(shaken)).min(axis=1) <= 2
+    assert named.effect == SHOCK and not used[near].any() and used[~near].mean() > 0.9
 
 
 @pytest.mark.parametrize(
