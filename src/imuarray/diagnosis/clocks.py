@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from imuarray.diagnosis.scores import Candidate, Scanned, Score
+from imuarray.diagnosis.scores import Candidate, Information, Scanned, Score
 from imuarray.engine.clock_scan import CLOCK, DELAY, age_of, delay_parts, sawtooth, sawtooths
 from imuarray.engine.fit import Fit
 from imuarray.engine.gyroscope_clocks import clocks_from_gyroscopes, enough_gyroscopes
@@ -19,14 +19,15 @@ def delay_score(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     return delay_parts(fit.residual, fit.whitened[..., column], fit.through([column])[..., 0])
 
 
-def scan_clocks(fit: Fit, imus, delays: dict) -> list[Scanned]:
+def scan_clocks(fit: Fit, given: Information, imus, delays: dict) -> list[Scanned]:
     """A sawtooth age for each IMU, and for those together that show one beyond a constant delay.
 
     ``delays`` (imu tuple -> chi-square of a constant delay) is what a clock must go beyond: its
     sawtooth counts on top, and must gain a fair share of it (a delay that is large leaves a
     little that a sawtooth can use, until it is adopted).
     """
-    score, information = delay_score(fit)
+    wide = widening(fit, given)
+    score, information = (part / wide for part in delay_score(fit))
     time = fit.readings.time
     each = sawtooths(time, score, information, imus, delays)
     found = [
@@ -38,6 +39,16 @@ def scan_clocks(fit: Fit, imus, delays: dict) -> list[Scanned]:
         several = _clock_score(tuple(each), gain, delays, len(time), 1)
         found.append(Scanned(several, {imu: values for imu, (_, values) in each.items()}))
     return found
+
+
+def widening(fit: Fit, given: Information) -> np.ndarray:
+    """(N,) by how much coloured noise makes the variance of a delay's score larger."""
+    place = given.index[:, fit.columns.of(DELAY)[0]]
+    if given.meat is None:
+        return np.ones(len(place))
+    there = np.maximum(place, 0)
+    ratio = np.diag(given.meat)[there] / np.diag(given.information)[there]
+    return np.where(place < 0, 1.0, np.maximum(ratio, 1.0))
 
 
 def _clock_score(imus, gain, delays, samples, count) -> Score:

@@ -53,7 +53,7 @@ def scans(fit, given, effects, scores, taken=lambda effect: ()) -> list[Scanned]
 def scan_clocks(fit, given, imus, scores) -> list[Scanned]:
     """Clocks, beyond the constant delays that were tested."""
     delays = {s.candidate.imus: s.statistic for s in scores if s.candidate.effect == DELAY}
-    return clocks.scan_clocks(fit, imus, delays)
+    return clocks.scan_clocks(fit, given, imus, delays)
 
 
 def maybe_drift(search, cause, own) -> bool:
