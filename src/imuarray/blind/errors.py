@@ -65,6 +65,7 @@ def accelerometer_nonlinearity(curvature, field, sensors):
 def size_effect(scene, rng, sensors, size):
     """Axis i of triad k sits at r_k + d_k,i; size in metres; value (n, axis i, 3).
 
+    A triad's place r_k is the mean of its axes' places: nothing else is measured of it.
     If all are chosen, half the time each chip is made alike: its axes' places, in the chip, are
     the same nine numbers but for `UNLIKE` of them.
     """
@@ -75,6 +76,7 @@ def size_effect(scene, rng, sensors, size):
         turned = np.einsum("kij,kaj->kai", scene.array.turns, arms)
         # which of its axes lies along each of the array's
         arms = np.einsum("kia,kaj->kij", np.abs(scene.array.turns), turned)
+    arms = arms - arms.mean(axis=1, keepdims=True)
     said = {"lever_arm": Parameter(arms, "m"), "alike": Parameter(bool(alike), "1")}
     error = {"force_error": lambda field: apart(arms, field, list(sensors))}
     return {"parameters": said, **error}
