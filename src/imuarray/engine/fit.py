@@ -135,9 +135,8 @@ def seen_through(whitened, basis, chosen):
             block = block[..., chosen[imu]]
         places = slice(counts[:imu].sum(), counts[: imu + 1].sum())
         own = np.swapaxes(basis[:, 6 * imu : 6 * imu + 6], 1, 2)
-        through[..., places] = (
-            own @ block
-        )  # straight into a part, the product is eight times slower
+        # straight into its place, the product would be eight times slower
+        through[..., places] = own @ block
         blocks.append((imu, places, block))
     return through, blocks
 
