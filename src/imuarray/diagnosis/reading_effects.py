@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.engine.linearise import polynomial_derivative
+from imuarray.engine.derivatives import polynomial_derivative
 from imuarray.engine.readings import Readings, part_of
 from imuarray.model.effects import KINDS
 from imuarray.recording.record import AXES
