@@ -18,9 +18,10 @@ from imuarray.diagnosis.scores import candidates, information_at, mask_of, score
 from imuarray.diagnosis.settings import SETTINGS as CRITICAL
 from imuarray.diagnosis.state import Search
 from imuarray.engine.clock_scan import sawtooth
+from imuarray.engine.derivatives import polynomial_taps
 from imuarray.engine.fit import Fit, fit, flat_parameters, from_flat, normal
 from imuarray.engine.heldout import blocks_of, log_scores
-from imuarray.engine.linearise import linearise, polynomial_taps
+from imuarray.engine.linearise import linearise
 from imuarray.engine.parameters import catalogue_effects, columns_of, prior_precision
 from imuarray.engine.readings import arrange, part_of
 from imuarray.engine.settings import SETTINGS

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from imuarray.engine.clock_phases import with_phases
+from imuarray.engine.derivatives import no_derivatives
 from imuarray.engine.gyroscope_clocks import (
     Gyroscopes,
     ages_of,
     clocks_from_gyroscopes,
     moved,
 )
-from imuarray.engine.linearise import RoughPrior, State, no_derivatives
+from imuarray.engine.linearise import RoughPrior, State
 from imuarray.engine.readings import Readings
 from imuarray.model.timing import clock_turns
 

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from imuarray.engine.derivatives import no_derivatives
 from imuarray.engine.fusion import better, equations, fuse, one_sided, turned
-from imuarray.engine.linearise import State, no_derivatives
+from imuarray.engine.linearise import State
 from imuarray.engine.readings import measured
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.motion_ml import motion_from

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 import imuarray
-from imuarray.engine.linearise import RoughPrior, State, no_derivatives, predicted
+from imuarray.engine.derivatives import no_derivatives
+from imuarray.engine.linearise import RoughPrior, State, predicted
 from imuarray.engine.parameters import columns_of
 from imuarray.engine.readings import measured
 from imuarray.engine.rough_fusion import Rough
