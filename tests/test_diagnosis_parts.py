@@ -13,6 +13,7 @@ import imuarray
 from imuarray.blind.cases import Case, make
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects as variance
+from imuarray.diagnosis.clocks import scan_clocks, widening
 from imuarray.diagnosis.replicates import Replicator, discrepancies
 from imuarray.diagnosis.scores import candidates, information_at, mask_of, score_all
 from imuarray.diagnosis.settings import SETTINGS as CRITICAL
@@ -299,6 +300,18 @@ def test_sawtooth_finds_its_period_frequency_and_offset():
     assert drift == 0.0
     null = sawtooth(time, np.sqrt(information) * rng.standard_normal(3000), information)[0]
     assert null < 45
+
+
+def test_a_clock_in_coloured_noise_must_show_more():
+    case = Case("c", (("coloured_noise", tuple(range(8))),), None, kind="one", duration=SHORT)
+    search, _ = started(case, 3)
+    given, white = search.given, replace(search.given, meat=None)
+    assert np.all(widening(search.fit, white) == 1.0) and np.all(widening(search.fit, given) > 1.2)
+    best = [
+        min(found.score.log_p for found in scan_clocks(search.fit, one, range(8), {}))
+        for one in (given, white)
+    ]
+    assert best[0] > best[1] + 50
 
 
 def test_replicates_have_the_residual_s_size(clean):
