@@ -25,6 +25,7 @@ from imuarray.provenance import atomic_write
 
 LENGTHS, IMUS = (1, 2, 4), (4, 8, 16)  # times a minute and a half; 4 IMUs grow longer
 DRAWN = 100  # samples that are sampled from, times length: more need another sampler
+FIRST = ("convert", "first-order")  # what all others go on from
 COMMANDS = {
     "convert": "convert csv log.csv --columns columns.yaml --out rec.nc",
     "first-order": f"first-order rec.nc --gravity {GRAVITY} --out corrected.nc",
@@ -51,6 +52,8 @@ def board(imus: int, length: float, commands, folder: Path) -> list[dict]:
     rows = []
     for name, line in COMMANDS.items():
         if name not in commands:
+            if name in FIRST:
+                spent(line, folder)
             continue
         if name == "sample":
             spent(f"select corrected.nc --samples {round(DRAWN * length)} --out few.nc", folder)
