@@ -13,7 +13,7 @@ import imuarray
 from imuarray.blind.cases import Case, make
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects as variance
-from imuarray.diagnosis.clocks import scan_clocks, widening
+from imuarray.diagnosis.clocks import scan_clocks, wider
 from imuarray.diagnosis.replicates import Replicator, discrepancies
 from imuarray.diagnosis.scores import candidates, information_at, mask_of, score_all
 from imuarray.diagnosis.settings import SETTINGS as CRITICAL
@@ -305,8 +305,11 @@ def test_sawtooth_finds_its_period_frequency_and_offset():
 def test_a_clock_in_coloured_noise_must_show_more():
     case = Case("c", (("coloured_noise", tuple(range(8))),), None, kind="one", duration=SHORT)
     search, _ = started(case, 3)
-    given, white = search.given, replace(search.given, meat=None)
-    assert np.all(widening(search.fit, white) == 1.0) and np.all(widening(search.fit, given) > 1.2)
+    given, white = search.given, replace(search.given, meat=None, correlation=None)
+    rho, clock = given.correlation[0].max(), (1e-3, 1.0)
+    density = (1 - rho**2) / np.abs(1 - rho * np.exp(-2j * np.pi / 125)) ** 2
+    assert wider(search.fit, given, 0, clock) == pytest.approx(density, rel=1e-4) and density > 3
+    assert wider(search.fit, white, 0, clock) == 1.0
     best = [
         min(found.score.log_p for found in scan_clocks(search.fit, one, range(8), {}))
         for one in (given, white)

@@ -8,7 +8,7 @@ import pytest
 from imuarray.blind.cases import Case, make
 from imuarray.diagnosis.procedure import unshaken
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.diagnosis.shocks import SHOCK, find_shocks, misfits
+from imuarray.diagnosis.shocks import SHOCK, find_shocks, misfits, with_neighbours
 from imuarray.diagnosis.state import Search
 from imuarray.engine.parameters import columns_of
 from imuarray.engine.readings import arrange
@@ -65,6 +65,11 @@ def test_what_rings_beside_a_shock_is_left_out_with_it():
     _, shaken = find_shocks(search.fit, SETTINGS.limit(SHOCK))
     near = np.abs(np.arange(len(shaken))[:, None] - np.flatnonzero(shaken)).min(axis=1) <= 2
     assert named.effect == SHOCK and not used[near].any() and used[~near].mean() > 0.9
+    none = np.zeros(6, bool)
+    none[2] = True
+    beside = with_neighbours(none, np.array([0, 0, 0, 1, 1, 1]), 2)
+    assert beside.tolist() == [True, True, True, False, False, False]
+    assert with_neighbours(none, np.zeros(6), 0).tolist() == none.tolist()
 
 
 @pytest.mark.parametrize(

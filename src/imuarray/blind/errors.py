@@ -76,7 +76,7 @@ def size_effect(scene, rng, sensors, size):
         turned = np.einsum("kij,kaj->kai", scene.array.turns, arms)
         # which of its axes lies along each of the array's
         arms = np.einsum("kia,kaj->kij", np.abs(scene.array.turns), turned)
-    arms = arms - arms.mean(axis=1, keepdims=True)
+    arms = np.sqrt(1.5) * (arms - arms.mean(axis=1, keepdims=True))  # of the same size
     said = {"lever_arm": Parameter(arms, "m"), "alike": Parameter(bool(alike), "1")}
     error = {"force_error": lambda field: apart(arms, field, list(sensors))}
     return {"parameters": said, **error}

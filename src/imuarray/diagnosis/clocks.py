@@ -1,5 +1,7 @@
 """IMUs on clocks of their own: the test for `sensor_clock`, by a scan (`engine.clock_scan`)."""
 
+from functools import partial
+
 import numpy as np
 
 from imuarray.diagnosis.scores import Candidate, Information, Scanned, Score
@@ -26,10 +28,9 @@ def scan_clocks(fit: Fit, given: Information, imus, delays: dict) -> list[Scanne
     sawtooth counts on top, and must gain a fair share of it (a delay that is large leaves a
     little that a sawtooth can use, until it is adopted).
     """
-    wide = widening(fit, given)
-    score, information = (part / wide for part in delay_score(fit))
+    score, information = delay_score(fit)
     time = fit.readings.time
-    each = sawtooths(time, score, information, imus, delays)
+    each = sawtooths(time, score, information, imus, delays, partial(wider, fit, given))
     found = [
         Scanned(_clock_score((imu,), gain, delays, len(time), len(imus)), {imu: values})
         for imu, (gain, values) in each.items()
@@ -41,14 +42,17 @@ def scan_clocks(fit: Fit, given: Information, imus, delays: dict) -> list[Scanne
     return found
 
 
-def widening(fit: Fit, given: Information) -> np.ndarray:
-    """(N,) by how much coloured noise makes the variance of a delay's score larger."""
-    place = given.index[:, fit.columns.of(DELAY)[0]]
-    if given.meat is None:
-        return np.ones(len(place))
-    there = np.maximum(place, 0)
-    ratio = np.diag(given.meat)[there] / np.diag(given.information)[there]
-    return np.where(place < 0, 1.0, np.maximum(ratio, 1.0))
+def wider(fit: Fit, given: Information, imu: int, clock) -> float:
+    """How much larger AR(1) noise makes the variance of a sawtooth's score than white noise does.
+
+    Its density at the sawtooth's frequency: the derivative by the delay is smooth in time. Of the
+    IMU's two triads the larger, and at least 1.
+    """
+    if given.correlation is None:
+        return 1.0
+    rho, step = given.correlation[imu], np.median(np.diff(fit.readings.time))
+    turn = 2 * np.pi * clock[1] * step
+    return float(max(1.0, np.max((1 - rho**2) / (1 + rho**2 - 2 * rho * np.cos(turn)))))
 
 
 def _clock_score(imus, gain, delays, samples, count) -> Score:
@@ -76,10 +80,11 @@ def maybe_clock(search, cause, own: float) -> bool:
     ``own``: chi-square of the delay that was adopted as ``cause``.
     """
     score, information = delay_score(search.fit)
-    gains = [
-        sawtooth(search.readings.time, score[:, imu], information[:, imu])[0] for imu in cause.imus
-    ]
-    return bool(np.sum(gains) > own / 6)
+    total = 0.0
+    for imu in cause.imus:
+        gain, clock = sawtooth(search.readings.time, score[:, imu], information[:, imu])
+        total += gain / wider(search.fit, search.given, imu, clock)
+    return bool(total > own / 6)
 
 
 def placebo_of_ages(search) -> tuple[float, float]:

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.ndimage import binary_dilation
 
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects
@@ -18,7 +17,7 @@ from imuarray.diagnosis.residual_checks import Check, all_checks
 from imuarray.diagnosis.scores import Score
 from imuarray.diagnosis.separability import rivals
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.diagnosis.shocks import SHOCK, find_shocks
+from imuarray.diagnosis.shocks import SHOCK, find_shocks, with_neighbours
 from imuarray.diagnosis.state import Search
 from imuarray.engine.clock_scan import DELAY
 from imuarray.engine.fit import Fit, fit, flat_parameters
@@ -135,7 +134,7 @@ def unshaken(search: Search, without) -> tuple[list, np.ndarray]:
     shock, shaken = find_shocks(search.fit, SETTINGS.limit(SHOCK))
     if shock is None or not search.smooth:
         return [shock] if shock else [], every
-    left = binary_dilation(shaken, iterations=SETTINGS.beside_shocks)
+    left = with_neighbours(shaken, search.readings.run, SETTINGS.beside_shocks)
     try:
         return [shock], determined(search.readings.without(left[:, None, None]))
     except InputError:  # too few are left

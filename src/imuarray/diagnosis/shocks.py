@@ -73,6 +73,16 @@ def find_shocks(fit: Fit, limit: float) -> tuple[Named | None, np.ndarray]:
     return Named(SHOCK, imus, log_p, numbers, *held_out(nats), where=where), shaken
 
 
+def with_neighbours(shaken, run, number: int) -> np.ndarray:
+    """(T,) bool: the shaken samples, and so many of the same run on each side of them."""
+    found = shaken.copy()
+    for step in range(1, number + 1):
+        together = run[step:] == run[:-step]
+        found[step:] |= shaken[:-step] & together
+        found[:-step] |= shaken[step:] & together
+    return found
+
+
 def _by_chance(shaken, alone, worst, size) -> float:
     """Samples in which several IMUs would be off if each was so by itself, tenths by ``size``."""
     number = 0.0

@@ -69,7 +69,9 @@ class Weighed:
         """Of all parameters that the fit has derivatives by."""
         plain = information_at(self.fit)
         meat = noises.coloured_meat(self.fit, plain.information, self.correlation)
-        return plain if meat is None else replace(plain, meat=meat)
+        if meat is None:
+            return plain
+        return replace(plain, meat=meat, correlation=self.correlation)
 
 
 @dataclass(frozen=True)

@@ -33,8 +33,10 @@ def delay_parts(residual, along, through) -> tuple[np.ndarray, np.ndarray]:
     return score, np.maximum(information, 1e-300)
 
 
-def sawtooths(time, score, information, imus, delays: dict) -> dict:
+def sawtooths(time, score, information, imus, delays: dict, wider=lambda imu, clock: 1.0) -> dict:
     """{imu: (gain in chi-square, (P, f, phi, c, g))} of those that show one beyond a constant.
+
+    ``wider`` (imu, clock): how much larger than white noise's the variance of its score is.
 
     ``delays`` (imu tuple -> chi-square of a constant delay): a sawtooth must gain a fair share of
     it (a delay that is large leaves a little that one can use, until it is adopted).
@@ -42,6 +44,7 @@ def sawtooths(time, score, information, imus, delays: dict) -> dict:
     each = {}
     for imu in imus:
         gain, values = sawtooth(time, score[:, imu], information[:, imu])
+        gain /= wider(imu, values)
         log_p = log_chi_square(max(gain, 1e-9), 3) + SETTINGS.many + np.log(len(time) * len(imus))
         if log_p < SETTINGS.sawtooth and gain > SETTINGS.fair * delays.get((imu,), 0.0):
             each[imu] = (gain, values)

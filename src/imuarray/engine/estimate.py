@@ -182,7 +182,8 @@ def estimate(
         if moved[-1] < SETTINGS.settled and change < SETTINGS.same_noise and number > 4:
             break
         # full steps may alternate across a valley: half of them lead into it
-        back = last is not None and np.sum(step * last / sds**2) < 0
+        along = 0.0 if last is None else np.sum(step * last / sds**2)
+        back = along < 0 and -along > SETTINGS.alternating * np.sum((last / sds) ** 2)
         length = max(length / 2, SETTINGS.shortest) if back else min(1.0, 1.5 * length)
         last = step
         recorded = tuple(

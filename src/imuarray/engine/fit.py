@@ -198,7 +198,11 @@ def fit(
 
 
 def search_optimum(readings, columns, active, state, smooth, rough):
-    """(state, whether it converged, the recording linearised there or a step before)."""
+    """(state, whether it converged, the recording as seen there or a step before).
+
+    A step from the derivatives of one before it is enough where what is left is noise; where a
+    model lacks something, what is left moves the optimum as these change.
+    """
     whole, active = columns, movable(columns, active, [state])
     columns, kept = in_use(whole, active, state)
     parameters, active = flat_parameters(whole, state), active[:, kept]
@@ -209,6 +213,7 @@ def search_optimum(readings, columns, active, state, smooth, rough):
     few = active[:, wanted]
     converged, last, length, seen, near, predicted = False, np.inf, 1.0, None, False, np.inf
     enough = SETTINGS.rough_gain if rough else SETTINGS.fine_gain
+    noisy = SETTINGS.noisy * (readings.keep.sum() - state.motion.size)
     for number in range(SETTINGS.steps):
         state = with_derivatives(readings, state, smooth)
         if near:
@@ -229,9 +234,11 @@ def search_optimum(readings, columns, active, state, smooth, rough):
             state = advance(columns, state, active, step, few, seen, 1.0)
             converged = True
             break
-        near = predicted < SETTINGS.near_by * (former if near else misfit)
+        begun = predicted < SETTINGS.near_by * (former if near else misfit)
+        near, stale = begun and misfit < noisy and state.turning is None, near
         cost = misfit + in_motion + float(offset @ precision @ offset)
-        if number > 3 and abs(cost - last) < 0.3 * enough * last:
+        if number > 3 and not stale and abs(cost - last) < 0.3 * enough * last:
+            converged = True
             break  # it stays around the optimum, by less than anything distinguished here
         # full steps may alternate across a valley: half of them lead into it
         length = max(length / 2, SETTINGS.shortest) if cost > last else min(1.0, 1.2 * length)

@@ -24,8 +24,10 @@ class Settings:
     least_step: float = 0.02  # nats; a step predicted to gain less ends the search
     rough_gain: float = 1e-4  # of the misfit that a step must gain while causes are looked for
     fine_gain: float = 3e-6  # the same at the end
-    # of the misfit, or the last step's gain: a step that gains less leaves derivatives as they are
+    # of the misfit: a step that gains less leaves derivatives as they are; so does the next one
+    # if it gains less than this of the last one's gain
     near_by: float = 0.1
+    noisy: float = 1.5  # times its degrees of freedom: a misfit below it is mostly noise
     converged: float = 0.02  # of a parameter's own sd: steps below it end the search
     shortest: float = 0.2  # share of a Gauss-Newton step
     wide: float = 10.0  # prior sd of the third derivatives, in sizes of the differences near by
@@ -44,6 +46,7 @@ class Settings:
     iterations: int = 40  # Gauss-Newton steps at most
     rung_steps: int = 6  # the same while rungs of the sensor model are tried
     robust_first: int = 4  # of them with Student's t of 4, until readings far out are seen
+    alternating: float = 0.3  # of a step that the next one goes back: the valley is crossed
     settled: float = 0.05  # of a parameter's sd, a jackknife's where larger: shorter steps end it
     same_noise: float = 0.005  # relative change of a noise sd below which it is the same
     dense: float = 0.5  # share of samples in gapless runs from which neighbours are looked at

@@ -7,10 +7,7 @@ leave it open about the line that joins them.
 import numpy as np
 
 from imuarray.engine.derivatives import polynomial_derivative, polynomial_taps
-from imuarray.engine.linearise import (
-    State,
-    TurningPrior,
-)
+from imuarray.engine.linearise import State, TurningPrior
 from imuarray.engine.readings import Readings
 
 CLEAR = 10.0  # times the noise's power, from which a frequency is motion
