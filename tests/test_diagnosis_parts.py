@@ -20,7 +20,18 @@ from imuarray.diagnosis.settings import SETTINGS as CRITICAL
 from imuarray.diagnosis.state import Search
 from imuarray.engine.clock_scan import sawtooth
 from imuarray.engine.derivatives import polynomial_taps
-from imuarray.engine.fit import Fit, fit, flat_parameters, from_flat, normal
+from imuarray.engine.fit import (
+    Fit,
+    fit,
+    flat_parameters,
+    from_flat,
+    normal,
+    prior_means,
+    scaled_solve,
+    search_optimum,
+    summed_normal,
+    with_derivatives,
+)
 from imuarray.engine.heldout import blocks_of, log_scores
 from imuarray.engine.linearise import linearise
 from imuarray.engine.parameters import catalogue_effects, columns_of, prior_precision
@@ -285,6 +296,22 @@ def test_fast_part_passes_white_noise_and_stops_what_is_smooth():
     # no five samples across the gap between runs
     assert np.isnan(fast[498:502]).all()
     assert np.isfinite(fast[503:997]).all()
+
+
+@pytest.mark.parametrize("effect", ["size_effect", "gyroscope_scale"])
+def test_the_search_ends_at_the_optimum(effect):
+    """Where the model lacks the cause, too, and what is left moves the optimum with the slopes."""
+    recording, _ = make(Case("c", ((effect, (2,)),), 1000.0, kind="one", duration=2.5), 2)
+    readings, free = arrange(recording), ("gyroscope_scale", "accelerometer_bias")
+    columns = columns_of(readings.array, free, readings.position_prior_sd)
+    active, state = columns.owner, start(readings, columns)
+    state, converged, _ = search_optimum(readings, columns, active, state, True, False)
+    seen = linearise(readings, columns, with_derivatives(readings, state, True))
+    information, score = summed_normal(seen, active)
+    precision = prior_precision(columns, active)
+    off = flat_parameters(columns, state)[active] - prior_means(readings, columns)[active]
+    step, sds = scaled_solve(information + precision, score - precision @ off)
+    assert converged and np.max(np.abs(step) / sds) < 0.5
 
 
 def test_sawtooth_finds_its_period_frequency_and_offset():
