@@ -52,7 +52,7 @@ def board(imus: int, length: float, commands, folder: Path) -> list[dict]:
     rows = []
     for name, line in COMMANDS.items():
         if name not in commands:
-            if name in FIRST or (name, "apply" in commands) == ("calibrate", True):
+            if name in FIRST or (name == "calibrate" and "apply" in commands):
                 spent(line, folder)
             continue
         if name == "sample":

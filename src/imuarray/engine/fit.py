@@ -135,8 +135,7 @@ def seen_through(whitened, basis, chosen):
             block = block[..., chosen[imu]]
         places = slice(counts[:imu].sum(), counts[: imu + 1].sum())
         own = np.swapaxes(basis[:, 6 * imu : 6 * imu + 6], 1, 2)
-        # straight into its place, the product would be eight times slower
-        through[..., places] = own @ block
+        np.matmul(own, block, out=through[..., places])
         blocks.append((imu, places, block))
     return through, blocks
 

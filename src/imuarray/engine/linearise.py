@@ -269,7 +269,7 @@ def linearise(
 def seen_again(readings: Readings, columns: Columns, state: State, seen: Eliminated) -> Eliminated:
     """The residual at another state by the derivatives of one near by: a chord's, not a tangent's.
 
-    A tenth of the work of `linearise`.
+    Without the derivatives and the products of them, most of the work of `linearise`.
     """
     count, first = readings.values.shape[1], seen.unexpected.shape[1]
 
