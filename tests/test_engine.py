@@ -8,7 +8,7 @@ import pytest
 
 import imuarray
 from imuarray.analysis.calibration_dataset import engine_dataset
-from imuarray.engine.estimate import Recorded, estimate
+from imuarray.engine.estimate import Recorded, estimate, to_come
 from imuarray.engine.fit import flat_parameters
 from imuarray.engine.ladder import climb, mask_of
 from imuarray.engine.linearise import linearise, reading, seen_again
@@ -215,6 +215,16 @@ def test_readings_far_out_lose_their_say():
     size = [np.sqrt(np.mean(errors(f, truth) ** 2)) for f in (clean, robust, plain)]
     assert size[1] < 2.5 * size[0] < size[2]
     assert robust.freedoms[0] < 5 and robust.freedoms[1] >= 20
+    # gone on from, it stays: its weights are known, and nothing is begun anew
+    again = estimate(robust.recorded, robust.columns, robust.active)
+    assert again.steps[0] < 0.1 and len(again.steps) < len(robust.steps)
+    np.testing.assert_allclose(again.values, robust.values, atol=0.1 * position_sds(robust).min())
+
+
+def test_steps_that_shrink_alike_are_gone_at_once():
+    """The sum of a geometric series; one where they do not shrink alike."""
+    steps = 0.02 * np.array([0.8, 0.6, 0.1, -0.7]) ** np.arange(3)[:, None]
+    np.testing.assert_allclose(to_come(*steps), [1 / (1 - 0.8), 1 / (1 - 0.6), 1, 1])
 
 
 def test_recordings_of_a_board_are_fitted_jointly():

@@ -33,6 +33,8 @@ from imuarray.engine.start import is_smooth, start
 from imuarray.model.effects import EFFECTS
 from imuarray.model.jax64 import jax
 
+ALIKE, APART = 0.85, 0.35  # share of a size's step that the next one is: about, and at most from it
+SHORT = 0.1  # log of a factor; longer steps are not yet those near the end
 SMOOTH = 0.2  # share of rough samples that are looked at as the smooth ones
 NORMAL, ROBUST = np.array([np.inf, np.inf]), np.array([4.0, 4.0])  # degrees of freedom
 
@@ -44,6 +46,8 @@ class Recorded:
     readings: Readings
     state: State
     smooth: bool
+    # MacKay's last steps of the rough prior's log sds, (G,) each, since one went farther
+    resized: tuple[np.ndarray, ...] = ()
 
     @classmethod
     def of(cls, readings: Readings, columns: Columns, former: State | None = None) -> Recorded:
@@ -159,9 +163,13 @@ def estimate(
     """
     active = movable(columns, active, [one.state for one in recorded])
     places = places_of(columns, active, len(recorded))
-    recorded, nu, length, last, moved = tuple(recorded), NORMAL, 1.0, None, []
+    recorded = tuple(replace(one, resized=()) for one in recorded)
+    nu, length, last, moved = NORMAL, 1.0, None, []
+    # from a former estimate: readings far out have little weight as it is
+    weighted = all(one.readings.trust is not None for one in recorded)
+    first = 0 if weighted else SETTINGS.robust_first
     for number in range(steps):
-        far = number < SETTINGS.robust_first
+        far = number < first
         recorded, passes = _passed(recorded, columns, active, int(far))
         if robust:
             nu = ROBUST if far else _freedoms(recorded, passes)
@@ -169,7 +177,7 @@ def estimate(
         change = _noise_change(recorded, noisy)
         information, score, blocks = _summed(passes, places)
         precision = pinned(recorded, columns, active, places)
-        if number == 0:  # what is far out is to have no say in the first step
+        if number == 0 and not weighted:  # what is far out is to have no say in the first step
             recorded = noisy
             continue
         values = _values(recorded, columns, active, places)
@@ -179,7 +187,7 @@ def estimate(
         step, sds = scaled_solve(information + precision, slope)
         sds = np.maximum(sds, jackknifed(information + precision, blocks))
         moved.append(float(np.max(np.abs(step) / sds, initial=0.0)))
-        if moved[-1] < SETTINGS.settled and change < SETTINGS.same_noise and number > 4:
+        if moved[-1] < SETTINGS.settled and change < SETTINGS.same_noise and number > first:
             break
         # full steps may alternate across a valley: half of them lead into it
         along = 0.0 if last is None else np.sum(step * last / sds**2)
@@ -217,18 +225,35 @@ def _passed(recorded, columns, active, improved: int = 1):
         state = with_derivatives(one.readings, one.state, one.smooth)
         seen.append(normal_pass(one.readings, columns, state, active, improved))
         state = state._replace(motion=seen[-1].motion)
-        moved.append(replace(one, state=_sized(state, seen[-1].rough)))
+        moved.append(_sized(replace(one, state=state), seen[-1].rough))
     return tuple(moved), tuple(seen)
 
 
-def _sized(state: State, rough) -> State:
-    """The prior of rough motion as wide as is likeliest (MacKay's step), where readings tell."""
-    if state.rough_prior is None:
-        return state
-    told = rough[1] > SETTINGS.told * len(state.motion)
-    factors = np.sqrt(rough[0] / np.where(told, rough[1], 1.0))
-    factors = np.clip(factors, 1 / SETTINGS.widening, SETTINGS.widening)
-    return state._replace(rough_prior=state.rough_prior.scaled(np.where(told, factors, 1.0)))
+def _sized(one: Recorded, rough) -> Recorded:
+    """The prior of rough motion as wide as is likeliest (MacKay's step), where readings tell.
+
+    Where they tell little, steps are short and go on: three that shrink alike show how far.
+    """
+    if one.state.rough_prior is None:
+        return one
+    told = (rough[1] > SETTINGS.told * len(one.state.motion)) & (rough[0] > 0)
+    step = np.log(np.where(told, rough[0], 1.0) / np.where(told, rough[1], 1.0)) / 2
+    made = (*one.resized, step)[-3:]
+    if len(made) == 3:
+        farther = to_come(*made)
+        step, made = farther * step, (() if np.any(farther > 1.0) else made)
+    most = np.log(SETTINGS.widening)
+    prior = one.state.rough_prior.scaled(np.exp(np.clip(step, -most, most)))
+    return replace(one, state=one.state._replace(rough_prior=prior), resized=made)
+
+
+def to_come(first, second, third) -> np.ndarray:
+    """All steps (G,) from the third on in units of it, where three shrink alike (Aitken), or 1."""
+    shares = np.array([
+        new / np.where(old == 0, np.inf, old) for old, new in ((first, second), (second, third))
+    ])  # fmt: skip
+    alike = np.all(np.abs(shares - ALIKE) < APART, axis=0) & (np.abs(third) < SHORT)
+    return np.where(alike, 1.0 / np.clip(1.0 - shares[1], 1.0 / SETTINGS.farthest, 1.0), 1.0)
 
 
 def _summed(passes, places):

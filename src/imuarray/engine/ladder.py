@@ -106,7 +106,7 @@ def climb(readings: Sequence[Readings], bare: bool = True) -> tuple[Estimate, li
                 rungs = [rung._replace(kept=rung.kept or rung.name == GYROSCOPES) for rung in rungs]
                 now = now.with_kept([GYROSCOPES])
             break
-        now = now.fitted(SETTINGS.rung_steps)
+        now = now.fitted(SETTINGS.rung_again)
     now = now.without([rung.name for rung in rungs if not rung.kept])
     if not (now.kept or bare):
         return now.found, clocks + rungs
@@ -175,7 +175,7 @@ class Climbed(NamedTuple):
         """Whether ages show clocks once IMUs' delays are fitted: a late IMU's misfit may, too."""
         if not all(one.smooth for one in self.found.recorded):
             return True
-        found = self.with_kept([DELAYS]).fitted(SETTINGS.rung_steps).found
+        found = self.with_kept([DELAYS]).fitted(SETTINGS.rung_again).found
         return any(shown_clocks(one, found.columns) for one in found.recorded)
 
     def fitted(self, steps: int = SETTINGS.iterations) -> Climbed:

@@ -36,6 +36,7 @@ class Settings:
     offset: float = 1e-4  # s, of what they see of omega, for each of that
     told: float = 0.03  # of these that readings must tell, for their sds to be estimated
     widening: float = 3.0  # factor by which an iteration may change such an sd
+    farthest: float = 8.0  # of MacKay's steps at once, where they go on alike
     least_size: float = 1e-3  # of a size that is estimated, times what such sensors have
     most_size: float = 30.0  # the same
     tied: float = 1e-5  # of that sd, as long as it is not free
@@ -44,7 +45,8 @@ class Settings:
 
     # Robust estimation of several recordings (`estimate`)
     iterations: int = 40  # Gauss-Newton steps at most
-    rung_steps: int = 6  # the same while rungs of the sensor model are tried
+    rung_steps: int = 6  # the same of the bare model, before rungs of the sensor model are tried
+    rung_again: int = 4  # the same while they are tried
     robust_first: int = 4  # of them with Student's t of 4, until readings far out are seen
     alternating: float = 0.3  # of a step that the next one goes back: the valley is crossed
     settled: float = 0.05  # of a parameter's sd, a jackknife's where larger: shorter steps end it
