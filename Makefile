@@ -49,7 +49,7 @@ install:
 	@test -e $(READY) || { set -e; rm -rf $(VENV); $(PYTHON) -m venv $(VENV); \
 	  grep -oE '^[A-Za-z0-9_.-]+==[^\]*' requirements.lock > $(VENV)/versions.txt; \
 	  $(BIN)/python -m pip install --quiet --disable-pip-version-check -c $(VENV)/versions.txt '.[ros]'; }
-	@echo "$(CURDIR)/$(BIN)/imuarray board log.csv --columns columns.yaml --out answer/"
+	@echo "$(CURDIR)/$(BIN)/imuarray board log.csv --columns columns.yaml --gravity 9.81 --out answer/"
 
 run: $(READY)
 	$(SNAKEMAKE)

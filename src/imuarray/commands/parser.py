@@ -41,12 +41,11 @@ def _file(name: str, help: str, type=InputFile, **given: Any) -> Option:
 
 
 RECORDING = _option("recording", "NetCDF-4 recording to read", type=InputFile)
-SEED = _number("--seed", "S", "of the random numbers (default: 0)", 0, seed)
+SEED = _number("--seed", "S", "seed of the random numbers (default: 0)", 0, seed)
 NOISE = _number(
     "--accelerometer-noise",
     "SD",
-    "assumed sd, m/s^2, of the papers' model (default: of calibrate and apply as declared, of"
-    " sample unknown)",
+    "assumed sd, m/s^2, of the papers' model (default: the declared one; sample estimates it)",
 )
 EFFECT_FILE = _file(
     "--effect-file", "Python file with effects of your own, which is run: they join the catalogue;"
@@ -95,7 +94,7 @@ COMMANDS = (
     Command(
         "board", "board.board",
         "From a log to positions, what the sensors do, and a page that says how good it is.",
-        "log.csv --columns columns.yaml --out answer/",
+        "log.csv --columns columns.yaml --gravity 9.81 --out answer/",
         "folder to write: report.html, cal.nc, positions.csv, recording.nc",
         (
             _option("logs", "what a logger wrote (docs/convert.md), or a recording (NetCDF-4)",
@@ -162,7 +161,7 @@ COMMANDS = (
             _option("--gyroscopes", "calibrate: their scales, misalignments and turns, from moves"
                     " between poses (default); offset: only their offsets, as paper 2021",
                     choices=("calibrate", "offset"), default="calibrate"),
-            _number("--shortest-pose", "S", "that a still pose lasts at least, s (default: 3)",
+            _number("--shortest-pose", "S", "shortest still pose, s (default: 3)",
                     3.0),
             _option("--with", "further recordings of the board, made at the same place: maps, and"
                     " so the array's frame and size, are from the poses and moves of all",
@@ -269,7 +268,7 @@ COMMANDS = (
     ),
     Command(
         "diagnose", "diagnose.diagnose",
-        "What does the simulation get wrong, why, and what does the extended model gain?",
+        "What the sensor model gets wrong on a recording, why, and what an extended model gains.",
         "corrected.nc --out diagnosis/", "folder to write: diagnosis.json, report.html, figures",
         (
             RECORDING, EFFECT_FILE,
