@@ -20,11 +20,16 @@ import xarray as xr
 from benchmarks.board import GRAVITY, Options, draw_board
 from benchmarks.cost import cost
 from benchmarks.written import publish
-from imuarray.figures.style import PAGE, look, new_figure, styled
+from imuarray.figures.style import BLACK, GREY, LOOKS, PAGE, new_figure, styled
 from imuarray.provenance import atomic_write
 
 LENGTHS, IMUS = (1, 2, 4), (4, 8, 16)  # times a minute and a half; 4 IMUs grow longer
 DRAWN = 100  # samples that are sampled from, times length: more need another sampler
+LINES = (  # a look for each command
+    *LOOKS,
+    {"color": BLACK, "marker": "X", "linestyle": "-."},
+    {"color": GREY, "marker": "*", "linestyle": ":"},
+)
 FIRST = ("convert", "first-order")  # what all others go on from
 COMMANDS = {
     "convert": "convert csv log.csv --columns columns.yaml --out rec.nc",
@@ -110,10 +115,11 @@ def draw(rows: pd.DataFrame):
         for line, (key, words) in enumerate(kinds):
             axes = grid[line, column]
             for place, (name, own) in enumerate(part.groupby("command", sort=False)):
-                axes.loglog(own[what], own[key], label=name, **look(place))
+                axes.loglog(own[what], own[key], label=name, **LINES[place])
             axes.set_ylabel(words if column == 0 else "")
         axes.set_xlabel(what.replace("imus", "IMUs"))
-    grid[0, 1].legend(fontsize=6)
+    labels = grid[0, 1].get_legend_handles_labels()
+    figure.legend(*labels, loc="outside upper center", ncols=4, fontsize=6)
     return figure
 
 
