@@ -249,6 +249,12 @@ def test_version(capsys):
     assert capsys.readouterr().out == f"imuarray {imuarray.__version__}\n"
 
 
+def test_the_package_runs_as_a_module():
+    run = [sys.executable, "-m", "imuarray", "calibrate", "none.nc", "--out", "cal.nc"]
+    said = subprocess.run(run, capture_output=True, text=True, check=False)
+    assert said.returncode == 2 and said.stderr.count("\n") == 1
+
+
 def test_start_is_fast():
     """Help and refusals need neither numpy nor JAX."""
     heavy = "('numpy', 'jax', 'xarray')"
