@@ -61,6 +61,7 @@ paper: $(READY)
 	$(SNAKEMAKE) --config scale=paper
 
 publish: $(READY)
+	$(BIN)/python workflow/published.py begin
 	$(SNAKEMAKE) publish
 
 stale: $(READY)

@@ -88,8 +88,22 @@ def test_a_file_rests_on_all_that_made_what_it_was_made_from(published, sources,
     assert (row["scripts"], row["scale"]) == ("claims tune", "paper")
     assert row["sha256"] == hashlib.sha256(b"1\n").hexdigest()
     published.write([row | {"commit": "0"}], tmp_path / "published.csv")
+    with pytest.raises(InputError, match="found one of a clone"):
+        published.entry("a.csv", made, scripts, sources)
     made["a.csv"] = made["a.csv"]._replace(outdated=True)
     with pytest.raises(InputError, match="found a.csv to be made again"):
         published.entry(str(file), made, scripts, sources)
     [again] = published.read((tmp_path / "published.csv").read_text(encoding="utf-8"))
     assert again == row | {"commit": "0"}
+
+
+def test_files_of_a_clone_are_made_anew_once(published, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for folder in ("results", "paper_figures"):
+        Path(folder).mkdir()
+    drawn = Path("paper_figures/a.png")
+    published.write([{"file": drawn.name}], published.MANIFEST)
+    for stays in (False, True):  # what was made since it began stays
+        drawn.touch()
+        published.begin()
+        assert drawn.exists() is stays

@@ -1,7 +1,8 @@
 """What made each file of paper_figures/, and whether its code is still the tree's.
 
 ``python workflow/published.py stale`` lists the files whose code has changed since they were made,
-and says so in published.csv; ``write`` FILE... states what has just made these files.
+and says so in published.csv; ``begin`` removes those that came with a clone; ``write`` FILE...
+states what has just made these files.
 """
 
 import argparse
@@ -22,6 +23,7 @@ from imuarray.provenance import write_bytes
 
 ROOT = Path(__file__).parents[1]
 MANIFEST = "paper_figures/published.csv"
+BEGUN = "results/publishing_begun"  # in a folder that makes its files itself
 CODE = ("src", "workflow", "config.yaml", "Snakefile")
 COLUMNS = ("file", "current", "commit", "command", "scale", "sha256", "code", "scripts")
 SCALES = {"quick", "default", "paper"}
@@ -75,8 +77,11 @@ def entry(
 ) -> dict:
     """A file's row, but for the commit; ``by_rule`` as from `scripts`.
 
-    Raises InputError where the tree's code would make something else of what it rests on.
+    Raises InputError where the tree's code would make something else of what it rests on, and where
+    no rule made it in this folder.
     """
+    if made[file].inputs == ["-"]:
+        raise InputError(f"{file}: expected a file that a rule has made here, found one of a clone")
     back = origin(file, made)
     if outdated := sorted(name for name in back if made[name].outdated):
         raise InputError(f"{file}: expected it up to date, found {outdated[0]} to be made again")
@@ -130,6 +135,15 @@ def changed(rows: Iterable[Mapping], sources: Sources) -> list[str]:
     return [row["file"] for row in rows if digests[row["scripts"]] != row["code"]]
 
 
+def begin() -> None:
+    """Remove published files that came with a clone: without a record Snakemake keeps them."""
+    if Path(BEGUN).exists():
+        return
+    for row in read(Path(MANIFEST).read_text(encoding="utf-8")):
+        Path(MANIFEST).with_name(row["file"]).unlink(missing_ok=True)
+    Path(BEGUN).touch()
+
+
 def mark() -> None:
     """Say in the manifest which files are stale, and list all that are."""
     rows = read((ROOT / MANIFEST).read_text(encoding="utf-8"))
@@ -156,6 +170,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     verbs = parser.add_subparsers(dest="verb", required=True)
     verbs.add_parser("stale")
+    verbs.add_parser("begin")
     writing = verbs.add_parser("write")
     writing.add_argument("--snakefile", default=str(ROOT / "Snakefile"))
     writing.add_argument("--scale", default="default")
@@ -163,6 +178,8 @@ def main() -> None:
     given = parser.parse_args()
     if given.verb == "stale":
         return mark()
+    if given.verb == "begin":
+        return begin()
     state(given.files, commit(), ancestry(summary(given.snakefile, given.scale, given.files)))
 
 
