@@ -221,6 +221,15 @@ def test_readings_far_out_lose_their_say():
     np.testing.assert_allclose(again.values, robust.values, atol=0.1 * position_sds(robust).min())
 
 
+def test_sensors_that_agree_to_the_last_digit_have_the_noise_of_that_digit():
+    recording, truth = simulated(3.0)
+    step, middle = 0.05, np.median(recording.angular_rate, axis=1, keepdims=True)
+    alike = np.broadcast_to(np.round(middle / step) * step, recording.angular_rate.shape)
+    found = fitted(replace(recording, angular_rate=alike.copy()))
+    np.testing.assert_allclose(found.noise_sd()[:, 1], step / np.sqrt(12), rtol=0.2)
+    assert np.abs(errors(found, truth) / position_sds(found)).max() < 4
+
+
 def test_steps_that_shrink_alike_are_gone_at_once():
     """The sum of a geometric series; one where they do not shrink alike."""
     steps = 0.02 * np.array([0.8, 0.6, 0.1, -0.7]) ** np.arange(3)[:, None]

@@ -1,8 +1,11 @@
 """Arrays: the board of both papers, and positions from configs and CSV files."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from imuarray import simulate
 from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.geometry import (
     UNDERSIDE_ROTATION,
@@ -12,6 +15,7 @@ from imuarray.geometry import (
     mimu4444_corners,
 )
 from imuarray.geometry.array import require_planar_extent
+from imuarray.geometry.read import BOARDS
 
 CORNERS = 1e-3 * np.array([[-9.45, 9.45], [-9.45, -9.45], [9.45, 9.45], [9.45, -9.45]])
 SQUARE = [[0, 0, 0], [0.01, 0, 0], [0, 0.01, 0]]
@@ -70,6 +74,16 @@ def test_config_names_a_board(count):
     board = array_from_config(section)
     np.testing.assert_array_equal(board.positions, mimu4444().positions)
     assert board.gyroscopes == (32 if count is None else count)
+
+
+def test_a_board_keeps_its_axes_in_a_configuration_and_a_simulated_recording(monkeypatch):
+    turns = np.array([np.eye(3), UNDERSIDE_ROTATION] * 4)
+    turned = replace(mimu4444_corners(), axes=turns)
+    monkeypatch.setitem(BOARDS, "turned", lambda: turned)
+    board = array_from_config({"board": "turned", "gyroscopes": 2})
+    assert board.gyroscopes == 2
+    recording, _ = simulate(board, duration=0.1)
+    np.testing.assert_array_equal(recording.accelerometer_axes, turns)
 
 
 def test_config_gives_positions():

@@ -268,14 +268,11 @@ def resolution_check(fit: Fit) -> Check:
 
     Of so many continuous values some two would be far nearer to each other than any step.
     """
-    readings, worst = fit.readings, (0.0, 0)
-    for imu, kind in np.argwhere(readings.exists):
-        values = np.sort(readings.values[:, imu, 3 * kind])
-        gaps = np.diff(values)
-        gaps = gaps[gaps > SETTINGS.same]
-        if len(gaps):
-            worst = max(worst, (float(gaps.min()) / readings.sd[imu, kind], int(imu)))
-    return Check("resolution", worst[0], -50.0 if worst[0] > SETTINGS.coarse else 0.0, (worst[1],))
+    readings = fit.readings
+    steps = np.where(readings.exists, readings.resolution / readings.sd, 0.0).max(axis=1)
+    imu = int(np.argmax(steps))
+    coarse = steps[imu] > SETTINGS.coarse
+    return Check("resolution", float(steps[imu]), -50.0 if coarse else 0.0, (imu,))
 
 
 def all_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]:

@@ -35,6 +35,7 @@ class Readings:
     gapless : bool, whether samples have neighbours that say something of time derivatives
     trust : (T, N, 2) square roots of a robust loss' weights, or None for all one
     period : s, of the clocks of sensors that have one, NaN where it is not declared
+    resolution : (N, 2) least step between a triad's readings
     wander : (T, N) turns by which the IMUs' clocks depart from a steady drift, or None for none
     labels : N str
     """
@@ -57,6 +58,7 @@ class Readings:
     trust: np.ndarray | None = None
     wander: np.ndarray | None = None
     period: float = np.nan
+    resolution: np.ndarray | None = None
 
     @property
     def weights(self) -> np.ndarray:
@@ -179,6 +181,14 @@ def _stretches(readings: Readings, stretch, used) -> Readings:
     return replace(readings.select(used), run=run)  # fmt: skip
 
 
+def resolution(values) -> np.ndarray:
+    """(N, 2) least steps between readings (T, N, 6) along x; zero where all are equal."""
+    values = values[:: max(1, len(values) // SETTINGS.few), :, ::3]
+    gaps = np.diff(np.sort(values, axis=0), axis=0)
+    least = np.min(gaps, axis=0, initial=np.inf, where=gaps > SETTINGS.same)
+    return np.where(np.isfinite(least), least, 0.0)
+
+
 def few_at_once(far) -> np.ndarray:
     """Outliers (T, N, 2) bool without the samples where a quarter of a kind stands out at once.
 
@@ -241,13 +251,13 @@ def arrange(recording: Recording, sparse: bool = False) -> Readings:
     lost = by_imu(force, rate)[used]
     longer = recording.accelerometer_labels if kinds[0] == count else recording.gyroscope_labels
     time = recording.time - recording.time[0]
+    values = by_imu(recording.specific_force, recording.angular_rate)[used]
     return Readings(
-        array, time[used], float(time[-1]) or 1.0,
-        by_imu(recording.specific_force, recording.angular_rate)[used],
+        array, time[used], float(time[-1]) or 1.0, values,
         ~lost & np.repeat(exists, 3, axis=1), exists, np.tile(noise, (count, 1)),
         np.tile(noise, (count, 1)), runs(time[used]), tuple(longer), recording.position_prior_sd,
         gapless, float(recording.time[0]), recording.gyroscope_common_scale_sd,
-        recording.map_covariance, period=recording.output_period,
+        recording.map_covariance, period=recording.output_period, resolution=resolution(values),
     )  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from imuarray.engine.readings import Readings
 
 FREEDOMS = np.array([3.0, 4.0, 6.0, 10.0, 20.0, 50.0, np.inf])
 ROUNDS = 20  # of the scale that goes with each of them
+LEAST = 1e-4  # of the declared noise
 MEDIAN = 2.37  # of chi-square of three readings
 
 
@@ -26,19 +27,29 @@ def judged(readings: Readings, seen: Pass, owned, former: np.ndarray) -> Reading
     number = readings.keep.reshape(*readings.keep.shape[:2], 2, 3).sum(axis=-1)
     trust = 1.0 if readings.trust is None else readings.trust
     squares, distance = seen.squares / trust**2, distances(readings, seen)
-    ratio, weight = np.ones_like(free), np.ones_like(distance)
+    ratio, weight, least = np.ones_like(free), np.ones_like(distance), least_ratio(readings)
     for kind, nu in enumerate(former):
         own = readings.exists[:, kind] & (free[:, kind] > 0)
         d, n, s = (part[:, own, kind] for part in (distance, number, squares))
         if not np.isfinite(nu):
-            ratio[own, kind] = s.sum(axis=0) / free[own, kind]
+            ratio[own, kind] = np.maximum(s.sum(axis=0) / free[own, kind], least[own, kind])
             continue
-        scale = np.median(d, axis=0) / MEDIAN
+        scale = np.maximum(np.median(d, axis=0) / MEDIAN, least[own, kind])
         for _ in range(ROUNDS):
             scale = np.sum((nu + n) / (nu + d / scale) * s, axis=0) / free[own, kind]
+            scale = np.maximum(scale, least[own, kind])
         ratio[own, kind], weight[:, own, kind] = scale, (nu + n) / (nu + d / scale)
     sd = readings.sd * np.sqrt(ratio)
     return readings.with_noise(sd, np.sqrt(weight) if np.isfinite(former).any() else None)
+
+
+def least_ratio(readings: Readings) -> np.ndarray:
+    """The least ratio (N, 2) of a triad's noise variance to that in use.
+
+    Sensors that read in coarse steps may agree to the last digit, which is not without error.
+    """
+    steps = 0.0 if readings.resolution is None else readings.resolution / np.sqrt(12.0)
+    return (np.maximum(steps, LEAST * readings.declared) / readings.sd) ** 2
 
 
 def distances(readings: Readings, seen: Pass) -> np.ndarray:
@@ -49,11 +60,12 @@ def distances(readings: Readings, seen: Pass) -> np.ndarray:
 def freedoms(readings: Readings, seen: Pass) -> np.ndarray:
     """Degrees of freedom (2,) that make the triads' distances likeliest, of each kind of sensor."""
     number = readings.keep.reshape(*readings.keep.shape[:2], 2, 3).sum(axis=-1)
-    found = np.full(2, np.inf)
+    found, far = np.full(2, np.inf), distances(readings, seen)
+    told = np.median(far, axis=0) / MEDIAN > least_ratio(readings)
     for kind in range(2):
-        used = number[..., kind] == 3
+        used = (number[..., kind] == 3) & told[:, kind]
         if used.any():
-            d = distances(readings, seen)[..., kind][used]
+            d = far[..., kind][used]
             found[kind] = FREEDOMS[np.argmax([_log_likelihood(d, nu) for nu in FREEDOMS])]
     return found
 

@@ -14,6 +14,8 @@ class Settings:
     # least information of a sample on omega_dot and s, in shares of all readings'
     weakest: float = 1e-2
     least_samples: int = 200  # samples; fewer determine next to nothing of any effect
+    few: int = 4096  # samples that show in what steps a sensor reads
+    same: float = 1e-9  # m/s^2 or rad/s: equal readings
     stretch: int = 128  # samples, of the stretches in which a long recording is looked at first
     most: int = 32000  # of IMUs, samples that positions are estimated from; more say little more
     window: float = 0.04  # s, length of the polynomials that give time derivatives

@@ -1,6 +1,7 @@
 """An array from a file or a configuration, checked."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 
@@ -61,7 +62,7 @@ def array_from_config(section: dict) -> Array:
         )
     board = BOARDS[section["board"]]()
     checked = _checked(board.positions, board.labels, count, board.name)
-    return board if count is None else checked
+    return replace(board, gyroscopes=checked.gyroscopes)
 
 
 def _checked(values, labels, gyroscopes, where) -> Array:

@@ -45,7 +45,8 @@ def simulate_samples(
         accelerometer_noise_sd=float(np.sqrt(model.noise.accelerometer[0, 0])),
         gyroscope_noise_sd=float(np.sqrt(model.noise.gyroscope[0, 0])),
         accelerometer_range=accelerometer_range, gyroscope_range=gyroscope_range,
-        position_prior_sd=position_prior_sd, title=title, source="simulated by imuarray",
+        accelerometer_axes=model.array.axes, position_prior_sd=position_prior_sd, title=title,
+        source="simulated by imuarray",
     )  # fmt: skip
     return recording, _truth(model, motion, relative, parameters)
 
