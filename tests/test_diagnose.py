@@ -3,22 +3,26 @@
 import json
 from dataclasses import replace
 from functools import cache
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
 from imuarray.blind.cases import Case, make
 from imuarray.cli import main
+from imuarray.diagnosis import elimination
 from imuarray.diagnosis.document import diagnose, precision_of, structural_gain
+from imuarray.diagnosis.elimination import eliminate, need
 from imuarray.diagnosis.extension import extended_model, read_extension
 from imuarray.diagnosis.final_checks import beside_left
 from imuarray.diagnosis.noise_effects import verdict
 from imuarray.diagnosis.procedure import run_procedure
 from imuarray.diagnosis.reading_effects import find_structural
 from imuarray.diagnosis.residual_checks import all_checks
+from imuarray.diagnosis.scores import Candidate, Score
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Cause, Search
-from imuarray.diagnosis.warming import Courses
+from imuarray.diagnosis.warming import Courses, maybe_grown
 from imuarray.engine.fit import flat_parameters
 from imuarray.engine.heldout import gain, log_scores
 from imuarray.engine.parameters import catalogue_effects, columns_of
@@ -27,6 +31,7 @@ from imuarray.model import EFFECTS, ArrayModel
 from imuarray.model.effects import KINDS, effect, known_effect
 from imuarray.recording import write_recording
 from imuarray.streams import stream
+from imuarray.tails import log_chi_square
 
 pytestmark = pytest.mark.slow
 
@@ -146,10 +151,15 @@ def test_what_first_order_says_it_left_is_no_fault_of_the_model():
     assert least[0] < -20 and least[1] > SETTINGS.check
 
 
-def test_biases_put_back_gain_along_a_course_what_they_had_to_gain():
-    readings = arrange(make(injected(("warm_up", ALL)), SEED)[0])
+def searched(recording):
+    """A search with the papers' model fitted."""
+    readings = arrange(recording)
     columns = columns_of(readings.array, catalogue_effects(), readings.position_prior_sd)
-    bare = Search(readings, columns, (), str).fitted()
+    return Search(readings, columns, (), str).fitted()
+
+
+def test_biases_put_back_gain_along_a_course_what_they_had_to_gain():
+    bare = searched(make(injected(("warm_up", ALL)), SEED)[0])
     causes = (Cause(f"{kind}_bias", ALL, frozenset({""}), -9.0) for kind in KINDS)
     fitted = replace(bare, causes=tuple(causes)).refit()
     gains = []
@@ -157,6 +167,38 @@ def test_biases_put_back_gain_along_a_course_what_they_had_to_gain():
         courses = Courses(search.fit, search.given, ALL, back=True)
         gains.append([courses.gain(courses.course(pace, 0.0))[0] for pace in (-4.0, 0.0, 8.0)])
     np.testing.assert_allclose(*gains, rtol=0.03)
+
+
+def test_a_faint_cause_needs_more_beside_another():
+    """The many places it was looked for at count, too: beside others, not alone."""
+    search = searched(make(injected(("gyroscope_bias", (2,))), SEED)[0])
+    statistic, freedom = 120.0, 3
+    tries = np.log(2 * 24 * 8)
+    found = Score(Candidate("gyroscope_bias", (2,)), statistic, freedom, -40.0)
+    assert found.tries == pytest.approx(-40.0 - log_chi_square(statistic, freedom))
+    alone = replace(search, causes=(Cause("gyroscope_bias", (2,), frozenset({""}), -9.0, tries),))
+    alone = alone.refit()
+    known = log_chi_square(*need(alone, "gyroscope_bias"))
+    for limit, others, there in (
+        (known + 1.0, (), True), (known + 1.0, ("shock",), False),
+        (known + 1.0 + 4.0 + tries, ("shock",), True),
+    ):  # fmt: skip
+        with patch.object(elimination, "SETTINGS", replace(SETTINGS, effect=limit, beside=4.0)):
+            assert bool(eliminate(alone, others).causes) is there
+
+
+@pytest.mark.parametrize(("course", "says"), [(0.0, False), (4.0, True)])
+def test_a_bias_that_may_have_grown_from_nothing_is_said_to_be_maybe_a_drift(course, says):
+    """Large and constant it cannot have."""
+    recording, _ = make(Case("test-grown", duration=DURATION), SEED)
+    time = (recording.time - recording.time[0]) / DURATION
+    rate = recording.angular_rate.copy()
+    size = 3e-3 * (1 - np.exp(-course * time)) if course else np.full(len(time), 3e-3)
+    rate[:, 2] += size[:, None]
+    search = searched(replace(recording, angular_rate=rate))
+    cause = Cause("gyroscope_bias", (2,), frozenset({""}), -9.0)
+    found = replace(search, causes=(cause,)).refit()
+    assert maybe_grown(found, cause) is says
 
 
 def test_the_others_of_those_far_off_are_not_at_zero_where_that_is_unlikely():

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from imuarray.diagnosis.elimination import heldout_gain, prune
-from imuarray.diagnosis.scores import Candidate, candidates, score_all
+from imuarray.diagnosis.scores import Candidate, Score, candidates, score_all
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL, scans
 from imuarray.diagnosis.state import Adoption, Cause, Search
@@ -59,9 +59,7 @@ def adopt(search: Search, proposed=None) -> Search:
     while len(search.causes) < SETTINGS.most_causes and vain < SETTINGS.patience:
         proposed = proposals(search) if proposed is None else proposed
         best, values = (proposed or [(None, None)])[0]
-        if best is None or log_odds(search, best) > SETTINGS.limit(best.candidate.effect):
-            break
-        if best.statistic < search.least:
+        if best is None or not likely(search, best) or best.statistic < search.least:
             break
         found = attempt(search, best, values)
         # refused, it leaves all others' tests as they are
@@ -71,11 +69,18 @@ def adopt(search: Search, proposed=None) -> Search:
     return search
 
 
+def likely(search: Search, score) -> bool:
+    """Whether a test is significant: beside causes of other effects more is asked."""
+    effect = score.candidate.effect
+    beside = search.causes and not search.imus_with(effect)
+    return log_odds(search, score) <= SETTINGS.limit(effect, beside)
+
+
 def attempt(search: Search, score, values) -> Search:
     """Adopt a candidate and refit; where held-out time does not gain, refuse it."""
     candidate = score.candidate
     effect, special = candidate.effect, SPECIAL.get(candidate.effect)
-    found = replace(search, causes=merged(search.causes, candidate, score.log_p))
+    found = replace(search, causes=merged(search.causes, score))
     if special and not special.linear:
         gain, error = np.inf, 0.0
     else:
@@ -122,12 +127,13 @@ def label(search: Search, candidate) -> str:
     )
 
 
-def merged(causes, candidate: Candidate, log_p: float) -> tuple[Cause, ...]:
-    """The causes with a candidate: in one of the same effect, or as one more.
+def merged(causes, score: Score) -> tuple[Cause, ...]:
+    """The causes with a test's candidate: in one of the same effect, or as one more.
 
     What a new one contains is no cause of its own in its IMUs: a drift or a clock has its own
     constant.
     """
+    candidate, log_p = score.candidate, score.log_p
     if any(cause.effect == candidate.effect for cause in causes):
         return tuple(
             replace(
@@ -137,7 +143,8 @@ def merged(causes, candidate: Candidate, log_p: float) -> tuple[Cause, ...]:
             for cause in causes
         )  # fmt: skip
     left = [replace(c, imus=_beside(c, candidate)) for c in causes]
-    new = Cause(candidate.effect, candidate.imus, frozenset({candidate.variant}), log_p)
+    variants = frozenset({candidate.variant})
+    new = Cause(candidate.effect, candidate.imus, variants, log_p, score.tries)
     return (*(cause for cause in left if cause.imus), new)
 
 

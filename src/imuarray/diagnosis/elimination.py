@@ -71,11 +71,13 @@ def needed(search: Search, effect: str, limit: float, imus=None) -> bool:
     return bool(freedom) and log_chi_square(statistic, freedom) < limit
 
 
-def eliminate(search: Search) -> Search:
-    """Causes that are not needed beside the others go, one after the other."""
+def eliminate(search: Search, others=()) -> Search:
+    """Causes that are not needed beside each other and the ``others`` go, one after the other."""
     for cause in search.causes:
         small = need(search, cause.effect)[0] < search.least
-        if small or not needed(search, cause.effect, SETTINGS.limit(cause.effect)):
+        beside = len(search.causes) + len(others) > 1
+        limit = SETTINGS.limit(cause.effect, beside) - beside * cause.tries
+        if small or not needed(search, cause.effect, limit):
             search.say(f"dropped {cause.effect}: not needed beside the others")
             rest = tuple(other for other in search.causes if other.effect != cause.effect)
             search = replace(search, causes=rest)

@@ -91,18 +91,39 @@ def run_procedure(
     if tailed:  # whose outliers may have hidden them
         search, more = leave_out_clips(search, without)
         clips = together(clips, more)
-    search = fit_coloured_noise(search, without)
     say("testing what is left")
-    checks = final_checks(search, tailed)
-    untied = all(c.log_p >= SETTINGS.check for c in checks if c.name.startswith("residual"))
-    in_noise += [*shock, *named_noise(search, without, tailed, untied)]
+    found, checks, named = ended(search, without, tailed)
+    fewer = eliminate(found, [*in_noise, *shock, *named])
+    if fewer is not found:
+        found, checks, named = ended(fewer, without, tailed)
+    search, in_noise = found, [*in_noise, *shock, *named]
+    in_noise = [item for item in in_noise if sure(item)]
     explained, failing = within_tolerance(search, checks, in_noise)
+    in_noise = [item for item in in_noise if not weak(item, len(in_noise) + len(search.causes))]
     say("looking for what cannot be distinguished")
     classes = {cause.effect: rivals(search, cause) for cause in search.causes}
     return Found(
         search, base, scores, base_checks, together(structural, clips), in_noise, checks, explained,
         failing, raw, whole, classes,
     )  # fmt: skip
+
+
+def ended(search: Search, without, tailed) -> tuple[Search, list[Check], list[noise_effects.Named]]:
+    """The search with the colour of its noise, the checks of what is left, causes in the noise."""
+    search = fit_coloured_noise(search, without)
+    checks = final_checks(search, tailed)
+    untied = all(c.log_p >= SETTINGS.check for c in checks if c.name.startswith("residual"))
+    return search, checks, named_noise(search, without, tailed, untied)
+
+
+def sure(item: noise_effects.Named) -> bool:
+    """Whether a cause in the noise gains on held-out time; a shock is in few stretches of it."""
+    return item.effect == SHOCK or item.gain > SETTINGS.least_z * item.gain_se
+
+
+def weak(item: noise_effects.Named, causes: int) -> bool:
+    """Whether a cause in the noise is not worth a name beside others; it is there all the same."""
+    return item.log_p > SETTINGS.limit(item.effect, causes > 1)
 
 
 def prepared(recording: Recording, without=(), sparse=False):
@@ -236,7 +257,7 @@ def named_noise(search: Search, without, tailed, untied: bool) -> list[noise_eff
     if COLOURED not in without:
         limit = SETTINGS.limit(COLOURED)
         found.append(noise_effects.coloured(made, search.noise, limit, untied))
-    return sorted((n for n in found if n and n.gain > 0), key=lambda item: item.log_p)
+    return sorted(filter(None, found), key=lambda item: item.log_p)
 
 
 def least_ratios(search: Search) -> np.ndarray:

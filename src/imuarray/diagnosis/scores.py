@@ -33,6 +33,11 @@ class Score:
     freedom: int
     log_p: float
 
+    @property
+    def tries(self) -> float:
+        """Nats that many tests took off."""
+        return self.log_p - log_chi_square(self.statistic, self.freedom)
+
 
 class Scanned(NamedTuple):
     """A scanned candidate's test and where its nonlinear parameters begin, by IMU."""

@@ -19,6 +19,8 @@ class Settings:
     # Critical values, from simulating the whole procedure on clean recordings
     # (benchmarks/thresholds.py): all tests together give under 5 % of false alarms.
     effect: float = -7.5  # log p of an effect's best test, its IMUs and forms allowed for
+    # nats more of one beside others: what they leave of themselves is not quite noise
+    beside: float = 4.0
     check: float = -7.5  # log p of a check of what is left
     share: float = 0.002  # of the base model's excess that a cause must explain
     explained: float = 0.99  # share of the excess from which failing checks are within tolerance
@@ -86,7 +88,6 @@ class Settings:
     # Checks of what is left (`residual_checks`, `final_checks`, `words`)
     # of a feature's own information must survive the projection to count
     seen_feature: float = 1e-4
-    same: float = 1e-9  # m/s^2 or rad/s: equal readings
     coarse: float = 2.0  # noise sds of a step between readings
     slow: int = 3  # turns in the recording; slower ages are a drift
     around: int = 101  # frequencies that give a periodogram's level
@@ -100,10 +101,13 @@ class Settings:
     # does not move a clock's sawtooth past a sample
     pinned: float = 1e-9
 
-    def limit(self, effect: str) -> float:
-        """Critical log p of an effect: its own, where its test has another tail."""
+    def limit(self, effect: str, beside: object = False) -> float:
+        """Critical log p of an effect: its own, where its test has another tail.
+
+        ``beside``: whether there are other causes.
+        """
         own = known_effect(effect).critical
-        return self.effect if own is None else own
+        return (self.effect if own is None else own) - bool(beside) * self.beside
 
 
 SETTINGS = Settings()

@@ -57,7 +57,12 @@ def scan_clocks(fit, given, imus, scores) -> list[Scanned]:
 
 
 def maybe_drift(search, cause, own) -> bool:
-    """Whether a bias may change through the recording: not enough to be adopted, but likely."""
+    """Whether a bias may change through the recording: not enough to be adopted, but likely.
+
+    Or as likely grows from nothing.
+    """
+    if warming.maybe_grown(search, cause):
+        return True
     kind = EFFECTS[cause.effect].sensors
     tried = [Candidate(DRIFT, cause.imus, f"{kind} {form}") for form in ("linear", "cubic")]
     scores = score_all(search.given, search.fit, tried)

@@ -35,12 +35,13 @@ from imuarray.engine.start import is_smooth, start
 
 @dataclass(frozen=True)
 class Cause:
-    """An adopted effect: its IMUs, forms and log p."""
+    """An adopted effect: its IMUs, forms, log p, and what of that was for so many tests (nats)."""
 
     effect: str
     imus: tuple[int, ...]
     variants: frozenset[str]
     log_p: float
+    tries: float = 0.0
 
 
 class Adoption(NamedTuple):

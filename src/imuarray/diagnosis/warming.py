@@ -10,12 +10,13 @@ from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.fit import Fit, flat_parameters
 from imuarray.engine.heldout import blocks_of
 from imuarray.linear import scaled_inverse
-from imuarray.model.effects import KINDS
+from imuarray.model.effects import EFFECTS, KINDS
 from imuarray.model.timing import warming
 from imuarray.tails import log_chi_square
 
 WARM_UP = "warm_up"
 PACES = (-8.0, -4.0, -2.0, 0.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # in the recording's length
+SETTLED = 8.0  # pace; what is over in so short a part of the recording is called constant
 ZEROS = (-1.0, 2.0)  # of a course from 0 to 1, between which all offsets vanish
 
 
@@ -120,6 +121,16 @@ def scan_warming(fit: Fit, given: Information, imus, _=None) -> list[Scanned]:
     }
     score = Score(Candidate(WARM_UP, tuple(imus), "", True), gain, freedom, log_p)
     return [Scanned(score, starts)]
+
+
+def maybe_grown(search, cause) -> bool:
+    """Whether the biases that a cause is may as well have grown from zero as be constant."""
+    imus = list(cause.imus)
+    courses = Courses(search.fit, search.given, imus, back=True)
+    own = np.tile(np.arange(6) // 3 == KINDS.index(EFFECTS[cause.effect].sensors), len(imus))
+    paces = [pace for pace in PACES if abs(pace) <= SETTLED]
+    grown = max(courses.gain(courses.course(pace, 0.0), own)[0] for pace in paces)
+    return bool(grown > courses.gain(np.ones_like(courses.time), own)[0] - 2 * SETTINGS.rival)
 
 
 def maybe_warming(search, cause, own: float) -> bool:
