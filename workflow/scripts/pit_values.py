@@ -18,7 +18,7 @@ with job(snakemake) as settings:
     count = settings["scale"]["validation_replicates"]
     place, threads = (int(chosen.part), snakemake.params.parts), snakemake.threads
     asked = settings["validation"]["settings"][chosen.setting]
-    few = share(range(max(2, round(count * asked.get("share", 1.0)))), *place)
+    few = share(range(count), *place)
     if asked.get("command", False):
         table = by_default.pit_values(setting, few, sample, threads)
     else:
