@@ -20,6 +20,7 @@ from imuarray.cli import main
 from imuarray.commands.board import answer
 from imuarray.commands.calibrate import position_lines
 from imuarray.diagnosis.plain import Sizes, plain
+from imuarray.errors import InputError
 from imuarray.report.board import html, write_board
 from imuarray.report.board_words import advice, facts, turned, verdict
 from imuarray.report.excitation import missing
@@ -168,6 +169,20 @@ def test_sds_have_a_unit_that_fits_and_the_frame_its_cost(found, page):
     far = np.linalg.norm(found.calibration["position"], axis=1).max()
     size = re.search(r"not the board\S+s edges: .* away by ([\d.]+)\sµm", words(page)).group(1)
     assert float(size) == pytest.approx(1e6 * np.radians(0.1) * far, rel=0.05)
+
+
+def test_a_log_of_one_row_is_refused(folder, tmp_path):
+    rows = (folder / "log.csv").read_text(encoding="utf-8").splitlines(keepends=True)
+    (tmp_path / "log.csv").write_text("".join(rows[:2]), encoding="utf-8")
+    with pytest.raises(InputError, match="^log.csv: expected at least 3 samples, found 1"):
+        board([tmp_path / "log.csv"], folder / "columns.yaml", 9.81)
+
+
+def test_the_motion_says_by_how_much_it_is_late(found):
+    """One IMU is late: the mean of all is late by its share."""
+    motion = imuarray.apply(found.calibration, found.corrected)
+    count = found.calibration.sizes["accelerometer"]
+    assert motion.attrs["late_s"] == pytest.approx(LATE / count, rel=0.05)
 
 
 def test_an_error_leaves_the_folder_as_it_was(found, tmp_path, monkeypatch, no_pictures):

@@ -90,6 +90,16 @@ def test_a_gap_ends_a_pose():
     assert len(still_poses(recording.select(kept))) == 17
 
 
+def test_missing_rows_and_late_stamps_end_no_pose():
+    recording, *_ = board(np.random.default_rng(3))
+    rng = np.random.default_rng(4)
+    kept = recording.select(rng.random(len(recording.time)) > 0.02)
+    late = np.abs(0.2 / RATE * rng.standard_normal(len(kept.time)))
+    for given in (kept, replace(kept, time=kept.time + late)):
+        assert np.diff(given.time).max() > 1.5 / RATE
+        assert len(still_poses(given)) == 16
+
+
 def test_nothing_still_is_one_line():
     recording, *_ = board(np.random.default_rng(4))
     rng = np.random.default_rng(5)

@@ -7,13 +7,16 @@ from pathlib import Path
 from imuarray.analysis.calibration import calibrate
 from imuarray.analysis.logs import open_logs
 from imuarray.analysis.model import Say, silent
-from imuarray.analysis.trust import reasons_of_calibration
+from imuarray.analysis.trust import reasons_of_calibration, reasons_of_poses
 from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.firstorder.correct import FirstOrder, calibrate_first_order, correct
 from imuarray.firstorder.still import still_poses
 from imuarray.recording import Recording
 from imuarray.recording.units import GRAVITY
+from imuarray.recording.validate import check_values
 from imuarray.report.board import Board
+
+FEWEST = 3  # samples
 
 
 def board(
@@ -28,6 +31,12 @@ def board(
     """
     opened = open_logs(logs, columns, topics)
     recording = opened.recording
+    source = ", ".join(Path(path).name for path in logs)
+    check_values(recording, source)
+    if len(recording.time) < FEWEST:
+        raise InputError(
+            f"{source}: expected at least {FEWEST} samples, found {len(recording.time)}"
+        )
     count = len(recording.accelerometer_labels)
     say(f"{len(recording.time)} samples of {count} IMUs; each sensor from still poses")
     found = _first_order(recording, gravity)
@@ -38,14 +47,13 @@ def board(
         corrected = correct(recording, found)
     say("positions from the motion")
     calibration = calibrate(corrected)
-    known = []
+    known = [] if isinstance(found, str) else reasons_of_poses(found.triads.residual_ratio)
     if isinstance(found, str) and recording.map_covariance is None:
         known = [
             f"first order was left out ({found}): offsets, scales and axes of the sensors are taken"
             " as read, and the sds do not know how far these are off"
         ]
     reasons = reasons_of_calibration(corrected, calibration, known)
-    source = ", ".join(Path(path).name for path in logs)
     return Board(source, opened.lines, recording, found, corrected, calibration, reasons)
 
 

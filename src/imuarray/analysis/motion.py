@@ -85,7 +85,19 @@ def _motion_of(calibration, recording: Recording, accelerometer_noise, origin) -
             dataset[f"{name}_sd_from_calibration"][:] = np.nan
     dataset["gyroscope_at_rail"] = (("time",), saturated.any(axis=(1, 2)))
     dataset["accelerometer_at_rail"] = (("time",), railed)
-    return dataset.assign_attrs(own_clocks=int(anew))
+    return dataset.assign_attrs(own_clocks=int(anew), late_s=_late(calibration))
+
+
+def _late(calibration: xr.Dataset) -> float:
+    """By how much (s) the motion is late for its stamps, by the clock of most IMUs.
+
+    What is common to the delays of all IMUs is nowhere seen: their mean is taken for zero.
+    """
+    if "effect_parameter" not in calibration:
+        return 0.0
+    mine = [str(name).startswith("sensor_delay ") for name in calibration["parameter"].to_numpy()]
+    delays = calibration["effect_parameter"].to_numpy()[mine]
+    return float(np.median(delays)) if len(delays) else 0.0
 
 
 def _with_common_map(found, calibration: xr.Dataset, recording: Recording):

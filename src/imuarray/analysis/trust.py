@@ -21,6 +21,7 @@ from imuarray.recording.channels import repeated
 
 RESIDUAL = 3.0  # times the declared noise: widths are too small, or scaled by what is no noise
 TRIAD = 10.0  # the same of one triad where the noise of each is estimated
+POSES = 3.0  # times the noise of a pose's mean; real boards have up to 1.9
 LEARNT = 0.5  # of the drawing's sd: positions known worse are hardly known from the recording
 OTHER = 1.2  # times less residual elsewhere; 1.003 at most for the right board, 2 for another
 SHRUNK = 1.0  # sds: 95 % intervals then cover 83 %
@@ -56,6 +57,17 @@ def reasons_of_calibration(
         reason if len(whose) == len(several) else f"recording {', '.join(whose)}: {reason}"
         for reason, whose in found.items()
     ] + ([] if little or any(map(UNIT.search, found)) else _not_converged(calibration.attrs))
+
+
+def reasons_of_poses(ratio: float) -> list[str]:
+    """Why a first-order calibration is not to be trusted: its residual, in noise of the poses."""
+    if not ratio > POSES:
+        return []
+    return [
+        f"the still poses fit {ratio:.2g} times worse than their noise allows: offsets changed"
+        " between them (sensors that still warm up), or the board bent or was not still; sds do"
+        " not cover that: let it warm up and record again"
+    ]
 
 
 def reasons_of_posterior(

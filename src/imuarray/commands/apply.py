@@ -17,6 +17,8 @@ from imuarray.motion.state import UNITS
 from imuarray.provenance import trust, write_netcdf_parts
 from imuarray.recording import Recording, load_dataset, read_recording
 
+LATE = 1e-4  # s, worth a line
+
 
 def apply(arguments) -> None:
     """The calibrated array's motion with covariances; see `imuarray.apply` for the output."""
@@ -35,10 +37,13 @@ def apply(arguments) -> None:
     write_netcdf_parts(
         (sums.add(part) for part in chain((first,), parts)), len(recording.time), arguments.out
     )
+    late = first.attrs["late_s"]
     average = recording.gyroscope_noise_sd / np.sqrt(recording.angular_rate.shape[1])
     found = sums.document()
-    output.say("\n".join(report(found, average)))
-    found |= {"gyroscopes_averaged_sd_rad_s": average, "out": str(arguments.out)}
+    output.say("\n".join([*report(found, average), *late_lines(late)]))
+    found |= {
+        "gyroscopes_averaged_sd_rad_s": average, "late_s": late, "out": str(arguments.out)
+    }  # fmt: skip
     output.done(found, reasons)
 
 
@@ -80,6 +85,16 @@ class Sums:
             for name, (n, sums) in self.squares.items()
             if n
         }
+
+
+def late_lines(late: float) -> list[str]:
+    """Where an IMU is late, the mean of all is not the time of most of them."""
+    if abs(late) < LATE:
+        return []
+    return [
+        f"by the clock of most IMUs the motion is {1e3 * late:.2f} ms late: it is that of"
+        f" time - {late:.3g} s (attribute late_s)"
+    ]
 
 
 def report(found: dict, average: float) -> list[str]:

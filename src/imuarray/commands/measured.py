@@ -11,6 +11,7 @@ from imuarray.recording import read_recording, write_recording
 
 def first_order(arguments) -> None:
     """Calibration of each triad from poses and moves; the corrected recording carries it."""
+    from imuarray.analysis.trust import reasons_of_poses
     from imuarray.firstorder.correct import calibrate_first_order
     from imuarray.firstorder.report import noise_table, residual_table, summary_lines
     from imuarray.firstorder.store import write_corrected
@@ -24,14 +25,16 @@ def first_order(arguments) -> None:
     table, offsets = residual_table(found, recording), found.triads.offset
     ratios = noise_table(found, recording).groupby("sensor").ratio.median()
     output.say("\n".join(summary_lines(found, recording)))
+    reasons = reasons_of_poses(found.triads.residual_ratio)
     output.done({
         "out": str(arguments.out), "poses": len(found.poses), "still_samples": found.still_samples,
         "gravity_m_s2": found.gravity, "triads": list(table.triad),
         "residual_m_s2": table.residual_rms.to_numpy(), "offset_m_s2": offsets,
+        "residual_ratio": found.triads.residual_ratio,
         "noise_over_declared": ratios.to_dict(), "gyroscopes": arguments.gyroscopes,
         "gyroscope_matrix": found.gyroscope_matrix,
         "gyroscope_common_scale_sd": found.common_scale_sd,
-    })  # fmt: skip
+    }, reasons)  # fmt: skip
 
 
 def select(arguments) -> None:

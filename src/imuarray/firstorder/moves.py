@@ -17,6 +17,7 @@ from imuarray.estimation.reference import skew
 
 FEWEST = 4  # moves
 LONGEST, FARTHEST = 30.0, 30.0  # s and rad of a move; drift and other errors are too large beyond
+BRIDGED = 3.5  # steps from one sample to the next, over which a spline is good enough
 PRIOR, PRIOR_TURN = 0.01, 0.1  # sds about the identity: scales and skews, and (rad) a turn
 FREEDOM = 4.0  # of the t distribution of a move's error
 LOST = np.radians(10.0)  # median error of a move from which the rates are not what they say
@@ -97,7 +98,7 @@ def gather(rate, time, poses, offsets, good, noise_sd: float) -> list[Move]:
     for p, (one, two) in enumerate(zip(poses[:-1], poses[1:], strict=True)):
         part = slice(one.stop - 1, two.start + 1)
         own, length = time[part], time[two.start] - time[one.stop - 1]
-        whole = np.diff(own).max() < 1.5 * usual and good[part].all()
+        whole = np.diff(own).max() < BRIDGED * usual and good[part].all()
         if not whole or length > LONGEST or len(own) < 4:
             continue
         middles = [(time[pose.start] + time[pose.stop - 1]) / 2 for pose in (one, two)]

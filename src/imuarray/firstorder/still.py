@@ -14,6 +14,7 @@ THRESHOLD = 3.0  # times the noise floor
 FLOOR = 0.02  # quantile of the windows' spreads taken as the noise floor
 # A floor this many times the declared noise is motion, not noise: nothing was still.
 MOVING = 10.0
+BRIDGED = 0.1  # s; a pose goes on over so short a gap, and where stamps are late
 STEP_TIME = 0.25  # s, before and after an instant, whose means are compared
 STEP = 0.3  # m/s^2 between them: another pose, with nothing recorded on the way
 
@@ -38,8 +39,8 @@ def still_poses(recording: Recording, window=WINDOW, shortest=SHORTEST) -> list[
     compared with its floor, the recording's own quietest windows. A window that touches a motion
     is not quiet, so half a window at each end of a pose is left out; up to as much again is cut as
     a margin, from what is longer than KEPT. ``shortest`` (s) is a pose with all of its ends. A
-    declared mask ``stationary`` is used instead, as it is, where the recording has one. A gap in
-    time or a step of the specific force ends a pose.
+    declared mask ``stationary`` is used instead, as it is, where the recording has one. A gap
+    longer than BRIDGED or a step of the specific force ends a pose.
 
     Raises
     ------
@@ -59,8 +60,8 @@ def still_poses(recording: Recording, window=WINDOW, shortest=SHORTEST) -> list[
         still, half = (recording.stationary & ~_steps(recording, step)), 0
     else:
         still, half = _quiet(recording, width), width // 2
-    # a gap ends a pose: what happened meanwhile is not known
-    breaks = np.flatnonzero(np.diff(recording.time) > 1.5 * step) + 1
+    # a long gap ends a pose: what happened meanwhile is not known
+    breaks = np.flatnonzero(np.diff(recording.time) > max(1.5 * step, BRIDGED)) + 1
     still[breaks] = False
     found, least = runs(still), int(round(shortest / step)) - 2 * half
     poses = [

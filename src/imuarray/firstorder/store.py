@@ -1,5 +1,6 @@
 """A first-order calibration in a file: the corrected recording with the numbers in a group."""
 
+import h5py
 import numpy as np
 import xarray as xr
 
@@ -17,6 +18,13 @@ def write_corrected(recording: Recording, found: FirstOrder, path) -> None:
     attrs = stamp({"recording": data, "gravity": found.gravity}, 0)
     groups = {FIRST_ORDER: _first_order_dataset(recording, found)}
     write_recording(correct(recording, found), path, attrs=attrs, groups=groups)
+
+
+def stored_residual_ratio(path) -> float:
+    """The residual of the poses in their noise, as a corrected recording's file has it, or 1."""
+    with h5py.File(path, "r") as file:
+        stored = file[FIRST_ORDER].attrs if FIRST_ORDER in file else {}
+        return float(np.ravel(stored.get("residual_ratio", 1.0))[0])
 
 
 def _first_order_dataset(recording: Recording, found) -> xr.Dataset:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -44,7 +45,8 @@ class Board(NamedTuple):
 def write_board(board: Board, folder: Path) -> None:
     """recording.nc, cal.nc, positions.csv and, last, report.html: all of them or none."""
     page = html(board).encode()
-    with atomic_folder(folder, last="report.html") as made:
+    with atomic_folder(folder, last="report.html") as made, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of a recording that was warned of when it was read
         if isinstance(board.first_order, str):
             write_recording(board.corrected, made / "recording.nc")
         else:
