@@ -312,3 +312,11 @@ def test_offsets_that_drift_from_pose_to_pose_are_told(tmp_path, recording, caps
     cal = ["calibrate", out, "--model", "papers", "--out", str(tmp_path / "cal.nc"), "--quiet"]
     assert main(cal) == 3
     assert "still poses fit" in load_dataset(tmp_path / "cal.nc").attrs["reasons"]
+
+
+def test_a_gyroscope_that_failed_is_not_one_of_another_scale(recording):
+    rate = recording.angular_rate.copy()
+    half = len(rate) // 2
+    rate[half:, 2] = rate[half, 2]
+    with pytest.raises(InputError, match=f"gyroscope '{recording.gyroscope_labels[2]}' repeats"):
+        calibrate_first_order(replace(recording, angular_rate=rate), GRAVITY)

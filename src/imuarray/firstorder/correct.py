@@ -15,7 +15,7 @@ from imuarray.firstorder.triads import TriadFit, fit_triads
 from imuarray.firstorder.turns import nearest_orthogonal, shared_turn
 from imuarray.model.effects import KINDS
 from imuarray.recording import Recording
-from imuarray.recording.channels import require_apart, require_live, require_once
+from imuarray.recording.channels import repeated, require_apart, require_live, require_once
 from imuarray.recording.record import CORRECTION, NUMBERS
 from imuarray.recording.units import GRAVITY
 
@@ -120,7 +120,13 @@ def calibrate_first_order(
     every = [_still(one, shortest_pose) for one in (recording, *others)]
     triads, maps = _triads(every, gravity), None
     if gyroscopes == "calibrate":
-        maps, triads = calibrate_gyroscopes(every, triads)
+        try:
+            maps, triads = calibrate_gyroscopes(every, triads)
+        except InputError:  # a failed sensor looks like one of another scale
+            failed = [words for one in every for words in repeated(one.recording)]
+            if failed:
+                raise InputError(failed[0]) from None
+            raise
     return replace(_of_poses(every[0], triads.first(), gravity), gyroscopes=maps)
 
 
