@@ -68,11 +68,13 @@ def facts(board: Board) -> str:
     time, calibration = board.recording.time, board.calibration
     rate, count = 1 / np.median(np.diff(time)), len(board.recording.accelerometer_labels)
     found = board.first_order
-    still = "" if isinstance(found, str) else f" {len(found.poses)} still poses;"
+    still, noise = "", "declared noise"
+    if not isinstance(found, str):  # whose noise the corrected recording declares
+        still, noise = f" {len(found.poses)} still poses;", "noise of the still poses"
     return (
         f"{len(time)} samples of {count} IMUs at {rate:.4g} Hz, {time[-1] - time[0]:.1f} s;"
         f"{still} positions from {calibration.attrs['samples']} moving samples, whose"
-        f" residual is {misfit(calibration):.2f} times the declared noise{_shaken(calibration)}."
+        f" residual is {misfit(calibration):.2f} times the {noise}{_shaken(calibration)}."
     )
 
 
