@@ -205,7 +205,8 @@ def fit_heavy_tails(search: Search, without) -> tuple[Search, list, list]:
         left = noise_effects.heavy_tails(search.fit, search.noise, limit)[1]
         if not left:
             break
-    search = adopt(search)
+    if search.smooth:  # what is left of rough motion is faster than the samples, and no cause
+        search = adopt(search)
     if len(search.causes) > before:
         search = eliminate(search)
     tailed = [(i, k, noise_effects.mixture(search.fit, i, k)) for i, k, _ in hits + others]
