@@ -248,7 +248,10 @@ def test_what_limits_is_said_and_shocks_are_not_misfit(found, no_pictures):
     quiet = rough.assign_attrs(residual_ratio=0.91)
     assert "shocks" not in facts(found._replace(calibration=quiet))
     page = words(html(found._replace(calibration=rough)))
-    assert "residual is 0.90 times the noise of the still poses where the motion is smooth (11 times" in page
+    assert (
+        "residual is 0.90 times the noise of the still poses where the motion is smooth (11 times"
+        in page
+    )
     assert "imuarray diagnose" not in page
 
 

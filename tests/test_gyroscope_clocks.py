@@ -1,8 +1,11 @@
 """Clocks estimated from the gyroscopes alone, where the motion is too rough for its samples."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from imuarray.engine import clocks
 from imuarray.engine.clock_phases import with_phases
 from imuarray.engine.derivatives import no_derivatives
 from imuarray.engine.gyroscope_clocks import (
@@ -118,3 +121,14 @@ def test_a_declared_period_near_the_found_one_is_taken():
     guesses = there.guesses(np.random.default_rng(3))
     found = clocks_from_gyroscopes(there, there.acceleration, guesses)
     assert {values[0] for values in found.values()} == {there.period}
+
+
+@pytest.mark.parametrize(("smooth", "seen"), [(True, {1}), (False, {0, 1})])
+def test_a_short_period_is_no_clock_but_in_rough_motion(monkeypatch, smooth, seen):
+    """There a first look sees a small part of the ages; in smooth motion no IMU is so fast."""
+    each = {0: (200.0, np.array([2e-5, 0.3, 0, 0, 0])), 1: (200.0, np.array([1e-3, 0.3, 0, 0, 0]))}
+    monkeypatch.setattr(clocks, "sawtooths", lambda *given: each)
+    monkeypatch.setattr(clocks, "delay_of", lambda *given: (None, None))
+    readings = SimpleNamespace(exists=np.ones((2, 2), bool), time=None)
+    one = SimpleNamespace(readings=readings, smooth=smooth, state=None)
+    assert set(clocks.shown_clocks(one, None)) == seen

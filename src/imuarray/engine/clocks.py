@@ -24,9 +24,9 @@ def shown_clocks(one: Recorded, columns: Columns) -> dict[int, np.ndarray]:
     score, information = delay_of(one.readings, columns, one.state)
     imus = np.flatnonzero(one.readings.exists.any(axis=1))
     each = sawtooths(one.readings.time, score, information, imus, {})
-    return {
-        int(imu): values for imu, (_, values) in each.items() if values[0] > SETTINGS.least_period
-    }
+    # in rough motion a first look sees a small part of an age, and so of the period
+    least = SETTINGS.least_period if one.smooth else 0.0
+    return {int(imu): values for imu, (_, values) in each.items() if values[0] > least}
 
 
 def with_clocks(one: Recorded, columns: Columns, clocks: dict) -> Recorded:
