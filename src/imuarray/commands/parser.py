@@ -158,7 +158,7 @@ COMMANDS = (
         "corrected recording to write (NetCDF-4), with the calibration in group 'first_order'",
         (
             RECORDING, GRAVITY,
-            _option("--gyroscopes", "calibrate: scales, misalignments and orientations, from the moves"
+            _option("--gyroscopes", "calibrate: scales, misalignments, orientations, from the moves"
                     " between poses (default); offset: only their offsets, as paper 2021",
                     choices=("calibrate", "offset"), default="calibrate"),
             _number("--shortest-pose", "S", "shortest still pose, s (default: 3)",
