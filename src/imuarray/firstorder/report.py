@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from imuarray.firstorder.allan import allan_deviation
 from imuarray.firstorder.correct import FirstOrder
 from imuarray.firstorder.gyroscopes import Gyroscopes
-from imuarray.firstorder.triads import parts_of, parts_sd_of
+from imuarray.firstorder.parts import parts_of, parts_sd_of
 from imuarray.firstorder.turns import TURNED, angle_of, nearest_orthogonal
 from imuarray.recording import Recording
 
