@@ -58,7 +58,8 @@ def made():
         f"{kind}_{name}": ((kind, "axis", "axis_other")[: value.ndim], value)
         for kind in maps
         for name, value in (("inverse", np.linalg.inv(maps[kind])), ("offset", offsets[kind]),
-                            ("offset_sd", 0.01 * np.ones((count, 3))))
+                            ("offset_sd", 0.01 * np.ones((count, 3))),
+                            ("offset_walk", np.zeros(count)))
     })  # fmt: skip
     back = np.swapaxes(nearest_orthogonal(maps["accelerometer"]), 1, 2)
     root = 1e-4 * rng.standard_normal((36, 36))
