@@ -63,6 +63,7 @@ class Options:
     drawing_error: float = 5e-4
     position_prior: float = 7e-4
     gyroscope_walk: float = 2e-5  # rad/s per root second
+    accelerometer_walk: float = 0.0  # m/s^2 per root second
 
 
 def _products(q: np.ndarray) -> np.ndarray:
@@ -360,8 +361,10 @@ def draw_board(seed: int, options: Options = Options()) -> Board:
     bias = draw_biases(rng, count)
     walk = rng.standard_normal((len(time), count, 3)).cumsum(axis=0)
     walk *= options.gyroscope_walk / np.sqrt(options.sampling_rate)
+    walked = np.random.default_rng([seed, 24]).standard_normal(walk.shape).cumsum(axis=0)
+    walked *= options.accelerometer_walk / np.sqrt(options.sampling_rate)
     noise = np.array(NOISE) * rng.uniform(0.9, 1.1, 2)
-    counts = read_out(rng, chips, true, (bias[0], bias[1] + walk), noise)
+    counts = read_out(rng, chips, true, (bias[0] + walked, bias[1] + walk), noise)
     truth = in_frame(chips, hand.rates(time)[0], bias[1])
     return Board(options, time, *counts, chips.drawing, truth)
 

@@ -26,7 +26,7 @@ from imuarray.diagnosis.warming import Courses, maybe_grown
 from imuarray.engine.fit import flat_parameters
 from imuarray.engine.heldout import gain, log_scores
 from imuarray.engine.parameters import catalogue_effects, columns_of
-from imuarray.engine.readings import arrange
+from imuarray.engine.readings import Left, arrange
 from imuarray.model import EFFECTS, ArrayModel
 from imuarray.model.effects import KINDS, effect, known_effect
 from imuarray.recording import write_recording
@@ -143,7 +143,8 @@ def test_what_first_order_says_it_left_is_no_fault_of_the_model():
     readings = arrange(replace(recording, angular_rate=rate))
     columns = columns_of(readings.array, catalogue_effects(), readings.position_prior_sd)
     search = Search(readings, columns, (), str).fitted()
-    corrected = replace(readings, left=np.diag(np.repeat([0.0, 1e-6], 72)))
+    left = Left(np.diag(np.repeat([0.0, 1e-6], 72)), np.zeros((8, 6, 4, 4)))
+    corrected = replace(readings, left=left)
     least = [
         min(c.log_p for c in all_checks(*beside_left(found), found.noise) if "residual" in c.name)
         for found in (search, replace(search, readings=corrected))

@@ -58,7 +58,8 @@ def made():
         f"{kind}_{name}": ((kind, "axis", "axis_other")[: value.ndim], value)
         for kind in maps
         for name, value in (("inverse", np.linalg.inv(maps[kind])), ("offset", offsets[kind]),
-                            ("offset_sd", 0.01 * np.ones((count, 3))))
+                            ("offset_sd", 0.01 * np.ones((count, 3))),
+                            ("offset_walk", np.zeros(count)))
     })  # fmt: skip
     back = np.swapaxes(nearest_orthogonal(maps["accelerometer"]), 1, 2)
     root = 1e-4 * rng.standard_normal((36, 36))
@@ -237,7 +238,7 @@ def test_joints_and_rows_are_the_document_s(made):
 def test_the_turns_sds_are_those_of_drawn_maps(made, upper):
     """1500 draws of what first order left, seed 2: 5 sds of an sd are 9 %."""
     from imuarray.analysis.frames import lower_times_rotation, turn_sds
-    from imuarray.firstorder.triads import upper_times_rotation
+    from imuarray.firstorder.parts import upper_times_rotation
 
     calibration = made[0]
     part = upper_times_rotation if upper else lower_times_rotation

@@ -10,9 +10,11 @@ from scipy.spatial.transform import Rotation
 from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.firstorder.allan import allan_deviation, lag_correlation, white_noise_sd
 from imuarray.firstorder.correct import calibrate_first_order, correct, corrected
+from imuarray.firstorder.parts import parts_of
+from imuarray.firstorder.pose_noise import PoseNoise, walked_mean
 from imuarray.firstorder.report import noise_table, parameter_table, residual_table
 from imuarray.firstorder.still import still_poses, window_spread
-from imuarray.firstorder.triads import fit_triads, parts_of
+from imuarray.firstorder.triads import fit_triads
 from imuarray.geometry import mimu4444_corners
 from imuarray.recording import Recording, read_recording, write_recording
 
@@ -130,6 +132,63 @@ def test_the_truth_is_within_the_claimed_widths():
         covariance = found.covariance[np.ix_(free, free)] / max(found.residual_ratio, 1.0) ** 2
         squares.append(errors[free] @ np.linalg.solve(covariance, errors[free]))
     assert np.mean(squares) / 45 == pytest.approx(1.0, abs=6 * np.sqrt(2 / 45 / 40))
+
+
+def test_offsets_that_walk_bias_no_map():
+    """30 fits, seed 9: squared z of the 36 parameters of maps, and less error than white noise."""
+    squares, errors, plain = [], [], []
+    for seed in range(30):
+        rng = np.random.default_rng([9, seed])
+        matrix, offset = triads(4, rng)
+        unit, time = directions(14, rng), -12.0 * np.arange(14, 0, -1)
+        sd = np.full((14, 4, 3), 1e-3)
+        steps = 1e-3 * np.sqrt(12.0) * rng.standard_normal((14, 4, 3))
+        mean = np.einsum("kij,pj->pki", matrix, GRAVITY * unit) + offset + steps.cumsum(axis=0)
+        mean += sd * rng.standard_normal(mean.shape)
+        found, steady = fit_triads(mean, sd, GRAVITY, time=time), fit_triads(mean, sd, GRAVITY)
+        covariance = found.covariance.reshape(4, 12, 4, 12)[:, :9, :, :9].reshape(36, 36)
+        free = np.diag(covariance) > 0
+        off = (found.matrix - matrix).ravel()
+        squares.append(off[free] ** 2 / np.diag(covariance)[free])
+        errors.append(np.mean(off**2))
+        plain.append(np.mean((steady.matrix - matrix) ** 2))
+    assert np.mean(squares) == pytest.approx(1.0, abs=0.3)
+    assert np.sqrt(np.mean(errors) / np.mean(plain)) < 0.75
+
+
+def test_a_walk_is_whitened_as_the_dense_covariance_says():
+    rng = np.random.default_rng(10)
+    time, sd = np.array([-30.0, -18.0, -7.0, 4.0, 16.0]), rng.uniform(1e-3, 3e-3, (5, 2, 3))
+    recording, used = np.array([0, 0, 0, 0, 1]), np.ones((5, 2), bool)
+    used[1, 1] = False
+    noise = PoseNoise.of(sd, time, recording)._replace(walk=1e-6)
+    white = noise.whitening(used)
+    walked = np.zeros((5, 5))  # two ways from time 0, each recording its own
+    walked[:3, :3] = [[30, 18, 7], [18, 18, 7], [7, 7, 7]]
+    walked[3, 3], walked[4, 4] = 4, 16
+    for k in range(2):
+        for i in range(3):
+            own = np.flatnonzero(used[:, k])
+            dense = np.diag(sd[:, k, i] ** 2) + 1e-6 * walked
+            expected = np.linalg.inv(dense[np.ix_(own, own)])
+            np.testing.assert_allclose(
+                (white[k, i].T @ white[k, i])[np.ix_(own, own)], expected, rtol=1e-9
+            )
+            assert not white[k, i][:, ~used[:, k]].any()
+
+
+def test_the_mean_of_offsets_that_walk_is_within_its_sd():
+    rng, squares, walks = np.random.default_rng(11), [], []
+    time, sd = -12.0 * np.arange(12, 0, -1), np.full((12, 4, 3), 2e-5)
+    for _ in range(60):
+        steps = 2e-5 * np.sqrt(12.0) * rng.standard_normal((13, 4, 3))
+        path = steps.cumsum(axis=0)
+        readings = path[:12] - path[12] + sd * rng.standard_normal(sd.shape)
+        mean, spread, walk = walked_mean(readings, sd, time)
+        squares.append(np.mean((mean / spread) ** 2))
+        walks.append(walk)
+    assert np.mean(squares) == pytest.approx(1.0, abs=0.25)
+    assert np.median(walks) == pytest.approx(2e-5, rel=0.3)
 
 
 def plain_fit(mean, sd, magnitude):

@@ -298,11 +298,11 @@ def test_the_file_and_the_report_carry_it(tmp_path, recording, capsys):
     assert len(kept.map_covariance) == 2 * len(bare.map_covariance)
 
 
-def test_offsets_that_drift_from_pose_to_pose_are_told(tmp_path, recording, capsys):
-    """Here, and by what reads the file."""
-    drift = np.linspace(0.0, 0.2, len(recording.time))[:, None] * [0.0, 1.0, 0.5]
+def test_poses_that_fit_badly_are_told(tmp_path, recording, capsys):
+    """A board that bends as gravity pulls at it; here, and by what reads the file."""
     force = recording.specific_force.copy()
-    force[:, 1] += drift
+    force[:, 1, 0] += 0.3 * (force[:, 0, 1] / GRAVITY) ** 3
+    force[:, 2, 1] += 0.3 * (force[:, 0, 2] / GRAVITY) ** 3
     write_recording(replace(recording, specific_force=force), tmp_path / "rec.nc")
     out = str(tmp_path / "out.nc")
     given = ["first-order", str(tmp_path / "rec.nc"), "--gravity", str(GRAVITY), "--out", out]
@@ -312,6 +312,33 @@ def test_offsets_that_drift_from_pose_to_pose_are_told(tmp_path, recording, caps
     cal = ["calibrate", out, "--model", "papers", "--out", str(tmp_path / "cal.nc"), "--quiet"]
     assert main(cal) == 3
     assert "still poses fit" in load_dataset(tmp_path / "cal.nc").attrs["reasons"]
+
+
+def test_offsets_that_drift_bias_no_position(tmp_path, capsys):
+    """By 2 mg in 60 s, as of a sensor that warms up; with steady offsets 50 um are wrong."""
+    board = draw_board(6, SHORT)
+    recording = board.recording()
+    force = recording.specific_force.copy()
+    force[:, 1] += np.linspace(0.0, 0.2, len(force))[:, None] * [0.0, 1.0, 0.5]
+    write_recording(replace(recording, specific_force=force), tmp_path / "rec.nc")
+    out, cal = (str(tmp_path / name) for name in ("out.nc", "cal.nc"))
+    given = ["first-order", str(tmp_path / "rec.nc"), "--gravity", str(GRAVITY), "--out", out]
+    assert main(given) == 0
+    said = re.search(
+        r"offsets drift, in a minute by some: accelerometers (\S+) mm/s", (capsys.readouterr().out)
+    )
+    assert 10 < float(said[1]) < 60
+    assert main(["calibrate", out, "--out", cal, "--quiet"]) == 0
+    assert rms(off(board, load_dataset(cal))) < 20e-6
+    assert main(["calibrate", out, "--model", "papers", "--out", cal, "--quiet"]) == 3
+    assert rms(off(board, load_dataset(cal))) > 40e-6
+    assert "offsets drift by some" in load_dataset(cal).attrs["reasons"]
+
+
+def off(board, calibration):
+    """Errors (A - 1, 3) m of positions."""
+    position = calibration["position"].to_numpy()
+    return (position - position[0] - board.truth.positions)[1:]
 
 
 def test_a_gyroscope_that_failed_is_not_one_of_another_scale(recording):

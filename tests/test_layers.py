@@ -10,8 +10,8 @@ import imuarray
 PACKAGE = Path(imuarray.__file__).parent
 # Each rests on those above it, or beside it; the injector of the blind study on no model at all.
 LAYERS = (
-    ("errors", "caches", "linear", "tails"), ("compiled",), ("streams", "provenance", "geometry"),
-    ("motion",), ("model", "config"),
+    ("errors", "caches", "linear", "tails", "walk"), ("compiled",),
+    ("streams", "provenance", "geometry"), ("motion",), ("model", "config"),
     ("recording",), ("simulation", "firstorder", "estimation"), ("alignment", "engine"),
     ("posterior",), ("studies", "measured"), ("blind", "diagnosis"), ("claims", "figures"),
     ("report",), ("analysis",), ("plots",), ("commands",), ("cli",), ("__main__",),

@@ -22,6 +22,7 @@ from imuarray.recording.channels import repeated
 RESIDUAL = 3.0  # times the declared noise: widths are too small, or scaled by what is no noise
 TRIAD = 10.0  # the same of one triad where the noise of each is estimated
 POSES = 3.0  # times the noise of a pose's mean; real boards have up to 1.9
+DRIFT = 3.0  # sds of the mean of all samples; offsets that differ by more bias positions
 LEARNT = 0.5  # of the drawing's sd: positions known worse are hardly known from the recording
 OTHER = 1.2  # times less residual elsewhere; 1.003 at most for the right board, 2 for another
 SHRUNK = 1.0  # sds: 95 % intervals then cover 83 %
@@ -51,6 +52,7 @@ def reasons_of_calibration(
             little = _little(recording, places)
         judged = _judged(recording, places, residual, limit)
         units = [reason for reason in judged if UNIT.search(reason)]
+        judged += _drifts(recording) if _is_papers(calibration) else []
         for reason in [*units, *known] if units else [*little, *known, *judged]:
             found.setdefault(reason, []).append(str(number))
     return [
@@ -64,9 +66,25 @@ def reasons_of_poses(ratio: float) -> list[str]:
     if not ratio > POSES:
         return []
     return [
-        f"the still poses fit {ratio:.2g} times worse than their noise allows: offsets changed"
-        " between them (sensors that still warm up), or the board bent or was not still; sds do"
-        " not cover that: let it warm up and record again"
+        f"the still poses fit {ratio:.2g} times worse than noise and a drift of offsets allow: the"
+        " board bent or was not still, or an offset jumped; sds do not cover that: record again"
+    ]
+
+
+def _drifts(recording: Recording) -> list[str]:
+    """What a model with steady offsets leaves out, where first order saw them drift."""
+    if recording.correction is None:
+        return []
+    walk = float(recording.correction["accelerometer_offset_walk"].max())
+    still = recording.stationary
+    time = recording.time if still is None else recording.time[~still]
+    far = walk * np.sqrt(np.mean(np.abs(time - np.median(time)))) if len(time) else 0.0
+    if not far > DRIFT * recording.accelerometer_noise_sd / np.sqrt(max(len(time), 1)):
+        return []
+    return [
+        f"accelerometers' offsets drift by some {far:.2g} m/s^2 between the samples, and this model"
+        " takes them to be steady: take imuarray calibrate without --model papers, or let the board"
+        " warm up and record again"
     ]
 
 
@@ -83,7 +101,7 @@ def reasons_of_posterior(
     places = _places(recording, np.vstack([np.zeros(3), draws.mean(0).reshape(-1, 3)]), covariance)
     plain = "effect_parameter" not in posterior["posterior"]
     residual = _rigid(recording, places, rates == "spread") if plain else {}
-    found = _little(recording, places) + _judged(recording, places, residual)
+    found = _little(recording, places) + _judged(recording, places, residual) + _drifts(recording)
     shrunk = posterior.attrs.get("shrunk_by_sds", 0.0)
     if shrunk > SHRUNK:
         found.append(

@@ -45,7 +45,7 @@ SEED = _number("--seed", "S", "seed of the random numbers (default: 0)", 0, seed
 NOISE = _number(
     "--accelerometer-noise",
     "SD",
-    "assumed sd, m/s^2, of the papers' model (default: the declared one; sample estimates it)",
+    "assumed sd, m/s^2, of the papers' model (default: the declared one)",
 )
 EFFECT_FILE = _file(
     "--effect-file", "Python file with effects of your own, which is run: they join the catalogue;"
@@ -64,7 +64,7 @@ EFFECTS = (
 
 MODEL = (
     _option("--model", "sensors: what a standard sensor model needs, noise estimated (default);"
-            " papers: positions and motion alone, the papers' noise; or the diagnosis.json of"
+            " papers: positions and motion alone, the declared noise; or the diagnosis.json of"
             " `imuarray diagnose`", default="sensors", metavar="{sensors,papers,FILE.json}",
             type=model),
     EFFECT_FILE,
@@ -158,7 +158,7 @@ COMMANDS = (
         "corrected recording to write (NetCDF-4), with the calibration in group 'first_order'",
         (
             RECORDING, GRAVITY,
-            _option("--gyroscopes", "calibrate: their scales, misalignments and turns, from moves"
+            _option("--gyroscopes", "calibrate: scales, misalignments, orientations, from the moves"
                     " between poses (default); offset: only their offsets, as paper 2021",
                     choices=("calibrate", "offset"), default="calibrate"),
             _number("--shortest-pose", "S", "shortest still pose, s (default: 3)",
@@ -205,8 +205,8 @@ COMMANDS = (
     ),
     Command(
         "sample", "sample.sample",
-        "Sample the posterior distribution of the accelerometer positions: about a minute, several"
-        " where NUTS is needed.",
+        "Sample the posterior distribution of the accelerometer positions: from seconds to a"
+        " minute, minutes where NUTS is needed.",
         "rec.nc --seed 1 --out posterior.nc",
         "posterior to write (NetCDF-4)",
         (
@@ -329,7 +329,13 @@ def _add(commands, name: str, command: Command) -> None:
         name, help=command.summary, description=command.summary,
         epilog=f"example: imuarray {command.name} {command.example}",
     )  # fmt: skip
-    parser.add_argument("--out", required=True, type=Path, metavar="FILE", help=command.out)
+    parser.add_argument(
+        "--out",
+        required=True,
+        type=Path,
+        metavar="FOLDER" if command.folder else "FILE",
+        help=command.out,
+    )
     parser.add_argument("--quiet", action="store_true", help="no progress, no summary")
     parser.add_argument(
         "--json", action="store_true", help="the summary as one JSON object (SI units)"

@@ -17,7 +17,7 @@ from imuarray.engine.linearise import State
 from imuarray.engine.parameters import POSITION, Columns, columns_of
 from imuarray.engine.readings import Readings, most_informative
 from imuarray.engine.start import start
-from imuarray.engine.widths import MAPS, settled
+from imuarray.engine.widths import corrected, settled
 from imuarray.errors import LARGEST, SMALLEST, InputError
 from imuarray.model import EFFECTS, ArrayModel
 from imuarray.model.array_model import EffectPrior
@@ -182,7 +182,7 @@ def extended_estimate(readings: Readings, columns: Columns, active, state: State
 
     With columns for what the model has, and for maps that first order may have left.
     """
-    maps = MAPS if readings.left is not None else ()
+    maps = corrected(readings.left)
     few, kept = in_use(columns, active, state, maps)
     state = from_flat(few, state, flat_parameters(columns, state)[:, kept])
     columns, active = few, active[:, kept]

@@ -37,6 +37,7 @@ ALIKE, APART = 0.85, 0.35  # share of a size's step that the next one is: about,
 SHORT = 0.1  # log of a factor; longer steps are not yet those near the end
 SMOOTH = 0.2  # share of rough samples that are looked at as the smooth ones
 NORMAL, ROBUST = np.array([np.inf, np.inf]), np.array([4.0, 4.0])  # degrees of freedom
+SPARED = 1e-3  # least share of the information that blocks but one are taken to have
 
 
 @dataclass(frozen=True)
@@ -146,10 +147,21 @@ class Estimate:
 
 
 def jackknifed(information, blocks) -> np.ndarray:
-    """Sds (n,) from leaving out a block of time after the other, priors in the information."""
-    moved = np.array([-np.linalg.solve(information - inner, score) for inner, score in blocks])
-    count = len(moved)
-    return np.sqrt((count - 1) / count * np.sum((moved - moved.mean(axis=0)) ** 2, axis=0))
+    """Sds (n,) from what each block of time says against all, priors in the information.
+
+    A block left out moves the estimate by (1 - h)^-1, h its share of the information, and so by too
+    much where it holds most of it; with (1 - h)^-1/2 the variance is unbiased where the model holds
+    (Bell and McCaffrey, "Bias reduction in standard errors ...", 2002).
+    """
+    scale = 1 / np.sqrt(np.diag(information))
+    root = np.linalg.cholesky(information * np.outer(scale, scale))
+    back = np.linalg.inv(root) * scale
+    variance = np.zeros(len(information))
+    for inner, score in blocks:
+        share, axes = np.linalg.eigh(back @ inner @ back.T)
+        spared = np.sqrt(np.maximum(1 - share, SPARED))
+        variance += (back.T @ (axes @ (axes.T @ (back @ score) / spared))) ** 2
+    return np.sqrt(variance)
 
 
 def estimate(

@@ -19,11 +19,13 @@ from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.turning import turned
 from imuarray.engine.widths import (
+    DRIFT,
     FIXED,
-    MAPS,
+    OFFSETS,
     SCALES,
     SKEWS,
     beside_maps,
+    corrected,
     mask_of_left,
     settled,
     spread_of,
@@ -35,7 +37,7 @@ from imuarray.model.effects import EFFECTS
 CLOCKS, DELAYS, GYROSCOPES = "clocks of the IMUs", "delay of each IMU", "gyroscope maps"
 RUNGS = {
     CLOCKS: (CLOCK,),
-    "offsets": ("accelerometer_bias", "gyroscope_bias"),
+    "offsets": OFFSETS,
     DELAYS: ("sensor_delay",),
     "lag of the gyroscopes": ("gyroscope_delay",),
     GYROSCOPES: ("gyroscope_scale", "gyroscope_misalignment"),
@@ -88,8 +90,7 @@ def climb(readings: Sequence[Readings], bare: bool = True) -> tuple[Estimate, li
     """
     names = rungs_of(readings)
     effects = [effect for name in names for effect in RUNGS[name]]
-    if any(one.left is not None for one in readings):
-        effects += [name for name in MAPS if name not in effects]
+    effects += [name for name in corrected(readings[0].left) if name not in effects]
     columns = columns_of(readings[0].array, effects, readings[0].position_prior_sd)
     begun = [Recorded.of(one, columns) for one in readings]
     found = estimate(begun, columns, mask_of(columns, [POSITION]), steps=SETTINGS.rung_steps)
@@ -202,13 +203,13 @@ def without(found: Estimate, active) -> list[Recorded]:
 
 
 def _left(found: Estimate) -> list[tuple[np.ndarray, np.ndarray]]:
-    """[(mask (N, m), covariance)] of accelerometers' and gyroscopes' maps that were corrected.
+    """[(mask (N, m), covariance)] of both kinds' maps, and of the offsets, that were corrected.
 
     The first recording's stands for all.
     """
     left, out = found.recorded[0].readings.left, []
     known = mask_of_left(left, found.columns, np.zeros_like(found.active))
-    for names in zip(SCALES, SKEWS, strict=True):
+    for names in (*zip(SCALES, SKEWS, strict=True), OFFSETS, (DRIFT,)):
         mask = known & mask_of(found.columns, names)
         if mask.any():
             spread = spread_of(left, found.columns, mask)

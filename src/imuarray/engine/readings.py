@@ -4,16 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
 
 from imuarray.engine.settings import SETTINGS
 from imuarray.errors import InputError
 from imuarray.estimation.selection import neighbours
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
+from imuarray.model.effects import KINDS
 from imuarray.model.structure import design
 from imuarray.recording import Recording, array_of
+from imuarray.walk import shared_walk
+
+COURSE = 200  # instants of a walk that a polynomial is laid through
+
+
+class Left(NamedTuple):
+    """What a first-order correction left in the readings, as uncertain as it says.
+
+    ``maps`` covariance as `Recording.map_covariance`; ``offsets`` (N, 6, 4, 4) of each channel's
+    offset as a polynomial of time, as `bias_drift` has it, of degree 0 where none ``walks``.
+    """
+
+    maps: np.ndarray
+    offsets: np.ndarray
+
+    @property
+    def walks(self) -> bool:
+        """Whether some offset changes along the recording."""
+        return bool(self.offsets[..., 1:, 1:].any())
 
 
 @dataclass(frozen=True)
@@ -31,7 +53,7 @@ class Readings:
     run : (T,) number of the gapless run a sample is in
     origin : s, where time begins in the recording's own
     scale_sd : of a scale common to all gyroscopes, NaN where nothing is known of it
-    left : covariance of the maps that a correction left in them, as a recording has it; or None
+    left : `Left`, or None where no correction was made
     gapless : bool, whether samples have neighbours that say something of time derivatives
     trust : (T, N, 2) square roots of a robust loss' weights, or None for all one
     period : s, of the clocks of sensors that have one, NaN where it is not declared
@@ -54,7 +76,7 @@ class Readings:
     gapless: bool = True
     origin: float = 0.0
     scale_sd: float = np.nan
-    left: np.ndarray | None = None
+    left: Left | None = None
     trust: np.ndarray | None = None
     wander: np.ndarray | None = None
     period: float = np.nan
@@ -257,8 +279,35 @@ def arrange(recording: Recording, sparse: bool = False) -> Readings:
         ~lost & np.repeat(exists, 3, axis=1), exists, np.tile(noise, (count, 1)),
         np.tile(noise, (count, 1)), runs(time[used]), tuple(longer), recording.position_prior_sd,
         gapless, float(recording.time[0]), recording.gyroscope_common_scale_sd,
-        recording.map_covariance, period=recording.output_period, resolution=resolution(values),
+        _left(recording, count), period=recording.output_period, resolution=resolution(values),
     )  # fmt: skip
+
+
+def _left(recording: Recording, count: int) -> Left | None:
+    if recording.map_covariance is None:
+        return None
+    offsets = np.zeros((2, count, 3, 4, 4))
+    if recording.correction is not None:
+        course = _course(recording)
+        for kind, own in zip(KINDS, offsets, strict=True):
+            inverse, sd, walk = (
+                np.nan_to_num(recording.correction[f"{kind}_{name}"].to_numpy())
+                for name in ("inverse", "offset_sd", "offset_walk")
+            )
+            variance = np.einsum("kij,kj->ki", inverse**2, sd**2)
+            own[: len(sd), :, 0, 0] = variance
+            own[: len(sd)] += walk[:, None, None, None] ** 2 * course
+    return Left(recording.map_covariance, np.moveaxis(offsets, 0, 1).reshape(count, 6, 4, 4))
+
+
+def _course(recording: Recording) -> np.ndarray:
+    """(4, 4) covariance of polynomials laid through a walk of 1 a second, known where it moves."""
+    still = recording.stationary
+    time = recording.time if still is None else recording.time[~still]
+    time = np.quantile(time, np.linspace(0, 1, COURSE))
+    whole = recording.time[-1] - recording.time[0] or 1.0
+    back = np.linalg.pinv(legvander(2 * (time - recording.time[0]) / whole - 1, 3))
+    return back @ shared_walk(time - np.median(time)) @ back.T
 
 
 def measured(

@@ -18,6 +18,7 @@ from imuarray.engine.estimate import (
 from imuarray.engine.fit import flat_parameters, from_flat, scaled_solve
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import Columns, columns_of, gauge_masks
+from imuarray.engine.readings import Left
 from imuarray.linear import scaled_inverse
 from imuarray.model.catalogue import OFF_COLUMNS, OFF_ROWS
 from imuarray.model.effects import KINDS
@@ -27,14 +28,17 @@ SCALES, SKEWS = ("accelerometer_scale", "gyroscope_scale"), (
 )  # fmt: skip
 FIXED = 1e-7  # sd of a map's entry that is known
 MAPS = SCALES + SKEWS  # effects that are 3 x 3 maps, which first order corrects
+OFFSETS = "accelerometer_bias", "gyroscope_bias"
+DRIFT = "bias_drift"
 
 
 def settled(found: Estimate) -> Estimate:
-    """An estimate beside what a first-order correction left of the maps, each as uncertain as that.
+    """An estimate beside what a first-order correction left of maps and offsets.
 
-    One step of everything at once: such errors are so small that it is the last one. The maps stay
-    out of the answer, as they belong to a recording's correction; ``information``, ``precision``
-    and ``blocks`` have them after the n parameters, those of each recording.
+    Each as uncertain as that. One step of everything at once: such errors are so small that it is
+    the last one. They stay out of the answer, as they belong to a recording's correction;
+    ``information``, ``precision`` and ``blocks`` have them after the n parameters, those of each
+    recording.
     """
     return beside_maps(found)[0]
 
@@ -68,7 +72,8 @@ def beside_maps(found: Estimate) -> tuple[Estimate, dict[str, float]]:
     names = np.array(wide.columns.names)[np.nonzero(maps)[1]]
     spread, likely = np.linalg.inv(precision[count:, count:]), {}
     for kind in KINDS:
-        own = np.tile(np.char.startswith(names, kind), len(wide.recorded))
+        mine = np.char.startswith(names, kind) & np.isin(names, MAPS)
+        own = np.tile(mine, len(wide.recorded))
         if own.any():
             distance = off[own] @ np.linalg.solve(spread[np.ix_(own, own)], off[own])
             likely[kind] = float(chdtrc(own.sum(), distance))
@@ -144,9 +149,16 @@ def _lost(freedoms) -> float:
     return max((nu + 5) / (nu + 3) if np.isfinite(nu) else 1.0 for nu in freedoms)
 
 
-def mask_of_left(left, columns: Columns, active) -> np.ndarray:
-    """(N, m) bool of the maps that a correction left, where they are not estimated."""
-    known = () if left is None else MAPS if len(left) > _accelerometers(columns) else MAPS[::2]
+def corrected(left: Left | None) -> tuple[str, ...]:
+    """Effects of which a correction may have left something."""
+    return () if left is None else (*MAPS, DRIFT) if left.walks else MAPS + OFFSETS
+
+
+def mask_of_left(left: Left | None, columns: Columns, active) -> np.ndarray:
+    """(N, m) bool of maps and offsets that a correction left, where they are not estimated."""
+    known = corrected(left)
+    if left is not None and len(left.maps) == _accelerometers(columns):
+        known = tuple(name for name in known if name not in MAPS[1::2])
     return np.isin(columns.names, known) & columns.owner & ~active
 
 
@@ -155,27 +167,32 @@ def _accelerometers(columns: Columns) -> int:
     return 9 * columns.model.array.accelerometers
 
 
-def spread_of(left, columns: Columns, maps) -> np.ndarray:
-    """Covariance of the parameters ``maps`` (N, m) bool, in their order, from those of the maps."""
-    pairs = np.argwhere(maps)
-    begin = np.array([columns.names[c].startswith("gyroscope") for c in pairs[:, 1]], int)
-    begin *= _accelerometers(columns)
-    entry = begin + np.array([9 * imu + _entry(columns, column) for imu, column in pairs], int)
-    return left[np.ix_(entry, entry)]
+def spread_of(left: Left, columns: Columns, chosen) -> np.ndarray:
+    """Covariance of the parameters ``chosen`` (N, m) bool, in their order, of those left."""
+    entry = [_entry(left, columns, *pair) for pair in np.argwhere(chosen)]
+    offsets = left.offsets.reshape(-1, *left.offsets.shape[2:])
+    return block_diag(left.maps, *offsets)[np.ix_(entry, entry)]
 
 
-def _entry(columns: Columns, column: int) -> int:
-    """Where a scale or a misalignment is in its 3 x 3 map, row by row."""
-    place = columns.places[column][-1]
-    if columns.names[column] in SCALES:
-        return 4 * place
-    return int(3 * OFF_ROWS[place] + OFF_COLUMNS[place])
+def _entry(left: Left, columns: Columns, imu: int, column: int) -> int:
+    """Where a parameter is among the maps, triad by triad and row by row, and the offsets."""
+    name, places = columns.names[column], columns.places[column]
+    gyroscope, place = name.startswith("gyroscope"), places[-1]
+    if name == DRIFT:
+        kind, axis, degree = places[-3:]
+        return int(len(left.maps) + 4 * (6 * imu + 3 * kind + axis) + degree)
+    if name in OFFSETS:
+        return int(len(left.maps) + 4 * (6 * imu + 3 * gyroscope + place))
+    begin = 9 * imu + gyroscope * _accelerometers(columns)
+    if name in SCALES:
+        return begin + 4 * place
+    return begin + int(3 * OFF_ROWS[place] + OFF_COLUMNS[place])
 
 
 def _with_maps(found: Estimate) -> Estimate:
-    """The same with columns for all maps."""
-    old = found.columns
-    missing = [name for name in MAPS if name not in old.names]
+    """The same with columns for all maps and offsets."""
+    old, left = found.columns, found.recorded[0].readings.left
+    missing = [name for name in corrected(left) if name not in old.names]
     if not missing:
         return found
     readings = found.recorded[0].readings

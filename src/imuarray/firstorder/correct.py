@@ -10,6 +10,7 @@ from scipy.linalg import block_diag
 from imuarray.errors import InputError, require_one_of
 from imuarray.firstorder.allan import lag_correlation, white_noise_sd
 from imuarray.firstorder.gyroscopes import Gyroscopes, Still, calibrate_gyroscopes
+from imuarray.firstorder.pose_noise import walked_mean
 from imuarray.firstorder.still import SHORTEST, still_poses
 from imuarray.firstorder.triads import TriadFit, fit_triads
 from imuarray.firstorder.turns import nearest_orthogonal, shared_turn
@@ -32,8 +33,9 @@ class FirstOrder:
     poses : list of slice
     triads : TriadFit, accelerometers, with this recording's poses
     gyroscope_offset, gyroscope_offset_sd : (G, 3) rad/s
-        Mean over poses, and its sd from the spread among poses, which holds drift and whatever
-        depends on gravity.
+        Where the board moves, and its sd from the spread among poses, which holds drift and
+        whatever depends on gravity.
+    gyroscope_walk : rad/s per root of a second, sd of an offset's walk; 0 where none shows
     accelerometer_noise, gyroscope_noise : (A, 3) m/s^2, (G, 3) rad/s
         White noise of one reading, from differences of neighbours.
     accelerometer_correlation, gyroscope_correlation : (A, 3), (G, 3)
@@ -46,6 +48,7 @@ class FirstOrder:
     triads: TriadFit
     gyroscope_offset: np.ndarray
     gyroscope_offset_sd: np.ndarray
+    gyroscope_walk: float
     accelerometer_noise: np.ndarray
     gyroscope_noise: np.ndarray
     accelerometer_correlation: np.ndarray
@@ -159,20 +162,34 @@ def _triads(every: Sequence[Still], gravity: float) -> TriadFit:
         sd += [noise / np.sqrt(len(piece)) for piece in force]
     recording = np.repeat(np.arange(len(every)), [len(one.poses) for one in every])
     labels = every[0].recording.accelerometer_labels
-    return fit_triads(np.array(mean), np.array(sd), gravity, labels, recording)
+    time = np.concatenate([_after_moving(one) for one in every])
+    return fit_triads(np.array(mean), np.array(sd), gravity, labels, recording, time)
+
+
+def _after_moving(still: Still) -> np.ndarray:
+    """(P,) s of the poses' middles after that of the moving samples, where offsets are wanted."""
+    time, moving = still.recording.time, np.ones(len(still.recording.time), bool)
+    for pose in still.poses:
+        moving[pose] = False
+    middle = np.median(time[moving]) if moving.any() else time[-1]
+    return np.array([time[pose].mean() for pose in still.poses]) - middle
 
 
 def _of_poses(still: Still, triads: TriadFit, gravity: float) -> FirstOrder:
     """What the still poses alone say: nothing of the gyroscopes' maps."""
     force, noise = _forces(still)
     rate = [still.recording.angular_rate[pose] for pose in still.poses]
-    offsets, counts = still.offsets, [len(piece) for piece in rate]
-    spread = offsets.std(axis=0, ddof=1) if len(rate) > 1 else np.full(offsets.shape[1:], np.nan)
     return FirstOrder(
-        still.poses, triads, np.average(offsets, axis=0, weights=counts),
-        spread / np.sqrt(len(rate)), noise, still.noise, lag_correlation(force),
-        lag_correlation(rate), gravity,
+        still.poses, triads, *_gyroscope_offsets(still), noise, still.noise,
+        lag_correlation(force), lag_correlation(rate), gravity,
     )  # fmt: skip
+
+
+def _gyroscope_offsets(still: Still) -> tuple[np.ndarray, np.ndarray, float]:
+    """(G, 3) rad/s where the board moves, their sds, NaN of one pose alone, and their walk."""
+    counts = np.array([pose.stop - pose.start for pose in still.poses], float)
+    sd = np.maximum(still.noise, 1e-9) / np.sqrt(counts)[:, None, None]
+    return walked_mean(still.offsets, sd, _after_moving(still))
 
 
 def correct(recording: Recording, found: FirstOrder) -> Recording:
@@ -221,21 +238,23 @@ def corrected(inverse, offset, readings) -> np.ndarray:
 
 def _correction(recording: Recording, found: FirstOrder, *inverses) -> xr.Dataset:
     """What `Recording.correction` holds; after a former correction, both as one."""
-    offsets = (found.triads.offset, found.triads.parts_sd()["offset"]), (
-        found.gyroscope_offset, found.gyroscope_offset_sd,
+    offsets = (found.triads.offset, found.triads.parts_sd()["offset"], found.triads.walk), (
+        found.gyroscope_offset, found.gyroscope_offset_sd, found.gyroscope_walk,
     )  # fmt: skip
     variables, before = {}, recording.correction
-    for kind, inverse, (offset, sd) in zip(KINDS, inverses, offsets, strict=True):
+    for kind, inverse, (offset, sd, walk) in zip(KINDS, inverses, offsets, strict=True):
         if before is not None:
             first = before[f"{kind}_inverse"].to_numpy()
             offset = np.linalg.solve(first, offset[..., None])[..., 0]
             offset, inverse = before[f"{kind}_offset"].to_numpy() + offset, inverse @ first
         unit = {"units": NUMBERS[f"{kind}_noise_sd"]}
-        values = (inverse, {"units": "1"}), (offset, unit), (sd, unit)
-        for name, (value, attrs) in zip(("inverse", "offset", "offset_sd"), values, strict=True):
-            full = f"{kind}_{name}"
-            variables[full] = CORRECTION[full], value, attrs
-    return xr.Dataset(variables)
+        rooted = {"units": f"{unit['units']} s-0.5"}
+        variables |= {
+            f"{kind}_inverse": (inverse, {"units": "1"}), f"{kind}_offset": (offset, unit),
+            f"{kind}_offset_sd": (sd, unit),
+            f"{kind}_offset_walk": (np.full(len(offset), walk), rooted),
+        }  # fmt: skip
+    return xr.Dataset({name: (CORRECTION[name], *both) for name, both in variables.items()})
 
 
 def _axes(recording: Recording, found: FirstOrder) -> np.ndarray:

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from imuarray.firstorder.allan import allan_deviation
 from imuarray.firstorder.correct import FirstOrder
 from imuarray.firstorder.gyroscopes import Gyroscopes
-from imuarray.firstorder.triads import parts_of, parts_sd_of
+from imuarray.firstorder.parts import parts_of, parts_sd_of
 from imuarray.firstorder.turns import TURNED, angle_of, nearest_orthogonal
 from imuarray.recording import Recording
 
@@ -57,11 +57,23 @@ def summary_lines(found: FirstOrder, recording: Recording) -> list[str]:
         shown = ", ".join(f"{1e3 * value:.0f}" for value in offset)
         lines.append(f"{row.triad:>5}  {1e3 * row.residual_rms:15.2f}  {row.left_out:14d}  {shown}")
     ratios = noise_table(found, recording).groupby("sensor").ratio.median()
+    lines += walk_lines(found)
     lines += turned_lines(found, recording) + gyroscope_lines(found.gyroscopes, recording)
     return lines + [
         f"noise of {sensor}: {ratio:.2f} times the declared one (median over axes)"
         for sensor, ratio in ratios.items()
     ]
+
+
+def walk_lines(found: FirstOrder) -> list[str]:
+    """For a person: how far offsets walk in a minute, where they do."""
+    root = np.sqrt(60.0)
+    walks = {
+        f"accelerometers {1e3 * root * found.triads.walk:.2g} mm/s^2": found.triads.walk,
+        f"gyroscopes {np.degrees(root * found.gyroscope_walk):.2g} deg/s": found.gyroscope_walk,
+    }
+    shown = [words for words, walk in walks.items() if walk]
+    return [f"offsets drift, in a minute by some: {', '.join(shown)}"] if shown else []
 
 
 def gyroscope_lines(maps: Gyroscopes | None, recording: Recording) -> list[str]:

@@ -46,6 +46,8 @@ def _first_order_dataset(recording: Recording, found) -> xr.Dataset:
         "accelerometer_noise": (accelerometer, found.accelerometer_noise, {"units": "m s-2"}),
         "gyroscope_offset": (gyroscope, found.gyroscope_offset, {"units": "rad s-1"}),
         "gyroscope_offset_sd": (gyroscope, found.gyroscope_offset_sd, {"units": "rad s-1"}),
+        "accelerometer_walk": ((), fit.walk, {"units": "m s-2 s-0.5"}),
+        "gyroscope_walk": ((), found.gyroscope_walk, {"units": "rad s-1 s-0.5"}),
         "gyroscope_noise": (gyroscope, found.gyroscope_noise, {"units": "rad s-1"}),
     }  # fmt: skip
     coords = {

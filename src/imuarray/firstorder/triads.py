@@ -9,18 +9,18 @@ Several recordings of a board share the matrices, and have offsets b_k of their 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import NamedTuple, Self
 
 import numpy as np
-from scipy.linalg import rq
 from scipy.optimize import least_squares
 
 from imuarray.errors import IdentifiabilityError, InputError
+from imuarray.firstorder.parts import parts_sd_of
+from imuarray.firstorder.pose_noise import SEEN, PoseNoise
 from imuarray.firstorder.turns import procrustes, require_rotations
 from imuarray.model.jax64 import jax, jnp
 
-UPPER, SKEW = np.triu_indices(3), np.triu_indices(3, 1)
+UPPER = np.triu_indices(3)
 
 OUTLIER = 5.0  # times the median size of a residual
 MOST_OFF = 0.5  # relative, of a pose's mean specific force from gravity
@@ -53,11 +53,13 @@ class TriadFit:
     covariance : (12 A, 12 A) of (matrix row by row, offset) triad by triad, scaled to the
         residual; rows of the fixed zeros are zero
     residual_ratio : float
-        Residual over what the noise of the poses' averages explains; 1 if nothing else is there.
+        Residual over what the noise of the poses' averages, and the walk of offsets, explain; 1 if
+        nothing else is there.
     used : (P, A) bool
         False where a triad's reading in a pose was left out as an outlier.
     direction_covariance : (3 P, 3 P), scaled like the other; along a direction it says nothing
     recording : (P,) int, the recording of each pose
+    walk : m/s^2 per root of a second, sd of an offset's walk; 0 where none shows
     fitted : what the poses of all recordings gave
     """
 
@@ -70,6 +72,7 @@ class TriadFit:
     used: np.ndarray
     direction_covariance: np.ndarray
     recording: np.ndarray
+    walk: float
     fitted: Fitted
 
     def beside_directions(self) -> np.ndarray:
@@ -88,7 +91,7 @@ class TriadFit:
         along = own.covariance[:, -len(score) :]
         values, spread = own.values + along @ score, along @ information @ along.T
         own = own._replace(values=values, covariance=own.covariance - spread)
-        return _result(own, self.used, self.recording, self.residual_ratio)
+        return _result(own, self.used, self.recording, self.residual_ratio, self.walk)
 
     def first(self) -> Self:
         """The same with the poses of the first recording only."""
@@ -118,60 +121,6 @@ class TriadFit:
         return parts_sd_of(self.matrix, blocks[:, :9, :9]) | {"offset": offset}
 
 
-def parts_of(matrices) -> dict[str, np.ndarray]:
-    """Scale, misalignment (xy, xz, yz) and orientation (rotation vector) of (K, 3, 3), (K, 3)."""
-    values = [_parts(matrix) for matrix in matrices]
-    return {name: np.array([value[name] for value in values]) for name in values[0]}
-
-
-def parts_sd_of(matrices, covariances) -> dict[str, np.ndarray]:
-    """Their sds, (K, 3) each, with the covariances (K, 9, 9) of the matrices row by row."""
-    out: dict[str, list] = {}
-    for matrix, covariance in zip(matrices, covariances, strict=True):
-        for name, slope in _part_slopes(matrix).items():
-            out.setdefault(name, []).append(np.sqrt(np.diag(slope @ covariance @ slope.T)))
-    return {name: np.array(value) for name, value in out.items()}
-
-
-def upper_times_rotation(matrix) -> tuple[np.ndarray, np.ndarray]:
-    """matrix = U R, U upper triangular with a positive diagonal but for its first, R a rotation."""
-    upper, rotation = rq(matrix)
-    signs = np.sign(np.diag(upper))
-    signs[0] *= np.sign(np.linalg.det(rotation * signs[:, None]))  # so that R stays a rotation
-    return upper * signs, rotation * signs[:, None]
-
-
-def _parts(matrix) -> dict[str, np.ndarray]:
-    """Scale, misalignment (xy, xz, yz) and rotation vector of one triad's matrix, (3,) each."""
-    from scipy.spatial.transform import Rotation
-
-    upper, rotation = upper_times_rotation(matrix)
-    scale = np.diag(upper)
-    return {
-        "scale": scale,
-        "misalignment": upper[SKEW] / scale[SKEW[0]],
-        "orientation": Rotation.from_matrix(rotation).as_rotvec(),
-    }
-
-
-def _part_slopes(matrix) -> dict[str, np.ndarray]:
-    """Derivatives (3, 9) of each part in the matrix's entries, orientation as a small turn.
-
-    U^-1 dM R' = U^-1 dU + dR R', upper triangular and skew-symmetric: the latter follows from what
-    is beneath the diagonal.
-    """
-    upper, rotation = upper_times_rotation(matrix)
-    both = np.linalg.inv(upper) @ np.eye(9).reshape(9, 3, 3) @ rotation.T
-    below = np.tril(both, -1)
-    turn = below - np.swapaxes(below, 1, 2)
-    change = upper @ (both - turn)
-    scale, diagonal = np.diag(upper), change[:, range(3), range(3)]
-    first = scale[SKEW[0]]
-    skew = change[:, *SKEW] / first - upper[SKEW] / first**2 * diagonal[:, SKEW[0]]
-    small = np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]])
-    return {"scale": diagonal.T, "misalignment": skew.T, "orientation": small}
-
-
 def _unpack(p, triads, poses):
     """(matrices (A, 3, 3), offsets (R, A, 3), directions (P, 3) not normalised) from the flat p."""
     first = jnp.zeros((3, 3)).at[UPPER].set(p[:6])
@@ -181,14 +130,14 @@ def _unpack(p, triads, poses):
     return jnp.concatenate([first[None], others]), offsets, p[end:].reshape(-1, 3)
 
 
-def _predict(p, triads, magnitude, recording):
+def _predicted(p, triads, magnitude, recording):
     matrices, offsets, directions = _unpack(p, triads, len(recording))
     length = jnp.sqrt(jnp.sum(directions**2, axis=1, keepdims=True))
     force = magnitude * directions / length
     return jnp.einsum("kij,pj->pki", matrices, force) + offsets[recording]
 
 
-def fit_triads(mean, sd, magnitude: float, labels=None, recording=None) -> TriadFit:
+def fit_triads(mean, sd, magnitude: float, labels=None, recording=None, time=None) -> TriadFit:
     """ML estimate from the poses' averages, without the readings that stand far out.
 
     A triad whose offset has jumped or drifts (sensors settling after power-on do) spoils the
@@ -204,6 +153,8 @@ def fit_triads(mean, sd, magnitude: float, labels=None, recording=None) -> Triad
     labels : of the triads, for messages; by default their numbers
     recording : (P,) int, which of several recordings of the board, from 0, each pose is from; the
         board was not taken apart between them. By default all are of one.
+    time : (P,) s of each pose, after the instant at which its recording's offsets are asked for; by
+        default offsets do not walk
 
     Raises
     ------
@@ -213,6 +164,7 @@ def fit_triads(mean, sd, magnitude: float, labels=None, recording=None) -> Triad
         Where the poses are too few or too alike to determine all parameters.
     """
     recording = np.zeros(len(mean), int) if recording is None else np.asarray(recording)
+    time = np.zeros(len(mean)) if time is None else np.asarray(time)
     turns = _turns(mean, labels or [str(k + 1) for k in range(mean.shape[1])])
     # all triads' mean in the frame of the first
     unit = np.einsum("kji,pkj->pki", turns, mean).mean(axis=1) / magnitude
@@ -223,10 +175,43 @@ def fit_triads(mean, sd, magnitude: float, labels=None, recording=None) -> Triad
             f"still poses: expected specific forces of about {magnitude:g} m/s^2, found"
             f" {size[wild[0]] * magnitude:.3g} in pose {wild[0] + 1}; are the units right?"
         )
-    used = np.ones(mean.shape[:2], bool)
+    given = _Poses(mean, magnitude, recording, turns, unit)
+    noise = PoseNoise.of(sd, time, recording)
+    found = _without_outliers(given, noise)
+    if found.residual_ratio > SEEN:
+        noise = noise.estimated(found.used, *given.linearised(found.fitted.values))
+        if noise.walk:
+            found = _without_outliers(given, noise)
+    return found
+
+
+class _Poses(NamedTuple):
+    """Averages (P, A, 3) m/s^2 in P poses, gravity, whose poses; where a fit starts."""
+
+    mean: np.ndarray
+    magnitude: float
+    recording: np.ndarray
+    turns: np.ndarray
+    unit: np.ndarray
+
+    def start(self) -> np.ndarray:
+        offsets = np.zeros(3 * len(self.turns) * (1 + self.recording.max()))
+        matrices = np.eye(3)[UPPER], self.turns[1:].ravel()
+        return np.concatenate([*matrices, offsets, self.unit.ravel()])
+
+    def linearised(self, p) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Misfit (P, A, 3), slopes (P, A, 3, n) of the averages, information on free lengths."""
+        given = len(self.turns), self.magnitude, self.recording
+        misfit, slopes = self.mean - np.asarray(_predict(p, *given)), _slopes(p, *given)
+        lengths = np.asarray(_length_slopes(p, len(self.mean)))
+        return misfit, np.asarray(slopes), lengths.T @ lengths
+
+
+def _without_outliers(given: _Poses, noise: PoseNoise) -> TriadFit:
+    used = np.ones(given.mean.shape[:2], bool)
     while True:
-        found, gain = _fit(mean, sd, magnitude, recording, used, (turns, unit))
-        spare = (~used).sum(axis=0) < MOST_LEFT_OUT * len(mean)
+        found, gain = _fit(given, noise, used)
+        spare = (~used).sum(axis=0) < MOST_LEFT_OUT * len(given.mean)
         candidates = np.where(used & spare, gain, 0.0)
         worst = np.unravel_index(np.argmax(candidates), gain.shape)
         if not candidates[worst] > OUTLIER**2 * np.median(gain[used]):
@@ -243,55 +228,71 @@ def _turns(mean, labels) -> np.ndarray:
     return turns
 
 
-@partial(jax.jit, static_argnums=1)
-def _residual(p, triads, mean, weight, magnitude, recording):
-    misfit = ((mean - _predict(p, triads, magnitude, recording)) * weight).ravel()
-    # fixes the directions' free lengths at 1; zero at the solution, so it costs nothing
-    lengths = jnp.sum(_unpack(p, triads, len(mean))[2] ** 2, axis=1) - 1.0
-    return jnp.concatenate([misfit, lengths])
+def _lengths(p, poses):
+    """Fixes the directions' free lengths at 1; zero at the solution, so it costs nothing."""
+    return jnp.sum(p[-3 * poses :].reshape(-1, 3) ** 2, axis=1) - 1.0
 
 
-_slopes = jax.jit(jax.jacfwd(_residual), static_argnums=1)
+_predict = jax.jit(_predicted, static_argnums=1)
+_slopes = jax.jit(jax.jacfwd(_predicted), static_argnums=1)
+_length_slopes = jax.jit(jax.jacfwd(_lengths), static_argnums=1)
 
 
-def _fit(mean, sd, magnitude, recording, used, start) -> tuple[TriadFit, np.ndarray]:
+def _fit(given: _Poses, noise: PoseNoise, used) -> tuple[TriadFit, np.ndarray]:
     """Least squares over the readings ``used``; also what leaving each one out would gain.
 
     The gain (P, A) is how much the sum of squares would fall (by linear theory), so that a
-    reading which bends the fit to itself is seen for what it is. ``start``: turns (A, 3, 3) and
-    directions (P, 3).
+    reading which bends the fit to itself is seen for what it is.
     """
-    poses, triads = mean.shape[:2]
-    given = mean, used[..., None] / sd, magnitude, recording
-    turns, unit = start
-    offsets = np.zeros(3 * triads * (1 + recording.max()))
-    start = np.concatenate([np.eye(3)[UPPER], turns[1:].ravel(), offsets, unit.ravel()])
+    poses, triads = used.shape
+    options, white = (triads, given.magnitude, given.recording), noise.whitening(used)
+
+    def residual(p):
+        misfit = np.moveaxis(given.mean - np.asarray(_predict(p, *options)), 0, -1)
+        return np.concatenate([(white @ misfit[..., None]).ravel(), _lengths(p, poses)])
+
+    def slopes(p):
+        own = np.moveaxis(np.asarray(_slopes(p, *options)), 0, -2)
+        return np.concatenate([-(white @ own).reshape(-1, len(p)), _length_slopes(p, poses)])
+
     found = least_squares(
-        lambda p: np.asarray(_residual(p, triads, *given)), start,
-        jac=lambda p: np.asarray(_slopes(p, triads, *given)),
+        residual, given.start(), jac=slopes,
         x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-12, max_nfev=200,
     )  # fmt: skip
     norm = np.linalg.norm(found.jac, axis=0)
     scaled = found.jac / np.where(norm > 0, norm, 1.0)
     left, values, _ = np.linalg.svd(scaled, full_matrices=False)
     rank = int(np.sum(values > 1e-7 * values[0]))
-    if rank < start.size:
+    if rank < found.x.size:
         raise IdentifiabilityError(
             f"still poses: expected about twelve or more directions, found {poses}, which determine"
-            f" {rank} of {start.size} unknowns"
+            f" {rank} of {found.x.size} unknowns"
         )
-    rows = left[: mean.size].reshape(poses, triads, 3, -1)
-    free = np.eye(3) - np.einsum("pkin,pkjn->pkij", rows, rows)
-    misfit = found.fun[: mean.size].reshape(poses, triads, 3)
-    # a reading that alone determines something cannot be spared: its inverse is kept finite
-    solved = np.linalg.solve(free + 1e-9 * np.eye(3), misfit[..., None])[..., 0]
-    gain = np.einsum("pki,pki->pk", misfit, solved)
+    count = white.shape[0] * 3 * poses
+    gain = _gain(white, left[:count], found.fun[:count])
     freedom = 3 * int(used.sum()) + poses - found.x.size
     ratio = np.sqrt(2 * found.cost / freedom) if freedom > 0 else np.nan
     scale = max(ratio, 1.0) if freedom > 0 else 1.0
     spread = scale**2 * np.linalg.inv(scaled.T @ scaled) / np.outer(norm, norm)
-    own = Fitted(found.x, spread, mean, magnitude)
-    return _result(own, used, recording, float(ratio)), gain
+    own = Fitted(found.x, spread, given.mean, given.magnitude)
+    return _result(own, used, given.recording, float(ratio), np.sqrt(noise.walk)), gain
+
+
+def _gain(white, left, misfit) -> np.ndarray:
+    """(P, A) what leaving out each triad's reading in each pose takes from the sum of squares.
+
+    ``white`` (A, 3, P, P), left singular vectors and misfit of white averages, row by row.
+    """
+    back = np.swapaxes(white, -1, -2)
+    rows = np.moveaxis(back @ left.reshape(*white.shape[:3], -1), 2, 0)
+    misfit = np.moveaxis(back @ misfit.reshape(*white.shape[:3], 1), 2, 0)[..., 0]
+    weight = np.moveaxis(np.sum(white**2, axis=2), 2, 0)
+    size = np.sqrt(np.where(weight > 0, weight, 1.0))
+    rows, misfit = rows / size[..., None], misfit / size
+    free = np.eye(3) - np.einsum("pkin,pkjn->pkij", rows, rows)
+    # a reading that alone determines something cannot be spared: its inverse is kept finite
+    solved = np.linalg.solve(free + 1e-9 * np.eye(3), misfit[..., None])[..., 0]
+    return np.einsum("pki,pki->pk", misfit, solved)
 
 
 def _places(triads: int) -> np.ndarray:
@@ -303,7 +304,7 @@ def _places(triads: int) -> np.ndarray:
     )
 
 
-def _result(own: Fitted, used, recording, ratio: float) -> TriadFit:
+def _result(own: Fitted, used, recording, ratio: float, walk: float) -> TriadFit:
     poses, triads = used.shape
     matrices, offsets, directions = (np.asarray(x) for x in _unpack(own.values, triads, poses))
     place = _places(triads)
@@ -313,5 +314,5 @@ def _result(own: Fitted, used, recording, ratio: float) -> TriadFit:
     residual = own.mean - np.asarray(_predict(own.values, triads, own.magnitude, recording))
     return TriadFit(
         matrices, offsets[0], direction, residual, covariance, ratio, used,
-        own.covariance[-3 * poses :, -3 * poses :], recording, own,
+        own.covariance[-3 * poses :, -3 * poses :], recording, walk, own,
     )  # fmt: skip

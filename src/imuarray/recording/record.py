@@ -72,7 +72,8 @@ CORRECTION = {
     f"{kind}_{name}": (kind, *dims)
     for kind in ("accelerometer", "gyroscope")
     for name, dims in (
-        ("inverse", ("axis", "axis_other")), ("offset", ("axis",)), ("offset_sd", ("axis",))
+        ("inverse", ("axis", "axis_other")), ("offset", ("axis",)), ("offset_sd", ("axis",)),
+        ("offset_walk", ()),
     )
 }  # fmt: skip
 
@@ -124,8 +125,9 @@ class Recording:
         Rotations from the accelerometers' own axes, those of their chips, to the array's.
     correction : Dataset, or None
         How the readings were corrected (first-order calibration): ``accelerometer_inverse``
-        (A, 3, 3) and ``accelerometer_offset`` (A, 3) m/s^2 with ``accelerometer_offset_sd``, the
-        same of the gyroscopes in rad/s; readings = inverse @ (raw - offset).
+        (A, 3, 3) and ``accelerometer_offset`` (A, 3) m/s^2 with ``accelerometer_offset_sd`` where
+        the board moves, ``accelerometer_offset_walk`` (A,) m/s^2 per root of a second, the same of
+        the gyroscopes in rad/s; readings = inverse @ (raw - offset).
     alignment : Dataset, or None
         How the logs of loose IMUs were brought together (`imuarray.alignment.Alignment.dataset`).
     output_period : float, s, NaN where not declared

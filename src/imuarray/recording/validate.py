@@ -211,7 +211,8 @@ def _check_correction(dataset: xr.Dataset, name: str, where: str) -> None:
     _check_numeric(dataset[name], where)
     values = dataset[name].values.astype(float)
     unknown = np.isnan(values) & name.endswith("_sd")  # of a single pose
-    if values.shape[-1] != 3 or not (unknown | (np.abs(values) <= LARGEST)).all():
+    axes = values.ndim == 1 or values.shape[-1] == 3
+    if not axes or not (unknown | (np.abs(values) <= LARGEST)).all():
         raise InputError(f"{where}: {name}: expected finite numbers for each axis, found others")
 
 
