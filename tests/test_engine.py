@@ -8,7 +8,7 @@ import pytest
 
 import imuarray
 from imuarray.analysis.calibration_dataset import engine_dataset
-from imuarray.engine.estimate import Recorded, estimate, to_come
+from imuarray.engine.estimate import Recorded, estimate, jackknifed, to_come
 from imuarray.engine.fit import flat_parameters
 from imuarray.engine.ladder import climb, mask_of
 from imuarray.engine.linearise import linearise, reading, seen_again
@@ -304,3 +304,25 @@ def test_a_clock_that_wanders_is_read_at_other_ages():
         read.append(reading(columns.model, 3, x, places, clock, extra, 1.0, 9.0))
     np.testing.assert_allclose(*read, rtol=1e-12)
     assert np.abs(read[0][0, 3:] - x[:3]).max() > 1e-4
+
+
+def test_a_block_that_holds_most_of_the_information_widens_no_sd():
+    """3000 lines through blocks of 200 and nine times 4 points, the model right: E[sd^2] is the
+    formal variance; leaving each block out, as a plain jackknife does, gives several times that.
+    """
+    rng, sizes = np.random.default_rng(5), [200, *[4] * 9]
+    rows = [np.stack([np.ones(n), rng.uniform(0, 1 + 3 * (n > 4), n)], axis=1) for n in sizes]
+    inner = [x.T @ x for x in rows]
+    information = sum(inner)
+    found, plain = [], []
+    for _ in range(3000):
+        scores = [x.T @ rng.standard_normal(len(x)) for x in rows]
+        at = np.linalg.solve(information, sum(scores))
+        left = [score - own @ at for own, score in zip(inner, scores, strict=True)]
+        blocks = list(zip(inner, left, strict=True))
+        found.append(jackknifed(information, blocks) ** 2)
+        moved = [np.linalg.solve(information - own, score) for own, score in blocks]
+        plain.append(0.9 * np.sum(np.square(moved - np.mean(moved, axis=0)), axis=0))
+    formal = np.diag(np.linalg.inv(information))
+    np.testing.assert_allclose(np.mean(found, axis=0), formal, rtol=0.1)
+    assert (np.mean(plain, axis=0) > 3 * formal).any()
