@@ -156,12 +156,11 @@ def _aligned(folder: Path, rig: Rig) -> dict[str, float]:
     """Clocks while the rig is twisted (us), turns of the gyroscopes against the first (degrees)."""
     found = load_dataset(folder / "rec.nc", "alignment")
     times = np.linspace(*rig.twisting, 100)
-    zero = min(table["t"].iloc[0] for table in rig.tables)  # from which the file's stamps count
     errors, sds = [], []
     for k in range(1, rig.options.imus):
         part = found.isel(imu=k)
         stamps = rig.offset[k] + (1 + rig.drift[k]) * times
-        late = stamps - zero - float(part.clock_middle)
+        late = stamps - float(part.clock_middle)
         instants = stamps - float(part.clock_offset) - float(part.clock_drift) * late
         errors.append(instants - times - rig.offset[0])
         sds.append(np.hypot(float(part.clock_offset_sd), float(part.clock_drift_sd) * late))

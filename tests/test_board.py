@@ -11,16 +11,19 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
+import yaml
 
 import imuarray
 from benchmarks.board import Options, draw_board, write
 from imuarray.analysis.board import board
-from imuarray.analysis.trust import reasons_of_calibration
+from imuarray.analysis.motion import _late, as_calibrated
+from imuarray.analysis.trust import reasons_of_calibration, reasons_of_motion
 from imuarray.cli import main
 from imuarray.commands.board import answer
 from imuarray.commands.calibrate import position_lines
 from imuarray.diagnosis.plain import Sizes, plain
 from imuarray.errors import InputError
+from imuarray.firstorder.store import stored_residual_ratio
 from imuarray.report.board import html, write_board
 from imuarray.report.board_words import advice, facts, turned, verdict
 from imuarray.report.excitation import missing
@@ -183,6 +186,58 @@ def test_the_motion_says_by_how_much_it_is_late(found):
     motion = imuarray.apply(found.calibration, found.corrected)
     count = found.calibration.sizes["accelerometer"]
     assert motion.attrs["late_s"] == pytest.approx(LATE / count, rel=0.05)
+
+
+def test_by_clocks_of_their_own_as_well(found):
+    """A clock's offset is an age: it is what a delay is, of the other sign."""
+    own = found.calibration
+    names = [
+        str(name).replace("sensor_delay delay", "sensor_clock offset")
+        for name in own.parameter.to_numpy()
+    ]
+    clocks = own.assign(effect_parameter=-own.effect_parameter).assign_coords(parameter=names)
+    assert _late(clocks) == _late(own) != 0.0
+
+
+def test_a_log_as_read_is_corrected_as_the_calibration_s_was(found):
+    raw, corrected = found.recording, found.corrected
+    mine = as_calibrated(raw, found.calibration)
+    np.testing.assert_array_equal(mine.specific_force, corrected.specific_force)
+    np.testing.assert_array_equal(mine.angular_rate, corrected.angular_rate)
+    assert as_calibrated(corrected, found.calibration) is corrected
+    motions = [imuarray.apply(found.calibration, one).angular_rate for one in (raw, corrected)]
+    assert np.abs(motions[0] - motions[1]).max() < 0.1 * raw.gyroscope_noise_sd
+    said = reasons_of_motion(mine, found.calibration, as_read=True)
+    assert any("offsets that have changed" in reason for reason in said)
+    swapped = found.calibration.assign_attrs(mended="axis_swap")
+    with pytest.raises(InputError, match="the right axes, found axis_swap"):
+        imuarray.apply(swapped, raw)
+
+
+def test_a_corrected_recording_is_for_calibrate(folder, tmp_path):
+    with pytest.raises(InputError, match="found one that is corrected: imuarray calibrate"):
+        board([folder / "answer" / "recording.nc"])
+
+
+def test_the_input_is_not_written_over(folder, capsys):
+    inputs = [str(folder / "answer" / "recording.nc"), "--out", str(folder / "answer")]
+    assert main(["board", *inputs]) == 2
+    assert "expected a folder without the input recording.nc" in capsys.readouterr().err
+
+
+def test_a_selection_has_what_first_order_found(folder, tmp_path):
+    read, few = folder / "answer" / "recording.nc", tmp_path / "few.nc"
+    assert main(["select", str(read), "--samples", "100", "--out", str(few), "--quiet"]) == 0
+    assert stored_residual_ratio(few) == stored_residual_ratio(read) != 1.0
+
+
+def test_a_gyroscope_in_another_imu_s_place_is_refused(folder, tmp_path):
+    layout = yaml.safe_load((folder / "columns.yaml").read_text(encoding="utf-8"))
+    first = next(iter(layout["gyroscopes"]["triads"]))
+    layout["gyroscopes"]["triads"].pop(first)
+    (tmp_path / "columns.yaml").write_text(yaml.safe_dump(layout))
+    with pytest.raises(InputError, match="IMUs without one last, found .* as number 1"):
+        imuarray.open_logs(folder / "log.csv", tmp_path / "columns.yaml")
 
 
 def test_an_error_leaves_the_folder_as_it_was(found, tmp_path, monkeypatch, no_pictures):

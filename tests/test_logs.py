@@ -96,6 +96,11 @@ def test_loose_imus_are_aligned(loose, capsys):
     np.testing.assert_allclose(found.angular_rate[inner], expected.angular_rate[inner], atol=2e-4)
     np.testing.assert_allclose(kept.rotation, alignment.rotation, atol=1e-6)
     np.testing.assert_allclose(kept.clock_drift, [c.drift for c in alignment.clocks], atol=1e-7)
+    # by the logs' own stamps, which are these after an epoch of each
+    epochs = np.array([10.0, 0.0, 10.0])
+    for name, begun in (("offset", epochs - 10.0), ("middle", epochs)):
+        true = [getattr(clock, name) for clock in alignment.clocks] + begun
+        np.testing.assert_allclose(kept[f"clock_{name}"], true, atol=2e-5, err_msg=name)
 
 
 def test_tables_and_a_bag_agree_bit_for_bit(loose):

@@ -11,6 +11,7 @@ from imuarray.analysis.beyond import posterior_beyond
 from imuarray.analysis.fitting import fitted_beyond
 from imuarray.analysis.known import fused
 from imuarray.analysis.past_rail import _choose, _hidden, past_rail
+from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.figures.board import figure_past_rail, table_past_rail
 from imuarray.model.names import parameter_names
@@ -60,6 +61,29 @@ def test_the_right_model_predicts_what_is_withheld(withheld, diagnosis):
     assert all(len(axes.lines) == 7 for axes in figure.axes)
     rows, _, _, notes = table_past_rail([table, table], ["a", "b"], "board")
     assert len(rows) == 4 and "without the withheld readings" in notes[0]
+
+
+def test_what_a_diagnosis_doubts_goes_along(withheld, diagnosis, tmp_path, capsys):
+    recording, _ = withheld
+    document = json.loads(diagnosis.read_text())
+    document["reasons"] = ["too slow"]
+    begins, lasts = float(recording.time[0]), float(np.ptp(recording.time))
+    document["clock"] = {"origin_s": begins, "span_s": lasts}
+    diagnosis.write_text(json.dumps(document))
+    found = imuarray.diagnosed(diagnosis, recording)
+    assert json.loads(found.attrs["reasons"]) == ["too slow"] and found.attrs["of_diagnosed"]
+    part = recording.select(slice(1, None))
+    assert not imuarray.diagnosed(diagnosis, part).attrs["of_diagnosed"]
+    document["causes"].append({"effect": "axis_swap", "sensors": ["2"], "parameters": {}})
+    diagnosis.write_text(json.dumps(document))
+    with pytest.raises(InputError, match="right axes, found axis_swap"):
+        imuarray.diagnosed(diagnosis, recording)
+    with pytest.raises(InputError, match="expected none with a diagnosis.json"):
+        imuarray.calibrate(recording, diagnosis, effects=["gyroscope_scale"])
+    imuarray.write_recording(recording, tmp_path / "rec.nc")
+    command = ["sample", str(tmp_path / "rec.nc"), "--out", str(tmp_path / "chains.nc")]
+    assert main([*command, "--model", str(diagnosis), "--effects", "gyroscope_scale"]) == 2
+    assert "expected none with a diagnosis.json" in capsys.readouterr().err
 
 
 def test_the_withheld_readings_are_not_used(withheld, diagnosis):

@@ -12,11 +12,13 @@ import imuarray
 from imuarray.analysis import trust
 from imuarray.analysis.drawing import Places, departures
 from imuarray.analysis.rigid import slope, turning
-from imuarray.analysis.suspects import suspects, told
+from imuarray.analysis.suspects import clipped, suspects, told
 from imuarray.blind.cases import Case, make
 from imuarray.cli import main
 from imuarray.errors import InputError
+from imuarray.firstorder.correct import corrected
 from imuarray.geometry import mimu4444, mimu4444_corners
+from imuarray.recording.record import CORRECTION
 
 CASE = Case("trust", duration=8.0)
 FLIP = np.array([1.0, 1.0, -1.0])
@@ -384,17 +386,47 @@ def test_a_motion_of_another_board_s_calibration(sound, tmp_path, capsys):
     assert status == 3 and "the calibration is not to be trusted" in capsys.readouterr().err
 
 
-def test_clocks_have_the_phases_of_their_own_recording(sound):
+@pytest.mark.parametrize("effect", ["sensor_clock", "bias_drift", "position_shift"])
+def test_what_looks_at_the_time_is_of_its_own_recording(sound, effect):
     rate = np.median(sound.angular_rate, axis=1)[::2]
     calibration = xr.Dataset(
         {"angular_rate": (("time", "axis"), rate)}, {"time": sound.time[::2]},
-        {"effects": "sensor_clock,gyroscope_delay", "model": "sensors"},
+        {"effects": f"{effect},gyroscope_delay", "model": "diagnosis.json"},
     )  # fmt: skip
-    assert trust._other_clocks(sound, calibration) == []
+    part = sound.select(slice(100, 400))
+    assert trust._of_another_time(sound, calibration, False) == []
+    assert trust._of_another_time(part, calibration, False) == []
     another = make(CASE, 2)[0]
-    (said,) = trust._other_clocks(another, calibration)
-    assert "clocks" in said
-    assert trust._other_clocks(another, calibration.assign_attrs(effects="gyroscope_delay")) == []
+    later = replace(another, time=another.time + 100.0)
+    for one in (another, later):
+        (said,) = trust._of_another_time(one, calibration, False)
+        assert effect in said
+        assert bool(trust._of_another_time(one, calibration, True)) == (effect != "sensor_clock")
+    without = calibration.assign_attrs(effects="gyroscope_delay")
+    assert trust._of_another_time(another, without, False) == []
+    for mine in (0, 1):
+        found = calibration.drop_vars("angular_rate").assign_attrs(of_diagnosed=mine)
+        assert bool(trust._of_another_time(sound, found, False)) != bool(mine)
+
+
+def test_a_rail_within_the_range_shows_under_a_correction(sound):
+    raw = one(sound, 2, lambda x: np.clip(x, -12, 12), ACCELEROMETER)
+    rng, variables = np.random.default_rng(3), {}
+    for kind, values in (("accelerometer", raw.specific_force), ("gyroscope", raw.angular_rate)):
+        inverse = np.eye(3) + 0.005 * rng.standard_normal((values.shape[1], 3, 3))
+        offset = 0.05 * rng.standard_normal(values.shape[1:])
+        parts = {"inverse": inverse, "offset": offset, "offset_sd": offset,
+                 "offset_walk": offset[:, 0]}  # fmt: skip
+        variables |= {f"{kind}_{n}": (CORRECTION[f"{kind}_{n}"], x) for n, x in parts.items()}
+    correction = xr.Dataset(variables)
+    found = replace(
+        raw, correction=correction, specific_force=corrected(
+            *(variables[f"accelerometer_{n}"][1] for n in ("inverse", "offset")), raw.specific_force
+        ), angular_rate=corrected(
+            *(variables[f"gyroscope_{n}"][1] for n in ("inverse", "offset")), raw.angular_rate
+        ),
+    )  # fmt: skip
+    assert clipped(found) == clipped(raw) != []
 
 
 def test_rough_motion_is_judged_by_its_smooth_samples(sound):

@@ -19,6 +19,7 @@ from imuarray.errors import InputError, one_line
 
 NETCDF = (".nc", ".nc4", ".h5")
 FIGURES = (".png", ".pdf")
+PAGES = ("recording.nc", "cal.nc", "positions.csv", "report.html", "diagnosis.json")  # in folders
 OK, UNFORESEEN, BAD_INPUT, UNTRUSTED, INTERRUPTED, CLOSED = 0, 1, 2, 3, 130, 141
 AGAIN = 0.05  # s, after which an interrupt that was dropped comes again
 PATIENCE = 1.0  # s, in which an interrupted command may tidy up
@@ -173,6 +174,8 @@ def _check_output(arguments: argparse.Namespace) -> None:
             raise InputError(f"{source}: expected a file to read, found {found}")
         if out.is_file() and out.samefile(source):
             raise InputError(f"--out {out}: expected another file than the input, found the same")
+        if arguments.folder and source.name in PAGES and source.resolve().parent == out.resolve():
+            raise InputError(f"--out {out}: expected a folder without the input {source.name}")
         if source.suffix in NETCDF:
             from imuarray.recording.apart import require_readable
 
@@ -201,7 +204,10 @@ def _require_writable(option: str, path: Path, folder: bool = False) -> None:
 
 
 def _read_effects(arguments: argparse.Namespace) -> None:
-    """The user's own effects into the catalogue."""
+    """The user's own effects into the catalogue; none beside those of a diagnosis."""
+    model = getattr(arguments, "model", None)
+    if getattr(arguments, "effects", None) and isinstance(model, InputFile):
+        raise InputError("--effects: expected none with a diagnosis.json, found some")
     files = getattr(arguments, "effect_file", None)
     if not files:
         return

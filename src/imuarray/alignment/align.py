@@ -60,7 +60,7 @@ def align(
         recording.accelerometer_labels, rotation, _declared(logs, rotation),
         _of_stamps(clocks, gyroscopes, origins), agreement,
         tuple(zip(facts[::2], facts[1::2], strict=True)), step, origins[0], int(whole.sum()),
-        int((~whole).sum()),
+        int((~whole).sum()), np.array([log.epoch for log in logs]),
     )  # fmt: skip
     return replace(
         recording, accelerometer_noise_sd=float(noise[0]), gyroscope_noise_sd=float(noise[1]),

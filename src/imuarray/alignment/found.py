@@ -53,6 +53,7 @@ class Alignment:
     step : s, between common instants
     origin : s, the first log's stamp at the recording's instant zero
     count, left_out : common instants, and those that gaps in the logs cost beside
+    epochs : (K,) s, the logs' stamps at the zeros of their times; `dataset` counts by stamps
     """
 
     labels: tuple[str, ...]
@@ -65,6 +66,7 @@ class Alignment:
     origin: float
     count: int
     left_out: int
+    epochs: np.ndarray
 
     @property
     def angle(self) -> np.ndarray:
@@ -108,10 +110,13 @@ class Alignment:
         """The same as the recording's file keeps it: dimensions imu, axis, kind."""
         sds = np.sqrt([np.diag(clock.covariance)[:2] for clock in self.clocks])
         clocks = {"offset": "s", "drift": "1", "middle": "s"}
+        begun = {"offset": self.epochs - self.epochs[0], "drift": 0.0, "middle": self.epochs}
         facts = {
-            f"clock_{name}": (np.array([getattr(clock, name) for clock in self.clocks]), unit)
+            f"clock_{name}": (
+                np.array([getattr(clock, name) for clock in self.clocks]) + begun[name], unit
+            )
             for name, unit in clocks.items()
-        }
+        }  # fmt: skip
         facts |= {"clock_offset_sd": (sds[:, 0], "s"), "clock_drift_sd": (sds[:, 1], "1")}
         facts |= {"angle_sd": (self.angle_sd, "rad"), "agreement": (self.agreement, "1")}
         made = {name: ("imu", values, {"units": unit}) for name, (values, unit) in facts.items()}
@@ -125,7 +130,10 @@ class Alignment:
         named = {"imu": self.labels, "kind": KINDS, "axis": AXES}
         return xr.Dataset(
             made, {name: np.array(list(labels), object) for name, labels in named.items()},
-            {"step": self.step, "origin": self.origin, "left_out": self.left_out},
+            {
+                "step": self.step, "origin": self.origin + self.epochs[0],
+                "left_out": self.left_out,
+            },
         )  # fmt: skip
 
 

@@ -27,12 +27,17 @@ def board(
 
     ``gravity`` m/s^2; ``topics`` of bags; ``say`` is called with each remark on the work's course.
     A log without still poses is calibrated as it is. InputError as of `open_logs`, `first_order`
-    and `calibrate`.
+    and `calibrate`, and for a recording that first order has corrected.
     """
     opened = open_logs(logs, columns, topics)
     recording = opened.recording
     source = ", ".join(Path(path).name for path in logs)
     check_values(recording, source)
+    if recording.correction is not None:
+        raise InputError(
+            f"{source}: expected a log, or a recording as read, found one that is corrected:"
+            " imuarray calibrate takes that"
+        )
     if len(recording.time) < FEWEST:
         raise InputError(
             f"{source}: expected at least {FEWEST} samples, found {len(recording.time)}"
@@ -47,20 +52,19 @@ def board(
         corrected = correct(recording, found)
     say("positions from the motion")
     calibration = calibrate(corrected)
-    known = [] if isinstance(found, str) else reasons_of_poses(found.triads.residual_ratio)
-    if isinstance(found, str) and recording.map_covariance is None:
+    if isinstance(found, str):
         known = [
             f"first order was left out ({found}): offsets, scales and axes of the sensors are taken"
             " as read, and the sds do not know how far these are off"
         ]
+    else:
+        known = reasons_of_poses(found.triads.residual_ratio)
     reasons = reasons_of_calibration(corrected, calibration, known)
     return Board(source, opened.lines, recording, found, corrected, calibration, reasons)
 
 
 def _first_order(recording: Recording, gravity: float) -> FirstOrder | str:
     """What still poses and moves say, or why they do not."""
-    if recording.map_covariance is not None:
-        return "the recording is corrected already"
     try:
         still_poses(recording)
     except InputError as error:

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from os import PathLike
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -12,6 +13,7 @@ from imuarray.analysis.calibration_dataset import engine_dataset, papers_dataset
 from imuarray.analysis.fitting import fitted
 from imuarray.analysis.model import Say, assumed, model_of, require_together, silent, usable
 from imuarray.errors import InputError, require_one_of
+from imuarray.model.effects import DATA_EFFECTS
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording, stored
 from imuarray.recording.channels import require_apart, require_live
@@ -73,6 +75,8 @@ def calibrate(
     if method is not None:
         require_one_of("method", method, methods.CALIBRATION)
     require_together(model, recordings, effects, accelerometer_noise)
+    if effects and str(model).endswith(".json"):
+        raise InputError("--effects: expected none with a diagnosis.json, found some")
     if method is not None and model != "papers":
         raise InputError(f"--method {method}: expected it with --model papers, found {model}")
     if model == "papers":
@@ -114,7 +118,12 @@ def _readings(part: Recording):
 
 def _engine(recordings, model: str, effects, say: Say) -> xr.Dataset:
     """Robust least squares (`imuarray.engine`): a ladder, given effects, or a diagnosis'."""
+    from imuarray.diagnosis.extension import read_extension
+
     found, rungs = fitted(recordings, model, effects, say)
     dataset = engine_dataset(recordings, found)
     dataset.attrs["parts"] = json.dumps([rung._asdict() for rung in rungs])
+    if model.endswith(".json"):
+        mended = read_extension(Path(model)).before
+        dataset.attrs["mended"] = " ".join(n for n in mended if not DATA_EFFECTS[n].left_out)
     return dataset

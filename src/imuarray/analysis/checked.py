@@ -5,12 +5,13 @@ numbers all the same.
 """
 
 import json
+from collections.abc import Iterable
 
 import numpy as np
 import xarray as xr
 
 from imuarray.errors import LARGEST, SMALLEST, InputError
-from imuarray.model.effects import EFFECTS
+from imuarray.model.effects import DATA_EFFECTS, EFFECTS, KINDS
 from imuarray.model.own import own_version
 from imuarray.recording import Recording
 from imuarray.recording.record import CLOCKS, CORRECTION, DIMENSIONS, MATRICES
@@ -42,8 +43,9 @@ def require_fit(calibration: xr.Dataset, recording: Recording | None = None) -> 
             _require_numbers(calibration[name], dimensions)
         elif name in needed:
             raise InputError(f"expected a calibration (imuarray calibrate), found no {name}")
+    require_right_axes(str(calibration.attrs.get("mended", "")).split())
     if recording is not None:
-        _require_labels(calibration, recording)
+        require_labels(calibration, recording)
     if "effect_parameter" in calibration:
         _require_effects(calibration)
     _require_sizes(calibration)
@@ -52,6 +54,19 @@ def require_fit(calibration: xr.Dataset, recording: Recording | None = None) -> 
             _require_covariance(calibration[name])
     if recording is not None:
         _require_board(calibration, recording)
+
+
+def require_right_axes(mended: Iterable[str]) -> None:
+    """InputError where readings were mended in memory: those of the file are as they were.
+
+    ``mended``: data effects that a diagnosis has found.
+    """
+    for name in mended:
+        if not (name in DATA_EFFECTS and DATA_EFFECTS[name].left_out):
+            raise InputError(
+                f"expected a calibration of readings with the right axes, found {name}: give the"
+                " axes in columns.yaml, convert the log again, and calibrate that"
+            )
 
 
 def _require_numbers(variable: xr.DataArray, dimensions: tuple[str, ...]) -> None:
@@ -70,9 +85,9 @@ def _require_numbers(variable: xr.DataArray, dimensions: tuple[str, ...]) -> Non
         )
 
 
-def _require_labels(calibration: xr.Dataset, recording: Recording) -> None:
-    gyroscopes = ("gyroscope",) if "effect_parameter" in calibration else ()  # else of no matter
-    for kind in ("accelerometer", *gyroscopes):
+def require_labels(calibration: xr.Dataset, recording: Recording) -> None:
+    """InputError where a calibration's sensors are not the recording's."""
+    for kind in KINDS:
         expected = getattr(recording, f"{kind}_labels")
         coordinate = calibration.coords.get(kind)
         labels = () if coordinate is None else tuple(map(str, coordinate.to_numpy().ravel()))

@@ -32,6 +32,24 @@ def open_logs(
     their stamps, with known axes, become samples as they are; others are aligned (`alignment`),
     which the lines say and the recording keeps. InputError says what does not fit.
     """
+    found = _opened(paths, columns, topics)
+    _require_paired(found.recording)
+    return found
+
+
+def _require_paired(recording: Recording) -> None:
+    """InputError where a gyroscope stands at the place of another IMU's accelerometer."""
+    labels = recording.accelerometer_labels
+    for place, label in enumerate(recording.gyroscope_labels):
+        if label in labels and labels.index(label) != place:
+            raise InputError(
+                f"gyroscopes: expected them in the accelerometers' order, IMUs without one last,"
+                f" found {label!r} as number {place + 1}, whose accelerometer is number"
+                f" {labels.index(label) + 1}"
+            )
+
+
+def _opened(paths, columns, topics) -> Opened:
     from imuarray.recording import bags, csv_logs
     from imuarray.recording.mimu_recording import read_board
 

@@ -2,22 +2,25 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from imuarray.analysis.checked import require_fit
+from imuarray.analysis.checked import require_fit, require_labels
 from imuarray.analysis.model import assumed, model_of
 from imuarray.errors import InputError
+from imuarray.firstorder.correct import corrected, rails_shown
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
-from imuarray.model.effects import find_effects
+from imuarray.model.effects import KINDS, find_effects
 from imuarray.model.names import parameter_names
 from imuarray.model.noise import Noise
 from imuarray.motion import Motion
 from imuarray.motion.state import UNITS
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording
+from imuarray.recording.record import CORRECTION
 
 
 def apply(
@@ -27,10 +30,10 @@ def apply(
 
     ``calibration``: what `calibrate` gave for a recording of the same IMUs, with effects or
     without; where effects look at the time (drifts) it must be the same recording, or a part of
-    it. Where motion is rough and the IMUs have clocks of their own, biases and clocks are found
-    anew. A gyroscope at its rail says on which side the rate is and what it is at least, no
-    more. ``accelerometer_noise``: assumed sd in m/s^2, by default what the recording declares, or
-    with effects what the calibration assumed.
+    it. A recording as read is corrected as the calibration's was. Where motion is rough and the
+    IMUs have clocks of their own, biases and clocks are found anew. A gyroscope at its rail says on
+    which side the rate is and what it is at least, no more. ``accelerometer_noise``: assumed sd in
+    m/s^2, by default the calibration's.
 
     Returns ``angular_rate`` (time, axis) rad/s, ``angular_acceleration`` rad/s^2 and
     ``specific_force`` m/s^2, each with ``_sd`` and the part of it that is due to the calibration,
@@ -56,7 +59,7 @@ def motion_parts(
     """
     from imuarray.engine.clock_scan import CLOCK
 
-    recording = assumed(recording, accelerometer_noise)
+    recording = as_calibrated(assumed(recording, accelerometer_noise), calibration)
     require_fit(calibration, recording)
     used = [calibration[name].to_numpy() for name in sorted(map(str, calibration.data_vars))]
     data = digest(recording.specific_force, recording.angular_rate, *used)
@@ -66,6 +69,34 @@ def motion_parts(
         dataset = _motion_of(calibration, part, accelerometer_noise, origin)
         dataset.attrs |= stamp({"recording and calibration": data}, 0)
         yield dataset
+
+
+def as_calibrated(recording: Recording, calibration: xr.Dataset) -> Recording:
+    """A recording as read, corrected as the (first) one of the calibration was; others as they are.
+
+    The offsets are those of then. InputError where the sensors are others.
+    """
+    if recording.correction is not None or not set(CORRECTION) <= set(calibration.variables):
+        return recording
+    require_fit(calibration)
+    require_labels(calibration, recording)
+    first, recording = calibration[list(CORRECTION)].isel(recording=0), recording.in_memory()
+    names = "specific_force", "angular_rate"
+    rails = recording.saturated_accelerometers(), recording.saturated_gyroscopes()
+    changed: dict[str, Any] = {}
+    for kind, name, railed in zip(KINDS, names, rails, strict=True):
+        inverse, offset = (first[f"{kind}_{part}"].to_numpy() for part in ("inverse", "offset"))
+        limit, most = getattr(recording, f"{kind}_range"), np.abs(np.linalg.inv(inverse)).max()
+        changed |= {
+            name: corrected(inverse, offset, getattr(recording, name)),
+            f"{name}_saturated": rails_shown(inverse, railed),
+            f"{kind}_range": float((limit - np.abs(offset).max()) / most),
+        }
+    axes = calibration.get("accelerometer_axes")
+    return replace(
+        recording, correction=first, accelerometer_position=calibration["nominal_position"].values,
+        accelerometer_axes=None if axes is None else axes.to_numpy(), **changed,
+    )  # fmt: skip
 
 
 def _motion_of(calibration, recording: Recording, accelerometer_noise, origin) -> xr.Dataset:
@@ -91,12 +122,16 @@ def _motion_of(calibration, recording: Recording, accelerometer_noise, origin) -
 def _late(calibration: xr.Dataset) -> float:
     """By how much (s) the motion is late for its stamps, by the clock of most IMUs.
 
-    What is common to the delays of all IMUs is nowhere seen: their mean is taken for zero.
+    What is common to the delays of all IMUs is nowhere seen: their mean is taken for zero. With
+    clocks of their own, the delays are the offsets of these.
     """
     if "effect_parameter" not in calibration:
         return 0.0
-    mine = [str(name).startswith("sensor_delay ") for name in calibration["parameter"].to_numpy()]
-    delays = calibration["effect_parameter"].to_numpy()[mine]
+    names = [str(name) for name in calibration["parameter"].to_numpy()]
+    delay = [name.startswith("sensor_delay ") for name in names]
+    clock = [name.startswith("sensor_clock offset") for name in names]
+    values = calibration["effect_parameter"].to_numpy()
+    delays = values[delay] if any(delay) else -values[clock]
     return float(np.median(delays)) if len(delays) else 0.0
 
 

@@ -24,6 +24,7 @@ LAGS = range(-3, 4)  # samples
 LEAST_LAG = 0.3  # samples
 STILL = 0.05  # of gravity; raw accelerometers are off by some per cent
 ENDS, NEXT = 10, 5  # readings at a channel's end, and times those at the values next to it
+ALIKE = 9  # decimals to which equal readings are equal again when a correction is undone
 
 
 class Suspect(NamedTuple):
@@ -253,8 +254,8 @@ def gravity(recording: Recording) -> list[str]:
 def clipped(recording: Recording) -> list[str]:
     """A sentence for each channel that ends abruptly within its declared range."""
     found = []
-    for kind, name in (("accelerometer", "specific_force"), ("gyroscope", "angular_rate")):
-        values = getattr(recording, name)
+    for kind in ("accelerometer", "gyroscope"):
+        values = _as_read(recording, kind)
         for k, axis in np.ndindex(values.shape[1:]):
             ends = _ends(values[:, k, axis])
             if ends:
@@ -263,6 +264,16 @@ def clipped(recording: Recording) -> list[str]:
                              f" {' and '.join(f'{end:.4g}' for end in ends)}, within its declared"
                              " range")  # fmt: skip
     return found
+
+
+def _as_read(recording: Recording, kind: str) -> np.ndarray:
+    """Readings (T, K, 3) before first order corrected them: a rail is one value there only."""
+    values = recording.specific_force if kind == "accelerometer" else recording.angular_rate
+    if recording.correction is None:
+        return values
+    inverse, offset = (recording.correction[f"{kind}_{name}"] for name in ("inverse", "offset"))
+    raw = np.einsum("kij,tkj->tki", np.linalg.inv(inverse), values) + offset.to_numpy()
+    return np.round(raw, ALIKE)
 
 
 def _ends(channel) -> list[float]:

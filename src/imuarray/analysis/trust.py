@@ -15,7 +15,7 @@ import xarray as xr
 from imuarray.analysis.drawing import FAR, Places, another_size, departures, size_of
 from imuarray.analysis.rigid import SLOPE, Slope, Turning, elsewhere, kept, slope, turning
 from imuarray.analysis.suspects import MIRRORED, clipped, common, gravity, suspects, told
-from imuarray.model.effects import EFFECTS, KINDS
+from imuarray.model.effects import KINDS
 from imuarray.recording import Recording
 from imuarray.recording.channels import repeated
 
@@ -30,6 +30,13 @@ FEW = 20  # samples
 UNIT = re.compile(r"\bin \S+ declared ")  # in a reason that names a unit
 SHORT = 60.0  # s
 SAME = 0.1  # relative difference of rates, up to which they are those of one recording
+# Effects that look at the time of a recording of their own.
+CLOCK = "sensor_clock"
+TIMED = CLOCK, "bias_drift", "warm_up", "position_shift"
+AS_READ = (
+    "the recording is as read, and was corrected as the calibration's own was: offsets that have"
+    " changed since are not seen; correct it by its own still poses (imuarray first-order)"
+)
 
 
 def reasons_of_calibration(
@@ -112,18 +119,20 @@ def reasons_of_posterior(
 
 
 def reasons_of_motion(
-    recording: Recording, calibration: xr.Dataset, own_clocks: bool = False
+    recording: Recording, calibration: xr.Dataset, own_clocks: bool = False, as_read: bool = False
 ) -> list[str]:
     """Why the motion that `imuarray.apply` gives for this recording is not to be trusted.
 
     A calibration that is not, or that this recording does not fit, as one of another board.
-    ``own_clocks``: whether `imuarray.apply` has found the recording's own.
+    ``own_clocks``: whether `imuarray.apply` has found the recording's own; ``as_read``: whether it
+    had to correct the readings as the calibration's were.
     """
     said = json.loads(calibration.attrs.get("reasons", "[]"))
     places = _places(recording, calibration["position"].to_numpy(), _covariance(calibration))
     residual = _rigid(recording, places) if _is_papers(calibration) else {}
     found = _judged(recording, places, residual) + _elsewhere(kept(recording), places)
-    found += [] if own_clocks else _other_clocks(recording, calibration)
+    found += _of_another_time(recording, calibration, own_clocks)
+    found += [AS_READ] if as_read else []
     return [f"the calibration is not to be trusted: {reason}" for reason in said] + [
         reason for reason in found if reason not in said
     ]
@@ -235,22 +244,32 @@ def _elsewhere(moving: Recording, places: Places) -> list[str]:
     ]
 
 
-def _other_clocks(recording: Recording, calibration: xr.Dataset) -> list[str]:
-    """One sentence where the calibration's clocks have their phases from another recording."""
-    effects = [EFFECTS[name] for name in calibration.attrs.get("effects", "").split(",") if name]
-    timed = any(item.own and item.scanned and item.shifts_time for item in effects)
-    if not timed or str(calibration.attrs.get("model", "")).endswith(".json"):
+def _of_another_time(recording: Recording, calibration: xr.Dataset, own_clocks: bool) -> list[str]:
+    """One sentence where clocks and drifts of the calibration are those of another recording."""
+    effects = [name for name in calibration.attrs.get("effects", "").split(",") if name in TIMED]
+    if own_clocks and CLOCK in effects:
+        effects.remove(CLOCK)
+    if not effects or _is_of(recording, calibration):
         return []
-    if "angular_rate" in calibration:
-        rate, time = np.median(recording.angular_rate, axis=1), calibration["time"].to_numpy()
-        here = np.stack([np.interp(time, recording.time, axis) for axis in rate.T], axis=1)
-        there = calibration["angular_rate"].to_numpy()
-        if np.median(np.abs(here - there)) < SAME * np.median(np.abs(there)):
-            return []
     return [
-        "the IMUs have clocks of their own, whose phases the calibration knows in its own (first)"
-        " recording only: calibrate this one, too, and apply that"
+        f"the calibration has {', '.join(effects)}, at the instants of its own (first) recording:"
+        " calibrate this one, too, and apply that"
     ]
+
+
+def _is_of(recording: Recording, calibration: xr.Dataset) -> bool:
+    """Whether the calibration is of this recording, or of one that this is a part of."""
+    if "of_diagnosed" in calibration.attrs:
+        return bool(calibration.attrs["of_diagnosed"])
+    if "angular_rate" not in calibration:
+        return False
+    time = calibration["time"].to_numpy()
+    inside = (time >= recording.time[0]) & (time <= recording.time[-1])
+    if inside.sum() < min(FEW, len(recording.time)):
+        return False
+    rate, there = np.median(recording.angular_rate, axis=1), calibration["angular_rate"].to_numpy()
+    here = np.stack([np.interp(time[inside], recording.time, axis) for axis in rate.T], axis=1)
+    return bool(np.median(np.abs(here - there[inside])) < SAME * np.median(np.abs(there[inside])))
 
 
 def _turning_words(course: Slope, places: Places) -> str:

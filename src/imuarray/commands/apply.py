@@ -9,7 +9,7 @@ import xarray as xr
 
 from imuarray.analysis.extension import diagnosed
 from imuarray.analysis.model import assumed
-from imuarray.analysis.motion import motion_parts
+from imuarray.analysis.motion import as_calibrated, motion_parts
 from imuarray.analysis.trust import reasons_of_motion
 from imuarray.commands.output import Output
 from imuarray.errors import InputError
@@ -23,16 +23,18 @@ LATE = 1e-4  # s, worth a line
 def apply(arguments) -> None:
     """The calibrated array's motion with covariances; see `imuarray.apply` for the output."""
     output = Output(arguments)
-    recording = read_recording(arguments.recording, stored=True)
-    calibration = _calibration(arguments.calibration, recording)
+    read = read_recording(arguments.recording, stored=True)
+    calibration = _calibration(arguments.calibration, read)
     noise, sums = arguments.accelerometer_noise, Sums()
-    parts = motion_parts(calibration, recording, noise)
     try:
+        recording = as_calibrated(read, calibration)
+        parts = motion_parts(calibration, recording, noise)
         first = next(parts)
     except InputError as error:
         raise InputError(f"{arguments.calibration}: {error}") from None
     own = bool(first.attrs["own_clocks"])
-    reasons = reasons_of_motion(assumed(recording, noise), calibration, own)
+    as_read = recording is not read
+    reasons = reasons_of_motion(assumed(recording, noise), calibration, own, as_read)
     first = first.assign_attrs(trust(reasons))
     write_netcdf_parts(
         (sums.add(part) for part in chain((first,), parts)), len(recording.time), arguments.out

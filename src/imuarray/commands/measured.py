@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 
 from imuarray.commands.output import Output
 from imuarray.errors import InputError
@@ -45,7 +46,10 @@ def select(arguments) -> None:
     found = select_dynamic(recording)
     index = found.spread(arguments.samples)
     data = digest(recording.specific_force, recording.angular_rate)
-    write_recording(recording.select(index), arguments.out, attrs=stamp({"recording": data}, 0))
+    with xr.open_datatree(arguments.recording) as file:  # what first order found goes along
+        groups = {name: file[name].to_dataset().load() for name in file.children}
+    attrs = stamp({"recording": data}, 0)
+    write_recording(recording.select(index), arguments.out, attrs=attrs, groups=groups)
     lines = [f"{len(recording.time)} samples"]
     lines += [f"{-count:7d} {words}" for words, count in found.removed.items()]
     output.say("\n".join(lines))

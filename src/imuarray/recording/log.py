@@ -22,6 +22,7 @@ class Log:
         Rotation from the chip's axes to the array's; None where nobody knows it.
     accelerometer_noise_sd, accelerometer_range : float, m/s^2
     gyroscope_noise_sd, gyroscope_range : float, rad/s
+    epoch : float, the stamp in s from which the times are counted
     """
 
     label: str
@@ -35,3 +36,4 @@ class Log:
     accelerometer_range: float
     gyroscope_noise_sd: float
     gyroscope_range: float
+    epoch: float = 0.0

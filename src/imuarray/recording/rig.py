@@ -70,6 +70,7 @@ def to_rig(imus: Mapping[str, dict], read: Mapping[str, list[Readings]], layout,
         logs.append(Log(
             label, times[0], kinds[0].values, times[1], kinds[1].values, place,
             None if axes is None else rotation(axes, own), **given,
+            epoch=float(origin.unit * origin.stamps[0]),
         ))  # fmt: skip
     return Rig(logs, prior, lines, source)
 
