@@ -131,7 +131,55 @@ def test_gaps_and_rails_are_left_out_or_marked(motion):
     marked = recording.angular_rate_saturated
     np.testing.assert_array_equal(marked[near, 0], [[False, True, False]] * near.sum())
     assert near.sum() >= 3 and not marked[:, 1:].any()
-    assert not marked[np.abs(time - first.gyroscope_time[700]) > 0.05].any()
+    assert not marked[np.abs(time - first.gyroscope_time[700]) > 0.09].any()
+
+
+def lossy(log, share, rng):
+    """Without a share of its readings, here and there."""
+    kept = rng.uniform(size=len(log.gyroscope_time)) > share
+    return replace(
+        log, gyroscope_time=log.gyroscope_time[kept], angular_rate=log.angular_rate[kept],
+        accelerometer_time=log.accelerometer_time[kept], specific_force=log.specific_force[kept],
+    )  # fmt: skip
+
+
+def test_lost_readings_do_not_hide_motion_that_is_too_fast():
+    """No run is whole then; what bridges the gaps would be off by a thousand times the noise."""
+    rng = np.random.default_rng(5)
+    fast, slow = (hand_twisting(np.random.default_rng(3), 8.0, 5.0, band) for band in (40.0, 4.0))
+    with pytest.raises(InputError, match="motion too fast"):
+        align([lossy(log, 0.05, rng) for log in logs(fast, 2)], position_prior_sd=1e-3)
+    recording, alignment = align(
+        [lossy(log, 0.05, rng) for log in logs(slow, 2)], position_prior_sd=1e-3
+    )
+    true = slow.rotation.derivative(recording.time + alignment.origin)
+    left = (recording.angular_rate - true[:, None])[20:-20]
+    assert np.abs(left).max() < 10 * NOISE[1] and alignment.left_out == 0
+
+
+def test_a_sensor_much_faster_than_the_rest_is_averaged():
+    """Slow motion leaks little into what ten readings' mean would miss."""
+    time, rng = np.arange(0.0, 10.0, 1e-3), np.random.default_rng(1)
+    motion = hand_twisting(np.random.default_rng(3), 8.0, 5.0, 3.0)
+    values = motion.rotation.derivative(time) + 1e-3 * rng.standard_normal((len(time), 3))
+    sensor = Sensor("", time, 0.0, values, np.zeros(values.shape, bool), 1e-3)
+    assert sensor.error(0.01) < 1e-5 < sensor.error(0.2)
+
+
+@pytest.mark.parametrize("later", [0.0, 4.0])
+def test_of_places_that_fit_alike_the_stamps_decide(later):
+    """A machine repeats its motion; logs that do not begin at once are no whole turn apart."""
+    period, turns, out = 2.0, np.eye(3), []
+    for k, begin in enumerate((0.0, later + 3.0)):
+        time = begin + np.arange(0.0, 30.0 - begin, 0.005)
+        phase = 2 * np.pi * time[:, None] / period
+        rate = 4 * np.sin(phase * [1, 2, 3] + [0, 1, 2]) + 3 * np.cos(phase * [2, 3, 1])
+        noise = np.random.default_rng(k).standard_normal(rate.shape)
+        out.append(Log(str(k), time, 9.8 + 0.04 * noise, time, rate + 1e-3 * noise,
+                       np.array([0.1 * k, 0, 0]), turns, 0.04, 160.0, 1e-3, 35.0))  # fmt: skip
+    alignment = align(out, position_prior_sd=1e-3)[1]
+    assert abs(alignment.clocks[1].offset) < 1e-4
+    assert f"gyroscope '1' begins {later + 3.0:.1f} s after" in "\n".join(alignment.lines())
 
 
 def test_what_was_found_is_said_and_kept(found, tmp_path):

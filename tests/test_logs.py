@@ -103,9 +103,8 @@ def test_loose_imus_are_aligned(loose, capsys):
         np.testing.assert_allclose(kept[f"clock_{name}"], true, atol=2e-5, err_msg=name)
 
 
-def test_tables_and_a_bag_agree_bit_for_bit(loose):
-    folder, _, tables, columns = loose
-    bag = imuarray.open_logs(folder / "run", folder / "rig.yaml")
+def opened(folder, tables, columns):
+    """The loose IMUs' tables."""
     units = {"accelerometers": "m/s^2", "gyroscopes": "rad/s"}
     names = {"time": {"column": "t", "unit": "ns"}, "columns": ["ax", "ay", "az", "gx", "gy", "gz"]}
     described = columns | names | {kind: columns[kind] | {"unit": u} for kind, u in units.items()}
@@ -113,9 +112,45 @@ def test_tables_and_a_bag_agree_bit_for_bit(loose):
         label: imu | {"log": f"{label[1:]}.csv"} for label, imu in columns["imus"].items()
     }
     put_tables(folder, tables, described)
-    found = imuarray.open_logs([folder / name for name in tables], folder / "rig.yaml")
+    return imuarray.open_logs([folder / name for name in tables], folder / "rig.yaml")
+
+
+def changed(loose, folder, change):
+    """The tables, one of them (its cells but for the stamps) changed, opened."""
+    _, _, tables, columns = loose
+    head, *rows = tables["imu1.csv"]
+    cells = np.array([row[1:] for row in rows], float)
+    change(cells)
+    table = [head, *([row[0], *new] for row, new in zip(rows, cells.tolist(), strict=True))]
+    return opened(folder, tables | {"imu1.csv": table}, columns)
+
+
+def test_a_rail_within_the_declared_range_is_one(loose, tmp_path):
+    """Once interpolated, it could not be seen."""
+
+    def clip(rows):
+        rows[:, 3:] = np.clip(rows[:, 3:], -12.0, 12.0)
+
+    found, lines = changed(loose, tmp_path, clip)
+    (said,) = (line for line in lines if "clipped" in line)
+    assert "/imu1: gyroscope: clipped at 12 rad/s" in said
+    assert found.angular_rate_saturated[:, 1].any() and not found.angular_rate_saturated[:, 0].any()
+
+
+def test_a_frozen_sensor_of_a_loose_imu_is_refused(loose, tmp_path):
+    def freeze(rows):
+        rows[500:700, :3] = rows[500, :3]
+
+    with pytest.raises(InputError, match="/imu1: .* accelerometer '/imu1' is frozen"):
+        changed(loose, tmp_path, freeze)
+
+
+def test_tables_and_a_bag_agree_bit_for_bit(loose):
+    folder, _, tables, columns = loose
+    bag = imuarray.open_logs(folder / "run", folder / "rig.yaml")
+    found = opened(folder, tables, columns)
     for name in (*QUANTITIES, *NUMBERS, "accelerometer_axes"):
-        ours, theirs = (getattr(opened.recording, name) for opened in (found, bag))
+        ours, theirs = (getattr(one.recording, name) for one in (found, bag))
         np.testing.assert_array_equal(ours, theirs, name)
     assert found.lines == bag.lines
     put(folder, columns)

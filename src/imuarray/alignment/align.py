@@ -1,13 +1,13 @@
 """Logs of loose IMUs as one recording: common axes, common clock, common instants."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from imuarray.alignment.clocks import Clock, compare, itself
 from imuarray.alignment.found import KINDS, Alignment, Carried
-from imuarray.alignment.resample import Sensor, Splines
+from imuarray.alignment.resample import WIDEST, Sensor, Splines
 from imuarray.alignment.stamps import steadied
 from imuarray.errors import InputError
 from imuarray.firstorder.correct import rails_shown
@@ -18,8 +18,10 @@ from imuarray.recording.log import Log
 SLOWER = 1.5  # times the common rate, from which a sensor's readings are averaged
 LITTLE = 0.3  # of the noise that is left, what averaging may miss
 SHORTEST = 100  # readings of a sensor, and common instants
+UNBROKEN = 32  # readings of a sensor, but for a few missing ones
 PAUSED = 100  # times as long as its readings take, which a log may last
 RAIL = 1 - 1e-6  # of the range
+UNEVEN = 2.0  # s, by which logs may begin and end apart without a line
 
 
 def align(
@@ -42,7 +44,9 @@ def align(
     pairs, origins = _sensors(logs)
     _require_slow([sensor for pair in pairs for sensor in pair])
     gyroscopes = [pair[1] for pair in pairs]
-    clocks = [itself(gyroscopes[0].time), *(compare(gyroscopes[0], g) for g in gyroscopes[1:])]
+    ahead = _ahead(logs, gyroscopes, origins)
+    clocks = [itself(gyroscopes[0].time)]
+    clocks += map(compare, gyroscopes[:1] * len(ahead), gyroscopes[1:], ahead)
     frame = np.eye(3) if logs[0].axes is None else logs[0].axes
     rotation = np.array([frame @ clock.rotation.T for clock in clocks])
     sensors = [
@@ -60,7 +64,7 @@ def align(
         recording.accelerometer_labels, rotation, _declared(logs, rotation),
         _of_stamps(clocks, gyroscopes, origins), agreement,
         tuple(zip(facts[::2], facts[1::2], strict=True)), step, origins[0], int(whole.sum()),
-        int((~whole).sum()), np.array([log.epoch for log in logs]),
+        int((~whole).sum()), np.array([log.epoch for log in logs]), tuple(_ends(sensors)),
     )  # fmt: skip
     return replace(
         recording, accelerometer_noise_sd=float(noise[0]), gyroscope_noise_sd=float(noise[1]),
@@ -98,6 +102,30 @@ def _sensors(logs: Sequence[Log]) -> tuple[list[tuple[Sensor, Sensor]], list[flo
             for kind, (time, values, limit, noise) in zip(KINDS, parts, strict=True)
         ))  # fmt: skip
     return out, origins
+
+
+def _ahead(logs, gyroscopes, origins) -> list[float]:
+    """By how much (s) the first log begins later than each other, 0 where stamps do not tell."""
+    ends = [
+        origin + gyroscope.time[-1] for origin, gyroscope in zip(origins, gyroscopes, strict=True)
+    ]
+    return [
+        origins[0] - origin
+        if log.epoch == logs[0].epoch and origin < ends[0] and origins[0] < end else 0.0
+        for log, origin, end in zip(logs, origins, ends, strict=True)
+    ][1:]  # fmt: skip
+
+
+def _ends(sensors: Sequence[Sensor]) -> Iterator[str]:
+    """Which sensors end long before the others, or begin long after them."""
+    first, last = min(s.time[0] for s in sensors), max(s.time[-1] for s in sensors)
+    for sensor in sensors:
+        for late, what in (
+            (sensor.time[0] - first, "begins {:.1f} s after"),
+            (last - sensor.time[-1], "ends {:.1f} s before"),
+        ):
+            if late > UNEVEN:
+                yield f"{sensor.name} {what.format(late)} the others: what it has not is left out"
 
 
 def _grid(sensors: Sequence[Sensor]) -> tuple[np.ndarray, float]:
@@ -146,7 +174,17 @@ def _of_stamps(clocks, gyroscopes, origins) -> tuple[Clock, ...]:
 
 
 def _require_slow(sensors: Sequence[Sensor]) -> None:
-    """InputError, naming the worst sensor, where the motion is too fast for one's rate."""
+    """InputError, naming the worst sensor, where the motion is too fast for one's rate.
+
+    And where readings are too scattered to tell.
+    """
+    for sensor in sensors:
+        run = max(len(sensor.time[part]) for part in sensor.runs(WIDEST + 0.5))
+        if run < UNBROKEN:
+            raise InputError(
+                f"{sensor.name}: expected stretches of {UNBROKEN} readings with at most"
+                f" {WIDEST - 1} missing in a row, found {run} at most"
+            )
     worst = max(sensors, key=lambda sensor: sensor.error(sensor.step) / sensor.noise_sd)
     missed = worst.error(worst.step)
     if missed > worst.noise_sd:
@@ -164,7 +202,8 @@ def _recording(logs, rotation, grid, sensors, knots) -> tuple[Recording, np.ndar
     shape = len(logs), 2, len(grid), 3
     values = [Splines(sensor, None, own)(grid) for sensor, own in zip(sensors, knots, strict=True)]
     values = np.reshape(values, shape)
-    railed = np.reshape([sensor.near_rail(grid) for sensor in sensors], shape)
+    widths = [0.0 if own is None else own[1] - own[0] for own in knots]
+    railed = np.reshape([s.near_rail(grid, w) for s, w in zip(sensors, widths, strict=True)], shape)
     whole = np.isfinite(values).all(axis=(0, 1, 3))
     _require_common(int(whole.sum()))
     force, rate = np.einsum("kij,knTj->nTki", rotation, values[:, :, whole])

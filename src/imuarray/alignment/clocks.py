@@ -78,13 +78,14 @@ def itself(stamps) -> Clock:
     return Clock(0.0, 0.0, float(np.mean(stamps[[0, -1]])), np.eye(3), np.zeros((14, 14)), 0.0, 0.0)
 
 
-def compare(first: Sensor, other: Sensor) -> Clock:
+def compare(first: Sensor, other: Sensor, ahead: float = 0.0) -> Clock:
     """Clock and map of a gyroscope against another by robust least squares.
 
+    ``ahead`` s: by which the first's stamps are said to count from a later instant.
     InputError where they show no common motion, or a mirror image.
     """
     splines = Splines(first)
-    middle, offset, drift = _coarse(first, other)
+    middle, offset, drift = _coarse(first, other, ahead)
     clock = Clock(offset, drift, middle, np.eye(3), np.zeros((14, 14)), 0.0, 0.0)
     at = clock.instants(other.time)
     base = splines(at)
@@ -172,12 +173,12 @@ def _sandwich(columns, weight, left, time, inverse) -> np.ndarray:
     return scores.T @ scores * count / max(count - 14, 1)
 
 
-def _coarse(first: Sensor, other: Sensor) -> tuple[float, float, float]:
+def _coarse(first: Sensor, other: Sensor, ahead: float) -> tuple[float, float, float]:
     """(middle, offset, drift) to some milliseconds, from the speeds' correlation."""
     base, start = _speed(first)
     speed, own = _speed(other)
     length = min(round(WINDOW / COARSE), len(speed), len(base))
-    begin, lag = _placed(base, speed, length, start - own, other.name)
+    begin, lag = _placed(base, speed, length, start - own + ahead, other.name)
     # further pieces of the same log, about where the first one lies
     half = round(AHEAD / COARSE)
     short = min(length, round(HOP / COARSE))

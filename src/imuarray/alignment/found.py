@@ -54,6 +54,7 @@ class Alignment:
     origin : s, the first log's stamp at the recording's instant zero
     count, left_out : common instants, and those that gaps in the logs cost beside
     epochs : (K,) s, the logs' stamps at the zeros of their times; `dataset` counts by stamps
+    ends : a line for each sensor that ends long before the others, or begins long after them
     """
 
     labels: tuple[str, ...]
@@ -67,6 +68,7 @@ class Alignment:
     count: int
     left_out: int
     epochs: np.ndarray
+    ends: tuple[str, ...]
 
     @property
     def angle(self) -> np.ndarray:
@@ -82,7 +84,7 @@ class Alignment:
         """For a person: what was found of each log, and how well readings are carried over."""
         gaps = f"; {self.left_out} more in gaps left out" if self.left_out else ""
         rate = f"{1 / self.step:.2f} Hz, the slowest sensor's rate"
-        out = [f"{self.count} common instants at {rate}{gaps}"]
+        out = [f"{self.count} common instants at {rate}{gaps}", *self.ends]
         for k, (label, pair) in enumerate(zip(self.labels, self.carried, strict=True)):
             out += [f"IMU {label}: {self._lies(k)}"] if k else []
             shown = (one.line(kind) for kind, one in zip(KINDS, pair, strict=True))

@@ -13,7 +13,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.interpolate import BSpline, make_interp_spline, make_lsq_spline
 
 DEGREE = 5
-REACH = 6  # readings beside a rail or a run's end that show in the spline: 0.43^6 is 1 %
+REACH = 8  # readings, or knots, beside a rail that show in the spline: 0.43^8 is 0.1 %
 WIDEST = 8  # readings that may be missing in a row where the motion is slow enough
 SEGMENT = 128  # readings in a piece of the spectrum
 NOISY = 3.0  # times the declared noise that a sensor's own may be
@@ -43,26 +43,42 @@ class Sensor:
         return float(np.mean(steps[steps < 1.5 * np.median(steps)]))
 
     @cached_property
-    def spectrum(self) -> tuple[np.ndarray, np.ndarray]:
+    def even(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Runs at even steps, gaps filled by the spline: values, and which are railed."""
+        found = []
+        for run in self.runs(WIDEST + 0.5):
+            time, values, railed = self.time[run], self.values[run], self.railed[run]
+            if len(time) > 2 * DEGREE and (np.diff(time) > 1.5 * self.step).any():
+                at = np.arange(time[0], time[-1], self.step)
+                nearest = np.searchsorted((time[1:] + time[:-1]) / 2, at)
+                values, railed = make_interp_spline(time, values, DEGREE)(at), railed[nearest]
+            found.append((values, railed))
+        return found
+
+    @cached_property
+    def spectra(self) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+        """`spectrum` by its segment, as far as asked for."""
+        return {}
+
+    def spectrum(self, segment: int) -> tuple[np.ndarray, np.ndarray]:
         """Frequencies (F,) in cycles a reading, and the power of motion (S, F) in moving pieces.
 
         In units of the readings squared, summed over axes; all frequencies add up to it.
+        ``segment`` readings a piece, fewer where no run has as many.
         """
-        whole = [part for part in self.runs(1.5) if len(self.time[part]) >= SEGMENT]
-        if not whole:
-            return np.zeros(0), np.zeros((0, 0))
-        window = np.kaiser(SEGMENT, 14.0)  # leaks less than 1e-10: fast motion beside little noise
+        segment = min(segment, max(len(values) for values, _ in self.even))
+        whole = [pair for pair in self.even if len(pair[0]) >= segment]
+        window = np.kaiser(segment, 14.0)  # leaks less than 1e-10: fast motion beside little noise
         pieces, railed = (
-            np.concatenate([sliding_window_view(x[part], SEGMENT, axis=0)[:: SEGMENT // 2]
-                            for part in whole])
-            for x in (self.values, self.railed)
-        )  # fmt: skip
+            np.concatenate([sliding_window_view(x, segment, axis=0)[:: segment // 2] for x in part])
+            for part in zip(*whole, strict=True)
+        )
         railed = railed.any(axis=(1, 2))  # a rail's corners are not the motion's
         pieces = pieces[~railed | railed.all()]
         pieces = (pieces - pieces.mean(axis=-1, keepdims=True)) * window
-        power = 2 * np.sum(np.abs(np.fft.rfft(pieces)) ** 2, axis=1) / SEGMENT / np.sum(window**2)
-        frequency = np.fft.rfftfreq(SEGMENT)
-        noise = 6 * self.noise_sd**2 / SEGMENT
+        power = 2 * np.sum(np.abs(np.fft.rfft(pieces)) ** 2, axis=1) / segment / np.sum(window**2)
+        frequency = np.fft.rfftfreq(segment)
+        noise = 6 * self.noise_sd**2 / segment
         quiet = np.argsort(power.sum(axis=1))[: len(power) // 4 + 1]
         level = np.clip(power[quiet][:, frequency > 0.4].mean(), noise, NOISY**2 * noise)
         moving = power.sum(axis=1) > MOVING**2 * level * len(frequency)
@@ -76,7 +92,11 @@ class Sensor:
 
     def error(self, spacing: float) -> float:
         """Rms of what a spline of knots ``spacing`` seconds apart misses, one axis, in motion."""
-        frequency, power = self.spectrum
+        # the window widens what is slow by 4.6 / segment, which must be little beside the knots
+        segment = SEGMENT * max(round(spacing / self.step / 2), 1)
+        if segment not in self.spectra:
+            self.spectra[segment] = self.spectrum(segment)
+        frequency, power = self.spectra[segment]
         if not len(power):
             return 0.0
         missed = power @ spline_error(frequency * spacing / self.step)
@@ -89,15 +109,16 @@ class Sensor:
         allowed = [n for n in range(2, WIDEST + 1) if self.error(n * self.step) < self.noise_sd]
         return 0.5 + max(allowed, default=1)
 
-    def near_rail(self, at) -> np.ndarray:
-        """Where (T, 3) a railed reading shows in the spline at ``at`` (T,)."""
+    def near_rail(self, at, spacing: float = 0.0) -> np.ndarray:
+        """Where (T, 3) a railed reading shows at ``at`` (T,), with knots ``spacing`` s apart."""
+        reach = REACH * max(self.step, spacing)
         found = np.zeros((len(at), 3), bool)
         for axis in range(3):
             railed = self.time[self.railed[:, axis]]
             if len(railed):
                 after = np.clip(np.searchsorted(railed, at), 1, max(len(railed) - 1, 1))
                 beside = railed[[after - 1, np.minimum(after, len(railed) - 1)]]
-                found[:, axis] = np.abs(beside - at).min(axis=0) < REACH * self.step
+                found[:, axis] = np.abs(beside - at).min(axis=0) < reach
         return found
 
 

@@ -1,16 +1,23 @@
 """Any logger's files as one recording of the array, and an account of what that took."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
+from imuarray.analysis.suspects import ends
 from imuarray.errors import InputError
 from imuarray.recording import Recording, read_recording
+from imuarray.recording.channels import repeated
+from imuarray.recording.log import Log
 from imuarray.recording.rig import Rig, recording_of
 
 RECORDINGS = (".nc", ".nc4", ".h5")
 PACKETS = ".bin"
+LARGE = 0.5  # of the largest reading, from which an abrupt end is a rail and no rest
 
 
 class Opened(NamedTuple):
@@ -79,8 +86,52 @@ def _together(found: Recording | Rig) -> Opened:
         return Opened(recording, found.lines)
     from imuarray.alignment import align
 
+    lines, logs = list(found.lines), []
+    for log in found.logs:
+        _require_own(log)
+        log, said = _railed(log)
+        logs.append(log)
+        lines += said
     recording, alignment = align(
-        found.logs, position_prior_sd=found.position_prior_sd, source=found.source
+        logs, position_prior_sd=found.position_prior_sd, source=found.source
     )
-    lines = [*found.lines, *alignment.lines()]
-    return Opened(recording, lines)
+    return Opened(recording, [*lines, *alignment.lines()])
+
+
+def _require_own(log: Log) -> None:
+    """InputError for readings that are frozen, held or another's: interpolated, none shows it."""
+    for time, other in (
+        (log.accelerometer_time, log.gyroscope_time), (log.gyroscope_time, log.accelerometer_time)
+    ):  # fmt: skip
+        both = time[(time >= other[0]) & (time <= other[-1])]
+        force, rate = (
+            np.stack([np.interp(both, own, axis) for axis in values.T], axis=1)[:, None]
+            for own, values in (
+                (log.accelerometer_time, log.specific_force), (log.gyroscope_time, log.angular_rate)
+            )
+        )  # fmt: skip
+        alone = Recording(
+            both, force, rate, np.zeros((1, 3)), (log.label,), (log.label,),
+            log.accelerometer_noise_sd, log.gyroscope_noise_sd, log.accelerometer_range,
+            log.gyroscope_range, 1.0,
+        )  # fmt: skip
+        said = repeated(alone)
+        if said:
+            raise InputError(f"{log.label}: expected each reading once, found: {said[0]}")
+
+
+def _railed(log: Log) -> tuple[Log, list[str]]:
+    """With the rails that readings show within the declared ranges, and lines that say so."""
+    ranges, lines = {}, []
+    for kind, unit in (("accelerometer", "m/s^2"), ("gyroscope", "rad/s")):
+        values = log.specific_force if kind == "accelerometer" else log.angular_rate
+        limit, largest = getattr(log, f"{kind}_range"), np.abs(values).max()
+        found = [abs(end) for axis in values.T for end in ends(axis)]
+        found = [end for end in found if LARGE * largest < end < limit]
+        if found:
+            ranges[f"{kind}_range"] = min(found)
+            lines.append(
+                f"{log.label}: {kind}: clipped at {min(found):.4g} {unit}, within its declared"
+                f" range of {limit:.4g}: that is taken for its range"
+            )
+    return replace(log, **ranges), lines

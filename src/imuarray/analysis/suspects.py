@@ -257,11 +257,11 @@ def clipped(recording: Recording) -> list[str]:
     for kind in ("accelerometer", "gyroscope"):
         values = _as_read(recording, kind)
         for k, axis in np.ndindex(values.shape[1:]):
-            ends = _ends(values[:, k, axis])
-            if ends:
+            rails = ends(values[:, k, axis])
+            if rails:
                 label = getattr(recording, f"{kind}_labels")[k]
                 found.append(f"{kind} {label}, axis {'xyz'[axis]}, is clipped at"
-                             f" {' and '.join(f'{end:.4g}' for end in ends)}, within its declared"
+                             f" {' and '.join(f'{end:.4g}' for end in rails)}, within its declared"
                              " range")  # fmt: skip
     return found
 
@@ -276,7 +276,7 @@ def _as_read(recording: Recording, kind: str) -> np.ndarray:
     return np.round(raw, ALIKE)
 
 
-def _ends(channel) -> list[float]:
+def ends(channel) -> list[float]:
     """Extreme values at which far more readings are than at the values next to them."""
     values, counts = np.unique(channel, return_counts=True)
     if len(values) < 4 * NEXT:

@@ -29,6 +29,10 @@ def read_tables(paths: Sequence[str | PathLike], columns: str | PathLike) -> Rec
     table = loaded[files[0]]
     slow = tables.used(table, layout).isna().mean() > tables.OFTEN
     if slow.any() and "incomplete_rows" not in layout:
+        if "output_rate" in layout:
+            raise InputError(
+                f"{columns}: output_rate: expected none where cells are blank, found one"
+            )
         return _read(loaded, layout, _imus(layout, str(columns)), str(columns))
     return tables.recording_of(table, layout, files[0], columns)
 

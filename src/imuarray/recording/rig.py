@@ -131,8 +131,13 @@ def _in_order(readings: Readings) -> tuple[Readings, list[str]]:
 
 
 def recording_of(rig: Rig) -> Recording | None:
-    """The samples as they are, where all IMUs share stamps, noise, ranges, and axes are known."""
+    """The samples as they are, where all IMUs share stamps, noise, ranges, and axes are known.
+
+    Not where a clock has an origin of its own: that logs begin at once is a guess then.
+    """
     logs = rig.logs
+    if any(log.epoch != logs[0].epoch for log in logs):
+        return None
     time = logs[0].accelerometer_time
     shared = all(
         np.array_equal(t, time) for x in logs for t in (x.accelerometer_time, x.gyroscope_time)
