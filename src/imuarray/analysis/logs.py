@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -122,7 +122,8 @@ def _require_own(log: Log) -> None:
 
 def _railed(log: Log) -> tuple[Log, list[str]]:
     """With the rails that readings show within the declared ranges, and lines that say so."""
-    ranges, lines = {}, []
+    ranges: dict[str, Any] = {}
+    lines = []
     for kind, unit in (("accelerometer", "m/s^2"), ("gyroscope", "rad/s")):
         values = log.specific_force if kind == "accelerometer" else log.angular_rate
         limit, largest = getattr(log, f"{kind}_range"), np.abs(values).max()
