@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 import imuarray
 from imuarray.analysis import trust
 from imuarray.analysis.drawing import Places, departures
+from imuarray.analysis.misfit import residuals
 from imuarray.analysis.rigid import slope, turning
 from imuarray.analysis.suspects import clipped, suspects, told
 from imuarray.blind.cases import Case, make
@@ -439,7 +440,7 @@ def test_rough_motion_is_judged_by_its_smooth_samples(sound):
         },
         {"accelerometer": labels, "gyroscope": labels}, {"residual_ratio": 40.0},
     )  # fmt: skip
-    found = trust._residuals(sound, calibration, None)
+    found = residuals(sound, calibration, None)
     assert found[""] == pytest.approx(np.sqrt(2.5)) and found[f"gyroscope {labels[0]}"] == 2.0
 
 

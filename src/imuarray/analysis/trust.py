@@ -13,20 +13,18 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis.drawing import FAR, Places, another_size, departures, size_of
-from imuarray.analysis.rigid import SLOPE, Slope, Turning, elsewhere, kept, slope, turning
-from imuarray.analysis.suspects import MIRRORED, clipped, common, gravity, suspects, told
-from imuarray.model.effects import KINDS
+from imuarray.analysis.misfit import FEW, RESIDUAL, is_papers, residuals, rigid, unfitting
+from imuarray.analysis.rigid import SLOPE, Slope, elsewhere, kept, slope, turning
+from imuarray.analysis.suspects import MIRRORED, clipped, common, gravity
 from imuarray.recording import Recording
 from imuarray.recording.channels import repeated
 
-RESIDUAL = 3.0  # times the declared noise: widths are too small, or scaled by what is no noise
 TRIAD = 10.0  # the same of one triad where the noise of each is estimated
 POSES = 3.0  # times the noise of a pose's mean; real boards have up to 1.9
 DRIFT = 3.0  # sds of the mean of all samples; offsets that differ by more bias positions
 LEARNT = 0.5  # of the drawing's sd: positions known worse are hardly known from the recording
 OTHER = 1.2  # times less residual elsewhere; 1.003 at most for the right board, 2 for another
 SHRUNK = 1.0  # sds: 95 % intervals then cover 83 %
-FEW = 20  # samples
 UNIT = re.compile(r"\bin \S+ declared ")  # in a reason that names a unit
 SHORT = 60.0  # s
 SAME = 0.1  # relative difference of rates, up to which they are those of one recording
@@ -51,15 +49,15 @@ def reasons_of_calibration(
     several = [recordings] if isinstance(recordings, Recording) else list(recordings)
     found: dict[str, list[str]] = {}
     little: list[str] = []
-    limit = RESIDUAL if _is_papers(calibration) else TRIAD
+    limit = RESIDUAL if is_papers(calibration) else TRIAD
     for number, recording in enumerate(several, 1):
         places = _places(recording, calibration["position"].to_numpy(), _covariance(calibration))
-        residual = _residuals(recording, calibration, places)
+        residual = residuals(recording, calibration, places)
         if len(several) == 1:
             little = _little(recording, places)
         judged = _judged(recording, places, residual, limit)
         units = [reason for reason in judged if UNIT.search(reason)]
-        judged += _drifts(recording) if _is_papers(calibration) else []
+        judged += _drifts(recording) if is_papers(calibration) else []
         for reason in [*units, *known] if units else [*little, *known, *judged]:
             found.setdefault(reason, []).append(str(number))
     return [
@@ -107,7 +105,7 @@ def reasons_of_posterior(
     covariance[3:, 3:] = np.cov(draws, rowvar=False)
     places = _places(recording, np.vstack([np.zeros(3), draws.mean(0).reshape(-1, 3)]), covariance)
     plain = "effect_parameter" not in posterior["posterior"]
-    residual = _rigid(recording, places, rates == "spread") if plain else {}
+    residual = rigid(recording, places, rates == "spread") if plain else {}
     found = _little(recording, places) + _judged(recording, places, residual) + _drifts(recording)
     shrunk = posterior.attrs.get("shrunk_by_sds", 0.0)
     if shrunk > SHRUNK:
@@ -129,7 +127,7 @@ def reasons_of_motion(
     """
     said = json.loads(calibration.attrs.get("reasons", "[]"))
     places = _places(recording, calibration["position"].to_numpy(), _covariance(calibration))
-    residual = _rigid(recording, places) if _is_papers(calibration) else {}
+    residual = rigid(recording, places) if is_papers(calibration) else {}
     found = _judged(recording, places, residual) + _elsewhere(kept(recording), places)
     found += _of_another_time(recording, calibration, own_clocks)
     found += [AS_READ] if as_read else []
@@ -146,11 +144,6 @@ def reasons_of_diagnosis(recording: Recording, document: dict) -> list[str]:
     found, sds = (np.array(document["extended"][f"positions_{name}"]) for name in ("m", "sd_m"))
     places = _places(recording, found, np.diag(sds.ravel() ** 2))
     return _little(recording, places) + _judged(recording, places, {})
-
-
-def _is_papers(calibration: xr.Dataset) -> bool:
-    """Whether it is of the papers' model, in which nothing but noise is between the triads."""
-    return calibration.attrs.get("model") == "papers"
 
 
 def _size(recording: Recording) -> int:
@@ -187,7 +180,7 @@ def _judged(
     alike = [size] if size else [f"{said}?" for said in common(moving)]
     if alike:
         return found + alike
-    bad, named = _unfitting(residual, moving, limit)
+    bad, named = unfitting(residual, moving, limit)
     if named:
         return found + bad
     rate = np.median(moving.angular_rate, axis=1)
@@ -297,76 +290,3 @@ def _times(factor: float) -> str:
     if 0.5 < factor < 2:
         return f"{100 * abs(factor - 1):.2g} % too {word}"
     return f"{max(factor, 1 / factor):.4g} times too {word}"
-
-
-def _unfitting(
-    residual: dict[str, float], moving: Recording, limit: float
-) -> tuple[list[str], bool]:
-    """The residual where it is too large, and whose it is; and whether that is known.
-
-    ``limit``: of a single triad's.
-    """
-    whole = residual.get("", 0.0)
-    triads = {name: ratio for name, ratio in residual.items() if name}
-    worst = max(triads, key=triads.__getitem__, default="")
-    if not (whole > RESIDUAL or triads.get(worst, 0.0) > limit):
-        return [], False
-    named = told(suspects(moving))
-    cause = f"{', '.join(named)}?" if named else f"most at {worst}, {triads[worst]:.3g} times"
-    return [f"the residual is {whole:.3g} times the declared noise: {cause}"], bool(named)
-
-
-def _residuals(recording: Recording, calibration: xr.Dataset, places: Places) -> dict[str, float]:
-    """Residual over declared noise, of the whole (the key is empty) and of each triad."""
-    found = {"": float(calibration.attrs["residual_ratio"])}
-    if _is_papers(calibration):
-        return _rigid(recording, places) | found
-    if "gyroscope_smooth_residual" in calibration:
-        # what is faster than the samples is no fault of the calibration, and its sds allow for it
-        smooth = {
-            f"{kind} {label}": float(value)
-            for kind in KINDS
-            for label, value in zip(
-                calibration[kind].values, calibration[f"{kind}_smooth_residual"].values, strict=True
-            )
-        }
-        return smooth | {"": float(np.sqrt(np.mean(np.square(list(smooth.values())))))}
-    kinds = (("accelerometer", recording.accelerometer_noise_sd),
-             ("gyroscope", recording.gyroscope_noise_sd))  # fmt: skip
-    for kind, declared in kinds:
-        for label, sds in zip(calibration[kind].values, calibration[f"{kind}_sd"], strict=True):
-            found[f"{kind} {label}"] = float(np.sqrt(np.mean(sds**2))) / declared
-    return found
-
-
-def _rigid(recording: Recording, places: Places, spread: bool = False) -> dict[str, float]:
-    """The same for a rigid array without any errors, by plain least squares.
-
-    ``spread``: of the accelerometers alone.
-    """
-    moving = kept(recording)
-    count, gyroscopes = places.found.shape[0], moving.angular_rate.shape[1]
-    if len(moving.time) < FEW:
-        return {}
-    rate = moving.angular_rate.mean(axis=1)
-    motion: Turning = turning(moving.specific_force, rate, places.found)
-    off = (moving.specific_force - motion.at(places.found)) / recording.accelerometer_noise_sd
-    squares = dict(zip(_names("accelerometer", recording), _mean_squares(off), strict=True))
-    free = {name: max(3 * count - 6, 1) / (3 * count) for name in squares}
-    if gyroscopes > 1 and not spread:
-        off = (moving.angular_rate - rate[:, None]) / recording.gyroscope_noise_sd
-        own = dict(zip(_names("gyroscope", recording), _mean_squares(off), strict=True))
-        squares |= own
-        free |= dict.fromkeys(own, 1 - 1 / gyroscopes)
-    whole = sum(squares.values()) / sum(free.values())
-    return {"": float(np.sqrt(whole))} | {
-        name: float(np.sqrt(value / free[name])) for name, value in squares.items()
-    }
-
-
-def _mean_squares(values) -> np.ndarray:
-    return np.mean(values**2, axis=(0, 2))
-
-
-def _names(kind: str, recording: Recording) -> list[str]:
-    return [f"{kind} {label}" for label in getattr(recording, f"{kind}_labels")]
