@@ -11,6 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 import yaml
 
 import imuarray
@@ -24,7 +25,7 @@ from imuarray.commands.calibrate import position_lines
 from imuarray.diagnosis.plain import Sizes, plain
 from imuarray.errors import InputError
 from imuarray.firstorder.store import stored_residual_ratio
-from imuarray.report.board import html, write_board
+from imuarray.report.board import html, noises, write_board
 from imuarray.report.board_words import advice, facts, turned, verdict
 from imuarray.report.excitation import missing
 from tests.browser import in_browser, needs_browser
@@ -186,6 +187,16 @@ def test_the_motion_says_by_how_much_it_is_late(found):
     motion = imuarray.apply(found.calibration, found.corrected)
     count = found.calibration.sizes["accelerometer"]
     assert motion.attrs["late_s"] == pytest.approx(LATE / count, rel=0.05)
+
+
+def test_the_noise_of_logs_of_their_own_is_each_one_s(found):
+    count = found.calibration.sizes["accelerometer"]
+    mine = np.arange(1.0, 2 * count + 1).reshape(count, 2)
+    own = xr.Dataset({"interpolated_noise": (("imu", "kind"), mine)})
+    table = noises(found._replace(recording=replace(found.recording, alignment=own)))
+    assert table.declared.tolist() == mine.T.ravel().tolist()
+    plain = noises(found).set_index("sensor").declared
+    assert set(plain["gyroscope"]) == {found.recording.gyroscope_noise_sd}
 
 
 def test_by_clocks_of_their_own_as_well(found):

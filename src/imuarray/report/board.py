@@ -115,11 +115,15 @@ def turn_table(board: Board) -> pd.DataFrame | None:
 
 
 def noises(board: Board) -> pd.DataFrame:
-    """sensor, imu: sd of a reading as declared and as the calibration finds it; in its unit."""
-    rows = []
-    for kind, unit in (("accelerometer", "m s-2"), ("gyroscope", "rad s-1")):
-        declared = getattr(board.recording, f"{kind}_noise_sd")
+    """sensor, imu: sd of a reading as declared and as the calibration finds it; in its unit.
+
+    Of logs brought together, as declared for each and carried to the common instants.
+    """
+    rows, own = [], board.recording.alignment
+    for which, (kind, unit) in enumerate(zip(KINDS, ("m s-2", "rad s-1"), strict=True)):
         found = np.sqrt(np.mean(board.calibration[f"{kind}_sd"].to_numpy() ** 2, axis=1))
-        labels = board.calibration[kind].to_numpy()
-        rows += [(kind, str(k), declared, sd, unit) for k, sd in zip(labels, found, strict=True)]
+        same = np.full(len(found), getattr(board.recording, f"{kind}_noise_sd"))
+        declared = same if own is None else own["interpolated_noise"].to_numpy()[:, which]
+        labels = map(str, board.calibration[kind].to_numpy())
+        rows += zip([kind] * len(found), labels, declared, found, [unit] * len(found), strict=True)
     return pd.DataFrame(rows, columns=["sensor", "imu", "declared", "found", "unit"])
