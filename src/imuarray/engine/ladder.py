@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.special import chdtrc
 
 from imuarray.engine.clock_scan import CLOCK
@@ -44,7 +45,8 @@ RUNGS = {
     "lever arms of the axes": ("size_effect",),
 }
 AGREES = 1.02  # times the residual that a prior of omega_dot may make
-CHANCE = 1e-3  # of maps as far from those of first order
+CHANCE = 1e-3  # of maps as far from those of first order, of positions as far apart
+LEAST_SHARE = 0.03  # of the variance, by which two estimates may differ at least
 LEAST_Z, LEAST_NATS = 2.0, 2.0  # standard errors of a gain, and nats, from which a rung is kept
 
 
@@ -120,7 +122,8 @@ def climb(readings: Sequence[Readings], bare: bool = True) -> tuple[Estimate, li
             for one in found.recorded
         ]
         better = estimate(begun, columns, found.active)
-        if pair or better.residual_ratio() < AGREES * found.residual_ratio():
+        alike = better.residual_ratio() < AGREES * found.residual_ratio()
+        if pair or (alike and _of_one_truth(found, better)):
             found = better
     return settled(found), clocks + rungs
 
@@ -205,16 +208,36 @@ def without(found: Estimate, active) -> list[Recorded]:
 def _left(found: Estimate) -> list[tuple[np.ndarray, np.ndarray]]:
     """[(mask (N, m), covariance)] of both kinds' maps, and of the offsets, that were corrected.
 
-    The first recording's stands for all.
+    Of maps the first recording's stands for all; offsets are each recording's own, one after the
+    other. Nothing where not all recordings are corrected.
     """
-    left, out = found.recorded[0].readings.left, []
-    known = mask_of_left(left, found.columns, np.zeros_like(found.active))
+    every, out = [one.readings.left for one in found.recorded], []
+    if any(left is None for left in every):
+        return out
+    known = mask_of_left(every[0], found.columns, np.zeros_like(found.active))
     for names in (*zip(SCALES, SKEWS, strict=True), OFFSETS, (DRIFT,)):
         mask = known & mask_of(found.columns, names)
         if mask.any():
-            spread = spread_of(left, found.columns, mask)
+            own = every if EFFECTS[names[0]].own else every[:1]
+            spread = block_diag(*(spread_of(left, found.columns, mask) for left in own))
             out.append((mask, spread + FIXED**2 * np.eye(len(spread))))
     return out
+
+
+def _of_one_truth(found: Estimate, more: Estimate) -> bool:
+    """Whether positions by a prior beside the readings are where the readings alone may have them.
+
+    Hausman's test (Econometrica 46, 1978): what differs has the difference of the covariances.
+    """
+    spreads = []
+    for one in (found, more):
+        placed = one.places[0][np.argwhere(one.active)[:, 1] < 3]
+        spreads.append(scaled_inverse(one.information + one.precision)[np.ix_(placed, placed)])
+    root = np.linalg.cholesky(spreads[0])
+    share = np.linalg.solve(root, np.linalg.solve(root, spreads[0] - spreads[1]).T)
+    sizes, turns = np.linalg.eigh((share + share.T) / 2)
+    apart = turns.T @ np.linalg.solve(root, (more.positions - found.positions)[1:].ravel())
+    return bool(chdtrc(len(apart), np.sum(apart**2 / np.maximum(sizes, LEAST_SHARE))) > CHANCE)
 
 
 def _contradicted(parts, ridge, values, freed, spread) -> bool:
