@@ -53,6 +53,22 @@ def test_packets_bags_and_what_cannot_be_told(tmp_path):
             imuarray.open_logs(wrong, columns)
 
 
+def test_a_rail_in_a_turned_sensor_s_own_axes_is_one(tmp_path):
+    """Its reading in the array's axes is below the range."""
+    columns, rows = layout(), table()
+    turn = np.sqrt(0.5) * np.array([[1, -1, 0], [1, 1, 0], [0, 0, np.sqrt(2)]])
+    rows[2][HEADER.index("gx1")], columns["gyroscopes"]["triads"]["1"]["axes"] = (
+        "2000",
+        turn.tolist(),
+    )
+    read_table(tmp_path, rows, columns)
+    found = imuarray.open_logs(tmp_path / "log.csv", tmp_path / "columns.yaml").recording
+    expected = np.zeros((4, 3, 3), bool)
+    expected[1, 0, :2] = True
+    np.testing.assert_array_equal(found.angular_rate_saturated, expected)
+    assert not found.saturated_accelerometers().any()
+
+
 @pytest.fixture(scope="module")
 def loose(tmp_path_factory):
     """Logs of three IMUs as a bag and as tables, and what `align` makes of them."""

@@ -7,7 +7,8 @@ from pathlib import Path
 from imuarray.analysis.calibration import calibrate
 from imuarray.analysis.logs import open_logs
 from imuarray.analysis.model import Say, silent
-from imuarray.analysis.trust import reasons_of_calibration, reasons_of_poses
+from imuarray.analysis.poses import of_first_order, reasons_of_poses
+from imuarray.analysis.trust import reasons_of_calibration
 from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.firstorder.correct import FirstOrder, calibrate_first_order, correct
 from imuarray.firstorder.still import still_poses
@@ -58,7 +59,7 @@ def board(
             " as read, and the sds do not know how far these are off"
         ]
     else:
-        known = reasons_of_poses(found.triads.residual_ratio)
+        known = reasons_of_poses(of_first_order(found))
     reasons = reasons_of_calibration(corrected, calibration, known)
     return Board(source, opened.lines, recording, found, corrected, calibration, reasons)
 

@@ -31,6 +31,8 @@ _PERHAPS = {
     **dict.fromkeys((*CLOCKS, "log_rate"), ("accelerometer",)),
     **{name: ("recording", *dims) for name, dims in CORRECTION.items() if name[-3:] != "_sd"},
 }  # fmt: skip
+FEW = 20  # samples
+SAME = 0.1  # relative difference of rates, up to which they are those of one recording
 SAME_BOARD = 5.0  # prior sds by which two drawings of one board may differ
 INDEFINITE = 1e-3  # of a correlation matrix' least eigenvalue; rounding leaves less
 
@@ -67,6 +69,21 @@ def require_right_axes(mended: Iterable[str]) -> None:
                 f"expected a calibration of readings with the right axes, found {name}: give the"
                 " axes in columns.yaml, convert the log again, and calibrate that"
             )
+
+
+def is_of(recording: Recording, calibration: xr.Dataset) -> bool:
+    """Whether the calibration is of this recording, or of one that this is a part of."""
+    if "of_diagnosed" in calibration.attrs:
+        return bool(calibration.attrs["of_diagnosed"])
+    if "angular_rate" not in calibration:
+        return False
+    time = calibration["time"].to_numpy()
+    inside = (time >= recording.time[0]) & (time <= recording.time[-1])
+    if inside.sum() < min(FEW, len(recording.time)):
+        return False
+    rate, there = np.median(recording.angular_rate, axis=1), calibration["angular_rate"].to_numpy()
+    here = np.stack([np.interp(time[inside], recording.time, axis) for axis in rate.T], axis=1)
+    return bool(np.median(np.abs(here - there[inside])) < SAME * np.median(np.abs(there[inside])))
 
 
 def _require_numbers(variable: xr.DataArray, dimensions: tuple[str, ...]) -> None:

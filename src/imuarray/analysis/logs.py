@@ -10,13 +10,16 @@ import numpy as np
 
 from imuarray.analysis.suspects import ends
 from imuarray.errors import InputError
+from imuarray.firstorder.correct import rails_shown
 from imuarray.recording import Recording, read_recording
 from imuarray.recording.channels import repeated
+from imuarray.recording.layout import read_layout, rotation
 from imuarray.recording.log import Log
 from imuarray.recording.rig import Rig, recording_of
 
 RECORDINGS = (".nc", ".nc4", ".h5")
 PACKETS = ".bin"
+RAIL = 1 - 1e-6  # of the range
 LARGE = 0.5  # of the largest reading, from which an abrupt end is a rail and no rest
 
 
@@ -42,6 +45,26 @@ def open_logs(
     found = _opened(paths, columns, topics)
     _require_paired(found.recording)
     return found
+
+
+def _with_rails(recording: Recording, layout=None) -> Recording:
+    """Where sensors' axes are not the array's, what a rail in their own axes shows in these."""
+    forces = recording.accelerometer_axes
+    if forces is None:
+        return recording
+    rates, changed = forces, dict[str, Any]()
+    if layout is not None:
+        triads = layout["gyroscopes"]["triads"].values()
+        rates = np.array([rotation(one.get("axes", list("xyz")), "gyroscopes") for one in triads])
+    for kind, name, turns in (
+        ("accelerometer", "specific_force", forces), ("gyroscope", "angular_rate", rates)
+    ):  # fmt: skip
+        if (np.isclose(turns, 0) | np.isclose(np.abs(turns), 1)).all():
+            continue
+        own = np.einsum("kji,tkj->tki", turns, getattr(recording, name))
+        rails = np.abs(own) >= RAIL * getattr(recording, f"{kind}_range")
+        changed[f"{name}_saturated"] = rails_shown(turns, rails)
+    return replace(recording, **changed)
 
 
 def _require_paired(recording: Recording) -> None:
@@ -74,7 +97,10 @@ def _opened(paths, columns, topics) -> Opened:
     if len(logs) == 1 and logs[0].suffix == PACKETS:
         recording, account = read_board(logs[0], Path(columns))
         return Opened(recording, account.lines())
-    return _together(csv_logs.read_tables(logs, columns))
+    found = csv_logs.read_tables(logs, columns)
+    if isinstance(found, Recording):
+        found = _with_rails(found, read_layout(columns))
+    return _together(found)
 
 
 def _together(found: Recording | Rig) -> Opened:
@@ -83,7 +109,7 @@ def _together(found: Recording | Rig) -> Opened:
         return Opened(found, [])
     recording = recording_of(found)
     if recording is not None:
-        return Opened(recording, found.lines)
+        return Opened(_with_rails(recording), found.lines)
     from imuarray.alignment import align
 
     lines, logs = list(found.lines), []

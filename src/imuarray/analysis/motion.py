@@ -92,10 +92,11 @@ def as_calibrated(recording: Recording, calibration: xr.Dataset) -> Recording:
             f"{name}_saturated": rails_shown(inverse, railed),
             f"{kind}_range": float((limit - np.abs(offset).max()) / most),
         }
-    axes = calibration.get("accelerometer_axes")
+    axes, maps = calibration.get("accelerometer_axes"), calibration.get("map_covariance")
     return replace(
         recording, correction=first, accelerometer_position=calibration["nominal_position"].values,
-        accelerometer_axes=None if axes is None else axes.to_numpy(), **changed,
+        accelerometer_axes=None if axes is None else axes.to_numpy(),
+        map_covariance=None if maps is None else maps.to_numpy(), **changed,
     )  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
+from imuarray.analysis.checked import is_of
 from imuarray.analysis.drawing import FAR, Places, another_size, departures, size_of
 from imuarray.analysis.misfit import FEW, RESIDUAL, is_papers, residuals, rigid, unfitting
 from imuarray.analysis.rigid import SLOPE, Slope, elsewhere, kept, slope, turning
@@ -20,14 +21,12 @@ from imuarray.recording import Recording
 from imuarray.recording.channels import repeated
 
 TRIAD = 10.0  # the same of one triad where the noise of each is estimated
-POSES = 3.0  # times the noise of a pose's mean; real boards have up to 1.9
 DRIFT = 3.0  # sds of the mean of all samples; offsets that differ by more bias positions
 LEARNT = 0.5  # of the drawing's sd: positions known worse are hardly known from the recording
 OTHER = 1.2  # times less residual elsewhere; 1.003 at most for the right board, 2 for another
 SHRUNK = 1.0  # sds: 95 % intervals then cover 83 %
 UNIT = re.compile(r"\bin \S+ declared ")  # in a reason that names a unit
 SHORT = 60.0  # s
-SAME = 0.1  # relative difference of rates, up to which they are those of one recording
 # Effects that look at the time of a recording of their own.
 CLOCK = "sensor_clock"
 TIMED = CLOCK, "bias_drift", "warm_up", "position_shift"
@@ -64,16 +63,6 @@ def reasons_of_calibration(
         reason if len(whose) == len(several) else f"recording {', '.join(whose)}: {reason}"
         for reason, whose in found.items()
     ] + ([] if little or any(map(UNIT.search, found)) else _not_converged(calibration.attrs))
-
-
-def reasons_of_poses(ratio: float) -> list[str]:
-    """Why a first-order calibration is not to be trusted: its residual, in noise of the poses."""
-    if not ratio > POSES:
-        return []
-    return [
-        f"the still poses fit {ratio:.2g} times worse than noise and a drift of offsets allow: the"
-        " board bent or was not still, or an offset jumped; sds do not cover that: record again"
-    ]
 
 
 def _drifts(recording: Recording) -> list[str]:
@@ -242,27 +231,12 @@ def _of_another_time(recording: Recording, calibration: xr.Dataset, own_clocks: 
     effects = [name for name in calibration.attrs.get("effects", "").split(",") if name in TIMED]
     if own_clocks and CLOCK in effects:
         effects.remove(CLOCK)
-    if not effects or _is_of(recording, calibration):
+    if not effects or is_of(recording, calibration):
         return []
     return [
         f"the calibration has {', '.join(effects)}, at the instants of its own (first) recording:"
         " calibrate this one, too, and apply that"
     ]
-
-
-def _is_of(recording: Recording, calibration: xr.Dataset) -> bool:
-    """Whether the calibration is of this recording, or of one that this is a part of."""
-    if "of_diagnosed" in calibration.attrs:
-        return bool(calibration.attrs["of_diagnosed"])
-    if "angular_rate" not in calibration:
-        return False
-    time = calibration["time"].to_numpy()
-    inside = (time >= recording.time[0]) & (time <= recording.time[-1])
-    if inside.sum() < min(FEW, len(recording.time)):
-        return False
-    rate, there = np.median(recording.angular_rate, axis=1), calibration["angular_rate"].to_numpy()
-    here = np.stack([np.interp(time[inside], recording.time, axis) for axis in rate.T], axis=1)
-    return bool(np.median(np.abs(here - there[inside])) < SAME * np.median(np.abs(there[inside])))
 
 
 def _turning_words(course: Slope, places: Places) -> str:

@@ -5,11 +5,11 @@ import xarray as xr
 
 from imuarray.analysis.calibration import calibrate as calibrated
 from imuarray.analysis.model import assumed
-from imuarray.analysis.trust import reasons_of_calibration, reasons_of_poses
+from imuarray.analysis.poses import of_file, reasons_of_poses
+from imuarray.analysis.trust import reasons_of_calibration
 from imuarray.commands.output import Output
 from imuarray.diagnosis.quantities import number
 from imuarray.estimation.informative import position_sds, weakest_of
-from imuarray.firstorder.store import stored_residual_ratio
 from imuarray.model.effects import KINDS
 from imuarray.provenance import trust, write_netcdf
 from imuarray.recording import read_recording
@@ -26,8 +26,7 @@ def calibrate(arguments) -> None:
     dataset = calibrated(
         recordings, arguments.model, arguments.method, arguments.effects, noise, output.say
     )
-    ratio = max(map(stored_residual_ratio, arguments.recordings))
-    known = reasons_of_poses(ratio)
+    known = reasons_of_poses(*map(of_file, arguments.recordings))
     reasons = reasons_of_calibration([assumed(one, noise) for one in recordings], dataset, known)
     write_netcdf(dataset.assign_attrs(trust(reasons)), arguments.out)
     output.say(report(dataset))

@@ -1,10 +1,10 @@
 """The work behind `imuarray diagnose`."""
 
-from imuarray.analysis.trust import reasons_of_diagnosis, reasons_of_poses
+from imuarray.analysis.poses import of_file, reasons_of_poses
+from imuarray.analysis.trust import reasons_of_diagnosis
 from imuarray.commands.output import Output
 from imuarray.diagnosis.document import diagnose as diagnosed
 from imuarray.errors import InputError
-from imuarray.firstorder.store import stored_residual_ratio
 from imuarray.model.effects import DATA_EFFECTS, EFFECTS
 from imuarray.recording import read_recording
 from imuarray.report.write import write_report
@@ -20,7 +20,7 @@ def diagnose(arguments) -> None:
     found = diagnosed(
         recording, arguments.seed, arguments.without, arguments.recording, output.step
     )
-    reasons = reasons_of_poses(stored_residual_ratio(arguments.recording))
+    reasons = reasons_of_poses(of_file(arguments.recording))
     reasons += reasons_of_diagnosis(recording, found.document)
     found.document.update(trusted=not reasons, reasons=reasons)
     write_report(found, arguments.out)

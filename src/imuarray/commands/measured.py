@@ -12,7 +12,7 @@ from imuarray.recording import read_recording, write_recording
 
 def first_order(arguments) -> None:
     """Calibration of each triad from poses and moves; the corrected recording carries it."""
-    from imuarray.analysis.trust import reasons_of_poses
+    from imuarray.analysis.poses import of_first_order, reasons_of_poses
     from imuarray.firstorder.correct import calibrate_first_order
     from imuarray.firstorder.report import noise_table, residual_table, summary_lines
     from imuarray.firstorder.store import write_corrected
@@ -26,7 +26,7 @@ def first_order(arguments) -> None:
     table, offsets = residual_table(found, recording), found.triads.offset
     ratios = noise_table(found, recording).groupby("sensor").ratio.median()
     output.say("\n".join(summary_lines(found, recording)))
-    reasons = reasons_of_poses(found.triads.residual_ratio)
+    reasons = reasons_of_poses(of_first_order(found))
     output.done({
         "out": str(arguments.out), "poses": len(found.poses), "still_samples": found.still_samples,
         "gravity_m_s2": found.gravity, "triads": list(table.triad),

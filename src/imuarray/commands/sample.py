@@ -7,11 +7,11 @@ import pandas as pd
 import xarray as xr
 
 from imuarray.analysis.model import assumed
+from imuarray.analysis.poses import of_file, reasons_of_poses
 from imuarray.analysis.sampling import sample as sampled
 from imuarray.analysis.sampling import summary
-from imuarray.analysis.trust import reasons_of_poses, reasons_of_posterior
+from imuarray.analysis.trust import reasons_of_posterior
 from imuarray.commands.output import Output
-from imuarray.firstorder.store import stored_residual_ratio
 from imuarray.provenance import trust, write_netcdf
 from imuarray.recording import read_recording
 
@@ -33,7 +33,7 @@ def sample(arguments) -> None:
     )  # fmt: skip
     checkpoint = posterior.attrs.pop("checkpoint", None)
     recording = assumed(recording, arguments.accelerometer_noise)
-    reasons = reasons_of_poses(stored_residual_ratio(arguments.recording))
+    reasons = reasons_of_poses(of_file(arguments.recording))
     reasons += reasons_of_posterior(recording, posterior, arguments.rates)
     posterior.attrs |= trust(reasons)
     write_netcdf(posterior, arguments.out)
