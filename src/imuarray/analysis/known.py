@@ -37,7 +37,9 @@ def fused(recording: Recording, calibration: xr.Dataset, chosen) -> Rough:
     since, part = recording.time - recording.time[0], recording.select(moving)
     papers, rails = model_of(recording), part.saturated_gyroscopes()
     readings = measured(papers, part.specific_force, part.angular_rate, rails, since[moving])
-    readings, lost = replace(readings, span=float(since[-1])), part.saturated_accelerometers()
+    # from the recording's start, not from its first moving sample
+    readings = replace(readings, time=since[moving], span=float(since[-1]))
+    lost = part.saturated_accelerometers()
     railed = np.zeros(readings.keep.shape, bool)
     railed[:, : lost.shape[1], :3] = lost
     whole = roughly(readings.without(railed), own, papers, rails)
