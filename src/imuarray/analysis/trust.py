@@ -17,6 +17,7 @@ from imuarray.analysis.drawing import FAR, Places, another_size, departures, siz
 from imuarray.analysis.misfit import FEW, RESIDUAL, is_papers, residuals, rigid, unfitting
 from imuarray.analysis.rigid import SLOPE, Slope, elsewhere, kept, slope, turning
 from imuarray.analysis.suspects import MIRRORED, clipped, common, gravity
+from imuarray.model.effects import EFFECTS, Effect
 from imuarray.recording import Recording
 from imuarray.recording.channels import repeated
 
@@ -27,9 +28,6 @@ OTHER = 1.2  # times less residual elsewhere; 1.003 at most for the right board,
 SHRUNK = 1.0  # sds: 95 % intervals then cover 83 %
 UNIT = re.compile(r"\bin \S+ declared ")  # in a reason that names a unit
 SHORT = 60.0  # s
-# Effects that look at the time of a recording of their own.
-CLOCK = "sensor_clock"
-TIMED = CLOCK, "bias_drift", "warm_up", "position_shift"
 AS_READ = (
     "the recording is as read, and was corrected as the calibration's own was: offsets that have"
     " changed since are not seen; correct it by its own still poses (imuarray first-order)"
@@ -228,15 +226,21 @@ def _elsewhere(moving: Recording, places: Places) -> list[str]:
 
 def _of_another_time(recording: Recording, calibration: xr.Dataset, own_clocks: bool) -> list[str]:
     """One sentence where clocks and drifts of the calibration are those of another recording."""
-    effects = [name for name in calibration.attrs.get("effects", "").split(",") if name in TIMED]
-    if own_clocks and CLOCK in effects:
-        effects.remove(CLOCK)
+    names = calibration.attrs.get("effects", "").split(",")
+    effects = [name for name in names if name in EFFECTS and _looks_at_time(EFFECTS[name])]
+    if own_clocks:
+        effects = [n for n in effects if not (EFFECTS[n].scanned and EFFECTS[n].shifts_time)]
     if not effects or is_of(recording, calibration):
         return []
     return [
         f"the calibration has {', '.join(effects)}, at the instants of its own (first) recording:"
         " calibrate this one, too, and apply that"
     ]
+
+
+def _looks_at_time(effect: Effect) -> bool:
+    """Whether a recording's own effect is another at each instant: its function reads the time."""
+    return effect.own and effect.apply is not None and "time" in effect.apply.__code__.co_names
 
 
 def _turning_words(course: Slope, places: Places) -> str:
