@@ -111,3 +111,25 @@ def test_errors_under_a_known_effect_are_as_large_as_their_covariance_says(name)
         "ti,ti->t", error, np.linalg.solve(found.covariance, error[..., None])[..., 0]
     )
     assert abs(square.mean() - 9) < 5 * np.sqrt(18 / samples)
+
+
+@pytest.mark.parametrize("name", ["sensor_delay", "gyroscope_delay"])
+def test_delays_count_beyond_the_first_order(name):
+    """Readings of other instants, 4 ms later, not of an expansion about the same one."""
+    own, late, time = model(), 0.004, np.arange(600) / 100.0
+    hand, rng = hand_twisting(np.random.default_rng(6), 12.0, 5.0, 4.0), np.random.default_rng(7)
+    moved = hand.at(time)
+    force, rate, _ = measure(own, moved, own.array.relative, rng)
+    other, turning, _ = measure(own, hand.at(time + late), own.array.relative, rng)
+    if name == "sensor_delay":
+        force[:, 2], rate[:, 2] = other[:, 2], turning[:, 2]
+        delays = late * (np.arange(5) == 2)
+    else:
+        rate, delays = turning, np.full(5, late)
+    parameters = np.concatenate([own.array.parameters, delays])
+    found = fuse(replace(own, effects=(name,)), force, rate, parameters, time=time, span=6.0)
+    pairs = zip(found.estimate.motion[:3], moved[:3], strict=True)
+    error = np.hstack([np.asarray(one) - truth for one, truth in pairs])[20:-20]
+    sds = np.sqrt(np.einsum("tii->ti", found.covariance))[20:-20]
+    z = np.sqrt(np.mean((error / sds) ** 2, axis=0))
+    assert z.max() < 1.35, z

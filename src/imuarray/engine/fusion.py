@@ -24,7 +24,7 @@ from imuarray.engine.linearise import (
 from imuarray.engine.parameters import Columns, columns_of
 from imuarray.engine.readings import Readings, by_imu, measured
 from imuarray.engine.settings import SETTINGS
-from imuarray.engine.start import start
+from imuarray.engine.start import is_smooth, start
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.motion_ml import MotionEstimate, motion_at, motion_from
 from imuarray.geometry.array import positions_of, require_planar_extent
@@ -112,10 +112,35 @@ def fuse(
         take = better(one, (again.cost, again.converged))
         _put(found, other[take], Motions(*(part[take] for part in again)))
     state = state._replace(motion=found.motion)
+    timed = any(item.shifts_time for item in model.chain)
+    if timed and _followed(readings) and is_smooth(readings, found.motion):
+        found, state = _with_neighbours(readings, model, state, rails)
     parts = np.split(found.motion, found.motion.shape[1] // 3, axis=1)
     motion = Motion(*parts) if len(parts) == 5 else Motion.of(*parts)
     estimate = MotionEstimate(motion, found.cost, found.steps, found.converged)
     return Fused(estimate, *covariances(readings, model, state, covariance))
+
+
+def _followed(readings: Readings) -> bool:
+    """Whether samples follow each other closely enough for neighbours to tell derivatives."""
+    step = np.median(np.diff(readings.time)) if len(readings.time) > 1 else 0.0
+    close = 0.0 < step < SETTINGS.longest_step
+    return bool(close and np.bincount(readings.run).max() >= readings.window)
+
+
+def _with_neighbours(readings: Readings, model: ArrayModel, state: State, rails):
+    """(`Motions`, state) with the higher derivatives from the neighbours, as an estimate has them.
+
+    A delay then counts to second order, and of gyroscopes to third.
+    """
+    readings, every = replace(readings, gapless=True), np.arange(len(readings.time))
+    nothing = no_derivatives(len(every), len(state.positions))
+    state = State(state.motion[:, :9], state.positions, state.parameters, nothing)
+    for _ in range(TURNS):
+        state = with_derivatives(readings, state, True)
+        found = descend(readings, model, state, every, rails)
+        state = state._replace(motion=found.motion)
+    return found, state
 
 
 def _of_two(readings: Readings, model: ArrayModel, positions, effects, covariance) -> Fused:
@@ -126,9 +151,7 @@ def _of_two(readings: Readings, model: ArrayModel, positions, effects, covarianc
     samples = len(readings.time)
     seen = np.flatnonzero(readings.keep[..., 3:].any(axis=1).all(axis=1))
     part = readings.select(seen)
-    followed = len(seen) > 1 and np.median(np.diff(part.time)) < SETTINGS.longest_step
-    followed = followed and np.bincount(part.run).max() >= part.window
-    part = replace(part, gapless=bool(followed))
+    part = replace(part, gapless=_followed(part))
     state = start(part, columns_of(model.array, model.effects, np.inf))
     state = state._replace(positions=positions, parameters=np.asarray(effects))
     for _ in range(TURNS):
