@@ -3,13 +3,13 @@
 import numpy as np
 import xarray as xr
 
+from imuarray.analysis.checked import FEW
 from imuarray.analysis.drawing import Places
 from imuarray.analysis.rigid import Turning, kept, turning
 from imuarray.analysis.suspects import suspects, told
 from imuarray.model.effects import KINDS
 from imuarray.recording import Recording
 
-FEW = 20  # samples
 RESIDUAL = 3.0  # times the declared noise: widths are too small, or scaled by what is no noise
 
 

@@ -36,7 +36,8 @@ def of_file(path) -> Poses:
         stored = file[FIRST_ORDER]
         ratio = float(np.ravel(stored.attrs.get("residual_ratio", 1.0))[0])
         squares = np.where(stored["used"][:][..., None] != 0, stored["residual"][:] ** 2, np.nan)
-        scale = np.trace(stored["gyroscope_common"][:]) / 3 if "gyroscope_common" in stored else 1.0
+        common = stored["gyroscope_common"][:] if "gyroscope_common" in stored else [[np.nan]]
+        scale = np.trace(common) / 3
     return Poses(ratio, float(np.sqrt(np.nanmax(np.nanmean(squares, axis=(0, 2))))), float(scale))
 
 

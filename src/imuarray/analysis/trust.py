@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from imuarray.analysis.checked import is_of
+from imuarray.analysis.checked import FEW, is_of
 from imuarray.analysis.drawing import FAR, Places, another_size, departures, size_of
-from imuarray.analysis.misfit import FEW, RESIDUAL, is_papers, residuals, rigid, unfitting
+from imuarray.analysis.misfit import RESIDUAL, is_papers, residuals, rigid, unfitting
 from imuarray.analysis.rigid import SLOPE, Slope, elsewhere, kept, slope, turning
 from imuarray.analysis.suspects import MIRRORED, clipped, common, gravity
 from imuarray.model.effects import EFFECTS, Effect
