@@ -8,7 +8,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from imuarray.errors import IdentifiabilityError, InputError
-from imuarray.firstorder.allan import allan_deviation, lag_correlation, white_noise_sd
+from imuarray.firstorder.allan import allan_deviation, lag_correlation, reading_sd
 from imuarray.firstorder.correct import calibrate_first_order, correct, corrected
 from imuarray.firstorder.parts import parts_of
 from imuarray.firstorder.pose_noise import PoseNoise, walked_mean
@@ -161,7 +161,7 @@ def test_a_walk_is_whitened_as_the_dense_covariance_says():
     time, sd = np.array([-30.0, -18.0, -7.0, 4.0, 16.0]), rng.uniform(1e-3, 3e-3, (5, 2, 3))
     recording, used = np.array([0, 0, 0, 0, 1]), np.ones((5, 2), bool)
     used[1, 1] = False
-    noise = PoseNoise.of(sd, time, recording)._replace(walk=1e-6)
+    noise = PoseNoise.of(sd, time, recording)._replace(walk=np.full(2, 1e-6))
     white = noise.whitening(used)
     walked = np.zeros((5, 5))  # two ways from time 0, each recording its own
     walked[:3, :3] = [[30, 18, 7], [18, 18, 7], [7, 7, 7]]
@@ -385,7 +385,7 @@ def test_allan_deviation_of_white_noise_falls_as_its_law():
     for tau, values in zip(taus, deviation, strict=True):
         error = 5 / np.sqrt(2 * 20000 / (1.5 * tau))
         np.testing.assert_allclose(values * np.sqrt(tau) / 0.3, 1.0, atol=error)
-    np.testing.assert_allclose(white_noise_sd(pieces), 0.3, rtol=0.03)
+    np.testing.assert_allclose(reading_sd(pieces, 0.01), 0.3, rtol=0.03)
     assert np.abs(lag_correlation(pieces)).max() < 0.04
 
 

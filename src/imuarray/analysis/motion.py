@@ -10,7 +10,7 @@ import xarray as xr
 from imuarray.analysis.checked import require_fit, require_labels
 from imuarray.analysis.model import assumed, model_of
 from imuarray.errors import InputError
-from imuarray.firstorder.correct import corrected, rails_shown
+from imuarray.firstorder.correct import corrected, nearest_rail, rails_shown
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.model.effects import KINDS, find_effects
@@ -86,11 +86,11 @@ def as_calibrated(recording: Recording, calibration: xr.Dataset) -> Recording:
     changed: dict[str, Any] = {}
     for kind, name, railed in zip(KINDS, names, rails, strict=True):
         inverse, offset = (first[f"{kind}_{part}"].to_numpy() for part in ("inverse", "offset"))
-        limit, most = getattr(recording, f"{kind}_range"), np.abs(np.linalg.inv(inverse)).max()
+        limit = getattr(recording, f"{kind}_range")
         changed |= {
             name: corrected(inverse, offset, getattr(recording, name)),
             f"{name}_saturated": rails_shown(inverse, railed),
-            f"{kind}_range": float((limit - np.abs(offset).max()) / most),
+            f"{kind}_range": nearest_rail(limit, np.linalg.inv(inverse), offset),
         }
     axes, maps = calibration.get("accelerometer_axes"), calibration.get("map_covariance")
     return replace(

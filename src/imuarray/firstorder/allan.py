@@ -2,6 +2,8 @@
 
 import numpy as np
 
+WINDOW, BLOCK = 1.0, 0.25  # s
+
 
 def allan_deviation(pieces, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Overlapping Allan deviation pooled over still pieces.
@@ -20,23 +22,44 @@ def allan_deviation(pieces, step: float) -> tuple[np.ndarray, np.ndarray]:
     longest = max(len(piece) for piece in pieces)
     widths = 2 ** np.arange(int(np.log2(max(longest / 3, 1))) + 1)
     widths = widths[2 * widths < longest]
-    sums = [np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(x - x.mean(0), 0)])
-            for x in pieces]  # fmt: skip
-    deviations = []
-    for n in widths:
-        total, count = 0.0, 0
-        for s in sums:
-            if len(s) > 2 * n:
-                second = (s[2 * n :] - 2 * s[n:-n] + s[: -2 * n]) / n
-                total, count = total + np.sum(second**2, axis=0), count + len(second)
-        deviations.append(np.sqrt(total / (2 * count)))
-    return widths * step, np.array(deviations)
+    sums = [_sums(piece) for piece in pieces]
+    return widths * step, np.array([_deviation(sums, n) for n in widths])
 
 
-def white_noise_sd(pieces) -> np.ndarray:
-    """Noise sd of one reading, (...), from differences of neighbours, blind to slow drift."""
-    differences = np.concatenate([np.diff(piece, axis=0) for piece in pieces])
-    return np.sqrt(np.mean(differences**2, axis=0) / 2)
+def _sums(piece) -> np.ndarray:
+    """Of its readings less their mean, before each of them and after all."""
+    return np.concatenate([np.zeros((1, *piece.shape[1:])), np.cumsum(piece - piece.mean(0), 0)])
+
+
+def _deviation(sums, width: int) -> np.ndarray:
+    """Of averages over ``width`` samples, from the pieces that are long enough."""
+    total, count = 0.0, 0
+    for s in sums:
+        if len(s) > 2 * width:
+            second = (s[2 * width :] - 2 * s[width:-width] + s[: -2 * width]) / width
+            total, count = total + np.sum(second**2, axis=0), count + len(second)
+    return np.sqrt(total / (2 * count))
+
+
+def reading_sd(pieces, step: float) -> np.ndarray:
+    """Noise sd of one reading, (...), within WINDOW: blind to what drifts more slowly."""
+    squares, freedom = 0.0, 0
+    for piece in pieces:
+        count = max(round(len(piece) * step / WINDOW), 1)
+        for part in np.array_split(piece, count):
+            squares = squares + np.sum((part - part.mean(axis=0)) ** 2, axis=0)
+            freedom += len(part) - 1
+    return np.sqrt(squares / max(freedom, 1))
+
+
+def averaged_sd(pieces, step: float) -> np.ndarray:
+    """Sd of white noise of which averages scatter as those of BLOCK do, (...).
+
+    Behind a filter neighbours are alike: averages scatter more than one reading's sd says.
+    """
+    longest = max(len(piece) for piece in pieces)
+    width = max(min(round(BLOCK / step), longest // 2), 1)
+    return _deviation([_sums(piece) for piece in pieces], width) * np.sqrt(width)
 
 
 def lag_correlation(pieces, lag: int = 1) -> np.ndarray:

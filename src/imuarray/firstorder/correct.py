@@ -8,7 +8,7 @@ import xarray as xr
 from scipy.linalg import block_diag
 
 from imuarray.errors import InputError, require_one_of
-from imuarray.firstorder.allan import lag_correlation, white_noise_sd
+from imuarray.firstorder.allan import averaged_sd, lag_correlation, reading_sd
 from imuarray.firstorder.gyroscopes import Gyroscopes, Still, calibrate_gyroscopes
 from imuarray.firstorder.pose_noise import walked_mean
 from imuarray.firstorder.still import SHORTEST, still_poses
@@ -35,9 +35,9 @@ class FirstOrder:
     gyroscope_offset, gyroscope_offset_sd : (G, 3) rad/s
         Where the board moves, and its sd from the spread among poses, which holds drift and
         whatever depends on gravity.
-    gyroscope_walk : rad/s per root of a second, sd of an offset's walk; 0 where none shows
+    gyroscope_walk : (G,) rad/s per root of a second, sd of an offset's walk; 0 where none shows
     accelerometer_noise, gyroscope_noise : (A, 3) m/s^2, (G, 3) rad/s
-        White noise of one reading, from differences of neighbours.
+        Noise of one reading within a second.
     accelerometer_correlation, gyroscope_correlation : (A, 3), (G, 3)
         Correlation of neighbouring readings.
     gravity : float, m/s^2, the assumed magnitude
@@ -48,7 +48,7 @@ class FirstOrder:
     triads: TriadFit
     gyroscope_offset: np.ndarray
     gyroscope_offset_sd: np.ndarray
-    gyroscope_walk: float
+    gyroscope_walk: np.ndarray
     accelerometer_noise: np.ndarray
     gyroscope_noise: np.ndarray
     accelerometer_correlation: np.ndarray
@@ -143,21 +143,25 @@ def _still(recording: Recording, shortest: float) -> Still:
     poses = still_poses(recording, shortest=shortest)
     rate = [recording.angular_rate[pose] for pose in poses]
     offsets = np.array([piece.mean(axis=0) for piece in rate])
-    return Still(recording, poses, offsets, white_noise_sd(rate))
+    return Still(recording, poses, offsets, averaged_sd(rate, _step(recording)))
 
 
-def _forces(still: Still) -> tuple[list[np.ndarray], np.ndarray]:
-    """Readings of the accelerometers in each pose, and the noise (A, 3) m/s^2 of one."""
-    force = [still.recording.specific_force[pose] for pose in still.poses]
-    # a quantised reading that never changes has no spread of its own
-    return force, np.maximum(white_noise_sd(force), 1e-6 * GRAVITY)
+def _step(recording: Recording) -> float:
+    return float(np.median(np.diff(recording.time)))
+
+
+def _forces(still: Still) -> list[np.ndarray]:
+    """Readings of the accelerometers in each pose."""
+    return [still.recording.specific_force[pose] for pose in still.poses]
 
 
 def _triads(every: Sequence[Still], gravity: float) -> TriadFit:
     """Of the poses of all recordings, one recording after the other."""
     mean, sd = [], []
     for one in every:
-        force, noise = _forces(one)
+        force = _forces(one)
+        # a quantised reading that never changes has no spread of its own
+        noise = np.maximum(averaged_sd(force, _step(one.recording)), 1e-6 * GRAVITY)
         mean += [piece.mean(axis=0) for piece in force]
         sd += [noise / np.sqrt(len(piece)) for piece in force]
     recording = np.repeat(np.arange(len(every)), [len(one.poses) for one in every])
@@ -177,16 +181,17 @@ def _after_moving(still: Still) -> np.ndarray:
 
 def _of_poses(still: Still, triads: TriadFit, gravity: float) -> FirstOrder:
     """What the still poses alone say: nothing of the gyroscopes' maps."""
-    force, noise = _forces(still)
+    force, step = _forces(still), _step(still.recording)
     rate = [still.recording.angular_rate[pose] for pose in still.poses]
     return FirstOrder(
-        still.poses, triads, *_gyroscope_offsets(still), noise, still.noise,
+        still.poses, triads, *_gyroscope_offsets(still),
+        np.maximum(reading_sd(force, step), 1e-6 * GRAVITY), reading_sd(rate, step),
         lag_correlation(force), lag_correlation(rate), gravity,
     )  # fmt: skip
 
 
-def _gyroscope_offsets(still: Still) -> tuple[np.ndarray, np.ndarray, float]:
-    """(G, 3) rad/s where the board moves, their sds, NaN of one pose alone, and their walk."""
+def _gyroscope_offsets(still: Still) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(G, 3) rad/s where the board moves, their sds, NaN of one pose alone, and their walks."""
     counts = np.array([pose.stop - pose.start for pose in still.poses], float)
     sd = np.maximum(still.noise, 1e-9) / np.sqrt(counts)[:, None, None]
     return walked_mean(still.offsets, sd, _after_moving(still))
@@ -211,10 +216,10 @@ def correct(recording: Recording, found: FirstOrder) -> Recording:
         accelerometer_position=recording.accelerometer_position @ found.drawing_turn,
         accelerometer_noise_sd=_noise(found.triads.matrix, found.accelerometer_noise),
         gyroscope_noise_sd=_noise(maps, found.gyroscope_noise),
-        accelerometer_range=_nearest_rail(
+        accelerometer_range=nearest_rail(
             recording.accelerometer_range, found.triads.matrix, found.triads.offset
         ),
-        gyroscope_range=_nearest_rail(recording.gyroscope_range, maps, found.gyroscope_offset),
+        gyroscope_range=nearest_rail(recording.gyroscope_range, maps, found.gyroscope_offset),
         map_covariance=found.left(),
         stationary=still,
         accelerometer_axes=_axes(recording, found),
@@ -252,7 +257,7 @@ def _correction(recording: Recording, found: FirstOrder, *inverses) -> xr.Datase
         variables |= {
             f"{kind}_inverse": (inverse, {"units": "1"}), f"{kind}_offset": (offset, unit),
             f"{kind}_offset_sd": (sd, unit),
-            f"{kind}_offset_walk": (np.full(len(offset), walk), rooted),
+            f"{kind}_offset_walk": (walk, rooted),
         }  # fmt: skip
     return xr.Dataset({name: (CORRECTION[name], *both) for name, both in variables.items()})
 
@@ -276,6 +281,6 @@ def _noise(matrix, noise) -> float:
     return float(np.sqrt(squares.mean()))
 
 
-def _nearest_rail(limit: float, matrix, offset) -> float:
+def nearest_rail(limit: float, matrix, offset) -> float:
     """The rail after correction, at its nearest."""
     return float((limit - np.abs(offset).max()) / np.abs(matrix).max())

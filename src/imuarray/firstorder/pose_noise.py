@@ -1,8 +1,9 @@
 """How still poses' averages scatter: noise of the readings, and offsets that walk.
 
-Offsets do as sensors warm up. All walk alike, and are pinned where the board moves: there the
-offset is a parameter of the fit. The walk's variance in a second is estimated by restricted maximum
-likelihood beside a factor of the readings' own noise.
+Offsets do as sensors warm up. They are pinned where the board moves: there the offset is a
+parameter of the fit. The walks' variances in a second are estimated by restricted maximum
+likelihood beside a factor of the readings' own noise: one for all triads, or each its own where
+that gains more than as many parameters do by chance.
 """
 
 from __future__ import annotations
@@ -12,68 +13,162 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from imuarray.linear import scaled_inverse
 from imuarray.walk import shared_walk
 
 SHOWN = 2.0  # nats that a walk must gain
 SEEN = 1.2  # times the noise; a walk is looked for beyond
 RANGE = 1e-4, 1e8  # of a walk in a second, as a share of an average's variance
+STEPS, CLOSE = 60, 0.02  # of each triad's own walk, relative
 
 
 class PoseNoise(NamedTuple):
     """Of the averages (P, A, 3) in P poses.
 
     ``sd`` (P, A, 3) of the readings' noise; ``walked`` (P, P) s, how long each two poses' offsets
-    have walked together; ``walk``, their variance in a second.
+    have walked together; ``walk`` (A,), their variance in a second.
     """
 
     sd: np.ndarray
     walked: np.ndarray
-    walk: float = 0.0
+    walk: np.ndarray
 
     @classmethod
     def of(cls, sd, time, recording) -> PoseNoise:
         """``time`` (P,) s of each pose, after the instant of its recording's offset."""
-        return cls(sd, np.where(recording[:, None] == recording, shared_walk(time), 0.0))
+        together = np.where(recording[:, None] == recording, shared_walk(time), 0.0)
+        return cls(sd, together, np.zeros(sd.shape[1]))
+
+    def grown(self, factors, walk) -> PoseNoise:
+        """With a factor (A,) of the readings' variances, and walks (A,)."""
+        return self._replace(sd=self.sd * np.sqrt(factors)[:, None], walk=walk)
 
     def whitening(self, used) -> np.ndarray:
         """(A, 3, P, P) that makes averages white, zero for those not ``used`` (P, A) bool."""
         mine = np.swapaxes(used, 0, 1)[:, None]
         both = mine[..., None] & mine[..., None, :]
-        spread = np.where(both, self.walk * self.walked, 0.0) + _diagonal(self._variances(mine))
+        walked = self.walk[:, None, None, None] * self.walked
+        spread = np.where(both, walked, 0.0) + _diagonal(self._variances(mine))
         return np.where(both, np.linalg.inv(np.linalg.cholesky(spread)), 0.0)
 
     def _variances(self, mine) -> np.ndarray:
         return np.where(mine, np.moveaxis(self.sd, 0, -1) ** 2, 1.0)
 
+    def misfits(self, used, residual) -> float:
+        """The largest of the triads' residuals (P, A, 3) in their noise, over the usual of all."""
+        squares = np.sum((residual / self.sd) ** 2, axis=2) * used
+        each = squares.sum(axis=0) / np.maximum(used.sum(axis=0), 1)
+        return float(np.sqrt(each.max() / max(np.median(each), np.finfo(float).tiny)))
+
     def estimated(self, used, misfit, slopes, fixed) -> PoseNoise:
-        """With the walk that misfits show, if they do.
+        """With the walks that misfits show, if they do.
 
         ``misfit`` (P, A, 3) m/s^2 at an estimate, ``slopes`` (P, A, 3, n) of the averages in its
         parameters, ``fixed`` (n, n) information that comes from elsewhere.
         """
-        misfit, slopes = np.moveaxis(misfit, 0, -1), np.moveaxis(slopes, 0, -2)
-        free = 3 * int(used.sum()) - (slopes.shape[-1] - np.linalg.matrix_rank(fixed))
-
-        def deviance(walk: float) -> float:
-            white = self._replace(walk=walk).whitening(used)
-            rows = (white @ slopes).reshape(-1, slopes.shape[-1])
-            left = (white @ misfit[..., None]).ravel()
-            inner = rows.T @ rows + fixed
-            scale = 1 / np.sqrt(np.diag(inner))
-            step = scale * np.linalg.solve(inner * np.outer(scale, scale), scale * (rows.T @ left))
-            square = left @ left - step @ inner @ step
-            grown = max(square / free, 1.0)
-            known = np.diagonal(white, axis1=-2, axis2=-1)
-            lost = np.linalg.slogdet(inner * np.outer(scale, scale))[1] - 2 * np.log(scale).sum()
-            return free * np.log(grown) + square / grown - 2 * np.log(known[known > 0]).sum() + lost
-
+        if not self.walked.any():
+            return self
+        rows, one = _Rows.of(misfit, slopes, fixed), np.ones(len(self.walk))
         unit = np.median(self.sd) ** 2
+
+        def judged(factors, walk) -> _Judged:
+            return rows.judged(self.grown(factors, walk).whitening(used), used)
+
         found = minimize_scalar(
-            lambda x: deviance(unit * np.exp(x)), bounds=np.log(RANGE), method="bounded",
-            options={"xatol": 0.05},
+            lambda x: judged(one, unit * np.exp(x) * one).deviance, bounds=np.log(RANGE),
+            method="bounded", options={"xatol": 0.05},
         )  # fmt: skip
-        walk = unit * np.exp(found.x)
-        return self._replace(walk=walk if deviance(0.0) - found.fun > 2 * SHOWN else 0.0)
+        common, own = unit * np.exp(found.x) * one, rows.own(self, used, unit)
+        asked = 0.0, 2 * SHOWN, 2 * (SHOWN + 2 * len(one) - 2)
+        each = [judged(*pair) for pair in ((one, 0.0 * one), (one, common), own)]
+        best = int(np.argmin([x.deviance + more for x, more in zip(each, asked, strict=True)]))
+        # noise and walk that both grow: what of it is noise's, the fit's residual will show
+        return self._replace(walk=each[best].grown * (0.0 * one, common, own[1])[best])
+
+
+class _Judged(NamedTuple):
+    """-2 log of the restricted likelihood, and the factor ``grown`` of all variances in it."""
+
+    deviance: float
+    grown: float
+
+
+class _Rows(NamedTuple):
+    """Misfits (A, 3, P), their slopes (A, 3, P, m) in each triad's ``columns`` (A, m) of n.
+
+    A column that a triad has not is n itself, with slopes of zero.
+    """
+
+    misfit: np.ndarray
+    slopes: np.ndarray
+    columns: np.ndarray
+    fixed: np.ndarray
+
+    @classmethod
+    def of(cls, misfit, slopes, fixed) -> _Rows:
+        slopes, count = np.moveaxis(slopes, 0, -2), slopes.shape[-1]
+        has = np.any(slopes != 0, axis=(1, 2))
+        most = int(has.sum(axis=1).max())
+        columns = np.array([np.append(np.flatnonzero(own), [count] * most)[:most] for own in has])
+        padded = np.concatenate([slopes, np.zeros((*slopes.shape[:-1], 1))], axis=-1)
+        own = np.take_along_axis(padded, columns[:, None, None], axis=-1)
+        return cls(np.moveaxis(misfit, 0, -1), own, columns, fixed)
+
+    def free(self, used) -> int:
+        """How many misfits more than parameters that they determine."""
+        return 3 * int(used.sum()) - (len(self.fixed) - np.linalg.matrix_rank(self.fixed))
+
+    def solved(self, white):
+        """Whitened misfits and slopes; information (n, n), its right side (n,) and solution."""
+        count = len(self.fixed)
+        left, rows = (white @ self.misfit[..., None])[..., 0], white @ self.slopes
+        inner, right = np.zeros((count + 1, count + 1)), np.zeros(count + 1)
+        for mine, own, rest in zip(self.columns, rows, left, strict=True):
+            flat = own.reshape(-1, own.shape[-1])
+            inner[np.ix_(mine, mine)] += flat.T @ flat
+            right[mine] += flat.T @ rest.ravel()
+        inner, right = inner[:-1, :-1] + self.fixed, right[:-1]
+        scale = 1 / np.sqrt(np.diag(inner))
+        step = scale * np.linalg.solve(inner * np.outer(scale, scale), scale * right)
+        return left, rows, inner, right, step
+
+    def judged(self, white, used) -> _Judged:
+        """Under ``white``, with the factor of all variances that fits best, at least 1."""
+        left, _, inner, right, step = self.solved(white)
+        free, square = self.free(used), float(np.sum(left**2) - right @ step)
+        grown = max(square / free, 1.0)
+        known, size = np.diagonal(white, axis1=-2, axis2=-1), np.diag(inner)
+        scaled = inner / np.sqrt(np.outer(size, size))
+        lost = np.linalg.slogdet(scaled)[1] + np.log(size).sum()
+        logs = lost - 2 * np.log(known[known > 0]).sum()
+        return _Judged(float(free * np.log(grown) + square / grown + logs), grown)
+
+    def own(self, noise: PoseNoise, used, unit: float) -> tuple[np.ndarray, np.ndarray]:
+        """Each triad's own factor of its noise, at least 1, and walk; (A,) both.
+
+        Minorise-maximise steps for variance components (Zhou, Hu, Zhou and Lange, J. Comput. Graph.
+        Stat. 28, 2019): no step lowers the likelihood.
+        """
+        factors, walk = np.ones(len(self.columns)), np.full(len(self.columns), unit)
+        variances = _diagonal(np.moveaxis(noise.sd, 0, -1) ** 2)
+        for _ in range(STEPS):
+            white = noise.grown(factors, walk).whitening(used)
+            left, rows, inner, _, step = self.solved(white)
+            inverse = np.zeros(np.add(inner.shape, 1))
+            inverse[:-1, :-1] = scaled_inverse(inner)
+            rest = left - np.einsum("kipm,km->kip", rows, np.append(step, 0.0)[self.columns])
+            given = inverse[self.columns[:, :, None], self.columns[:, None]]
+            change = []
+            for part in (variances, noise.walked):
+                own = white @ part @ np.swapaxes(white, -1, -2)
+                square = np.einsum("kip,kipq,kiq->k", rest, own, rest)
+                known = np.einsum("kmn,kinm->k", given, np.swapaxes(rows, -1, -2) @ own @ rows)
+                change.append(np.sqrt(square / (np.einsum("kipp->k", own) - known)))
+            before, walk = walk, np.maximum(walk * change[1], unit * RANGE[0])
+            factors = np.maximum(factors * change[0], 1.0)
+            if np.abs(np.log(walk / before)).max() < CLOSE:
+                break
+        return factors, walk
 
 
 def _diagonal(values) -> np.ndarray:
@@ -81,24 +176,24 @@ def _diagonal(values) -> np.ndarray:
     return values[..., None] * np.eye(values.shape[-1])
 
 
-def walked_mean(values, sd, time) -> tuple[np.ndarray, np.ndarray, float]:
-    """Offsets (K, 3) at time 0 from averages (P, K, 3) in poses at ``time`` (P,) s; sds; walk.
+def walked_mean(values, sd, time) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Offsets (K, 3) at time 0 from averages (P, K, 3) in poses at ``time`` (P,) s; sds; walks.
 
     ``sd`` (P, K, 3) of the averages' noise. What scatters more than noise and walk say makes the
-    sds larger; of one pose alone they are NaN. The walk is an sd per root of a second.
+    sds larger; of one pose alone they are NaN. The walks (K,) are sds per root of a second.
     """
     count, channels = len(values), values[0].size
     used = np.ones(values.shape[:2], bool)
     noise = PoseNoise.of(sd, time, np.zeros(count, int))
     mean, spread, ratio = _weighted(values, noise.whitening(used))
-    if ratio > SEEN:
+    if ratio > SEEN or noise.misfits(used, values - mean) > SEEN:
         slopes = np.broadcast_to(np.eye(channels), (count, channels, channels))
         noise = noise.estimated(
             used, values - mean, slopes.reshape(*values.shape, channels), np.zeros((channels,) * 2)
         )
         mean, spread, ratio = _weighted(values, noise.whitening(used))
     sds = np.sqrt(spread) * (max(ratio, 1.0) if count > 1 else np.nan)
-    return mean, sds, float(np.sqrt(noise.walk))
+    return mean, sds, np.sqrt(noise.walk)
 
 
 def _weighted(values, white) -> tuple[np.ndarray, np.ndarray, float]:

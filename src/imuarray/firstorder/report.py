@@ -12,6 +12,7 @@ from imuarray.firstorder.turns import TURNED, angle_of, nearest_orthogonal
 from imuarray.recording import Recording
 
 MISALIGNMENT = ("xy", "xz", "yz")
+APART = 3.0  # times the usual walk, from which a sensor's is told by itself
 SENSORS = {"specific_force": "accelerometer", "angular_rate": "gyroscope"}
 
 
@@ -57,7 +58,7 @@ def summary_lines(found: FirstOrder, recording: Recording) -> list[str]:
         shown = ", ".join(f"{1e3 * value:.0f}" for value in offset)
         lines.append(f"{row.triad:>5}  {1e3 * row.residual_rms:15.2f}  {row.left_out:14d}  {shown}")
     ratios = noise_table(found, recording).groupby("sensor").ratio.median()
-    lines += walk_lines(found)
+    lines += doubtful_lines(found, recording) + walk_lines(found, recording)
     lines += turned_lines(found, recording) + gyroscope_lines(found.gyroscopes, recording)
     return lines + [
         f"noise of {sensor}: {ratio:.2f} times the declared one (median over axes)"
@@ -65,15 +66,32 @@ def summary_lines(found: FirstOrder, recording: Recording) -> list[str]:
     ]
 
 
-def walk_lines(found: FirstOrder) -> list[str]:
-    """For a person: how far offsets walk in a minute, where they do."""
-    root = np.sqrt(60.0)
-    walks = {
-        f"accelerometers {1e3 * root * found.triads.walk:.2g} mm/s^2": found.triads.walk,
-        f"gyroscopes {np.degrees(root * found.gyroscope_walk):.2g} deg/s": found.gyroscope_walk,
-    }
-    shown = [words for words, walk in walks.items() if walk]
+def walk_lines(found: FirstOrder, recording: Recording) -> list[str]:
+    """For a person: how far offsets walk in a minute, where they do, and whose most."""
+    root, shown = np.sqrt(60.0), []
+    for kind, walks, unit in (
+        ("accelerometer", 1e3 * found.triads.walk, "mm/s^2"),
+        ("gyroscope", np.degrees(found.gyroscope_walk), "deg/s"),
+    ):
+        most, usual = int(np.argmax(walks)), root * np.median(walks)
+        if root * walks[most] > APART * usual:
+            label = getattr(recording, f"{kind}_labels")[most]
+            own = f"{kind} {label} {root * walks[most]:.2g} {unit}"
+            shown.append(f"{own} (as a rule {usual:.2g})")
+        elif walks[most]:
+            shown.append(f"{kind}s {usual:.2g} {unit}")
     return [f"offsets drift, in a minute by some: {', '.join(shown)}"] if shown else []
+
+
+def doubtful_lines(found: FirstOrder, recording: Recording) -> list[str]:
+    """For a person: poses that fit the others in no triad."""
+    begins = [recording.time[pose.start] for pose in found.poses]
+    poses = [f"the pose from {begins[p]:.4g} s" for p in np.flatnonzero(found.triads.doubtful > 1)]
+    if not poses:
+        return []
+    return [
+        f"not quite still, as no triad fits, and counted little: the poses from {', '.join(poses)}"
+    ]
 
 
 def gyroscope_lines(maps: Gyroscopes | None, recording: Recording) -> list[str]:
@@ -152,7 +170,7 @@ def residual_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
     fit = found.triads
     return pd.DataFrame({
         "triad": recording.accelerometer_labels, "poses": len(fit.used),
-        "left_out": (~fit.used).sum(axis=0), "residual_rms": fit.residual_rms,
+        "left_out": (~fit.relied).sum(axis=0), "residual_rms": fit.residual_rms,
         "residual_rms_all_poses": fit.residual_rms_all,
     })  # fmt: skip
 

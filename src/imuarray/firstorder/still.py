@@ -3,6 +3,7 @@
 import numpy as np
 
 from imuarray.errors import InputError
+from imuarray.firstorder.turns import nearest_orthogonal
 from imuarray.recording import Recording
 from imuarray.recording.channels import runs
 from imuarray.recording.units import require_plausible_rate
@@ -17,6 +18,12 @@ MOVING = 10.0
 BRIDGED = 0.1  # s; a pose goes on over so short a gap, and where stamps are late
 STEP_TIME = 0.25  # s, before and after an instant, whose means are compared
 STEP = 0.3  # m/s^2 between them: another pose, with nothing recorded on the way
+TURNING = np.radians(2.0)  # rad/s of all gyroscopes: a steady turn, as offsets do not go together
+TOGETHER = 0.1  # relative, what they agree to then
+BURSTS = 2.0  # of the mean step over the usual one; gaps beyond LOST are not counted
+LOST = 1.0  # s
+FAR = 1.0  # of a turn's matrix from the identity: 41 degrees
+ENOUGH = 20_000  # samples that tell how triads are turned
 
 
 def window_spread(readings: np.ndarray, window: int) -> np.ndarray:
@@ -42,14 +49,16 @@ def still_poses(recording: Recording, window=WINDOW, shortest=SHORTEST) -> list[
     declared mask ``stationary`` is used instead, as it is, where the recording has one. A gap
     longer than BRIDGED or a step of the specific force ends a pose.
 
+    Where all gyroscopes read another rate than in most poses the board turns steadily.
+
     Raises
     ------
     InputError
         Where nothing is still: no run long enough (with the longest found), or a floor far above
-        the declared noise.
+        the declared noise; where stamps come in bursts.
     """
     require_plausible_rate(recording.time, "recording: time")
-    step = float(np.median(np.diff(recording.time))) if len(recording.time) > 1 else np.inf
+    step = _step(recording.time)
     width = max(int(round(window / step)), 2)
     if len(recording.time) < 2 * width:
         raise InputError(
@@ -67,6 +76,7 @@ def still_poses(recording: Recording, window=WINDOW, shortest=SHORTEST) -> list[
     poses = [
         _cut(a, b, half, int(round(KEPT / step))) for a, b in found if b - a >= max(least, 2)
     ]  # fmt: skip
+    poses = _not_turning(recording, poses)
     if not poses:
         longest = max((b - a + 2 * half for a, b in found), default=0) * step
         raise InputError(
@@ -74,6 +84,45 @@ def still_poses(recording: Recording, window=WINDOW, shortest=SHORTEST) -> list[
             f" calibration, found none; the longest lasts {longest:.2g} s"
         )
     return poses
+
+
+def _step(time) -> float:
+    """The usual step of the stamps (T,) s; InputError where they come in bursts."""
+    if len(time) < 2:
+        return np.inf
+    steps = np.diff(time)
+    usual, counted = float(np.median(steps)), steps[steps < LOST]
+    mean = float(counted.mean()) if counted.size else usual
+    if mean > BURSTS * usual:
+        raise InputError(
+            f"recording: expected stamps in even steps, found bursts: {1e3 * usual:.3g} ms as a"
+            f" rule, {1e3 * mean:.3g} in the mean; does the log have the times at which packets"
+            " came? declare the sensors' rate (`time: {rate: ...}`)"
+        )
+    return usual
+
+
+def _not_turning(recording: Recording, poses: list[slice]) -> list[slice]:
+    """The poses in which not all gyroscopes read another rate than in most, a steady turn's."""
+    if len(poses) < 3:
+        return poses
+    levels = np.array([recording.angular_rate[pose].mean(axis=0) for pose in poses])
+    off = np.linalg.norm(levels - np.median(levels, axis=0), axis=2)
+    usual = np.median(off, axis=1)
+    apart = np.median(np.abs(off - usual[:, None]), axis=1)
+    turning = (usual > TURNING) & (apart < TOGETHER * usual)
+    return [pose for pose, turns in zip(poses, turning, strict=True) if not turns]
+
+
+def _together(readings) -> np.ndarray:
+    """Mean (T, 3) of triads (T, K, 3), each turned as the first is where it is turned far."""
+    few = readings[:: len(readings) // ENOUGH + 1]
+    few = few - few.mean(axis=0)
+    turns = nearest_orthogonal(np.einsum("tki,tj->kij", few, few[:, 0]))
+    turns[np.linalg.norm(turns - np.eye(3), axis=(1, 2)) < FAR] = np.eye(3)
+    if np.array_equal(turns, np.broadcast_to(np.eye(3), turns.shape)):
+        return readings.mean(axis=1)
+    return np.einsum("kij,tki->tj", turns, readings) / len(turns)
 
 
 def _cut(start: int, stop: int, margin: int, kept: int) -> slice:
@@ -85,7 +134,7 @@ def _cut(start: int, stop: int, margin: int, kept: int) -> slice:
 def _steps(recording: Recording, step: float) -> np.ndarray:
     """Near where the specific force of a declared pose jumps to another level, (T,) bool."""
     width = max(int(round(STEP_TIME / step)), 1)
-    levels = np.column_stack([recording.specific_force.mean(axis=1), recording.stationary])
+    levels = np.column_stack([_together(recording.specific_force), recording.stationary])
     sums = np.cumsum(np.vstack([np.zeros(4), levels]), axis=0)
     means = (sums[width:] - sums[:-width]) / width
     before, after = means[:-width], means[width:]
@@ -105,7 +154,7 @@ def _quiet(recording: Recording, width: int) -> np.ndarray:
     )
     for name, declared in kinds:
         readings = getattr(recording, name)
-        spread = window_spread(readings.mean(axis=1), width)
+        spread = window_spread(_together(readings), width)
         floor = np.quantile(spread, FLOOR)
         if floor > MOVING * declared:
             raise InputError(

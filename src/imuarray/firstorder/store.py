@@ -1,6 +1,5 @@
 """A first-order calibration in a file: the corrected recording with the numbers in a group."""
 
-import h5py
 import numpy as np
 import xarray as xr
 
@@ -20,13 +19,6 @@ def write_corrected(recording: Recording, found: FirstOrder, path) -> None:
     write_recording(correct(recording, found), path, attrs=attrs, groups=groups)
 
 
-def stored_residual_ratio(path) -> float:
-    """The residual of the poses in their noise, as a corrected recording's file has it, or 1."""
-    with h5py.File(path, "r") as file:
-        stored = file[FIRST_ORDER].attrs if FIRST_ORDER in file else {}
-        return float(np.ravel(stored.get("residual_ratio", 1.0))[0])
-
-
 def _first_order_dataset(recording: Recording, found) -> xr.Dataset:
     """Matrix, offset and their covariance, poses, residuals, noise."""
     fit = found.triads
@@ -41,13 +33,13 @@ def _first_order_dataset(recording: Recording, found) -> xr.Dataset:
             {"long_name": "of (matrix row by row, offset), triad by triad"},
         ),
         "residual": (("pose", "accelerometer", "axis"), fit.residual, {"units": "m s-2"}),
-        "used": (("pose", "accelerometer"), fit.used),
+        "used": (("pose", "accelerometer"), fit.relied),
         "pose_time": (("pose", "edge"), np.array(limits), {"units": "s"}),
         "accelerometer_noise": (accelerometer, found.accelerometer_noise, {"units": "m s-2"}),
         "gyroscope_offset": (gyroscope, found.gyroscope_offset, {"units": "rad s-1"}),
         "gyroscope_offset_sd": (gyroscope, found.gyroscope_offset_sd, {"units": "rad s-1"}),
-        "accelerometer_walk": ((), fit.walk, {"units": "m s-2 s-0.5"}),
-        "gyroscope_walk": ((), found.gyroscope_walk, {"units": "rad s-1 s-0.5"}),
+        "accelerometer_walk": (("accelerometer",), fit.walk, {"units": "m s-2 s-0.5"}),
+        "gyroscope_walk": (("gyroscope",), found.gyroscope_walk, {"units": "rad s-1 s-0.5"}),
         "gyroscope_noise": (gyroscope, found.gyroscope_noise, {"units": "rad s-1"}),
     }  # fmt: skip
     coords = {

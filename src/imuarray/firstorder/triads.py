@@ -23,6 +23,7 @@ from imuarray.model.jax64 import jax, jnp
 UPPER = np.triu_indices(3)
 
 OUTLIER = 5.0  # times the median size of a residual
+SHARED = 5.0  # times the median of what leaving out a pose gains, the worst of its triads apart
 MOST_OFF = 0.5  # relative, of a pose's mean specific force from gravity
 MOST_LEFT_OUT = 0.2  # of a triad's poses
 SMALL = np.radians(20.0)  # a triad turned by less starts from the drawing
@@ -59,7 +60,8 @@ class TriadFit:
         False where a triad's reading in a pose was left out as an outlier.
     direction_covariance : (3 P, 3 P), scaled like the other; along a direction it says nothing
     recording : (P,) int, the recording of each pose
-    walk : m/s^2 per root of a second, sd of an offset's walk; 0 where none shows
+    walk : (A,) m/s^2 per root of a second, sd of an offset's walk; 0 where none shows
+    doubtful : (P,) factor of a pose's noise, more than 1 where no triad says what the others do
     fitted : what the poses of all recordings gave
     """
 
@@ -72,7 +74,8 @@ class TriadFit:
     used: np.ndarray
     direction_covariance: np.ndarray
     recording: np.ndarray
-    walk: float
+    walk: np.ndarray
+    doubtful: np.ndarray
     fitted: Fitted
 
     def beside_directions(self) -> np.ndarray:
@@ -91,7 +94,14 @@ class TriadFit:
         along = own.covariance[:, -len(score) :]
         values, spread = own.values + along @ score, along @ information @ along.T
         own = own._replace(values=values, covariance=own.covariance - spread)
-        return _result(own, self.used, self.recording, self.residual_ratio, self.walk)
+        return _result(
+            own, self.used, self.recording, self.residual_ratio, self.walk, self.doubtful
+        )
+
+    @property
+    def relied(self) -> np.ndarray:
+        """(P, A) bool: used, in a pose that fits the others."""
+        return self.used & (self.doubtful == 1)[:, None]
 
     def first(self) -> Self:
         """The same with the poses of the first recording only."""
@@ -100,13 +110,14 @@ class TriadFit:
         return replace(
             self, direction=self.direction[own], residual=self.residual[own], used=self.used[own],
             direction_covariance=self.direction_covariance[both], recording=self.recording[own],
+            doubtful=self.doubtful[own],
         )  # fmt: skip
 
     @property
     def residual_rms(self) -> np.ndarray:
-        """Root mean square over the poses used and axes, (A,) m/s^2."""
+        """Root mean square over the poses relied on and axes, (A,) m/s^2."""
         squares = np.mean(self.residual**2, axis=2)
-        return np.sqrt(np.sum(squares * self.used, axis=0) / self.used.sum(axis=0))
+        return np.sqrt(np.sum(squares * self.relied, axis=0) / self.relied.sum(axis=0))
 
     @property
     def residual_rms_all(self) -> np.ndarray:
@@ -143,7 +154,9 @@ def fit_triads(mean, sd, magnitude: float, labels=None, recording=None, time=Non
     A triad whose offset has jumped or drifts (sensors settling after power-on do) spoils the
     directions for all others. One reading of one triad in one pose is left out at a time, the
     one whose absence helps most, as long as that is more than OUTLIER squared times the usual;
-    never more than a fifth of a triad's. A triad may be turned by any angle against the first.
+    never more than a fifth of a triad's. A pose that stands out in all triads, as where the board
+    was not quite still, counts by as much less. A triad may be turned by any angle against the
+    first.
 
     Parameters
     ----------
@@ -178,10 +191,11 @@ def fit_triads(mean, sd, magnitude: float, labels=None, recording=None, time=Non
     given = _Poses(mean, magnitude, recording, turns, unit)
     noise = PoseNoise.of(sd, time, recording)
     found = _without_outliers(given, noise)
-    if found.residual_ratio > SEEN:
-        noise = noise.estimated(found.used, *given.linearised(found.fitted.values))
-        if noise.walk:
-            found = _without_outliers(given, noise)
+    own = _doubted(noise, found.doubtful)
+    if found.residual_ratio > SEEN or own.misfits(found.used, found.residual) > SEEN:
+        noise = own.estimated(found.used, *given.linearised(found.fitted.values))
+        if noise.walk.any():
+            found = _without_outliers(given, noise._replace(sd=np.asarray(sd)))
     return found
 
 
@@ -207,16 +221,44 @@ class _Poses(NamedTuple):
         return misfit, np.asarray(slopes), lengths.T @ lengths
 
 
-def _without_outliers(given: _Poses, noise: PoseNoise) -> TriadFit:
-    used = np.ones(given.mean.shape[:2], bool)
+def _without_outliers(given: _Poses, noise: PoseNoise, doubts: bool = True) -> TriadFit:
+    """``doubts``: of whole poses, too; none where more stand out than the others can tell."""
+    poses, triads = given.mean.shape[:2]
+    used, doubtful = np.ones((poses, triads), bool), np.ones(poses)
+    # nine unknowns are common to all triads
+    most = min(int(MOST_LEFT_OUT * poses), (poses - 9) // 4)
     while True:
-        found, gain = _fit(given, noise, used)
-        spare = (~used).sum(axis=0) < MOST_LEFT_OUT * len(given.mean)
-        candidates = np.where(used & spare, gain, 0.0)
-        worst = np.unravel_index(np.argmax(candidates), gain.shape)
-        if not candidates[worst] > OUTLIER**2 * np.median(gain[used]):
+        found, gain, whole = _fit(given, noise, used, doubtful)
+        out = used & (gain > OUTLIER**2 * np.median(gain[used]))
+        out[:, (~used).sum(axis=0) >= MOST_LEFT_OUT * poses] = False
+        worst = np.unravel_index(np.argmax(np.where(out, gain, 0.0)), gain.shape)
+        pose = _shared(out, worst, whole - gain.max(axis=1)) if doubts else -1
+        if pose >= 0 and doubtful[pose] == 1:
+            if (doubtful > 1).sum() >= most:
+                return _without_outliers(given, noise, doubts=False)
+            # all err alike, but count as if each erred by itself
+            doubtful[pose], used[pose] = max(np.sqrt(whole[pose]), OUTLIER), True
+        elif out.any():
+            used[worst] = False
+        else:
             return found
-        used[worst] = False
+
+
+def _shared(out, worst, beside) -> int:
+    """The pose that stands out in most triads, or -1.
+
+    ``out`` (P, A) whose readings do, the ``worst`` of them; ``beside`` (P,) what leaving out a pose
+    gains, beside the worst triad's.
+    """
+    triads = out.shape[1]
+    if out.any():
+        return int(worst[0]) if 2 * out[worst[0]].sum() > triads else -1
+    pose = int(np.argmax(beside))
+    return pose if beside[pose] > SHARED * max(np.median(beside), triads) else -1
+
+
+def _doubted(noise: PoseNoise, doubtful) -> PoseNoise:
+    return noise._replace(sd=noise.sd * doubtful[:, None, None])
 
 
 def _turns(mean, labels) -> np.ndarray:
@@ -238,14 +280,17 @@ _slopes = jax.jit(jax.jacfwd(_predicted), static_argnums=1)
 _length_slopes = jax.jit(jax.jacfwd(_lengths), static_argnums=1)
 
 
-def _fit(given: _Poses, noise: PoseNoise, used) -> tuple[TriadFit, np.ndarray]:
-    """Least squares over the readings ``used``; also what leaving each one out would gain.
+def _fit(
+    given: _Poses, noise: PoseNoise, used, doubtful
+) -> tuple[TriadFit, np.ndarray, np.ndarray]:
+    """Least squares over the readings ``used``; also what leaving each, or a pose, out would gain.
 
-    The gain (P, A) is how much the sum of squares would fall (by linear theory), so that a
+    The gain (P, A), (P,) is how much the sum of squares would fall (by linear theory), so that a
     reading which bends the fit to itself is seen for what it is.
     """
     poses, triads = used.shape
-    options, white = (triads, given.magnitude, given.recording), noise.whitening(used)
+    options = triads, given.magnitude, given.recording
+    white = _doubted(noise, doubtful).whitening(used)
 
     def residual(p):
         misfit = np.moveaxis(given.mean - np.asarray(_predict(p, *options)), 0, -1)
@@ -269,17 +314,18 @@ def _fit(given: _Poses, noise: PoseNoise, used) -> tuple[TriadFit, np.ndarray]:
             f" {rank} of {found.x.size} unknowns"
         )
     count = white.shape[0] * 3 * poses
-    gain = _gain(white, left[:count], found.fun[:count])
+    gain, whole = _gain(white, left[:count], found.fun[:count])
     freedom = 3 * int(used.sum()) + poses - found.x.size
     ratio = np.sqrt(2 * found.cost / freedom) if freedom > 0 else np.nan
     scale = max(ratio, 1.0) if freedom > 0 else 1.0
     spread = scale**2 * np.linalg.inv(scaled.T @ scaled) / np.outer(norm, norm)
     own = Fitted(found.x, spread, given.mean, given.magnitude)
-    return _result(own, used, given.recording, float(ratio), np.sqrt(noise.walk)), gain
+    walk = np.sqrt(noise.walk)
+    return _result(own, used, given.recording, float(ratio), walk, doubtful.copy()), gain, whole
 
 
-def _gain(white, left, misfit) -> np.ndarray:
-    """(P, A) what leaving out each triad's reading in each pose takes from the sum of squares.
+def _gain(white, left, misfit) -> tuple[np.ndarray, np.ndarray]:
+    """What leaving out a triad's reading in a pose (P, A), or a pose (P,), takes off the squares.
 
     ``white`` (A, 3, P, P), left singular vectors and misfit of white averages, row by row.
     """
@@ -289,10 +335,17 @@ def _gain(white, left, misfit) -> np.ndarray:
     weight = np.moveaxis(np.sum(white**2, axis=2), 2, 0)
     size = np.sqrt(np.where(weight > 0, weight, 1.0))
     rows, misfit = rows / size[..., None], misfit / size
-    free = np.eye(3) - np.einsum("pkin,pkjn->pkij", rows, rows)
-    # a reading that alone determines something cannot be spared: its inverse is kept finite
-    solved = np.linalg.solve(free + 1e-9 * np.eye(3), misfit[..., None])[..., 0]
-    return np.einsum("pki,pki->pk", misfit, solved)
+    poses = len(rows)
+    return _spared(rows, misfit), _spared(rows.reshape(poses, -1, rows.shape[-1]),
+                                          misfit.reshape(poses, -1))  # fmt: skip
+
+
+def _spared(rows, misfit) -> np.ndarray:
+    """(...) of misfits (..., m) with left singular vectors ``rows`` (..., m, n)."""
+    free = np.eye(misfit.shape[-1]) - rows @ np.swapaxes(rows, -1, -2)
+    # what alone determines something cannot be spared: its inverse is kept finite
+    solved = np.linalg.solve(free + 1e-9 * np.eye(free.shape[-1]), misfit[..., None])[..., 0]
+    return np.sum(misfit * solved, axis=-1)
 
 
 def _places(triads: int) -> np.ndarray:
@@ -304,7 +357,7 @@ def _places(triads: int) -> np.ndarray:
     )
 
 
-def _result(own: Fitted, used, recording, ratio: float, walk: float) -> TriadFit:
+def _result(own: Fitted, used, recording, ratio: float, walk, doubtful) -> TriadFit:
     poses, triads = used.shape
     matrices, offsets, directions = (np.asarray(x) for x in _unpack(own.values, triads, poses))
     place = _places(triads)
@@ -314,5 +367,5 @@ def _result(own: Fitted, used, recording, ratio: float, walk: float) -> TriadFit
     residual = own.mean - np.asarray(_predict(own.values, triads, own.magnitude, recording))
     return TriadFit(
         matrices, offsets[0], direction, residual, covariance, ratio, used,
-        own.covariance[-3 * poses :, -3 * poses :], recording, walk, own,
+        own.covariance[-3 * poses :, -3 * poses :], recording, walk, doubtful, own,
     )  # fmt: skip

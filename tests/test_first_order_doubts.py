@@ -1,0 +1,111 @@
+"""What first order is told wrongly by still poses: drift, filters, turns, motion, stamps."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from scipy.spatial.transform import Rotation
+
+from imuarray.errors import InputError
+from imuarray.firstorder.allan import averaged_sd, reading_sd
+from imuarray.firstorder.correct import calibrate_first_order
+from imuarray.firstorder.pose_noise import walked_mean
+from imuarray.firstorder.still import still_poses
+from imuarray.firstorder.triads import fit_triads
+from tests.test_first_order import GRAVITY, board, directions, triads
+
+WALKS = [[0.0, 1e-2, 0.0, 0.0], [2e-2] * 4]  # one triad's; strong beside the noise
+
+
+def averages(rng, poses, walks, sd=1e-3):
+    """Means (P, A, 3) and sds of poses each 12 s, before the offsets (A, 3) that they end at."""
+    matrix, offset = triads(len(walks), rng)
+    time, sds = -12.0 * np.arange(poses, 0, -1), np.full((poses, len(walks), 3), sd)
+    steps = np.sqrt(12.0) * rng.standard_normal((poses + 1, len(walks), 3))
+    path = (np.array(walks)[:, None] * steps).cumsum(axis=0)
+    mean = np.einsum("kij,pj->pki", matrix, GRAVITY * directions(poses, rng)) + offset
+    return mean + path[:-1] - path[-1] + sds * rng.standard_normal(sds.shape), sds, time, offset
+
+
+@pytest.mark.parametrize("walks", WALKS)
+def test_each_triad_walks_by_itself(walks):
+    """A walk that is one for all leaves the sds of the one that drifts too small."""
+    squares, found = [], []
+    for seed in range(25):
+        mean, sd, time, offset = averages(np.random.default_rng([31, seed]), 14, walks)
+        fit = fit_triads(mean, sd, GRAVITY, time=time)
+        squares.append(((fit.offset - offset) / fit.parts_sd()["offset"]) ** 2)
+        found.append(fit.walk)
+    assert np.sqrt(np.mean(squares, axis=(0, 2))).max() < 1.7
+    drifting = np.array(walks) > 0
+    assert np.median(found, axis=0)[drifting] == pytest.approx(np.array(walks)[drifting], rel=0.3)
+    assert (np.median(found, axis=0)[~drifting] < 1e-3).all()
+
+
+def test_a_gyroscope_that_drifts_alone_is_told_from_the_others():
+    rng, time, sd = (
+        np.random.default_rng(32),
+        -12.0 * np.arange(14, 0, -1),
+        np.full((14, 4, 3), 2e-5),
+    )
+    squares = []
+    for _ in range(40):
+        steps = np.sqrt(12.0) * rng.standard_normal((15, 4, 3)) * np.array([0, 3e-4, 0, 0])[:, None]
+        path = steps.cumsum(axis=0)
+        mean, spread, _ = walked_mean(
+            path[:-1] - path[-1] + sd * rng.standard_normal(sd.shape), sd, time
+        )
+        squares.append((mean / spread) ** 2)
+    each = np.sqrt(np.mean(squares, axis=(0, 2)))
+    assert 0.6 < each.min() and each.max() < 1.3
+
+
+def test_a_pose_that_fits_in_no_triad_counts_little():
+    """Where the board was pulled: 0.03 m/s^2 along gravity in all triads, 30 sds."""
+    mean, sd, time, offset = averages(np.random.default_rng(33), 16, [0.0] * 4)
+    mean[5] *= 1 + 0.03 / GRAVITY
+    fit = fit_triads(mean, sd, GRAVITY, time=time)
+    assert np.flatnonzero(fit.doubtful > 1).tolist() == [5]
+    assert not fit.relied[5].any() and np.delete(fit.relied, 5, axis=0).all()
+    off = (fit.offset - offset) / fit.parts_sd()["offset"]
+    assert np.sqrt(np.mean(off**2)) < 1.7 and fit.residual_ratio < 1.3
+
+
+def test_averages_of_filtered_noise_scatter_as_said():
+    """A low-pass filter of 12 Hz at 250 Hz."""
+    white = np.random.default_rng(34).standard_normal((40, 2000))
+    pieces = list(lfilter([0.26], [1, -0.74], white)[:, 500:, None])
+    means = np.std([piece.mean() for piece in pieces])
+    assert averaged_sd(pieces, 0.004) / np.sqrt(1500) == pytest.approx(means, rel=0.35)
+    assert averaged_sd(pieces, 0.004) == pytest.approx(1.0, rel=0.15)
+    assert reading_sd(pieces, 0.004) == pytest.approx(np.std(pieces), rel=0.05)
+
+
+def test_a_steady_turn_is_no_still_pose():
+    recording, poses = board(np.random.default_rng(35))[:2]
+    rate, turned = recording.angular_rate.copy(), still_poses(recording)[6]
+    begin, end = turned.start - 200, turned.stop + 200
+    rate[begin:end] += np.radians([0.0, 0.0, 20.0])
+    found = still_poses(replace(recording, angular_rate=rate))
+    assert len(found) == len(still_poses(recording)) - 1
+    assert not any(begin < pose.start < end for pose in found)
+
+
+def test_sensors_turned_over_do_not_hide_that_the_board_moves():
+    """Half of them by half a turn: the mean of all as declared showed only one axis in three."""
+    recording = board(np.random.default_rng(36))[0]
+    over = Rotation.from_euler("x", 180, degrees=True).as_matrix()
+    force, rate = recording.specific_force.copy(), recording.angular_rate.copy()
+    force[:, ::2], rate[:, ::2] = force[:, ::2] @ over, rate[:, ::2] @ over
+    found = still_poses(replace(recording, specific_force=force, angular_rate=rate))
+    assert found == still_poses(recording)
+
+
+def test_stamps_in_bursts_are_one_line():
+    recording = board(np.random.default_rng(37))[0]
+    time = recording.time.copy()
+    step = np.median(np.diff(time))
+    time -= 0.9 * step * (np.arange(len(time)) % 10)
+    with pytest.raises(InputError, match="found bursts: .* declare the sensors' rate"):
+        calibrate_first_order(replace(recording, time=time))
