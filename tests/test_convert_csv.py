@@ -191,6 +191,14 @@ def test_a_sensor_slower_than_the_log(tmp_path, time):
         read(tmp_path, rows, columns | {"incomplete_rows": "leave out"})
 
 
+def test_rows_without_a_stamp_are_left_out_and_rows_keep_their_numbers(tmp_path):
+    rows, columns = blank(table(8), ["t"], (3,)), layout() | {"incomplete_rows": "leave out"}
+    assert read(tmp_path, rows, columns).selected == "7 of 8 samples"
+    rows[6][HEADER.index("t")] = rows[5][HEADER.index("t")]
+    with pytest.raises(InputError, match="a time that increases, found .* in data row 6"):
+        read(tmp_path, rows, columns)
+
+
 @pytest.mark.parametrize("rule", ["keep", True, None, []])
 def test_what_may_be_done_with_incomplete_rows(tmp_path, rule):
     with pytest.raises(InputError, match="incomplete_rows: expected 'leave out', found"):

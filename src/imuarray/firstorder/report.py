@@ -86,12 +86,10 @@ def walk_lines(found: FirstOrder, recording: Recording) -> list[str]:
 def doubtful_lines(found: FirstOrder, recording: Recording) -> list[str]:
     """For a person: poses that fit the others in no triad."""
     begins = [recording.time[pose.start] for pose in found.poses]
-    poses = [f"the pose from {begins[p]:.4g} s" for p in np.flatnonzero(found.triads.doubtful > 1)]
+    poses = [f"{begins[p]:.4g} s" for p in np.flatnonzero(found.triads.doubtful > 1)]
     if not poses:
         return []
-    return [
-        f"not quite still, as no triad fits, and counted little: the poses from {', '.join(poses)}"
-    ]
+    return [f"poses that fit in no triad, as if not quite still, count little: {', '.join(poses)}"]
 
 
 def gyroscope_lines(maps: Gyroscopes | None, recording: Recording) -> list[str]:

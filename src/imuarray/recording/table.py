@@ -92,7 +92,9 @@ def _whole(table, layout, columns: str) -> tuple[pd.DataFrame, str]:
     rule = layout["incomplete_rows"]
     if rule != LEAVE_OUT:
         raise InputError(f"{columns}: incomplete_rows: expected '{LEAVE_OUT}', found {rule!r}")
-    whole = used(table, layout).notna().all(axis=1)
+    stamp = layout["time"].get("column") if isinstance(layout["time"], dict) else None
+    needed = [used(table, layout), table.loc[:, table.columns == str(stamp)]]
+    whole = pd.concat(needed, axis=1).notna().all(axis=1)
     if whole.all():
         return table, ""
     return table[whole], f"{whole.sum()} of {len(table)} samples"
@@ -176,7 +178,7 @@ def _time(table, section, where, layout_name) -> np.ndarray:
         i = back[0]
         raise InputError(
             f"{where}: column {section['column']!r}: expected a time that increases, found"
-            f" {values[i + 1]:.15g} after {values[i]:.15g} in data row {table.index[i] + 2}"
+            f" {values[i + 1]:.15g} after {values[i]:.15g} in data row {table.index[i + 1] + 1}"
             f" ({back.size} such steps)"
         )
     # from the first sample: microseconds since 1970 would cost the last digits
