@@ -72,6 +72,47 @@ def test_a_pose_that_fits_in_no_triad_counts_little():
     assert np.sqrt(np.mean(off**2)) < 1.7 and fit.residual_ratio < 1.3
 
 
+def test_few_triads_do_not_say_which_of_them_walks():
+    """Of two that walk alike one was found steady by chance: sds of offsets 10 times too small."""
+    squares = []
+    for seed in range(24):
+        mean, sd, time, offset = averages(np.random.default_rng([38, seed]), 12, [1e-2] * 2)
+        fit = fit_triads(mean, sd, GRAVITY, time=time)
+        squares.append(np.mean(((fit.offset - offset) / fit.parts_sd()["offset"]) ** 2))
+    assert np.sqrt(np.mean(squares)) < 1.9
+
+
+def test_a_triad_that_scatters_by_itself_has_the_wider_sds():
+    """One of eight, 20 times as much as its noise says; poses say so, too."""
+    squares, ratios = [], []
+    for seed in range(12):
+        rng = np.random.default_rng([39, seed])
+        mean, sd, time, offset = averages(rng, 14, [0.0] * 8)
+        mean[:, 3] += 0.02 * rng.standard_normal((14, 3))
+        fit = fit_triads(mean, sd, GRAVITY, time=time)
+        squares.append(((fit.offset - offset) / fit.parts_sd()["offset"]) ** 2)
+        ratios.append(fit.residual_ratio)
+    each = np.sqrt(np.mean(squares, axis=(0, 2)))
+    assert each[3] < 1.7 and 0.7 < np.median(each) < 1.4
+    assert np.median(ratios) > 3
+
+
+def test_a_jump_of_one_triad_leaves_the_pose_to_the_others():
+    for seed in range(4):
+        mean, sd, time, _ = averages(np.random.default_rng([40, seed]), 16, [0.0] * 8)
+        mean[4, 2] += [0.0, 0.1, 0.2]
+        fit = fit_triads(mean, sd, GRAVITY, time=time)
+        assert (fit.doubtful == 1).all() and np.argwhere(~fit.used).tolist() == [[4, 2]]
+
+
+@pytest.mark.parametrize("pulled", [2, 4])
+def test_poses_pulled_beyond_what_can_be_told_are_answered(pulled):
+    for seed in range(4):
+        mean, sd, time, _ = averages(np.random.default_rng([41, seed]), 16, [0.0] * 4)
+        mean[1 : 1 + pulled] *= 1 + 0.03 / GRAVITY
+        assert np.isfinite(fit_triads(mean, sd, GRAVITY, time=time).offset).all()
+
+
 def test_averages_of_filtered_noise_scatter_as_said():
     """A low-pass filter of 12 Hz at 250 Hz."""
     white = np.random.default_rng(34).standard_normal((40, 2000))

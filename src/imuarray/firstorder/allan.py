@@ -21,7 +21,7 @@ def allan_deviation(pieces, step: float) -> tuple[np.ndarray, np.ndarray]:
     """
     longest = max(len(piece) for piece in pieces)
     widths = 2 ** np.arange(int(np.log2(max(longest / 3, 1))) + 1)
-    widths = widths[2 * widths < longest]
+    widths = widths[2 * widths <= longest]
     sums = [_sums(piece) for piece in pieces]
     return widths * step, np.array([_deviation(sums, n) for n in widths])
 
@@ -57,8 +57,8 @@ def averaged_sd(pieces, step: float) -> np.ndarray:
 
     Behind a filter neighbours are alike: averages scatter more than one reading's sd says.
     """
-    longest = max(len(piece) for piece in pieces)
-    width = max(min(round(BLOCK / step), longest // 2), 1)
+    usual = int(np.median([len(piece) for piece in pieces]))
+    width = max(min(round(BLOCK / step), usual // 4), 1)
     return _deviation([_sums(piece) for piece in pieces], width) * np.sqrt(width)
 
 

@@ -19,6 +19,7 @@ from imuarray.walk import shared_walk
 SHOWN = 2.0  # nats that a walk must gain
 SEEN = 1.2  # times the noise; a walk is looked for beyond
 RANGE = 1e-4, 1e8  # of a walk in a second, as a share of an average's variance
+FREEDOM = 15.0  # of a triad's averages, from which its own walk and noise are asked
 STEPS, CLOSE = 60, 0.02  # of each triad's own walk, relative
 
 
@@ -26,22 +27,20 @@ class PoseNoise(NamedTuple):
     """Of the averages (P, A, 3) in P poses.
 
     ``sd`` (P, A, 3) of the readings' noise; ``walked`` (P, P) s, how long each two poses' offsets
-    have walked together; ``walk`` (A,), their variance in a second.
+    have walked together; ``walk`` (A,), their variance in a second; ``factor`` (A,) of the
+    readings' variance, with which what else scatters is as large.
     """
 
     sd: np.ndarray
     walked: np.ndarray
     walk: np.ndarray
+    factor: np.ndarray
 
     @classmethod
     def of(cls, sd, time, recording) -> PoseNoise:
         """``time`` (P,) s of each pose, after the instant of its recording's offset."""
         together = np.where(recording[:, None] == recording, shared_walk(time), 0.0)
-        return cls(sd, together, np.zeros(sd.shape[1]))
-
-    def grown(self, factors, walk) -> PoseNoise:
-        """With a factor (A,) of the readings' variances, and walks (A,)."""
-        return self._replace(sd=self.sd * np.sqrt(factors)[:, None], walk=walk)
+        return cls(sd, together, np.zeros(sd.shape[1]), np.ones(sd.shape[1]))
 
     def whitening(self, used) -> np.ndarray:
         """(A, 3, P, P) that makes averages white, zero for those not ``used`` (P, A) bool."""
@@ -52,7 +51,8 @@ class PoseNoise(NamedTuple):
         return np.where(both, np.linalg.inv(np.linalg.cholesky(spread)), 0.0)
 
     def _variances(self, mine) -> np.ndarray:
-        return np.where(mine, np.moveaxis(self.sd, 0, -1) ** 2, 1.0)
+        squares = self.factor[:, None, None] * np.moveaxis(self.sd, 0, -1) ** 2
+        return np.where(mine, squares, 1.0)
 
     def misfits(self, used, residual) -> float:
         """The largest of the triads' residuals (P, A, 3) in their noise, over the usual of all."""
@@ -71,19 +71,23 @@ class PoseNoise(NamedTuple):
         rows, one = _Rows.of(misfit, slopes, fixed), np.ones(len(self.walk))
         unit = np.median(self.sd) ** 2
 
-        def judged(factors, walk) -> _Judged:
-            return rows.judged(self.grown(factors, walk).whitening(used), used)
+        def judged(noise: PoseNoise) -> _Judged:
+            return rows.judged(noise.whitening(used), used)
 
         found = minimize_scalar(
-            lambda x: judged(one, unit * np.exp(x) * one).deviance, bounds=np.log(RANGE),
-            method="bounded", options={"xatol": 0.05},
+            lambda x: judged(self._replace(walk=unit * np.exp(x) * one)).deviance,
+            bounds=np.log(RANGE), method="bounded", options={"xatol": 0.05},
         )  # fmt: skip
-        common, own = unit * np.exp(found.x) * one, rows.own(self, used, unit)
-        asked = 0.0, 2 * SHOWN, 2 * (SHOWN + 2 * len(one) - 2)
-        each = [judged(*pair) for pair in ((one, 0.0 * one), (one, common), own)]
-        best = int(np.argmin([x.deviance + more for x, more in zip(each, asked, strict=True)]))
         # noise and walk that both grow: what of it is noise's, the fit's residual will show
-        return self._replace(walk=each[best].grown * (0.0 * one, common, own[1])[best])
+        common = self._replace(walk=unit * np.exp(found.x) * one)
+        ways = [(self, 0.0), (common, 2 * SHOWN)]
+        if len(one) > 2:  # of two, either may say that it is the other
+            own, freedom = rows.own(self, used, unit)
+            if freedom > FREEDOM:
+                ways.append((own, 2 * (SHOWN + 2 * len(one) - 2)))
+        best = min(ways, key=lambda way: judged(way[0]).deviance + way[1])[0]
+        grown = judged(best).grown
+        return best._replace(walk=best.walk * grown)
 
 
 class _Judged(NamedTuple):
@@ -143,32 +147,33 @@ class _Rows(NamedTuple):
         logs = lost - 2 * np.log(known[known > 0]).sum()
         return _Judged(float(free * np.log(grown) + square / grown + logs), grown)
 
-    def own(self, noise: PoseNoise, used, unit: float) -> tuple[np.ndarray, np.ndarray]:
-        """Each triad's own factor of its noise, at least 1, and walk; (A,) both.
+    def own(self, noise: PoseNoise, used, unit: float) -> tuple[PoseNoise, float]:
+        """With each triad's own walk and factor, at least 1; the fewest that judge a triad's.
 
         Minorise-maximise steps for variance components (Zhou, Hu, Zhou and Lange, J. Comput. Graph.
         Stat. 28, 2019): no step lowers the likelihood.
         """
-        factors, walk = np.ones(len(self.columns)), np.full(len(self.columns), unit)
-        variances = _diagonal(np.moveaxis(noise.sd, 0, -1) ** 2)
+        parts = _diagonal(np.moveaxis(noise.sd, 0, -1) ** 2), noise.walked
+        noise = noise._replace(walk=np.full(len(self.columns), unit))
         for _ in range(STEPS):
-            white = noise.grown(factors, walk).whitening(used)
+            white = noise.whitening(used)
             left, rows, inner, _, step = self.solved(white)
             inverse = np.zeros(np.add(inner.shape, 1))
             inverse[:-1, :-1] = scaled_inverse(inner)
             rest = left - np.einsum("kipm,km->kip", rows, np.append(step, 0.0)[self.columns])
             given = inverse[self.columns[:, :, None], self.columns[:, None]]
             change = []
-            for part in (variances, noise.walked):
+            for part in parts:
                 own = white @ part @ np.swapaxes(white, -1, -2)
                 square = np.einsum("kip,kipq,kiq->k", rest, own, rest)
                 known = np.einsum("kmn,kinm->k", given, np.swapaxes(rows, -1, -2) @ own @ rows)
                 change.append(np.sqrt(square / (np.einsum("kipp->k", own) - known)))
-            before, walk = walk, np.maximum(walk * change[1], unit * RANGE[0])
-            factors = np.maximum(factors * change[0], 1.0)
+            before, walk = noise.walk, np.maximum(noise.walk * change[1], unit * RANGE[0])
+            noise = noise._replace(walk=walk, factor=np.maximum(noise.factor * change[0], 1.0))
             if np.abs(np.log(walk / before)).max() < CLOSE:
                 break
-        return factors, walk
+        taken = np.einsum("kmn,kinm->k", given, np.swapaxes(rows, -1, -2) @ rows)
+        return noise, float(np.min(3 * used.sum(axis=0) - taken))
 
 
 def _diagonal(values) -> np.ndarray:

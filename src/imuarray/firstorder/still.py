@@ -16,6 +16,7 @@ FLOOR = 0.02  # quantile of the windows' spreads taken as the noise floor
 # A floor this many times the declared noise is motion, not noise: nothing was still.
 MOVING = 10.0
 BRIDGED = 0.1  # s; a pose goes on over so short a gap, and where stamps are late
+MISSED = 3.5  # steps; and where so many are missing
 STEP_TIME = 0.25  # s, before and after an instant, whose means are compared
 STEP = 0.3  # m/s^2 between them: another pose, with nothing recorded on the way
 TURNING = np.radians(2.0)  # rad/s of all gyroscopes: a steady turn, as offsets do not go together
@@ -70,15 +71,19 @@ def still_poses(recording: Recording, window=WINDOW, shortest=SHORTEST) -> list[
     else:
         still, half = _quiet(recording, width), width // 2
     # a long gap ends a pose: what happened meanwhile is not known
-    breaks = np.flatnonzero(np.diff(recording.time) > max(1.5 * step, BRIDGED)) + 1
+    breaks = np.flatnonzero(np.diff(recording.time) > max(MISSED * step, BRIDGED)) + 1
     still[breaks] = False
-    found, least = runs(still), int(round(shortest / step)) - 2 * half
+    found, least = runs(still), shortest - (2 * half + 0.5) * step
+    lasts = [recording.time[b - 1] - recording.time[a] + step for a, b in found]
     poses = [
-        _cut(a, b, half, int(round(KEPT / step))) for a, b in found if b - a >= max(least, 2)
+        _cut(a, b, half, int(round(KEPT / step)))
+        for (a, b), length in zip(found, lasts, strict=True)
+        if b - a >= 2 and length > least
     ]  # fmt: skip
-    poses = _not_turning(recording, poses)
+    if recording.stationary is None:
+        poses = _not_turning(recording, poses)
     if not poses:
-        longest = max((b - a + 2 * half for a, b in found), default=0) * step
+        longest = max(lasts, default=0.0) + 2 * half * step * bool(lasts)
         raise InputError(
             f"recording: expected still poses of at least {shortest:g} s for the first-order"
             f" calibration, found none; the longest lasts {longest:.2g} s"
@@ -103,14 +108,19 @@ def _step(time) -> float:
 
 
 def _not_turning(recording: Recording, poses: list[slice]) -> list[slice]:
-    """The poses in which not all gyroscopes read another rate than in most, a steady turn's."""
-    if len(poses) < 3:
+    """The poses in which not all gyroscopes read another rate than in most, a steady turn's.
+
+    One or two gyroscopes may both warm up as much.
+    """
+    if len(poses) < 3 or recording.angular_rate.shape[1] < 3:
         return poses
     levels = np.array([recording.angular_rate[pose].mean(axis=0) for pose in poses])
     off = np.linalg.norm(levels - np.median(levels, axis=0), axis=2)
     usual = np.median(off, axis=1)
     apart = np.median(np.abs(off - usual[:, None]), axis=1)
     turning = (usual > TURNING) & (apart < TOGETHER * usual)
+    if 3 * turning.sum() > len(poses):
+        return poses
     return [pose for pose, turns in zip(poses, turning, strict=True) if not turns]
 
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.firstorder.parts import parts_sd_of
@@ -26,6 +25,8 @@ OUTLIER = 5.0  # times the median size of a residual
 SHARED = 5.0  # times the median of what leaving out a pose gains, the worst of its triads apart
 MOST_OFF = 0.5  # relative, of a pose's mean specific force from gravity
 MOST_LEFT_OUT = 0.2  # of a triad's poses
+NEARLY = 0.5  # of the largest gain: as many triads leave out a reading at once
+MOST_STEPS, HALVED, CLOSE = 100, 12, 1e-8  # of Gauss-Newton; steps in sds
 SMALL = np.radians(20.0)  # a triad turned by less starts from the drawing
 
 
@@ -195,7 +196,9 @@ def fit_triads(mean, sd, magnitude: float, labels=None, recording=None, time=Non
     if found.residual_ratio > SEEN or own.misfits(found.used, found.residual) > SEEN:
         noise = own.estimated(found.used, *given.linearised(found.fitted.values))
         if noise.walk.any():
-            found = _without_outliers(given, noise._replace(sd=np.asarray(sd)))
+            noise = noise._replace(sd=np.asarray(sd))
+            found = _without_outliers(given, noise)
+            found = replace(found, residual_ratio=_ratio(given, noise, found))
     return found
 
 
@@ -221,40 +224,54 @@ class _Poses(NamedTuple):
         return misfit, np.asarray(slopes), lengths.T @ lengths
 
 
+def _ratio(given: _Poses, noise: PoseNoise, found: TriadFit) -> float:
+    """Residual over the readings' noise and the walk, without what else a triad scatters by."""
+    plain = _doubted(noise._replace(factor=np.ones_like(noise.factor)), found.doubtful)
+    misfit = np.moveaxis(found.residual, 0, -1)[..., None]
+    freedom = 3 * int(found.used.sum()) + len(found.used) - len(found.fitted.values)
+    square = np.sum((plain.whitening(found.used) @ misfit) ** 2)
+    return float(np.sqrt(square / freedom)) if freedom > 0 else np.nan
+
+
 def _without_outliers(given: _Poses, noise: PoseNoise, doubts: bool = True) -> TriadFit:
     """``doubts``: of whole poses, too; none where more stand out than the others can tell."""
     poses, triads = given.mean.shape[:2]
     used, doubtful = np.ones((poses, triads), bool), np.ones(poses)
     # nine unknowns are common to all triads
-    most = min(int(MOST_LEFT_OUT * poses), (poses - 9) // 4)
+    most, start = min(int(MOST_LEFT_OUT * poses), (poses - 9) // 3), given.start()
     while True:
-        found, gain, whole = _fit(given, noise, used, doubtful)
+        found, gain, whole = _fit(given, noise, used, doubtful, start)
+        start = found.fitted.values
         out = used & (gain > OUTLIER**2 * np.median(gain[used]))
         out[:, (~used).sum(axis=0) >= MOST_LEFT_OUT * poses] = False
-        worst = np.unravel_index(np.argmax(np.where(out, gain, 0.0)), gain.shape)
-        pose = _shared(out, worst, whole - gain.max(axis=1)) if doubts else -1
+        out[used.sum(axis=1) <= 1] = False
+        beside, gain = whole - gain.max(axis=1), np.where(out, gain, 0.0)
+        worst = int(np.argmax(gain.max(axis=1)))
+        pose = _shared(out, worst, beside) if doubts and triads > 1 else -1
         if pose >= 0 and doubtful[pose] == 1:
             if (doubtful > 1).sum() >= most:
                 return _without_outliers(given, noise, doubts=False)
             # all err alike, but count as if each erred by itself
             doubtful[pose], used[pose] = max(np.sqrt(whole[pose]), OUTLIER), True
-        elif out.any():
-            used[worst] = False
+        elif out.any():  # the worst of each triad, one in a pose, if nearly as bad as that of all
+            own = gain.max(axis=0)
+            bad = np.argsort(-own)[: np.sum(own > NEARLY * own.max())]
+            place, first = np.unique(gain[:, bad].argmax(axis=0), return_index=True)
+            used[place, bad[first]] = False
         else:
             return found
 
 
-def _shared(out, worst, beside) -> int:
+def _shared(out, worst: int, beside) -> int:
     """The pose that stands out in most triads, or -1.
 
-    ``out`` (P, A) whose readings do, the ``worst`` of them; ``beside`` (P,) what leaving out a pose
-    gains, beside the worst triad's.
+    ``out`` (P, A) whose readings do, in the pose ``worst`` most; ``beside`` (P,) what leaving out a
+    pose gains, beside the worst triad's.
     """
-    triads = out.shape[1]
-    if out.any():
-        return int(worst[0]) if 2 * out[worst[0]].sum() > triads else -1
-    pose = int(np.argmax(beside))
-    return pose if beside[pose] > SHARED * max(np.median(beside), triads) else -1
+    if out.any() and 2 * out[worst].sum() <= out.shape[1]:
+        return -1
+    pose = worst if out.any() else int(np.argmax(beside))
+    return pose if beside[pose] > SHARED * max(np.median(beside), out.shape[1]) else -1
 
 
 def _doubted(noise: PoseNoise, doubtful) -> PoseNoise:
@@ -281,7 +298,7 @@ _length_slopes = jax.jit(jax.jacfwd(_lengths), static_argnums=1)
 
 
 def _fit(
-    given: _Poses, noise: PoseNoise, used, doubtful
+    given: _Poses, noise: PoseNoise, used, doubtful, start
 ) -> tuple[TriadFit, np.ndarray, np.ndarray]:
     """Least squares over the readings ``used``; also what leaving each, or a pose, out would gain.
 
@@ -300,28 +317,47 @@ def _fit(
         own = np.moveaxis(np.asarray(_slopes(p, *options)), 0, -2)
         return np.concatenate([-(white @ own).reshape(-1, len(p)), _length_slopes(p, poses)])
 
-    found = least_squares(
-        residual, given.start(), jac=slopes,
-        x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-12, max_nfev=200,
-    )  # fmt: skip
-    norm = np.linalg.norm(found.jac, axis=0)
-    scaled = found.jac / np.where(norm > 0, norm, 1.0)
-    left, values, _ = np.linalg.svd(scaled, full_matrices=False)
-    rank = int(np.sum(values > 1e-7 * values[0]))
-    if rank < found.x.size:
-        raise IdentifiabilityError(
-            f"still poses: expected about twelve or more directions, found {poses}, which determine"
-            f" {rank} of {found.x.size} unknowns"
-        )
+    values, left, right = _solved(residual, slopes, start, poses)
+    rest, inverse = residual(values), np.linalg.inv(right)
     count = white.shape[0] * 3 * poses
-    gain, whole = _gain(white, left[:count], found.fun[:count])
-    freedom = 3 * int(used.sum()) + poses - found.x.size
-    ratio = np.sqrt(2 * found.cost / freedom) if freedom > 0 else np.nan
+    gain, whole = _gain(white, left[:count], rest[:count])
+    freedom = 3 * int(used.sum()) + poses - values.size
+    ratio = np.sqrt(rest @ rest / freedom) if freedom > 0 else np.nan
     scale = max(ratio, 1.0) if freedom > 0 else 1.0
-    spread = scale**2 * np.linalg.inv(scaled.T @ scaled) / np.outer(norm, norm)
-    own = Fitted(found.x, spread, given.mean, given.magnitude)
+    own = Fitted(values, scale**2 * inverse @ inverse.T, given.mean, given.magnitude)
     walk = np.sqrt(noise.walk)
     return _result(own, used, given.recording, float(ratio), walk, doubtful.copy()), gain, whole
+
+
+def _solved(residual, slopes, start, poses: int):
+    """Gauss-Newton: values (n,), and Q (m, n), R (n, n) of the slopes there.
+
+    IdentifiabilityError where they do not determine all values.
+    """
+    values, rest = start, residual(start)
+    for _ in range(MOST_STEPS):
+        rows = slopes(values)
+        norm = np.linalg.norm(rows, axis=0)
+        left, right = np.linalg.qr(rows / np.where(norm > 0, norm, 1.0))
+        sizes = np.linalg.svd(right, compute_uv=False)
+        rank = int(np.sum(sizes > 1e-7 * sizes[0]))
+        if rank < values.size:
+            raise IdentifiabilityError(
+                f"still poses: expected about twelve or more directions, found {poses}, which"
+                f" determine {rank} of {values.size} unknowns"
+            )
+        whole = -np.linalg.solve(right, left.T @ rest)
+        for share in 0.5 ** np.arange(HALVED):
+            moved = values + share * whole / norm
+            after = residual(moved)
+            if after @ after <= rest @ rest:
+                values, rest = moved, after
+                break
+        else:
+            break
+        if np.abs(whole).max() < CLOSE:
+            break
+    return values, left, right * norm
 
 
 def _gain(white, left, misfit) -> tuple[np.ndarray, np.ndarray]:
