@@ -25,7 +25,8 @@ def of_first_order(found: FirstOrder) -> Poses:
     """From the answer."""
     common = None if found.gyroscopes is None else found.gyroscopes.common
     scale = np.nan if common is None or isinstance(common, str) else common.scale
-    return Poses(found.triads.residual_ratio, float(found.triads.residual_rms.max()), scale)
+    fit = found.triads
+    return Poses(fit.residual_ratio, _worst(fit.residual, fit.relied), scale)
 
 
 def of_file(path) -> Poses:
@@ -35,10 +36,16 @@ def of_file(path) -> Poses:
             return Poses()
         stored = file[FIRST_ORDER]
         ratio = float(np.ravel(stored.attrs.get("residual_ratio", 1.0))[0])
-        squares = np.where(stored["used"][:][..., None] != 0, stored["residual"][:] ** 2, np.nan)
+        residual = _worst(stored["residual"][:], stored["used"][:] != 0)
         common = stored["gyroscope_common"][:] if "gyroscope_common" in stored else [[np.nan]]
         scale = np.trace(common) / 3
-    return Poses(ratio, float(np.sqrt(np.nanmax(np.nanmean(squares, axis=(0, 2))))), float(scale))
+    return Poses(ratio, residual, float(scale))
+
+
+def _worst(residual, used) -> float:
+    """Rms of the worst triad, of residuals (P, A, 3) where they are ``used`` (P, A)."""
+    squares = np.where(used[..., None], residual**2, np.nan)
+    return float(np.sqrt(np.nanmax(np.nanmean(np.ascontiguousarray(squares), axis=(0, 2)))))
 
 
 def reasons_of_poses(*several: Poses) -> list[str]:
