@@ -1,5 +1,6 @@
 """Are the uncertainties right? `snakemake validate`, small, and proof that it can fail."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -7,6 +8,8 @@ import pandas as pd
 import pytest
 
 import imuarray
+from imuarray.analysis.fitting import fitted
+from imuarray.analysis.model import silent
 from imuarray.config import read_config
 from imuarray.estimation.newton import fisher_scoring
 from imuarray.figures import validation
@@ -168,3 +171,21 @@ def test_histogram_of_uniform_pit_values_is_flat():
     figure, same = validation.figure_validation_ranks([values], settings)
     pd.testing.assert_frame_equal(same, table)
     assert [axes.get_title() for axes in figure.axes] == ["x: s, T = 5, n = 400"]
+
+
+def test_few_readings_that_lie_far_apart_are_not_taken_for_coarse_ones():
+    """Fifty rates of 1000 deg/s lie 4 deg/s apart at least: the noise came out 20 times too large,
+    and the posterior of gyroscopes' scales took NUTS a minute."""
+    made = setting("extended", 50, 6)
+    recording = by_default.drawn(made, 2)[1]
+    found = fitted([recording], "sensors", made.model.effects, silent)[0]
+    sd = np.sqrt(made.model.noise.gyroscope[0, 0])
+    np.testing.assert_allclose(found.noise_sd()[:, 1], sd, rtol=0.3)
+
+
+def test_readings_in_steps_are_noise_of_a_step_at_least():
+    made = setting("extended", 50, 6)
+    recording = by_default.drawn(made, 2)[1]
+    recording = replace(recording, angular_rate=np.round(recording.angular_rate / 0.5) * 0.5)
+    found = fitted([recording], "sensors", made.model.effects, silent)[0]
+    assert (found.noise_sd()[:, 1] >= 0.99 * 0.5 / np.sqrt(12)).all()
