@@ -97,6 +97,27 @@ def test_a_file_rests_on_all_that_made_what_it_was_made_from(published, sources,
     assert again == row | {"commit": "0"}
 
 
+def test_a_file_made_of_published_ones_rests_on_what_they_state(
+    published, sources, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    made = {
+        "paper_figures/findings.pdf": published.Made(
+            "claims", ["paper_figures/blind.csv", "page.typ"], False
+        ),
+        "paper_figures/blind.csv": published.Made("copy", ["results/blind.csv"], True),
+        "results/blind.csv": published.Made("rate_error", ["-"], True),
+    }
+    stated = {"file": "blind.csv", "scripts": "rate_error tune", "scale": "default"}
+    given = made, {"claims": "claims", "rate_error": "rate_error"}, sources
+    Path("paper_figures").mkdir()
+    Path("paper_figures/findings.pdf").touch()
+    row = published.entry("paper_figures/findings.pdf", *given, [stated])
+    assert (row["scripts"], row["scale"]) == ("claims rate_error tune", "default")
+    with pytest.raises(InputError, match="found paper_figures/blind.csv to be made again"):
+        published.entry("paper_figures/findings.pdf", *given)
+
+
 def test_files_of_a_clone_are_made_anew_once(published, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for folder in ("results", "paper_figures"):

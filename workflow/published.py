@@ -48,12 +48,13 @@ def ancestry(summary: str) -> dict[str, Made]:
     }
 
 
-def origin(file: str, made: Mapping[str, Made]) -> set[str]:
-    """A file and all that it was made from, however far back, of what rules have made."""
+def origin(file: str, made: Mapping[str, Made], known: Iterable[str] = ()) -> set[str]:
+    """A file and all that it was made from, of what rules have made, back to what is ``known``."""
     found, ahead = set(), {file}
     while ahead:
         found |= ahead
-        ahead = {name for one in ahead for name in made[one].inputs if name in made} - found
+        further = {name for one in ahead - set(known) for name in made[one].inputs}
+        ahead = {name for name in further if name in made} - found
     return found
 
 
@@ -73,24 +74,32 @@ def scripts() -> dict[str, str]:
 
 
 def entry(
-    file: str, made: Mapping[str, Made], by_rule: Mapping[str, str], sources: Sources
-) -> dict:
+    file: str, made: Mapping[str, Made], by_rule: Mapping[str, str], sources: Sources,
+    stated: Iterable[Mapping] = (),
+) -> dict:  # fmt: skip
     """A file's row, but for the commit; ``by_rule`` as from `scripts`.
+
+    Published files that it is made from, and whose rows are ``stated``, need not be made again.
 
     Raises InputError where the tree's code would make something else of what it rests on, and where
     no rule made it in this folder.
     """
     if made[file].inputs == ["-"]:
         raise InputError(f"{file}: expected a file that a rule has made here, found one of a clone")
-    back = origin(file, made)
-    if outdated := sorted(name for name in back if made[name].outdated):
+    known = {name: row for row in stated if (name := f"paper_figures/{row['file']}") != file}
+    back = origin(file, made, known)
+    own, taken = back - set(known), [known[name] for name in back & set(known)]
+    if outdated := sorted(name for name in own if made[name].outdated):
         raise InputError(f"{file}: expected it up to date, found {outdated[0]} to be made again")
-    names = sorted({by_rule[made[name].rule] for name in back if made[name].rule in by_rule})
+    used = {by_rule[made[name].rule] for name in own if made[name].rule in by_rule}
+    names = sorted(used.union(*(row["scripts"].split() for row in taken)))
+    scales = {part for name in own for part in name.split("/")}
+    scales = scales.union(*(row["scale"].split() for row in taken))
     return {
         "file": Path(file).name,
         "current": "yes",
         "command": f"snakemake --cores 2 -- {file}",
-        "scale": " ".join(sorted(SCALES & {part for name in back for part in name.split("/")})),
+        "scale": " ".join(sorted(SCALES & scales)),
         "sha256": hashlib.sha256(Path(file).read_bytes()).hexdigest(),
         "code": sources.digest(*names),
         "scripts": " ".join(names),
@@ -155,13 +164,23 @@ def mark() -> None:
     write(rows, ROOT / MANIFEST)
 
 
+def _sum(manifest: Path, name: str) -> str:
+    return hashlib.sha256(manifest.with_name(name).read_bytes()).hexdigest()
+
+
 def state(files: Iterable[str], made_at: str, made: Mapping) -> None:
     """Write the rows of ``files``; those of other files that are there stay."""
     path, sources, by_rule = Path(MANIFEST), Sources(), scripts()
     rows = read(path.read_text(encoding="utf-8")) if path.exists() else []
     found = {row["file"]: row for row in rows if path.with_name(row["file"]).exists()}
+    old = {*changed(found.values(), sources), *(Path(file).name for file in files)}
+    stated = [
+        row for name, row in found.items()
+        if name not in old and row["current"] == "yes" and row["sha256"] == _sum(path, name)
+    ]  # fmt: skip
     found |= {
-        Path(file).name: entry(file, made, by_rule, sources) | {"commit": made_at} for file in files
+        Path(file).name: entry(file, made, by_rule, sources, stated) | {"commit": made_at}
+        for file in files
     }
     write(found.values(), path)
 
