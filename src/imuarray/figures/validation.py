@@ -10,6 +10,7 @@ from imuarray.figures.tables import Column
 from imuarray.studies.sbc import WHOLE, coverage
 
 BINS = 20
+ACROSS = 4  # panels in a line
 
 COVERAGE = (
     Column("setting", "setting", "setting"),
@@ -102,7 +103,7 @@ def histogram(values: pd.DataFrame) -> pd.DataFrame:
 
 @styled
 def figure_validation_ranks(pit_values: list[pd.DataFrame], settings: dict):
-    """A histogram for each method (row) and T (column); band: all 20 bins of a panel, 95 %.
+    """A histogram for each setting, T and method; band: all 20 bins of a panel, 95 %.
 
     ``pit_values``: `studies.sbc`, of each setting.
     """
@@ -111,24 +112,22 @@ def figure_validation_ranks(pit_values: list[pd.DataFrame], settings: dict):
         scale_line(settings, "n: truths from the prior, those without intervals left out"),
         "Histograms of all positions' coordinates; band: 95 % for all bins of a panel together.",
     ]
-    methods = list(dict.fromkeys(table.method))
-    settings = list(dict.fromkeys(zip(table.setting, table.samples, strict=True)))
-    figure = new_figure(footer, PAGE, 0.3 + 1.35 * len(methods))
-    panels = figure.subplots(len(methods), len(settings), sharex=True, sharey=True, squeeze=False)
-    for method, line in zip(methods, panels, strict=True):
-        for (setting, samples), axes in zip(settings, line, strict=True):
-            rows = table[
-                (table.method == method) & (table.setting == setting) & (table.samples == samples)
-            ]
-            width = stats.norm.isf(0.025 / BINS) * rows.se.mean()
-            axes.axhspan(1 - width, 1 + width, color=SKY, alpha=0.4, linewidth=0)
-            axes.axhline(1.0, color=BLACK, linewidth=0.6)
-            axes.stairs(rows.density, [*rows.low, 1.0], color=look(2)["color"], linewidth=1.2)
-            count = rows.replicates.max()
-            axes.set_title(f"{method}: {setting}, T = {samples}, n = {count}", size=7)
-    for axes in panels[-1]:
-        axes.set_xlabel("share of the posterior below the truth")
+    groups = list(table.groupby(["setting", "samples", "method"], sort=False))
+    lines = -(-len(groups) // ACROSS)
+    figure = new_figure(footer, PAGE, 0.5 + 1.35 * lines)
+    panels = figure.subplots(lines, ACROSS, sharex=True, sharey=True, squeeze=False)
+    for ((setting, samples, method), rows), axes in zip(groups, panels.flat, strict=False):
+        width = stats.norm.isf(0.025 / BINS) * rows.se.mean()
+        axes.axhspan(1 - width, 1 + width, color=SKY, alpha=0.4, linewidth=0)
+        axes.axhline(1.0, color=BLACK, linewidth=0.6)
+        axes.stairs(rows.density, [*rows.low, 1.0], color=look(2)["color"], linewidth=1.2)
+        count = rows.replicates.max()
+        axes.set_title(f"{setting}, T = {samples}\n{method}, n = {count}", size=7)
+    for axes in panels.flat[len(groups) :]:
+        axes.set_visible(False)
     for axes in panels[:, 0]:
         axes.set_ylabel("density")
+    for axes in panels[-1]:
+        axes.set_xlabel("posterior below the truth")
     panels[0, 0].set(xlim=(0, 1), ylim=(0, None))
     return figure, table
