@@ -277,6 +277,13 @@ def test_an_effect_struck_from_the_catalogue_leaves_something_unexplained():
     assert document["unexplained"] or not document["causes"]
 
 
+def test_a_bias_is_found_without_those_that_it_is_told_from():
+    recording, _ = make(injected(("accelerometer_bias", (4,))), SEED)
+    without = ("warm_up", "gyroscope_bias")
+    document = diagnose(recording, SEED, without, replicates=REPLICATES).document
+    assert named(document) == {"accelerometer_bias"}
+
+
 @pytest.mark.parametrize(
     ("effect", "size", "sign"),
     [

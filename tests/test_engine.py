@@ -160,6 +160,45 @@ def test_what_a_correction_left_widens_by_as_much_as_it_moves(kinds, again):
     np.testing.assert_allclose(added, 0.05 * size, atol=0.15 * 0.05 * size.max())
 
 
+def jointly(*recordings):
+    readings = [arrange(one, sparse=True) for one in recordings]
+    columns = columns_of(readings[0].array, (), readings[0].position_prior_sd)
+    begun = [Recorded.of(one, columns) for one in readings]
+    return estimate(begun, columns, mask_of(columns, [POSITION]), robust=False)
+
+
+def test_recordings_that_one_calibration_corrected_err_alike():
+    """As much as one of them does; those of two calibrations in part cancel."""
+    recording, _ = simulated(2.0, bandwidth=2.0)
+    one, other = (
+        arrange(replace(recording, map_covariance=k * 5e-10 * np.eye(72)), sparse=True).left
+        for k in (1.0, 1.001)
+    )
+
+    def added(*lefts):
+        bare = jointly(*[recording] * len(lefts))
+        recorded = tuple(
+            replace(each, readings=replace(each.readings, left=left))
+            for each, left in zip(bare.recorded, lefts, strict=True)
+        )
+        return widths(settled(replace(bare, recorded=recorded)))[1] ** 2 - widths(bare)[1] ** 2
+
+    alone = added(one)
+    for share, lefts in ((1.0, (one, one)), (0.5, (one, other)), (0.25, (one, None))):
+        np.testing.assert_allclose(added(*lefts), share * alone, rtol=0.05, err_msg=str(share))
+
+
+def test_maps_that_are_off_are_no_scatter_between_blocks():
+    recording, _ = simulated(4.0, bandwidth=2.0)
+    rng, sd = np.random.default_rng(4), 5e-3
+    change = sd * rng.standard_normal((4, 3, 3))
+    moved = recording.specific_force + np.einsum("kij,tkj->tki", change, recording.specific_force)
+    spread = np.diag(np.repeat([sd**2, 1e-14], 36))
+    found = settled(jointly(replace(recording, specific_force=moved, map_covariance=spread)))
+    _, formal, jackknife = widths(found)
+    assert np.median(jackknife / formal) < 1.3
+
+
 def test_the_rates_change_says_more_than_the_accelerometers_of_turning():
     """Slower twisting, as the window of a derivative has to be short beside it."""
     ratios, z = [], []

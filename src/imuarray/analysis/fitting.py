@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 
 import numpy as np
 
@@ -12,8 +11,6 @@ from imuarray.engine.ladder import Rung, climb, rungs_of, with_effects
 from imuarray.engine.readings import Readings, arrange, determined, most_informative
 from imuarray.errors import InputError, one_line
 from imuarray.recording import Recording
-
-OFF_STEP, SELDOM = 0.01, 0.05  # of a step; share of gaps that are so far from a multiple of it
 
 
 def fitted(
@@ -67,8 +64,7 @@ def fitted_beyond(
 
 def _arranged(recordings, say: Say) -> list[Readings]:
     arranged = [arrange(one, sparse=True) for one in recordings]
-    whole = [_without_chance_steps(one.select(determined(one, 1))) for one in arranged]
-    found = [most_informative(one, say) for one in whole]
+    found = [most_informative(one.select(determined(one, 1)), say) for one in arranged]
     for recording, one in zip(recordings, found, strict=True):
         if not len(one.time):
             rate = 1 / np.median(np.diff(recording.time)) if len(recording.time) > 1 else 0.0
@@ -77,20 +73,6 @@ def _arranged(recordings, say: Say) -> list[Readings]:
                 " samples a second; is the unit of time right?"
             )
     return found
-
-
-def _without_chance_steps(readings: Readings) -> Readings:
-    """Without steps that sensors seem to read in, where readings are no multiples of them.
-
-    Few readings lie far apart by chance, and the noise was taken to be that at least.
-    """
-    steps = readings.resolution
-    if steps is None or not len(readings.time):
-        return readings
-    gaps = np.diff(np.sort(readings.values[..., ::3], axis=0), axis=0)
-    counts = gaps / np.where(steps > 0, steps, 1.0)
-    odd = np.mean(np.abs(counts - np.round(counts)) > OFF_STEP, axis=0)
-    return replace(readings, resolution=np.where(odd > SELDOM, 0.0, steps))
 
 
 def _tell(rungs: Sequence[Rung], say: Say) -> None:

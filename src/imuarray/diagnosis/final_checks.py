@@ -34,7 +34,7 @@ def beside_left(search: Search) -> tuple[Fit, Information]:
     """
     made, given, columns = search.fit, search.given, search.columns
     left = search.readings.left
-    maps = mask_of_left(left, columns, made.active)
+    maps = mask_of_left([left], columns, made.active)
     if not maps.any():
         return made, given
     spread = spread_of(left, columns, maps)

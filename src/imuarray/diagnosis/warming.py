@@ -47,8 +47,11 @@ class Courses:
         self.moved = values @ self.cross.sum(axis=0)
         self.time = np.array([fit.readings.time[block].mean() for block in blocks])
         self.span = fit.readings.span
-        own = fit.columns.prior_sd[fit.columns.of(WARM_UP)[: len(columns)]]
-        self.ridge = np.diag(np.tile(own**-2.0, len(imus)))
+        # the catalogue's: a diagnosis without the effect asks, too, whether biases grew
+        sds = np.reshape(EFFECTS[WARM_UP].prior_sd[:6], (2, 3))
+        own = [k for k, kind in enumerate(KINDS) for _ in fit.columns.of(f"{kind}_bias")]
+        self.ridge = np.diag(np.tile(sds[own, np.arange(len(own)) % 3] ** -2.0, len(imus)))
+        self.kind = np.tile(own, len(imus))
         active = given.places(beside)
         inner = given.information[np.ix_(active, active)] + given.precision[np.ix_(active, active)]
         self.outside = scaled_inverse(inner)
@@ -101,7 +104,7 @@ def scan_warming(fit: Fit, given: Information, imus, _=None) -> list[Scanned]:
     if gain - courses.gain(steady)[0] < -2 * SETTINGS.effect:
         return []
     for kind in range(len(KINDS)):
-        own = np.arange(len(values)) % 6 // 3 == kind
+        own = courses.kind == kind
         alone = courses.gain(course, own)[0]
         sure = log_chi_square(max(alone, 1e-9), own.sum()) < SETTINGS.likely_drift
         if not sure or alone < courses.gain(steady, own)[0]:
@@ -127,7 +130,7 @@ def maybe_grown(search, cause) -> bool:
     """Whether the biases that a cause is may as well have grown from zero as be constant."""
     imus = list(cause.imus)
     courses = Courses(search.fit, search.given, imus, back=True)
-    own = np.tile(np.arange(6) // 3 == KINDS.index(EFFECTS[cause.effect].sensors), len(imus))
+    own = courses.kind == KINDS.index(EFFECTS[cause.effect].sensors)
     paces = [pace for pace in PACES if abs(pace) <= SETTLED]
     grown = max(courses.gain(courses.course(pace, 0.0), own)[0] for pace in paces)
     return bool(grown > courses.gain(np.ones_like(courses.time), own)[0] - 2 * SETTINGS.rival)

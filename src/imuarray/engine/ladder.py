@@ -92,7 +92,7 @@ def climb(readings: Sequence[Readings], bare: bool = True) -> tuple[Estimate, li
     """
     names = rungs_of(readings)
     effects = [effect for name in names for effect in RUNGS[name]]
-    effects += [name for name in corrected(readings[0].left) if name not in effects]
+    effects += [name for name in corrected(*(one.left for one in readings)) if name not in effects]
     columns = columns_of(readings[0].array, effects, readings[0].position_prior_sd)
     begun = [Recorded.of(one, columns) for one in readings]
     found = estimate(begun, columns, mask_of(columns, [POSITION]), steps=SETTINGS.rung_steps)
@@ -214,7 +214,7 @@ def _left(found: Estimate) -> list[tuple[np.ndarray, np.ndarray]]:
     every, out = [one.readings.left for one in found.recorded], []
     if any(left is None for left in every):
         return out
-    known = mask_of_left(every[0], found.columns, np.zeros_like(found.active))
+    known = mask_of_left(every, found.columns, np.zeros_like(found.active))
     for names in (*zip(SCALES, SKEWS, strict=True), OFFSETS, (DRIFT,)):
         mask = known & mask_of(found.columns, names)
         if mask.any():

@@ -20,6 +20,7 @@ from imuarray.recording import Recording, array_of
 from imuarray.walk import shared_walk
 
 COURSE = 200  # instants of a walk that a polynomial is laid through
+OFF_STEP, SELDOM = 0.01, 0.05  # of a step; share of gaps that are so far from a multiple of it
 
 
 class Left(NamedTuple):
@@ -204,11 +205,16 @@ def _stretches(readings: Readings, stretch, used) -> Readings:
 
 
 def resolution(values) -> np.ndarray:
-    """(N, 2) least steps between readings (T, N, 6) along x; zero where all are equal."""
+    """(N, 2) least steps between readings (T, N, 6) along x; zero where they read in none.
+
+    All must be multiples of it: few readings, or finer ones, have some least gap by chance.
+    """
     values = values[:: max(1, len(values) // SETTINGS.few), :, ::3]
     gaps = np.diff(np.sort(values, axis=0), axis=0)
     least = np.min(gaps, axis=0, initial=np.inf, where=gaps > SETTINGS.same)
-    return np.where(np.isfinite(least), least, 0.0)
+    counts = gaps / least
+    odd = np.abs(counts - np.round(counts)) > OFF_STEP
+    return np.where(np.isfinite(least) & (odd.sum(axis=0) <= SELDOM * len(gaps)), least, 0.0)
 
 
 def few_at_once(far) -> np.ndarray:

@@ -1,5 +1,6 @@
 """How well an estimate's parameters are known: formal, by a jackknife, and what was corrected."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -47,44 +48,74 @@ def beside_maps(found: Estimate) -> tuple[Estimate, dict[str, float]]:
     """`settled`, and how likely maps as far from the correction's as it takes them to be are.
 
     {"accelerometer" or "gyroscope": p} of the kinds whose maps were corrected and not estimated.
+    Recordings that one calibration corrected have its errors of the maps in common.
     """
-    if all(one.readings.left is None for one in found.recorded):
+    lefts = [one.readings.left for one in found.recorded]
+    if all(left is None for left in lefts):
         return found, {}
     wide = _with_maps(found)
-    maps = mask_of_left(wide.recorded[0].readings.left, wide.columns, wide.active)
+    maps = mask_of_left(lefts, wide.columns, wide.active)
     active, count = wide.active | maps, len(found.values)
     blocks, _, _ = tested(wide, active)
-    precision, places = [found.precision], []
-    for number, place in enumerate(places_of(wide.columns, active, len(wide.recorded))):
-        own, mine = np.empty(len(place), int), maps[active]
-        own[~mine] = found.places[number]
-        own[mine] = count + number * mine.sum() + np.arange(mine.sum())
-        left = spread_of(wide.recorded[number].readings.left, wide.columns, maps)
-        precision.append(np.linalg.inv(left + FIXED**2 * np.eye(len(left))))
-        places.append((place, own))
-    precision = block_diag(*precision)
-    blocks = _placed(blocks, places, len(precision))
+    names = np.array(wide.columns.names)[np.nonzero(maps)[1]]
+    places, spread = _places_left(lefts, [spread_of(left, wide.columns, maps) for left in lefts],
+                                  np.isin(names, MAPS), count)  # fmt: skip
+    precision = block_diag(found.precision, np.linalg.inv(spread))
+    both, mine = [], maps[active]
+    for number, place in enumerate(places_of(wide.columns, active, len(lefts))):
+        own = np.empty(len(place), int)
+        own[~mine], own[mine] = found.places[number], places[number]
+        both.append((place, own))
+    blocks = _placed(blocks, both, len(precision))
     information = sum(inner for inner, _ in blocks)
     slope = sum(score for _, score in blocks)
     slope[:count] -= found.precision @ (found.values - means(found))
     whole = scaled_solve(information + precision, slope)[0]
-    step, off = whole[:count], whole[count:]
-    names = np.array(wide.columns.names)[np.nonzero(maps)[1]]
-    spread, likely = np.linalg.inv(precision[count:, count:]), {}
+    step, off, likely = whole[:count], whole[count:], {}
     for kind in KINDS:
-        mine = np.char.startswith(names, kind) & np.isin(names, MAPS)
-        own = np.tile(mine, len(wide.recorded))
-        if own.any():
+        own = np.char.startswith(names, kind) & np.isin(names, MAPS)
+        own = np.unique([place[own] - count for place in places])
+        if own.size:
             distance = off[own] @ np.linalg.solve(spread[np.ix_(own, own)], off[own])
-            likely[kind] = float(chdtrc(own.sum(), distance))
+            likely[kind] = float(chdtrc(own.size, distance))
     recorded = tuple(
         replace(one, state=stepped(one.state, found.columns, found.active, step[place]))
         for one, place in zip(found.recorded, found.places, strict=True)
     )
+    # what the blocks say where the step ends: a jackknife takes the rest for their scatter
+    blocks = [(inner, score - inner @ whole) for inner, score in blocks]
     found = replace(
         found, recorded=recorded, information=information, precision=precision, blocks=blocks
     )
     return found, likely
+
+
+def _places_left(lefts, spreads, of_maps, begin):
+    """(each recording's places from ``begin`` on of what was left in it, covariance of all).
+
+    ``spreads`` each recording's covariance (k, k), in which those ``of_maps`` (k,) bool belong to
+    the calibration that corrected it, all others to the recording itself.
+    """
+    places, parts, end = [], [], begin
+    for number, (left, spread) in enumerate(zip(lefts, spreads, strict=True)):
+        place = np.empty(len(spread), int)
+        same = next(k for k, other in enumerate(lefts) if _of_one(left, other))
+        for mine in (of_maps, ~of_maps):
+            if mine is of_maps and same < number:
+                place[mine] = places[same][mine]
+                continue
+            place[mine] = end + np.arange(mine.sum())
+            parts.append(spread[np.ix_(mine, mine)] + FIXED**2 * np.eye(mine.sum()))
+            end += mine.sum()
+        places.append(place)
+    return places, block_diag(*parts)
+
+
+def _of_one(left: Left | None, other: Left | None) -> bool:
+    """Whether one calibration corrected both."""
+    if left is None or other is None:
+        return left is other
+    return np.array_equal(left.maps, other.maps)
 
 
 def _placed(blocks, places, size):
@@ -149,15 +180,18 @@ def _lost(freedoms) -> float:
     return max((nu + 5) / (nu + 3) if np.isfinite(nu) else 1.0 for nu in freedoms)
 
 
-def corrected(left: Left | None) -> tuple[str, ...]:
-    """Effects of which a correction may have left something."""
-    return () if left is None else (*MAPS, DRIFT) if left.walks else MAPS + OFFSETS
+def corrected(*lefts: Left | None) -> tuple[str, ...]:
+    """Effects of which a correction, of one recording at least, may have left something."""
+    made = [left for left in lefts if left is not None]
+    if not made:
+        return ()
+    return (*MAPS, DRIFT) if any(left.walks for left in made) else MAPS + OFFSETS
 
 
-def mask_of_left(left: Left | None, columns: Columns, active) -> np.ndarray:
-    """(N, m) bool of maps and offsets that a correction left, where they are not estimated."""
-    known = corrected(left)
-    if left is not None and len(left.maps) == _accelerometers(columns):
+def mask_of_left(lefts: Sequence[Left | None], columns: Columns, active) -> np.ndarray:
+    """(N, m) bool of maps and offsets that corrections left, where they are not estimated."""
+    known, forces = corrected(*lefts), _accelerometers(columns)
+    if any(left is not None and len(left.maps) == forces for left in lefts):
         known = tuple(name for name in known if name not in MAPS[1::2])
     return np.isin(columns.names, known) & columns.owner & ~active
 
@@ -167,8 +201,10 @@ def _accelerometers(columns: Columns) -> int:
     return 9 * columns.model.array.accelerometers
 
 
-def spread_of(left: Left, columns: Columns, chosen) -> np.ndarray:
+def spread_of(left: Left | None, columns: Columns, chosen) -> np.ndarray:
     """Covariance of the parameters ``chosen`` (N, m) bool, in their order, of those left."""
+    if left is None:
+        return np.zeros((np.sum(chosen),) * 2)
     entry = [_entry(left, columns, *pair) for pair in np.argwhere(chosen)]
     offsets = left.offsets.reshape(-1, *left.offsets.shape[2:])
     return block_diag(left.maps, *offsets)[np.ix_(entry, entry)]
@@ -191,8 +227,8 @@ def _entry(left: Left, columns: Columns, imu: int, column: int) -> int:
 
 def _with_maps(found: Estimate) -> Estimate:
     """The same with columns for all maps and offsets."""
-    old, left = found.columns, found.recorded[0].readings.left
-    missing = [name for name in corrected(left) if name not in old.names]
+    old, lefts = found.columns, [one.readings.left for one in found.recorded]
+    missing = [name for name in corrected(*lefts) if name not in old.names]
     if not missing:
         return found
     readings = found.recorded[0].readings
