@@ -343,6 +343,12 @@ def test_a_long_recording_keeps_its_most_informative_stretches(monkeypatch):
     assert len(part.time) == 128
     size = [np.mean(np.sum(r.values[:, 0, 3:] ** 2, axis=1) ** 2) for r in (part, whole)]
     assert size[0] > size[1]
+    # a spin about one axis says nothing of the places along it
+    spinning, about = np.arange(len(whole.time)) < 190, np.eye(3)
+    rate = np.where(spinning[:, None], 30.0 * about[2], about[0])
+    values = np.tile(np.hstack([np.zeros_like(rate), rate])[:, None], (1, 4, 1))
+    part = most_informative(replace(whole, values=values), lambda text: None)
+    assert {30.0, 1.0} == set(part.values[:, 0, 3:].max(axis=1))
 
 
 def test_a_clock_that_wanders_is_read_at_other_ages():

@@ -177,16 +177,24 @@ def part_of(readings: Readings, most: int) -> Readings:
 
 
 def most_informative(readings: Readings, say: Callable[[str], None]) -> Readings:
-    """Of a long recording the stretches that say most of the positions, by their rates' squares."""
+    """Of a long recording the stretches that say most of the positions, by their rates' squares.
+
+    A third of them for each coordinate: a board that spins for long about one axis tells two.
+    """
     samples, most = len(readings.time), max(SETTINGS.most // len(readings.labels), 1)
     if samples <= most:
         return readings
     used = np.where(readings.keep[..., 3:], readings.values[..., 3:], np.nan)
-    size = np.sum(np.nanmedian(used, axis=1) ** 2, axis=1) ** 2
+    rate = np.nan_to_num(np.nanmedian(used, axis=1))
+    squares = (rate @ np.linalg.eigh(rate.T @ rate)[1]) ** 2
+    across = (squares.sum(axis=1, keepdims=True) - squares) ** 2
     stretch = np.arange(samples) // (SETTINGS.stretch if readings.gapless else 1)
-    mean = np.bincount(stretch, size) / np.bincount(stretch)
-    best = np.zeros(len(mean), bool)
-    best[np.argsort(mean)[-int(most / samples * len(mean)) :]] = True
+    best = np.zeros(stretch[-1] + 1, bool)
+    for coordinate, told in enumerate(across.T):
+        mean = np.bincount(stretch, told) / np.bincount(stretch)
+        mean[best] = -1.0
+        number = (int(most / samples * len(mean)) + coordinate) // 3
+        best[np.argsort(-mean)[:number]] = True
     say(f"using the most informative {most} of {samples} samples")
     return _stretches(readings, stretch, best[stretch])
 
