@@ -4,13 +4,15 @@ Misfit that the motion causes is smooth in time, noise is not: fourth difference
 half of the spectrum show the noise whatever the means get wrong.
 """
 
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.fit import Fit, seen_through
-from imuarray.engine.linearise import CHUNK
+from imuarray.engine.linearise import CHUNK, THREADS
 from imuarray.engine.readings import Readings, few_at_once
 from imuarray.tails import QUARTILE, log_normal, log_poisson
 
@@ -145,27 +147,32 @@ def coloured_meat(fit: Fit, information, correlation) -> np.ndarray | None:
     """Covariance of the score (K, K) where triads have AR(1) noise; None where all is white."""
     if not np.any(correlation):
         return None
-    from scipy.signal import lfilter  # slow to import, and seldom needed
-
-    meat = information.copy()
-    for imu, kind in np.argwhere(correlation != 0):
-        seen, rho = _projected(fit, int(imu), slice(3 * kind, 3 * kind + 3)), correlation[imu, kind]
-        # the sum over samples before of rho^lag times theirs; of those after it is the transpose
-        spread = lfilter([0.0, rho], [1.0, -rho], seen, axis=0)
-        half = seen.reshape(-1, len(meat)).T @ spread.reshape(-1, len(meat))
-        meat += half + half.T
+    shares = np.array_split(np.argwhere(correlation != 0), THREADS)
+    with ThreadPoolExecutor(THREADS) as pool:
+        halves = list(pool.map(partial(_with_former, fit, correlation), shares))
+    meat = information + sum(half + half.T for half in halves)
     return (meat + meat.T) / 2
 
 
-def _projected(fit: Fit, imu: int, axes: slice) -> np.ndarray:
-    """(T, 3, K) derivatives of a triad's readings, the motion's share taken out."""
+def _with_former(fit: Fit, correlation, triads) -> np.ndarray:
+    """Covariance (K, K) of some triads' scores with those of all samples before."""
+    from scipy.signal import lfilter  # slow to import, and seldom needed
+
     mask = fit.described[:, fit.wanted]
-    seen = np.empty((len(fit.residual), 3, int(mask.sum())))
-    for start in range(0, len(seen), CHUNK):
+    size = int(mask.sum())
+    half, states = np.zeros((size, size)), np.zeros((len(triads), 1, 3, size))
+    for start in range(0, len(fit.residual), CHUNK):
         part = slice(start, start + CHUNK)
         through, blocks = seen_through(fit.whitened[part], fit.basis[part], mask)
-        own = fit.basis[part, 6 * imu : 6 * imu + 6][:, axes]
-        np.matmul(-own, through, out=seen[part])
-        for _, places, block in (item for item in blocks if item[0] == imu):
-            seen[part, :, places] += block[:, axes]
-    return seen
+        for number, (imu, kind) in enumerate(triads):
+            axes, rho = slice(3 * kind, 3 * kind + 3), correlation[imu, kind]
+            # derivatives of the triad's readings, the motion's share taken out
+            seen = -fit.basis[part, 6 * imu : 6 * imu + 6][:, axes] @ through
+            for _, places, block in (item for item in blocks if item[0] == imu):
+                seen[..., places] += block[:, axes]
+            # the sum over samples before of rho^lag times theirs
+            before, states[number] = lfilter(
+                [0.0, rho], [1.0, -rho], seen, axis=0, zi=states[number]
+            )
+            half += seen.reshape(-1, size).T @ before.reshape(-1, size)
+    return half

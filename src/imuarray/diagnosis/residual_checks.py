@@ -15,7 +15,7 @@ from imuarray.diagnosis.noise import Noise, standardised, tail_log_p
 from imuarray.diagnosis.replicates import motion_sizes
 from imuarray.diagnosis.scores import Information
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.engine.fit import Fit, pick
+from imuarray.engine.fit import Fit, seen_through
 from imuarray.linear import scaled_inverse, scaled_square
 from imuarray.tails import log_chi_square, log_normal
 
@@ -81,9 +81,8 @@ def regression_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]
     active = given.places(fit.active)
     both = given.information + given.precision
     inner = scaled_inverse(both[np.ix_(active, active)])
-    chosen = np.flatnonzero(fit.active.any(axis=0))
-    pairs, through = pick(fit.through(chosen), fit.active[:, chosen])
-    place = np.searchsorted(fit.wanted, chosen)
+    chosen = fit.active[:, fit.wanted]
+    pairs, through = np.argwhere(chosen), seen_through(fit.whitened, fit.basis, chosen)[0]
     samples, count = fit.residual.shape[:2]
     basis = fit.basis.reshape(samples, count, 6, -1)
     groups: dict[str, list] = {}
@@ -103,7 +102,7 @@ def regression_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]
             stacked = np.hstack(list(table.values()))
             seen = -np.einsum("ti,tia->ta", basis[:, imu, axis], through)
             own = np.flatnonzero(pairs[:, 0] == imu)
-            seen[:, own] += fit.whitened[:, imu, axis][:, place[pairs[own, 1]]]
+            seen[:, own] += fit.whitened[:, imu, axis][:, pairs[own, 1]]
             kept = fit.readings.keep[:, imu, axis].astype(float)
             free = kept - np.sum(basis[:, imu, axis] ** 2, axis=1)
             score = stacked.T @ fit.residual[:, imu, axis]
