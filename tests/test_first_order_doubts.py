@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 from imuarray.errors import InputError
 from imuarray.firstorder.allan import averaged_sd, reading_sd
 from imuarray.firstorder.correct import calibrate_first_order
+from imuarray.firstorder.outliers import fit_triads
 from imuarray.firstorder.pose_noise import walked_mean
 from imuarray.firstorder.still import still_poses
-from imuarray.firstorder.triads import fit_triads
-from tests.test_first_order import GRAVITY, board, directions, triads
+from tests.test_first_order import GRAVITY, RATE, board, directions, triads
 
 WALKS = [[0.0, 1e-2, 0.0, 0.0], [2e-2] * 4]  # one triad's; strong beside the noise
 
@@ -150,3 +150,14 @@ def test_stamps_in_bursts_are_one_line():
     time -= 0.9 * step * (np.arange(len(time)) % 10)
     with pytest.raises(InputError, match="found bursts: .* declare the sensors' rate"):
         calibrate_first_order(replace(recording, time=time))
+
+
+def test_a_recording_of_one_pose_says_nothing_to_the_others():
+    whole, short = (board(np.random.default_rng(seed))[0] for seed in (36, 37))
+    short = short.select(np.arange(int(8 * RATE)))
+    found, alone = (
+        calibrate_first_order(whole, gyroscopes="offset", others=others) for others in ([short], [])
+    )
+    np.testing.assert_array_equal(found.triads.matrix, alone.triads.matrix)
+    with pytest.raises(InputError, match="expected two still poses or more .*, found one"):
+        calibrate_first_order(short, gyroscopes="offset", others=[whole])

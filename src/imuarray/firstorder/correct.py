@@ -10,9 +10,10 @@ from scipy.linalg import block_diag
 from imuarray.errors import InputError, require_one_of
 from imuarray.firstorder.allan import averaged_sd, lag_correlation, reading_sd
 from imuarray.firstorder.gyroscopes import Gyroscopes, Still, calibrate_gyroscopes
+from imuarray.firstorder.outliers import fit_triads
 from imuarray.firstorder.pose_noise import walked_mean
-from imuarray.firstorder.still import SHORTEST, still_poses
-from imuarray.firstorder.triads import TriadFit, fit_triads
+from imuarray.firstorder.still import SHORTEST, still_poses, usual_step
+from imuarray.firstorder.triads import TriadFit
 from imuarray.firstorder.turns import nearest_orthogonal, shared_turn
 from imuarray.model.effects import KINDS
 from imuarray.recording import Recording
@@ -108,8 +109,8 @@ def calibrate_first_order(
     gravity : m/s^2
     gyroscopes : "calibrate" for their maps, "offset" for no more than their offsets (paper 2021)
     shortest_pose : s, that a still pose lasts at least
-    others : further recordings of the same board at the same place, whose poses and moves, too, say
-        what the maps are; offsets are each recording's own
+    others : further recordings of the same board at the same place, whose poses (two of them at
+        least) and moves, too, say what the maps are; offsets are each recording's own
 
     InputError or IdentifiabilityError where there are no poses, too few or too similar ones, and
     where axes are mirrored, rates have another unit, or channels or samples are copied.
@@ -120,7 +121,14 @@ def calibrate_first_order(
             raise InputError("recordings: expected one board, found sensors of other labels")
     if others:
         require_apart([recording, *others])
-    every = [_still(one, shortest_pose) for one in (recording, *others)]
+    every = [_still(recording, shortest_pose)]
+    # one pose alone says nothing beside offsets of its own
+    every += [s for s in (_still(one, shortest_pose) for one in others) if len(s.poses) > 1]
+    if len(every) > 1 and len(every[0].poses) == 1:
+        raise InputError(
+            "recording: expected two still poses or more beside those of others, as its offsets are"
+            " its own, found one"
+        )
     triads, maps = _triads(every, gravity), None
     if gyroscopes == "calibrate":
         try:
@@ -143,25 +151,17 @@ def _still(recording: Recording, shortest: float) -> Still:
     poses = still_poses(recording, shortest=shortest)
     rate = [recording.angular_rate[pose] for pose in poses]
     offsets = np.array([piece.mean(axis=0) for piece in rate])
-    return Still(recording, poses, offsets, averaged_sd(rate, _step(recording)))
-
-
-def _step(recording: Recording) -> float:
-    return float(np.median(np.diff(recording.time)))
-
-
-def _forces(still: Still) -> list[np.ndarray]:
-    """Readings of the accelerometers in each pose."""
-    return [still.recording.specific_force[pose] for pose in still.poses]
+    return Still(recording, poses, offsets, averaged_sd(rate, usual_step(recording.time)))
 
 
 def _triads(every: Sequence[Still], gravity: float) -> TriadFit:
     """Of the poses of all recordings, one recording after the other."""
     mean, sd = [], []
     for one in every:
-        force = _forces(one)
+        force = one.pieces(one.recording.specific_force)
+        step = usual_step(one.recording.time)
         # a quantised reading that never changes has no spread of its own
-        noise = np.maximum(averaged_sd(force, _step(one.recording)), 1e-6 * GRAVITY)
+        noise = np.maximum(averaged_sd(force, step), 1e-6 * GRAVITY)
         mean += [piece.mean(axis=0) for piece in force]
         sd += [noise / np.sqrt(len(piece)) for piece in force]
     recording = np.repeat(np.arange(len(every)), [len(one.poses) for one in every])
@@ -181,8 +181,8 @@ def _after_moving(still: Still) -> np.ndarray:
 
 def _of_poses(still: Still, triads: TriadFit, gravity: float) -> FirstOrder:
     """What the still poses alone say: nothing of the gyroscopes' maps."""
-    force, step = _forces(still), _step(still.recording)
-    rate = [still.recording.angular_rate[pose] for pose in still.poses]
+    force = still.pieces(still.recording.specific_force)
+    rate, step = still.pieces(still.recording.angular_rate), usual_step(still.recording.time)
     return FirstOrder(
         still.poses, triads, *_gyroscope_offsets(still),
         np.maximum(reading_sd(force, step), 1e-6 * GRAVITY), reading_sd(rate, step),

@@ -58,6 +58,10 @@ class Still(NamedTuple):
     offsets: np.ndarray
     noise: np.ndarray
 
+    def pieces(self, readings) -> list[np.ndarray]:
+        """Readings (T, K, 3) of each pose."""
+        return [readings[pose] for pose in self.poses]
+
     def rate(self) -> np.ndarray:
         """Angular rates (T, G, 3) rad/s without their offsets."""
         counts = [pose.stop - pose.start for pose in self.poses]

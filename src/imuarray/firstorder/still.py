@@ -59,7 +59,7 @@ def still_poses(recording: Recording, window=WINDOW, shortest=SHORTEST) -> list[
         the declared noise; where stamps come in bursts.
     """
     require_plausible_rate(recording.time, "recording: time")
-    step = _step(recording.time)
+    step = usual_step(recording.time)
     width = max(int(round(window / step)), 2)
     if len(recording.time) < 2 * width:
         raise InputError(
@@ -91,7 +91,7 @@ def still_poses(recording: Recording, window=WINDOW, shortest=SHORTEST) -> list[
     return poses
 
 
-def _step(time) -> float:
+def usual_step(time) -> float:
     """The usual step of the stamps (T,) s; InputError where they come in bursts."""
     if len(time) < 2:
         return np.inf

@@ -13,19 +13,14 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from imuarray.errors import IdentifiabilityError, InputError
+from imuarray.errors import IdentifiabilityError
 from imuarray.firstorder.parts import parts_sd_of
-from imuarray.firstorder.pose_noise import SEEN, PoseNoise
+from imuarray.firstorder.pose_noise import PoseNoise
 from imuarray.firstorder.turns import procrustes, require_rotations
 from imuarray.model.jax64 import jax, jnp
 
 UPPER = np.triu_indices(3)
 
-OUTLIER = 5.0  # times the median size of a residual
-SHARED = 5.0  # times the median of what leaving out a pose gains, the worst of its triads apart
-MOST_OFF = 0.5  # relative, of a pose's mean specific force from gravity
-MOST_LEFT_OUT = 0.2  # of a triad's poses
-NEARLY = 0.5  # of the largest gain: as many triads leave out a reading at once
 MOST_STEPS, HALVED, CLOSE = 100, 12, 1e-8  # of Gauss-Newton; steps in sds
 SMALL = np.radians(20.0)  # a triad turned by less starts from the drawing
 
@@ -149,60 +144,7 @@ def _predicted(p, triads, magnitude, recording):
     return jnp.einsum("kij,pj->pki", matrices, force) + offsets[recording]
 
 
-def fit_triads(mean, sd, magnitude: float, labels=None, recording=None, time=None) -> TriadFit:
-    """ML estimate from the poses' averages, without the readings that stand far out.
-
-    A triad whose offset has jumped or drifts (sensors settling after power-on do) spoils the
-    directions for all others. One reading of one triad in one pose is left out at a time, the
-    one whose absence helps most, as long as that is more than OUTLIER squared times the usual;
-    never more than a fifth of a triad's. A pose that stands out in all triads, as where the board
-    was not quite still, counts by as much less. A triad may be turned by any angle against the
-    first.
-
-    Parameters
-    ----------
-    mean : (P, A, 3) m/s^2, average reading in each pose
-    sd : (P, A, 3) m/s^2, standard deviation of that average
-    magnitude : float, m/s^2, gravity where the recording was made
-    labels : of the triads, for messages; by default their numbers
-    recording : (P,) int, which of several recordings of the board, from 0, each pose is from; the
-        board was not taken apart between them. By default all are of one.
-    time : (P,) s of each pose, after the instant at which its recording's offsets are asked for; by
-        default offsets do not walk
-
-    Raises
-    ------
-    InputError
-        Where the mean over triads is nowhere near ``magnitude``, or a triad is mirrored.
-    IdentifiabilityError
-        Where the poses are too few or too alike to determine all parameters.
-    """
-    recording = np.zeros(len(mean), int) if recording is None else np.asarray(recording)
-    time = np.zeros(len(mean)) if time is None else np.asarray(time)
-    turns = _turns(mean, labels or [str(k + 1) for k in range(mean.shape[1])])
-    # all triads' mean in the frame of the first
-    unit = np.einsum("kji,pkj->pki", turns, mean).mean(axis=1) / magnitude
-    size = np.linalg.norm(unit, axis=1)
-    wild = np.flatnonzero(~(np.abs(size - 1) < MOST_OFF))
-    if wild.size:
-        raise InputError(
-            f"still poses: expected specific forces of about {magnitude:g} m/s^2, found"
-            f" {size[wild[0]] * magnitude:.3g} in pose {wild[0] + 1}; are the units right?"
-        )
-    given = _Poses(mean, magnitude, recording, turns, unit)
-    noise = PoseNoise.of(sd, time, recording)
-    found = _without_outliers(given, noise)
-    own = _doubted(noise, found.doubtful)
-    if found.residual_ratio > SEEN or own.misfits(found.used, found.residual) > SEEN:
-        noise = own.estimated(found.used, *given.linearised(found.fitted.values))
-        if noise.walk.any():
-            noise = noise._replace(sd=np.asarray(sd))
-            found = _without_outliers(given, noise)
-            found = replace(found, residual_ratio=_ratio(given, noise, found))
-    return found
-
-
-class _Poses(NamedTuple):
+class Poses(NamedTuple):
     """Averages (P, A, 3) m/s^2 in P poses, gravity, whose poses; where a fit starts."""
 
     mean: np.ndarray
@@ -224,61 +166,11 @@ class _Poses(NamedTuple):
         return misfit, np.asarray(slopes), lengths.T @ lengths
 
 
-def _ratio(given: _Poses, noise: PoseNoise, found: TriadFit) -> float:
-    """Residual over the readings' noise and the walk, without what else a triad scatters by."""
-    plain = _doubted(noise._replace(factor=np.ones_like(noise.factor)), found.doubtful)
-    misfit = np.moveaxis(found.residual, 0, -1)[..., None]
-    freedom = 3 * int(found.used.sum()) + len(found.used) - len(found.fitted.values)
-    square = np.sum((plain.whitening(found.used) @ misfit) ** 2)
-    return float(np.sqrt(square / freedom)) if freedom > 0 else np.nan
-
-
-def _without_outliers(given: _Poses, noise: PoseNoise, doubts: bool = True) -> TriadFit:
-    """``doubts``: of whole poses, too; none where more stand out than the others can tell."""
-    poses, triads = given.mean.shape[:2]
-    used, doubtful = np.ones((poses, triads), bool), np.ones(poses)
-    # nine unknowns are common to all triads
-    most, start = min(int(MOST_LEFT_OUT * poses), (poses - 9) // 3), given.start()
-    while True:
-        found, gain, whole = _fit(given, noise, used, doubtful, start)
-        start = found.fitted.values
-        out = used & (gain > OUTLIER**2 * np.median(gain[used]))
-        out[:, (~used).sum(axis=0) >= MOST_LEFT_OUT * poses] = False
-        out[used.sum(axis=1) <= 1] = False
-        beside, gain = whole - gain.max(axis=1), np.where(out, gain, 0.0)
-        worst = int(np.argmax(gain.max(axis=1)))
-        pose = _shared(out, worst, beside) if doubts and triads > 1 else -1
-        if pose >= 0 and doubtful[pose] == 1:
-            if (doubtful > 1).sum() >= most:
-                return _without_outliers(given, noise, doubts=False)
-            # all err alike, but count as if each erred by itself
-            doubtful[pose], used[pose] = max(np.sqrt(whole[pose]), OUTLIER), True
-        elif out.any():  # the worst of each triad, one in a pose, if nearly as bad as that of all
-            own = gain.max(axis=0)
-            bad = np.argsort(-own)[: np.sum(own > NEARLY * own.max())]
-            place, first = np.unique(gain[:, bad].argmax(axis=0), return_index=True)
-            used[place, bad[first]] = False
-        else:
-            return found
-
-
-def _shared(out, worst: int, beside) -> int:
-    """The pose that stands out in most triads, or -1.
-
-    ``out`` (P, A) whose readings do, in the pose ``worst`` most; ``beside`` (P,) what leaving out a
-    pose gains, beside the worst triad's.
-    """
-    if out.any() and 2 * out[worst].sum() <= out.shape[1]:
-        return -1
-    pose = worst if out.any() else int(np.argmax(beside))
-    return pose if beside[pose] > SHARED * max(np.median(beside), out.shape[1]) else -1
-
-
-def _doubted(noise: PoseNoise, doubtful) -> PoseNoise:
+def doubted(noise: PoseNoise, doubtful) -> PoseNoise:
     return noise._replace(sd=noise.sd * doubtful[:, None, None])
 
 
-def _turns(mean, labels) -> np.ndarray:
+def turns_of(mean, labels) -> np.ndarray:
     """How far each triad is turned against the first, (A, 3, 3); small turns are the fit's own."""
     turns = np.array([procrustes(own, mean[:, 0]) for own in np.moveaxis(mean, 1, 0)])
     require_rotations(turns, labels, "accelerometer")
@@ -297,17 +189,16 @@ _slopes = jax.jit(jax.jacfwd(_predicted), static_argnums=1)
 _length_slopes = jax.jit(jax.jacfwd(_lengths), static_argnums=1)
 
 
-def _fit(
-    given: _Poses, noise: PoseNoise, used, doubtful, start
+def least_squares(
+    given: Poses, noise: PoseNoise, used, doubtful, start
 ) -> tuple[TriadFit, np.ndarray, np.ndarray]:
-    """Least squares over the readings ``used``; also what leaving each, or a pose, out would gain.
+    """Least squares over the readings ``used``; left singular vectors (P, A, 3, n), and misfits.
 
-    The gain (P, A), (P,) is how much the sum of squares would fall (by linear theory), so that a
-    reading which bends the fit to itself is seen for what it is.
+    Both of averages as white as they can be reading by reading.
     """
     poses, triads = used.shape
     options = triads, given.magnitude, given.recording
-    white = _doubted(noise, doubtful).whitening(used)
+    white = doubted(noise, doubtful).whitening(used)
 
     def residual(p):
         misfit = np.moveaxis(given.mean - np.asarray(_predict(p, *options)), 0, -1)
@@ -320,13 +211,14 @@ def _fit(
     values, left, right = _solved(residual, slopes, start, poses)
     rest, inverse = residual(values), np.linalg.inv(right)
     count = white.shape[0] * 3 * poses
-    gain, whole = _gain(white, left[:count], rest[:count])
+    rows = _by_reading(white, left[:count])
+    misfit = _by_reading(white, rest[:count, None])[..., 0]
     freedom = 3 * int(used.sum()) + poses - values.size
     ratio = np.sqrt(rest @ rest / freedom) if freedom > 0 else np.nan
     scale = max(ratio, 1.0) if freedom > 0 else 1.0
     own = Fitted(values, scale**2 * inverse @ inverse.T, given.mean, given.magnitude)
     walk = np.sqrt(noise.walk)
-    return _result(own, used, given.recording, float(ratio), walk, doubtful.copy()), gain, whole
+    return _result(own, used, given.recording, float(ratio), walk, doubtful.copy()), rows, misfit
 
 
 def _solved(residual, slopes, start, poses: int):
@@ -360,28 +252,11 @@ def _solved(residual, slopes, start, poses: int):
     return values, left, right * norm
 
 
-def _gain(white, left, misfit) -> tuple[np.ndarray, np.ndarray]:
-    """What leaving out a triad's reading in a pose (P, A), or a pose (P,), takes off the squares.
-
-    ``white`` (A, 3, P, P), left singular vectors and misfit of white averages, row by row.
-    """
-    back = np.swapaxes(white, -1, -2)
-    rows = np.moveaxis(back @ left.reshape(*white.shape[:3], -1), 2, 0)
-    misfit = np.moveaxis(back @ misfit.reshape(*white.shape[:3], 1), 2, 0)[..., 0]
-    weight = np.moveaxis(np.sum(white**2, axis=2), 2, 0)
-    size = np.sqrt(np.where(weight > 0, weight, 1.0))
-    rows, misfit = rows / size[..., None], misfit / size
-    poses = len(rows)
-    return _spared(rows, misfit), _spared(rows.reshape(poses, -1, rows.shape[-1]),
-                                          misfit.reshape(poses, -1))  # fmt: skip
-
-
-def _spared(rows, misfit) -> np.ndarray:
-    """(...) of misfits (..., m) with left singular vectors ``rows`` (..., m, n)."""
-    free = np.eye(misfit.shape[-1]) - rows @ np.swapaxes(rows, -1, -2)
-    # what alone determines something cannot be spared: its inverse is kept finite
-    solved = np.linalg.solve(free + 1e-9 * np.eye(free.shape[-1]), misfit[..., None])[..., 0]
-    return np.sum(misfit * solved, axis=-1)
+def _by_reading(white, values) -> np.ndarray:
+    """(P, A, 3, n) of values (A * 3 * P, n) of white averages: ``white`` (A, 3, P, P) undone."""
+    back = np.swapaxes(white, -1, -2) @ values.reshape(*white.shape[:3], -1)
+    weight = np.sum(white**2, axis=2)[..., None]
+    return np.moveaxis(back / np.sqrt(np.where(weight > 0, weight, 1.0)), 2, 0)
 
 
 def _places(triads: int) -> np.ndarray:
