@@ -97,9 +97,11 @@ COMMANDS = (
         "log.csv --columns columns.yaml --gravity 9.81 --out answer/",
         "folder to write: report.html, cal.nc, positions.csv, recording.nc",
         (
-            _option("logs", "what a logger wrote (docs/convert.md), or a recording (NetCDF-4)",
+            _option("logs", "of one recording (docs/convert.md): a table, a log of each IMU,"
+                    " ROS bags, MIMU packets, or NetCDF-4",
                     type=InputLog, nargs="+", metavar="log"),
-            _file("--columns", "YAML: columns, units, positions"), TOPICS, GRAVITY,
+            _file("--columns", "YAML: columns, units, positions; of MIMU packets a CSV"),
+            TOPICS, GRAVITY,
         ),
         folder=True,
     ),
@@ -146,8 +148,8 @@ COMMANDS = (
         " (docs/convert.md).",
         "run.bag --columns rig.yaml --out rec.nc", "recording to write (NetCDF-4)",
         (
-            _option("data", "ROS 1 bag, ROS 2 bag's folder or file (.db3, .mcap); several of a rig"
-                    " are joined in time", type=bag, nargs="+", metavar="bag"),
+            _option("data", "ROS 1 bag, ROS 2 bag's folder or file (.db3, .mcap); one after the"
+                    " other of a rig are joined", type=bag, nargs="+", metavar="bag"),
             _file("--columns", "YAML: positions, noise, range"), TOPICS,
         ),
     ),
@@ -159,7 +161,7 @@ COMMANDS = (
         (
             RECORDING, GRAVITY,
             _option("--gyroscopes", "calibrate: scales, misalignments, orientations, from the moves"
-                    " between poses (default); offset: only their offsets, as paper 2021",
+                    " between poses (default); offset: only their offsets, as in the 2021 paper",
                     choices=("calibrate", "offset"), default="calibrate"),
             _number("--shortest-pose", "S", "shortest still pose, s (default: 3)",
                     3.0),
@@ -186,8 +188,8 @@ COMMANDS = (
             _option("recordings", "recording to read (NetCDF-4), or several of one board",
                     type=InputFile, nargs="+", metavar="recording"),
             *MODEL,
-            _option("--method", "of the papers' model. gauss-newton (default), of any number"
-                    " of samples; bcd: the same by block coordinate descent, in memory",
+            _option("--method", "the search under --model papers. gauss-newton (default): for any"
+                    " length; bcd: block coordinate descent (2017), all samples in memory",
                     choices=methods.CALIBRATION),
             NOISE,
         ),
@@ -214,16 +216,16 @@ COMMANDS = (
             _option("--method", "independent: proposals from the normal density about the mode, on"
                     " the exact marginal likelihood; nuts: the no-U-turn sampler on the same; auto"
                     " (default): the former where it is enough, else the latter; pmmh:"
-                    " pseudo-marginal Metropolis-Hastings, as paper 2021; pcn: the same with"
+                    " pseudo-marginal Metropolis-Hastings, as in the 2021 paper; pcn: the same with"
                     " preconditioned Crank-Nicolson proposals",
                     choices=methods.SAMPLING, default="auto"),
             _option("--motion-prior", "proper (default): angular rate and acceleration are normal,"
-                    " of the recording's own size; flat: as paper 2021, of the papers' model, which"
-                    " shrinks the array",
+                    " of the recording's own size; flat: as in the 2021 paper, under the papers'"
+                    " model, which shrinks the array",
                     choices=methods.MOTION_PRIORS, default="proper"),
             _option("--rates", "p(omega | y_g) from the gyroscopes' noise (default: declared), or"
-                    " from the spread among the gyroscopes of each sample, as paper 2021 does with"
-                    " measured data (30), with --motion-prior flat",
+                    " from the spread among the gyroscopes of each sample, as the 2021 paper does"
+                    " with measured data (30), with --motion-prior flat",
                     choices=methods.RATES, default="declared"),
             _number("--steps", "N", "steps of each chain", type=count),
             SEED,
@@ -256,7 +258,7 @@ COMMANDS = (
             _option("calibration", "what `imuarray calibrate` has written", type=InputFile),
             _option("--format", "json: everything; kalibr: imu.yaml of several IMUs; urdf: links"
                     " and fixed joints; csv: positions", choices=methods.EXPORTS, required=True),
-            _file("--noise", "still recording of the same IMUs, for noise and random walk"),
+            _file("--noise", "recording of the same IMUs lying still, for noise and random walk"),
             EFFECT_FILE,
         ),
     ),

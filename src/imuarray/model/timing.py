@@ -52,7 +52,7 @@ DELAY = (("delay",),)
     meaning="whole IMUs are read at instants of their own",
 )  # fmt: skip
 def sensor_delay(delay, instant, predicted):
-    """Both triads of IMU k sampled tau_k late; a delay common to all is the motion's."""
+    """Both triads of IMU k show the motion at t + tau_k; what is common to all is the motion's."""
     return later(delay, instant, predicted)
 
 
@@ -62,7 +62,7 @@ def sensor_delay(delay, instant, predicted):
     meaning="gyroscopes sample at another instant than accelerometers, later for delays > 0",
 )  # fmt: skip
 def gyroscope_delay(delay, instant, predicted):
-    """Gyroscope k sampled tau_k late, accelerometers in time (their filters differ)."""
+    """Gyroscope k shows the motion at t + tau_k, accelerometers at t (their filters differ)."""
     return later(delay, instant, predicted, accelerometers=False)
 
 

@@ -1,4 +1,4 @@
-"""What a recording has shown of its board: directions of still poses, axes of rotation."""
+"""How a recording has excited its board: directions of still poses, axes of rotation."""
 
 from __future__ import annotations
 

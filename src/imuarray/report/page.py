@@ -39,12 +39,12 @@ CAPTIONS = {
         " left out of the positions; shocks are samples in which several IMUs are far off at once.",
     ),
     "sphere": (
-        "What the board has been shown",
+        "Excitation",
         "Directions in the board's frame, from +z (left) and from −z. Poses ought to be all over"
         " the sphere, axes of rotation too.",
     ),
     "length": (
-        "Error against length",
+        "Standard deviation against recorded time",
         "Claimed standard deviation, had the motion ended earlier. Where it falls faster than"
         " 1/√length, the motion is getting better; where as fast, four times as long a motion"
         " halves the error; where it is level, noise is not what limits it.",
