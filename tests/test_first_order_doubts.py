@@ -12,6 +12,7 @@ from imuarray.firstorder.allan import averaged_sd, reading_sd
 from imuarray.firstorder.correct import calibrate_first_order
 from imuarray.firstorder.outliers import fit_triads
 from imuarray.firstorder.pose_noise import walked_mean
+from imuarray.firstorder.report import summary_lines
 from imuarray.firstorder.still import still_poses
 from tests.test_first_order import GRAVITY, RATE, board, directions, triads
 
@@ -152,12 +153,27 @@ def test_stamps_in_bursts_are_one_line():
         calibrate_first_order(replace(recording, time=time))
 
 
-def test_a_recording_of_one_pose_says_nothing_to_the_others():
+@pytest.mark.parametrize("seconds", [5, 8, 14])  # still all along, in one pose, in two
+def test_a_recording_of_few_poses_says_nothing_to_the_others(seconds):
     whole, short = (board(np.random.default_rng(seed))[0] for seed in (36, 37))
-    short = short.select(np.arange(int(8 * RATE)))
+    short = short.select(np.arange(int(seconds * RATE)))
     found, alone = (
         calibrate_first_order(whole, gyroscopes="offset", others=others) for others in ([short], [])
     )
     np.testing.assert_array_equal(found.triads.matrix, alone.triads.matrix)
-    with pytest.raises(InputError, match="expected two still poses or more .*, found one"):
+    assert "recording 1 of those beside it left out" in "\n".join(summary_lines(found, whole))
+    with pytest.raises(InputError, match="expected still poses in three orientations or more"):
         calibrate_first_order(short, gyroscopes="offset", others=[whole])
+
+
+def test_orientations_that_repeat_are_few():
+    """Four poses in two orientations leave a circle of solutions."""
+    whole, other = (board(np.random.default_rng(seed))[0] for seed in (36, 37))
+    pair = np.arange(int(14 * RATE))
+    both = np.concatenate([pair, pair])
+    noise = 1e-3 * np.random.default_rng(1).standard_normal((len(both), 4, 3))
+    again = replace(
+        other, time=np.arange(len(both)) / RATE, specific_force=other.specific_force[both] + noise,
+        angular_rate=other.angular_rate[both] + noise,
+    )  # fmt: skip
+    assert calibrate_first_order(whole, gyroscopes="offset", others=[again]).spare == (1,)

@@ -89,6 +89,12 @@ def require_together(
                 raise InputError(
                     "recordings: expected one board, found other labels or nominal positions"
                 )
+        ways = {None if r.map_covariance is None else len(r.map_covariance) for r in recordings}
+        if len(ways) > 1:
+            raise InputError(
+                "recordings: expected all of them corrected alike (imuarray first-order), or none,"
+                " found some with maps of sensors taken out that others have"
+            )
 
 
 def extender(diagnosis: str | PathLike | None, effects: Sequence[str] = (), say: Say = silent):

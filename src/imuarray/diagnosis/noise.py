@@ -147,7 +147,8 @@ def coloured_meat(fit: Fit, information, correlation) -> np.ndarray | None:
     """Covariance of the score (K, K) where triads have AR(1) noise; None where all is white."""
     if not np.any(correlation):
         return None
-    shares = np.array_split(np.argwhere(correlation != 0), THREADS)
+    triads = np.argwhere(correlation != 0)
+    shares = np.array_split(triads, min(THREADS, len(triads)))
     with ThreadPoolExecutor(THREADS) as pool:
         halves = list(pool.map(partial(_with_former, fit, correlation), shares))
     meat = information + sum(half + half.T for half in halves)

@@ -19,24 +19,37 @@ from imuarray.model.structure import design
 from imuarray.recording import Recording, array_of
 from imuarray.walk import shared_walk
 
+SAME = 0.05  # of their sds, from which maps are another calibration's
 COURSE = 200  # instants of a walk that a polynomial is laid through
-OFF_STEP, SELDOM = 0.01, 0.05  # of a step; share of gaps that are so far from a multiple of it
+# of a gap between readings, in steps: looked at, off a multiple; shares that are chance
+FEW_STEPS, OFF_STEP, SELDOM = 5.5, 0.12, 0.05
 
 
 class Left(NamedTuple):
     """What a first-order correction left in the readings, as uncertain as it says.
 
-    ``maps`` covariance as `Recording.map_covariance`; ``offsets`` (N, 6, 4, 4) of each channel's
-    offset as a polynomial of time, as `bias_drift` has it, of degree 0 where none ``walks``.
+    ``maps`` covariance (n, n) as `Recording.map_covariance`; ``offsets`` (N, 6, 4, 4) of each
+    channel's offset as a polynomial of time, as `bias_drift` has it, of degree 0 where none
+    ``walks``; ``taken`` (n,) inverses of the maps that were taken out, None where that is unknown.
     """
 
     maps: np.ndarray
     offsets: np.ndarray
+    taken: np.ndarray | None = None
 
     @property
     def walks(self) -> bool:
         """Whether some offset changes along the recording."""
         return bool(self.offsets[..., 1:, 1:].any())
+
+    def is_of(self, other: Left) -> bool:
+        """Whether one calibration corrected both: each may have made it, begun with its own."""
+        if self.maps.shape != other.maps.shape:
+            return False
+        if self.taken is None or other.taken is None:
+            return np.array_equal(self.maps, other.maps)
+        sds = np.sqrt(np.maximum(np.diag(self.maps), np.diag(other.maps)))
+        return bool(np.all(np.abs(self.taken - other.taken) <= SAME * sds + SETTINGS.same))
 
 
 @dataclass(frozen=True)
@@ -92,6 +105,11 @@ class Readings:
         """The same of some samples."""
         found = self.keep[index] / np.repeat(self.sd, 3, axis=1)
         return found if self.trust is None else found * np.repeat(self.trust[index], 3, axis=2)
+
+    @property
+    def stretch(self) -> int:
+        """Samples of the stretches in which a long recording is looked at: several windows."""
+        return max(SETTINGS.stretch, 3 * self.window)
 
     @property
     def pair(self) -> bool:
@@ -171,8 +189,8 @@ def part_of(readings: Readings, most: int) -> Readings:
     samples = len(readings.time)
     if samples <= most:
         return readings
-    stretch = np.arange(samples) // SETTINGS.stretch
-    chosen = np.linspace(0, stretch[-1], -(-most // SETTINGS.stretch)).round()
+    stretch = np.arange(samples) // readings.stretch
+    chosen = np.linspace(0, stretch[-1], -(-most // readings.stretch)).round()
     return _stretches(readings, stretch, np.isin(stretch, chosen))
 
 
@@ -188,13 +206,13 @@ def most_informative(readings: Readings, say: Callable[[str], None]) -> Readings
     rate = np.nan_to_num(np.nanmedian(used, axis=1))
     squares = (rate @ np.linalg.eigh(rate.T @ rate)[1]) ** 2
     across = (squares.sum(axis=1, keepdims=True) - squares) ** 2
-    stretch = np.arange(samples) // (SETTINGS.stretch if readings.gapless else 1)
+    stretch = np.arange(samples) // (readings.stretch if readings.gapless else 1)
     best = np.zeros(stretch[-1] + 1, bool)
+    number = max(int(most / samples * len(best)), 3)
     for coordinate, told in enumerate(across.T):
         mean = np.bincount(stretch, told) / np.bincount(stretch)
         mean[best] = -1.0
-        number = (int(most / samples * len(mean)) + coordinate) // 3
-        best[np.argsort(-mean)[:number]] = True
+        best[np.argsort(-mean)[: (number + coordinate) // 3]] = True
     say(f"using the most informative {most} of {samples} samples")
     return _stretches(readings, stretch, best[stretch])
 
@@ -215,14 +233,18 @@ def _stretches(readings: Readings, stretch, used) -> Readings:
 def resolution(values) -> np.ndarray:
     """(N, 2) least steps between readings (T, N, 6) along x; zero where they read in none.
 
-    All must be multiples of it: few readings, or finer ones, have some least gap by chance.
+    Gaps of a few steps must be many, and multiples but for a log's rounding: few readings, or
+    finer ones, have some least gap by chance.
     """
     values = values[:: max(1, len(values) // SETTINGS.few), :, ::3]
     gaps = np.diff(np.sort(values, axis=0), axis=0)
-    least = np.min(gaps, axis=0, initial=np.inf, where=gaps > SETTINGS.same)
+    apart = gaps > SETTINGS.same
+    least = np.min(gaps, axis=0, initial=np.inf, where=apart)
     counts = gaps / least
-    odd = np.abs(counts - np.round(counts)) > OFF_STEP
-    return np.where(np.isfinite(least) & (odd.sum(axis=0) <= SELDOM * len(gaps)), least, 0.0)
+    near = apart & (counts < FEW_STEPS)
+    odd = near & (np.abs(counts - np.round(counts)) > OFF_STEP)
+    many = near.sum(axis=0) > SELDOM * apart.sum(axis=0)
+    return np.where(many & (odd.sum(axis=0) <= SELDOM * near.sum(axis=0)), least, 0.0)
 
 
 def few_at_once(far) -> np.ndarray:
@@ -300,8 +322,10 @@ def arrange(recording: Recording, sparse: bool = False) -> Readings:
 def _left(recording: Recording, count: int) -> Left | None:
     if recording.map_covariance is None:
         return None
-    offsets = np.zeros((2, count, 3, 4, 4))
+    offsets, taken = np.zeros((2, count, 3, 4, 4)), None
     if recording.correction is not None:
+        inverses = [recording.correction[f"{kind}_inverse"].to_numpy().ravel() for kind in KINDS]
+        taken = np.concatenate(inverses)[: len(recording.map_covariance)]
         course = _course(recording)
         for kind, own in zip(KINDS, offsets, strict=True):
             inverse, sd, walk = (
@@ -311,7 +335,8 @@ def _left(recording: Recording, count: int) -> Left | None:
             variance = np.einsum("kij,kj->ki", inverse**2, sd**2)
             own[: len(sd), :, 0, 0] = variance
             own[: len(sd)] += walk[:, None, None, None] ** 2 * course
-    return Left(recording.map_covariance, np.moveaxis(offsets, 0, 1).reshape(count, 6, 4, 4))
+    by_imu = np.moveaxis(offsets, 0, 1).reshape(count, 6, 4, 4)
+    return Left(recording.map_covariance, by_imu, taken)
 
 
 def _course(recording: Recording) -> np.ndarray:

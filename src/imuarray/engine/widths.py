@@ -28,7 +28,6 @@ SCALES, SKEWS = ("accelerometer_scale", "gyroscope_scale"), (
     "accelerometer_misalignment", "gyroscope_misalignment",
 )  # fmt: skip
 FIXED = 1e-7  # sd of a map's entry that is known
-ALIKE = 0.01  # relative, of covariances of one calibration; those of others differ by a quarter
 MAPS = SCALES + SKEWS  # effects that are 3 x 3 maps, which first order corrects
 OFFSETS = "accelerometer_bias", "gyroscope_bias"
 DRIFT = "bias_drift"
@@ -52,7 +51,7 @@ def beside_maps(found: Estimate) -> tuple[Estimate, dict[str, float]]:
     Recordings that one calibration corrected have its errors of the maps in common.
     """
     lefts = [one.readings.left for one in found.recorded]
-    if all(left is None for left in lefts):
+    if any(left is None for left in lefts):
         return found, {}
     wide = _with_maps(found)
     maps = mask_of_left(lefts, wide.columns, wide.active)
@@ -100,7 +99,7 @@ def _places_left(lefts, spreads, of_maps, begin):
     places, parts, end = [], [], begin
     for number, (left, spread) in enumerate(zip(lefts, spreads, strict=True)):
         place = np.empty(len(spread), int)
-        same = next(k for k, other in enumerate(lefts) if _of_one(left, other))
+        same = next(k for k, other in enumerate(lefts) if left.is_of(other))
         for mine in (of_maps, ~of_maps):
             if mine is of_maps and same < number:
                 place[mine] = places[same][mine]
@@ -110,13 +109,6 @@ def _places_left(lefts, spreads, of_maps, begin):
             end += mine.sum()
         places.append(place)
     return places, block_diag(*parts)
-
-
-def _of_one(left: Left | None, other: Left | None) -> bool:
-    """Whether one calibration corrected both: each may have made it, beginning with its own."""
-    if left is None or other is None or left.maps.shape != other.maps.shape:
-        return left is other
-    return bool(np.linalg.norm(left.maps - other.maps) <= ALIKE * np.linalg.norm(left.maps))
 
 
 def _placed(blocks, places, size):
@@ -182,17 +174,16 @@ def _lost(freedoms) -> float:
 
 
 def corrected(*lefts: Left | None) -> tuple[str, ...]:
-    """Effects of which a correction, of one recording at least, may have left something."""
-    made = [left for left in lefts if left is not None]
-    if not made:
+    """Effects of which a correction may have left something in some of a board's recordings."""
+    if any(left is None for left in lefts):
         return ()
-    return (*MAPS, DRIFT) if any(left.walks for left in made) else MAPS + OFFSETS
+    return (*MAPS, DRIFT) if any(left.walks for left in lefts) else MAPS + OFFSETS
 
 
 def mask_of_left(lefts: Sequence[Left | None], columns: Columns, active) -> np.ndarray:
     """(N, m) bool of maps and offsets that corrections left, where they are not estimated."""
     known, forces = corrected(*lefts), _accelerometers(columns)
-    if any(left is not None and len(left.maps) == forces for left in lefts):
+    if any(len(left.maps) == forces for left in lefts if left is not None):
         known = tuple(name for name in known if name not in MAPS[1::2])
     return np.isin(columns.names, known) & columns.owner & ~active
 
@@ -202,10 +193,8 @@ def _accelerometers(columns: Columns) -> int:
     return 9 * columns.model.array.accelerometers
 
 
-def spread_of(left: Left | None, columns: Columns, chosen) -> np.ndarray:
+def spread_of(left: Left, columns: Columns, chosen) -> np.ndarray:
     """Covariance of the parameters ``chosen`` (N, m) bool, in their order, of those left."""
-    if left is None:
-        return np.zeros((np.sum(chosen),) * 2)
     entry = [_entry(left, columns, *pair) for pair in np.argwhere(chosen)]
     offsets = left.offsets.reshape(-1, *left.offsets.shape[2:])
     return block_diag(left.maps, *offsets)[np.ix_(entry, entry)]

@@ -22,6 +22,7 @@ from imuarray.recording.record import CORRECTION, NUMBERS
 from imuarray.recording.units import GRAVITY
 
 GYROSCOPES = ("calibrate", "offset")
+APART = 0.2  # of gravity, root of the sum of squares: poses in more than two orientations
 COUPLED = 0.1  # a rail of one axis shows in another that the correction mixes it into by this much
 
 
@@ -43,6 +44,7 @@ class FirstOrder:
         Correlation of neighbouring readings.
     gravity : float, m/s^2, the assumed magnitude
     gyroscopes : Gyroscopes, their maps; None where only their offsets were asked for
+    spare : numbers, from 1, of the other recordings left out: poses in two orientations at most
     """
 
     poses: list[slice]
@@ -56,6 +58,7 @@ class FirstOrder:
     gyroscope_correlation: np.ndarray
     gravity: float
     gyroscopes: Gyroscopes | None = None
+    spare: tuple[int, ...] = ()
 
     @property
     def still_samples(self) -> int:
@@ -109,8 +112,8 @@ def calibrate_first_order(
     gravity : m/s^2
     gyroscopes : "calibrate" for their maps, "offset" for no more than their offsets (paper 2021)
     shortest_pose : s, that a still pose lasts at least
-    others : further recordings of the same board at the same place, whose poses (two of them at
-        least) and moves, too, say what the maps are; offsets are each recording's own
+    others : further recordings of the same board at the same place, whose poses (in three
+        orientations at least) and moves, too, say what the maps are; offsets are each recording's
 
     InputError or IdentifiabilityError where there are no poses, too few or too similar ones, and
     where axes are mirrored, rates have another unit, or channels or samples are copied.
@@ -119,16 +122,15 @@ def calibrate_first_order(
     for other in others:
         if _labels(other) != _labels(recording):
             raise InputError("recordings: expected one board, found sensors of other labels")
-    if others:
-        require_apart([recording, *others])
-    every = [_still(recording, shortest_pose)]
-    # one pose alone says nothing beside offsets of its own
-    every += [s for s in (_still(one, shortest_pose) for one in others) if len(s.poses) > 1]
-    if len(every) > 1 and len(every[0].poses) == 1:
+    require_apart([recording, *others])
+    every = [_still(one, shortest_pose) for one in (recording, *others)]
+    spare = tuple(k for k, one in enumerate(every[1:], 1) if not _tells(one))
+    if len(every) > len(spare) + 1 and not _tells(every[0]):
         raise InputError(
-            "recording: expected two still poses or more beside those of others, as its offsets are"
-            " its own, found one"
+            "recording: expected still poses in three orientations or more beside those of others,"
+            f" as its offsets are its own, found {len(every[0].poses)} poses in fewer"
         )
+    every = [one for k, one in enumerate(every) if k not in spare]
     triads, maps = _triads(every, gravity), None
     if gyroscopes == "calibrate":
         try:
@@ -138,7 +140,7 @@ def calibrate_first_order(
             if failed:
                 raise InputError(failed[0]) from None
             raise
-    return replace(_of_poses(every[0], triads.first(), gravity), gyroscopes=maps)
+    return replace(_of_poses(every[0], triads.first(), gravity), gyroscopes=maps, spare=spare)
 
 
 def _labels(recording: Recording) -> tuple:
@@ -152,6 +154,13 @@ def _still(recording: Recording, shortest: float) -> Still:
     rate = [recording.angular_rate[pose] for pose in poses]
     offsets = np.array([piece.mean(axis=0) for piece in rate])
     return Still(recording, poses, offsets, averaged_sd(rate, usual_step(recording.time)))
+
+
+def _tells(still: Still) -> bool:
+    """Whether poses say more than offsets of their own: in two orientations they do not."""
+    means = np.array([f[:, 0].mean(axis=0) for f in still.pieces(still.recording.specific_force)])
+    apart = means - means.mean(axis=0)
+    return len(means) > 2 and np.linalg.svd(apart, compute_uv=False)[1] > APART * GRAVITY
 
 
 def _triads(every: Sequence[Still], gravity: float) -> TriadFit:

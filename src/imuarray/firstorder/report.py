@@ -58,6 +58,10 @@ def summary_lines(found: FirstOrder, recording: Recording) -> list[str]:
         shown = ", ".join(f"{1e3 * value:.0f}" for value in offset)
         lines.append(f"{row.triad:>5}  {1e3 * row.residual_rms:15.2f}  {row.left_out:14d}  {shown}")
     ratios = noise_table(found, recording).groupby("sensor").ratio.median()
+    lines += [
+        f"recording {number} of those beside it left out: still in two orientations at most"
+        for number in found.spare
+    ]
     lines += doubtful_lines(found, recording) + walk_lines(found, recording)
     lines += turned_lines(found, recording) + gyroscope_lines(found.gyroscopes, recording)
     return lines + [

@@ -239,7 +239,7 @@ def _turning(recording: Recording) -> np.ndarray:
 def _rows(recording: Recording) -> np.ndarray:
     """(T, 3 (A + G)) all readings of each sample."""
     parts = [getattr(recording, name) for name in _KINDS.values()]
-    return np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1)
+    return np.concatenate([part.reshape(len(part), 3 * part.shape[1]) for part in parts], axis=1)
 
 
 def runs(mask) -> list[tuple[int, int]]:
