@@ -11,8 +11,8 @@ HEAD = """# Figures and tables of the two papers
 Made by `snakemake` at scale `{scale}`, seed {seed}; do not edit. Every claim of the papers with
 our value and a verdict: [claims.md](claims.md), [claims.csv](claims.csv). Figures of `theory` and
 `validate` are in [docs/uncertainty.md](../docs/uncertainty.md), of `blind` in
-[docs/findings.md](../docs/findings.md#is-the-diagnosis-reliable), of diagnoses in [docs/measured.md](../docs/measured.md). The
-commit and the command that made each file, and whether its code has changed since:
+[docs/findings.md](../docs/findings.md#is-the-diagnosis-reliable), of diagnoses in
+[docs/measured.md](../docs/measured.md). The commit and the command that made each file, and whether its code has changed since:
 [published.csv](published.csv).
 
 The chains behind the figures and tables of 2021:
