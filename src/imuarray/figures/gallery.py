@@ -12,7 +12,8 @@ Made by `snakemake` at scale `{scale}`, seed {seed}; do not edit. Every claim of
 our value and a verdict: [claims.md](claims.md), [claims.csv](claims.csv). Figures of `theory` and
 `validate` are in [docs/uncertainty.md](../docs/uncertainty.md), of `blind` in
 [docs/findings.md](../docs/findings.md#is-the-diagnosis-reliable), of diagnoses in
-[docs/measured.md](../docs/measured.md). The commit and the command that made each file, and whether its code has changed since:
+[docs/measured.md](../docs/measured.md). The commit and the
+command that made each file, and whether its code has changed since:
 [published.csv](published.csv).
 
 The chains behind the figures and tables of 2021:
