@@ -113,7 +113,7 @@ def calibrate_first_order(
     gyroscopes : "calibrate" for their maps, "offset" for no more than their offsets (paper 2021)
     shortest_pose : s, that a still pose lasts at least
     others : further recordings of the same board at the same place, whose poses (in three
-        orientations at least) and moves, too, say what the maps are; offsets are each recording's
+        orientations at least) and moves, too, say what the maps are; offsets are their own
 
     InputError or IdentifiabilityError where there are no poses, too few or too similar ones, and
     where axes are mirrored, rates have another unit, or channels or samples are copied.
