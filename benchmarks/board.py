@@ -294,7 +294,7 @@ def write(table: pd.DataFrame, columns: dict, folder: Path) -> None:
     """log.csv and columns.yaml."""
     folder.mkdir(parents=True, exist_ok=True)
     table.to_csv(folder / "log.csv", index=False)
-    (folder / "columns.yaml").write_text(yaml.safe_dump(columns), encoding="utf-8")
+    (folder / "columns.yaml").write_text(yaml.safe_dump(columns, sort_keys=False), encoding="utf-8")
 
 
 def _matrices(rng, options: Options, scale: float, skew: float, ideal: bool) -> np.ndarray:

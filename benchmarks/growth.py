@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import xarray as xr
+from matplotlib.ticker import FixedLocator, LogLocator, NullFormatter, StrMethodFormatter
 
 from benchmarks.board import GRAVITY, Options, draw_board
 from benchmarks.cost import cost
@@ -104,6 +105,13 @@ def table(rows: pd.DataFrame) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _plain(axis, ticks) -> None:
+    """Numbers as they are, at these ticks alone: few decades."""
+    axis.set_major_locator(ticks)
+    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
 @styled
 def draw(rows: pd.DataFrame):
     """Core seconds and peak memory over samples and over IMUs."""
@@ -117,7 +125,9 @@ def draw(rows: pd.DataFrame):
             for place, (name, own) in enumerate(part.groupby("command", sort=False)):
                 axes.loglog(own[what], own[key], label=name, **LINES[place])
             axes.set_ylabel(words if column == 0 else "")
+            _plain(axes.yaxis, LogLocator(subs=(1, 2, 5)))
         axes.set_xlabel(what.replace("imus", "IMUs"))
+    _plain(grid[1, 1].xaxis, FixedLocator(IMUS))
     labels = grid[0, 1].get_legend_handles_labels()
     figure.legend(*labels, loc="outside upper center", ncols=4, fontsize=6)
     return figure
