@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import imuarray
 from imuarray.analysis import trust
 from imuarray.analysis.drawing import Places, departures
-from imuarray.analysis.misfit import residuals
+from imuarray.analysis.misfit import residuals, unsteady
 from imuarray.analysis.rigid import slope, turning
 from imuarray.analysis.suspects import clipped, suspects, told
 from imuarray.blind.cases import Case, make
@@ -442,6 +442,48 @@ def test_rough_motion_is_judged_by_its_smooth_samples(sound):
     )  # fmt: skip
     found = residuals(sound, calibration, None)
     assert found[""] == pytest.approx(np.sqrt(2.5)) and found[f"gyroscope {labels[0]}"] == 2.0
+
+
+def jumped(recording, imu, by=(0.1, 0.1, 0.1)):
+    """The recording with an accelerometer's offset other from its middle on."""
+    late = recording.time > recording.time.mean()
+    return one(recording, imu, lambda read: read + np.outer(late, by), ("specific_force",))
+
+
+@pytest.mark.parametrize("imu", [0, 2], ids=["the reference", "another"])
+def test_an_offset_that_jumps_is_named(sound, imu, monkeypatch):
+    """It leaves hardly a residual: all parts of the recording fit, at other places of the IMU."""
+    monkeypatch.setattr(trust, "unsteady", lambda found, _: unsteady(found, True))
+    found = imuarray.calibrate(jumped(sound, imu))
+    assert found.attrs["residual_ratio"] < 1.5
+    (reason,) = trust.reasons_of_calibration(jumped(sound, imu), found)
+    assert f"on the place of IMU {sound.accelerometer_labels[imu]}, by" in reason
+
+
+@pytest.mark.parametrize(
+    ("ratios", "corrected", "named"),
+    [
+        ([1.3, 1.0, 1.2], True, None),
+        ([3.0, 1.5, 1.4], False, "IMU 2"),
+        ([4.0, 5.0, 1.4, 1.3], False, "IMU 2 and 3"),
+        ([4.0, 4.2, 4.4], True, "IMU 1"),
+        ([4.0, 4.2, 4.4], False, None),  # wrong scales do the same
+        ([9.0], True, "IMU 1 and 2"),
+    ],
+)  # fmt: skip
+def test_whom_parts_of_a_recording_disagree_on(ratios, corrected, named):
+    ones = np.ones((len(ratios) + 1, 3))
+    ones[0] = 0.0
+    wide = ones.copy()
+    wide[1:] *= np.array(ratios)[:, None]
+    sds = {"position_sd_jackknife": wide, "position_sd_formal": ones}
+    labels = [str(k + 1) for k in range(len(ones))]
+    calibration = xr.Dataset(
+        {name: (("accelerometer", "axis"), value) for name, value in sds.items()},
+        {"accelerometer": labels},
+    )
+    found = unsteady(calibration, corrected)
+    assert not found if named is None else f"the place of {named}, by" in found[0]
 
 
 def test_a_search_that_diverges_is_bad_input(monkeypatch, sound):

@@ -23,7 +23,7 @@ FIGURES = (".png", ".pdf")
 PAGES = ("recording.nc", "cal.nc", "positions.csv", "report.html", "diagnosis.json")  # in folders
 OK, UNFORESEEN, BAD_INPUT, UNTRUSTED, INTERRUPTED, CLOSED = 0, 1, 2, 3, 130, 141
 AGAIN = 0.05  # s, after which an interrupt that was dropped comes again
-MALLOC = (-3, 4 << 20), (-8, 2)  # M_MMAP_THRESHOLD, bytes; M_ARENA_MAX
+M_ARENA_MAX = -8  # of glibc's malloc.h
 PATIENCE = 1.0  # s, in which an interrupted command may tidy up
 
 
@@ -33,7 +33,7 @@ def script() -> NoReturn:
     Interrupted, it does not wait for threads of compiled code: Python's shutdown would fault.
     """
     _end_soon()
-    _give_memory_back()
+    _share_heap()
     status = main()
     if status == INTERRUPTED:
         sys.stderr.flush()
@@ -59,12 +59,10 @@ def _end_soon() -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def _give_memory_back() -> None:
-    """Freed arrays return to the system at once; glibc would keep a sixth of a diagnosis's peak."""
-    with suppress(OSError, AttributeError):  # another C library
-        set_option = ctypes.CDLL(None).mallopt
-        for option, value in MALLOC:
-            set_option(option, value)
+def _share_heap() -> None:
+    """Threads take memory from two heaps: of its own each would keep what another has freed."""
+    with suppress(OSError, AttributeError):  # not glibc
+        ctypes.CDLL(None).mallopt(M_ARENA_MAX, 2)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -10,6 +10,8 @@ from imuarray.analysis.suspects import suspects, told
 from imuarray.model.effects import KINDS
 from imuarray.recording import Recording
 
+UNSTEADY = 2.5  # times what noise explains between parts of a recording; 1.3 at most of sound ones
+APART = 1.5  # times that of the other IMUs: what disturbs one disturbs all a little
 RESIDUAL = 3.0  # times the declared noise: widths are too small, or scaled by what is no noise
 
 
@@ -56,6 +58,33 @@ def residuals(recording: Recording, calibration: xr.Dataset, places: Places) -> 
         for label, sds in zip(calibration[kind].values, calibration[f"{kind}_sd"], strict=True):
             found[f"{kind} {label}"] = float(np.sqrt(np.mean(sds**2))) / declared
     return found
+
+
+def unsteady(calibration: xr.Dataset, corrected: bool) -> list[str]:
+    """IMUs on whose position parts of the recording disagree: it came loose, or its offset jumped.
+
+    Where all do, it is the reference; if they are not ``corrected``, their scales do it as well.
+    """
+    if "position_sd_jackknife" not in calibration:
+        return []
+    squares = (
+        np.sum(calibration[f"position_sd_{name}"].to_numpy()[1:] ** 2, axis=1)
+        for name in ("jackknife", "formal")
+    )
+    ratio = np.sqrt(np.divide(*squares))
+    usual = np.sort(ratio)[(len(ratio) - 1) // 2]
+    labels = calibration["accelerometer"].to_numpy()
+    found = labels[1:][ratio > max(UNSTEADY, APART * usual)]
+    if not len(found) and corrected and usual > UNSTEADY:
+        found = labels[:1] if len(ratio) > 1 else labels
+    if not len(found):
+        return []
+    named = " and ".join(found) if len(found) < 3 else f"{', '.join(found[:-1])} and {found[-1]}"
+    return [
+        f"parts of the recording disagree on the place of IMU {named}, by {ratio.max():.2g} times"
+        " what noise explains: did it come loose, or did its accelerometer's offset jump? imuarray"
+        " diagnose tells which"
+    ]
 
 
 def rigid(recording: Recording, places: Places, spread: bool = False) -> dict[str, float]:

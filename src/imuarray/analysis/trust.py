@@ -14,7 +14,7 @@ import xarray as xr
 
 from imuarray.analysis.checked import FEW, is_of
 from imuarray.analysis.drawing import FAR, Places, another_size, departures, size_of
-from imuarray.analysis.misfit import RESIDUAL, is_papers, residuals, rigid, unfitting
+from imuarray.analysis.misfit import RESIDUAL, is_papers, residuals, rigid, unfitting, unsteady
 from imuarray.analysis.rigid import SLOPE, Slope, elsewhere, kept, slope, turning
 from imuarray.analysis.suspects import MIRRORED, clipped, common, gravity
 from imuarray.model.effects import EFFECTS, Effect
@@ -57,10 +57,15 @@ def reasons_of_calibration(
         judged += _drifts(recording) if is_papers(calibration) else []
         for reason in [*units, *known] if units else [*little, *known, *judged]:
             found.setdefault(reason, []).append(str(number))
-    return [
+    judged = [
         reason if len(whose) == len(several) else f"recording {', '.join(whose)}: {reason}"
         for reason, whose in found.items()
-    ] + ([] if little or any(map(UNIT.search, found)) else _not_converged(calibration.attrs))
+    ]
+    if not judged:
+        corrected = all(one.correction is not None for one in several)
+        judged = unsteady(calibration, corrected)
+    root = little or any(map(UNIT.search, found))
+    return judged + ([] if root else _not_converged(calibration.attrs))
 
 
 def _drifts(recording: Recording) -> list[str]:
