@@ -1,6 +1,7 @@
 """Any logger's files as one recording."""
 
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 
@@ -199,3 +200,54 @@ def test_a_board_with_a_sensor_slower_than_its_log(tmp_path):
     ):
         left = (one - wanted[:, None])[inner].std(axis=(0, 2))
         assert (left < 1.1 * found.alignment.interpolated_noise[:, kind]).all()
+
+
+def board_log(folder, stamps, read=None, rail=np.inf):
+    """One table of three IMUs: what it is opened as. ``read``: when they read, if not then."""
+    rng, read = np.random.default_rng(0), stamps if read is None else read
+    waves = np.stack(
+        [np.sin(2 * np.pi * hertz * read + hertz) for hertz in (1.1, 1.7, 2.3)], axis=1
+    )
+    noise = rng.standard_normal((6, len(read), 3))
+    parts = [12.0 * waves + 0.04 * part for part in noise[:3]]
+    parts += [np.clip(9.0 * waves + 1e-3 * part, -rail, rail) for part in noise[3:]]
+    names = [f"{kind}{axis}{k}" for kind in "ag" for k in range(3) for axis in "xyz"]
+    table = pd.DataFrame(np.hstack(parts), columns=names)
+    table.insert(0, "t", stamps)
+    table.to_csv(folder / "log.csv", index=False)
+    triads = {
+        kind: {str(k): {"columns": [f"{kind}{axis}{k}" for axis in "xyz"]} for k in range(3)}
+        for kind in "ag"
+    }
+    for k, place in enumerate(np.eye(3)):
+        triads["a"][str(k)]["position"] = (20 * place).tolist()
+    columns = {
+        "time": {"column": "t", "unit": "s"}, "position_unit": "mm",
+        "accelerometers": {"unit": "m/s^2", "noise": 0.04, "range": 100, "triads": triads["a"]},
+        "gyroscopes": {"unit": "rad/s", "noise": 1e-3, "range": 35, "triads": triads["g"]},
+    }  # fmt: skip
+    (folder / "columns.yaml").write_text(yaml.safe_dump(columns))
+    return imuarray.open_logs(folder / "log.csv", folder / "columns.yaml")
+
+
+EVEN = np.arange(600) / 200
+LATE = EVEN + 2e-4 * np.random.default_rng(1).standard_normal(600)
+
+
+def test_stamps_of_a_table_that_jitter_are_evened(tmp_path):
+    found, (said,) = board_log(tmp_path, LATE, read=EVEN)
+    assert "stamps 0.19 ms off even readings" in said
+    np.testing.assert_allclose(np.diff(found.time), 5e-3, atol=1e-6)
+
+
+@pytest.mark.parametrize("stamps", [EVEN, LATE], ids=["even", "as uneven as the readings"])
+def test_stamps_of_a_table_that_are_right_stay(tmp_path, stamps):
+    found, lines = board_log(tmp_path, stamps)
+    assert not lines
+    np.testing.assert_allclose(found.time, stamps - stamps[0], atol=1e-12)
+
+
+def test_a_rail_that_a_table_shows_is_its_range(tmp_path):
+    found, (said,) = board_log(tmp_path, EVEN, rail=np.radians(500))
+    assert "gyroscope: clipped at 8.727 rad/s (500 deg/s), within its declared range of 35" in said
+    assert found.gyroscope_range == pytest.approx(np.radians(500))

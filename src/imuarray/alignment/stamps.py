@@ -10,18 +10,19 @@ ROUNDED = 3  # different steps of rounded stamps
 FASTEST = 0.75  # quantile of the readings' change, above which stamps show in them
 
 
-def steadied(time, values) -> tuple[np.ndarray, float]:
+def steadied(time, values, enough: float = 1.0) -> tuple[np.ndarray, float]:
     """Instants (N,) s of readings (N, 3), and how far (rms, s) their stamps ``time`` are off them.
 
-    A smooth function of the readings' numbers, if the readings are no less smooth in it than in
-    the stamps: those that a logger rounds or writes late are smoother. Else the stamps.
+    A smooth function of the readings' numbers, if the readings are rough in it by at most
+    ``enough`` times what they are in the stamps: those that a logger rounds or writes late are
+    smoother. Else the stamps.
     """
     step = np.median(np.diff(time))
     cuts = np.flatnonzero(np.diff(time) > RUN * step) + 1
     pieces = [_paced(part) for part in np.split(time, cuts)]
     even = np.concatenate(pieces)
     off = float(np.sqrt(np.mean((even - time) ** 2)))
-    if (np.diff(even) <= 0).any() or _roughness(even, values) > _roughness(time, values):
+    if (np.diff(even) <= 0).any() or _roughness(even, values) > enough * _roughness(time, values):
         return time, 0.0
     return even, off
 

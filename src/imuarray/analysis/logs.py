@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from imuarray.recording.rig import Rig, recording_of
 RECORDINGS = (".nc", ".nc4", ".h5")
 PACKETS = ".bin"
 RAIL = 1 - 1e-6  # of the range
+Read = TypeVar("Read", Log, Recording)
+SURE = 0.8  # of the rates' roughness is left at even instants; a motion too slow shows nothing
 LARGE = 0.5  # of the largest reading, from which an abrupt end is a rail and no rest
 
 
@@ -106,10 +108,10 @@ def _opened(paths, columns, topics) -> Opened:
 def _together(found: Recording | Rig) -> Opened:
     """Samples as they are, or brought to common instants and axes, which is kept."""
     if isinstance(found, Recording):
-        return Opened(found, [])
+        return _sampled(found, [])
     recording = recording_of(found)
     if recording is not None:
-        return Opened(_with_rails(recording), found.lines)
+        return _sampled(_with_rails(recording), found.lines)
     from imuarray.alignment import align
 
     lines, logs = list(found.lines), []
@@ -122,6 +124,24 @@ def _together(found: Recording | Rig) -> Opened:
         logs, position_prior_sd=found.position_prior_sd, source=found.source
     )
     return Opened(recording, [*lines, *alignment.lines()])
+
+
+def _sampled(recording: Recording, lines: list[str]) -> Opened:
+    """Of samples as they are: even instants where stamps jitter, and the rails that show."""
+    from imuarray.alignment.found import JITTER
+    from imuarray.alignment.stamps import SHORTEST, steadied
+
+    recording, more = _railed(recording)
+    if len(recording.time) < SHORTEST:
+        return Opened(recording, [*lines, *more])
+    time, off = steadied(recording.time, recording.angular_rate.mean(axis=1), SURE)
+    if off > JITTER:
+        recording = replace(recording, time=time)
+        more.append(
+            f"stamps {1e3 * off:.2g} ms off even readings, which the rates fit better: taken as"
+            " even"
+        )
+    return Opened(recording, [*lines, *more])
 
 
 def _require_own(log: Log) -> None:
@@ -146,19 +166,22 @@ def _require_own(log: Log) -> None:
             raise InputError(f"{log.label}: expected each reading once, found: {said[0]}")
 
 
-def _railed(log: Log) -> tuple[Log, list[str]]:
+def _railed(log: Read) -> tuple[Read, list[str]]:
     """With the rails that readings show within the declared ranges, and lines that say so."""
     ranges: dict[str, Any] = {}
     lines = []
+    whose = f"{log.label}: " if isinstance(log, Log) else ""
     for kind, unit in (("accelerometer", "m/s^2"), ("gyroscope", "rad/s")):
         values = log.specific_force if kind == "accelerometer" else log.angular_rate
         limit, largest = getattr(log, f"{kind}_range"), np.abs(values).max()
-        found = [abs(end) for axis in values.T for end in ends(axis)]
-        found = [end for end in found if LARGE * largest < end < limit]
+        channels = values.reshape(len(values), -1).T
+        found = [abs(end) for axis in channels for end in ends(axis)]
+        found = [end for end in found if LARGE * largest < end < RAIL * limit]
         if found:
-            ranges[f"{kind}_range"] = min(found)
+            least = ranges[f"{kind}_range"] = min(found)
+            degrees = f" ({np.degrees(least):.4g} deg/s)" if kind == "gyroscope" else ""
             lines.append(
-                f"{log.label}: {kind}: clipped at {min(found):.4g} {unit}, within its declared"
-                f" range of {limit:.4g}: that is taken for its range"
+                f"{whose}{kind}: clipped at {least:.4g} {unit}{degrees}, within its declared range"
+                f" of {limit:.4g}: that is taken for its range"
             )
     return replace(log, **ranges), lines
