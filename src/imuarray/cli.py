@@ -2,6 +2,7 @@
 
 import argparse
 import ctypes
+import gc
 import os
 import signal
 import sys
@@ -23,6 +24,7 @@ FIGURES = (".png", ".pdf")
 PAGES = ("recording.nc", "cal.nc", "positions.csv", "report.html", "diagnosis.json")  # in folders
 OK, UNFORESEEN, BAD_INPUT, UNTRUSTED, INTERRUPTED, CLOSED = 0, 1, 2, 3, 130, 141
 AGAIN = 0.05  # s, after which an interrupt that was dropped comes again
+COLLECTED = 100_000  # objects, after which Python looks for cycles
 M_ARENA_MAX = -8  # of glibc's malloc.h
 PATIENCE = 1.0  # s, in which an interrupted command may tidy up
 
@@ -60,7 +62,11 @@ def _end_soon() -> None:
 
 
 def _share_heap() -> None:
-    """Threads take memory from two heaps: of its own each would keep what another has freed."""
+    """Threads take memory from two heaps: of its own each would keep what another has freed.
+
+    Cycles are looked for less often: fonts and figures are many objects, hardly any in a cycle.
+    """
+    gc.set_threshold(COLLECTED)
     with suppress(OSError, AttributeError):  # not glibc
         ctypes.CDLL(None).mallopt(M_ARENA_MAX, 2)
 
