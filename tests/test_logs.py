@@ -186,11 +186,13 @@ def test_a_board_with_a_sensor_slower_than_its_log(tmp_path):
     columns["accelerometers"] |= {"unit": "m/s^2", "noise": 0.04, "range": 160}
     columns["gyroscopes"] |= {"unit": "rad/s", "noise": 1e-3, "range": 35}
     slow = blank(rows, [f"a{axis}2" for axis in "xyz"], range(2, 1201, 2))
+    slow = blank(slow, ["gy3"], (7, 500))
     text = "\n".join(",".join(row) for row in slow) + "\n"
     (tmp_path / "log.csv").write_text(text)
     (tmp_path / "columns.yaml").write_text(yaml.safe_dump(columns))
     found, lines = imuarray.open_logs(tmp_path / "log.csv", tmp_path / "columns.yaml")
     assert "2: accelerometer: no reading in 600 of 1200" in lines
+    assert "3: gyroscope: no reading in 2 of 1200" in lines
     np.testing.assert_allclose(found.alignment.rate[1], [50, 100], rtol=1e-4)
     assert np.abs(found.alignment.clock_offset).max() < 5e-6
     true = [motion.force.derivative(found.time), motion.rotation.derivative(found.time)]
