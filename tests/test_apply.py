@@ -8,8 +8,10 @@ import xarray as xr
 
 import imuarray
 from imuarray.cli import main
+from imuarray.firstorder.correct import corrected, rails_shown
 from imuarray.motion import normal_motion
 from imuarray.recording import read_recording, write_recording
+from imuarray.recording.record import CORRECTION
 from imuarray.simulation.measure import measure
 from tests.test_bound import model
 from tests.test_recording import make
@@ -68,6 +70,34 @@ def test_samples_with_an_accelerometer_at_its_rail_are_left_out(files, tmp_path)
     with xr.open_dataset(out) as found:
         lost = np.isnan(found.angular_rate.to_numpy()).all(axis=1)
         assert np.flatnonzero(lost).tolist() == [7] and not found.converged[7]
+
+
+def test_an_axis_at_its_rail_does_not_leak_through_the_maps(files):
+    """A chip's axes are skew: corrected, each has a share of what a clipped one did not read."""
+    calibration, recording, motion = files
+    rng, own = np.random.default_rng(2), model()
+    force, rate, _ = measure(own, motion, own.array.relative, rng)
+    maps = np.eye(3) + 0.02 * rng.standard_normal((rate.shape[1], 3, 3))
+    inverse, nothing = np.linalg.inv(maps), np.zeros((rate.shape[1], 3))
+    raw = np.clip(corrected(maps, nothing, rate), -RAIL, RAIL)
+    parts = {"inverse": inverse, "offset": nothing, "offset_sd": nothing,
+             "offset_walk": nothing[:, 0]}  # fmt: skip
+    whole = replace(
+        read_recording(recording), specific_force=force,
+        angular_rate=corrected(inverse, nothing, raw),
+        angular_rate_saturated=rails_shown(inverse, np.abs(raw) >= RAIL),
+        correction=xr.Dataset({
+            f"{kind}_{name}": (CORRECTION[f"{kind}_{name}"], value)
+            for kind in ("accelerometer", "gyroscope") for name, value in parts.items()
+        }),
+    )  # fmt: skip
+    with xr.open_dataset(calibration) as found:
+        moved = imuarray.apply(found, whole)
+    z = (moved.angular_rate - motion.angular_rate) / moved.angular_rate_sd
+    over = np.abs(motion.angular_rate) > 0.9 * RAIL
+    off = over.any(axis=1)[:, None] & ~over
+    assert off.sum() > 20
+    assert np.sqrt(np.mean(z.to_numpy()[off] ** 2)) == pytest.approx(1.0, abs=0.3)
 
 
 def test_what_does_not_fit_is_refused(files, tmp_path, capsys):

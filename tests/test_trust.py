@@ -453,7 +453,7 @@ def jumped(recording, imu, by=(0.1, 0.1, 0.1)):
 @pytest.mark.parametrize("imu", [0, 2], ids=["the reference", "another"])
 def test_an_offset_that_jumps_is_named(sound, imu, monkeypatch):
     """It leaves hardly a residual: all parts of the recording fit, at other places of the IMU."""
-    monkeypatch.setattr(trust, "unsteady", lambda found, _: unsteady(found, True))
+    monkeypatch.setattr(trust, "unsteady", lambda found, *_: unsteady(found, True))
     found = imuarray.calibrate(jumped(sound, imu))
     assert found.attrs["residual_ratio"] < 1.5
     (reason,) = trust.reasons_of_calibration(jumped(sound, imu), found)
@@ -484,6 +484,8 @@ def test_whom_parts_of_a_recording_disagree_on(ratios, corrected, named):
     )
     found = unsteady(calibration, corrected)
     assert not found if named is None else f"the place of {named}, by" in found[0]
+    joint = unsteady(calibration, corrected, 2)
+    assert not joint if named is None else joint[0].startswith("the recordings disagree")
 
 
 def test_a_search_that_diverges_is_bad_input(monkeypatch, sound):

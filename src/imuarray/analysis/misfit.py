@@ -33,7 +33,12 @@ def unfitting(
     if not (whole > RESIDUAL or triads.get(worst, 0.0) > limit):
         return [], False
     named = told(suspects(moving))
-    cause = f"{', '.join(named)}?" if named else f"most at {worst}, {triads[worst]:.3g} times"
+    if named:
+        cause = f"{', '.join(named)}?"
+    elif triads.get(worst, 0.0) > limit:
+        cause = f"most at {worst}, {triads[worst]:.3g} times"
+    else:
+        cause = "in all alike, or only where one is at its rail"
     return [f"the residual is {whole:.3g} times the declared noise: {cause}"], bool(named)
 
 
@@ -60,7 +65,7 @@ def residuals(recording: Recording, calibration: xr.Dataset, places: Places) -> 
     return found
 
 
-def unsteady(calibration: xr.Dataset, corrected: bool) -> list[str]:
+def unsteady(calibration: xr.Dataset, corrected: bool, recordings: int = 1) -> list[str]:
     """IMUs on whose position parts of the recording disagree: it came loose, or its offset jumped.
 
     Where all do, it is the reference; if they are not ``corrected``, their scales do it as well.
@@ -80,10 +85,15 @@ def unsteady(calibration: xr.Dataset, corrected: bool) -> list[str]:
     if not len(found):
         return []
     named = " and ".join(found) if len(found) < 3 else f"{', '.join(found[:-1])} and {found[-1]}"
+    by = f"disagree on the place of IMU {named}, by {ratio.max():.2g} times what noise explains: "
+    if recordings > 1:
+        return [
+            f"the recordings {by}was it glued anew, or is one recording of another board? Calibrate"
+            " each alone, and compare (imuarray repeat)"
+        ]
     return [
-        f"parts of the recording disagree on the place of IMU {named}, by {ratio.max():.2g} times"
-        " what noise explains: did it come loose, or did its accelerometer's offset jump? imuarray"
-        " diagnose tells which"
+        f"parts of the recording {by}did it come loose, or did its accelerometer's offset jump?"
+        " imuarray diagnose tells which"
     ]
 
 

@@ -55,7 +55,8 @@ def reasons_of_poses(*several: Poses) -> list[str]:
     if ratio > POSES:
         found.append(
             f"the still poses fit {ratio:.2g} times worse than noise and a drift of offsets allow:"
-            " the board bent or was not still, or an offset jumped; sds do not cover that: record"
+            " the board bent or was not still, an offset jumped, a response is curved (imuarray"
+            " diagnose tells), or recordings are of other boards; sds do not cover that: record"
             " again"
         )
     scale = max((x.scale for x in several), key=lambda x: abs(x - 1) if x == x else 0.0)

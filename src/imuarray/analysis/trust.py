@@ -30,7 +30,8 @@ UNIT = re.compile(r"\bin \S+ declared ")  # in a reason that names a unit
 SHORT = 60.0  # s
 AS_READ = (
     "the recording is as read, and was corrected as the calibration's own was: offsets that have"
-    " changed since are not seen; correct it by its own still poses (imuarray first-order)"
+    " changed since are not seen; correct it by three still poses or more of its own (imuarray"
+    " first-order new.nc --with old.nc, the calibration's recording as read)"
 )
 
 
@@ -63,7 +64,7 @@ def reasons_of_calibration(
     ]
     if not judged:
         corrected = all(one.correction is not None for one in several)
-        judged = unsteady(calibration, corrected)
+        judged = unsteady(calibration, corrected, len(several))
     root = little or any(map(UNIT.search, found))
     return judged + ([] if root else _not_converged(calibration.attrs))
 
