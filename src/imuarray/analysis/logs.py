@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from imuarray.recording.rig import Rig, recording_of
 RECORDINGS = (".nc", ".nc4", ".h5")
 PACKETS = ".bin"
 RAIL = 1 - 1e-6  # of the range
-Read = TypeVar("Read", Log, Recording)
+READ = {"accelerometer": "specific_force", "gyroscope": "angular_rate"}
 SURE = 0.8  # of the rates' roughness is left at even instants; a motion too slow shows nothing
 LARGE = 0.5  # of the largest reading, from which an abrupt end is a rail and no rest
 
@@ -131,7 +131,7 @@ def _sampled(recording: Recording, lines: list[str]) -> Opened:
     from imuarray.alignment.found import JITTER
     from imuarray.alignment.stamps import SHORTEST, steadied
 
-    recording, more = _railed(recording)
+    recording, more = _railed_triads(recording)
     if len(recording.time) < SHORTEST:
         return Opened(recording, [*lines, *more])
     time, off = steadied(recording.time, recording.angular_rate.mean(axis=1), SURE)
@@ -166,22 +166,48 @@ def _require_own(log: Log) -> None:
             raise InputError(f"{log.label}: expected each reading once, found: {said[0]}")
 
 
-def _railed(log: Read) -> tuple[Read, list[str]]:
+def _railed(log: Log) -> tuple[Log, list[str]]:
     """With the rails that readings show within the declared ranges, and lines that say so."""
     ranges: dict[str, Any] = {}
     lines = []
-    whose = f"{log.label}: " if isinstance(log, Log) else ""
-    for kind, unit in (("accelerometer", "m/s^2"), ("gyroscope", "rad/s")):
-        values = log.specific_force if kind == "accelerometer" else log.angular_rate
-        limit, largest = getattr(log, f"{kind}_range"), np.abs(values).max()
-        channels = values.reshape(len(values), -1).T
-        found = [abs(end) for axis in channels for end in ends(axis)]
-        found = [end for end in found if LARGE * largest < end < RAIL * limit]
-        if found:
-            least = ranges[f"{kind}_range"] = min(found)
-            degrees = f" ({np.degrees(least):.4g} deg/s)" if kind == "gyroscope" else ""
-            lines.append(
-                f"{whose}{kind}: clipped at {least:.4g} {unit}{degrees}, within its declared range"
-                f" of {limit:.4g}: that is taken for its range"
-            )
+    for kind, name in READ.items():
+        limit, values = getattr(log, f"{kind}_range"), getattr(log, name)
+        least = _rail(values, limit, np.abs(values).max())
+        if least < limit:
+            ranges[f"{kind}_range"] = least
+            lines.append(_clipped(f"{log.label}: {kind}", kind, least, limit))
     return replace(log, **ranges), lines
+
+
+def _railed_triads(recording: Recording) -> tuple[Recording, list[str]]:
+    """The same of a board's triads, each with rails of its own."""
+    changed: dict[str, Any] = {}
+    lines = []
+    for kind, name in READ.items():
+        limit, values = getattr(recording, f"{kind}_range"), getattr(recording, name)
+        largest = np.abs(values).max(initial=0.0)
+        rails = np.array([_rail(own, limit, largest) for own in values.swapaxes(0, 1)])
+        if (rails == limit).all():
+            continue
+        known = getattr(recording, f"saturated_{kind}s")()
+        changed[f"{name}_saturated"] = known | (np.abs(values) >= RAIL * rails[:, None])
+        changed[f"{kind}_range"] = rails.max()
+        labels = getattr(recording, f"{kind}_labels")
+        for rail in np.unique(rails[rails < limit]):
+            whose = ", ".join(labels[k] for k in np.flatnonzero(rails == rail))
+            lines.append(_clipped(f"{kind} {whose}", kind, rail, limit))
+    return replace(recording, **changed), lines
+
+
+def _rail(values, limit: float, largest: float) -> float:
+    """The range that a triad's readings (T, 3) show, or that declared; rests are no rails."""
+    found = [abs(end) for axis in values.T for end in ends(axis)]
+    return min((end for end in found if LARGE * largest < end < RAIL * limit), default=limit)
+
+
+def _clipped(whose: str, kind: str, rail: float, limit: float) -> str:
+    unit = "m/s^2" if kind == "accelerometer" else f"rad/s ({np.degrees(rail):.4g} deg/s)"
+    return (
+        f"{whose}: clipped at {rail:.4g} {unit}, within its declared range of {limit:.4g}: that is"
+        " taken for its range"
+    )
