@@ -32,10 +32,10 @@ def answer(found: Board, folder: Path) -> list[str]:
     turned = said.turned(found)
     causes = turned if found.reasons else turned + said.causes(calibration)
     lines += [f"Least well known direction: {said.weakest(calibration)}.", said.facts(found)]
-    few = len(found.account) <= CAUSES
-    lines += (
-        found.account if few else [f"What became of the logs: {len(found.account)} lines there."]
-    )
+    if len(found.account) <= CAUSES:
+        lines += found.account
+    else:
+        lines.append(f"What became of the logs ({len(found.account)} lines) is on the page.")
     lines += causes[:CAUSES]
     if len(causes) > CAUSES:
         lines.append(f"What else the sensors do ({len(causes) - CAUSES} more) is on the page.")
