@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 import imuarray
+from imuarray.analysis.leak import less_leak_by_others
 from imuarray.cli import main
 from imuarray.firstorder.correct import corrected, rails_shown
 from imuarray.motion import normal_motion
@@ -93,6 +94,17 @@ def test_an_axis_at_its_rail_does_not_leak_through_the_maps(files):
     )  # fmt: skip
     with xr.open_dataset(calibration) as found:
         moved = imuarray.apply(found, whole)
+    # one chip's alone, whose rate the others know
+    raw[:, 1:] = corrected(maps, nothing, rate)[:, 1:]
+    railed = rails_shown(inverse, np.abs(raw) >= RAIL)
+    railed[:, 1:] = False
+    alone = replace(
+        whole, angular_rate=corrected(inverse, nothing, raw), angular_rate_saturated=railed
+    )
+    mended = less_leak_by_others(alone).angular_rate
+    left = np.where(railed, 0.0, mended - rate)
+    leaked = np.where(railed, 0.0, alone.angular_rate - rate)
+    assert np.abs(left).max() < 0.01 < 0.1 < np.abs(leaked).max()
     z = (moved.angular_rate - motion.angular_rate) / moved.angular_rate_sd
     over = np.abs(motion.angular_rate) > 0.9 * RAIL
     off = over.any(axis=1)[:, None] & ~over

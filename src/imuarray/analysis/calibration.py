@@ -11,6 +11,7 @@ import xarray as xr
 from imuarray.analysis import methods
 from imuarray.analysis.calibration_dataset import engine_dataset, papers_dataset, with_readings
 from imuarray.analysis.fitting import fitted
+from imuarray.analysis.leak import less_leak_by_others
 from imuarray.analysis.model import Say, assumed, model_of, require_together, silent, usable
 from imuarray.errors import InputError, require_one_of
 from imuarray.model.effects import DATA_EFFECTS
@@ -82,7 +83,8 @@ def calibrate(
     if model == "papers":
         dataset = _papers(recordings[0], method or methods.CALIBRATION[0], accelerometer_noise, say)
     else:
-        dataset = _engine(recordings, str(model), tuple(effects), say)
+        whole = [less_leak_by_others(one) for one in recordings]
+        dataset = _engine(whole, str(model), tuple(effects), say)
     if not all(np.isfinite(dataset[f"position{name}"]).all() for name in ("", "_covariance")):
         raise InputError("recording: expected one that determines the positions, found no solution")
     dataset = with_readings(dataset, recordings)

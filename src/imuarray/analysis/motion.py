@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis.checked import require_fit, require_labels
+from imuarray.analysis.leak import less_leak
 from imuarray.analysis.model import assumed, model_of
 from imuarray.errors import InputError
 from imuarray.firstorder.correct import corrected, nearest_rail, rails_shown
@@ -21,8 +22,6 @@ from imuarray.motion.state import UNITS
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording
 from imuarray.recording.record import CORRECTION
-
-AT_RAIL = 1e-4  # of a channel's largest reading
 
 
 def apply(
@@ -109,9 +108,8 @@ def _motion_of(calibration, recording: Recording, accelerometer_noise, origin) -
     except np.linalg.LinAlgError as error:
         raise InputError(f"expected a calibration that determines the motion: {error}") from None
     if saturated.any() and recording.correction is not None:
-        # the maps that first order took out mix a chip's axes: what one did not read, all lack
         rate = found.estimate.motion.angular_rate
-        whole, leak = _less_leak(recording, recording.correction, rate, saturated)
+        whole, leak = less_leak(recording, recording.correction, rate, saturated)
         spread = leak @ found.covariance[:, :3, :3] @ np.swapaxes(leak, 1, 2)
         found, anew = motion_under(calibration, whole, saturated, accelerometer_noise, origin)
         found.covariance[:, :3, :3] += np.nan_to_num(spread)
@@ -127,29 +125,6 @@ def _motion_of(calibration, recording: Recording, accelerometer_noise, origin) -
     dataset["gyroscope_at_rail"] = (("time",), saturated.any(axis=(1, 2)))
     dataset["accelerometer_at_rail"] = (("time",), railed)
     return dataset.assign_attrs(own_clocks=int(anew), late_s=_late(calibration))
-
-
-def _less_leak(
-    recording: Recording, correction: xr.Dataset, rate, saturated
-) -> tuple[Recording, np.ndarray]:
-    """As if axes at their rail had read the ``rate`` (T, 3): the others less what was missing.
-
-    And (T, 3, 3), by how much the mean of the gyroscopes changes with the rate of such axes.
-    """
-    inverse, offset = (correction[f"gyroscope_{x}"].values for x in ("inverse", "offset"))
-    maps = np.linalg.inv(inverse)
-    read, true = (
-        np.einsum("kij,tkj->tki", maps, x) + offset
-        for x in (recording.angular_rate, np.nan_to_num(rate)[:, None])
-    )
-    rail = (1 - AT_RAIL) * np.abs(read).max(axis=0)
-    at_rail = (np.abs(read) >= rail) & saturated.any(axis=2, keepdims=True)
-    short = np.where(at_rail & (np.abs(true) > np.abs(read)), true - read, 0.0)
-    free = ~saturated
-    mended = recording.angular_rate + free * np.einsum("kij,tkj->tki", inverse, short)
-    mixed = free[..., None] * inverse * at_rail[:, :, None]
-    leak = np.einsum("tkij,kjl->til", mixed, maps) / np.maximum(free.sum(axis=1), 1)[..., None]
-    return replace(recording, angular_rate=mended), leak
 
 
 def _late(calibration: xr.Dataset) -> float:
