@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from imuarray.firstorder.correct import COUPLED
+from imuarray.firstorder.correct import rails_shown
 from imuarray.recording import Recording
 
 
@@ -26,8 +26,7 @@ def less_leak(
         np.einsum("kij,tkj->tki", maps, x) + offset
         for x in (recording.angular_rate, np.asarray(rate)[:, None])
     )
-    shows = np.abs(inverse) > COUPLED  # as the flags have it
-    at_rail = np.einsum("kij,tki->tkj", shows.astype(np.int8), saturated.astype(np.int8)) > 0
+    at_rail = rails_shown(np.swapaxes(inverse, 1, 2), saturated)  # back to the chip's own axes
     short = np.where(at_rail & np.isfinite(true), true - read, 0.0)
     free = ~saturated
     mended = recording.angular_rate + free * np.einsum("kij,tkj->tki", inverse, short)
