@@ -15,7 +15,7 @@ SNAKEMAKE := $(BIN)/snakemake --cores $(CORES) $(SNAKEMAKE_ARGS)
 # Snakemake's jobs start `python` and `imuarray` by name.
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: help install run quick paper publish stale test test-slurm bench docs dist lint lock clean
+.PHONY: help install run quick paper publish crate test test-slurm bench docs dist lint lock clean
 .DEFAULT_GOAL := help
 
 help:
@@ -23,8 +23,8 @@ help:
 	@echo "make run     all results and figures at the default scale"
 	@echo "make quick   the same pipeline, smallest useful sizes"
 	@echo "make paper   the papers' own sizes (long)"
-	@echo "make publish all of paper_figures/ from one commit (hours), with what made it: published.csv"
-	@echo "make stale   which of paper_figures/ rest on code that has changed since; says so in published.csv"
+	@echo "make publish all of paper_figures/ (hours)"
+	@echo "make crate   results/ro-crate-metadata.json: what the results are, for an archive"
 	@echo "make test    the tests"
 	@echo "make test-slurm   the quick run through a Slurm of one node, brought up here (root, a container)"
 	@echo "make bench   the benchmarks"
@@ -35,18 +35,17 @@ help:
 	@echo "make clean   remove the environment and the caches, not the results"
 
 # The stamp is newer than the lock: nothing is installed again until the lock or the project changes.
-# The old environment goes first, so that `python3` below cannot be the one inside it.
+# What `make install` made is kept and added to.
 $(READY): requirements.lock pyproject.toml
-	rm -rf $(VENV)
 	@$(PYTHON) -c 'import sys; v = sys.version_info; v >= (3, 11) or sys.exit("imuarray: expected Python 3.11 or newer, found %d.%d; set PYTHON=..." % v[:2])'
-	$(PYTHON) -m venv $(VENV)
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $@
 
 # The versions of the lock; its hashes are for all of it. An environment that has the pipeline has the package.
 install:
-	@test -e $(READY) || { set -e; rm -rf $(VENV); $(PYTHON) -m venv $(VENV); \
+	@test -e $(READY) || { set -e; test -x $(BIN)/python || $(PYTHON) -m venv $(VENV); \
 	  grep -oE '^[A-Za-z0-9_.-]+==[^\]*' requirements.lock > $(VENV)/versions.txt; \
 	  $(BIN)/python -m pip install --quiet --disable-pip-version-check -c $(VENV)/versions.txt '.[ros]'; }
 	@echo "$(CURDIR)/$(BIN)/imuarray board log.csv --columns columns.yaml --gravity 9.81 --out answer/"
@@ -61,11 +60,10 @@ paper: $(READY)
 	$(SNAKEMAKE) --config scale=paper
 
 publish: $(READY)
-	$(BIN)/python workflow/published.py begin
 	$(SNAKEMAKE) publish
 
-stale: $(READY)
-	$(BIN)/python workflow/published.py stale
+crate: $(READY)
+	$(BIN)/python -m imuarray.pipeline.crate
 
 test: $(READY)
 	$(BIN)/python -m pytest -q -n $(CORES) --dist loadfile --no-loadscope-reorder $(PYTEST_ARGS)

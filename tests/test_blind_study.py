@@ -357,22 +357,23 @@ def test_figures_and_tables(tmp_path):
     given = {"rows": study_of_everything()}
     settings = {"scale": {"name": "quick"}, "seed": 1}
     for against in ("sigma", "amplitude"):
-        figure, bins = drawing.figure_blind_detection(given, against, settings)
-        assert set(bins.against) == {against}
+        draw, table = drawing.figure_blind_detection(given, against, settings)
+        figure = draw(table)
+        assert set(table.against.dropna()) == {against}
         titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
         assert len(titles) == len(CATALOGUE) + (against == "sigma")
         for axes in figure.axes[: len(titles)]:
             low, high = axes.get_xlim()
             assert high > 2.9 * low and len(axes.get_xticks())
-    figure, confusion = drawing.figure_blind_confusion(given, settings)
-    axes = figure.axes[0]
+    draw, confusion = drawing.figure_blind_confusion(given, settings)
+    axes = draw(confusion).axes[0]
     labels = [label.get_text() for label in axes.get_yticklabels()]
     struck = f"{drawing.STRUCK} ({3 * len(CATALOGUE)})"
     assert len(labels) == len(EFFECTS) + 2 and labels[-1] == struck
     cells = {(round(t.get_position()[0]), round(t.get_position()[1])) for t in axes.texts}
     assert len(cells) >= len(labels)
     paths = {kind: tmp_path / f"confusion.{kind}" for kind in ("pdf", "png", "csv")}
-    write_figure(figure, confusion, **paths)
+    write_figure(draw, confusion, **paths)
     assert all(path.stat().st_size > 1000 for path in paths.values())
     paths = {kind: tmp_path / f"bars.{kind}" for kind in ("csv", "tex", "md")}
     write_table(*blind_tables.table_blind_bars(given, settings), **paths)

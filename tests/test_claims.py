@@ -26,14 +26,23 @@ from imuarray.studies.checks import identifiability, marginalisation, proposal
 from imuarray.studies.checks.bound import bound_table
 from imuarray.studies.rate_error import accelerometers_only
 from imuarray.studies.settings2017 import magnitudes
+from tests.test_claims_measured import SETTINGS as MEASURED
+from tests.test_claims_measured import measured
 
 SAMPLES = (5, 50, 500)
-SDS = {"": 1.0, "simulation_": 100.0, "standin_": 100.0, "simulation_small_noise_": 3.0}
+SDS = {
+    "": 1.0,
+    "simulation_": 100.0,
+    "quiet_": 100.0,
+    "mine_": 100.0,
+    "simulation_small_noise_": 3.0,
+}
 
 
 @pytest.fixture(scope="module")
 def settings():
-    config = read_config("config.yaml")
+    config = read_config("config.yaml") | {"recordings": MEASURED["recordings"]}
+    config["experiment"]["recording"] = "mine"
     return config | {"scale": {"name": "made up", **config["scales"]["quick"]}}
 
 
@@ -158,7 +167,7 @@ def studies(settings):
 @pytest.fixture(scope="module")
 def results(settings):
     given = calibration(settings["paper2017"]) | bayes() | studies(settings)
-    return Results("/nowhere", settings, given)
+    return Results("/nowhere", settings, given | measured(residual=0.5, variance=0.1))
 
 
 @pytest.fixture(scope="module")
@@ -252,7 +261,7 @@ FLIPS = [
     ("2021-33", scaled("posterior/T50", "mean_m", "sd_m > 0", 5.0)),
     ("2021-37", scaled("posterior/T500", "truth_m", "sd_m > 0", lambda old: old + 1e-4)),
     ("2021-43", scaled("posterior/simulation_T5", "sd_m", "sd_m > 0", 0.2)),
-    ("2021-54", scaled("posterior/standin_T500", "truth_m", "axis == 'x'", lambda old: old - 1e-2)),
+    ("2021-54", scaled("posterior/quiet_T500", "truth_m", "axis == 'x'", lambda old: old - 1e-2)),
     ("2021-47", scaled("posterior/simulation_T500", "sd_m", "sd_m > 0", 20.0)),
 ]
 
@@ -274,7 +283,7 @@ def test_unconverged_chains_are_not_believed(results):
 
 @pytest.mark.parametrize("name", [f"2021-{n}" for n in (30, 31, 32, 33, 43, 45, 46, 47)])
 def test_fallback_is_named(results, name):
-    prefix = {"2021-45": "standin_", "2021-46": "standin_", "2021-47": "simulation_"}.get(name, "")
+    prefix = {"2021-45": "mine_", "2021-46": "mine_", "2021-47": "simulation_"}.get(name, "")
     assert "linearised" not in CLAIMS[name](results).remark
     change = replaced(f"posterior/{prefix}T50", converged=False, rhat_max=2.0)(results)
     remark = CLAIMS[name](results.replace(change)).remark

@@ -117,3 +117,12 @@ def test_model_from_a_position_list(config):
     config["array"] = {"positions": [[0, 0, 0], [0.02, 0, 0], [0, 0.02, 0]], "gyroscopes": 1}
     model = model_from(check_config(yaml.safe_load(yaml.safe_dump(config))))
     assert model.array.accelerometers == 3 and model.array.gyroscopes == 1
+
+
+def test_defaults_are_the_shipped_configuration(config):
+    """A module with `config: {}` gets what a clone has."""
+    assert check_config({}) == config
+    other = check_config({"noise": {"gyroscope_sd_dps": 0.1}, "scales": {"mine": {"threads": 1}}})
+    assert other["noise"] == config["noise"] | {"gyroscope_sd_dps": 0.1}
+    assert other["scales"]["mine"] == config["scales"]["default"] | {"threads": 1}
+    assert other["scales"]["quick"] == config["scales"]["quick"]

@@ -9,7 +9,6 @@ import yaml
 
 from imuarray.cli import main
 from imuarray.errors import InputError
-from imuarray.recording import published as remote
 from imuarray.recording import read_recording
 from imuarray.recording.table import read_csv
 
@@ -115,52 +114,3 @@ def test_bad_input_is_one_line_and_status_2(tmp_path, capsys, content, extra, wo
     assert main([*arguments, "--out", str(out), *extra]) == 2
     error = capsys.readouterr().err
     assert words in error and error.count("\n") == 1 and not out.exists()
-
-
-@pytest.fixture
-def source(monkeypatch):
-    """A published set of one small file."""
-    import hashlib
-
-    files = {"a/data.bin": hashlib.sha256(b"content").hexdigest()}
-    made = remote.Source("https://example.invalid/", files, "title", "licence")
-    monkeypatch.setitem(remote.SOURCES, "board", made)
-    monkeypatch.delenv(remote.MIRROR, raising=False)
-    return made
-
-
-def test_mirror_and_cache_are_used_where_the_checksum_is_right(source, tmp_path, monkeypatch):
-    def no_network(*_, **__):
-        raise AssertionError("the network was asked")
-
-    monkeypatch.setattr("pooch.retrieve", no_network)
-    place = tmp_path / "board" / "a" / "data.bin"
-    place.parent.mkdir(parents=True)
-    place.write_bytes(b"content")
-    assert remote.fetch("board", "a/data.bin", tmp_path) == place
-    monkeypatch.setenv(remote.MIRROR, str(tmp_path))
-    assert remote.fetch("board", "a/data.bin", tmp_path / "elsewhere") == place
-    place.write_bytes(b"other")
-    with pytest.raises(InputError, match="expected sha256"):
-        remote.fetch("board", "a/data.bin", tmp_path)
-
-
-def test_download_goes_to_the_folder(source, tmp_path, monkeypatch):
-    def retrieve(url, known_hash, fname, path, downloader):
-        assert url == "https://example.invalid/a/data.bin" and known_hash.startswith("sha256:")
-        Path(path).mkdir(parents=True)
-        (Path(path) / fname).write_bytes(b"content")
-
-    monkeypatch.setattr("pooch.retrieve", retrieve)
-    assert remote.fetch("board", "a/data.bin", tmp_path).read_bytes() == b"content"
-
-
-def test_out_of_reach_says_why(source, tmp_path, monkeypatch):
-    def retrieve(*_, **__):
-        raise OSError("no route\nto host")
-
-    monkeypatch.setattr("pooch.retrieve", retrieve)
-    with pytest.raises(InputError, match="IMUARRAY_MIRROR.*no route to host"):
-        remote.fetch("board", "a/data.bin", tmp_path)
-    with pytest.raises(InputError, match="expected any of"):
-        remote.fetch("board", "b", tmp_path)

@@ -7,6 +7,9 @@ from types import SimpleNamespace
 
 import pytest
 
+from imuarray.config import read_config
+from imuarray.pipeline.rules import read_by
+
 ROOT = Path(__file__).parents[1]
 SCRIPTS = ROOT / "workflow" / "scripts"
 PAGES = [SCRIPTS / "findings.typ", SCRIPTS / "findings_results.typ"]
@@ -28,23 +31,21 @@ def test_no_number_of_the_paper_is_typed_in():
 
 
 @pytest.fixture
-def typeset(tmp_path, monkeypatch):
+def typeset(tmp_path, committed):
     """Run the rule's script with the published files, one of them altered."""
     pytest.importorskip("typst")
-    monkeypatch.syspath_prepend(str(ROOT / "workflow"))
-    monkeypatch.syspath_prepend(str(SCRIPTS))
-    monkeypatch.chdir(ROOT)
-    from support import read_by
+    settings = read_config(ROOT / "config.yaml")
 
     def run(altered="", change=str):
-        data = [Path(path) for path in read_by(PAGES[1])]
+        data = [committed / name for name in read_by(PAGES[1].read_text(encoding="utf-8"))]
         if altered:
-            [place] = [path for path in data if path.name == altered]
-            (tmp_path / altered).write_text(change(place.read_text(encoding="utf-8")))
-            data[data.index(place)] = tmp_path / altered
+            text = (committed / altered).read_text(encoding="utf-8")
+            (tmp_path / altered).write_text(change(text), encoding="utf-8")
+            data[data.index(committed / altered)] = tmp_path / altered
+        given = SimpleNamespace(pages=PAGES, data=data, papers=ROOT / "CITATION.cff")
         snakemake = SimpleNamespace(
-            input=SimpleNamespace(pages=PAGES, data=data), output=[tmp_path / "findings.pdf"],
-            log=[tmp_path / "log"], params={}, rule="findings",
+            input=given, output=[tmp_path / "findings.pdf"], log=[tmp_path / "log"],
+            params={"settings": settings}, rule="findings",
         )  # fmt: skip
         runpy.run_path(str(SCRIPTS / "findings.py"), {"snakemake": snakemake})
         return (tmp_path / "findings.pdf").read_bytes()

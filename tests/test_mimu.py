@@ -1,6 +1,7 @@
 """The MIMU reader: whole files, every kind of damage, the published recordings."""
 
-import os
+import hashlib
+import lzma
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from imuarray.recording.mimu import read_mimu
 from imuarray.recording.mimu_recording import read_positions, to_recording
 from tests.mimu_writer import PERIOD, acknowledgement, packet, packets, readings
 
+DATA = Path(__file__).parents[1] / "data" / "mimu4444"
 REAL = {1: 37439, 2: 39301, 3: 37541, 4: 38238, 5: 37257}
 
 
@@ -115,18 +117,31 @@ def test_wrong_positions_are_one_line(tmp_path, text):
         read_positions(path)
 
 
+def test_a_compressed_file_reads_as_the_plain_one(tmp_path):
+    content = b"".join(packets(readings(np.random.default_rng(8), 60, 3)))
+    plain, packed = read_mimu(stored(tmp_path, content)), lzma.compress(content)
+    found = read_mimu(stored(tmp_path, packed))
+    np.testing.assert_array_equal(found.counts, plain.counts)
+    assert found.account == plain.account
+    with pytest.raises(InputError, match="expected a whole file compressed by xz"):
+        read_mimu(stored(tmp_path, packed[: len(packed) // 2]))
+
+
+@pytest.mark.parametrize("number", REAL)
+def test_the_recordings_are_the_published_ones(number):
+    """What is inside has the digest that the README gives."""
+    content = lzma.decompress((DATA / f"exp_{number}.bin.xz").read_bytes())
+    assert hashlib.sha256(content).hexdigest() in (DATA / "README.md").read_text("utf-8")
+
+
 @pytest.mark.parametrize("number", REAL)
 def test_the_published_recordings(number):
-    mirror = os.environ.get("IMUARRAY_MIRROR")
-    if not mirror:
-        pytest.skip("IMUARRAY_MIRROR does not say where the published recordings are")
-    folder = Path(mirror) / "mimu4444"
-    found = read_mimu(folder / f"exp_{number}" / "data.bin")
+    found = read_mimu(DATA / f"exp_{number}.bin.xz")
     assert len(found.counts) == REAL[number] and adds_up(found.account)
     counts = found.account.attributes()
     assert counts["packets_lost"] == counts["packets_bad"] == 0
     assert counts["packets_out_of_sequence"] == 0
-    positions, labels = read_positions(folder / "IMU_positions.csv")
+    positions, labels = read_positions(DATA / "IMU_positions.csv")
     np.testing.assert_allclose(positions, mimu4444_corners().positions)
     recording = to_recording(found, positions, labels)
     still = np.linalg.norm(recording.specific_force[:600].mean(axis=0), axis=1)

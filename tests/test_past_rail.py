@@ -13,7 +13,7 @@ from imuarray.analysis.known import fused
 from imuarray.analysis.past_rail import _choose, _hidden, past_rail
 from imuarray.cli import main
 from imuarray.errors import InputError
-from imuarray.figures.board import figure_past_rail, table_past_rail
+from imuarray.figures.board import draw_past_rail, table_past_rail
 from imuarray.model.names import parameter_names
 from tests import cases
 from tests.test_bound import model
@@ -57,7 +57,7 @@ def test_the_right_model_predicts_what_is_withheld(withheld, diagnosis):
     assert np.all(errors.calibrated < errors.clipped)
     board = table[table.model == "board"]
     assert np.all(np.abs(board.within_95 - 0.95) < 0.05)
-    figure = figure_past_rail(table, 300, ["a footer"])
+    figure = draw_past_rail(table, 300, ["a footer"])
     assert all(len(axes.lines) == 7 for axes in figure.axes)
     rows, _, _, notes = table_past_rail([table, table], ["a", "b"], "board")
     assert len(rows) == 4 and "without the withheld readings" in notes[0]

@@ -1,6 +1,4 @@
-"""A user's own recording through the pipeline, and what happens without the published ones."""
-
-import json
+"""A user's own recording through the pipeline."""
 
 import numpy as np
 import pandas as pd
@@ -49,6 +47,7 @@ def snakemake(directory, *arguments, **environment):
 def configure(directory, recordings):
     config = yaml.safe_load((ROOT / "config.yaml").read_text())
     config["recordings"] = recordings
+    config["experiment"]["recording"] = next(iter(recordings))
     (directory / "config.yaml").write_text(yaml.safe_dump(config))
 
 
@@ -75,18 +74,6 @@ def test_an_own_recording_goes_through_the_measured_rules(tmp_path):
     for name in ("residuals_one.png", "noise_two.pdf", "agreement_board.png"):
         assert (measured / "figures" / name).stat().st_size > 5000
     assert "| one | 1 |" in (measured / "tables" / "first_order_board.md").read_text()
-
-
-def test_without_the_published_recordings_one_line_says_so(tmp_path):
-    configure(tmp_path, {"far": {"published": "mimu4444/exp_1/data.bin"}})
-    # a mirror without the file, and no way out
-    proxy = {"https_proxy": "http://127.0.0.1:9", "HTTPS_PROXY": "http://127.0.0.1:9"}
-    done = snakemake(tmp_path, "measured", IMUARRAY_MIRROR=str(tmp_path / "empty"), **proxy)
-    assert done.returncode == 0, done.stderr[-3000:]
-    lines = [line for line in done.stderr.splitlines() if "measured part skipped for far" in line]
-    assert len(lines) == 1
-    table = json.loads((tmp_path / "results" / "measured" / "available.json").read_text())
-    assert table["available"] == {} and list(table["missing"]) == ["far"]
 
 
 def test_a_missing_own_file_stops_the_run(tmp_path):

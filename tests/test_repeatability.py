@@ -11,7 +11,7 @@ from imuarray.diagnosis.repeatability import (
     positions_agreement,
     recordings_table,
 )
-from imuarray.report.repeatability import repeatability_figure
+from imuarray.report.repeatability import figure_repeatability
 
 
 def document(rng, scale):
@@ -60,7 +60,8 @@ def test_a_cause_s_numbers_repeat_by_their_spread(documents):
 
 
 def test_the_figure_has_every_coordinate(documents):
-    figure = repeatability_figure(documents, positions_agreement(documents))
+    draw, table = figure_repeatability(documents, positions_agreement(documents), "board")
+    figure = draw(table)
     figure.draw_without_rendering()
     left = figure.axes[0]
     assert sum(len(line.get_ydata()) for line in left.lines if len(line.get_ydata()) > 2) == (

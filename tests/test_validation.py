@@ -168,7 +168,8 @@ def test_histogram_of_uniform_pit_values_is_flat():
     assert table.density.mean() == pytest.approx(1.0)
     assert np.abs((table.density - 1) / table.se).max() < 4.5
     settings = {"scale": {"name": "quick"}, "seed": 1}
-    figure, same = validation.figure_validation_ranks([values], settings)
+    draw, same = validation.figure_validation_ranks([values], settings)
+    figure = draw(same)
     pd.testing.assert_frame_equal(same, table)
     [panel] = [axes for axes in figure.axes if axes.get_visible()]
     assert panel.get_title() == "s, T = 5\nx, n = 400"

@@ -22,12 +22,14 @@ def read_config(path) -> dict:
 
 
 def check_config(config, where: str = "config") -> dict:
-    """The same configuration, after the schema and what the schema cannot say."""
+    """The configuration with the schema's defaults, after the schema and what it cannot say."""
     import jsonschema
 
     _check_numbers(config, where)
     with open(SCHEMA, encoding="utf-8") as handle:
-        validator = jsonschema.Draft202012Validator(yaml.safe_load(handle))
+        schema = yaml.safe_load(handle)
+    config = _completed(config, schema)
+    validator = jsonschema.Draft202012Validator(schema)
     fault = jsonschema.exceptions.best_match(validator.iter_errors(config))
     if fault is not None:
         place = ".".join(str(part) for part in fault.absolute_path) or "top level"
@@ -39,6 +41,31 @@ def check_config(config, where: str = "config") -> dict:
                            f"{where}: scales.{name}.{key}")  # fmt: skip
     _check_recordings(config, where)
     return config
+
+
+def _completed(given, schema: dict):
+    """What is ``given`` before the defaults of the schema, key by key.
+
+    A default stands for all that is below it: of an array or of recordings none is added to the
+    user's own. Those of scales are completed, too.
+    """
+    if not isinstance(given, dict):
+        return given
+    found = dict(given)
+    for key, child in schema.get("properties", {}).items():
+        if key == "scales" and isinstance(found.setdefault(key, {}), dict):
+            rest = child["default"]  # a new scale has what it does not say from the default one
+            both = {name: rest.get(name, rest["default"]) for name in rest | found[key]}
+            found[key] = {name: _over(found[key].get(name, {}), x) for name, x in both.items()}
+        elif "default" in child:
+            found.setdefault(key, child["default"])
+        elif "properties" in child:
+            found[key] = _completed(found.get(key, {}), child)
+    return found
+
+
+def _over(given, rest: dict):
+    return rest | given if isinstance(given, dict) else given
 
 
 def _check_numbers(value, where: str, place: tuple = ()) -> None:
@@ -59,13 +86,11 @@ def _check_numbers(value, where: str, place: tuple = ()) -> None:
 
 
 def _check_recordings(config, where) -> None:
-    """Each kind of file comes with what it takes to read it."""
-    needed = {".csv": "columns", ".bin": "positions", ".nc": None}
+    """Each kind of file comes with what it takes to read it, and the experiment is one of them."""
+    needed = {".csv": "columns", ".bin": "positions", ".bin.xz": "positions", ".nc": None}
     for name, entry in config["recordings"].items():
-        if "published" in entry:
-            continue
-        ending = Path(entry["file"]).suffix.lower()
-        if ending not in needed:
+        ending = next((x for x in needed if entry["file"].lower().endswith(x)), None)
+        if ending is None:
             raise InputError(
                 f"{where}: recordings.{name}.file: expected a file that ends in"
                 f" {', '.join(needed)}, found {entry['file']}"
@@ -75,6 +100,8 @@ def _check_recordings(config, where) -> None:
                 f"{where}: recordings.{name}: expected '{needed[ending]}' beside a {ending} file,"
                 " found none"
             )
+    found = config["experiment"]["recording"]
+    require_one_of(f"{where}: experiment.recording", found, config["recordings"])
 
 
 def _check_lengths(lengths, samples, draws, where) -> None:
@@ -117,12 +144,13 @@ def describe_schema() -> str:
     lines = [
         "# Configuration",
         "",
-        "`config.yaml` at the top is the one file to edit. Made from",
-        "`workflow/schemas/config.schema.yaml` by `python -m imuarray.config`; a test keeps the",
-        "two in step. Unknown keys are errors.",
+        "`config.yaml` at the top is the one file to edit; `config/config.yaml`, where the",
+        "Snakemake workflow catalog and `snakedeploy` look for it, is a link to it. What it leaves",
+        "out has the default. Made from `workflow/schemas/config.schema.yaml` by",
+        "`python -m imuarray.config`; a test keeps the three in step. Unknown keys are errors.",
         "",
-        "| key | meaning |",
-        "|---|---|",
+        "| key | meaning | default |",
+        "|---|---|---|",
     ]
     return "\n".join([*lines, *_rows(schema, schema["$defs"], "")]) + "\n"
 
@@ -133,7 +161,8 @@ def _rows(node, shared, prefix):
         target = shared.get(child.get("$ref", "").rpartition("/")[2], {})
         whole = {**target, **child}
         choices = f" (one of {', '.join(whole['enum'])})" if "enum" in whole else ""
-        yield f"| `{prefix}{name}` | {whole.get('description', 'section')}{choices} |"
+        default = "" if isinstance(whole.get("default", {}), dict) else f"`{whole['default']}`"
+        yield f"| `{prefix}{name}` | {whole.get('description', 'section')}{choices} | {default} |"
         yield from _rows(whole, shared, f"{prefix}{name}.")
         if isinstance(whole.get("additionalProperties"), dict):
             yield from _rows(whole["additionalProperties"], shared, f"{prefix}{name}.NAME.")

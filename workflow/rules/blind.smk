@@ -11,7 +11,7 @@ rule blind_diagnose:
     params:
         settings=lambda wc: blind_settings(config, wc.scale),
         batches=lambda wc: config["scales"][wc.scale]["blind_batches"],
-        code=CODE.digest("blind_diagnose"),
+        code=code("blind_diagnose"),
     message:
         "blind study: diagnoses, batch {wildcards.batch} ({wildcards.scale})"
     script:
@@ -35,7 +35,7 @@ rule blind_grade:
         mem_mb=4000,
     params:
         settings=lambda wc: blind_settings(config, wc.scale),
-        code=CODE.digest("blind_grade"),
+        code=code("blind_grade"),
     message:
         "blind study: grades ({wildcards.scale})"
     script:
@@ -59,13 +59,13 @@ rule figure_blind_detection:
     wildcard_constraints:
         against="sigma|amplitude",
     params:
+        **by("figures.blind.figure_blind_detection"),
         settings=lambda wc: blind_settings(config, wc.scale),
         against=lambda wc: wc.against,
-        code=CODE.digest("figure_blind_detection"),
     message:
         "figure: blind study, detection over {wildcards.against} ({wildcards.scale})"
     script:
-        "../scripts/figure_blind_detection.py"
+        "../scripts/publish.py"
 
 
 rule figure_blind_confusion:
@@ -78,12 +78,12 @@ rule figure_blind_confusion:
     benchmark:
         "results/blind/{scale}/benchmarks/figures/blind_confusion.tsv"
     params:
+        **by("figures.blind.figure_blind_confusion"),
         settings=lambda wc: blind_settings(config, wc.scale),
-        code=CODE.digest("figure_blind_confusion"),
     message:
         "figure: blind study, confusion ({wildcards.scale})"
     script:
-        "../scripts/figure_blind_confusion.py"
+        "../scripts/publish.py"
 
 
 rule table_blind_bars:
@@ -96,12 +96,12 @@ rule table_blind_bars:
     benchmark:
         "results/blind/{scale}/benchmarks/tables/blind_bars.tsv"
     params:
+        **by("figures.blind_tables.table_blind_bars"),
         settings=lambda wc: blind_settings(config, wc.scale),
-        code=CODE.digest("table_blind_bars"),
     message:
         "table: blind study, acceptance criteria ({wildcards.scale})"
     script:
-        "../scripts/table_blind_bars.py"
+        "../scripts/publish.py"
 
 
 rule table_blind_gain:
@@ -114,9 +114,9 @@ rule table_blind_gain:
     benchmark:
         "results/blind/{scale}/benchmarks/tables/blind_gain.tsv"
     params:
+        **by("figures.blind_tables.table_blind_gain"),
         settings=lambda wc: blind_settings(config, wc.scale),
-        code=CODE.digest("table_blind_gain"),
     message:
         "table: blind study, gain ({wildcards.scale})"
     script:
-        "../scripts/table_blind_gain.py"
+        "../scripts/publish.py"

@@ -1,3 +1,7 @@
+# what each study of position errors depends on
+STUDIES = {"samples": "paper2017.fig4", "motion": "paper2017.fig5", "force": "paper2017"}
+
+
 rule position_error_part:
     output:
         "results/{scale}/calibration/parts/{study}_{part}.npz",
@@ -10,9 +14,9 @@ rule position_error_part:
     resources:
         runtime=90,
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017"),
+        settings=lambda wc: effective(config, wc.scale, STUDIES[wc.study]),
         parts=lambda wc: CORES.parts(wc.scale, wc.study),
-        code=CODE.digest("position_error_part"),
+        code=code("position_error_part"),
     message:
         "position error of 2017 over {wildcards.study}, part {wildcards.part} ({wildcards.scale})"
     script:
@@ -32,8 +36,8 @@ rule position_error:
     benchmark:
         "results/{scale}/benchmarks/calibration/position_error_{study}.tsv"
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017"),
-        code=CODE.digest("position_error"),
+        settings=lambda wc: effective(config, wc.scale, STUDIES[wc.study]),
+        code=code("position_error"),
     message:
         "position error of 2017 over {wildcards.study} ({wildcards.scale})"
     script:
@@ -51,8 +55,8 @@ rule rate_error:
     resources:
         runtime=90,
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017"),
-        code=CODE.digest("rate_error"),
+        settings=lambda wc: effective(config, wc.scale, "paper2017.fig3"),
+        code=code("rate_error"),
     message:
         "angular rate error of 2017 ({wildcards.scale})"
     script:

@@ -19,7 +19,7 @@ rule buy_causes:
         mem_mb=4000,
     params:
         entry=lambda wc: RECORDINGS[wc.name],
-        code=CODE.digest("buy_causes"),
+        code=code("buy_causes"),
     message:
         "what each cause buys on {wildcards.name}"
     script:
@@ -37,7 +37,7 @@ rule repeat_causes:
         "results/measured/benchmarks/causes_{group}.tsv"
     params:
         names=lambda wc: MEASURED.board(wc.group),
-        code=CODE.digest("repeat_causes"),
+        code=code("repeat_causes"),
     message:
         "how positions of {wildcards.group} repeat under each model"
     script:
@@ -54,11 +54,11 @@ rule figure_causes:
     benchmark:
         "results/measured/benchmarks/figures/causes_{group}.tsv"
     params:
-        code=CODE.digest("figure_causes"),
+        **by("figures.board.figure_causes"),
     message:
         "figure: what each cause buys on {wildcards.group}"
     script:
-        "../scripts/figure_causes.py"
+        "../scripts/publish.py"
 
 
 rule table_causes:
@@ -71,11 +71,11 @@ rule table_causes:
     benchmark:
         "results/measured/benchmarks/tables/causes_{group}.tsv"
     params:
-        code=CODE.digest("table_causes"),
+        **by("figures.board.table_causes"),
     message:
         "table: what each cause buys on {wildcards.group}"
     script:
-        "../scripts/table_causes.py"
+        "../scripts/publish.py"
 
 
 # Leave one recording out: what the others say of the board, and of this one.
@@ -97,7 +97,7 @@ rule leave_out:
         mem_mb=4000,
     params:
         entry=lambda wc: RECORDINGS[wc.name],
-        code=CODE.digest("leave_out"),
+        code=code("leave_out"),
     message:
         "the board of {wildcards.name} as the other recordings show it"
     script:
@@ -118,7 +118,7 @@ rule predict_left_out:
     resources:
         mem_mb=4000,
     params:
-        code=CODE.digest("predict_left_out"),
+        code=code("predict_left_out"),
     message:
         "what the other recordings say of {wildcards.name}"
     script:
@@ -137,12 +137,12 @@ rule table_left_out:
     benchmark:
         "results/measured/benchmarks/tables/left_out_{group}.tsv"
     params:
+        **by("figures.board.table_left_out"),
         names=lambda wc: MEASURED.board(wc.group),
-        code=CODE.digest("table_left_out"),
     message:
         "table: recordings of {wildcards.group} predicted by the others"
     script:
-        "../scripts/table_left_out.py"
+        "../scripts/publish.py"
 
 
 # Paper 2021's experiment once more, with the sensors as the other recordings show them.
@@ -161,7 +161,7 @@ rule locate_experiment:
         mem_mb=4000,
     params:
         samples=SAMPLES,
-        code=CODE.digest("locate_experiment"),
+        code=code("locate_experiment"),
     message:
         "positions from few samples of {wildcards.name}, sensors known"
     script:
@@ -179,12 +179,12 @@ rule figure_experiment:
     benchmark:
         "results/measured/benchmarks/figures/experiment_{name}.tsv"
     params:
+        **by("figures.paper2021_array.figure_experiment"),
         settings=effective(config, config["scale"], "paper2021", "experiment"),
-        code=CODE.digest("figure_experiment"),
     message:
         "figure 5 of 2021 once more, from {wildcards.name} with sensors known"
     script:
-        "../scripts/figure_experiment.py"
+        "../scripts/publish.py"
 
 
 rule table_experiment:
@@ -200,12 +200,12 @@ rule table_experiment:
     benchmark:
         "results/measured/benchmarks/tables/experiment_{group}.tsv"
     params:
+        **by("figures.board.table_experiment"),
         names=lambda wc: MEASURED.board(wc.group),
-        code=CODE.digest("table_experiment"),
     message:
         "table II of 2021 once more, {wildcards.group}"
     script:
-        "../scripts/table_experiment.py"
+        "../scripts/publish.py"
 
 
 rule figure_past_rail:
@@ -221,7 +221,7 @@ rule figure_past_rail:
     resources:
         mem_mb=4000,
     params:
-        code=CODE.digest("figure_past_rail"),
+        code=code("figure_past_rail"),
     message:
         "motion of {wildcards.name} past the rail"
     script:
@@ -240,9 +240,9 @@ rule table_past_rail:
     benchmark:
         "results/measured/benchmarks/tables/past_rail_{group}.tsv"
     params:
+        **by("figures.board.table_past_rail"),
         names=lambda wc: MEASURED.board(wc.group),
-        code=CODE.digest("table_past_rail"),
     message:
         "table: recordings of {wildcards.group} past the rail"
     script:
-        "../scripts/table_past_rail.py"
+        "../scripts/publish.py"

@@ -16,7 +16,7 @@ rule claims_identifiability:
         "results/{scale}/benchmarks/claims/identifiability.tsv"
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017"),
-        code=CODE.digest("claims_identifiability"),
+        code=code("claims_identifiability"),
     message:
         "claims: identifiability ({wildcards.scale})"
     script:
@@ -32,7 +32,7 @@ rule claims_position_bound:
         "results/{scale}/benchmarks/claims/position_bound.tsv"
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017"),
-        code=CODE.digest("claims_position_bound"),
+        code=code("claims_position_bound"),
     message:
         "claims: bound of the positions ({wildcards.scale})"
     script:
@@ -48,7 +48,7 @@ rule claims_accelerometers_only:
         "results/{scale}/benchmarks/claims/accelerometers_only.tsv"
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017"),
-        code=CODE.digest("claims_accelerometers_only"),
+        code=code("claims_accelerometers_only"),
     message:
         "claims: accelerometers only ({wildcards.scale})"
     script:
@@ -66,7 +66,7 @@ rule claims_marginalisation:
         "results/{scale}/benchmarks/claims/marginalisation.tsv"
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2021"),
-        code=CODE.digest("claims_marginalisation"),
+        code=code("claims_marginalisation"),
     message:
         "claims: marginalisation ({wildcards.scale})"
     script:
@@ -87,7 +87,7 @@ rule claims_linearised:
         settings=lambda wc: effective(config, wc.scale, "paper2021", "experiment"),
         names=SIMULATED,
         kinds=KINDS,
-        code=CODE.digest("claims_linearised"),
+        code=code("claims_linearised"),
     message:
         "claims: linearised model ({wildcards.scale})"
     script:
@@ -107,7 +107,7 @@ rule claims_timing:
         "results/{scale}/benchmarks/claims/timing.tsv"
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017", "paper2021"),
-        code=CODE.digest("claims_timing"),
+        code=code("claims_timing"),
     message:
         "claims: timing ({wildcards.scale})"
     script:
@@ -135,7 +135,6 @@ rule claims:
             "results/{{scale}}/posterior/{name}.{kind}", name=POSTERIORS, kind=["csv", "json"]
         ),
         chains=expand("results/{{scale}}/chains/{name}.nc", name=POSTERIORS),
-        benchmarks=expand("results/{{scale}}/benchmarks/chains/T{samples}.tsv", samples=SAMPLES),
         burn_in=expand("results/{{scale}}/posterior/burn_in_T{samples}.csv", samples=SAMPLES),
         identifiability="results/{scale}/claims/identifiability.json",
         ranks="results/{scale}/claims/ranks.csv",
@@ -165,9 +164,7 @@ rule claims:
         settings=lambda wc: effective(
             config, wc.scale, "paper2017", "paper2021", "experiment", "recordings"
         ),
-        experiment=lambda wc: MEASURED.experiment(wc.scale),
-        simulation=lambda wc: MEASURED.simulation(wc.scale),
-        code=CODE.digest("claims"),
+        code=code("claims"),
     message:
         "claims: verdicts ({wildcards.scale})"
     script:

@@ -21,7 +21,7 @@ rule diagnose_recording:
         runtime=60,
     params:
         settings=lambda wc: {"seed": config["seed"]},
-        code=CODE.digest("diagnose_recording"),
+        code=code("diagnose_recording"),
     message:
         "diagnosis of {wildcards.name}"
     script:
@@ -43,7 +43,7 @@ rule diagnosis_agreement:
     benchmark:
         "results/measured/benchmarks/diagnosis_{group}.tsv"
     params:
-        code=CODE.digest("diagnosis_agreement"),
+        code=code("diagnosis_agreement"),
     message:
         "diagnoses of {wildcards.group}, compared"
     script:
@@ -64,7 +64,7 @@ rule add_effect:
         effect="[a-z_]+",
     params:
         settings=lambda wc: {"seed": config["seed"]},
-        code=CODE.digest("add_effect"),
+        code=code("add_effect"),
     message:
         "{wildcards.effect} added to {wildcards.name}"
     script:
@@ -104,8 +104,8 @@ rule table_added:
     benchmark:
         "results/measured/benchmarks/added/{name}.tsv"
     params:
-        code=CODE.digest("table_added"),
+        **by("figures.blind_tables.table_added"),
     message:
         "table: effects added to {wildcards.name}"
     script:
-        "../scripts/table_added.py"
+        "../scripts/publish.py"

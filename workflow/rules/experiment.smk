@@ -14,7 +14,7 @@ rule sample_experiment:
         runtime=60,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017", "paper2021", "experiment"),
-        code=CODE.digest("sample_experiment"),
+        code=code("sample_experiment"),
     message:
         "chains of the experiment: {wildcards.kind} ({wildcards.scale})"
     script:
@@ -39,7 +39,7 @@ rule judge_experiment:
         mem_mb=4000,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017", "paper2021", "experiment"),
-        code=CODE.digest("judge_chains"),
+        code=code("judge_chains"),
     message:
         "chains of {wildcards.kind}: burn-in, R-hat, effective sample size ({wildcards.scale})"
     script:

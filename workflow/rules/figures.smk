@@ -1,14 +1,7 @@
-from imuarray.figures.notes import SOURCES
-
-MEASURED_SHOWN = [
-    "measured_residuals",
-    "measured_agreement",
-    "measured_noise",
-    "measured_first_order_table",
-    "measured_agreement_table",
+SHOWN_CAPTIONS = [
+    workflow.source_path(f"../report/{name}.rst")
+    for name in [*FIGURES, *TABLES, *MEASURED.published()]
 ]
-SHOWN = [*FIGURES, *TABLES, *MEASURED_SHOWN]
-CAPTIONS = [workflow.source_path(f"../report/{name}.rst") for name in SHOWN]
 
 
 rule figure_2017_fig3:
@@ -21,12 +14,12 @@ rule figure_2017_fig3:
     benchmark:
         "results/{scale}/benchmarks/figures/2017_fig3.tsv"
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017"),
-        code=CODE.digest("figure_2017_fig3"),
+        **by("figures.paper2017.figure_2017_fig3"),
+        settings=lambda wc: effective(config, wc.scale, "paper2017.fig3"),
     message:
         "figure 3 of 2017 ({wildcards.scale})"
     script:
-        "../scripts/figure_2017_fig3.py"
+        "../scripts/publish.py"
 
 
 rule figure_2017_fig4:
@@ -39,12 +32,12 @@ rule figure_2017_fig4:
     benchmark:
         "results/{scale}/benchmarks/figures/2017_fig4.tsv"
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017"),
-        code=CODE.digest("figure_2017_fig4"),
+        **by("figures.paper2017.figure_2017_fig4"),
+        settings=lambda wc: effective(config, wc.scale, "paper2017.fig4"),
     message:
         "figure 4 of 2017 ({wildcards.scale})"
     script:
-        "../scripts/figure_2017_fig4.py"
+        "../scripts/publish.py"
 
 
 rule figure_2017_fig5:
@@ -57,12 +50,12 @@ rule figure_2017_fig5:
     benchmark:
         "results/{scale}/benchmarks/figures/2017_fig5.tsv"
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017"),
-        code=CODE.digest("figure_2017_fig5"),
+        **by("figures.paper2017.figure_2017_fig5"),
+        settings=lambda wc: effective(config, wc.scale, "paper2017.fig5"),
     message:
         "figure 5 of 2017 ({wildcards.scale})"
     script:
-        "../scripts/figure_2017_fig5.py"
+        "../scripts/publish.py"
 
 
 rule figure_2021_fig1:
@@ -73,12 +66,12 @@ rule figure_2021_fig1:
     benchmark:
         "results/{scale}/benchmarks/figures/2021_fig1.tsv"
     params:
+        **by("figures.paper2021_array.figure_2021_fig1"),
         settings=lambda wc: effective(config, wc.scale),
-        code=CODE.digest("figure_2021_fig1"),
     message:
         "figure 1 of 2021 ({wildcards.scale})"
     script:
-        "../scripts/figure_2021_fig1.py"
+        "../scripts/publish.py"
 
 
 rule figure_2021_fig2:
@@ -91,12 +84,12 @@ rule figure_2021_fig2:
     benchmark:
         "results/{scale}/benchmarks/figures/2021_fig2.tsv"
     params:
+        **by("figures.paper2021.figure_2021_fig2"),
         settings=lambda wc: effective(config, wc.scale, "paper2021"),
-        code=CODE.digest("figure_2021_fig2"),
     message:
         "figure 2 of 2021 ({wildcards.scale})"
     script:
-        "../scripts/figure_2021_fig2.py"
+        "../scripts/publish.py"
 
 
 rule figure_2021_fig3:
@@ -111,12 +104,12 @@ rule figure_2021_fig3:
     benchmark:
         "results/{scale}/benchmarks/figures/2021_fig3.tsv"
     params:
+        **by("figures.paper2021.figure_2021_fig3"),
         settings=lambda wc: effective(config, wc.scale, "paper2021"),
-        code=CODE.digest("figure_2021_fig3"),
     message:
         "figure 3 of 2021 ({wildcards.scale})"
     script:
-        "../scripts/figure_2021_fig3.py"
+        "../scripts/publish.py"
 
 
 rule figure_2021_fig4:
@@ -131,26 +124,20 @@ rule figure_2021_fig4:
     benchmark:
         "results/{scale}/benchmarks/figures/2021_fig4.tsv"
     params:
+        **by("figures.paper2021.figure_2021_fig4"),
         settings=lambda wc: effective(config, wc.scale, "paper2021"),
-        code=CODE.digest("figure_2021_fig4"),
     message:
         "figure 4 of 2021 ({wildcards.scale})"
     script:
-        "../scripts/figure_2021_fig4.py"
+        "../scripts/publish.py"
 
 
 rule figure_2021_fig5:
     input:
-        chains=lambda wc: MEASURED.posterior(
-            wc.scale, MEASURED.experiment(wc.scale), "chains", ["nc"]
-        ),
-        verdicts=lambda wc: MEASURED.posterior(
-            wc.scale, MEASURED.experiment(wc.scale), "posterior", ["json"]
-        ),
-        coordinates=lambda wc: MEASURED.posterior(
-            wc.scale, MEASURED.experiment(wc.scale), "posterior", ["csv"]
-        ),
-        recordings=lambda wc: MEASURED.recordings(wc.scale),
+        chains=lambda wc: MEASURED.posterior(wc.scale, SHOWN, "chains", ["nc"]),
+        verdicts=lambda wc: MEASURED.posterior(wc.scale, SHOWN, "posterior", ["json"]),
+        coordinates=lambda wc: MEASURED.posterior(wc.scale, SHOWN, "posterior", ["csv"]),
+        recordings=MEASURED.subsets(),
     output:
         **figure("2021_fig5", "Paper 2021"),
     log:
@@ -158,14 +145,12 @@ rule figure_2021_fig5:
     benchmark:
         "results/{scale}/benchmarks/figures/2021_fig5.tsv"
     params:
+        **by("figures.paper2021_array.figure_2021_fig5"),
         settings=lambda wc: effective(config, wc.scale, "paper2021", "experiment"),
-        kind=lambda wc: MEASURED.source(wc.scale),
-        source=lambda wc: MEASURED.label(wc.scale, SOURCES),
-        code=CODE.digest("figure_2021_fig5"),
     message:
         "figure 5 of 2021 ({wildcards.scale})"
     script:
-        "../scripts/figure_2021_fig5.py"
+        "../scripts/publish.py"
 
 
 rule table_2021_table1:
@@ -179,21 +164,19 @@ rule table_2021_table1:
     benchmark:
         "results/{scale}/benchmarks/tables/2021_table1.tsv"
     params:
+        **by("figures.paper2021_tables.table_2021_table1"),
         settings=lambda wc: effective(config, wc.scale, "paper2021"),
-        code=CODE.digest("table_2021_table1"),
     message:
         "table I of 2021 ({wildcards.scale})"
     script:
-        "../scripts/table_2021_table1.py"
+        "../scripts/publish.py"
 
 
 rule table_2021_table2:
     input:
-        experiment=lambda wc: MEASURED.posterior(
-            wc.scale, MEASURED.experiment(wc.scale), "posterior", ["csv", "json"]
-        ),
+        experiment=lambda wc: MEASURED.posterior(wc.scale, SHOWN, "posterior", ["csv", "json"]),
         simulation=lambda wc: MEASURED.posterior(
-            wc.scale, MEASURED.simulation(wc.scale), "posterior", ["csv", "json"]
+            wc.scale, f"simulated_{SHOWN}", "posterior", ["csv", "json"]
         ),
         ideal=expand(
             "results/{{scale}}/posterior/T{samples}.{form}", samples=SAMPLES, form=["csv", "json"]
@@ -205,14 +188,12 @@ rule table_2021_table2:
     benchmark:
         "results/{scale}/benchmarks/tables/2021_table2.tsv"
     params:
+        **by("figures.paper2021_tables.table_2021_table2"),
         settings=lambda wc: effective(config, wc.scale, "paper2021", "experiment"),
-        kind=lambda wc: MEASURED.source(wc.scale),
-        source=lambda wc: MEASURED.label(wc.scale, SOURCES),
-        code=CODE.digest("table_2021_table2"),
     message:
         "table II of 2021 ({wildcards.scale})"
     script:
-        "../scripts/table_2021_table2.py"
+        "../scripts/publish.py"
 
 
 rule gallery:
@@ -223,11 +204,14 @@ rule gallery:
         verdicts=expand(
             "results/{scale}/posterior/T{samples}.json", scale=config["scale"], samples=SAMPLES
         ),
-        experiment=lambda wc: MEASURED.posterior(
-            config["scale"], MEASURED.experiment(config["scale"]), "posterior", ["json"]
-        ),
-        measured=lambda wc: MEASURED.published_files(config["scale"]),
-        captions=CAPTIONS,
+        experiment=MEASURED.posterior(config["scale"], SHOWN, "posterior", ["json"]),
+        measured=[
+            f"paper_figures/{name}.{kind}"
+            for folder, kinds in (("figures", FIGURE), ("tables", TABLE))
+            for name in MEASURED.published_names(folder)
+            for kind in kinds
+        ],
+        captions=SHOWN_CAPTIONS,
     output:
         "paper_figures/README.md",
     log:
@@ -236,12 +220,9 @@ rule gallery:
         "results/benchmarks/publish/README.tsv"
     params:
         settings=effective(config, config["scale"], "paper2017", "paper2021", "experiment"),
-        figures=FIGURES,
-        tables=TABLES,
-        measured=lambda wc: MEASURED.published_names(config["scale"], "figures"),
-        measured_tables=lambda wc: MEASURED.published_names(config["scale"], "tables"),
-        source=lambda wc: MEASURED.label(config["scale"], SOURCES),
-        code=CODE.digest("gallery"),
+        figures=[*FIGURES, *MEASURED.published_names("figures")],
+        tables=[*TABLES, *MEASURED.published_names("tables")],
+        code=code("gallery"),
     message:
         "paper_figures/README.md"
     script:

@@ -1,11 +1,14 @@
-PAGES = [f"{ROOT}/workflow/scripts/{name}.typ" for name in ("findings", "findings_results")]
+PAGES = [
+    workflow.source_path(f"../scripts/{name}.typ") for name in ("findings", "findings_results")
+]
 
 
 # A paper of four pages; every number and figure in it is read from the published files.
 rule findings:
     input:
         pages=PAGES,
-        data=read_by(PAGES[1]),
+        papers=workflow.source_path("../../CITATION.cff"),
+        data=expand("paper_figures/{name}", name=read_by(text_of("scripts/findings_results.typ"))),
     output:
         "paper_figures/findings.pdf",
     log:
@@ -13,7 +16,8 @@ rule findings:
     benchmark:
         "results/benchmarks/publish/findings.tsv"
     params:
-        code=CODE.digest("findings"),
+        settings=config,
+        code=code("findings"),
     message:
         "{output}"
     script:

@@ -1,28 +1,35 @@
 RECORDINGS = config["recordings"]
 
 
-# The published files may be out of reach: the rest is done without them, and one line says so.
-# What was missing is tried again at the next run.
-checkpoint fetch_recordings:
-    output:
-        "results/measured/available.json",
-    log:
-        "results/measured/logs/fetch_recordings.log",
-    benchmark:
-        "results/measured/benchmarks/fetch_recordings.tsv"
-    priority: 9  # the second longest path
-    params:
-        recordings=RECORDINGS,
-        attempt=attempt("results/measured/available.json"),
-    message:
-        "measured recordings, fetched"
-    script:
-        "../scripts/fetch_recordings.py"
+if not HOME.is_local:
+
+    # Read from a repository afar, the workflow takes its recordings out of it.
+    rule take_recording:
+        output:
+            "results/measured/data/{path}",
+        log:
+            "results/measured/logs/data/{path}.log",
+        benchmark:
+            "results/measured/benchmarks/data/{path}.tsv"
+        wildcard_constraints:
+            path="data/.*",
+        params:
+            blob=lambda wc: HOME.blob(wc.path),
+        message:
+            "{wildcards.path}"
+        shell:
+            "{params.blob} > {output:q} 2> {log:q}"
 
 
 rule convert_recording:
     input:
-        available="results/measured/available.json",
+        unpack(
+            lambda wc: {
+                key: HOME.recording(RECORDINGS[wc.name][key])
+                for key in ("file", "columns", "positions")
+                if key in RECORDINGS[wc.name]
+            }
+        ),
     output:
         "results/measured/recordings/{name}.nc",
     log:
@@ -31,9 +38,7 @@ rule convert_recording:
         "results/measured/benchmarks/recordings/{name}.tsv"
     priority: 9
     params:
-        entry=lambda wc: RECORDINGS[wc.name],
-        own=lambda wc: contents(*own_files(RECORDINGS[wc.name])),
-        code=CODE.digest("convert_recording"),
+        code=code("convert_recording"),
     message:
         "recording {wildcards.name}, converted"
     script:
@@ -56,7 +61,7 @@ rule first_order:
     priority: 9
     params:
         entry=lambda wc: RECORDINGS[wc.name],
-        code=CODE.digest("first_order"),
+        code=code("first_order"),
     message:
         "first-order calibration of {wildcards.name}"
     script:
@@ -78,8 +83,8 @@ rule subset_recording:
         "results/measured/benchmarks/subsets/{name}.tsv"
     priority: 9
     params:
-        settings=effective(config, config["scale"], "paper2021", "experiment", scaled=False),
-        code=CODE.digest("subset_recording"),
+        settings=effective(config, "", "paper2021", "experiment"),
+        code=code("subset_recording"),
     message:
         "moving samples of {wildcards.name}, chosen"
     script:
@@ -96,8 +101,8 @@ rule locate_positions:
     benchmark:
         "results/measured/benchmarks/positions/{name}.tsv"
     params:
-        settings=effective(config, config["scale"], "paper2021", "experiment", scaled=False),
-        code=CODE.digest("locate_positions"),
+        settings=effective(config, "", "paper2021", "experiment"),
+        code=code("locate_positions"),
     message:
         "positions from {wildcards.name}"
     script:
@@ -117,7 +122,7 @@ rule agreement:
     benchmark:
         "results/measured/benchmarks/agreement/{group}.tsv"
     params:
-        code=CODE.digest("agreement"),
+        code=code("agreement"),
     message:
         "agreement between recordings of {wildcards.group}"
     script:
@@ -135,8 +140,8 @@ rule residuals:
     benchmark:
         "results/measured/benchmarks/residuals/{name}.tsv"
     params:
-        settings=effective(config, config["scale"], scaled=False),
-        code=CODE.digest("residuals"),
+        settings=effective(config, ""),
+        code=code("residuals"),
     message:
         "residuals of {wildcards.name}"
     script:
@@ -161,7 +166,7 @@ rule sample_measured:
         runtime=60,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017", "paper2021", "experiment"),
-        code=CODE.digest("sample_measured"),
+        code=code("sample_measured"),
     message:
         "chains of {wildcards.kind} ({wildcards.scale})"
     script:
@@ -189,12 +194,12 @@ rule figure_measured_residuals:
     benchmark:
         "results/measured/benchmarks/figures/residuals_{name}.tsv"
     params:
-        settings=effective(config, config["scale"], scaled=False),
-        code=CODE.digest("figure_measured_residuals"),
+        **by("figures.measured.figure_measured_residuals"),
+        settings=effective(config, ""),
     message:
         "figure: residuals of {wildcards.name}"
     script:
-        "../scripts/figure_measured_residuals.py"
+        "../scripts/publish.py"
 
 
 rule figure_measured_noise:
@@ -207,12 +212,12 @@ rule figure_measured_noise:
     benchmark:
         "results/measured/benchmarks/figures/noise_{name}.tsv"
     params:
-        settings=effective(config, config["scale"], scaled=False),
-        code=CODE.digest("figure_measured_noise"),
+        **by("figures.noise.figure_measured_noise"),
+        settings=effective(config, ""),
     message:
         "figure: noise of {wildcards.name}"
     script:
-        "../scripts/figure_measured_noise.py"
+        "../scripts/publish.py"
 
 
 rule figure_measured_agreement:
@@ -231,12 +236,12 @@ rule figure_measured_agreement:
     benchmark:
         "results/measured/benchmarks/figures/agreement_{group}.tsv"
     params:
-        settings=effective(config, config["scale"], scaled=False),
-        code=CODE.digest("figure_measured_agreement"),
+        **by("figures.measured.figure_measured_agreement"),
+        settings=effective(config, ""),
     message:
         "figure: agreement within {wildcards.group}"
     script:
-        "../scripts/figure_measured_agreement.py"
+        "../scripts/publish.py"
 
 
 rule table_measured_first_order:
@@ -259,12 +264,12 @@ rule table_measured_first_order:
     benchmark:
         "results/measured/benchmarks/tables/first_order_{group}.tsv"
     params:
+        **by("figures.measured.table_measured_first_order"),
         names=lambda wc: MEASURED.board(wc.group),
-        code=CODE.digest("table_measured_first_order"),
     message:
         "table: first-order calibration of {wildcards.group}"
     script:
-        "../scripts/table_measured_first_order.py"
+        "../scripts/publish.py"
 
 
 rule table_measured_agreement:
@@ -282,8 +287,8 @@ rule table_measured_agreement:
     benchmark:
         "results/measured/benchmarks/tables/agreement_{group}.tsv"
     params:
-        code=CODE.digest("table_measured_agreement"),
+        **by("figures.measured.table_measured_agreement"),
     message:
         "table: agreement within {wildcards.group}"
     script:
-        "../scripts/table_measured_agreement.py"
+        "../scripts/publish.py"

@@ -1,33 +1,43 @@
-# paper_figures/ holds the configured scale's figures; every scale keeps its own in results/.
+def asked():
+    """The targets; in the process of a job None."""
+    return workflow.dag_settings.targets if workflow.is_main_process else None
+
+
+# paper_figures/ holds the configured scale's figures; every scale keeps its own in results/. Beside
+# each is the configuration that it was made from.
 rule copy_published:
     input:
-        lambda wc: "{}.{}".format(MEASURED.origin(wc.name), wc.kind),
+        made=lambda wc: PUBLISHED.origin(wc.name, wc.kind),
+        settings=lambda wc: PUBLISHED.stated(wc.name, asked()),
     output:
         "paper_figures/{name}.{kind}",
     log:
         "results/logs/publish/{name}.{kind}.log",
     wildcard_constraints:
-        name="|".join([*PLACES, "measured_.*"]),
+        name="|".join(PLACES),
         kind="pdf|png|csv|tex|md",
     message:
         "{output}"
     shell:
-        "cp {input:q} {output:q} 2> {log:q}"
+        "cp {input.made:q} {output:q} 2> {log:q}"
+        " && cp {input.settings:q} $(dirname {output:q})/{wildcards.name}.json 2>> {log:q}"
 
 
-# Drawings of one cause of a diagnosis, asked for by name.
-rule copy_cause:
+# A cause of a diagnosis, asked for by name.
+rule publish_cause:
     input:
-        "results/measured/diagnosis/{name}/diagnosis.json",
+        made="results/measured/diagnosis/{name}/diagnosis.json",
+        settings=lambda wc: PUBLISHED.stated(f"cause_{wc.effect}_{wc.name}", asked()),
     output:
-        "paper_figures/cause_{effect}_{name}.{kind}",
+        **{kind: f"paper_figures/cause_{{effect}}_{{name}}.{kind}" for kind in FIGURE},
     log:
-        "results/logs/publish/cause_{effect}_{name}.{kind}.log",
+        "results/logs/publish/cause_{effect}_{name}.log",
     wildcard_constraints:
         effect="[a-z_]+",
-        name="|".join(RECORDINGS) or "none",
-        kind="pdf|png|csv",
+        name="|".join(RECORDINGS),
+    params:
+        code=code("publish_cause"),
     message:
-        "{output}"
-    shell:
-        "cp $(dirname {input:q})/cause_*_{wildcards.effect}.{wildcards.kind} {output:q} 2> {log:q}"
+        "paper_figures/cause_{wildcards.effect}_{wildcards.name}"
+    script:
+        "../scripts/publish_cause.py"

@@ -15,7 +15,7 @@ rule sample_posterior:
         runtime=90,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2021"),
-        code=CODE.digest("sample_posterior"),
+        code=code("sample_posterior"),
     message:
         "chains, T = {wildcards.samples} ({wildcards.scale})"
     script:
@@ -38,7 +38,7 @@ rule judge_chains:
         mem_mb=4000,
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2021"),
-        code=CODE.digest("judge_chains"),
+        code=code("judge_chains"),
     message:
         "chains of the simulation: burn-in, R-hat, effective sample size ({wildcards.scale})"
     script:

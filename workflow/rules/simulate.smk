@@ -8,7 +8,7 @@ rule simulate_samples:
     priority: 10
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2021"),
-        code=CODE.digest("simulate_samples"),
+        code=code("simulate_samples"),
     message:
         "simulated recordings of 2021 ({wildcards.scale})"
     script:
@@ -24,7 +24,7 @@ rule simulate_experiment:
         "results/{scale}/benchmarks/recordings/{kind}.tsv"
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2017", "paper2021", "experiment"),
-        code=CODE.digest("simulate_experiment"),
+        code=code("simulate_experiment"),
     message:
         "simulated experiment of 2021: {wildcards.kind} ({wildcards.scale})"
     script:

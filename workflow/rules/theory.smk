@@ -13,8 +13,8 @@ rule bound_efficiency:
         mem_mb=3000,
         runtime=60,
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017", "theory", own="theory_"),
-        code=CODE.digest("bound_efficiency"),
+        settings=lambda wc: effective(config, wc.scale, "paper2017", "theory"),
+        code=code("bound_efficiency"),
     message:
         "theory: efficiency ({wildcards.scale})"
     script:
@@ -33,8 +33,8 @@ rule bound_convergence:
         mem_mb=3000,
         runtime=60,
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017", "theory", own="theory_"),
-        code=CODE.digest("bound_convergence"),
+        settings=lambda wc: effective(config, wc.scale, "paper2017", "theory"),
+        code=code("bound_convergence"),
     message:
         "theory: convergence ({wildcards.scale})"
     script:
@@ -52,8 +52,8 @@ rule bound_size:
         mem_mb=3000,
         runtime=60,
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017", "theory", own="theory_"),
-        code=CODE.digest("bound_size"),
+        settings=lambda wc: effective(config, wc.scale, "paper2017", "theory"),
+        code=code("bound_size"),
     message:
         "theory: size of the array ({wildcards.scale})"
     script:
@@ -71,10 +71,8 @@ rule bound_ranks:
         mem_mb=3000,
         runtime=60,
     params:
-        settings=lambda wc: effective(
-            config, wc.scale, "paper2017", "paper2021", "theory", own="theory_"
-        ),
-        code=CODE.digest("bound_ranks"),
+        settings=lambda wc: effective(config, wc.scale, "paper2017", "paper2021", "theory"),
+        code=code("bound_ranks"),
     message:
         "theory: ranks ({wildcards.scale})"
     script:
@@ -93,12 +91,12 @@ rule figure_theory_efficiency:
     resources:
         mem_mb=3000,
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017", "theory", own="theory_"),
-        code=CODE.digest("figure_theory_efficiency"),
+        **by("figures.theory.figure_theory_efficiency"),
+        settings=lambda wc: effective(config, wc.scale, "paper2017", "theory"),
     message:
         "figure: theory, efficiency ({wildcards.scale})"
     script:
-        "../scripts/figure_theory_efficiency.py"
+        "../scripts/publish.py"
 
 
 rule figure_theory_convergence:
@@ -113,12 +111,12 @@ rule figure_theory_convergence:
     resources:
         mem_mb=3000,
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017", "theory", own="theory_"),
-        code=CODE.digest("figure_theory_convergence"),
+        **by("figures.theory.figure_theory_convergence"),
+        settings=lambda wc: effective(config, wc.scale, "paper2017", "theory"),
     message:
         "figure: theory, convergence ({wildcards.scale})"
     script:
-        "../scripts/figure_theory_convergence.py"
+        "../scripts/publish.py"
 
 
 rule figure_theory_size:
@@ -133,12 +131,12 @@ rule figure_theory_size:
     resources:
         mem_mb=3000,
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017", "theory", own="theory_"),
-        code=CODE.digest("figure_theory_size"),
+        **by("figures.theory.figure_theory_size"),
+        settings=lambda wc: effective(config, wc.scale, "paper2017", "theory"),
     message:
         "figure: theory, size of the array ({wildcards.scale})"
     script:
-        "../scripts/figure_theory_size.py"
+        "../scripts/publish.py"
 
 
 rule table_theory_ranks:
@@ -153,9 +151,9 @@ rule table_theory_ranks:
     resources:
         mem_mb=3000,
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017", "theory", own="theory_"),
-        code=CODE.digest("table_theory_ranks"),
+        **by("figures.theory.table_theory_ranks"),
+        settings=lambda wc: effective(config, wc.scale, "paper2017", "theory"),
     message:
         "table: theory, ranks ({wildcards.scale})"
     script:
-        "../scripts/table_theory_ranks.py"
+        "../scripts/publish.py"

@@ -11,7 +11,7 @@ rule sweep_variance:
     threads: lambda wc: CORES.threads(wc.scale)
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2021"),
-        code=CODE.digest("sweep_variance"),
+        code=code("sweep_variance"),
     message:
         "variance of the log-likelihood estimate over N ({wildcards.scale})"
     script:
@@ -32,7 +32,7 @@ rule sweep_acceptance:
     threads: lambda wc: CORES.threads(wc.scale)
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2021"),
-        code=CODE.digest("sweep_acceptance"),
+        code=code("sweep_acceptance"),
     message:
         "acceptance over the step length ({wildcards.scale})"
     script:
@@ -51,7 +51,7 @@ rule tune:
     priority: 10
     params:
         settings=lambda wc: effective(config, wc.scale, "paper2021"),
-        code=CODE.digest("tune"),
+        code=code("tune"),
     message:
         "tuning: N and the step length ({wildcards.scale})"
     script:

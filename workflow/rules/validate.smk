@@ -18,11 +18,9 @@ rule pit_values:
         mem_mb=3000,
         runtime=240,
     params:
-        settings=lambda wc: effective(
-            config, wc.scale, "paper2021", "validation", own="validation_"
-        ),
+        settings=lambda wc: effective(config, wc.scale, "paper2021", "validation"),
         parts=lambda wc: CORES.parts(wc.scale),
-        code=CODE.digest("pit_values"),
+        code=code("pit_values"),
     message:
         "validation: {wildcards.setting}, T = {wildcards.samples}, part {wildcards.part} ({wildcards.scale})"
     script:
@@ -40,10 +38,8 @@ rule joint_test:
         mem_mb=3000,
         runtime=120,
     params:
-        settings=lambda wc: effective(
-            config, wc.scale, "paper2021", "validation", own="validation_"
-        ),
-        code=CODE.digest("joint_test"),
+        settings=lambda wc: effective(config, wc.scale, "paper2021", "validation"),
+        code=code("joint_test"),
     message:
         "validation: joint distribution test ({wildcards.scale})"
     script:
@@ -62,14 +58,12 @@ rule figure_validation_ranks:
     resources:
         mem_mb=3000,
     params:
-        settings=lambda wc: effective(
-            config, wc.scale, "paper2021", "validation", own="validation_"
-        ),
-        code=CODE.digest("figure_validation_ranks"),
+        **by("figures.validation.figure_validation_ranks"),
+        settings=lambda wc: effective(config, wc.scale, "paper2021", "validation"),
     message:
         "figure: validation, ranks ({wildcards.scale})"
     script:
-        "../scripts/figure_validation_ranks.py"
+        "../scripts/publish.py"
 
 
 rule table_validation_coverage:
@@ -84,14 +78,12 @@ rule table_validation_coverage:
     resources:
         mem_mb=3000,
     params:
-        settings=lambda wc: effective(
-            config, wc.scale, "paper2021", "validation", own="validation_"
-        ),
-        code=CODE.digest("table_validation_coverage"),
+        **by("figures.validation.table_validation_coverage"),
+        settings=lambda wc: effective(config, wc.scale, "paper2021", "validation"),
     message:
         "table: validation, coverage ({wildcards.scale})"
     script:
-        "../scripts/table_validation_coverage.py"
+        "../scripts/publish.py"
 
 
 rule table_validation_joint:
@@ -106,11 +98,9 @@ rule table_validation_joint:
     resources:
         mem_mb=3000,
     params:
-        settings=lambda wc: effective(
-            config, wc.scale, "paper2021", "validation", own="validation_"
-        ),
-        code=CODE.digest("table_validation_joint"),
+        **by("figures.validation.table_validation_joint"),
+        settings=lambda wc: effective(config, wc.scale, "paper2021", "validation"),
     message:
         "table: validation, joint distribution test ({wildcards.scale})"
     script:
-        "../scripts/table_validation_joint.py"
+        "../scripts/publish.py"

@@ -1,6 +1,6 @@
 """An effect on one IMU of a measured recording -> recording, truth."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
     from imuarray.blind.added import add

@@ -1,6 +1,6 @@
 """Do recordings of one board agree within their claimed widths? -> summary and all pairs, CSV."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
     import pandas as pd

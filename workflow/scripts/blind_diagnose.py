@@ -1,6 +1,6 @@
 """Diagnoses of one batch of blind cases, with the truth beside them -> JSON."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
     from functools import partial

@@ -1,6 +1,6 @@
 """Diagnoses of all batches compared with the truth: graded rows -> JSON, and flat as CSV."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
     import json

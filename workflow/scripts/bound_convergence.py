@@ -1,6 +1,6 @@
 """Iterations to 1.01 times the bound, ML-BCD and Gauss-Newton, by motion -> CSV."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
     from itertools import product

@@ -1,6 +1,6 @@
 """RMSE of the most likely positions beside the Cramer-Rao bound -> CSV."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
     import numpy as np

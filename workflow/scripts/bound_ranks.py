@@ -1,6 +1,6 @@
 """Rank and conditioning of the information over N, motion and geometry -> CSV."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
     from imuarray.config import model_from, motion_sds

@@ -1,6 +1,6 @@
 """The Cramer-Rao bound against the size of the array -> CSV."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
     from imuarray.config import model_from

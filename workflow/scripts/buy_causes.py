@@ -1,6 +1,6 @@
 """One recording fitted rung by rung, the gyroscopes' map from all of the board -> CSV."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake):
     from imuarray.firstorder.correct import calibrate_first_order, correct

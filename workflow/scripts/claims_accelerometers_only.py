@@ -1,8 +1,8 @@
 """RMSE of the angular rate without gyroscopes, over |omega| and position error -> CSV."""
 
-from job import job
+from imuarray.pipeline.job import job
 
-with job(snakemake) as settings:  # noqa: F821
+with job(snakemake) as settings:
     import numpy as np
 
     from imuarray.config import model_from
@@ -17,4 +17,4 @@ with job(snakemake) as settings:  # noqa: F821
         np.radians(paper["angular_acceleration_dps2"]), paper["specific_force"],
         paper["fig3_position_sds"], settings["scale"]["realisations"],
     )  # fmt: skip
-    write_csv(table, snakemake.output[0])  # noqa: F821
+    write_csv(table, snakemake.output[0])

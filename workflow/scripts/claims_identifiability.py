@@ -1,8 +1,8 @@
 """Ranks, Lemma 1, invariances, accelerations -> JSON; ranks over K and N, inner steps -> CSV."""
 
-from job import job
+from imuarray.pipeline.job import job
 
-with job(snakemake) as settings:  # noqa: F821
+with job(snakemake) as settings:
     import numpy as np
 
     from imuarray.config import model_from
@@ -32,8 +32,8 @@ with job(snakemake) as settings:  # noqa: F821
             ],
             "stamp": stamp(settings, seed),
         },
-        snakemake.output.checks,  # noqa: F821
+        snakemake.output.checks,
     )
-    write_csv(checks.ranks(rng("ranks"), model.array), snakemake.output.ranks)  # noqa: F821
+    write_csv(checks.ranks(rng("ranks"), model.array), snakemake.output.ranks)
     samples = paper["fig4_samples"]
-    write_csv(checks.inner_steps(rng("steps"), model, sizes, samples), snakemake.output.work)  # noqa: F821
+    write_csv(checks.inner_steps(rng("steps"), model, sizes, samples), snakemake.output.work)

@@ -1,8 +1,8 @@
 """Linearised posteriors of every recording, and the printed determinant's effect -> CSV, CSV."""
 
-from job import job
+from imuarray.pipeline.job import job
 
-with job(snakemake) as settings:  # noqa: F821
+with job(snakemake) as settings:
     import numpy as np
     import pandas as pd
 
@@ -18,7 +18,7 @@ with job(snakemake) as settings:  # noqa: F821
 
     paper, sd = settings["paper2021"], settings["noise"]["accelerometer_sd"]
     assumed = settings["experiment"]["accelerometer_sd"]
-    paths = dict(zip(snakemake.params.names, snakemake.input.recordings, strict=True))  # noqa: F821
+    paths = dict(zip(snakemake.params.names, snakemake.input.recordings, strict=True))
     model, tables, effects = model_from(settings), [], []
 
     def analyse(name, recording, truth, force_sd, gyroscopes, samples):
@@ -35,13 +35,13 @@ with job(snakemake) as settings:  # noqa: F821
         name = f"T{samples}"
         recording, truth = read_recording(paths[name]), read_truth(paths[name])
         analyse(name, recording, truth, sd, model.array.gyroscopes, samples)
-        for kind in snakemake.params.kinds:  # noqa: F821
+        for kind in snakemake.params.kinds:
             whole, truth = read_recording(paths[kind]), read_truth(paths[kind])
             index = select_disjoint(whole, paper["samples"])[samples]
             chosen, there = whole.select(index), truth.isel(time=index)
             analyse(f"{kind}_T{samples}", chosen, there, assumed, 1, samples)
             analyse(f"{kind}_small_noise_T{samples}", chosen, there, sd, 1, samples)
-    write_csv(pd.concat(tables), snakemake.output.coordinates)  # noqa: F821
+    write_csv(pd.concat(tables), snakemake.output.coordinates)
 
     rng, samples = stream(settings["seed"], "determinant"), paper["samples"][0]
     for force_sd in (sd, assumed):
@@ -63,4 +63,4 @@ with job(snakemake) as settings:  # noqa: F821
             label | {"method": "sampling"}
             | linearised.determinant_by_sampling(recording, truth, small, rng)
         )  # fmt: skip
-    write_csv(pd.DataFrame(effects), snakemake.output.determinant)  # noqa: F821
+    write_csv(pd.DataFrame(effects), snakemake.output.determinant)

@@ -1,8 +1,8 @@
 """Algebra, limits and unbiasedness of the estimator of 2021, its tuning rules -> JSON."""
 
-from job import job
+from imuarray.pipeline.job import job
 
-with job(snakemake) as settings:  # noqa: F821
+with job(snakemake) as settings:
     from imuarray.config import model_from, motion_sds
     from imuarray.provenance import stamp, write_json
     from imuarray.recording import read_recording, read_truth
@@ -17,7 +17,7 @@ with job(snakemake) as settings:  # noqa: F821
     def rng(name):
         return stream(seed, "marginalisation", name)
 
-    path = snakemake.input.recording[0]  # noqa: F821
+    path = snakemake.input.recording[0]
     recording, nominal = read_recording(path), read_recording(path).relative_positions()
     start = paper["start_sd"] * rng("start").standard_normal(nominal.shape)
     start[0] = 0.0  # the reference stays where it is
@@ -41,4 +41,4 @@ with job(snakemake) as settings:  # noqa: F821
         "random_walk": proposal.best_acceptance(rng("walk"), model.array.parameters.size),
         "stamp": stamp(settings, seed),
     }
-    write_json(found, snakemake.output[0])  # noqa: F821
+    write_json(found, snakemake.output[0])

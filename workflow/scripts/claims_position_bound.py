@@ -1,8 +1,8 @@
 """Cramer-Rao bound of the positions in the settings of figures 4 and 5 of 2017 -> CSV."""
 
-from job import job
+from imuarray.pipeline.job import job
 
-with job(snakemake) as settings:  # noqa: F821
+with job(snakemake) as settings:
     import numpy as np
 
     from imuarray.config import model_from
@@ -17,4 +17,4 @@ with job(snakemake) as settings:  # noqa: F821
         for acceleration in paper["fig5_accelerations_dps2"]
         for rate in paper["fig5_rates_dps"]
     ]
-    write_csv(bound_table(model_from(settings), settings["seed"], cases), snakemake.output[0])  # noqa: F821
+    write_csv(bound_table(model_from(settings), settings["seed"], cases), snakemake.output[0])

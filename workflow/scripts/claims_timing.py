@@ -3,9 +3,9 @@
 Also how the acceptance depends on the variance at the longest T -> CSV (that one is reproducible).
 """
 
-from job import job
+from imuarray.pipeline.job import job
 
-with job(snakemake) as settings:  # noqa: F821
+with job(snakemake) as settings:
     import json
 
     import pandas as pd
@@ -26,7 +26,7 @@ with job(snakemake) as settings:  # noqa: F821
         [longest // 10, longest // 3, longest, 3 * longest],
     )  # fmt: skip
     targets, thetas = {}, {}
-    for path, tuned in zip(snakemake.input.recordings, snakemake.input.tuning, strict=True):  # noqa: F821
+    for path, tuned in zip(snakemake.input.recordings, snakemake.input.tuning, strict=True):
         with open(tuned, encoding="utf-8") as handle:
             chosen = json.load(handle)
         samples, draws = chosen["samples"], chosen["draws"]
@@ -34,7 +34,7 @@ with job(snakemake) as settings:  # noqa: F821
         thetas[samples] = read_truth(path)["position"].to_numpy()[1:].ravel()
     rng = stream(seed, "timing transitions")
     moves = timing.transition_costs(targets, thetas, chosen["step_length_m"], rng)
-    write_csv(pd.concat([costs, moves]), snakemake.output.timing)  # noqa: F821
+    write_csv(pd.concat([costs, moves]), snakemake.output.timing)
     # the wide p(omega | y_g) of (30b) makes the variance really high
     sharp, wide = targets[samples], target_for(settings, read_recording(path), 1, spread=True)
     table = proposal.acceptance_against_variance(
@@ -46,4 +46,4 @@ with job(snakemake) as settings:  # noqa: F821
         thetas[samples], chosen["step_length_m"], 2 * settings["scale"]["acceptance_steps"],
         stream(seed, "acceptance over variance"),
     )  # fmt: skip
-    write_csv(pd.DataFrame(table), snakemake.output.acceptance)  # noqa: F821
+    write_csv(pd.DataFrame(table), snakemake.output.acceptance)

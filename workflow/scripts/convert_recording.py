@@ -1,17 +1,13 @@
 """A configured recording's file -> recording (NetCDF)."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake):
-    import json
-    from pathlib import Path
-
+    from imuarray.analysis.logs import open_logs
     from imuarray.provenance import stamp
     from imuarray.recording import write_recording
-    from imuarray.recording.sources import read_source
 
-    entry = snakemake.params.entry
-    table = json.loads(Path(snakemake.input.available).read_text(encoding="utf-8"))
-    recording, account = read_source(entry, table["available"][snakemake.wildcards.name])
-    print(f"{len(recording.time)} samples, {account}")
-    write_recording(recording, snakemake.output[0], attrs=stamp(entry, 0) | account)
+    given = snakemake.input
+    found = open_logs(given.file, given.get("columns", given.get("positions")))
+    print(f"{len(found.recording.time)} samples", *found.lines, sep="\n")
+    write_recording(found.recording, snakemake.output[0], attrs=stamp({"file": given.file}, 0))

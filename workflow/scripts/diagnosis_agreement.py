@@ -1,6 +1,6 @@
 """Do diagnoses of one board's recordings agree? -> tables of positions and parameters, figure."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake):
     import json
@@ -11,9 +11,9 @@ with job(snakemake):
         positions_agreement,
         recordings_table,
     )
-    from imuarray.figures.style import write_figure
+    from imuarray.figures.style import rounded, write_figure
     from imuarray.provenance import write_csv
-    from imuarray.report.repeatability import repeatability_figure
+    from imuarray.report.repeatability import figure_repeatability
 
     documents = {
         Path(path).parent.name: json.loads(Path(path).read_text(encoding="utf-8"))
@@ -21,12 +21,8 @@ with job(snakemake):
     }
     positions, parameters = positions_agreement(documents), parameters_agreement(documents)
     made = snakemake.output
-    write_csv(positions, made.positions)
-    write_csv(parameters, made.parameters)
-    write_csv(recordings_table(documents), made.recordings)
-    footer = [
-        f"{len(documents)} recordings of board {snakemake.wildcards.group}; differences of all"
-        " pairs in all coordinates. Pairs share recordings."
-    ]
-    figure = repeatability_figure(documents, positions, footer)
-    write_figure(figure, positions, pdf=made.pdf, png=made.png, csv=made.csv)
+    write_csv(rounded(positions), made.positions)
+    write_csv(rounded(parameters), made.parameters)
+    write_csv(rounded(recordings_table(documents)), made.recordings)
+    drawn = figure_repeatability(documents, positions, snakemake.wildcards.group)
+    write_figure(*drawn, pdf=made.pdf, png=made.png, csv=made.csv)

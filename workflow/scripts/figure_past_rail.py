@@ -1,10 +1,12 @@
 """Withheld gyroscope readings predicted by several models -> table, PDF, PNG, CSV."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake):
+    from functools import partial
+
     from imuarray.analysis.past_rail import ASSUMED, BINS, past_rail
-    from imuarray.figures.board import figure_past_rail
+    from imuarray.figures.board import draw_past_rail
     from imuarray.figures.style import write_figure
     from imuarray.recording import load_dataset, read_recording
 
@@ -16,4 +18,5 @@ with job(snakemake):
         f" fastest axis; papers' model with σa = {ASSUMED:g} m/s². Positions, delay and all other"
         " parameters of the board are from the other recordings."
     ]
-    write_figure(figure_past_rail(table, BINS[0], footer), table, **dict(snakemake.output.items()))
+    draw = partial(draw_past_rail, rail_dps=BINS[0], footer=footer)
+    write_figure(draw, table, **dict(snakemake.output.items()))

@@ -1,6 +1,6 @@
 """Per-triad calibration from still poses -> corrected recording, and its tables."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake):
     from imuarray.firstorder import report

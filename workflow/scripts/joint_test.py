@@ -1,6 +1,6 @@
 """Samplers and simulation by turns: do the positions keep their prior? -> CSV."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
     from imuarray.provenance import write_csv

@@ -1,6 +1,6 @@
 """A board from all recordings but one, which is corrected by their maps -> two NetCDF files."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake):
     from imuarray.analysis.leave_out import left_out

@@ -1,6 +1,6 @@
 """Positions from few samples of a recording whose sensors are known from others -> NetCDF."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake):
     from imuarray.analysis.experiment import located

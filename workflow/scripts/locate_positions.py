@@ -1,6 +1,6 @@
 """Positions of each subset for each sigma_a, assumed or estimated, and by ML-BCD -> CSV."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
     import pandas as pd

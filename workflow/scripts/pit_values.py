@@ -1,6 +1,6 @@
 """PIT values of a share of the truths drawn from the prior, for each method -> CSV."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
     import pandas as pd

@@ -1,6 +1,6 @@
 """RMSE of ML-BCD positions (2017, figures 4 and 5) from the shares of its realisations -> CSV."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
     import numpy as np

@@ -1,6 +1,6 @@
 """A share of the realisations of ML-BCD's position errors (2017, figures 4 and 5) -> NPZ."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
     import numpy as np

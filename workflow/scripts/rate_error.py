@@ -1,6 +1,6 @@
 """RMSE of the angular rate when positions are wrong (2017, figure 3) -> CSV."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
     import numpy as np

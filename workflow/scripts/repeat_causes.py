@@ -1,6 +1,6 @@
 """How positions repeat under each model -> CSV."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake):
     import pandas as pd

@@ -1,6 +1,6 @@
 """Residuals beside the simulation's, in assumed sigmas -> summary and histogram, CSV."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
     from dataclasses import replace

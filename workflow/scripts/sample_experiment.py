@@ -3,10 +3,10 @@
 N and sigma_q are tuned here, on the subset itself, as in section III-C.
 """
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
-    from chains import sample_paired
+    from imuarray.pipeline.chains import sample_paired
     from imuarray.recording import read_recording
     from imuarray.studies.bayes import select_disjoint, tuned_experiment
 

@@ -1,9 +1,9 @@
 """Chains of measured subsets or of their simulations, sigma_a enlarged: figure 5 and table II."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
-    from chains import sample_paired
+    from imuarray.pipeline.chains import sample_paired
     from imuarray.recording import read_recording
     from imuarray.studies.bayes import tuned_experiment
 

@@ -1,11 +1,11 @@
 """Paired PmMH chains of one T -> DataTree (NetCDF); checkpoints beside the results."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
     import json
 
-    from chains import sample_paired
+    from imuarray.pipeline.chains import sample_paired
     from imuarray.recording import read_recording
     from imuarray.studies.bayes import target_for
 

@@ -1,10 +1,10 @@
 """Simulate hand twisting -> recording with its truth (NetCDF).
 
-kind ``standin`` has the sensors' declared noise and is analysed as the paper analyses its
+kind ``quiet`` has the sensors' declared noise and is analysed as the paper analyses its
 experiment; ``simulation`` really has the large noise that the analysis assumes.
 """
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
     from imuarray.provenance import stamp
@@ -12,7 +12,7 @@ with job(snakemake) as settings:
     from imuarray.studies.bayes import simulate_twisting
 
     noise = {
-        "standin": settings["noise"]["accelerometer_sd"],
+        "quiet": settings["noise"]["accelerometer_sd"],
         "simulation": settings["experiment"]["accelerometer_sd"],
     }[snakemake.wildcards.kind]
     recording, truth = simulate_twisting(settings, noise)

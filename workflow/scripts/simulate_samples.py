@@ -1,6 +1,6 @@
 """Simulate the 2021 dataset of T samples for each T -> recordings with their truth (NetCDF)."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
     from imuarray.provenance import stamp

@@ -1,6 +1,6 @@
 """Dynamic samples of a recording -> disjoint subsets, their simulations, counts removed."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
     import pandas as pd

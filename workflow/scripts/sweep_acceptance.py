@@ -1,6 +1,6 @@
 """Acceptance against sigma_q -> CSV per T, with the variance of log p-hat at the chosen N."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
     import numpy as np

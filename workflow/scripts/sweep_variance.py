@@ -1,6 +1,6 @@
 """Variance of log p-hat at the prior mean -> CSV per T: samples, draws, variance, variance_se."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
     import numpy as np

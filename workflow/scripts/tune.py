@@ -1,6 +1,6 @@
 """Choose N and sigma_q from the sweeps -> JSON per T: samples, draws, step_length_m, ..."""
 
-from job import job
+from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
     import pandas as pd

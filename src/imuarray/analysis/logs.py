@@ -18,7 +18,7 @@ from imuarray.recording.log import Log
 from imuarray.recording.rig import Rig, recording_of
 
 RECORDINGS = (".nc", ".nc4", ".h5")
-PACKETS = ".bin"
+PACKETS = (".bin", ".bin.xz")
 RAIL = 1 - 1e-6  # of the range
 READ = {"accelerometer": "specific_force", "gyroscope": "angular_rate"}
 SURE = 0.8  # of the rates' roughness is left at even instants; a motion too slow shows nothing
@@ -39,10 +39,10 @@ def open_logs(
 ) -> Opened:
     """Logs of one rig as one recording: tables, ROS bags, a MIMU board's packets, a recording.
 
-    ``columns`` is the YAML of docs/convert.md, for packets (.bin) the CSV of positions, for a
-    recording (.nc) none; ``topics`` those of bags to use, the reference first. IMUs that share
-    their stamps, with known axes, become samples as they are; others are aligned (`alignment`),
-    which the lines say and the recording keeps. InputError says what does not fit.
+    ``columns`` is the YAML of docs/convert.md, for packets (.bin, .bin.xz) the CSV of positions,
+    for a recording (.nc) none; ``topics`` those of bags to use, the reference first. IMUs that
+    share their stamps, with known axes, become samples as they are; others are aligned
+    (`alignment`), which the lines say and the recording keeps. InputError says what does not fit.
     """
     found = _opened(paths, columns, topics)
     _require_paired(found.recording)
@@ -96,7 +96,7 @@ def _opened(paths, columns, topics) -> Opened:
         raise InputError(
             f"{logs[0]}: expected a YAML that describes it, found none: name it by --columns"
         )
-    if len(logs) == 1 and logs[0].suffix == PACKETS:
+    if len(logs) == 1 and logs[0].name.endswith(PACKETS):
         recording, account = read_board(logs[0], Path(columns))
         return Opened(recording, account.lines())
     found = csv_logs.read_tables(logs, columns)

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from imuarray.claims.numbers import listed, near, power_law, show
+from imuarray.claims.numbers import listed, near, power_law, show, tiny
 from imuarray.claims.registry import claim, judged
 
 EXACT = "rounding only"
@@ -23,7 +23,7 @@ def dimensions(results):
 @claim("2021-02")
 def gyroscopes(results):
     change = results.json("claims/identifiability")["invariances"]["gyroscope_change"]
-    return judged(f"{show(change, 2)} rad/s", EXACT, change == 0.0)
+    return judged(f"{change:g} rad/s", EXACT, change == 0.0)
 
 
 @claim("2021-03")
@@ -62,7 +62,7 @@ def variance_of_estimate(results):
 @claim("2021-07")
 def null_space(results):
     found = _found(results, "limits")
-    value = f"{show(found['SH_relative'], 2)}; rank {found['rank_S']} of {found['size']}"
+    value = f"{tiny(found['SH_relative'], 1e-9)}; rank {found['rank_S']} of {found['size']}"
     stands = found["SH_relative"] < 1e-9 and found["rank_S"] == found["size"] - 6
     return judged(value, EXACT, stands)
 
@@ -70,8 +70,8 @@ def null_space(results):
 @claim("2021-08")
 def identities(results):
     found = _found(results, "limits")
-    pair = found["inverse_identity"], abs(found["determinant_identity"])
-    return judged(f"{show(pair[0], 2)}, {show(pair[1], 2)}", EXACT, max(pair) < 1e-9)
+    worst = max(found["inverse_identity"], abs(found["determinant_identity"]))
+    return judged(tiny(worst, 1e-9), EXACT, worst < 1e-9)
 
 
 @claim("2021-09", column=1)
@@ -81,7 +81,9 @@ def limit(results, column):
     # exponent in beta of the distance from the limit
     slope = np.polyfit(np.log(table[3:9, 0]), np.log(table[3:9, column]), 1)[0]
     beta, last = table[-1, [0, column]]
-    value = f"exponent {show(slope, 4)}; relative distance {show(last, 2)} at beta = {show(beta)}"
+    value = (
+        f"exponent {show(slope, 4)}; relative distance {tiny(last, 1e-4)} at beta = {show(beta)}"
+    )
     return judged(value, EXACT, abs(slope + 1) < 0.05 and last < 1e-4)
 
 
@@ -90,7 +92,8 @@ def printed_power(results):
     found = _found(results, "determinant")
     remark = "(19) has the root of |M_t|, so (23) enters with power -1/2: print lost the root"
     stands = abs(found["power"] - 1) < 0.01
-    return judged(show(-found["power"], 4), found["misfit"], stands, remark)
+    value = f"{show(-found['power'])}; misfit {tiny(found['misfit'], 0.01)}"
+    return judged(value, EXACT, stands, remark)
 
 
 def _printed(results, prefix, remark):
@@ -128,15 +131,16 @@ def printed_large_noise(results):
 def six(results):
     found = _found(results, "six_dimensions")
     value = f"{found['dimensions']} of {found['full']} dimensions"
-    value += f"; difference {show(found['difference'], 2)}"
-    stands = found["dimensions"] == 6 and found["difference"] < 1e-6 * max(1, abs(found["value"]))
-    return judged(value, EXACT, stands)
+    limit = 1e-6 * max(1, abs(found["value"]))
+    value += f"; difference {tiny(found['difference'], float(show(limit)))}"
+    return judged(value, EXACT, found["dimensions"] == 6 and found["difference"] < limit)
 
 
 @claim("2021-15")
 def log_sum_exp(results):
     found = _found(results, "log_sum_exp")
-    return judged(show(found["worst_relative"], 2), EXACT, found["worst_relative"] < 1e-12)
+    worst = found["worst_relative"]
+    return judged(tiny(worst, 1e-12), EXACT, worst < 1e-12)
 
 
 @claim("2021-16")

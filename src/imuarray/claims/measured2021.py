@@ -3,7 +3,6 @@
 import numpy as np
 from scipy.special import bdtr
 
-from imuarray.claims.experiment2021 import MEASURED
 from imuarray.claims.numbers import by_samples, listed, show
 from imuarray.claims.posterior2021 import covered
 from imuarray.claims.registry import claim, judged, untested
@@ -27,15 +26,6 @@ def _offsets(results):
 
 @claim("2021-48")
 def ellipses(results):
-    if results.measured is None:
-        name = f"standin_T{results.samples[-1]}"
-        if not results.json(f"posterior/{name}")["converged"]:
-            return untested(f"measured data needed; for the stand-in {results.unconverged(name)}")
-        table = results.table(f"posterior/{name}")
-        top = table.accelerometer.astype(int).to_numpy().reshape(-1, 3)[:, 0] % 2 == 1
-        truth = table.truth_m.to_numpy().reshape(-1, 3)
-        inside = covered(results.draws(name)[:, top], truth[top])
-        return untested(MEASURED, f"{inside} of {top.sum()} hold the true position")
     _, top, draws, nominal, name = _offsets(results)
     if not results.json(f"posterior/{name}")["converged"]:
         return untested(results.unconverged(name))
@@ -50,8 +40,6 @@ def ellipses(results):
 
 @claim("2021-49")
 def quadrant(results):
-    if results.measured is None:
-        return untested("measured data needed: the stand-in has no offset within the packages")
     off, top, _, _, _ = _offsets(results)
     under, above = off[~top][:, :2], off[top][:, :2]
     one = np.all(np.sign(under) == np.sign(under[0]))
@@ -66,9 +54,7 @@ def quadrant(results):
 
 
 def _agreement(results):
-    """Coverage between recordings by assumed sigma_a, at the largest T; None without measured."""
-    if results.measured is None:
-        return None
+    """Coverage between recordings by assumed sigma_a, at the largest T; None of a single one."""
     group = results.settings["recordings"][results.measured].get("group", results.measured)
     try:
         table = results.measured_table(f"agreement/{group}")
@@ -108,8 +94,6 @@ def conservative(results):
 
 @claim("2021-56")
 def noise(results):
-    if results.measured is None:
-        return untested("measured data needed")
     if not results.settings["recordings"][results.measured].get("first_order", True):
         return untested("a recording with still poses needed")
     table = results.measured_table(f"first_order/{results.measured}_noise")
@@ -124,8 +108,6 @@ def noise(results):
 
 @claim("2021-57")
 def localised(results):
-    if results.measured is None:
-        return untested("measured data needed")
     limit = 2 * results.settings["paper2021"]["variance_target"]
     verdicts = results.each_json(f"posterior/{results.measured}_T{{}}")
     found = {t: v["variance_at_most_draws"] for t, v in verdicts.items()}

@@ -19,6 +19,11 @@ def by_samples(values: dict, digits: int = 3) -> str:
     return "; ".join(f"T = {samples}: {listed(value, digits)}" for samples, value in parts)
 
 
+def tiny(value: float, limit: float) -> str:
+    """A rounding error, whose digits differ between processors: below ``limit``, or itself."""
+    return f"below {limit:g}" if value < limit else show(value, 2)
+
+
 def power_law(x, y, error) -> tuple[float, float]:
     """Exponent of y ~ x^p and its standard error, from sds ``error`` of independent y's."""
     x, y, error = (np.asarray(values, float) for values in (x, y, error))

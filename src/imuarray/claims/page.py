@@ -39,7 +39,7 @@ def markdown(table: pd.DataFrame, settings: dict) -> str:
         f"Scale `{scale}`, seed {seed}. Every verdict is computed from the result files of this"
         " scale; errors are Monte Carlo standard errors. The tables and the plotted values of the"
         " papers are not in their text, so only what the text says is compared.",
-        f"Rests on clock times, which differ from run to run: {clock}.", "",
+        f"Ratios of clock times, with room for any machine: {clock}.", "",
     ]  # fmt: skip
     lines += _rows(counts(table).reset_index(), ["Paper", *VERDICTS])
     for paper, title in TITLES.items():

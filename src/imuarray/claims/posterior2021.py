@@ -4,7 +4,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from imuarray.claims.numbers import by_samples, falls, listed, show
-from imuarray.claims.registry import claim, judged, untested
+from imuarray.claims.registry import CLOCK, claim, judged, untested
 from imuarray.geometry import array_from_config
 from imuarray.posterior.diagnostics import ess
 
@@ -135,28 +135,17 @@ def coverage(results):
 def costs(results):
     table = results.table("claims/timing")
     rows = table[table.what == "transition"].sort_values("samples")
-    value = f"{listed(1e6 * rows.seconds)} us for T = {listed(rows.samples)}"
-    remark = (
-        f"{show(rows.seconds.iloc[-1] / rows.seconds.iloc[0], 2)} times from the first to the last"
-    )
-    error = f"{listed(1e6 * rows.spread_s, 2)} us"
-    return judged(value, error, np.all(np.diff(rows.seconds) > 0), remark)
+    dearer = rows.seconds.iloc[-1] > 3 * rows.seconds.iloc[0]
+    value = f"{'more' if dearer else 'not more'} than 3 times from the first of T = "
+    return judged(f"{value}{listed(rows.samples)} to the last", "", dearer, CLOCK)
 
 
 @claim("2021-39")
 def run_time(results):
     taken, chains = _verdicts(results, "steps", "chains")
     steps = {t: taken[t] * chains[t] for t in taken}
-    # its processor time is sampled: half of a job of 30 s is not in it
-    hours = {t: results.benchmark(f"chains/T{t}").s.iloc[0] / 3600 for t in taken}
-    first, *_, last = results.samples
-    each = (hours[last] / steps[last]) / (hours[first] / steps[first])
-    reason = (
-        f"neither number of steps nor code is published; ours for {by_samples(steps, 7)} steps,"
-        f" start-up included; a step at T = {last} costs {show(each, 2)} times one at T = {first},"
-        " the paper's runs 16 times"
-    )
-    return untested(reason, f"{by_samples(hours, 2)} hours on one or two cores")
+    reason = "neither number of steps nor code is published; ours: benchmarks/chains/ in results/"
+    return untested(reason, f"{by_samples(steps, 7)} steps")
 
 
 def size_offset(results, name) -> tuple[float, float, float]:
@@ -178,7 +167,7 @@ def size_offset(results, name) -> tuple[float, float, float]:
 
 @claim("2021-54")
 def flat_prior(results):
-    names = {t: f"standin_T{t}" for t in results.samples}
+    names = {t: f"quiet_T{t}" for t in results.samples}
     if not all(results.json(f"posterior/{name}")["converged"] for name in names.values()):
         return untested("our test of an unstated consequence: chains too short at this scale")
     found = {t: size_offset(results, name) for t, name in names.items()}

@@ -11,6 +11,7 @@ import yaml
 from imuarray.claims.numbers import show
 
 HOLDS, FAILS, UNTESTED = "holds", "does not hold", "cannot be tested here"
+CLOCK = "seconds: timing.csv beside this scale's claims in results/"
 VERDICTS = (HOLDS, FAILS, UNTESTED)
 REGISTER = yaml.safe_load(Path(__file__).with_name("register.yaml").read_text(encoding="utf-8"))
 

@@ -14,21 +14,14 @@ from imuarray.errors import InputError
 class Results:
     """Tables and summaries below ``root`` (results/<scale>), by path without the root.
 
-    ``settings`` is the effective configuration; ``given`` replaces or adds contents by path;
-    ``kinds`` names the chains of the experiment and of its simulation, by default simulated
-    stand-ins.
+    ``settings`` is the effective configuration; ``given`` replaces or adds contents by path.
+    The recording that is the experiment is ``measured``.
     """
 
-    def __init__(self, root, settings: dict, given: dict | None = None, kinds: dict | None = None):
+    def __init__(self, root, settings: dict, given: dict | None = None):
         self.root, self.settings = Path(root), settings
         self._read = dict(given or {})
-        self.kinds = kinds or {"experiment": "standin", "simulation": "simulation"}
-
-    @property
-    def measured(self) -> str | None:
-        """The recording that is the experiment, or None for a simulated stand-in."""
-        name = self.kinds["experiment"]
-        return None if name == "standin" else name
+        self.measured = settings["experiment"]["recording"]
 
     def measured_table(self, path: str) -> pd.DataFrame:
         """A CSV file below results/measured, by its path without the ending."""
@@ -36,7 +29,7 @@ class Results:
 
     def replace(self, contents: dict) -> Results:
         """A copy with other ``contents`` by path."""
-        return Results(self.root, self.settings, self._read | contents, self.kinds)
+        return Results(self.root, self.settings, self._read | contents)
 
     def _cached(self, path: str, suffix: str, reader):
         if path not in self._read:
@@ -49,10 +42,6 @@ class Results:
     def table(self, path: str) -> pd.DataFrame:
         """A CSV file, by its path without the ending."""
         return self._cached(path, ".csv", pd.read_csv)
-
-    def benchmark(self, path: str) -> pd.DataFrame:
-        """A Snakemake benchmark below benchmarks/."""
-        return self._cached(f"benchmarks/{path}", ".tsv", lambda p: pd.read_csv(p, sep="\t"))
 
     def json(self, path: str) -> dict:
         """A JSON file, by its path without the ending."""

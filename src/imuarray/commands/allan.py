@@ -4,9 +4,9 @@ import numpy as np
 
 from imuarray.commands.output import Output
 from imuarray.figures.noise import noise_figure
-from imuarray.figures.style import write_figure
+from imuarray.figures.style import saved
 from imuarray.firstorder.noise import StillNoise, allan
-from imuarray.provenance import write_csv
+from imuarray.provenance import write_bytes, write_csv
 from imuarray.recording import read_recording
 
 SHOWN = {"specific_force": ("accelerometer", 1e3, "mm/s^2"),
@@ -19,8 +19,9 @@ def run(arguments) -> None:
     output = Output(arguments)
     noise, folder = allan(read_recording(arguments.recording)), arguments.out
     figure = noise_figure(noise, [arguments.recording.name])
-    paths = (folder / f"allan.{ending}" for ending in ("pdf", "png", "csv"))
-    write_figure(figure, noise.deviation, *paths)
+    write_csv(noise.deviation, folder / "allan.csv")
+    for ending in ("pdf", "png"):
+        write_bytes(saved(figure, ending), folder / f"allan.{ending}")
     write_csv(noise.spectrum, folder / "spectrum.csv")
     write_csv(noise.terms, folder / "noise.csv")
     output.say("\n".join(lines(noise)))

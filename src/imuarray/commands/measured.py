@@ -72,8 +72,11 @@ def residuals(arguments) -> None:
         write_csv(table, arguments.out)
     else:
         from imuarray.figures.measured import residual_figure
+        from imuarray.figures.style import panels
 
-        figure = residual_figure(table, shape, [f"{arguments.recording.name}"])
+        figure = residual_figure(
+            panels(summary=table, shape=shape), [f"{arguments.recording.name}"]
+        )
         with atomic_write(arguments.figure) as temporary:
             figure.savefig(temporary, format=arguments.figure.suffix[1:].lower())
             write_csv(table, arguments.out)  # both or none

@@ -1,5 +1,7 @@
 """The blind study: how small an effect is found, and what it is taken for."""
 
+from functools import partial
+
 import numpy as np
 import pandas as pd
 from matplotlib.ticker import NullFormatter
@@ -8,7 +10,17 @@ from imuarray.blind import summary
 from imuarray.blind.inject import CATALOGUE
 from imuarray.blind.summary import ALL, CRASH, NOTHING, UNEXPLAINED
 from imuarray.figures.notes import scale_line
-from imuarray.figures.style import BLACK, BLUE, PAGE, SKY, VERMILLION, new_figure, shade, styled
+from imuarray.figures.style import (
+    BLACK,
+    BLUE,
+    PAGE,
+    SKY,
+    VERMILLION,
+    new_figure,
+    panels,
+    shade,
+    styled,
+)
 
 COLUMNS = 6  # panels in a row
 FOUND, WRONG = {"color": BLUE, "marker": "o"}, {"color": VERMILLION, "marker": "s"}
@@ -38,7 +50,6 @@ def words(name: str) -> str:
     return name.replace("accelerometer", "accel.").replace("gyroscope", "gyro.").replace("_", " ")
 
 
-@styled
 def figure_blind_detection(rows: dict, against: str, settings: dict):
     """Share found over size, a panel for each effect; ticks are single recordings.
 
@@ -47,29 +58,36 @@ def figure_blind_detection(rows: dict, against: str, settings: dict):
     effects = summary.effects(rows["rows"])
     bins = summary.detection(effects, against)
     footer = [scale_line(settings, f"{(effects.kind == 'one').sum()} recordings of one effect")]
+    effects = effects.loc[effects.kind == "one", ["effect", against, "found"]]
+    table = panels(bins=bins, recordings=effects)
+    return partial(_draw_detection, against=against, footer=footer), table
+
+
+@styled
+def _draw_detection(table, against, footer):
+    bins, effects = table[table.panel == "bins"], table[table.panel == "recordings"]
     names = list(dict.fromkeys(bins.effect))
     lines = -(-(len(names) + 1) // COLUMNS)
     figure = new_figure(footer, PAGE, 0.1 + 1.25 * lines)
     grid = figure.subplots(lines, COLUMNS, sharey=True, sharex=against == "sigma", squeeze=False)
-    panels = grid.ravel()
-    for axes, name in zip(panels, names, strict=False):
-        part = effects[effects.kind == "one"]
-        part = part if name == ALL else part[part.effect == name]
+    cells = grid.ravel()
+    for axes, name in zip(cells, names, strict=False):
+        part = effects if name == ALL else effects[effects.effect == name]
         _detection_panel(axes, bins[bins.effect == name], part, against, name)
     # last: shared limits grow with each panel
-    for axes in panels[: len(names)]:
+    for axes in cells[: len(names)]:
         _ticks(axes)
-    for axes in panels[len(names) :]:
+    for axes in cells[len(names) :]:
         axes.axis("off")
-    _detection_legend(panels[len(names)])
+    _detection_legend(cells[len(names)])
     for axes in grid[:, 0]:
         axes.set_ylabel("recordings (%)", size=6, labelpad=1)
     if against == "sigma":
         # the lowest panel of each column: below some of them there is none
-        for axes in panels[max(len(names) - COLUMNS, 0) : len(names)]:
+        for axes in cells[max(len(names) - COLUMNS, 0) : len(names)]:
             axes.tick_params(labelbottom=True)
             axes.set_xlabel("size (σ)", size=6, labelpad=1)
-    return figure, bins
+    return figure
 
 
 def _detection_panel(axes, bins, effects, against, name):
@@ -134,7 +152,6 @@ def names_of(table: pd.DataFrame) -> list[str]:
     return [*CATALOGUE, *others, *last]
 
 
-@styled
 def figure_blind_confusion(rows: dict, settings: dict):
     """Truth by name, percent of recordings; blue where the name is right, vermillion where not.
 
@@ -147,6 +164,11 @@ def figure_blind_confusion(rows: dict, settings: dict):
         " Blue: right by class; vermillion and bold: wrong, in all or some of them. A recording"
         " with several names is in several columns; unexplained: the flag, whatever is named.",
     )
+    return partial(_draw_confusion, footer=footer), found
+
+
+@styled
+def _draw_confusion(found, footer):
     table = confusion_rows(found)
     columns = names_of(table)
     lines = list(dict.fromkeys(zip(table.kind, table.truth, strict=True)))
@@ -162,7 +184,7 @@ def figure_blind_confusion(rows: dict, settings: dict):
     axes.xaxis.tick_top()
     axes.set(xlim=(-0.5, len(columns) - 0.5), ylim=(len(lines) - 0.5, -0.5))
     _separate(axes, lines, columns)
-    return figure, found
+    return figure
 
 
 def _cell(axes, column: int, line: int, row) -> None:

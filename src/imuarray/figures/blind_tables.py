@@ -88,22 +88,9 @@ def table_blind_bars(rows: dict, settings: dict):
         " indistinguishable from. A wrong name: in its class there is nothing of the truth. A"
         " crash counts as a miss where a bar is a least share, and has a bar of its own. In a"
         " gauge the array is not determined, and no intervals around one answer can cover.",
-        _time_line(found),
     ]
     caption = "Blind study: what was asked of the diagnosis, and what was measured."
     return table, CRITERIA, caption, notes
-
-
-def _time_line(recordings: pd.DataFrame) -> str:
-    """How long the diagnoses took."""
-    part = recordings[recordings.standard & ~recordings.crash]
-    if part.empty:
-        return "No diagnosis of 8 IMUs, 125 Hz, 24 s."
-    return (
-        f"8 IMUs, 125 Hz, 24 s: {part.least_seconds.median():.0f} s for a diagnosis in the median,"
-        f" {part.least_seconds.max():.0f} s at most, of wall or CPU time of all threads, whichever"
-        " is less: machines are shared."
-    )
 
 
 def table_blind_gain(rows: dict, settings: dict):

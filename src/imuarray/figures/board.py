@@ -1,5 +1,7 @@
 """A measured board under the sensor model: what each cause buys, prediction, past the rail."""
 
+from functools import partial
+
 import numpy as np
 import pandas as pd
 import xarray as xr
@@ -25,7 +27,7 @@ SERIES = {
 
 
 @styled
-def figure_past_rail(table: pd.DataFrame, rail_dps: float, footer=()):
+def draw_past_rail(table: pd.DataFrame, rail_dps: float, footer=()):
     """Median error and RMSE of the withheld readings over the angular rate; log-log."""
     figure = new_figure(footer, PAGE, 2.8)
     panels = figure.subplots(1, 2, sharey=True)
@@ -179,7 +181,6 @@ def table_left_out(tables: list[pd.DataFrame], names: list[str], group: str):
     return pd.DataFrame(rows), LEFT_OUT, "Recordings predicted by the others", [note]
 
 
-@styled
 def figure_causes(summary: pd.DataFrame, group: str):
     """What each cause buys: repeatability, size and residual, a row a model.
 
@@ -190,6 +191,11 @@ def figure_causes(summary: pd.DataFrame, group: str):
         " coordinates. Residual over the noise of still poses: rms of all samples, outliers with"
         " them; robust, of the fifth of least jerk among those with most angular acceleration."
     ]
+    return partial(_draw_causes, footer=footer), summary
+
+
+@styled
+def _draw_causes(summary, footer):
     figure = new_figure(footer, PAGE, 2.9)
     panels = figure.subplots(1, 3, sharey=True, width_ratios=(2, 1, 1))
     rows = np.arange(len(summary))[::-1]
@@ -208,4 +214,4 @@ def figure_causes(summary: pd.DataFrame, group: str):
     panels[0].set_yticks(rows, summary.model)
     for axes in panels[::2]:
         axes.legend()
-    return figure, summary
+    return figure

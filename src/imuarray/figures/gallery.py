@@ -12,9 +12,8 @@ Made by `snakemake` at scale `{scale}`, seed {seed}; do not edit. Every claim of
 our value and a verdict: [claims.md](claims.md), [claims.csv](claims.csv). Figures of `theory` and
 `validate` are in [docs/uncertainty.md](../docs/uncertainty.md), of `blind` in
 [docs/findings.md](../docs/findings.md#is-the-diagnosis-reliable), of diagnoses in
-[docs/measured.md](../docs/measured.md). The commit and the
-command that made each file, and whether its code has changed since:
-[published.csv](published.csv).
+[docs/measured.md](../docs/measured.md). The JSON file of a figure or table is the configuration
+that it was made from.
 
 The chains behind the figures and tables of 2021:
 
@@ -22,12 +21,10 @@ The chains behind the figures and tables of 2021:
 """
 
 
-def caption(template: str, settings: dict, **wildcards) -> str:
+def caption(template: str, settings: dict) -> str:
     """The caption that the report shows too: a template that prints its parameters."""
     environment = Environment(undefined=StrictUndefined, autoescape=False)
-    job = SimpleNamespace(
-        params=SimpleNamespace(settings=settings, **wildcards), wildcards=SimpleNamespace()
-    )
+    job = SimpleNamespace(params=SimpleNamespace(settings=settings), wildcards=SimpleNamespace())
     return environment.from_string(template).render(snakemake=job).strip()
 
 

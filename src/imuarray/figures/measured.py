@@ -1,5 +1,7 @@
 """Measured recordings: residuals beside the simulation's, agreement, first order."""
 
+from functools import partial
+
 import numpy as np
 import pandas as pd
 from scipy.special import ndtr
@@ -12,6 +14,7 @@ from imuarray.figures.style import (
     logarithmic,
     look,
     new_figure,
+    panels,
     styled,
 )
 from imuarray.figures.tables import Column
@@ -106,15 +109,16 @@ def figure_measured_residuals(
         " positions and motion fitted; the simulation has the fitted motion, this noise and the"
         " same rails, and is fitted likewise."
     ]
-    return residual_figure(summary, histogram, footer), summary
+    return partial(residual_figure, footer=footer), panels(summary=summary, shape=histogram)
 
 
 @styled
-def residual_figure(table: pd.DataFrame, shape: pd.DataFrame, footer=()):
+def residual_figure(table: pd.DataFrame, footer=()):
     """Standardised residuals, accelerometers above gyroscopes: distribution, sensors, motion.
 
-    ``table`` and ``shape`` as `imuarray.measured.residuals.compare` returns them.
+    ``table``: what `imuarray.measured.residuals.compare` returns, as panels summary and shape.
     """
+    shape = table[table.panel == "shape"]
     figure = new_figure(footer, PAGE, 4.3)
     axes = figure.subplots(2, 4)
     for row, (quantity, name) in zip(axes, QUANTITIES.items(), strict=True):
@@ -168,7 +172,6 @@ def _against(axes, table, factor, label):
     axes.set(yscale="log", xlabel=label)
 
 
-@styled
 def figure_measured_agreement(summary: pd.DataFrame, pairs: pd.DataFrame, group: str):
     """How far recordings of one board lie apart, in claimed widths, and the intervals' coverage.
 
@@ -180,18 +183,24 @@ def figure_measured_agreement(summary: pd.DataFrame, pairs: pd.DataFrame, group:
         " of all pairs in all coordinates, over their claimed sd. Pairs share recordings, and a"
         " recording's coordinates share its motion."
     ]
+    own = pairs.samples == summary.samples.max()
+    table = panels(summary=summary, pairs=pairs.loc[own, ["samples", "assumed", "z"]])
+    return partial(_draw_agreement, footer=footer), table.astype({"assumed": str})
+
+
+@styled
+def _draw_agreement(table, footer):
     figure = new_figure(footer, PAGE, 2.7)
     left, middle, right = figure.subplots(1, 3)
+    pairs, summary = table[table.panel == "pairs"], table[table.panel == "summary"]
     most = summary.samples.max()
-    assumed = list(dict.fromkeys(summary.assumed.astype(str)))
-    for index, name in enumerate(assumed):
+    for index, name in enumerate(dict.fromkeys(summary.assumed)):
         style = look(index)
-        part = pairs[(pairs.samples == most) & (pairs.assumed.astype(str) == name)]
-        size = np.sort(part.z.abs())
+        size = np.sort(pairs[pairs.assumed == name].z.abs())
         share = (np.arange(size.size) + 0.5) / size.size
         left.plot(size, share, label=_assumed(name, summary, most), color=style["color"],
                   linestyle=style["linestyle"])  # fmt: skip
-        rows = summary[summary.assumed.astype(str) == name].sort_values("samples")
+        rows = summary[summary.assumed == name].sort_values("samples")
         middle.plot(rows.samples, 1e6 * rows.spread_m, **style, markersize=4)
         middle.plot(rows.samples, 1e6 * rows.claimed_m, color=style["color"], linewidth=0.7,
                     linestyle=(0, (1, 1)), marker=style["marker"], markersize=4,
@@ -210,11 +219,11 @@ def figure_measured_agreement(summary: pd.DataFrame, pairs: pd.DataFrame, group:
     right.set(xscale="log", ylim=(0, 102), xlabel="samples $T$", ylabel="covered (%)")
     right.set_title("95 % intervals (filled)\nand 50 % intervals (open)")
     figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=4)
-    return figure, summary
+    return figure
 
 
 def _assumed(name, summary, most):
-    row = summary[(summary.assumed.astype(str) == name) & (summary.samples == most)].iloc[0]
+    row = summary[(summary.assumed == name) & (summary.samples == most)].iloc[0]
     if name == "residual":
         return f"$\\sigma_a$ from the residual ({row.accelerometer_sd:.2f} m/s²)"
     return f"$\\sigma_a$ = {name} m/s²"

@@ -1,5 +1,7 @@
 """Noise of still readings: Allan deviation and spectrum of every axis of every IMU."""
 
+from functools import partial
+
 import numpy as np
 import pandas as pd
 
@@ -12,7 +14,6 @@ KINDS = {
 }
 
 
-@styled
 def figure_measured_noise(allan: pd.DataFrame, name: str, settings: dict):
     """Allan deviation of the still poses, every axis of every IMU, and the papers' white noise.
 
@@ -28,13 +29,18 @@ def figure_measured_noise(allan: pd.DataFrame, name: str, settings: dict):
         f"Still poses of recording {name}. Black: the papers' σa ="
         f" {noise['accelerometer_sd']:g} m/s² and σg = {noise['gyroscope_sd_dps']:g} deg/s."
     ]
+    return partial(_draw_noise, papers=papers, footer=footer), allan
+
+
+@styled
+def _draw_noise(allan, papers, footer):
     figure = new_figure(footer, PAGE, 2.8)
     for axes, sensor in zip(figure.subplots(1, 2), KINDS, strict=True):
         taus = _deviations(axes, allan, sensor)
         white = KINDS[sensor][0] * papers[sensor] * np.sqrt(taus[0] / taus)
         axes.plot(taus, white, color=BLACK, linewidth=1.2, label="papers' σ, white")
         axes.legend()
-    return figure, allan
+    return figure
 
 
 @styled

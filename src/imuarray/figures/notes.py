@@ -1,11 +1,5 @@
 """The small print under figures and tables: scale, and how good the chains are."""
 
-SOURCES = {
-    "standin": "simulated stand-in; no measured data here",
-    "simulation": "simulation with the experiment's noise",
-    "measured": "measured",
-}
-
 
 def scale_line(settings: dict, *more: str) -> str:
     """'Scale quick, seed 1; ...' from a rule's settings."""

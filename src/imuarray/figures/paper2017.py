@@ -1,5 +1,7 @@
 """Paper 2017: what position errors do to the angular rate, and how well ML-BCD finds them."""
 
+from functools import partial
+
 import matplotlib
 import numpy as np
 import pandas as pd
@@ -26,7 +28,6 @@ def _footer(errors: pd.DataFrame, settings: dict) -> list[str]:
     return [scale_line(settings, f"{errors.realisations.max()} realisations per point")]
 
 
-@styled
 def figure_2017_fig3(rates: pd.DataFrame, settings: dict):
     """RMSE of the angular rate over |omega|, a line for each position error; log-log.
 
@@ -43,7 +44,7 @@ def figure_2017_fig3(rates: pd.DataFrame, settings: dict):
     unsaturated = means.assign(series="unsaturated", rmse_dps=least, rmse_se_dps=0.0)
     columns = ["series", "position_sd_m", "angular_rate_dps", "rmse_dps", "rmse_se_dps"]
     table = pd.concat([array, means, unsaturated], ignore_index=True)[columns]
-    return _draw_fig3(table, settings, _footer(rates, settings)), table
+    return partial(_draw_fig3, settings=settings, footer=_footer(rates, settings)), table
 
 
 def _gyroscopes_average(rates: pd.DataFrame) -> pd.DataFrame:
@@ -61,6 +62,7 @@ def _gyroscopes_average(rates: pd.DataFrame) -> pd.DataFrame:
     return means.assign(rmse_se_dps=np.sqrt(means.error / counts) / (2 * means.rmse_dps))
 
 
+@styled
 def _draw_fig3(table, settings, footer):
     figure = new_figure(footer, height=3.2)
     axes = figure.subplots()
@@ -87,7 +89,6 @@ def _draw_fig3(table, settings, footer):
     return figure
 
 
-@styled
 def figure_2017_fig4(errors: pd.DataFrame, settings: dict):
     """RMSE of the positions over N, a line for each number of iterations; log-log.
 
@@ -105,9 +106,11 @@ def figure_2017_fig4(errors: pd.DataFrame, settings: dict):
     table = pd.concat([lines, reference], ignore_index=True)
     table = table.sort_values(["series", "iterations", "samples"], ignore_index=True)
     table = table[["series", "iterations", "samples", "rmse_m", "rmse_se_m"]]
-    return _draw_fig4(table, _footer(errors, settings)), table
+    table.attrs["digits"] = {"rmse_m": 4}  # thousands of iterations enlarge what is rounded
+    return partial(_draw_fig4, footer=_footer(errors, settings)), table
 
 
+@styled
 def _draw_fig4(table, footer):
     figure = new_figure(footer, height=3.5)
     axes = figure.subplots()
@@ -135,7 +138,6 @@ def _draw_fig4(table, footer):
     return figure
 
 
-@styled
 def figure_2017_fig5(errors: pd.DataFrame, settings: dict):
     """RMSE of the positions over |omega|, a line for each |omega_dot|; log-log.
 
@@ -145,16 +147,22 @@ def figure_2017_fig5(errors: pd.DataFrame, settings: dict):
     columns = ["angular_acceleration_dps2", "angular_rate_dps", "rmse_m", "rmse_se_m"]
     # degrees went through radians on the way
     table = errors[columns].round({name: 6 for name in columns[:2]})
-    figure = new_figure([*_footer(errors, settings), counts], height=3.0)
+    table.attrs["digits"] = {"rmse_m": 4}
+    footer = [*_footer(errors, settings), counts]
+    return partial(_draw_fig5, start=settings["paper2017"]["position_sd"], footer=footer), table
+
+
+@styled
+def _draw_fig5(table, start, footer):
+    figure = new_figure(footer, height=3.0)
     axes = figure.subplots()
     for index, (value, rows) in enumerate(table.groupby("angular_acceleration_dps2")):
         label = _number(value)
         points(axes, rows.angular_rate_dps, rows.rmse_m, rows.rmse_se_m, index, label=label)
-    start = settings["paper2017"]["position_sd"]
     level(axes, start, r"start ($\sigma_r$)", color=GREY)
     logarithmic(axes, RATE, "RMSE of the positions (m)")
     axes.legend(loc="lower left", title=r"$\|\dot{\omega}\|$ (deg/s$^2$)", title_fontsize=7)
-    return figure, table
+    return figure
 
 
 def _power(value: float) -> str:

@@ -1,5 +1,7 @@
 """Paper 2021: tuning, chains and posteriors. (Its array: `paper2021_array`.)"""
 
+from functools import partial
+
 import numpy as np
 import pandas as pd
 from matplotlib.lines import Line2D
@@ -28,7 +30,6 @@ GRID = 160
 LINEAR = 5.0  # um, where figure 4's axis turns from linear to logarithmic
 
 
-@styled
 def figure_2021_fig2(variances: list[pd.DataFrame], settings: dict):
     """Variance of the log-likelihood estimator over N.
 
@@ -41,6 +42,12 @@ def figure_2021_fig2(variances: list[pd.DataFrame], settings: dict):
         ignore_index=True,
     )
     footer = [scale_line(settings, f"{table.realisations.max()} realisations per point")]
+    target = settings["paper2021"]["variance_target"]
+    return partial(_draw_fig2, target=target, footer=footer), table
+
+
+@styled
+def _draw_fig2(table, target, footer):
     figure = new_figure(footer, height=2.9)
     axes = figure.subplots()
     for index, (samples, rows) in enumerate(table.groupby("samples")):
@@ -48,15 +55,13 @@ def figure_2021_fig2(variances: list[pd.DataFrame], settings: dict):
                label=f"$T = {samples}$")  # fmt: skip
         axes.plot(rows.draws, rows.fit, "-", color=look(index)["color"], linewidth=0.9)
     axes.plot([], [], "-", color=GREY, linewidth=0.9, label=r"$\sim 1/N$")
-    target = settings["paper2021"]["variance_target"]
     level(axes, target, f"target {target:g}", color="0.3", linestyle=(0, (5, 2)))
     ylabel = r"Variance of $\log\,\hat{p}_N(y^{(a)}_{1:T}|\theta)$ (nat$^2$)"
     logarithmic(axes, "Monte Carlo samples $N$ (count)", ylabel)
     axes.legend(*legend_items(axes, [r"$\sim 1/N$"]), loc="lower left", ncols=2)
-    return figure, table
+    return figure
 
 
-@styled
 def figure_2021_fig3(chains: list, verdict: list[dict], coordinates: list, settings: dict):
     """(a) whole traces, and at the scale of the posterior beside the histogram; (b) their ACF.
 
@@ -69,7 +74,14 @@ def figure_2021_fig3(chains: list, verdict: list[dict], coordinates: list, setti
         found.draws[..., 0], verdict["burn_in_draws"], found.thin, coordinates[0].truth_m[0]
     )
     name = f"x of IMU {first}, $T = {verdict['samples']}$"
+    table.attrs["digits"] = {"value": 7, "low_um": 7, "high_um": 7}  # far from 0, and narrow
     footer = [scale_line(settings), *chain_lines({verdict["samples"]: verdict})]
+    given = {"burn_in_steps": verdict["burn_in_steps"], "name": name, "footer": footer}
+    return partial(_draw_fig3, **given), table
+
+
+@styled
+def _draw_fig3(table, burn_in_steps, name, footer):
     figure = new_figure(footer, height=4.6)
     mosaic = figure.subplot_mosaic(
         [["whole", "whole"], ["trace", "histogram"], ["correlation", "correlation"]],
@@ -80,7 +92,7 @@ def figure_2021_fig3(chains: list, verdict: list[dict], coordinates: list, setti
         mosaic[panel].xaxis.set_major_formatter(EngFormatter(sep=""))
         mosaic[panel].locator_params(axis="x", nbins=6)
     for panel in ("whole", "trace"):
-        _traces(mosaic[panel], table, verdict["burn_in_steps"])
+        _traces(mosaic[panel], table, burn_in_steps)
     _histograms(mosaic["histogram"], table)
     _correlations(mosaic["correlation"], table)
     mosaic["whole"].set_title(f"(a) {name}: whole trace, and zoomed", size=8)
@@ -91,7 +103,7 @@ def figure_2021_fig3(chains: list, verdict: list[dict], coordinates: list, setti
     mosaic["trace"].set_xlabel("Step (count)")
     figure.align_ylabels()
     figure.legend(*legend_items(mosaic["whole"]), loc="outside upper center", ncols=4)
-    return figure, table
+    return figure
 
 
 def chain_panels(series, burn_in: int, thin: int, truth: float | None = None) -> pd.DataFrame:
@@ -195,7 +207,6 @@ def prior_of(chains: list) -> list[np.ndarray]:
     return [prior[f"position_{name}"].to_numpy() for name in ("mean", "sd")]
 
 
-@styled
 def figure_2021_fig4(chains: list, verdicts: list[dict], coordinates: list, settings: dict):
     """Posterior of IMU 2's position: as wide as the widest one (left), and with the prior (right).
 
@@ -210,6 +221,11 @@ def figure_2021_fig4(chains: list, verdicts: list[dict], coordinates: list, sett
     )  # fmt: skip
     name = f"IMU {chains[-1][1]['posterior']['accelerometer'].to_numpy()[0]}"
     footer = [scale_line(settings), *chain_lines(verdicts)]
+    return partial(_draw_fig4, name=name, footer=footer), table
+
+
+@styled
+def _draw_fig4(table, name, footer):
     figure = new_figure(footer, PAGE, 4.9)
     panels = figure.subplots(3, 2, sharex="col", sharey=True)
     for letter, row, (axis, rows) in zip("abc", panels, table.groupby("axis"), strict=True):
@@ -234,7 +250,7 @@ def figure_2021_fig4(chains: list, verdicts: list[dict], coordinates: list, sett
         handles.append(Line2D([], [], color=GREY, linestyle=_dashes(number)))
         labels.append(f"chain {number + 1}")
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
-    return figure, table
+    return figure
 
 
 def densities(posteriors: dict[int, np.ndarray], prior, truth) -> pd.DataFrame:

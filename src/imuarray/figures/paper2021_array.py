@@ -1,5 +1,7 @@
 """Paper 2021, figures 1 and 5: the array, and where in its package each triad is."""
 
+from functools import partial
+
 import numpy as np
 import pandas as pd
 import xarray as xr
@@ -7,7 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from scipy.stats import chi2
 
-from imuarray.figures.notes import SOURCES, chain_lines, scale_line
+from imuarray.figures.notes import chain_lines, scale_line
 from imuarray.figures.paper2021 import after_burn_in, prior_of
 from imuarray.figures.style import (
     BLACK,
@@ -15,7 +17,6 @@ from imuarray.figures.style import (
     GREY,
     PAGE,
     SKY,
-    VERMILLION,
     look,
     new_figure,
     styled,
@@ -53,16 +54,21 @@ def layout_table(array: Array) -> pd.DataFrame:
     return table
 
 
-@styled
 def figure_2021_fig1(settings: dict):
     """Layout and dimensions: top view (y axis downwards) with numbers and pitch, and side view."""
     array = array_from_config(settings["array"])
     table = layout_table(array)
-    figure = new_figure([scale_line(settings, f"array {array.name}, nominal")], height=4.0)
+    footer = [scale_line(settings, f"array {array.name}, nominal")]
+    return partial(_draw_fig1, footer=footer), table
+
+
+@styled
+def _draw_fig1(table, footer):
+    figure = new_figure(footer, height=4.0)
     top, side = figure.subplots(2, 1, height_ratios=[6.2, 1], sharex=True)
     _top_view(top, table)
     _side_view(side, table)
-    return figure, table
+    return figure
 
 
 def _top_view(axes, table):
@@ -146,33 +152,26 @@ def _height(axes, place, edge, low, high):
     )  # fmt: skip
 
 
-@styled
 def figure_2021_fig5(
-    chains: list, verdicts: list[dict], coordinates: list, recordings: list, kind: str,
-    source: str, settings: dict,
+    chains: list, verdicts: list[dict], coordinates: list, recordings: list, settings: dict
 ):  # fmt: skip
     """Ellipses of the posteriors on (a) topside and (b) underside, at their true size.
 
     Both seen from above with the y axis downwards. ``chains`` as `posterior.chains.read_chains`
     gives them, ``verdicts`` and ``coordinates`` of `posterior/`, one for each T; the array is
-    the first of those of ``recordings``, if any; ``kind`` (`notes.SOURCES`) is written over it.
+    the first of those of ``recordings``.
     """
-    array = recordings[0] if recordings else array_from_config(settings["array"])
+    array = recordings[0]
     draws, verdicts = after_burn_in(chains, verdicts)
     known = "truth_m" in coordinates[0]
     truth = coordinates[0].truth_m.to_numpy().reshape(-1, 3) if known else None
     posteriors = {samples: _moments_of(values) for samples, values in draws.items()}
     table = ellipse_table(array, posteriors, prior_of(chains), truth)
-    footer = [scale_line(settings, source), *chain_lines(verdicts)]
-    figure = _ellipses(table, array, settings, footer)
-    figure.suptitle(
-        SOURCES.get(kind, kind).upper(), size=8, weight="bold",
-        color=BLACK if kind == "measured" else VERMILLION,
-    )  # fmt: skip
-    return figure, table
+    measured = f"recording {settings['experiment']['recording']}"
+    footer = [scale_line(settings, measured), *chain_lines(verdicts)]
+    return _ellipses(table, array, settings, footer, "MEASURED")
 
 
-@styled
 def figure_experiment(located: xr.Dataset, recordings: list, name: str, settings: dict):
     """`figure_2021_fig5` once more, under the sensor model.
 
@@ -192,14 +191,18 @@ def figure_experiment(located: xr.Dataset, recordings: list, name: str, settings
         f"Recording {name}, measured. Sensor model: maps, delays and lever arms from the board's"
         " other recordings, biases and clocks from the whole recording, positions from T samples."
     ]
-    figure = _ellipses(table, array, settings, footer)
-    figure.suptitle("MEASURED, SENSOR MODEL", size=8, weight="bold")
-    return figure, table
+    return _ellipses(table, array, settings, footer, "MEASURED, SENSOR MODEL")
 
 
-def _ellipses(table: pd.DataFrame, array: Array, settings: dict, footer: list[str]):
-    """Both sides of the board with the ellipses of `ellipse_table`, and all packages enlarged."""
+def _ellipses(table: pd.DataFrame, array: Array, settings: dict, footer: list[str], title: str):
     level = settings["experiment"]["ellipse_level"]
+    table.attrs["digits"] = {"mean_x_mm": 6, "mean_y_mm": 6}  # far from 0, and narrow
+    return partial(_draw_ellipses, array=array, level=level, footer=footer, title=title), table
+
+
+@styled
+def _draw_ellipses(table: pd.DataFrame, array: Array, level: float, footer: list[str], title: str):
+    """Both sides of the board with the ellipses of `ellipse_table`, and all packages enlarged."""
     figure = new_figure(footer, PAGE, 6.6)
     mosaic = figure.subplot_mosaic(
         [["topside", "underside"], ["top zoom", "under zoom"], ["legend", "legend"]],
@@ -225,6 +228,7 @@ def _ellipses(table: pd.DataFrame, array: Array, settings: dict, footer: list[st
         mosaic[zoom].set_title(f"({letter}) all packages laid over each other, $T = {names[-1]}$")
     mosaic["legend"].axis("off")
     mosaic["legend"].legend(handles=_handles(names, level, table), loc="center", ncols=7)
+    figure.suptitle(title, size=8, weight="bold")
     return figure
 
 

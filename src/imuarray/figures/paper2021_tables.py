@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from imuarray.figures.notes import SOURCES, scale_line, unfinished
+from imuarray.figures.notes import scale_line, unfinished
 from imuarray.figures.tables import Column
 
 NOT_IN_TEXT = "The paper's values are not in the extracted text; these are ours."
@@ -53,17 +53,15 @@ def table_2021_table1(tunings: list[dict], verdicts: list[dict], settings: dict)
     return table, TABLE1, "Table I of 2021: values for the tuning parameters", notes
 
 
-def table_2021_table2(
-    experiment: list, simulation: list, ideal: list, kind: str, source: str, settings: dict
-):
+def table_2021_table2(experiment: list, simulation: list, ideal: list, settings: dict):
     """Estimated standard deviations of the positions, one row for each T and source.
 
     ``experiment``, its ``simulation`` and section IV-A's (``ideal``): `posterior/`, coordinates
-    and verdict of each T in turn; ``kind`` (`notes.SOURCES`), ``source``: what the experiment is.
+    and verdict of each T in turn.
     Axes: medians over the triads; ``ratio``: the median over all coordinates by section IV-A's.
     """
     simulated = ("simulation, experiment's noise", "simulation, section IV-A")
-    names = (f"experiment ({SOURCES[kind]})", *simulated)
+    names = ("experiment (measured)", *simulated)
     noise = [settings[name]["accelerometer_sd"] for name in ("experiment", "experiment", "noise")]
     rows = []
     for turn in range(0, len(ideal), 2):
@@ -83,7 +81,8 @@ def table_2021_table2(
     counts = table.groupby("source", sort=False).accelerometers.first()
     sizes = ", ".join(f"{count} ({name})" for name, count in counts.items())
     notes = [
-        f"Experiment: {source}. {NOT_IN_TEXT}", f"IMUs: {sizes}.",
+        f"Experiment: recording {settings['experiment']['recording']}. {NOT_IN_TEXT}",
+        f"IMUs: {sizes}.",
         *unfinished(table, settings["paper2021"]["rhat_threshold"]), scale_line(settings) + ".",
     ]  # fmt: skip
     return table, TABLE2, "Table II of 2021: estimated standard deviations of the positions", notes

@@ -2,38 +2,44 @@
 
 import inspect
 import json
-from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 
 import pandas as pd
 
 from imuarray.figures.style import write_figure
 from imuarray.figures.tables import write_table
+from imuarray.posterior.chains import read_chains
+from imuarray.recording import array_of, load_dataset, read_recording
 
+# by an input's name, or else by its ending
 READERS = {
+    "chains": read_chains,
+    "recordings": lambda path: array_of(read_recording(path)),
+    "located": load_dataset,
     ".csv": pd.read_csv,
     ".json": lambda path: json.loads(Path(path).read_text(encoding="utf-8")),
 }
 
 
-def _read(path: str):
-    return READERS[Path(path).suffix](path)
-
-
-def publish(function: Callable, snakemake, **readers: Callable) -> None:
+def publish(snakemake) -> None:
     """Draw a figure (PDF, PNG, CSV) or make a table (CSV, LaTeX, Markdown) and write it.
 
-    ``function`` gives (figure, table), or what `tables.write_table` takes if its name begins with
-    "table". It is given what it asks for by name: the rule's input files, read by `READERS` or by
-    the one of ``readers`` for that name, its parameters and its wildcards.
+    The rule's parameter ``by`` names a function of the package, such as "figures.noise.allan".
+    It gives (drawing function, table), or what `tables.write_table` takes if its name begins with
+    "table". It is given what it asks for by name: the rule's input files, read by `READERS`, its
+    parameters and its wildcards.
     """
+    module, _, name = snakemake.params.by.rpartition(".")
+    function = getattr(import_module(f"imuarray.{module}"), name)
     wanted = inspect.signature(function).parameters
     sources = (snakemake.wildcards, snakemake.params)
     given = {key: value for source in sources for key, value in source.items()}
     for key, paths in snakemake.input.items():
         if key in wanted:
-            read = readers.get(key, _read)
-            given[key] = read(paths) if isinstance(paths, str) else [read(path) for path in paths]
-    write = write_table if function.__name__.startswith("table") else write_figure
+            files = [paths] if isinstance(paths, str) else paths
+            read = [READERS.get(key, READERS.get(Path(path).suffix))(path) for path in files]
+            given[key] = read[0] if isinstance(paths, str) else read
+    write = write_table if name.startswith("table") else write_figure
     made = function(**{key: value for key, value in given.items() if key in wanted})
     write(*made, **dict(snakemake.output.items()))

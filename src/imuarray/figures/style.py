@@ -1,7 +1,10 @@
 """House style of all figures: sizes, colours, footers, and files with the same bytes each time."""
 
 import functools
+import io
+import re
 import textwrap
+from collections.abc import Callable
 from pathlib import Path
 
 import matplotlib.style
@@ -9,11 +12,12 @@ import pandas as pd
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
-from imuarray.provenance import atomic_write, write_csv
+from imuarray.provenance import write_bytes, write_csv
 
 STYLE = Path(__file__).with_name("imuarray.mplstyle")
 COLUMN, PAGE = 3.5, 7.16  # inches: one column, both columns
 FOOTER_SIZE = 6.0  # pt
+DIGITS, ERROR_DIGITS = 5, 3  # significant, of a published number and of its standard error
 # Okabe and Ito's palette without its yellow, which white paper swallows.
 VERMILLION, GREEN, BLUE, SKY = "#D55E00", "#009E73", "#0072B2", "#56B4E9"
 PURPLE, ORANGE, BLACK, GREY = "#CC79A7", "#E69F00", "#000000", "#7F7F7F"
@@ -105,10 +109,41 @@ def significant(value: float) -> str:
     return f"{float(f'{value:.3g}'):.10g}"
 
 
+def rounded(table: pd.DataFrame) -> pd.DataFrame:
+    """A table as it is published: `DIGITS` significant, `ERROR_DIGITS` of standard errors.
+
+    Other numbers of digits are in ``table.attrs["digits"]``, by column. More would differ between
+    processors, whose instructions round differently.
+    """
+    worth = table.attrs.get("digits", {})
+    columns = {}
+    for name in table.columns[[kind.kind == "f" for kind in table.dtypes]]:
+        count = worth.get(name, ERROR_DIGITS if re.search("_(se|error)($|_)", name) else DIGITS)
+        columns[name] = [float(f"{value:.{count}g}") for value in table[name]]
+    return table.assign(**columns)
+
+
+def panels(**tables: pd.DataFrame) -> pd.DataFrame:
+    """Tables one below the other, their names in the column ``panel``."""
+    named = [table.assign(panel=name) for name, table in tables.items()]
+    table = pd.concat(named, ignore_index=True)
+    return table[["panel", *table.columns.drop("panel")]]
+
+
 @styled
-def write_figure(figure: Figure, table: pd.DataFrame, pdf, png, csv) -> None:
-    """Write a figure and the numbers behind it; the same input gives the same bytes."""
-    for path, metadata in ((pdf, {"CreationDate": None}), (png, {"Software": None})):
-        with atomic_write(path) as temporary:
-            figure.savefig(temporary, metadata=metadata)
+def saved(figure: Figure, suffix: str = "png") -> bytes:
+    """A figure as a file, the same bytes each time."""
+    buffer = io.BytesIO()
+    metadata = {"pdf": {"CreationDate": None}, "png": {"Software": None}}[suffix]
+    figure.savefig(buffer, format=suffix, metadata=metadata)
+    figure.set_layout_engine("none")  # laid out once
+    return buffer.getvalue()
+
+
+def write_figure(draw: Callable[[pd.DataFrame], Figure], table: pd.DataFrame, pdf, png, csv):
+    """Write a table, `rounded`, and what ``draw`` makes of it; its bytes follow from these."""
+    table = rounded(table)
+    figure = draw(table)
     write_csv(table, csv)
+    write_bytes(saved(figure, "pdf"), pdf)
+    write_bytes(saved(figure, "png"), png)

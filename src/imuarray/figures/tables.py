@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from imuarray.figures.style import rounded
 from imuarray.provenance import write_bytes, write_csv
 
 
@@ -26,7 +27,8 @@ class Column:
 
 
 def write_table(table, columns, caption: str, notes, csv, tex, md) -> None:
-    """``table`` in full as CSV; the ``columns`` of it as LaTeX and Markdown, with notes."""
+    """``table``, `rounded`, as CSV; the ``columns`` of it as LaTeX and Markdown, with notes."""
+    table = rounded(table)
     write_csv(table, csv)
     for path, form in ((tex, latex), (md, markdown)):
         write_bytes(form(table, columns, caption, notes).encode(), path)

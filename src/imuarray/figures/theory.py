@@ -1,5 +1,7 @@
 """Estimation theory: the Cramer-Rao bound, who reaches it, how fast, and the array's size."""
 
+from functools import partial
+
 import numpy as np
 import pandas as pd
 
@@ -37,14 +39,17 @@ def table_theory_ranks(rows: pd.DataFrame, settings: dict):
     return rows, RANKS, caption, [note, scale_line(settings)]
 
 
-@styled
 def figure_theory_efficiency(rows: pd.DataFrame, settings: dict):
     """RMSE over N beside the bound, their ratio, and that over the noise.
 
     ``rows``: `studies.bound.efficiency` for the model's noise, then for others at one N.
     """
-    table = rows
-    footer = [scale_line(settings, f"{table.realisations.max()} realisations per point")]
+    footer = [scale_line(settings, f"{rows.realisations.max()} realisations per point")]
+    return partial(_draw_efficiency, footer=footer), rows
+
+
+@styled
+def _draw_efficiency(table, footer):
     figure = new_figure(footer, height=5.4)
     top, below, louder = figure.subplots(3, 1, height_ratios=[2, 1, 1])
     others = table[table.noise != 1.0]
@@ -68,10 +73,9 @@ def figure_theory_efficiency(rows: pd.DataFrame, settings: dict):
     counts = ", ".join(map(str, others.samples.unique()))
     louder.set(xscale="log", xlabel=f"Noise, times the sensors' own ($N$ = {counts})")
     top.legend(loc="upper right")
-    return figure, table
+    return figure
 
 
-@styled
 def figure_theory_convergence(rows: pd.DataFrame, settings: dict):
     """Iterations to 1.01 times the bound over the motion, and ML-BCD's rate, predicted and seen.
 
@@ -79,8 +83,14 @@ def figure_theory_convergence(rows: pd.DataFrame, settings: dict):
     positions hardly better than they are known nominally are left out above; filled triangles at
     the top are medians beyond the limit of iterations.
     """
-    table, nominal_sd = rows, settings["paper2017"]["position_sd"]
-    figure = new_figure([scale_line(settings, f"N = {table.samples.max()}")], height=5.4)
+    footer = [scale_line(settings, f"N = {rows.samples.max()}")]
+    given = {"nominal_sd": settings["paper2017"]["position_sd"], "footer": footer}
+    return partial(_draw_convergence, **given), rows
+
+
+@styled
+def _draw_convergence(table, nominal_sd, footer):
+    figure = new_figure(footer, height=5.4)
     top, below = figure.subplots(2, 1)
     own = table[table.array == table.array.iloc[0]]
     for index, (acceleration, rows) in enumerate(own.groupby("angular_acceleration_dps2")):
@@ -118,17 +128,20 @@ def figure_theory_convergence(rows: pd.DataFrame, settings: dict):
     below.plot(ends, ends, color=BLACK, linewidth=0.8)
     logarithmic(below, "share of the error lost in an iteration, foreseen", "seen")
     below.legend(loc="upper left", title="other arrays", title_fontsize=7)
-    return figure, table
+    return figure
 
 
-@styled
 def figure_theory_size(rows: pd.DataFrame, settings: dict):
     """The bound over the array's size, absolute and relative to it; `studies.bound.against_size`.
 
     Both on one axis of lengths would hide that the one falls: two panels.
     """
-    table = rows
     footer = [scale_line(settings, f"N = {settings['theory']['convergence_samples']}")]
+    return partial(_draw_size, footer=footer), rows
+
+
+@styled
+def _draw_size(table, footer):
     figure = new_figure(footer, height=4.0)
     top, below = figure.subplots(2, 1, sharex=True)
     top.plot(1e3 * table.extent_m, 1e6 * table.bound_m, markerfacecolor="none", **look(0))
@@ -139,4 +152,4 @@ def figure_theory_size(rows: pd.DataFrame, settings: dict):
     span = (middle * 10**-decades, middle * 10**decades)
     logarithmic(top, None, "bound (µm)", ylim=span)
     logarithmic(below, "size of the array, corner to corner (mm)", "bound / size (ppm)")
-    return figure, table
+    return figure

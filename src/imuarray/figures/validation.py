@@ -1,5 +1,7 @@
 """Simulation-based calibration: rank histograms, and how often intervals hold the truth."""
 
+from functools import partial
+
 import numpy as np
 import pandas as pd
 from scipy import stats
@@ -101,7 +103,6 @@ def histogram(values: pd.DataFrame) -> pd.DataFrame:
     return pd.concat(frames, ignore_index=True)
 
 
-@styled
 def figure_validation_ranks(pit_values: list[pd.DataFrame], settings: dict):
     """A histogram for each setting, T and method; band: all 20 bins of a panel, 95 %.
 
@@ -112,6 +113,11 @@ def figure_validation_ranks(pit_values: list[pd.DataFrame], settings: dict):
         scale_line(settings, "n: truths from the prior, those without intervals left out"),
         "Histograms of all positions' coordinates; band: 95 % for all bins of a panel together.",
     ]
+    return partial(_draw_ranks, footer=footer), table
+
+
+@styled
+def _draw_ranks(table, footer):
     groups = list(table.groupby(["setting", "samples", "method"], sort=False))
     lines = -(-len(groups) // ACROSS)
     figure = new_figure(footer, PAGE, 0.5 + 1.35 * lines)
@@ -130,4 +136,4 @@ def figure_validation_ranks(pit_values: list[pd.DataFrame], settings: dict):
     for axes in panels[-1]:
         axes.set_xlabel("posterior below the truth")
     panels[0, 0].set(xlim=(0, 1), ylim=(0, None))
-    return figure, table
+    return figure

@@ -98,17 +98,23 @@ def exponents(first, size, data, quartic, b, numbers, out):
     """-(w' C w - 2 b . w) / 2 and `log_weight` at mean + factor n, n of ``numbers`` (N, 3, size).
 
     The sample's index is unsigned: one that might count from the end would be looked up number by
-    number.
+    number. Weights have a loop of their own: without them, a branch in the first one would become
+    masked loads from beyond their empty table, which cost several times all the rest where that
+    memory has no page.
     """
     mean, factor, k = data.mean, data.factor, data.log_weight
-    weighted = k.shape[1] > 0
     for n in range(out.shape[0]):
         for i in range(size):
             t = np.uint64(first + i)
             x, y, z = _rate(t, mean, factor, numbers[n, 0, i], numbers[n, 1, i], numbers[n, 2, i])
             out[n, i] = _exponent(x, y, z, quartic, b, t)
-            if weighted:
-                out[n, i] += log_weight(k, t, x, y, z)
+    if k.shape[1] == 0:
+        return
+    for n in range(out.shape[0]):
+        for i in range(size):
+            t = np.uint64(first + i)
+            x, y, z = _rate(t, mean, factor, numbers[n, 0, i], numbers[n, 1, i], numbers[n, 2, i])
+            out[n, i] += log_weight(k, t, x, y, z)
 
 
 @njit

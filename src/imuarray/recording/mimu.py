@@ -5,6 +5,7 @@ K times accelerometer and gyroscope x, y, z (int16), and the 16-bit sum of all b
 big endian. Acknowledgements (A0, a byte, their 16-bit sum) may stand between packets.
 """
 
+import lzma
 from bisect import bisect_left
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +15,7 @@ import numpy as np
 from imuarray.errors import InputError
 
 START, ACKNOWLEDGEMENT = 0xAA, 0xA0
+XZ = b"\xfd7zXZ\0"  # how a compressed file begins
 CLOCK = 64e6  # Hz
 WRAP, NUMBERS = 1 << 32, 1 << 16
 # Share of packets out of sequence beyond which the file is not one recording.
@@ -100,7 +102,7 @@ class MimuStream:
 
 
 def read_mimu(path: str | Path) -> MimuStream:
-    """Parse a file; everything that is not a sound packet in sequence is dropped and counted.
+    """Parse a file, plain or compressed by xz; what is no sound packet in sequence is counted.
 
     InputError where the file is missing, holds no packets, or is not one recording. The
     checksum cannot see bytes exchanged within a packet, nor one to two in a thousand of the
@@ -109,7 +111,7 @@ def read_mimu(path: str | Path) -> MimuStream:
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path}: expected a file of MIMU packets, found none")
-    data = np.fromfile(path, np.uint8)
+    data = np.frombuffer(_content(path), np.uint8)
     starts, size = _sound_packets(data, str(path))
     accepted, number, ticks, strangers = _in_sequence(data, starts, str(path))
     if len(accepted) == 1 and data.size > MOST_AROUND_ONE * size:
@@ -121,6 +123,16 @@ def read_mimu(path: str | Path) -> MimuStream:
     packets = data[accepted[:, None] + np.arange(8, size - 2)]
     counts = packets.view(">i2").astype(np.int16).reshape(len(accepted), -1, 6)
     return MimuStream(counts, ticks, number, account)
+
+
+def _content(path: Path) -> bytes:
+    content = path.read_bytes()
+    if not content.startswith(XZ):
+        return content
+    try:
+        return lzma.decompress(content)
+    except lzma.LZMAError as error:
+        raise InputError(f"{path}: expected a whole file compressed by xz, found {error}") from None
 
 
 def _big_endian(data, at, count) -> np.ndarray:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import io
 from typing import NamedTuple
 
 import pandas as pd
@@ -21,7 +20,7 @@ from imuarray.diagnosis.quantities import (
     unit_shown,
 )
 from imuarray.diagnosis.words import part_in_words, split_name, whose, words
-from imuarray.figures.style import PAGE, new_figure, styled
+from imuarray.figures.style import PAGE, new_figure, saved, styled
 
 # What the templates' tables call.
 IN_TABLES = (fixed, number, part_in_words, plus_minus, probability, quantity, split_name, symbols,
@@ -79,16 +78,6 @@ def beside(height: float, drawings, footer=()) -> Figure:
     for drawing, axes in zip(drawings, panels, strict=True):
         drawing(axes)
     return figure
-
-
-@styled
-def saved(figure: Figure, suffix: str = "png") -> bytes:
-    """A figure as a file, the same bytes each time."""
-    buffer = io.BytesIO()
-    metadata = {"pdf": {"CreationDate": None}, "png": {"Software": None}}[suffix]
-    figure.savefig(buffer, format=suffix, metadata=metadata)
-    figure.set_layout_engine("none")  # laid out once
-    return buffer.getvalue()
 
 
 def files(figure: Figure, table: pd.DataFrame) -> dict[str, bytes]:

@@ -95,14 +95,10 @@ def _remove_former(folder: Path, names) -> None:
 
 def draw(diagnosis: Diagnosis) -> list[Drawing]:
     """All figures in the report's order; those of causes only where there are any."""
-    document = diagnosis.document
-    footer = (
-        f"{drawn.plain(shortened(document['recording']))}; {document['samples']} samples,"
-        f" seed {document['seed']}, imuarray {document['version']}",
-    )
-    found = [_drawing("discrepancies", diagnosis, footer), _drawing("residual", diagnosis, footer)]
+    document, said = diagnosis.document, footer(diagnosis.document)
+    found = [_drawing("discrepancies", diagnosis, said), _drawing("residual", diagnosis, said)]
     if document["causes"]:
-        found.append(_drawing("gain", diagnosis, footer))
+        found.append(_drawing("gain", diagnosis, said))
     for place, cause in enumerate(diagnosis.found.search.causes):
         table = cause_table(diagnosis, cause)
         sensors = sensors_of(numbers.imu_labels(diagnosis), cause.imus)
@@ -110,10 +106,18 @@ def draw(diagnosis: Diagnosis) -> list[Drawing]:
             f"cause_{place + 1:02d}_{cause.effect}",
             f"Cause: {words(cause.effect)}, {whose(sensors)}",
             CAUSE_CAPTION.format(BESIDE.get(EFFECTS[cause.effect].against, PARAMETERS)),
-            files(cause_figure(table, footer), table),
+            files(cause_figure(table, said), table),
         ))  # fmt: skip
-    found += [_drawing(name, diagnosis, footer) for name in ("separability", "positions")]
-    return found + drawn_alike(diagnosis, footer)
+    found += [_drawing(name, diagnosis, said) for name in ("separability", "positions")]
+    return found + drawn_alike(diagnosis, said)
+
+
+def footer(document: dict) -> list[str]:
+    """The small print under a diagnosis' figures."""
+    return [
+        f"{drawn.plain(shortened(document['recording']))}; {document['samples']} samples,"
+        f" seed {document['seed']}, imuarray {document['version']}"
+    ]
 
 
 def _drawing(name: str, diagnosis: Diagnosis, footer) -> Drawing:

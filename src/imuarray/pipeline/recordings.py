@@ -1,0 +1,128 @@
+"""Names and paths of the measured part: what the configured recordings ask for."""
+
+FIGURE = ("pdf", "png", "csv")  # endings of what a drawing rule writes
+TABLE = ("csv", "tex", "md")
+DIAGNOSED = ("positions", "parameters", "recordings")  # tables of a board's diagnoses
+
+
+class Recordings:
+    """The recordings of a configuration, the experiment of 2021 and the boards they are of."""
+
+    def __init__(self, config: dict):
+        self.entries = config["recordings"]
+        self.shown = config["experiment"]["recording"]
+        self.samples = config["paper2021"]["samples"]
+
+    def is_first_order(self, name: str) -> bool:
+        """Whether each triad of a recording is calibrated from still poses first."""
+        return self.entries[name].get("first_order", True)
+
+    def recording(self, name: str) -> str:
+        """The file of a recording that all that follows reads."""
+        folder = "corrected" if self.is_first_order(name) else "recordings"
+        return f"results/measured/{folder}/{name}.nc"
+
+    def group(self, name: str) -> str:
+        """The board that a recording is of."""
+        return self.entries[name].get("group", name)
+
+    def groups(self) -> dict[str, list[str]]:
+        """Recordings of one board, where there are two or more."""
+        groups = {}
+        for name in self.entries:
+            groups.setdefault(self.group(name), []).append(name)
+        return {group: names for group, names in groups.items() if len(names) > 1}
+
+    def board(self, group: str) -> list[str]:
+        """All recordings of a board that went through the first-order calibration."""
+        names = filter(self.is_first_order, self.entries)
+        return [name for name in names if self.group(name) == group]
+
+    def others(self, name: str) -> list[str]:
+        """The other recordings of the same board, the next one first."""
+        names = self.board(self.group(name))
+        place = names.index(name) if name in names else 0
+        return [other for other in names[place:] + names[:place] if other != name]
+
+    def posterior(self, scale: str, kind: str, folder: str, endings) -> list[str]:
+        """Files results/<scale>/<folder>/<kind>_T<samples>.<ending>."""
+        names = [f"{kind}_T{samples}" for samples in self.samples]
+        return [f"results/{scale}/{folder}/{name}.{ending}" for name in names for ending in endings]
+
+    def subsets(self) -> list[str]:
+        """The experiment's samples."""
+        return [f"results/measured/subsets/{self.shown}_T{samples}.nc" for samples in self.samples]
+
+    def claims(self, scale: str) -> list[str]:
+        """What the claims on the experiment read."""
+        name, group = self.shown, self.group(self.shown)
+        paths = [f"results/measured/positions/{name}.csv"]
+        if self.is_first_order(name):
+            paths.append(f"results/measured/first_order/{name}_noise.csv")
+        if group in self.groups():
+            paths.append(f"results/measured/agreement/{group}.csv")
+        for kind in (name, f"simulated_{name}"):
+            paths += self.posterior(scale, kind, "posterior", ["csv", "json"])
+            paths += self.posterior(scale, kind, "chains", ["nc"])
+        return paths
+
+    def targets(self) -> list[str]:
+        """What the default target asks of the measured data, for each recording and group."""
+        paths = []
+        for name in self.entries:
+            paths += [f"results/measured/figures/residuals_{name}.{kind}" for kind in FIGURE]
+            paths.append(f"results/measured/positions/{name}.csv")
+            if self.is_first_order(name):
+                paths += [f"results/measured/figures/noise_{name}.{kind}" for kind in FIGURE]
+                paths.append(f"results/measured/tables/first_order_{self.group(name)}.md")
+        for group in self.groups():
+            paths += [f"results/measured/figures/agreement_{group}.{kind}" for kind in FIGURE]
+            paths.append(f"results/measured/tables/agreement_{group}.md")
+        return sorted(set(paths))
+
+    def diagnoses(self) -> list[str]:
+        """Diagnoses of all recordings, their agreement where a board has several."""
+        folder = "results/measured"
+        paths = [f"{folder}/diagnosis/{name}/diagnosis.json" for name in self.entries]
+        return paths + [
+            f"{folder}/figures/diagnosis_{g}.{k}" for g in self.groups() for k in FIGURE
+        ]
+
+    def causes(self) -> list[str]:
+        """What each cause buys on each board with several recordings, and the experiment anew."""
+        folder, groups = "results/measured", self.groups()
+        paths = [f"{folder}/figures/causes_{group}.{k}" for group in groups for k in FIGURE]
+        tables = ("causes_table", "experiment_table", "left_out", "past_rail_table")
+        paths += [f"{folder}/tables/{name}_{group}.md" for name in tables for group in groups]
+        if any(self.shown in self.board(group) for group in groups):
+            paths += [f"{folder}/figures/experiment_{self.shown}.{kind}" for kind in FIGURE]
+        return paths
+
+    def published(self) -> dict[str, str]:
+        """Names of the experiment's figures and tables in paper_figures/, and what they copy."""
+        name, group = self.shown, self.group(self.shown)
+        copies = {"measured_residuals": f"figures/residuals_{name}"}
+        if self.is_first_order(name):
+            copies["measured_noise"] = f"figures/noise_{name}"
+            copies["measured_first_order_table"] = f"tables/first_order_{group}"
+        if group in self.groups():
+            copies["measured_agreement"] = f"figures/agreement_{group}"
+            copies["measured_agreement_table"] = f"tables/agreement_{group}"
+        return copies
+
+    def published_names(self, folder: str) -> list[str]:
+        """Those of them that are "figures", or "tables"."""
+        return [name for name, of in self.published().items() if of.startswith(folder)]
+
+    def studied(self) -> dict[str, tuple[str, ...]]:
+        """By name in paper_figures/, endings of what is not in the default target."""
+        name, group = self.shown, self.group(self.shown)
+        last = self.board(group)[-1]
+        kinds = {f"diagnosis_{part}_{group}": ("csv",) for part in DIAGNOSED}
+        kinds |= {f"{part}_{group}": FIGURE for part in ("causes", "diagnosis")}
+        kinds |= {f"{part}_{name}": FIGURE for part in ("experiment", "past_rail")}
+        kinds |= {f"{part}_table_{group}": TABLE for part in ("causes", "experiment", "past_rail")}
+        return kinds | {
+            f"left_out_{group}": TABLE, f"added_{last}": TABLE,
+            f"cause_sensor_clock_{last}": FIGURE,
+        }  # fmt: skip

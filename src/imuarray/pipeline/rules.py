@@ -1,0 +1,96 @@
+"""What the rules share: the settings they depend on, outputs, cores, files from elsewhere."""
+
+import hashlib
+import re
+from pathlib import Path
+
+SIZES = {  # the sizes of a scale that a section of the configuration goes with
+    "paper2017": ("realisations", "rate_points"),
+    "paper2021": ("variance_realisations", "acceptance_steps", "draws", "transitions"),
+    "experiment": ("experiment_transitions", "measured_transitions"),
+    "theory": ("theory_realisations", "theory_repeats"),
+    "validation": ("validation_replicates", "validation_rounds"),
+}
+ALWAYS = ("seed", "array", "noise")
+
+
+def effective(config: dict, scale: str, *sections: str) -> dict:
+    """The part of the configuration a rule depends on, with the sizes of one scale.
+
+    Of a section such as "paper2017.fig4" the keys that begin with another figure are left out.
+    The numbers of threads and parts are never there: no result depends on them. Without a
+    ``scale`` nothing of it is, for results that all scales share.
+    """
+    found = {name: config[name] for name in ALWAYS}
+    if "file" in config["array"]:  # results rest on what is in it
+        found["array_contents"] = contents(config["array"]["file"])
+    sizes = {}
+    for section in sections:
+        name, _, figure = section.partition(".")
+        others = re.compile(rf"fig(?!{figure.removeprefix('fig')}_)\d_" if figure else "$")
+        found[name] = {key: x for key, x in config[name].items() if not others.match(key)}
+        sizes |= {key: config["scales"][scale][key] for key in SIZES.get(name, ()) if scale}
+    return {**found, "scale": {"name": scale, **sizes}} if scale else found
+
+
+def blind_settings(config: dict, scale: str) -> dict:
+    """The part of the configuration that the blind study depends on: it has scenes of its own."""
+    cases = config["scales"][scale]["blind_cases"]
+    return {"seed": config["seed"], "scale": {"name": scale, "cases": cases}}
+
+
+def figure(name: str, category: str, caption: str = "", folder: str = "results/{scale}") -> dict:
+    """Outputs of a rule that draws: PDF, PNG for the report, and the numbers drawn."""
+    from snakemake.io import report
+
+    path = f"{folder}/figures/{name}"
+    caption = f"../report/{caption or name}.rst"
+    png = report(f"{path}.png", caption=caption, category=category)
+    return {"pdf": f"{path}.pdf", "png": png, "csv": f"{path}.csv"}
+
+
+def table(
+    name: str, category: str = "", caption: str = "", folder: str = "results/{scale}"
+) -> dict:
+    """Outputs of a rule that writes a table: CSV (in a report's category), LaTeX, Markdown."""
+    from snakemake.io import report
+
+    path = f"{folder}/tables/{name}"
+    csv = f"{path}.csv"
+    if category:
+        csv = report(csv, caption=f"../report/{caption or name}.rst", category=category)
+    return {"csv": csv, "tex": f"{path}.tex", "md": f"{path}.md"}
+
+
+class CoreBudget:
+    """How work is shared: among ``cores`` of this machine, or a cluster's (None)."""
+
+    def __init__(self, config: dict, cores: int | None):
+        self.scales, self.cores = config["scales"], cores
+
+    def threads(self, scale: str) -> int:
+        """Of a heavy job: at most half of the cores, or others wait through its serial parts."""
+        wanted = self.scales[scale]["threads"]
+        return wanted if self.cores is None else max(1, min(wanted, self.cores // 2))
+
+    def parts(self, scale: str, study: str = "samples") -> int:
+        """Jobs that the realisations of a study are dealt to; those but "samples" are small."""
+        return self.scales[scale]["parts"] if study == "samples" else 1
+
+
+def added_effects() -> tuple[str, ...]:
+    """Effects that are added to measured recordings; slow to import, so only where asked for."""
+    from imuarray.blind.added import ADDED
+
+    return tuple(ADDED)
+
+
+def contents(*paths: str) -> list[str]:
+    """SHA-256 of files outside the pipeline: a parameter that changes when one does."""
+    files = [Path(path) for path in paths]
+    return [hashlib.sha256(f.read_bytes()).hexdigest() if f.is_file() else "" for f in files]
+
+
+def read_by(page: str) -> list[str]:
+    """Names of the published files that the text of a Typst page reads."""
+    return sorted(set(re.findall(r'"(\w+\.(?:csv|pdf))"', page)))
