@@ -33,12 +33,20 @@ def njit(function=None, **options):
 # Below, as in no other place, pure Python (NUMBA_DISABLE_JIT) cannot follow.
 @intrinsic
 def fma(typing, a, b, c):
-    """a b + c, rounded once: unlike ``fastmath`` the same bits however compiled.
+    """a b + c, rounded once where the processor has an instruction for it, else twice.
 
-    One instruction of x86 processors since 2013 and of ARM's; elsewhere a call of the C library.
+    x86 processors have it since 2013, ARM's always: unlike ``fastmath`` it gives the same bits
+    however compiled.
     """
     number = numba.types.float64
-    return number(number, number, number), lambda _, builder, __, values: builder.fma(*values)
+
+    def build(_, builder, __, values):
+        double = ir.DoubleType()
+        kind = ir.FunctionType(double, [double] * 3)
+        named = builder.module.declare_intrinsic("llvm.fmuladd", [double], kind)
+        return builder.call(named, values)
+
+    return number(number, number, number), build
 
 
 @intrinsic

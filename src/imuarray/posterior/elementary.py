@@ -1,8 +1,7 @@
 """Elementary functions for loops that are to become vector instructions: no branch and no call.
 
-Numbers are taken apart into 2^k m, and series do the rest, to an ulp or two. Each operation is
-rounded as written, so other machines give the same bits (`imuarray.compiled.fma` says where more
-slowly).
+Numbers are taken apart into 2^k m, and series do the rest, to an ulp or two. Processors with a
+fused multiply-add (`imuarray.compiled.fma`) give the same bits, others differ in the last one.
 """
 
 import math

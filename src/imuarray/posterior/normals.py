@@ -2,7 +2,7 @@
 
 The loops, over lanes and over pairs, have no branch and no type but one of 64 bits, so compilers
 turn them into vector instructions; numpy's ziggurat, a call for each number, was most of what a
-draw of omega cost. Other machines give the same bits.
+draw of omega cost.
 """
 
 import math
