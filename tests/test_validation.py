@@ -57,20 +57,20 @@ def test_widths_that_are_wrong_are_seen(monkeypatch, factor):
 
 
 def test_the_command_as_it_is_needs_neither_the_noise_nor_the_motions_size():
-    """20 truths; told half of the noise, its intervals are too narrow, and that is seen."""
-    values = by_default.pit_values(setting("default"), range(20), imuarray.sample)
-    assert len(values) == 20 * 10
+    """6 truths; told a quarter of the noise, its intervals are too narrow, and that is seen."""
+    values = by_default.pit_values(setting("default"), range(6), imuarray.sample)
+    assert len(values) == 6 * 10
     row = coverage(values).iloc[0]
     assert row.p > 1e-3 and row.none == row.slow == 0
     assert np.all(np.abs(row[["shift_z", "width_z", "size_z"]].astype(float)) < 4)
-    told = partial(imuarray.sample, model="papers", accelerometer_noise=0.02)
-    narrow = by_default.pit_values(setting("default"), range(20), told)
+    told = partial(imuarray.sample, model="papers", accelerometer_noise=0.01)
+    narrow = by_default.pit_values(setting("default"), range(6), told)
     assert coverage(narrow).width_z[0] > 3
 
 
 def test_pit_values_are_uniform_where_data_tell_little():
     """The hard setting: posteriors a third to two thirds as wide as the prior."""
-    values = sbc.pit_values(setting("hard"), range(24), methods=["NUTS"])
+    values = sbc.pit_values(setting("hard"), range(8), methods=["NUTS"])
     row = coverage(values).iloc[0]
     assert row.p > 1e-3
     scores = row[["shift_z", "width_z", "size_z", "misfit_z"]].astype(float)

@@ -125,7 +125,12 @@ def rounded(table: pd.DataFrame) -> pd.DataFrame:
 
 def panels(**tables: pd.DataFrame) -> pd.DataFrame:
     """Tables one below the other, their names in the column ``panel``."""
-    named = [table.assign(panel=name) for name, table in tables.items()]
+    named = [
+        table.assign(panel=name).astype(  # integers stay so where another table has no such column
+            {column: "Int64" for column, kind in table.dtypes.items() if kind.kind in "iu"}
+        )
+        for name, table in tables.items()
+    ]
     table = pd.concat(named, ignore_index=True)
     return table[["panel", *table.columns.drop("panel")]]
 
