@@ -9,12 +9,12 @@ from imuarray.geometry import mimu4444_corners
 from imuarray.model import EFFECTS, ArrayModel, Noise
 from imuarray.model.effects import effect
 from imuarray.motion import Motion, hand_twisting
-from imuarray.posterior.generic import GenericLikelihood
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.pmmh import run_chains
-from imuarray.posterior.target import GaussianPrior, GenericTarget
+from imuarray.posterior.target import GaussianPrior
 from imuarray.simulation.measure import measure
 from tests import oracles
+from tests.generic import GenericLikelihood, GenericTarget
 
 RATE = np.radians(0.06)
 

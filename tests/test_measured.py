@@ -251,34 +251,19 @@ def files(tmp_path):
     return paths
 
 
-def test_select_and_repeat_on_the_command_line(files, tmp_path, capsys):
+def test_select_on_the_command_line(files, tmp_path, capsys):
     out = str(tmp_path / "subset.nc")
     assert main(["select", files[0], "--samples", "60", "--out", out]) == 0
     assert "60 written" in capsys.readouterr().out
-    table = tmp_path / "pairs.csv"
-    assert main(["repeat", *files, "--samples", "60", "--out", str(table)]) == 0
-    assert "95 % cover" in capsys.readouterr().out and len(pd.read_csv(table)) == 21
-
-
-def test_residuals_on_the_command_line(files, tmp_path, capsys):
-    table, figure = tmp_path / "table.csv", tmp_path / "figure.png"
-    arguments = ["residuals", files[0], "--figure", str(figure), "--out", str(table)]
-    assert main(arguments) == 0
-    assert "assumed sigmas" in capsys.readouterr().out
-    assert figure.read_bytes()[:4] == b"\x89PNG" and len(pd.read_csv(table)) > 50
 
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
         (["select", "{0}", "--samples", "100000"], "informative samples"),
-        (["repeat", "{0}"], "two or more"),
-        (["repeat", "{0}", "{1}", "{0}"], "found one of them twice"),
         (["first-order", "{0}"], "expected still poses"),
         (["first-order", "{0}", "--gravity", "-9"], "expected a positive number"),
-        (["residuals", "nothing.nc"], "expected a file to read"),
-        (["residuals", "{0}", "--figure", "figure.jpg"], "expected .png or .pdf"),
-        (["residuals", "{0}", "--figure", "{0}/figure.png"], "expected a folder, found the file"),
+        (["select", "nothing.nc"], "expected a file to read"),
     ],
 )
 def test_bad_input_is_one_line_and_status_2(files, tmp_path, capsys, arguments, words):

@@ -1,4 +1,4 @@
-"""Joint Gauss-Newton in collapsed form, and its recursive use, against the general estimators."""
+"""Joint Gauss-Newton in collapsed form against the general estimators."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,6 @@ from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.gauss_newton import calibrate_gauss_newton
 from imuarray.estimation.information import arms, halves, information, information_at
 from imuarray.estimation.newton import fisher_scoring
-from imuarray.estimation.online import Online
 from imuarray.estimation.threads import one_thread
 from imuarray.model import ArrayModel, Noise
 from imuarray.model.structure import products
@@ -183,73 +182,6 @@ def test_another_model_is_refused():
             calibrate_gauss_newton(model, np.zeros((5, 4, 3)), np.zeros((5, 4, 3)))
 
 
-@pytest.fixture(scope="module")
-def stream():
-    """(model, force, rate) of 2000 samples; nominal positions 1 mm off."""
-    rng = np.random.default_rng(5)
-    array = small_array(6, 6)
-    true = ArrayModel.isotropic(array, 0.04, 0.02)
-    _, force, rate = simulate(rng, true, 2000)
-    off = array.relative + 1e-3 * rng.standard_normal((6, 3))
-    off[0] = 0.0
-    nominal = type(array)(off, array.labels, array.gyroscopes, "off")
-    return ArrayModel(nominal, true.noise), force, rate
-
-
-@pytest.mark.parametrize("block", [40, 200])
-def test_online_ends_where_the_batch_does(stream, block):
-    """Within 1 % of the batch answer's sds, and of their size, from chunks of any length."""
-    model, force, rate = stream
-    prior = model.array.parameters, 3e-3
-    batch = calibrate_gauss_newton(model, force, rate, position_prior=prior)
-    online = Online(model, 3e-3, block)
-    cuts = np.cumsum(np.random.default_rng(6).integers(1, 90, 60))
-    learned = [
-        online.add(f, w)
-        for f, w in zip(np.split(force, cuts), np.split(rate, cuts), strict=True)
-        if len(f)
-    ]
-    assert sum(learned) == 2000 // block
-    online.finish()
-    assert online.samples == 2000
-    sd = np.sqrt(np.diag(batch.covariance))
-    apart = (online.positions - batch.positions)[1:].ravel() / sd
-    assert np.abs(apart).max() < 0.01
-    np.testing.assert_allclose(np.sqrt(np.diag(online.covariance)), sd, rtol=0.01)
-
-
-def test_online_memory_is_bounded(stream):
-    """Nothing of a block stays but 3 (A - 1) squared numbers."""
-    model, force, rate = stream
-    online = Online(model, 3e-3, 100)
-    for part in range(0, 2000, 70):
-        online.add(force[part : part + 70], rate[part : part + 70])
-        assert sum(len(waiting[0]) for waiting in online._waiting) < 100
-
-
-def test_online_keeps_nothing_of_the_callers_buffer(stream):
-    model, force, rate = stream
-    one, other = Online(model, 3e-3, 100), Online(model, 3e-3, 100)
-    held = np.empty((50, *force.shape[1:])), np.empty((50, *rate.shape[1:]))
-    for first in range(0, 200, 50):
-        held[0][:], held[1][:] = force[first : first + 50], rate[first : first + 50]
-        one.add(*held)
-        other.add(held[0].copy(), held[1].copy())
-    np.testing.assert_array_equal(one.positions, other.positions)
-    with pytest.raises(InputError, match="expected samples of shapes"):
-        one.add(3.0, 4.0)
-
-
-def test_online_widths_shrink(stream):
-    model, force, rate = stream
-    online, widths = Online(model, 3e-3, 100), []
-    for part in range(0, 2000, 100):
-        online.add(force[part : part + 100], rate[part : part + 100])
-        widths.append(np.sqrt(np.diag(online.covariance)).max())
-    assert np.all(np.diff(widths) < 0)
-    assert widths[-1] / widths[3] == pytest.approx(np.sqrt(4 / 20), rel=0.15)
-
-
 def test_descents_that_overlap_leave_the_threads_of_blas_as_they_were():
     def blas():
         found = [item for item in threadpool_info() if item["user_api"] == "blas"]
@@ -264,14 +196,3 @@ def test_descents_that_overlap_leave_the_threads_of_blas_as_they_were():
         assert blas() == {1}  # the other one still runs
         other.__exit__(None, None, None)
         assert blas() == {2}
-
-
-def test_online_keeps_nothing_of_wrong_samples():
-    model, _, force, rate = problem()
-    online = Online(model, 3e-3, len(force))
-    bad = force.copy()
-    bad[0, 0, 0] = np.nan
-    for wrong in ((force[:, :2], rate), (force, rate[1:]), (force[0], rate[0]), (bad, rate)):
-        with pytest.raises(InputError, match="online: expected"):
-            online.add(*wrong)
-    assert online.add(force, rate) == 1 and online.samples == len(force)

@@ -8,6 +8,7 @@ import pytest
 
 import imuarray
 from imuarray.analysis.beyond import posterior_beyond
+from imuarray.analysis.density import traced
 from imuarray.analysis.fitting import fitted_beyond
 from imuarray.analysis.known import fused
 from imuarray.analysis.past_rail import _choose, _hidden, past_rail
@@ -116,4 +117,5 @@ def test_a_diagnosis_is_a_model_to_sample(withheld, diagnosis):
     assert posterior.model.effects == ("gyroscope_scale",)
     off = posterior.mode[:12] - truth["position"].to_numpy()[1:].ravel()
     assert np.abs(off / np.sqrt(np.diag(posterior.covariance))[:12]).max() < 5
-    assert np.isfinite(posterior.generic()(posterior.mode, np.random.default_rng(1)))
+    density, data = traced(posterior)
+    assert np.isfinite(float(density(posterior.mode, *data)))

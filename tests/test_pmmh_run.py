@@ -11,9 +11,10 @@ from imuarray.model import ArrayModel
 from imuarray.posterior import pmmh
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.pmmh import run_chains
-from imuarray.posterior.target import CompiledTarget, GaussianPrior, GenericTarget
+from imuarray.posterior.target import CompiledTarget, GaussianPrior
 from imuarray.streams import stream
 from tests.cases import simulate, small_array
+from tests.generic import GenericTarget
 
 STEP = 1e-4
 

@@ -17,10 +17,10 @@ from imuarray.posterior.pmmh import run_chains
 from imuarray.posterior.target import (
     CompiledTarget,
     GaussianPrior,
-    GenericTarget,
 )
 from tests import oracles
 from tests.cases import SHAPE, simulate
+from tests.generic import GenericTarget
 
 pytestmark = pytest.mark.slow
 

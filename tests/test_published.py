@@ -1,4 +1,4 @@
-"""paper_figures/: made from the configuration at hand, or made again; and the workflow elsewhere."""
+"""paper_figures/: made from the configuration at hand, or again; and the workflow elsewhere."""
 
 import json
 import re
@@ -105,7 +105,9 @@ def test_a_figure_asked_for_by_name_is_that_of_the_configuration_at_hand(clone):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("where", ["{}/workflow/Snakefile", "git+file://{}/workflow/Snakefile@HEAD"])
+@pytest.mark.parametrize(
+    "where", ["{}/workflow/Snakefile", "git+file://{}/workflow/Snakefile@HEAD"]
+)
 def test_the_workflow_is_a_module_of_another(tmp_path, where):
     if where.startswith("git") and not (ROOT / ".git").exists():
         pytest.skip("no repository")

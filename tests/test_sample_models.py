@@ -22,7 +22,7 @@ def simulated(samples, effects=()):
 def test_too_few_samples_for_any_part_are_the_papers_model():
     recording, _ = simulated(5)
     chains = [
-        imuarray.sample(recording, model, "pmmh", steps=20) for model in ("sensors", "papers")
+        imuarray.sample(recording, model, "nuts", steps=20) for model in ("sensors", "papers")
     ]
     one, other = (tree["posterior"]["position"].to_numpy() for tree in chains)
     np.testing.assert_array_equal(one, other)
@@ -30,7 +30,7 @@ def test_too_few_samples_for_any_part_are_the_papers_model():
 
 
 def test_skewed_gyroscopes_are_found_and_sampled():
-    """The density stands where the engine's estimate does, as wide as that says; pCN moves in it.
+    """The density stands where the engine's estimate does, as wide as that says; draws follow it.
 
     The mode is within 4.5 sds of the truth (seed 3, nine coordinates).
     """
@@ -45,7 +45,7 @@ def test_skewed_gyroscopes_are_found_and_sampled():
     place = found.places[0][np.argwhere(found.active)[:, 1] < 3]
     formal = widths(found)[1][place]
     np.testing.assert_allclose(sd[:9], formal, rtol=0.5)
-    tree = imuarray.sample(recording, method="pcn", steps=60)
+    tree = imuarray.sample(recording, method="independent", steps=60)
     moved = tree["posterior"]["position"].to_numpy().reshape(-1, 9) - posterior.mode[:9]
     assert 0.1 < np.sqrt(np.mean((moved / sd[:9]) ** 2)) < 3.0
     assert tree["posterior"]["effect_parameter"].shape[-1] == 4 * (3 + 6)
@@ -56,6 +56,7 @@ def test_skewed_gyroscopes_are_found_and_sampled():
     ("options", "said"),
     [
         ({"accelerometer_noise": 0.1}, "expected it with --model papers only"),
+        ({"method": "pmmh"}, "expected --model papers with it, found sensors"),
         ({"motion_prior": "flat"}, "expected --model papers with it, found sensors"),
         ({"model": "papers", "effects": ["size_effect"]}, "expected none with --model papers"),
         ({"model": "guess"}, "expected any of sensors, papers or a diagnosis.json"),

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from imuarray.model import ArrayModel
 from imuarray.posterior.likelihood import Likelihood
-from imuarray.posterior.target import GaussianPrior, GenericTarget
+from imuarray.posterior.target import GaussianPrior
 from imuarray.posterior.tuning import (
     acceptance,
     acceptance_sweep,
@@ -16,6 +16,7 @@ from imuarray.posterior.tuning import (
     variance_sweep,
 )
 from tests.cases import simulate, small_array
+from tests.generic import GenericTarget
 
 DRAWS = np.array([5, 20, 80, 320, 1280])
 

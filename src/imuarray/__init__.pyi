@@ -17,7 +17,6 @@ from .errors import InputError as InputError
 from .estimation.bcd import calibrate_bcd as calibrate_bcd
 from .estimation.gauss_newton import calibrate_gauss_newton as calibrate_gauss_newton
 from .estimation.motion_ml import estimate_motion as estimate_motion
-from .estimation.online import Online as Online
 from .firstorder.noise import allan as allan
 from .geometry.array import Array as Array
 from .geometry.mimu4444 import mimu4444 as mimu4444

@@ -146,20 +146,6 @@ def motion(dataset: xr.Dataset, quantity: str = "angular_rate", axes: Axes | Non
     return axes
 
 
-def residuals(recording: Recording, seed: int = 0) -> list[Axes]:
-    """Residuals of the papers' model beside those of the recording's own simulation.
-
-    Of its moving samples off the rails, as `imuarray residuals`.
-    """
-    from imuarray.estimation.selection import select_dynamic
-    from imuarray.figures.measured import residual_figure
-    from imuarray.measured.residuals import compare
-
-    moving = recording.select(select_dynamic(recording).usable)
-    table, shape = compare(moving, np.random.default_rng(seed))
-    return residual_figure(table, shape).axes
-
-
 def allan(noise: StillNoise) -> list[Axes]:
     """Allan deviations and spectra of all axes, and the terms found; of `imuarray.allan`."""
     from imuarray.figures.noise import noise_figure

@@ -16,11 +16,11 @@ from imuarray.errors import IdentifiabilityError
 from imuarray.geometry import positions_of
 from imuarray.model import ArrayModel
 from imuarray.posterior import tuning
-from imuarray.posterior.generic import SCALES, GenericLikelihood, log_laplace
+from imuarray.posterior.generic import SCALES, log_laplace, unknown
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.marginal import Marginal, log_posterior
 from imuarray.posterior.rate_density import sample_covariance
-from imuarray.posterior.target import GaussianPrior, GenericTarget, TiedPrior
+from imuarray.posterior.target import GaussianPrior, TiedPrior
 from imuarray.recording import Recording
 from imuarray.streams import stream
 
@@ -30,8 +30,6 @@ NOT_CONVERGED = (
 )
 WIDE = 3.0  # prior sd of the log of a noise's sd, and of the motion's: a factor of twenty
 FEW, STARTS = 50, 8  # samples; searches for the mode where there are no more
-WIDER = 1.05  # than the mode's curvature, for preconditioned Crank-Nicolson proposals
-LENGTHS = np.geomspace(0.02, 0.99, 10)  # of those that are tried
 
 
 class Posterior(NamedTuple):
@@ -65,13 +63,6 @@ class Posterior(NamedTuple):
             rate_distribution=sample_covariance(recording.angular_rate)
             if rates == "spread" else None,
         )  # fmt: skip
-
-    def generic(self, draws: int = 2) -> GenericLikelihood:
-        """The likelihood of a model with effects."""
-        assert self.readings is not None  # there are, with effects
-        return GenericLikelihood(
-            self.model, self.readings, self.motion, draws=draws, logs=self.spread
-        )
 
 
 def posterior_of(
@@ -180,12 +171,12 @@ def _fit(recording: Recording) -> Callable:
 
 
 @cache
-def log_extended(model: ArrayModel, steps: int) -> Callable:
+def log_extended(model: ArrayModel) -> Callable:
     """The same under a model with effects; one function for models that predict the same."""
 
     def log_density(theta, data, mean, root):
         prior = -0.5 * ((root @ (theta - mean)) ** 2).sum()
-        return log_laplace(model, steps, theta, data) + prior
+        return log_laplace(model, theta, data) + prior
 
     return log_density
 
@@ -194,9 +185,9 @@ def traced(posterior: Posterior, rates: str = "declared", say: Say = silent):
     """(log density, data): a function of theta (P,) and of arrays, to be compiled by JAX."""
     prior = posterior.prior
     if isinstance(prior, TiedPrior):
-        generic = posterior.generic()
-        function = log_extended(posterior.model, generic.steps)
-        return function, (generic.data, prior.mean, prior.root)
+        assert posterior.readings is not None  # there are, with effects
+        given = unknown(posterior.readings, posterior.motion, posterior.spread)
+        return log_extended(posterior.model), (given, prior.mean, prior.root)
     recording = posterior.recording
     likelihood = posterior.likelihood(rates)
     saturated = recording.saturated_gyroscopes()
@@ -218,8 +209,6 @@ def traced(posterior: Posterior, rates: str = "declared", say: Say = silent):
 
 def at_estimate(posterior: Posterior) -> Posterior:
     """The same with noise and motion's size at their estimates, for the compiled likelihood."""
-    if posterior.model.effects or not posterior.scales:
-        return posterior
     size, prior = len(posterior.mode) - len(posterior.scales), posterior.prior
     return posterior._replace(
         prior=GaussianPrior(prior.mean[:size], prior.sd[:size]), mode=posterior.mode[:size],
@@ -227,21 +216,13 @@ def at_estimate(posterior: Posterior) -> Posterior:
     )  # fmt: skip
 
 
-def tuned_target(posterior: Posterior, method: str, rates: str, rng, say: Say = silent):
-    """(target, step length, N) of the paper's walk, or with ``"pcn"`` of proposals shaped by it.
+def tuned_target(posterior: Posterior, rates: str, rng, say: Say = silent):
+    """(target, step length, N) of the paper's walk.
 
     N and the walk's length as in section III-C; where not even the largest N brings the variance of
     log p-hat near what is aimed at, omega is drawn around the integrand's mode.
     """
-    if posterior.model.effects:
-        return _tuned_generic(posterior, method == "pcn", rng)
     prior, mode, likelihood = posterior.prior, posterior.mode, posterior.likelihood(rates)
-    if method == "pcn":
-        factor = WIDER * np.linalg.cholesky(posterior.covariance)
-        target, step = tuning.tune_preconditioned(
-            likelihood, prior, mode, factor, LENGTHS, rng, may_centre=True
-        )
-        return target, step, target.draws
     sweeps = tuning.Sweeps(posterior.recording.position_prior_sd * np.geomspace(1e-6, 0.3, 16))
     found = tuning.tune(
         likelihood, prior, posterior.model.array.relative, lambda _: mode, sweeps, lambda _: rng
@@ -250,14 +231,3 @@ def tuned_target(posterior: Posterior, method: str, rates: str, rng, say: Say = 
         say(f"variance of log p-hat {found.variances[-1]:.3g} at N = {sweeps.draws[-1]}: omega is"
             " drawn around the integrand's mode instead")  # fmt: skip
     return found.target, found.step, found.target.draws
-
-
-def _tuned_generic(posterior: Posterior, pcn: bool, rng):
-    """The same for a model with effects: Laplace-centred importance sampling of omega."""
-    estimate, mode = posterior.generic(), posterior.mode
-    shape = np.linalg.cholesky(posterior.covariance)
-    target = GenericTarget(estimate, posterior.prior, shape, mode if pcn else None)
-    if pcn:
-        return target, tuning.longest_jump(target, mode, LENGTHS, 200, rng), estimate.draws
-    steps = np.geomspace(1e-3, 1.0, 8)
-    return target, tuning.tune_step(target, mode, steps, 200, rng), estimate.draws

@@ -89,7 +89,7 @@ def unsteady(calibration: xr.Dataset, corrected: bool, recordings: int = 1) -> l
     if recordings > 1:
         return [
             f"the recordings {by}was it glued anew, or is one recording of another board? Calibrate"
-            " each alone, and compare (imuarray repeat)"
+            " each alone, and compare their positions"
         ]
     return [
         f"parts of the recording {by}did it come loose, or did its accelerometer's offset jump?"

@@ -32,7 +32,7 @@ from imuarray.provenance import code_digest, digest, stamp
 from imuarray.recording import Recording
 from imuarray.streams import stream
 
-STEPS = {"pmmh": (200_000, 10_000), "pcn": (40_000, 4_000)}  # compiled, any effects
+STEPS = 200_000  # of PmMH
 # 1000 left the worst of 93 R-hats above 1.01 now and then; with effects a step costs ten times more
 NUTS_STEPS, NUTS_WARMUP = (1250, 750), 300
 APART = 2.0  # posterior sds by which the starts differ
@@ -88,10 +88,8 @@ def sample(
         proposals from the normal density about the mode, in four chains; ``"nuts"``: the no-U-turn
         sampler on the same; ``"auto"``: the former where Pareto's k of its weights is 0.7 at most,
         R-hat 1.01 and ESS 1000 are reached and the motion's prior is proper, else NUTS;
-        ``"pmmh"``: pseudo-marginal Metropolis-Hastings (paper 2021), N and the step length tuned
-        as in section III-C; ``"pcn"``: the same with preconditioned Crank-Nicolson proposals
-        shaped by the mode. The latter two take noise and the motion's size at their estimates
-        unless there are effects.
+        ``"pmmh"``, of the papers' model: pseudo-marginal Metropolis-Hastings (paper 2021), N and
+        the step length tuned as in section III-C, noise and the motion's size at their estimates.
     steps
         Transitions of each chain, after the warm-up in NUTS' case; by default as many as
         independent proposals need.
@@ -137,6 +135,8 @@ def sample(
     require_integer("seed", seed, 0)
     require_together(model, [recording], effects, accelerometer_noise)
     flat = motion_prior == "flat"
+    if method == "pmmh" and model != "papers":
+        raise InputError(f"--method pmmh: expected --model papers with it, found {model}")
     if flat and model != "papers":
         raise InputError(f"--motion-prior flat: expected --model papers with it, found {model}")
     if rates == "spread" and not flat:
@@ -155,7 +155,7 @@ def sample(
             " (docs/findings.md)")  # fmt: skip
     beside = None if beside is None else Path(beside)
     asked = Asked(method, motion_prior, steps, seed, rates, progress, beside, say)
-    made = (_pmmh if method in STEPS else _exact)(posterior, asked)
+    made = (_pmmh if method == "pmmh" else _exact)(posterior, asked)
     tree = _tree(made, seed, pull)
     if tree.attrs["on_a_line"]:
         say("a chain went to where the triads lie on one line: the flat motion prior has no bound"
@@ -271,16 +271,12 @@ def _pmmh(posterior: Posterior, asked: Asked) -> Made:
     asked.say("tuning N and the step length ...")
     posterior = at_estimate(posterior)
     mode, prior = posterior.mode, posterior.prior
-    target, step, draws = tuned_target(
-        posterior, asked.method, asked.rates, _stream(asked, "tuning"), asked.say
-    )
-    steps = asked.steps or STEPS[asked.method][bool(posterior.model.effects)]
+    target, step, draws = tuned_target(posterior, asked.rates, _stream(asked, "tuning"), asked.say)
+    steps = asked.steps or STEPS
     thin = max(1, steps // STORED)
     key = _key(posterior, asked, draws, step, steps)
     checkpoint = _checkpoint(asked, key)
-    rng = _stream(asked, "starts")
-    wide = asked.method == "pmmh" and not posterior.model.effects
-    starts = spread_starts(mode, prior.sd / 3, rng) if wide else _apart(posterior, rng)
+    starts = spread_starts(mode, prior.sd / 3, _stream(asked, "starts"))
     chains = run_chains(
         target, starts, step, max(4, steps // thin), thin, asked.seed, checkpoint=checkpoint,
         key=key, quiet=not asked.progress,

@@ -1,12 +1,9 @@
-"""The work behind the commands for measured data: first-order, select, residuals, repeat."""
+"""The work behind the commands for measured data: first-order, select."""
 
-import numpy as np
-import pandas as pd
 import xarray as xr
 
 from imuarray.commands.output import Output
-from imuarray.errors import InputError
-from imuarray.provenance import atomic_write, digest, stamp, write_csv
+from imuarray.provenance import digest, stamp
 from imuarray.recording import read_recording, write_recording
 
 
@@ -58,72 +55,3 @@ def select(arguments) -> None:
         "out": str(arguments.out), "samples": len(recording.time), "removed": found.removed,
         "informative": len(found.informative), "written": len(index),
     })  # fmt: skip
-
-
-def residuals(arguments) -> None:
-    """The papers' model against the recording, beside its simulation."""
-    from imuarray.estimation.selection import select_dynamic
-    from imuarray.measured.residuals import compare
-
-    recording, output = read_recording(arguments.recording), Output(arguments)
-    moving = recording.select(select_dynamic(recording).usable)
-    table, shape = compare(moving, np.random.default_rng(arguments.seed))
-    if arguments.figure is None:
-        write_csv(table, arguments.out)
-    else:
-        from imuarray.figures.measured import residual_figure
-        from imuarray.figures.style import panels
-
-        figure = residual_figure(
-            panels(summary=table, shape=shape), [f"{arguments.recording.name}"]
-        )
-        with atomic_write(arguments.figure) as temporary:
-            figure.savefig(temporary, format=arguments.figure.suffix[1:].lower())
-            write_csv(table, arguments.out)  # both or none
-    sizes: dict[str, dict[str, float]] = {}
-    for (source, quantity), part in table[table["by"] == "axis"].groupby(["source", "quantity"]):
-        size = float(np.sqrt(np.mean(part.rms**2)))
-        sizes.setdefault(source, {})[quantity] = size
-        output.say(f"{source:>9} {quantity:>14}: residual {size:8.2f} assumed sigmas rms")
-    output.done({"out": str(arguments.out), "residual_assumed_sigmas": sizes})
-
-
-def repeat(arguments) -> None:
-    """z-scores between recordings of one board."""
-    from imuarray.measured.positions import agreement, pairwise
-
-    if len(arguments.recordings) < 2:
-        raise InputError("repeat: expected two or more recordings, found one")
-    names = [path.resolve() for path in arguments.recordings]
-    if len(set(names)) < len(names):
-        raise InputError("repeat: expected different recordings, found one of them twice")
-    output = Output(arguments)
-    table = pd.concat(_located(arguments, output), ignore_index=True)
-    pairs = pairwise(table)
-    write_csv(pairs, arguments.out)
-    found = agreement(pairs, table)
-    output.say(f"50 % intervals cover {100 * found['coverage_50']:.0f} %, 95 % cover"
-               f" {100 * found['coverage_95']:.0f} %; rms z {found['z_rms']:.2f};"
-               f" claimed sd {1e6 * found['claimed_m']:.1f} um, between recordings"
-               f" {1e6 * found['spread_m']:.1f} um")  # fmt: skip
-    output.done({"out": str(arguments.out), **found})
-
-
-def _located(arguments, output: Output) -> list[pd.DataFrame]:
-    """The positions by each recording; InputError for one of other triads."""
-    from imuarray.estimation.selection import select_dynamic
-    from imuarray.measured.positions import locate, position_table
-
-    parts, labels = [], None
-    for path in arguments.recordings:
-        recording = read_recording(path)
-        labels = labels or recording.accelerometer_labels
-        if recording.accelerometer_labels != labels:
-            raise InputError(f"{path}: expected the triads {', '.join(labels)}, found others")
-        chosen = select_dynamic(recording).spread(arguments.samples)
-        found = locate(recording.select(chosen), arguments.accelerometer_noise)
-        parts.append(position_table(found, labels, recording=str(path)))
-        state = "" if found.converged else ", NOT converged"
-        output.say(f"{path}: sigma_a {found.accelerometer_sd:.3g} assumed,"
-                   f" {found.residual_sd:.3g} m/s^2 in the residual{state}")  # fmt: skip
-    return parts

@@ -216,8 +216,7 @@ COMMANDS = (
             _option("--method", "independent: proposals from the normal density about the mode, on"
                     " the exact marginal likelihood; nuts: the no-U-turn sampler on the same; auto"
                     " (default): the former where it is enough, else the latter; pmmh:"
-                    " pseudo-marginal Metropolis-Hastings, as in the 2021 paper; pcn: the same with"
-                    " preconditioned Crank-Nicolson proposals",
+                    " pseudo-marginal Metropolis-Hastings, as in the 2021 paper, of its model",
                     choices=methods.SAMPLING, default="auto"),
             _option("--motion-prior", "proper (default): angular rate and acceleration are normal,"
                     " of the recording's own size; flat: as in the 2021 paper, under the papers'"
@@ -229,25 +228,6 @@ COMMANDS = (
                     choices=methods.RATES, default="declared"),
             _number("--steps", "N", "steps of each chain", type=count),
             SEED,
-        ),
-    ),
-    Command(
-        "residuals", "measured.residuals",
-        "Residuals of the papers' model beside those of the recording's own simulation.",
-        "corrected.nc --figure residuals.png --out residuals.csv", "table to write (CSV)",
-        (RECORDING, _file("--figure", "figure to write (PNG or PDF)", type=Path), SEED),
-    ),
-    Command(
-        "repeat", "measured.repeat",
-        "Do several recordings of one board agree within their claimed widths?",
-        "one.nc two.nc three.nc --samples 500 --out agreement.csv",
-        "table to write (CSV): z-scores of all pairs",
-        (
-            _option("recordings", "two or more recordings", type=InputFile, nargs="+",
-                    metavar="recording"),
-            _number("--samples", "T", "of each recording (default: 500)", 500, count),
-            _number("--accelerometer-noise", "SD", "assumed sd, m/s^2 (default: estimated from"
-                    " each recording's residual)"),
         ),
     ),
     Command(

@@ -101,38 +101,3 @@ class CompiledTarget(Target):
             theta, log_target, prior, *shape, step, self.draws, self.likelihood.power,
             self.likelihood.data, rng, count,
         )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class GenericTarget(Target):
-    """Any model: ``estimate(theta, rng)`` returns log p-hat; one Python step at a time.
-
-    ``scale``, (size,) or a lower factor (size, size), turns the walk's one step length into a
-    step per parameter: effects have units of their own, and gauges that tie them together. With
-    a ``centre`` (size,) proposals are preconditioned Crank-Nicolson, ``scale`` their factor.
-    """
-
-    estimate: Callable
-    prior: GaussianPrior
-    scale: np.ndarray
-    centre: np.ndarray | None = None
-
-    def _energy(self, theta) -> float:
-        """Minus the log of the normal density that proposals leave as it is."""
-        if self.centre is None:
-            return 0.0
-        return 0.5 * float(np.sum(np.linalg.solve(self.scale, theta - self.centre) ** 2))
-
-    def transitions(self, theta, log_target, step, count, rng) -> tuple[int, float]:
-        """`Target.transitions` in plain Python."""
-        accepted, energy = 0, self._energy(theta)
-        shaped = np.matmul if self.scale.ndim == 2 else np.multiply
-        for _ in range(count):
-            proposal = theta + step * shaped(self.scale, rng.standard_normal(self.size))
-            if self.centre is not None:
-                proposal += (np.sqrt(1 - step**2) - 1) * (theta - self.centre)
-            value, moved = self.log_target(proposal, rng), self._energy(proposal)
-            if np.log(rng.random()) < value - log_target + moved - energy:
-                theta[:], log_target, energy = proposal, value, moved
-                accepted += 1
-        return accepted, log_target

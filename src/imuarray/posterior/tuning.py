@@ -85,26 +85,20 @@ def tune_step(target: Target, start, steps, transitions: int, rng, aim=0.18, thr
 
 
 def tune_preconditioned(
-    likelihood: Likelihood, prior: GaussianPrior, centre, factor, lengths, rng,
-    may_centre: bool = False,
+    likelihood: Likelihood, prior: GaussianPrior, centre, factor, lengths, rng
 ) -> tuple[CompiledTarget, float]:  # fmt: skip
     """(target, step) of preconditioned Crank-Nicolson proposals: N at the mode, the longest jumps.
 
     ``centre`` (P,) and ``factor`` (P, P) as in `CompiledTarget`; of the ``lengths`` that
-    with the largest expected squared jump. ``may_centre`` as in `tune`.
+    with the largest expected squared jump.
     """
     tried = Sweeps(lengths)
     likelihood, draws, *_ = _tuned_draws(
-        likelihood, positions_of(centre), lambda _: centre, tried, lambda _: rng, 1, may_centre
+        likelihood, positions_of(centre), lambda _: centre, tried, lambda _: rng, 1, False
     )
     target = CompiledTarget(likelihood, prior, draws, centre, factor)
-    return target, longest_jump(target, centre, lengths, tried.transitions, rng)
-
-
-def longest_jump(target: Target, start, lengths, transitions: int, rng) -> float:
-    """Of the ``lengths`` that with the largest expected squared jump, from ``start`` (P,)."""
-    rates = acceptance_sweep(target, start, lengths, transitions, rng)
-    return float(lengths[np.argmax(rates * np.square(lengths))])
+    rates = acceptance_sweep(target, centre, lengths, tried.transitions, rng)
+    return target, float(lengths[np.argmax(rates * np.square(lengths))])
 
 
 def _each(function, jobs, threads: int) -> np.ndarray:
