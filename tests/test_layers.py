@@ -14,7 +14,7 @@ LAYERS = (
     ("streams", "provenance", "geometry"), ("motion",), ("model", "config"),
     ("recording",), ("simulation", "firstorder", "estimation"), ("alignment", "engine"),
     ("posterior",), ("studies", "measured"), ("blind", "diagnosis"), ("claims", "figures"),
-    ("report",), ("analysis",), ("plots",), ("commands",), ("cli",), ("__main__",),
+    ("report",), ("analysis",), ("plots", "pipeline"), ("commands",), ("cli",), ("__main__",),
 )  # fmt: skip
 PLACE = {name: number for number, names in enumerate(LAYERS) for name in names}
 
