@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from imuarray.claims.page import markdown
 from imuarray.claims.registry import (
     CLAIMS,
     FAILS,
@@ -16,6 +15,7 @@ from imuarray.claims.registry import (
     VERDICTS,
     claim,
     evaluate,
+    markdown,
 )
 from imuarray.claims.results import Results
 from imuarray.config import model_from, read_config

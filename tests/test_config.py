@@ -9,7 +9,7 @@ import yaml
 
 from imuarray.config import check_config, describe_schema, model_from, read_config
 from imuarray.errors import InputError
-from imuarray.geometry.read import BOARDS
+from imuarray.geometry.boards import BOARDS
 from imuarray.studies.bayes import simulate_twisting
 
 ROOT = Path(__file__).parents[1]

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from imuarray.posterior import draws, elementary
+from imuarray.posterior import draws
+from imuarray.posterior import normals as elementary
 
 
 def test_exponential():

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from imuarray.figures import notes, paper2017, paper2021, paper2021_array, paper2021_tables, tables
+from imuarray.figures import paper2017, paper2021, paper2021_array, paper2021_tables, tables
 from imuarray.figures.gallery import caption, gallery, title
 from imuarray.figures.style import rounded, significant, write_figure
 from imuarray.geometry import mimu4444
@@ -312,8 +312,8 @@ def test_underside_lies_beneath_and_is_turned():
 
 
 def test_only_converged_chains_are_called_so():
-    assert "converged" not in " ".join(notes.chain_lines({5: verdict(), 50: verdict(50)}))
-    lines = notes.chain_lines({5: verdict(converged=True), 50: verdict(50)})
+    assert "converged" not in " ".join(tables.chain_lines({5: verdict(), 50: verdict(50)}))
+    lines = tables.chain_lines({5: verdict(converged=True), 50: verdict(50)})
     assert "converged: T = 5." in lines[-1] and "preliminary: T = 50." in lines[-1]
     assert "0.20/0.19" in lines[0] and "0.41 µm" in lines[0] and "R-hat 1.700" in lines[1]
 
@@ -374,8 +374,8 @@ def test_table2_compares_with_the_last_source():
     np.testing.assert_allclose(table.sd_median_m[:3], [2e-4, 2.2e-4, 2e-6])
     assert table.source[0] == "experiment (measured)"
     assert "IMUs: 2 (experiment" in lines[1] and "recording exp_1" in lines[0]
-    assert notes.unfinished(table, 1.05) == []
-    assert "3 of 3" in notes.unfinished(first, 1.05)[0]
+    assert tables.unfinished(table, 1.05) == []
+    assert "3 of 3" in tables.unfinished(first, 1.05)[0]
 
 
 def test_captions_and_gallery():

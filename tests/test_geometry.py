@@ -15,7 +15,7 @@ from imuarray.geometry import (
     mimu4444_corners,
 )
 from imuarray.geometry.array import require_planar_extent
-from imuarray.geometry.read import BOARDS
+from imuarray.geometry.boards import BOARDS
 
 CORNERS = 1e-3 * np.array([[-9.45, 9.45], [-9.45, -9.45], [9.45, 9.45], [9.45, -9.45]])
 SQUARE = [[0, 0, 0], [0.01, 0, 0], [0, 0.01, 0]]

@@ -10,8 +10,8 @@ import imuarray
 from imuarray.analysis.beyond import posterior_beyond
 from imuarray.analysis.density import traced
 from imuarray.analysis.fitting import fitted_beyond
+from imuarray.analysis.held_out import _choose, _hidden, past_rail
 from imuarray.analysis.known import fused
-from imuarray.analysis.past_rail import _choose, _hidden, past_rail
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.figures.board import draw_past_rail, table_past_rail

@@ -19,7 +19,7 @@ from .estimation.gauss_newton import calibrate_gauss_newton as calibrate_gauss_n
 from .estimation.motion_ml import estimate_motion as estimate_motion
 from .firstorder.noise import allan as allan
 from .geometry.array import Array as Array
-from .geometry.mimu4444 import mimu4444 as mimu4444
+from .geometry.boards import mimu4444 as mimu4444
 from .model.array_model import ArrayModel as ArrayModel
 from .model.own import read_effects as read_effects
 from .recording.format import read_recording as read_recording

@@ -148,7 +148,7 @@ def motion(dataset: xr.Dataset, quantity: str = "angular_rate", axes: Axes | Non
 
 def allan(noise: StillNoise) -> list[Axes]:
     """Allan deviations and spectra of all axes, and the terms found; of `imuarray.allan`."""
-    from imuarray.figures.noise import noise_figure
+    from imuarray.figures.measured import noise_figure
 
     return noise_figure(noise).axes
 

@@ -212,7 +212,7 @@ rule figure_measured_noise:
     benchmark:
         "results/measured/benchmarks/figures/noise_{name}.tsv"
     params:
-        **by("figures.noise.figure_measured_noise"),
+        **by("figures.measured.figure_measured_noise"),
         settings=effective(config, ""),
     message:
         "figure: noise of {wildcards.name}"

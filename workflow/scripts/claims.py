@@ -5,8 +5,7 @@ from imuarray.pipeline.job import job
 with job(snakemake) as settings:
     from pathlib import Path
 
-    from imuarray.claims.page import markdown
-    from imuarray.claims.registry import evaluate
+    from imuarray.claims.registry import evaluate, markdown
     from imuarray.claims.results import Results
     from imuarray.provenance import write_bytes, write_csv
 

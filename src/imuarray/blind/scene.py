@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.geometry import Array, mimu4444, mimu4444_corners
-from imuarray.geometry.mimu4444 import UNDERSIDE_ROTATION
+from imuarray.geometry.boards import UNDERSIDE_ROTATION
 from imuarray.motion import SmoothMotion, hand_twisting
 
 GYROSCOPE_RAIL = np.radians(2000.0)  # rad/s

@@ -3,8 +3,7 @@
 import numpy as np
 from scipy.special import chdtrc
 
-from imuarray.claims.numbers import listed, near, power_law, ratio, rises, show
-from imuarray.claims.registry import claim, judged
+from imuarray.claims.registry import claim, judged, listed, near, power_law, ratio, rises, show
 
 SAMPLES = "calibration/position_error_samples"
 MOTION = "calibration/position_error_motion"

@@ -3,8 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from imuarray.claims.numbers import listed, near, power_law, show, tiny
-from imuarray.claims.registry import claim, judged
+from imuarray.claims.registry import claim, judged, listed, near, power_law, show, tiny
 
 EXACT = "rounding only"
 UNBIASED = "four triads, T = 2; p from plain normal densities, none of the estimator's code"

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from imuarray.claims.numbers import by_samples, falls, listed, show
-from imuarray.claims.registry import claim, judged, untested
+from imuarray.claims.registry import by_samples, claim, falls, judged, listed, show, untested
 from imuarray.geometry import UNDERSIDE_ROTATION
 from imuarray.recording.units import GRAVITY
 

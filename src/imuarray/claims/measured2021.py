@@ -3,9 +3,8 @@
 import numpy as np
 from scipy.special import bdtr
 
-from imuarray.claims.numbers import by_samples, listed, show
 from imuarray.claims.posterior2021 import covered
-from imuarray.claims.registry import claim, judged, untested
+from imuarray.claims.registry import by_samples, claim, judged, listed, show, untested
 from imuarray.errors import InputError
 
 

@@ -3,8 +3,7 @@
 import numpy as np
 from scipy.special import chdtri
 
-from imuarray.claims.numbers import by_samples, falls, listed, show
-from imuarray.claims.registry import CLOCK, claim, judged, untested
+from imuarray.claims.registry import CLOCK, by_samples, claim, falls, judged, listed, show, untested
 from imuarray.geometry import array_from_config
 from imuarray.posterior.diagnostics import ess
 

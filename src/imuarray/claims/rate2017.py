@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from imuarray.claims.numbers import listed, ratio, show
-from imuarray.claims.registry import claim, judged, untested
+from imuarray.claims.registry import claim, judged, listed, ratio, show, untested
 
 COMPARABLE = 2.0  # "comparable" in the papers: within this factor
 SAME = 1.3  # "comparable to having no error at all"

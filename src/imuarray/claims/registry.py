@@ -1,14 +1,67 @@
-"""The list of claims (`register.yaml`) and the functions that judge them."""
+"""The list of claims (`register.yaml`), the functions that judge them, and all of it as a page."""
 
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pandas as pd
 import yaml
 
-from imuarray.claims.numbers import show
+
+def show(value: float, digits: int = 3) -> str:
+    """A number with ``digits`` significant digits."""
+    return f"{value:.{digits}g}"
+
+
+def listed(values, digits: int = 3) -> str:
+    """Numbers side by side."""
+    return ", ".join(show(value, digits) for value in values)
+
+
+def by_samples(values: dict, digits: int = 3) -> str:
+    """T = ...: value; ...; a value may be several numbers."""
+    parts = ((samples, np.atleast_1d(value)) for samples, value in values.items())
+    return "; ".join(f"T = {samples}: {listed(value, digits)}" for samples, value in parts)
+
+
+def tiny(value: float, limit: float) -> str:
+    """A rounding error, whose digits differ between processors: below ``limit``, or itself."""
+    return f"below {limit:g}" if value < limit else show(value, 2)
+
+
+def power_law(x, y, error) -> tuple[float, float]:
+    """Exponent of y ~ x^p and its standard error, from sds ``error`` of independent y's."""
+    x, y, error = (np.asarray(values, float) for values in (x, y, error))
+    weight = (y / error) ** 2
+    centred = np.log(x) - np.sum(weight * np.log(x)) / weight.sum()
+    spread = np.sum(weight * centred**2)
+    return float(np.sum(weight * centred * np.log(y)) / spread), float(spread**-0.5)
+
+
+def rises(values, errors, z: float = 3.0) -> int:
+    """How many steps of a sequence go up by more than ``z`` combined standard errors."""
+    values, errors = np.asarray(values, float), np.asarray(errors, float)
+    limit = z * np.hypot(errors[1:], errors[:-1])
+    return int(np.sum(np.diff(values) > limit))
+
+
+def near(value: float, wanted: float, error: float, least: float) -> bool:
+    """Whether a value is within ``least`` or three standard errors of what is wanted."""
+    return abs(value - wanted) <= max(least, 3 * error)
+
+
+def falls(values) -> bool:
+    """Whether each of a sequence (of numbers or of arrays) is below the one before."""
+    return bool(np.all(np.diff(np.asarray(list(values), float), axis=0) < 0))
+
+
+def ratio(a, a_error, b, b_error):
+    """a / b and its standard error for independent a and b, numbers or columns."""
+    value = a / b
+    return value, abs(value) * np.hypot(a_error / a, b_error / b)
+
 
 HOLDS, FAILS, UNTESTED = "holds", "does not hold", "cannot be tested here"
 CLOCK = "seconds: timing.csv beside this scale's claims in results/"
@@ -70,3 +123,47 @@ def evaluate(results) -> pd.DataFrame:
             "remark": outcome.remark, "rests_on": "clock" if item.get("clock") else "seed",
         })  # fmt: skip
     return pd.DataFrame(rows)
+
+
+TITLES = {
+    "2017": "On-the-fly geometric calibration of inertial sensor arrays (2017)",
+    "2021": "Quantifying the uncertainty of the relative geometry in inertial sensor arrays (2021)",
+}
+COLUMNS = {
+    "id": "Id", "section": "Section", "claim": "Claim", "paper_value": "Paper",
+    "our_value": "Ours", "our_error": "Monte Carlo error", "criterion": "Stands if",
+    "verdict": "Verdict", "remark": "Remark",
+}  # fmt: skip
+
+
+def counts(table: pd.DataFrame) -> pd.DataFrame:
+    """Number of claims by paper and verdict."""
+    return pd.crosstab(table.paper, table.verdict).reindex(columns=VERDICTS, fill_value=0)
+
+
+def _cell(value) -> str:
+    return " ".join(str(value).split()).replace("|", "\\|")
+
+
+def _rows(frame: pd.DataFrame, header) -> list[str]:
+    lines = ["| " + " | ".join(header) + " |", "|" + " --- |" * len(header)]
+    cells = frame.to_numpy().tolist()
+    return lines + ["| " + " | ".join(map(_cell, row)) + " |" for row in cells]
+
+
+def markdown(table: pd.DataFrame, settings: dict) -> str:
+    """A table for each paper with the counts, the scale and the seed above them."""
+    scale, seed = settings["scale"]["name"], settings["seed"]
+    clock = ", ".join(table.id[table.rests_on == "clock"])
+    lines = [
+        "# The papers' claims", "",
+        f"Scale `{scale}`, seed {seed}. Every verdict is computed from the result files of this"
+        " scale; errors are Monte Carlo standard errors. The tables and the plotted values of the"
+        " papers are not in their text, so only what the text says is compared.",
+        f"Ratios of clock times, with room for any machine: {clock}.", "",
+    ]  # fmt: skip
+    lines += _rows(counts(table).reset_index(), ["Paper", *VERDICTS])
+    for paper, title in TITLES.items():
+        lines += ["", f"## {title}", ""]
+        lines += _rows(table.loc[table.paper == paper, list(COLUMNS)], COLUMNS.values())
+    return "\n".join(lines) + "\n"

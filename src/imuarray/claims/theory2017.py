@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from imuarray.claims.numbers import listed, power_law, show, tiny
-from imuarray.claims.registry import CLOCK, claim, judged, untested
+from imuarray.claims.registry import CLOCK, claim, judged, listed, power_law, show, tiny, untested
 from imuarray.recording.units import GRAVITY
 
 EXACT = "rounding only"

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from imuarray.claims.numbers import by_samples, listed, near, power_law, rises, show
-from imuarray.claims.registry import claim, judged
+from imuarray.claims.registry import by_samples, claim, judged, listed, near, power_law, rises, show
 
 SWEEP = "tuning/variance_T{}"
 

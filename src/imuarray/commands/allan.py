@@ -3,7 +3,7 @@
 import numpy as np
 
 from imuarray.commands.output import Output
-from imuarray.figures.noise import noise_figure
+from imuarray.figures.measured import noise_figure
 from imuarray.figures.style import saved
 from imuarray.firstorder.noise import StillNoise, allan
 from imuarray.provenance import write_bytes, write_csv

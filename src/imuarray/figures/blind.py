@@ -9,7 +9,6 @@ from matplotlib.ticker import NullFormatter
 from imuarray.blind import summary
 from imuarray.blind.inject import CATALOGUE
 from imuarray.blind.summary import ALL, CRASH, NOTHING, UNEXPLAINED
-from imuarray.figures.notes import scale_line
 from imuarray.figures.style import (
     BLACK,
     BLUE,
@@ -21,6 +20,7 @@ from imuarray.figures.style import (
     shade,
     styled,
 )
+from imuarray.figures.tables import scale_line
 
 COLUMNS = 6  # panels in a row
 FOUND, WRONG = {"color": BLUE, "marker": "o"}, {"color": VERMILLION, "marker": "s"}

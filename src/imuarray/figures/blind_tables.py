@@ -5,8 +5,7 @@ import pandas as pd
 from imuarray.blind import summary
 from imuarray.blind.added import grade_added
 from imuarray.blind.criteria import criteria
-from imuarray.figures.notes import scale_line
-from imuarray.figures.tables import Column
+from imuarray.figures.tables import Column, scale_line
 
 YES_NO = {True: "yes", False: "no"}
 

@@ -6,7 +6,6 @@ import matplotlib
 import numpy as np
 import pandas as pd
 
-from imuarray.figures.notes import scale_line
 from imuarray.figures.style import (
     BLACK,
     GREY,
@@ -18,6 +17,7 @@ from imuarray.figures.style import (
     points,
     styled,
 )
+from imuarray.figures.tables import scale_line
 from imuarray.geometry import array_from_config
 
 MICROMETRE = 1e-6  # m, the level that the paper's conclusions speak of

@@ -8,7 +8,6 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter
 from scipy.stats import gaussian_kde, norm
 
-from imuarray.figures.notes import chain_lines, scale_line
 from imuarray.figures.style import (
     BLACK,
     GREY,
@@ -23,6 +22,7 @@ from imuarray.figures.style import (
     significant,
     styled,
 )
+from imuarray.figures.tables import chain_lines, scale_line
 
 TRACE_POINTS = 1000  # drawn per chain; more would not be seen
 BINS = 40

@@ -9,7 +9,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from scipy.stats import chi2
 
-from imuarray.figures.notes import chain_lines, scale_line
 from imuarray.figures.paper2021 import after_burn_in, prior_of
 from imuarray.figures.style import (
     BLACK,
@@ -21,6 +20,7 @@ from imuarray.figures.style import (
     new_figure,
     styled,
 )
+from imuarray.figures.tables import chain_lines, scale_line
 from imuarray.geometry import UNDERSIDE_ROTATION, Array, array_from_config
 
 # The orientation marker in a topside package, in units of the package's sides. The text does
@@ -175,7 +175,7 @@ def figure_2021_fig5(
 def figure_experiment(located: xr.Dataset, recordings: list, name: str, settings: dict):
     """`figure_2021_fig5` once more, under the sensor model.
 
-    ``located``: `analysis.experiment.located` of the recording ``name``.
+    ``located``: `analysis.held_out.located` of the recording ``name``.
     """
     array = recordings[0]
     posteriors = {}

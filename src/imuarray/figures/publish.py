@@ -25,7 +25,7 @@ READERS = {
 def publish(snakemake) -> None:
     """Draw a figure (PDF, PNG, CSV) or make a table (CSV, LaTeX, Markdown) and write it.
 
-    The rule's parameter ``by`` names a function of the package, such as "figures.noise.allan".
+    The rule's parameter ``by`` names a function of the package, such as "figures.measured.allan".
     It gives (drawing function, table), or what `tables.write_table` takes if its name begins with
     "table". It is given what it asks for by name: the rule's input files, read by `READERS`, its
     parameters and its wildcards.

@@ -5,7 +5,6 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-from imuarray.figures.notes import scale_line
 from imuarray.figures.style import (
     BLACK,
     GREY,
@@ -16,7 +15,7 @@ from imuarray.figures.style import (
     points,
     styled,
 )
-from imuarray.figures.tables import Column
+from imuarray.figures.tables import Column, scale_line
 
 ESTIMATORS = ("maximum likelihood", "with the prior")
 

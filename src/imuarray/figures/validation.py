@@ -6,9 +6,8 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from imuarray.figures.notes import scale_line
 from imuarray.figures.style import BLACK, PAGE, SKY, look, new_figure, styled
-from imuarray.figures.tables import Column
+from imuarray.figures.tables import Column, scale_line
 from imuarray.studies.sbc import WHOLE, coverage
 
 BINS = 20

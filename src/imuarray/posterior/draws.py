@@ -11,7 +11,7 @@ import numpy as np
 
 from imuarray.compiled import fma, njit
 from imuarray.posterior import normals
-from imuarray.posterior.elementary import exp
+from imuarray.posterior.normals import exp
 
 TILE = 32  # samples
 LEAST = -700.0  # nothing below is more than 0 beside exp(0)

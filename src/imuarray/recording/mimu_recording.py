@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from imuarray.errors import InputError
-from imuarray.geometry.mimu4444 import UNDERSIDE_ROTATION
+from imuarray.geometry.boards import UNDERSIDE_ROTATION
 from imuarray.recording.mimu import Account, MimuStream, read_mimu
 from imuarray.recording.record import Recording
 from imuarray.recording.units import GRAVITY
