@@ -186,7 +186,8 @@ def figure_measured_agreement(summary: pd.DataFrame, pairs: pd.DataFrame, group:
         " recording's coordinates share its motion."
     ]
     own = pairs.samples == summary.samples.max()
-    table = panels(summary=summary, pairs=pairs.loc[own, ["samples", "assumed", "z"]])
+    pairs = pairs.loc[own, ["samples", "assumed", "z"]].round({"z": 2})  # differences, some tiny
+    table = panels(summary=summary, pairs=pairs)
     return partial(_draw_agreement, footer=footer), table.astype({"assumed": str})
 
 

@@ -44,6 +44,7 @@ def figure_2017_fig3(rates: pd.DataFrame, settings: dict):
     unsaturated = means.assign(series="unsaturated", rmse_dps=least, rmse_se_dps=0.0)
     columns = ["series", "position_sd_m", "angular_rate_dps", "rmse_dps", "rmse_se_dps"]
     table = pd.concat([array, means, unsaturated], ignore_index=True)[columns]
+    table.attrs["digits"] = {"rmse_dps": 4}
     return partial(_draw_fig3, settings=settings, footer=_footer(rates, settings)), table
 
 
