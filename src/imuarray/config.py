@@ -107,7 +107,9 @@ def _check_recordings(config, where) -> None:
 def _check_lengths(lengths, samples, draws, where) -> None:
     for count in samples:
         if f"T{count}" not in lengths:
-            raise InputError(f"{where}: expected an entry T{count}, found {sorted(lengths)}")
+            raise InputError(
+                f"{where}: expected an entry T{count}, found {sorted(lengths, key=str)}"
+            )
         if lengths[f"T{count}"] < draws:
             raise InputError(
                 f"{where}.T{count}: expected at least {draws} transitions (one a stored draw),"

@@ -8,7 +8,9 @@ rule findings:
     input:
         pages=PAGES,
         papers=workflow.source_path("../../CITATION.cff"),
-        data=expand("paper_figures/{name}", name=read_by(text_of("scripts/findings_results.typ"))),
+        data=expand(
+            "paper_figures/{name}", name=read_by(text_of("../scripts/findings_results.typ"))
+        ),
     output:
         "paper_figures/findings.pdf",
     log:

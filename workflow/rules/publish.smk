@@ -1,8 +1,3 @@
-def asked():
-    """The targets; in the process of a job None."""
-    return workflow.dag_settings.targets if workflow.is_main_process else None
-
-
 # paper_figures/ holds the configured scale's figures; every scale keeps its own in results/. Beside
 # each is the configuration that it was made from.
 rule copy_published:

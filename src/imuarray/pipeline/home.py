@@ -1,6 +1,7 @@
 """Where the workflow's own files are: a folder, or a repository that Snakemake reads from afar."""
 
 import os
+import sys
 from pathlib import Path
 
 from snakemake.sourcecache import LocalGitFile
@@ -16,13 +17,19 @@ class Home:
             LocalGitFile.join = _joined
 
     def recording(self, path: str) -> str:
-        """A recording's file: in the working directory, or else one that came with the workflow."""
-        if os.path.exists(path) or os.path.isabs(path):
+        """A recording's file: in the working directory, or else one that came with the workflow.
+
+        Ends with one line and status 2 where there is none.
+        """
+        if os.path.exists(path):
             return path
-        if not self.is_local:
-            return f"results/measured/data/{path}" if path.startswith("data/") else path
+        if not self.is_local and path.startswith("data/"):
+            return f"results/measured/data/{path}"
         beside = Path(str(self.folder)).resolve().parent / path
-        return os.path.relpath(beside) if beside.exists() else path
+        if self.is_local and beside.exists():
+            return os.path.relpath(beside)
+        print(f"imuarray: {path}: expected a file to read, found none", file=sys.stderr)
+        sys.exit(2)
 
     def blob(self, path: str) -> str:
         """The command that prints a file of the repository: Snakemake's copies are text."""
