@@ -11,11 +11,14 @@ rule copy_published:
     wildcard_constraints:
         name="|".join(PLACES),
         kind="pdf|png|csv|tex|md",
+    params:
+        made=lambda wc, input: Path(input.made).with_suffix(""),
     message:
         "{output}"
     shell:
-        "cp {input.made:q} {output:q} 2> {log:q}"
-        " && cp {input.settings:q} $(dirname {output:q})/{wildcards.name}.json 2>> {log:q}"
+        # all kinds of it: one JSON file speaks for them
+        "for made in {params.made}.*; do cp $made paper_figures/{wildcards.name}.${{made##*.}}; done"
+        " 2> {log:q} && cp {input.settings:q} paper_figures/{wildcards.name}.json 2>> {log:q}"
 
 
 # A cause of a diagnosis, asked for by name.
