@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.growth import spent
 from benchmarks.written import publish
 from imuarray.config import model_from, read_config
-from imuarray.motion.smooth import hand_twisting
+from imuarray.motion.state import hand_twisting
 from imuarray.provenance import stamp, write_netcdf_parts
 from imuarray.recording import Recording
 from imuarray.recording.stored import PART

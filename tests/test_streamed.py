@@ -9,7 +9,7 @@ import xarray as xr
 import imuarray
 from imuarray.cli import main
 from imuarray.errors import InputError
-from imuarray.motion.smooth import hand_twisting
+from imuarray.motion.state import hand_twisting
 from imuarray.provenance import digest, is_damaged
 from imuarray.recording import read_recording, stored, validate, write_recording
 from imuarray.recording.channels import repeated

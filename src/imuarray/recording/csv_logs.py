@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from imuarray.errors import InputError
-from imuarray.recording import table as tables
 from imuarray.recording.layout import KINDS, read_layout, three_columns
 from imuarray.recording.record import Recording
 from imuarray.recording.rig import Readings, Rig, pair, to_rig
@@ -25,26 +24,26 @@ def read_tables(paths: Sequence[str | PathLike], columns: str | PathLike) -> Rec
     layout, files = read_layout(columns), [Path(path) for path in paths]
     if "imus" not in layout and len(files) > 1:
         raise InputError(f"{columns}: expected 'imus', one for each log, found triads of one table")
-    loaded = {path: tables.load(path, layout, columns) for path in files}
+    loaded = {path: load(path, layout, columns) for path in files}
     if "imus" in layout:
         return _read(loaded, layout, layout["imus"], str(columns))
     table = loaded[files[0]]
-    blank = tables.used(table, layout).isna().mean()
-    slow = (blank > (0.0 if len(table) > LONG else tables.OFTEN)).any()
+    blank = used(table, layout).isna().mean()
+    slow = (blank > (0.0 if len(table) > LONG else OFTEN)).any()
     if slow and "incomplete_rows" not in layout:
         if "output_rate" in layout:
             raise InputError(
                 f"{columns}: output_rate: expected none where cells are blank, found one"
             )
         return _read(loaded, layout, _imus(layout, str(columns)), str(columns))
-    return tables.recording_of(table, layout, files[0], columns)
+    return recording_of(table, layout, files[0], columns)
 
 
 def _read(loaded, layout, imus: dict[str, dict], name: str) -> Rig:
     read, unused, stamped = {}, list(loaded), True
     for label, imu in imus.items():
         where = f"{name}: imus {label!r}"
-        units = [np.prod(tables.unit_of(imu[kind], kind, where)) for kind in KINDS]
+        units = [np.prod(unit_of(imu[kind], kind, where)) for kind in KINDS]
         paths = [_file(log, label, list(loaded), where) for log in pair(imu.get("log"))]
         times = pair(imu.get("time", layout.get("time")))
         stamped &= len(loaded) == 1 or not any(isinstance(t, dict) and "rate" in t for t in times)
@@ -83,8 +82,8 @@ def _file(log: Any, label: str, files: list[Path], where: str) -> Path:
 
 def _readings(table, path: str, names, time, unit: float, where: str) -> Readings:
     names = three_columns(names, where)
-    values = [tables.column(table, name, path, blank=True).astype(float) for name in names]
-    stamps, second = tables.stamps_of(table, time, path, where, blank=True)
+    values = [column(table, name, path, blank=True).astype(float) for name in names]
+    stamps, second = stamps_of(table, time, path, where, blank=True)
     return Readings(stamps, second, unit * np.stack(values, axis=1), f"{path}: {', '.join(names)}")
 
 
@@ -98,7 +97,7 @@ def _imus(layout, where: str) -> dict[str, dict]:
         if other is None or len(rate) != len(force) or axes[0] != axes[1]:
             raise InputError(
                 f"{where}: {label!r}: expected, as some cells are blank, an accelerometer and a"
-                f" gyroscope of each label with the same axes, found others{tables.BLANK}"
+                f" gyroscope of each label with the same axes, found others{BLANK}"
             )
         columns = [
             name

@@ -12,7 +12,7 @@ import xarray as xr
 
 from imuarray.errors import InputError
 from imuarray.provenance import is_damaged, write_netcdf_parts
-from imuarray.recording import stored as parts_of
+from imuarray.recording import record as parts_of
 from imuarray.recording import validate
 from imuarray.recording.record import (
     ALIGNMENT,

@@ -11,7 +11,6 @@ import xarray as xr
 
 from imuarray.errors import InputError
 from imuarray.geometry import Array
-from imuarray.recording import stored
 from imuarray.recording.units import UNITS
 
 AXES = ("x", "y", "z")
@@ -97,7 +96,7 @@ _RAIL_TOLERANCE = 1e-6
 class Recording:
     """What the triads of one rigid array measured, in one array frame.
 
-    The readings of a long one may have stayed in its file (`recording.stored.Stored`): `parts` are
+    The readings of a long one may have stayed in its file (`Stored`): `parts` are
     in memory.
 
     Attributes
@@ -238,7 +237,7 @@ class Recording:
 
     def parts(self, size: int | None = None) -> Iterator[Recording]:
         """The samples in turn, `PART` or ``size`` at a time, in memory."""
-        size = size or stored.PART
+        size = size or PART
         for first in range(0, max(len(self.time), 1), size):
             yield self._at(slice(first, first + size))
 
