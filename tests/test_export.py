@@ -24,7 +24,7 @@ from imuarray.analysis.model import model_of
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.firstorder.turns import nearest_orthogonal
-from imuarray.model.names import parameter_names
+from imuarray.model.array_model import parameter_names
 from imuarray.motion import Motion
 from imuarray.provenance import trust, write_netcdf
 from tests.test_allan import still

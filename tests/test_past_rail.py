@@ -14,7 +14,7 @@ from imuarray.analysis.past_rail import _choose, _hidden, past_rail
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.figures.board import draw_past_rail, table_past_rail
-from imuarray.model.names import parameter_names
+from imuarray.model.array_model import parameter_names
 from tests import cases
 from tests.test_bound import model
 

@@ -11,8 +11,8 @@ from imuarray.engine.estimate import Estimate
 from imuarray.engine.parameters import POSITION
 from imuarray.engine.widths import widths
 from imuarray.model import ArrayModel, Noise
+from imuarray.model.array_model import parameter_ids, parameter_names
 from imuarray.model.effects import EFFECTS, KINDS
-from imuarray.model.names import parameter_ids, parameter_names
 from imuarray.motion.state import UNITS
 from imuarray.recording import Recording
 from imuarray.recording.record import CLOCKS, DIMENSIONS, MATRICES

@@ -12,7 +12,7 @@ from imuarray.analysis.checked import require_right_axes
 from imuarray.analysis.model import model_of
 from imuarray.diagnosis.extension import extended_model, read_extension
 from imuarray.errors import InputError
-from imuarray.model.names import parameter_ids, parameter_names
+from imuarray.model.array_model import parameter_ids, parameter_names
 from imuarray.recording import Recording
 
 

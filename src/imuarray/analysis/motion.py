@@ -14,8 +14,8 @@ from imuarray.errors import InputError
 from imuarray.firstorder.correct import corrected, nearest_rail, rails_shown
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
+from imuarray.model.array_model import parameter_names
 from imuarray.model.effects import KINDS, find_effects
-from imuarray.model.names import parameter_names
 from imuarray.model.noise import Noise
 from imuarray.motion import Motion
 from imuarray.motion.state import UNITS

@@ -24,7 +24,7 @@ from imuarray.analysis.fitting import fitted_beyond
 from imuarray.analysis.model import Say, assumed, model_of, require_together, silent, usable
 from imuarray.errors import InputError, require_integer, require_one_of
 from imuarray.model import ArrayModel
-from imuarray.model.names import parameter_names
+from imuarray.model.array_model import parameter_names
 from imuarray.posterior.chains import Chains
 from imuarray.posterior.generic import SCALES
 from imuarray.posterior.pmmh import checkpoint_beside, run_chains, spread_starts

@@ -20,9 +20,8 @@ from imuarray.engine.start import start
 from imuarray.engine.widths import corrected, settled
 from imuarray.errors import LARGEST, SMALLEST, InputError
 from imuarray.model import EFFECTS, ArrayModel
-from imuarray.model.array_model import EffectPrior
+from imuarray.model.array_model import EffectPrior, parameter_ids
 from imuarray.model.effects import DATA_EFFECTS, KINDS
-from imuarray.model.names import parameter_ids
 from imuarray.model.noise import Noise
 from imuarray.recording import Recording
 

@@ -20,8 +20,8 @@ from imuarray.diagnosis.quantities import (
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Cause, Search
 from imuarray.engine.fit import flat_parameters
+from imuarray.model.array_model import component, unit_of
 from imuarray.model.effects import known_effect
-from imuarray.model.names import component, unit_of
 
 FEW = 3  # parameters that are stated one by one
 

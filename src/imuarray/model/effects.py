@@ -59,7 +59,7 @@ class Effect:
     Attributes
     ----------
     unit : str
-        Of its parameters, in SI as files have it; `imuarray.model.names.unit_of` for several.
+        Of its parameters, in SI as files have it; `imuarray.model.array_model.unit_of` for several.
     prior_sd : float, or nested tuples that broadcast to ``shape``
         Prior standard deviation of each parameter around zero, in ``unit``.
     shape : callable (A, G) -> tuple

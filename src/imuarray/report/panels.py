@@ -12,8 +12,8 @@ from imuarray.engine.clock_scan import age_of
 from imuarray.engine.heldout import blocks_of
 from imuarray.engine.parameters import POSITION
 from imuarray.linear import scaled_inverse
+from imuarray.model.array_model import component
 from imuarray.model.effects import EFFECTS, KINDS
-from imuarray.model.names import component
 from imuarray.model.timing import clock_turns
 from imuarray.recording.record import AXES
 from imuarray.report.signals import BINS, Signal, binned, signal_of

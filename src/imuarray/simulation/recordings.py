@@ -5,7 +5,7 @@ import xarray as xr
 
 from imuarray.errors import InputError
 from imuarray.model import ArrayModel
-from imuarray.model.names import parameter_names
+from imuarray.model.array_model import parameter_names
 from imuarray.motion import Motion
 from imuarray.motion.state import HIGHER_UNITS, UNITS
 from imuarray.recording import Recording
