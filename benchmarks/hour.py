@@ -18,7 +18,7 @@ from imuarray.motion.state import hand_twisting
 from imuarray.provenance import stamp, write_netcdf_parts
 from imuarray.recording import Recording
 from imuarray.recording.stored import PART
-from imuarray.simulation.measure import measure
+from imuarray.simulation.recordings import measure
 
 RATE = 1000.0  # Hz
 COMMANDS = {

@@ -13,7 +13,7 @@ from imuarray.posterior.generic import GenericLikelihood
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.pmmh import run_chains
 from imuarray.posterior.target import GaussianPrior, GenericTarget
-from imuarray.simulation.measure import measure
+from imuarray.simulation.recordings import measure
 from tests import oracles
 
 RATE = np.radians(0.06)

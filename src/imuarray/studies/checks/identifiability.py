@@ -8,7 +8,7 @@ from imuarray.estimation.motion_ml import estimate_motion
 from imuarray.motion import Motion, sphere_motion
 from imuarray.motion.state import directions
 from imuarray.recording.units import GRAVITY
-from imuarray.simulation.measure import measure
+from imuarray.simulation.recordings import measure
 from imuarray.studies.checks.information import (
     NoiseLevels,
     joint_singular_values,
