@@ -13,7 +13,7 @@ from imuarray.errors import InputError
 from imuarray.firstorder.correct import rails_shown
 from imuarray.firstorder.turns import angle_of
 from imuarray.recording import Recording
-from imuarray.recording.log import Log
+from imuarray.recording.rig import Log
 
 SLOWER = 1.5  # times the common rate, from which a sensor's readings are averaged
 LITTLE = 0.3  # of the noise that is left, what averaging may miss

@@ -14,8 +14,7 @@ from imuarray.firstorder.correct import rails_shown
 from imuarray.recording import Recording, read_recording
 from imuarray.recording.channels import repeated
 from imuarray.recording.layout import read_layout, rotation
-from imuarray.recording.log import Log
-from imuarray.recording.rig import Rig, recording_of
+from imuarray.recording.rig import Log, Rig, recording_of
 
 RECORDINGS = (".nc", ".nc4", ".h5")
 PACKETS = (".bin", ".bin.xz")
