@@ -22,7 +22,7 @@ from .firstorder.noise import allan as allan
 from .geometry.array import Array as Array
 from .geometry.mimu4444 import mimu4444 as mimu4444
 from .model.array_model import ArrayModel as ArrayModel
-from .model.own import read_effects as read_effects
+from .model.effects import read_effects as read_effects
 from .recording.format import read_recording as read_recording
 from .recording.format import write_recording as write_recording
 from .recording.record import Recording as Recording

@@ -5,7 +5,7 @@ from scipy.interpolate import make_interp_spline, make_lsq_spline
 
 PACES = 1e9, 60.0, 20.0, 5.0  # s between knots of a pace that changes slowly
 RUN = 8.5  # steps, beyond which a gap begins another run
-SHORTEST = 16  # readings of a run
+FEWEST = 16  # readings of a run
 ROUNDED = 3  # different steps of rounded stamps
 FASTEST = 0.75  # quantile of the readings' change, above which stamps show in them
 
@@ -29,7 +29,7 @@ def steadied(time, values, enough: float = 1.0) -> tuple[np.ndarray, float]:
 
 def _paced(time) -> np.ndarray:
     """Stamps of a run as a line in the readings' numbers, or a spline where that tells."""
-    if len(time) < SHORTEST:
+    if len(time) < FEWEST:
         return time
     steps, every = np.diff(time), np.arange(float(len(time)))
     usual = steps[steps < 1.5 * np.median(steps)]
