@@ -17,7 +17,7 @@ from imuarray.config import model_from, read_config
 from imuarray.motion.state import hand_twisting
 from imuarray.provenance import stamp, write_netcdf_parts
 from imuarray.recording import Recording
-from imuarray.recording.stored import PART
+from imuarray.recording.record import PART
 from imuarray.simulation.recordings import measure
 
 RATE = 1000.0  # Hz

@@ -16,7 +16,8 @@ from imuarray.analysis.model import Say, assumed, model_of, require_together, si
 from imuarray.errors import InputError, require_one_of
 from imuarray.model.effects import DATA_EFFECTS
 from imuarray.provenance import digest, stamp
-from imuarray.recording import Recording, stored
+from imuarray.recording import Recording
+from imuarray.recording import record as stored
 from imuarray.recording.channels import require_apart, require_live
 
 

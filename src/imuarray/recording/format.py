@@ -26,8 +26,8 @@ from imuarray.recording.record import (
     TEXTS,
     TRUTH,
     Recording,
+    Stored,
 )
-from imuarray.recording.stored import Stored
 from imuarray.recording.units import factor
 
 

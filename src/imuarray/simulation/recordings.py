@@ -9,7 +9,7 @@ from imuarray.model.array_model import parameter_names
 from imuarray.motion import Motion
 from imuarray.motion.state import HIGHER_UNITS, UNITS
 from imuarray.recording import Recording
-from imuarray.recording.stored import MAX_VALUES
+from imuarray.recording.record import MAX_VALUES
 
 
 def clip(values, rail):
