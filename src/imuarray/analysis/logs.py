@@ -81,7 +81,8 @@ def _require_paired(recording: Recording) -> None:
 
 
 def _opened(paths, columns, topics) -> Opened:
-    from imuarray.recording import bags, csv_logs
+    from imuarray.recording import bags
+    from imuarray.recording import table as csv_logs
     from imuarray.recording.mimu_recording import read_board
 
     logs = [Path(path) for path in ([paths] if isinstance(paths, str | PathLike) else paths)]
