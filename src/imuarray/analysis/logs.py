@@ -128,8 +128,8 @@ def _together(found: Recording | Rig) -> Opened:
 
 def _sampled(recording: Recording, lines: list[str]) -> Opened:
     """Of samples as they are: even instants where stamps jitter, and the rails that show."""
+    from imuarray.alignment.align import SHORTEST, steadied
     from imuarray.alignment.found import JITTER
-    from imuarray.alignment.stamps import SHORTEST, steadied
 
     recording, more = _railed_triads(recording)
     if len(recording.time) < SHORTEST:
