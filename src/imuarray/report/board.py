@@ -13,8 +13,7 @@ import xarray as xr
 
 from imuarray.estimation.informative import position_sds
 from imuarray.firstorder.correct import FirstOrder
-from imuarray.firstorder.report import parameter_table
-from imuarray.firstorder.store import write_corrected
+from imuarray.firstorder.report import parameter_table, write_corrected
 from imuarray.model.effects import KINDS
 from imuarray.provenance import atomic_folder, trust, write_bytes, write_csv, write_netcdf
 from imuarray.recording import Recording, write_recording
