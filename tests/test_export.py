@@ -238,7 +238,7 @@ def test_joints_and_rows_are_the_document_s(made):
 def test_the_turns_sds_are_those_of_drawn_maps(made, upper):
     """1500 draws of what first order left, seed 2: 5 sds of an sd are 9 %."""
     from imuarray.analysis.frames import lower_times_rotation, turn_sds
-    from imuarray.firstorder.parts import upper_times_rotation
+    from imuarray.firstorder.turns import upper_times_rotation
 
     calibration = made[0]
     part = upper_times_rotation if upper else lower_times_rotation

@@ -6,8 +6,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.estimation.informative import position_sds
-from imuarray.firstorder.parts import upper_times_rotation
-from imuarray.firstorder.turns import nearest_orthogonal
+from imuarray.firstorder.turns import nearest_orthogonal, upper_times_rotation
 from imuarray.model.effects import KINDS
 from imuarray.recording.record import by_kind
 

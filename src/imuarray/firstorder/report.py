@@ -8,8 +8,7 @@ from scipy.spatial.transform import Rotation
 from imuarray.firstorder.allan import allan_deviation
 from imuarray.firstorder.correct import FirstOrder, correct
 from imuarray.firstorder.gyroscopes import Gyroscopes
-from imuarray.firstorder.parts import parts_of, parts_sd_of
-from imuarray.firstorder.turns import TURNED, angle_of, nearest_orthogonal
+from imuarray.firstorder.turns import TURNED, angle_of, nearest_orthogonal, parts_of, parts_sd_of
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording, write_recording
 from imuarray.recording.record import FIRST_ORDER
