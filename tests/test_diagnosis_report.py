@@ -13,7 +13,7 @@ from scipy.linalg import subspace_angles
 
 from imuarray.blind.cases import Case, make
 from imuarray.diagnosis.document import diagnose
-from imuarray.diagnosis.quantities import number, plus_minus, probability, quantity, span
+from imuarray.diagnosis.plain import number, plus_minus, probability, quantity, span
 from imuarray.diagnosis.replicates import _beside
 from imuarray.diagnosis.separability import (
     conditional,

@@ -5,11 +5,12 @@ The sentences of `diagnosis.json` and of its page alike.
 
 import numpy as np
 
-from imuarray.diagnosis.plain import Sizes, plain
-from imuarray.diagnosis.quantities import (
+from imuarray.diagnosis.plain import (
     NARROW,
+    Sizes,
     first_up,
     joined,
+    plain,
     plus_minus,
     probability,
     quantity,

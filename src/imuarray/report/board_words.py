@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from imuarray.diagnosis.plain import Sizes, plainly
-from imuarray.diagnosis.quantities import first_up, number, plus_minus, quantity
+from imuarray.diagnosis.plain import Sizes, first_up, number, plainly, plus_minus, quantity
 from imuarray.diagnosis.words import split_name
 from imuarray.estimation.informative import position_sds, weakest_of
 from imuarray.firstorder.report import turned_lines

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from imuarray.diagnosis.quantities import fixed, joined, number
+from imuarray.diagnosis.plain import fixed, joined, number
 from imuarray.recording import Recording
 from imuarray.recording.channels import runs
 
