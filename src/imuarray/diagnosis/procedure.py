@@ -8,9 +8,13 @@ import numpy as np
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects
 from imuarray.diagnosis.adoption import adopt, proposals
-from imuarray.diagnosis.clipping import leave_out_clips, together
 from imuarray.diagnosis.elimination import eliminate
-from imuarray.diagnosis.final_checks import final_checks, within_tolerance
+from imuarray.diagnosis.final_checks import (
+    final_checks,
+    leave_out_clips,
+    together,
+    within_tolerance,
+)
 from imuarray.diagnosis.noise_effects import COLOURED, SCALES, TAILS
 from imuarray.diagnosis.reading_effects import Structural, find_structural
 from imuarray.diagnosis.residual_checks import Check, all_checks
