@@ -86,7 +86,7 @@ def _cell(axes, line, column, value):
 def cause_figure(table: pd.DataFrame, footer=()):
     """The added-variable plot of a cause, and panels of its own physics.
 
-    ``table``: `imuarray.report.signals.cause_table`.
+    ``table``: `imuarray.report.panels.cause_table`.
     """
     count = int(table.panel.max()) + 1
     figure = new_figure(footer, PAGE, 2.35)
