@@ -32,7 +32,7 @@ from imuarray.engine.widths import corrected
 from imuarray.errors import InputError
 from imuarray.report.board import html, noises, write_board
 from imuarray.report.board_words import advice, facts, turned, verdict
-from imuarray.report.excitation import missing
+from imuarray.report.pictures import missing
 from tests.browser import in_browser, needs_browser
 
 matplotlib.use("agg")

@@ -19,8 +19,8 @@ from imuarray.provenance import atomic_folder, trust, write_bytes, write_csv, wr
 from imuarray.recording import Recording, write_recording
 from imuarray.report import board_words as said
 from imuarray.report import pictures as pictured
-from imuarray.report.excitation import shown
 from imuarray.report.page import CAPTIONS, Drawing, beside, rendered, saved
+from imuarray.report.pictures import shown
 
 SURE = 1.96  # sds: 95 %
 

@@ -13,8 +13,7 @@ from imuarray.diagnosis.words import split_name
 from imuarray.estimation.informative import position_sds, weakest_of
 from imuarray.firstorder.report import turned_lines
 from imuarray.model.effects import KINDS
-from imuarray.report.excitation import missing
-from imuarray.report.pictures import levelled
+from imuarray.report.pictures import levelled, missing
 
 if TYPE_CHECKING:
     from imuarray.report.board import Board
