@@ -1,7 +1,7 @@
 from . import plots as plots
 from .analysis.calibration import calibrate as calibrate
 from .analysis.export import export as export
-from .analysis.extension import diagnosed as diagnosed
+from .analysis.calibration_dataset import diagnosed as diagnosed
 from .analysis.prepare import read_calibration as read_calibration
 from .analysis.prepare import read_mimu as read_mimu
 from .analysis.prepare import read_posterior as read_posterior
