@@ -8,7 +8,7 @@ import pytest
 
 import imuarray
 from imuarray.analysis.beyond import posterior_beyond
-from imuarray.analysis.fitting import fitted_beyond
+from imuarray.analysis.calibration import fitted_beyond
 from imuarray.analysis.known import fused
 from imuarray.analysis.past_rail import _choose, _hidden, past_rail
 from imuarray.cli import main
