@@ -18,8 +18,12 @@ import imuarray
 from benchmarks.board import Options, draw_board, write
 from imuarray.analysis.board import board
 from imuarray.analysis.motion import _late, as_calibrated
-from imuarray.analysis.poses import of_file, of_first_order
-from imuarray.analysis.trust import reasons_of_calibration, reasons_of_motion
+from imuarray.analysis.trust import (
+    of_file,
+    of_first_order,
+    reasons_of_calibration,
+    reasons_of_motion,
+)
 from imuarray.cli import main
 from imuarray.commands.board import answer
 from imuarray.commands.calibrate import position_lines
