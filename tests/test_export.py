@@ -237,7 +237,7 @@ def test_joints_and_rows_are_the_document_s(made):
 @pytest.mark.parametrize("upper", [True, False])
 def test_the_turns_sds_are_those_of_drawn_maps(made, upper):
     """1500 draws of what first order left, seed 2: 5 sds of an sd are 9 %."""
-    from imuarray.analysis.frames import lower_times_rotation, turn_sds
+    from imuarray.analysis.formats import lower_times_rotation, turn_sds
     from imuarray.firstorder.turns import upper_times_rotation
 
     calibration = made[0]
