@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from imuarray.engine.clock_phases import with_phases
 from imuarray.engine.clock_scan import (
     CLOCK,
     delay_of,
@@ -14,7 +13,7 @@ from imuarray.engine.clock_scan import (
 )
 from imuarray.engine.estimate import Recorded
 from imuarray.engine.fit import flat_parameters, from_flat, with_free_gyroscopes
-from imuarray.engine.gyroscope_clocks import clocks_from_gyroscopes, enough_gyroscopes
+from imuarray.engine.gyroscope_clocks import clocks_from_gyroscopes, enough_gyroscopes, with_phases
 from imuarray.engine.parameters import Columns
 from imuarray.engine.settings import SETTINGS
 

@@ -12,13 +12,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import expit
 
-from imuarray.engine.clock_phases import with_phases
 from imuarray.engine.clock_scan import CLOCK
 from imuarray.engine.clocks import clocks_in
 from imuarray.engine.derivatives import no_derivatives
 from imuarray.engine.estimate import Estimate, Recorded
 from imuarray.engine.fit import with_derivatives, with_free_gyroscopes, with_rough_prior
 from imuarray.engine.fusion import covariances, descend, fuse, one_sided
+from imuarray.engine.gyroscope_clocks import with_phases
 from imuarray.engine.linearise import CHUNK, State, chunk_at, predicted
 from imuarray.engine.parameters import Columns
 from imuarray.engine.passes import normal_pass
