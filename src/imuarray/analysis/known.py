@@ -16,8 +16,8 @@ from imuarray.engine.heldout import gain
 from imuarray.engine.known_board import board_of, with_own
 from imuarray.engine.ladder import mask_of
 from imuarray.engine.parameters import POSITION, columns_of
-from imuarray.engine.passes import normal_pass
 from imuarray.engine.readings import Readings, arrange, determined, measured, most_informative
+from imuarray.engine.robust import normal_pass
 from imuarray.engine.rough_fusion import Rough, roughly
 from imuarray.engine.widths import settled
 from imuarray.firstorder.correct import FirstOrder, calibrate_first_order, correct
