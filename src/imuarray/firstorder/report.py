@@ -1,4 +1,4 @@
-"""A first-order calibration in tables and in a file: parameters with their sds, residuals, noise."""
+"""A first-order calibration in tables and in a file: parameters with sds, residuals, noise."""
 
 import numpy as np
 import pandas as pd

@@ -1,4 +1,4 @@
-"""A sensor's 3 x 3 matrix: the orthogonal one nearest to it, its scale, misalignment, orientation."""
+"""A sensor's 3 x 3 matrix: its nearest orthogonal one, scale, misalignment, orientation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a diagnosis draws: what is wrong with a recording, each cause, what the extended model gains."""
+"""What a diagnosis draws: what is wrong, each cause, what the extended model gains."""
 
 import matplotlib.ticker as ticks
 import numpy as np

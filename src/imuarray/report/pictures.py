@@ -114,10 +114,10 @@ def positions(calibration: xr.Dataset, axes: Axes) -> None:
     sds = position_sds(calibration)[1:]
     factor, unit = (1e3, "mm") if np.abs(moved).max() > 1e-3 else (1e6, "µm")
     places = np.arange(len(moved))
-    for number, name in enumerate("xyz"):
+    for which, name in enumerate("xyz"):
         axes.errorbar(
-            places + 0.2 * (number - 1), factor * moved[:, number], SURE * factor * sds[:, number],
-            label=name, **look(number, "linestyle") | {"linestyle": "none", "markersize": 3.5},
+            places + 0.2 * (which - 1), factor * moved[:, which], SURE * factor * sds[:, which],
+            label=name, **look(which, "linestyle") | {"linestyle": "none", "markersize": 3.5},
         )  # fmt: skip
     axes.axhline(0.0, color=GREY, linewidth=0.6)
     labels = [plain(label) for label in calibration["accelerometer"].to_numpy()]
@@ -212,10 +212,10 @@ def timeline(recording: Recording, calibration: xr.Dataset, axes: Axes) -> None:
     np.maximum.at(fastest, bins, speed)
     axes.plot((edges[1:] + edges[:-1]) / 2, fastest, color=BLACK, linewidth=0.7)
     top, names = float(fastest.max()), []
-    for number, (name, color, flags) in enumerate(_rows(recording, calibration)):
+    for which, (name, color, flags) in enumerate(_rows(recording, calibration)):
         shown = np.bincount(bins, flags, len(edges) - 1) > 0
         spans = [(edges[a], edges[b] - edges[a]) for a, b in runs(shown)]
-        place = -top * (0.1 + 0.11 * number)
+        place = -top * (0.1 + 0.11 * which)
         axes.broken_barh(spans, (place - 0.035 * top, 0.07 * top), color=color, linewidth=0)
         names.append((place, name if flags.any() else f"{name}: none"))
     step = round_factor(top / 2)
@@ -326,9 +326,9 @@ def residual_course(calibration: xr.Dataset, kind: str, axes: Axes) -> None:
     gaps = np.flatnonzero(steps > APART * np.median(steps)) + 1 if len(steps) else []
     time, rms = np.insert(time, gaps, np.nan), np.insert(rms, gaps, np.nan, axis=0)
     axes.plot(time, rms[:, others], color="0.75", linewidth=0.8)
-    for number, k in enumerate(worst):
+    for which, k in enumerate(worst):
         name = f"IMU {plain(labels[k])}"
-        style = look(number, "linestyle") | {"markersize": 2, "linewidth": 0.8}
+        style = look(which, "linestyle") | {"markersize": 2, "linewidth": 0.8}
         axes.plot(time, rms[:, k], label=name, **style)
     if len(others):
         axes.plot([], [], color="0.75", label="others")
