@@ -1,13 +1,13 @@
 from . import plots as plots
 from .analysis.calibration import calibrate as calibrate
-from .analysis.export import export as export
 from .analysis.calibration_dataset import diagnosed as diagnosed
-from .analysis.prepare import read_calibration as read_calibration
-from .analysis.prepare import read_mimu as read_mimu
-from .analysis.prepare import read_posterior as read_posterior
+from .analysis.export import export as export
 from .analysis.logs import open_logs as open_logs
 from .analysis.motion import apply as apply
 from .analysis.prepare import first_order as first_order
+from .analysis.prepare import read_calibration as read_calibration
+from .analysis.prepare import read_mimu as read_mimu
+from .analysis.prepare import read_posterior as read_posterior
 from .analysis.prepare import select as select
 from .analysis.prepare import simulate as simulate
 from .analysis.sampling import sample as sample

@@ -21,7 +21,7 @@ def delay_score(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     return delay_parts(fit.residual, fit.whitened[..., column], fit.through([column])[..., 0])
 
 
-def scan_clocks(fit: Fit, given: Information, imus, delays: dict) -> list[Scanned]:
+def sawtooth_scan(fit: Fit, given: Information, imus, delays: dict) -> list[Scanned]:
     """A sawtooth age for each IMU, and for those together that show one beyond a constant delay.
 
     ``delays`` (imu tuple -> chi-square of a constant delay) is what a clock must go beyond: its

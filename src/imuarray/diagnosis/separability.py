@@ -19,7 +19,7 @@ from imuarray.diagnosis.state import Cause, Search
 from imuarray.engine.fit import Fit
 from imuarray.engine.parameters import POSITION
 from imuarray.linear import scaled_eigh, scaled_inverse, scaled_square
-from imuarray.model import EFFECTS
+from imuarray.model.effects import EFFECTS
 from imuarray.tails import log_chi_square
 
 

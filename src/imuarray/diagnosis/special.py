@@ -7,11 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis import clocks, shifts, warming
+from imuarray.diagnosis.clocks import maybe_clock, placebo_of_ages, sawtooth_scan
 from imuarray.diagnosis.elimination import need
 from imuarray.diagnosis.residual_checks import Check
 from imuarray.diagnosis.scores import Candidate, Scanned, score_all
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.shifts import SHIFT, refine_instants, scan_shifts
+from imuarray.diagnosis.warming import WARM_UP, maybe_grown, maybe_warming, scan_warming
 from imuarray.engine.clock_scan import CLOCK, DELAY
 from imuarray.engine.fit import flat_parameters
 from imuarray.model.effects import EFFECTS
@@ -53,7 +55,7 @@ def scans(fit, given, effects, scores, taken=lambda effect: ()) -> list[Scanned]
 def scan_clocks(fit, given, imus, scores) -> list[Scanned]:
     """Clocks, beyond the constant delays that were tested."""
     delays = {s.candidate.imus: s.statistic for s in scores if s.candidate.effect == DELAY}
-    return clocks.scan_clocks(fit, given, imus, delays)
+    return sawtooth_scan(fit, given, imus, delays)
 
 
 def maybe_drift(search, cause, own) -> bool:
@@ -61,7 +63,7 @@ def maybe_drift(search, cause, own) -> bool:
 
     Or as likely grows from nothing.
     """
-    if warming.maybe_grown(search, cause):
+    if maybe_grown(search, cause):
         return True
     kind = EFFECTS[cause.effect].sensors
     tried = [Candidate(DRIFT, cause.imus, f"{kind} {form}") for form in ("linear", "cubic")]
@@ -85,11 +87,11 @@ def drift_check(search, cause) -> list[Check]:
 
 SPECIAL = {
     CLOCK: Special(
-        scan=scan_clocks, linear=False, maybe=clocks.maybe_clock, placebo=clocks.placebo_of_ages
+        scan=scan_clocks, linear=False, maybe=maybe_clock, placebo=placebo_of_ages
     ),
-    shifts.SHIFT: Special(scan=lambda fit, given, imus, _: shifts.scan_shifts(fit, given, imus),
-                          refine=shifts.refine_instants),
-    warming.WARM_UP: Special(scan=warming.scan_warming, maybe=warming.maybe_warming),
+    SHIFT: Special(scan=lambda fit, given, imus, _: scan_shifts(fit, given, imus),
+                          refine=refine_instants),
+    WARM_UP: Special(scan=scan_warming, maybe=maybe_warming),
     DRIFT: Special(maybe=maybe_drift, check=drift_check),
 }  # fmt: skip
 

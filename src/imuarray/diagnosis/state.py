@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis import clocks
 from imuarray.diagnosis import noise as noises
+from imuarray.diagnosis.clocks import started_by_gyroscopes
 from imuarray.diagnosis.scores import Candidate, Information, information_at, mask_of
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.alike import likely_sizes
@@ -228,7 +228,7 @@ class Search:
         if effect == CLOCK and values is not None and state.rough_prior is not None:
             # clocks that are there already are estimated again, all as one
             values = {imu: whole[imu, chosen] for imu in self.clocks} | values
-            state, values = clocks.started_by_gyroscopes(self.readings, state, values)
+            state, values = started_by_gyroscopes(self.readings, state, values)
         for imu, value in (values or {}).items():
             whole[imu, chosen] = value
         return from_flat(columns, state, whole)

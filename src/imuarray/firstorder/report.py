@@ -5,9 +5,9 @@ import pandas as pd
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
-from imuarray.firstorder.allan import allan_deviation
 from imuarray.firstorder.correct import FirstOrder, correct
 from imuarray.firstorder.gyroscopes import Gyroscopes
+from imuarray.firstorder.still import allan_deviation
 from imuarray.firstorder.turns import TURNED, angle_of, nearest_orthogonal, parts_of, parts_sd_of
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording, write_recording

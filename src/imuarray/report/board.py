@@ -17,7 +17,6 @@ from imuarray.firstorder.report import parameter_table, write_corrected
 from imuarray.model.effects import KINDS
 from imuarray.provenance import atomic_folder, trust, write_bytes, write_csv, write_netcdf
 from imuarray.recording import Recording, write_recording
-from imuarray.report import board_words as said
 from imuarray.report import pictures as pictured
 from imuarray.report.page import CAPTIONS, Drawing, beside, rendered, saved
 from imuarray.report.pictures import shown
@@ -58,12 +57,12 @@ def write_board(board: Board, folder: Path) -> None:
 def html(board: Board) -> str:
     """report.html, every text escaped."""
     return rendered(
-        "board.html.j2", board=board, verdict=said.verdict(board), facts=said.facts(board),
-        advice=said.advice(board), causes=said.causes(board.calibration),
+        "board.html.j2", board=board, verdict=verdict(board), facts=facts(board),
+        advice=advice(board), causes=causes(board.calibration),
         turned=turn_table(board), positions=position_table(board.calibration), sure=SURE,
         prior=board.corrected.position_prior_sd, noise=noises(board), figures=draw(board),
-        weakest=said.weakest(board.calibration), frame=said.frame(board.calibration),
-        before=said.before(board), account=said.account(board),
+        weakest=weakest(board.calibration), frame=frame(board.calibration),
+        before=before(board), account=account(board),
         first_order=None if isinstance(board.first_order, str)
         else parameter_table(board.first_order, board.recording),
     )  # fmt: skip

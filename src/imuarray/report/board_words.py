@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -14,9 +13,6 @@ from imuarray.estimation.informative import position_sds, weakest_of
 from imuarray.firstorder.report import turned_lines
 from imuarray.model.effects import KINDS
 from imuarray.report.pictures import levelled, missing
-
-if TYPE_CHECKING:
-    from imuarray.report.board import Board
 
 SLOW = np.radians(300.0)  # rad/s rms, of motion that says little of positions
 MISFIT = 1.5  # times the noise: a residual that is looked into
