@@ -7,7 +7,7 @@ import numpy as np
 
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects
-from imuarray.diagnosis.adoption import adopt, proposals
+from imuarray.diagnosis.adoption import adopt, proposals, rivals
 from imuarray.diagnosis.elimination import eliminate
 from imuarray.diagnosis.final_checks import (
     final_checks,
@@ -19,7 +19,6 @@ from imuarray.diagnosis.noise_effects import COLOURED, SCALES, TAILS
 from imuarray.diagnosis.reading_effects import Structural, find_structural
 from imuarray.diagnosis.residual_checks import Check, all_checks
 from imuarray.diagnosis.scores import Score
-from imuarray.diagnosis.separability import rivals
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.shocks import SHOCK, find_shocks, with_neighbours
 from imuarray.diagnosis.state import Search
