@@ -15,7 +15,7 @@ from imuarray.engine.linearise import linearise, reading, seen_again
 from imuarray.engine.parameters import POSITION, columns_of
 from imuarray.engine.readings import arrange, most_informative, resolution
 from imuarray.engine.robust import normal_pass
-from imuarray.engine.turning import turned
+from imuarray.engine.start import turned
 from imuarray.engine.widths import settled, widths
 from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.geometry import Array, sub_array

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.engine import turning
+from imuarray.engine import start as turning
 from imuarray.engine.derivatives import no_derivatives
 from imuarray.engine.fit import flat_parameters, pick, with_derivatives
 from imuarray.engine.linearise import (

@@ -18,7 +18,7 @@ from imuarray.engine.heldout import gain_of
 from imuarray.engine.parameters import POSITION, Columns, columns_of
 from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS
-from imuarray.engine.turning import turned
+from imuarray.engine.start import turned
 from imuarray.engine.widths import (
     DRIFT,
     FIXED,
