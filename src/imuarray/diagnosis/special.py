@@ -10,10 +10,17 @@ import numpy as np
 from imuarray.diagnosis.clocks import maybe_clock, placebo_of_ages, sawtooth_scan
 from imuarray.diagnosis.elimination import need
 from imuarray.diagnosis.residual_checks import Check
+from imuarray.diagnosis.scans import (
+    SHIFT,
+    WARM_UP,
+    maybe_grown,
+    maybe_warming,
+    refine_instants,
+    scan_shifts,
+    scan_warming,
+)
 from imuarray.diagnosis.scores import Candidate, Scanned, score_all
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.diagnosis.shifts import SHIFT, refine_instants, scan_shifts
-from imuarray.diagnosis.warming import WARM_UP, maybe_grown, maybe_warming, scan_warming
 from imuarray.engine.clock_scan import CLOCK, DELAY
 from imuarray.engine.fit import flat_parameters
 from imuarray.model.effects import EFFECTS
