@@ -34,8 +34,7 @@ from imuarray.engine.parameters import POSITION, columns_of
 from imuarray.engine.readings import arrange
 from imuarray.engine.widths import corrected
 from imuarray.errors import InputError
-from imuarray.report.board import html, noises, write_board
-from imuarray.report.board_words import advice, facts, turned, verdict
+from imuarray.report.board import advice, facts, html, noises, turned, verdict, write_board
 from imuarray.report.pictures import missing
 from tests.browser import in_browser, needs_browser
 
