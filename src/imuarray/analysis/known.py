@@ -9,7 +9,7 @@ import xarray as xr
 
 from imuarray.analysis.calibration_dataset import engine_dataset, places_among, positions_dataset
 from imuarray.analysis.model import model_of
-from imuarray.engine.densities import block_scores
+from imuarray.engine.course import block_scores
 from imuarray.engine.estimate import Estimate, Recorded, estimate, stepped
 from imuarray.engine.fit import flat_parameters, prior_means
 from imuarray.engine.heldout import gain
