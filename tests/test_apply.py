@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import imuarray
-from imuarray.analysis.leak import less_leak_by_others
+from imuarray.analysis.prepare import less_leak_by_others
 from imuarray.cli import main
 from imuarray.firstorder.correct import corrected, rails_shown
 from imuarray.motion import normal_motion

@@ -11,8 +11,8 @@ import xarray as xr
 
 from imuarray.analysis import methods
 from imuarray.analysis.calibration_dataset import engine_dataset, papers_dataset, with_readings
-from imuarray.analysis.leak import less_leak_by_others
 from imuarray.analysis.model import Say, assumed, model_of, require_together, silent, usable
+from imuarray.analysis.prepare import less_leak_by_others
 from imuarray.engine.estimate import Estimate
 from imuarray.engine.ladder import Rung, climb, rungs_of, with_effects
 from imuarray.engine.readings import Readings, arrange, determined, most_informative

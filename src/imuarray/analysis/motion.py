@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis.checked import require_fit, require_labels
-from imuarray.analysis.leak import less_leak
 from imuarray.analysis.model import assumed, model_of
+from imuarray.analysis.prepare import less_leak
 from imuarray.errors import InputError
 from imuarray.firstorder.correct import corrected, nearest_rail, rails_shown
 from imuarray.geometry import Array
