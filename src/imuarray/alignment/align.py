@@ -1,6 +1,7 @@
 """Logs of loose IMUs as one recording: common axes, common clock, common instants.
 
-Stamps may jitter or be rounded, of readings that a sensor makes at an even pace."""
+Stamps may jitter or be rounded, of readings that a sensor makes at an even pace.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

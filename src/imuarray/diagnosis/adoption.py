@@ -1,7 +1,8 @@
 """Causes adopted one by one, and which effects a recording can distinguish.
 
 The most significant test is refitted jointly and kept if it predicts; correlations of signals say
-what cannot be told apart."""
+what cannot be told apart.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """What is left after the last cause: is it within tolerance, and are the causes what they seem?
 
 Where a rail clips several readings they pile up at one value, which needs no model
-(`imuarray.diagnosis.reading_effects`); one alone is seen only beside its prediction."""
+(`imuarray.diagnosis.reading_effects`); one alone is seen only beside its prediction.
+"""
 
 from dataclasses import replace
 from typing import NamedTuple

@@ -1,7 +1,8 @@
 """Numbers with units as people read them, and what parameters mean in plain words.
 
 SI in the files, degrees and micrometres on the page. A delay or a turn common to all IMUs is
-nobody's: where one IMU stands out, the others are what it is held against."""
+nobody's: where one IMU stands out, the others are what it is held against.
+"""
 
 import math
 from typing import NamedTuple

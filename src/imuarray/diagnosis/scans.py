@@ -1,6 +1,7 @@
 """What is scanned for along time: a triad that moves, biases that follow one temperature.
 
-How `position_shift` is found and its instant refined; how `warm_up` is found by its course."""
+How `position_shift` is found and its instant refined; how `warm_up` is found by its course.
+"""
 
 from __future__ import annotations
 

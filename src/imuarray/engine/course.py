@@ -1,4 +1,4 @@
-"""An estimate along its recording: what more gains, residuals, shakes, how likely its readings are."""
+"""An estimate along its recording: what more gains, residuals, how likely its readings are."""
 
 import numpy as np
 from scipy.special import chdtri, gammaln

@@ -8,7 +8,8 @@ But all gyroscopes see one omega and one omega_dot, free at each sample:
 
 and three gyroscopes or more that sample at different ages overdetermine both. An oscillator wanders
 by tenths of a turn in minutes, and the host reads now before, now after a clock's jump: once the
-ages are nearly known, what is left of a reading over omega_dot is how far its own age is off."""
+ages are nearly known, what is left of a reading over omega_dot is how far its own age is off.
+"""
 
 from dataclasses import replace
 from typing import NamedTuple

@@ -1,7 +1,8 @@
-"""Where a fit begins: no effects, the motion that the readings say; omega_dot from the rate's change.
+"""Where a fit begins: no effects, the motion as read, omega_dot from the rate's change too.
 
 On a small array the gyroscopes know omega_dot far better than the accelerometers do; two
-accelerometers leave it open about the line that joins them."""
+accelerometers leave it open about the line that joins them.
+"""
 
 import numpy as np
 

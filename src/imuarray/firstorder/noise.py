@@ -1,7 +1,8 @@
 """The noise of a recording's longest still stretches: Allan deviation, spectrum, terms.
 
 White noise on a random walk of any start is diagonal in the discrete cosine transform, so what is
-fitted is the exact likelihood of coefficients that are independent and normal."""
+fitted is the exact likelihood of coefficients that are independent and normal.
+"""
 
 from typing import NamedTuple
 

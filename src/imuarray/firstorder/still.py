@@ -1,7 +1,8 @@
 """Still poses of a recording, found by itself, and the Allan deviation of their readings.
 
 Still is where array-averaged readings only show noise; the deviation tells which part of it
-averaging can remove."""
+averaging can remove.
+"""
 
 import numpy as np
 

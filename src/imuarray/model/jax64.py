@@ -1,7 +1,8 @@
-"""JAX in double precision: the one place that imports and configures it; small factorisations in it.
+"""JAX in double precision: the one place that configures it; small factorisations in it.
 
 Batched LAPACK calls inside jitted functions are slow on CPUs and have been seen to hang; these are
-plain arithmetic on static sizes (up to 15 or so)."""
+plain arithmetic on static sizes (up to 15 or so).
+"""
 
 import jax
 

@@ -1,7 +1,8 @@
 """The motion of the array: at one or many instants, random draws, smooth paths.
 
 Random motion is one independent draw a sample, as the two papers simulate it; a smooth path has
-exact derivatives at any instants."""
+exact derivatives at any instants.
+"""
 
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,6 +1,7 @@
 """A recording in SI units, in memory or left in its file, and the names and units of that file.
 
-A recording larger than memory is read part by part."""
+A recording larger than memory is read part by part.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 """Anybody's logger: CSV files, and a small YAML that names their columns and units.
 
-One table of a board, or files of IMUs that have stamps, and rates, of their own."""
+One table of a board, or files of IMUs that have stamps, and rates, of their own.
+"""
 
 from collections.abc import Sequence
 from difflib import get_close_matches

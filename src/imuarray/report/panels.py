@@ -2,7 +2,8 @@
 
 A cause's signal is its derivative times its parameters, with the motion and all other parameters
 refitted: what would be back in the residual without it. It is an added-variable plot's abscissa;
-residual and signal together are its ordinate, so that points on the line are explained."""
+residual and signal together are its ordinate, so that points on the line are explained.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 """Drawings of a calibration and its recording, each into given axes: for pages and notebooks.
 
-And how a recording has excited its board: directions of still poses, axes of rotation."""
+And how a recording has excited its board: directions of still poses, axes of rotation.
+"""
 
 from __future__ import annotations
 
