@@ -7,7 +7,7 @@ from imuarray.engine.estimate import Estimate, Recorded
 from imuarray.engine.heldout import Scores, blocks_of, trained_elsewhere
 from imuarray.engine.linearise import linearise
 from imuarray.engine.parameters import POSITION, Columns
-from imuarray.engine.robust import distances
+from imuarray.engine.robust import by_triad, distances
 from imuarray.engine.widths import growing
 from imuarray.model.effects import KINDS
 
@@ -28,7 +28,7 @@ def course(found: Estimate, moving) -> tuple[dict, dict]:
     readings, seen = found.recorded[0].readings, found.passes[0]
     time = readings.time + readings.origin
     far = distances(readings, seen)
-    number = readings.keep.reshape(*readings.keep.shape[:2], 2, 3).sum(axis=-1)
+    number = by_triad(readings.keep)
     blocks = blocks_of(len(time), int(np.clip(len(time) // FEWEST, 1, STRETCHES)))
     squares = far * (readings.sd / readings.declared) ** 2
     rms = np.sqrt([
@@ -86,10 +86,7 @@ def log_densities(one: Recorded, columns: Columns, freedoms) -> np.ndarray:
     """
     readings, state = one.readings, one.state
     seen = linearise(readings, columns, state, [])
-    number, squares = (
-        part.reshape(*part.shape[:2], 2, 3).sum(axis=-1)
-        for part in (readings.keep, seen.residual**2)
-    )
+    number, squares = by_triad(readings.keep), by_triad(seen.residual**2)
     weighted = squares.sum(axis=(1, 2))
     if readings.trust is not None:
         squares = squares / readings.trust**2

@@ -74,8 +74,8 @@ def normal_pass(
         used = part.stop - part.start
         residual, leverage = seen.residual[:used], _leverage(seen.basis[:used], count)
         left = np.where(readings.keep[part], 1.0 - leverage, 0.0)
-        squares[part], freedom[part] = _by_triad(residual**2), _by_triad(left)
-        unit[part] = _by_triad(residual**2 / np.maximum(1.0 - leverage, LEAST_FREE))
+        squares[part], freedom[part] = by_triad(residual**2), by_triad(left)
+        unit[part] = by_triad(residual**2 / np.maximum(1.0 - leverage, LEAST_FREE))
         if not improved:
             step = np.swapaxes(seen.inverse[:used], 1, 2) @ seen.taken[:used, :, None]
             motion[part] += step[..., 0]
@@ -125,7 +125,7 @@ def _leverage(basis, count) -> np.ndarray:
     return np.einsum("tij,tij->ti", basis, basis).reshape(len(basis), count, 6)
 
 
-def _by_triad(values) -> np.ndarray:
+def by_triad(values) -> np.ndarray:
     """(T, N, 2) sums over the axes of (T, N, 6)."""
     return values.reshape(*values.shape[:2], 2, 3).sum(axis=-1)
 
@@ -138,7 +138,7 @@ def judged(readings: Readings, seen: Pass, owned, former: np.ndarray) -> Reading
     """
     free = seen.freedom.sum(axis=0)
     free = np.maximum(free - owned, 0.1 * free)
-    number = readings.keep.reshape(*readings.keep.shape[:2], 2, 3).sum(axis=-1)
+    number = by_triad(readings.keep)
     trust = 1.0 if readings.trust is None else readings.trust
     squares, distance = seen.squares / trust**2, distances(readings, seen)
     ratio, weight, least = np.ones_like(free), np.ones_like(distance), least_ratio(readings)
@@ -173,7 +173,7 @@ def distances(readings: Readings, seen: Pass) -> np.ndarray:
 
 def freedoms(readings: Readings, seen: Pass) -> np.ndarray:
     """Degrees of freedom (2,) that make the triads' distances likeliest, of each kind of sensor."""
-    number = readings.keep.reshape(*readings.keep.shape[:2], 2, 3).sum(axis=-1)
+    number = by_triad(readings.keep)
     found, far = np.full(2, np.inf), distances(readings, seen)
     told = np.median(far, axis=0) / MEDIAN > least_ratio(readings)
     for kind in range(2):

@@ -22,7 +22,7 @@ from imuarray.engine.gyroscope_clocks import with_phases
 from imuarray.engine.linearise import CHUNK, State, chunk_at, predicted
 from imuarray.engine.parameters import Columns
 from imuarray.engine.readings import Readings
-from imuarray.engine.robust import distances, normal_pass
+from imuarray.engine.robust import by_triad, distances, normal_pass
 from imuarray.engine.settings import SETTINGS
 from imuarray.model import ArrayModel
 from imuarray.model.jax64 import jax
@@ -91,7 +91,7 @@ class Rough(NamedTuple):
 
         ``least``: degrees of freedom, if the estimate has fewer.
         """
-        readings, number = self.readings, _by_triad(self.readings.keep)
+        readings, number = self.readings, by_triad(self.readings.keep)
         distance, trust = distances(readings, seen), np.ones(number.shape)
         for kind, nu in enumerate(np.maximum(self.freedoms, least)):
             if not np.isfinite(nu):
@@ -202,8 +202,3 @@ def _timed(readings: Readings, state: State, one: Recorded, same, clocks) -> Rea
     other[..., :3] = False
     found = with_phases(readings.without(other), state._replace(motion=motion), clocks)
     return replace(readings, wander=found.wander)
-
-
-def _by_triad(values) -> np.ndarray:
-    """(T, N, 2) sums over the axes of (T, N, 6)."""
-    return values.reshape(*values.shape[:2], 2, 3).sum(axis=-1)

@@ -38,6 +38,11 @@ class Motion(NamedTuple):
         return Motion(*(np.asarray(field)[index] for field in self))
 
 
+def lever(rate, acceleration, arm) -> np.ndarray:
+    """What turning adds at the end of an arm: omega x (omega x r) + omega_dot x r, (..., 3)."""
+    return np.cross(rate, np.cross(rate, arm)) + np.cross(acceleration, arm)
+
+
 def directions(rng: np.random.Generator, shape) -> np.ndarray:
     """Unit vectors uniform on the sphere, shape (*shape, 3)."""
     raw = rng.standard_normal((*shape, 3))
