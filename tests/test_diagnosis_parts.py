@@ -18,7 +18,7 @@ from imuarray.diagnosis.replicates import Replicator, discrepancies
 from imuarray.diagnosis.scores import candidates, information_at, mask_of, score_all
 from imuarray.diagnosis.settings import SETTINGS as CRITICAL
 from imuarray.diagnosis.state import Search
-from imuarray.engine.clock_scan import sawtooth
+from imuarray.engine.clocks import sawtooth
 from imuarray.engine.derivatives import polynomial_taps
 from imuarray.engine.fit import (
     Fit,

@@ -9,8 +9,7 @@ import xarray as xr
 
 from imuarray.analysis.calibration_dataset import engine_dataset, places_among, positions_dataset
 from imuarray.analysis.model import model_of
-from imuarray.engine.clock_scan import CLOCK
-from imuarray.engine.clocks import refined, shown_clocks, timed, with_clocks
+from imuarray.engine.clocks import CLOCK, refined, shown_clocks, timed, with_clocks
 from imuarray.engine.course import block_scores
 from imuarray.engine.estimate import Estimate, Recorded, estimate, stepped
 from imuarray.engine.fit import flat_parameters, prior_means

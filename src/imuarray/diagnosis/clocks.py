@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 
 from imuarray.diagnosis.scores import Candidate, Information, Scanned, Score
-from imuarray.engine.clock_scan import CLOCK, DELAY, age_of, delay_parts, sawtooth, sawtooths
+from imuarray.engine.clocks import CLOCK, DELAY, age_of, delay_parts, sawtooth, sawtooths
 from imuarray.engine.fit import Fit
 from imuarray.engine.gyroscope_clocks import clocks_from_gyroscopes, enough_gyroscopes
 from imuarray.engine.linearise import State

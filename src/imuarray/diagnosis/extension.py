@@ -9,8 +9,7 @@ import numpy as np
 
 from imuarray.diagnosis.procedure import prepared
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.engine.clock_scan import CLOCK
-from imuarray.engine.clocks import timed
+from imuarray.engine.clocks import CLOCK, timed
 from imuarray.engine.estimate import Estimate, Recorded, estimate
 from imuarray.engine.fit import flat_parameters, from_flat, in_use
 from imuarray.engine.linearise import State

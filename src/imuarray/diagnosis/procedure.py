@@ -22,7 +22,7 @@ from imuarray.diagnosis.scores import Score
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.shocks import SHOCK, find_shocks, with_neighbours
 from imuarray.diagnosis.state import Search
-from imuarray.engine.clock_scan import DELAY
+from imuarray.engine.clocks import DELAY
 from imuarray.engine.fit import Fit, fit, flat_parameters
 from imuarray.engine.parameters import catalogue_effects, columns_of
 from imuarray.engine.readings import Readings, arrange, determined, few_at_once, part_of

@@ -21,7 +21,7 @@ from imuarray.diagnosis.scans import (
 )
 from imuarray.diagnosis.scores import Candidate, Scanned, score_all
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.engine.clock_scan import CLOCK, DELAY
+from imuarray.engine.clocks import CLOCK, DELAY
 from imuarray.engine.fit import flat_parameters
 from imuarray.model.effects import EFFECTS
 from imuarray.tails import log_chi_square

@@ -10,8 +10,7 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import chdtrc
 
-from imuarray.engine.clock_scan import CLOCK
-from imuarray.engine.clocks import refined, shown_clocks, timed, with_clocks
+from imuarray.engine.clocks import CLOCK, refined, shown_clocks, timed, with_clocks
 from imuarray.engine.estimate import Estimate, Recorded, estimate, places_of, tested
 from imuarray.engine.fit import flat_parameters, from_flat
 from imuarray.engine.heldout import gain_of

@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import expit
 
-from imuarray.engine.clock_scan import CLOCK
-from imuarray.engine.clocks import clocks_in
+from imuarray.engine.clocks import CLOCK, clocks_in
 from imuarray.engine.derivatives import no_derivatives
 from imuarray.engine.estimate import Estimate, Recorded
 from imuarray.engine.fit import with_derivatives, with_free_gyroscopes, with_rough_prior

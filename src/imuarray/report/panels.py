@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from imuarray.diagnosis.clocks import delay_score
-from imuarray.engine.clock_scan import age_of
+from imuarray.engine.clocks import age_of
 from imuarray.engine.fit import Fit, flat_parameters
 from imuarray.engine.heldout import blocks_of
 from imuarray.engine.parameters import POSITION
