@@ -9,8 +9,7 @@ import pytest
 import imuarray
 from imuarray.analysis.beyond import posterior_beyond
 from imuarray.analysis.calibration import fitted_beyond
-from imuarray.analysis.known import fused
-from imuarray.analysis.past_rail import _choose, _hidden, past_rail
+from imuarray.analysis.known import _choose, _hidden, fused, past_rail
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.figures.board import draw_past_rail, table_past_rail
