@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import median_filter
 
-from imuarray.diagnosis.clocks import delay_score
 from imuarray.diagnosis.noise import Noise, standardised, tail_log_p
 from imuarray.diagnosis.replicates import motion_sizes
 from imuarray.diagnosis.scores import Information
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray.engine.clocks import delay_score
 from imuarray.engine.fit import Fit, seen_through
 from imuarray.linear import scaled_inverse, scaled_square
 from imuarray.motion.state import lever

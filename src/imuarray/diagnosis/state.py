@@ -13,11 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.diagnosis import noise as noises
-from imuarray.diagnosis.clocks import started_by_gyroscopes
 from imuarray.diagnosis.scores import Candidate, Information, information_at, mask_of
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.alike import likely_sizes
-from imuarray.engine.clocks import CLOCK, estimated_again, without_jumps
+from imuarray.engine.clocks import CLOCK, estimated_again, started_by_gyroscopes, without_jumps
 from imuarray.engine.fit import (
     Fit,
     at,

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from imuarray.engine.estimate import Recorded
-from imuarray.engine.fit import flat_parameters, from_flat, with_free_gyroscopes
+from imuarray.engine.fit import Fit, flat_parameters, from_flat, with_free_gyroscopes
 from imuarray.engine.gyroscope_clocks import clocks_from_gyroscopes, enough_gyroscopes, with_phases
 from imuarray.engine.linearise import State, linearise
 from imuarray.engine.parameters import Columns
@@ -242,3 +242,20 @@ def timed(one: Recorded, keep, columns: Columns, imus) -> Recorded:
     if state.rough_prior.sd.shape[1] < 15:
         state = with_free_gyroscopes(readings, state)
     return replace(one, readings=with_phases(readings, state, clocks), state=state)
+
+
+def delay_score(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+    """Each sample's score and information of each IMU's delay, (T, N) each, motion projected."""
+    column = int(fit.columns.of(DELAY)[0])
+    return delay_parts(fit.residual, fit.whitened[..., column], fit.through([column])[..., 0])
+
+
+def started_by_gyroscopes(readings: Readings, state: State, clocks: dict) -> tuple[State, dict]:
+    """Rough motion: (state, {imu: (P, f, phi, c, g)}), all clocks from the gyroscopes alone.
+
+    As they are where too few gyroscopes have one.
+    """
+    if not enough_gyroscopes(readings, clocks):
+        return state, clocks
+    clocks = clocks_from_gyroscopes(readings, state.motion[:, 3:6], clocks)
+    return state._replace(rough_prior=state.rough_prior.freed()), clocks

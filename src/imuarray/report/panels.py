@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pandas as pd
 
-from imuarray.diagnosis.clocks import delay_score
-from imuarray.engine.clocks import age_of
+from imuarray.engine.clocks import age_of, delay_score
 from imuarray.engine.fit import Fit, flat_parameters
 from imuarray.engine.heldout import blocks_of
 from imuarray.engine.parameters import POSITION
