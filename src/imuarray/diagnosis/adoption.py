@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from imuarray.diagnosis.elimination import freed_places, heldout_gain, need, prune
 from imuarray.diagnosis.scores import (
     Candidate,
     Information,
@@ -22,7 +21,15 @@ from imuarray.diagnosis.scores import (
 )
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL, scans
-from imuarray.diagnosis.state import Adoption, Cause, Search
+from imuarray.diagnosis.state import (
+    Adoption,
+    Cause,
+    Search,
+    freed_places,
+    heldout_gain,
+    need,
+    prune,
+)
 from imuarray.engine.alike import likely_sizes
 from imuarray.engine.fit import Fit, at
 from imuarray.engine.heldout import normal_blocks

@@ -10,13 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.diagnosis import noise_effects
-from imuarray.diagnosis.elimination import need
 from imuarray.diagnosis.reading_effects import RAILS, Structural, rails_cause, unique
 from imuarray.diagnosis.residual_checks import Check, all_checks, normal_checks
 from imuarray.diagnosis.scores import Information
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL
-from imuarray.diagnosis.state import Search
+from imuarray.diagnosis.state import Search, need
 from imuarray.engine.fit import (
     Fit,
     flat_parameters,

@@ -8,7 +8,6 @@ import numpy as np
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects
 from imuarray.diagnosis.adoption import adopt, proposals, rivals
-from imuarray.diagnosis.elimination import eliminate
 from imuarray.diagnosis.final_checks import (
     final_checks,
     leave_out_clips,
@@ -21,7 +20,7 @@ from imuarray.diagnosis.residual_checks import Check, all_checks
 from imuarray.diagnosis.scores import Score
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.shocks import SHOCK, find_shocks, with_neighbours
-from imuarray.diagnosis.state import Search
+from imuarray.diagnosis.state import Search, eliminate
 from imuarray.engine.clocks import DELAY
 from imuarray.engine.fit import Fit, fit, flat_parameters
 from imuarray.engine.parameters import catalogue_effects, columns_of

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis.elimination import need
 from imuarray.diagnosis.residual_checks import Check
 from imuarray.diagnosis.scans import (
     SHIFT,
@@ -24,6 +23,7 @@ from imuarray.diagnosis.scans import (
 )
 from imuarray.diagnosis.scores import Candidate, Information, Scanned, Score, score_all
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.state import need
 from imuarray.engine.clocks import CLOCK, DELAY, age_of, delay_score, sawtooth, sawtooths
 from imuarray.engine.fit import Fit, flat_parameters
 from imuarray.engine.settings import SETTINGS as ENGINE
