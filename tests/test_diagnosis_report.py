@@ -27,7 +27,7 @@ from imuarray.report import drawings as drawn
 from imuarray.report import numbers
 from imuarray.report import write as report
 from imuarray.report.answers import answers, verdict
-from imuarray.report.drawings import cause_figure
+from imuarray.report.drawings_model import cause_figure
 from imuarray.report.panels import abscissa, binned, cause_table, signal_of
 from tests.browser import in_browser, needs_browser
 

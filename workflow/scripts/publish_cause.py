@@ -11,7 +11,7 @@ with job(snakemake):
     import pandas as pd
 
     from imuarray.figures.style import write_figure
-    from imuarray.report.drawings import cause_figure
+    from imuarray.report.drawings_model import cause_figure
     from imuarray.report.write import footer
 
     made, output = Path(snakemake.input.made), dict(snakemake.output.items())
