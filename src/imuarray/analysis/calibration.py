@@ -19,8 +19,7 @@ from imuarray.engine.readings import Readings, arrange, determined, most_informa
 from imuarray.errors import InputError, one_line, require_one_of
 from imuarray.model.effects import DATA_EFFECTS
 from imuarray.provenance import digest, stamp
-from imuarray.recording import Recording
-from imuarray.recording import record as stored
+from imuarray.recording import Recording, record
 from imuarray.recording.channels import require_apart, require_live
 
 
@@ -173,7 +172,7 @@ def _papers(recording: Recording, method: str, accelerometer_noise, say: Say) ->
 
     recording = assumed(usable(recording, say), accelerometer_noise)
     model = model_of(recording)
-    if method == "gauss-newton" and len(recording.time) > stored.PART:
+    if method == "gauss-newton" and len(recording.time) > record.PART:
         found = calibrate_parts(model, lambda: map(_readings, recording.parts()))
     else:
         force, rate, saturated = _readings(recording.in_memory())

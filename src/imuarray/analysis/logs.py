@@ -82,8 +82,8 @@ def _require_paired(recording: Recording) -> None:
 
 def _opened(paths, columns, topics) -> Opened:
     from imuarray.recording import bags
-    from imuarray.recording import table as csv_logs
     from imuarray.recording.mimu_recording import read_board
+    from imuarray.recording.table import read_tables
 
     logs = [Path(path) for path in ([paths] if isinstance(paths, str | PathLike) else paths)]
     if len(logs) == 1 and logs[0].suffix in RECORDINGS:
@@ -99,7 +99,7 @@ def _opened(paths, columns, topics) -> Opened:
     if len(logs) == 1 and logs[0].name.endswith(PACKETS):
         recording, account = read_board(logs[0], Path(columns))
         return Opened(recording, account.lines())
-    found = csv_logs.read_tables(logs, columns)
+    found = read_tables(logs, columns)
     if isinstance(found, Recording):
         found = _with_rails(found, read_layout(columns))
     return _together(found)

@@ -81,7 +81,7 @@ def _labels(coordinate: xr.DataArray) -> tuple[str, ...]:
 def read_recording(path: str | Path, stored: bool = False) -> Recording:
     """Read and validate a recording; angular rates come out in rad/s.
 
-    With ``stored`` the readings of a long one stay in the file (`recording.stored`).
+    With ``stored`` the readings of a long one stay in the file (`Stored`).
 
     Raises InputError, with one line that says what was expected, what was found and where, if the
     file is missing, is not NetCDF-4 or is not a recording; raises IdentifiabilityError for fewer
