@@ -137,7 +137,7 @@ PAST_RAIL = (
 
 
 def table_past_rail(tables: list[pd.DataFrame], names: list[str], group: str):
-    """Readings past a made-up rail by the board of the others; `analysis.known.past_rail` of each."""
+    """Readings past a made-up rail by the others' board; `analysis.known.past_rail` of each."""
     parts = [
         table[table.model == "board"].assign(recording=name)
         for name, table in zip(names, tables, strict=True)
