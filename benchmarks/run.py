@@ -37,7 +37,7 @@ from imuarray.posterior.draws import TILE  # noqa: E402
 from imuarray.posterior.likelihood import Likelihood  # noqa: E402
 from imuarray.posterior.marginal import Marginal  # noqa: E402
 from imuarray.posterior.target import CompiledTarget, GaussianPrior  # noqa: E402
-from imuarray.simulation.measure import measure  # noqa: E402
+from imuarray.simulation.recordings import measure  # noqa: E402
 from imuarray.studies.bound import paths  # noqa: E402
 from tests.oracles import joint_jacobian  # noqa: E402
 

@@ -7,8 +7,7 @@ from functools import partial
 import numpy as np
 
 from imuarray.model import ArrayModel
-from imuarray.model.jax64 import jax, jnp
-from imuarray.model.small_linear import cholesky, log_determinant, solve_lower
+from imuarray.model.jax64 import cholesky, jax, jnp, log_determinant, solve_lower
 from imuarray.posterior import generic
 from imuarray.posterior.generic import Unknown
 from imuarray.posterior.target import GaussianPrior, Target

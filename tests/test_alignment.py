@@ -15,7 +15,7 @@ from imuarray.alignment.resample import Sensor, Splines, spline_error
 from imuarray.errors import InputError
 from imuarray.motion import hand_twisting
 from imuarray.recording import read_recording, write_recording
-from imuarray.recording.log import Log
+from imuarray.recording.rig import Log
 
 OFFSETS, DRIFTS, RATES = (0.0, 1.7e9, -0.4), (0.0, 2e-4, -1e-4), (200.0, 190.0, 100.0)
 TURNS = Rotation.random(3, np.random.default_rng(1)).as_matrix()

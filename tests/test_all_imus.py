@@ -9,10 +9,9 @@ from imuarray.blind.cases import Case, make
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects
 from imuarray.diagnosis.reading_effects import find_rails, find_repeats
+from imuarray.diagnosis.scans import maybe_warming, scan_shifts, scan_warming
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.diagnosis.shifts import scan_shifts
 from imuarray.diagnosis.state import Cause, Search
-from imuarray.diagnosis.warming import maybe_warming, scan_warming
 from imuarray.engine.heldout import gain_of
 from imuarray.engine.parameters import catalogue_effects, columns_of
 from imuarray.engine.readings import arrange

@@ -9,7 +9,7 @@ import pytest
 import imuarray
 from imuarray.cli import main
 from imuarray.errors import InputError
-from imuarray.firstorder.spectrum import noise_terms, spectrum
+from imuarray.firstorder.noise import noise_terms, spectrum
 from imuarray.geometry import mimu4444_corners
 from imuarray.recording import Recording
 

@@ -7,13 +7,13 @@ import pytest
 import xarray as xr
 
 import imuarray
-from imuarray.analysis.leak import less_leak_by_others
+from imuarray.analysis.prepare import less_leak_by_others
 from imuarray.cli import main
 from imuarray.firstorder.correct import corrected, rails_shown
 from imuarray.motion import normal_motion
 from imuarray.recording import read_recording, write_recording
 from imuarray.recording.record import CORRECTION
-from imuarray.simulation.measure import measure
+from imuarray.simulation.recordings import measure
 from tests.test_bound import model
 from tests.test_recording import make
 

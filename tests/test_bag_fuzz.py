@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from imuarray.recording.bags import read_bags
-from imuarray.recording.csv_logs import read_tables
+from imuarray.recording.table import read_tables
 from tests.bag_writer import KINDS, write
 from tests.test_bags import TOPICS, put, readings, rig
 from tests.test_csv_logs import put as put_tables

@@ -18,8 +18,12 @@ import imuarray
 from benchmarks.board import Options, draw_board, write
 from imuarray.analysis.board import board
 from imuarray.analysis.motion import _late, as_calibrated
-from imuarray.analysis.poses import of_file, of_first_order
-from imuarray.analysis.trust import reasons_of_calibration, reasons_of_motion
+from imuarray.analysis.trust import (
+    of_file,
+    of_first_order,
+    reasons_of_calibration,
+    reasons_of_motion,
+)
 from imuarray.cli import main
 from imuarray.commands.board import answer
 from imuarray.commands.calibrate import position_lines
@@ -30,9 +34,8 @@ from imuarray.engine.parameters import POSITION, columns_of
 from imuarray.engine.readings import arrange
 from imuarray.engine.widths import corrected
 from imuarray.errors import InputError
-from imuarray.report.board import html, noises, write_board
-from imuarray.report.board_words import advice, facts, turned, verdict
-from imuarray.report.excitation import missing
+from imuarray.report.board import advice, facts, html, noises, turned, verdict, write_board
+from imuarray.report.pictures import missing
 from tests.browser import in_browser, needs_browser
 
 matplotlib.use("agg")

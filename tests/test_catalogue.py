@@ -6,7 +6,7 @@ import pytest
 from imuarray.geometry import mimu4444_corners
 from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting
-from imuarray.simulation.measure import measure
+from imuarray.simulation.recordings import measure
 from tests import oracles
 
 RATE = np.radians(0.06)

@@ -21,7 +21,7 @@ from imuarray.claims.results import Results
 from imuarray.config import model_from, read_config
 from imuarray.errors import InputError
 from imuarray.motion import normal_motion
-from imuarray.simulation.measure import measure
+from imuarray.simulation.recordings import measure
 from imuarray.studies.checks import identifiability, marginalisation, proposal
 from imuarray.studies.checks.bound import bound_table
 from imuarray.studies.rate_error import accelerometers_only

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from imuarray.blind.cases import Case, make
-from imuarray.diagnosis.clipping import Peak, clipped, together
+from imuarray.diagnosis.final_checks import Peak, clipped, together
 from imuarray.diagnosis.procedure import run_procedure
 from imuarray.diagnosis.reading_effects import Structural
 

@@ -8,7 +8,7 @@ import pytest
 
 import imuarray
 from imuarray.errors import InputError
-from imuarray.model.names import parameter_names
+from imuarray.model.array_model import parameter_names
 from tests.cases import diagnosis
 from tests.test_bound import model
 

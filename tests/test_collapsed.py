@@ -18,7 +18,7 @@ from imuarray.model import ArrayModel
 from imuarray.motion import normal_motion
 from imuarray.posterior import draws, kernels, reference
 from imuarray.posterior.likelihood import Likelihood
-from imuarray.simulation.measure import measure
+from imuarray.simulation.recordings import measure
 from tests import oracles
 from tests.cases import noises, simulate, small_array
 

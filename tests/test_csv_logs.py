@@ -6,8 +6,8 @@ import yaml
 
 from imuarray.errors import InputError
 from imuarray.recording import rig
-from imuarray.recording.csv_logs import read_tables
 from imuarray.recording.record import Recording
+from imuarray.recording.table import read_tables
 from tests.doc_pages import ROOT, blocks
 from tests.test_convert_csv import HEADER, blank, layout, table
 from tests.test_convert_csv import read as read_board

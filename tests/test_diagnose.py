@@ -10,19 +10,18 @@ import pytest
 
 from imuarray.blind.cases import Case, make
 from imuarray.cli import main
-from imuarray.diagnosis import elimination
+from imuarray.diagnosis import state as elimination
 from imuarray.diagnosis.document import diagnose, precision_of, structural_gain
-from imuarray.diagnosis.elimination import eliminate, need
 from imuarray.diagnosis.extension import extended_model, read_extension
 from imuarray.diagnosis.final_checks import beside_left
 from imuarray.diagnosis.noise_effects import verdict
 from imuarray.diagnosis.procedure import run_procedure
 from imuarray.diagnosis.reading_effects import find_structural
 from imuarray.diagnosis.residual_checks import all_checks
+from imuarray.diagnosis.scans import Courses, maybe_grown
 from imuarray.diagnosis.scores import Candidate, Score
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.diagnosis.state import Cause, Search
-from imuarray.diagnosis.warming import Courses, maybe_grown
+from imuarray.diagnosis.state import Cause, Search, eliminate, need
 from imuarray.engine.fit import flat_parameters
 from imuarray.engine.heldout import gain, log_scores
 from imuarray.engine.parameters import catalogue_effects, columns_of

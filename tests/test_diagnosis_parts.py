@@ -13,12 +13,12 @@ import imuarray
 from imuarray.blind.cases import Case, make
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects as variance
-from imuarray.diagnosis.clocks import scan_clocks, wider
 from imuarray.diagnosis.replicates import Replicator, discrepancies
 from imuarray.diagnosis.scores import candidates, information_at, mask_of, score_all
 from imuarray.diagnosis.settings import SETTINGS as CRITICAL
+from imuarray.diagnosis.special import sawtooth_scan, wider
 from imuarray.diagnosis.state import Search
-from imuarray.engine.clock_scan import sawtooth
+from imuarray.engine.clocks import sawtooth
 from imuarray.engine.derivatives import polynomial_taps
 from imuarray.engine.fit import (
     Fit,
@@ -338,7 +338,7 @@ def test_a_clock_in_coloured_noise_must_show_more():
     assert wider(search.fit, given, 0, clock) == pytest.approx(density, rel=1e-4) and density > 3
     assert wider(search.fit, white, 0, clock) == 1.0
     best = [
-        min(found.score.log_p for found in scan_clocks(search.fit, one, range(8), {}))
+        min(found.score.log_p for found in sawtooth_scan(search.fit, one, range(8), ()))
         for one in (given, white)
     ]
     assert best[0] > best[1] + 50

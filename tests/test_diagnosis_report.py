@@ -12,15 +12,15 @@ import pytest
 from scipy.linalg import subspace_angles
 
 from imuarray.blind.cases import Case, make
-from imuarray.diagnosis.document import diagnose
-from imuarray.diagnosis.quantities import number, plus_minus, probability, quantity, span
-from imuarray.diagnosis.replicates import _beside
-from imuarray.diagnosis.separability import (
+from imuarray.diagnosis.adoption import (
     conditional,
     orthonormal,
     separability,
     squared_correlations,
 )
+from imuarray.diagnosis.document import diagnose
+from imuarray.diagnosis.plain import number, plus_minus, probability, quantity, span
+from imuarray.diagnosis.replicates import _beside
 from imuarray.diagnosis.words import cause_in_words, equation, sizes, split_name
 from imuarray.model.effects import DATA_EFFECTS, EFFECTS
 from imuarray.report import drawings as drawn

@@ -12,7 +12,7 @@ from imuarray.motion import Motion, hand_twisting
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.pmmh import run_chains
 from imuarray.posterior.target import GaussianPrior
-from imuarray.simulation.measure import measure
+from imuarray.simulation.recordings import measure
 from tests import oracles
 from tests.generic import GenericLikelihood, GenericTarget
 

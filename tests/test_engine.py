@@ -13,9 +13,9 @@ from imuarray.engine.fit import flat_parameters
 from imuarray.engine.ladder import _of_one_truth, climb, mask_of
 from imuarray.engine.linearise import linearise, reading, seen_again
 from imuarray.engine.parameters import POSITION, columns_of
-from imuarray.engine.passes import normal_pass
 from imuarray.engine.readings import arrange, most_informative, resolution
-from imuarray.engine.turning import turned
+from imuarray.engine.robust import normal_pass
+from imuarray.engine.start import turned
 from imuarray.engine.widths import settled, widths
 from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.geometry import Array, sub_array

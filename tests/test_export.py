@@ -24,7 +24,7 @@ from imuarray.analysis.model import model_of
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.firstorder.turns import nearest_orthogonal
-from imuarray.model.names import parameter_names
+from imuarray.model.array_model import parameter_names
 from imuarray.motion import Motion
 from imuarray.provenance import trust, write_netcdf
 from tests.test_allan import still
@@ -237,8 +237,8 @@ def test_joints_and_rows_are_the_document_s(made):
 @pytest.mark.parametrize("upper", [True, False])
 def test_the_turns_sds_are_those_of_drawn_maps(made, upper):
     """1500 draws of what first order left, seed 2: 5 sds of an sd are 9 %."""
-    from imuarray.analysis.frames import lower_times_rotation, turn_sds
-    from imuarray.firstorder.parts import upper_times_rotation
+    from imuarray.analysis.formats import lower_times_rotation, turn_sds
+    from imuarray.firstorder.turns import upper_times_rotation
 
     calibration = made[0]
     part = upper_times_rotation if upper else lower_times_rotation

@@ -8,13 +8,18 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from imuarray.errors import IdentifiabilityError, InputError
-from imuarray.firstorder.allan import allan_deviation, lag_correlation, reading_sd
 from imuarray.firstorder.correct import calibrate_first_order, correct, corrected
 from imuarray.firstorder.outliers import fit_triads
-from imuarray.firstorder.parts import parts_of
 from imuarray.firstorder.pose_noise import PoseNoise, walked_mean
 from imuarray.firstorder.report import noise_table, parameter_table, residual_table
-from imuarray.firstorder.still import still_poses, window_spread
+from imuarray.firstorder.still import (
+    allan_deviation,
+    lag_correlation,
+    reading_sd,
+    still_poses,
+    window_spread,
+)
+from imuarray.firstorder.turns import parts_of
 from imuarray.geometry import mimu4444_corners
 from imuarray.recording import Recording, read_recording, write_recording
 

@@ -8,12 +8,11 @@ from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from imuarray.errors import InputError
-from imuarray.firstorder.allan import averaged_sd, reading_sd
 from imuarray.firstorder.correct import calibrate_first_order
 from imuarray.firstorder.outliers import fit_triads
 from imuarray.firstorder.pose_noise import walked_mean
 from imuarray.firstorder.report import summary_lines
-from imuarray.firstorder.still import still_poses
+from imuarray.firstorder.still import averaged_sd, reading_sd, still_poses
 from tests.test_first_order import GRAVITY, RATE, board, directions, triads
 
 WALKS = [[0.0, 1e-2, 0.0, 0.0], [2e-2] * 4]  # one triad's; strong beside the noise

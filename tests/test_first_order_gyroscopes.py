@@ -8,7 +8,7 @@ import pytest
 from scipy.linalg import rq
 
 from benchmarks.board import GRAVITY, Options, draw_board, draw_hand
-from imuarray.analysis.poses import POSES, Poses, of_file, reasons_of_poses
+from imuarray.analysis.trust import POSES, Poses, of_file, reasons_of_poses
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.firstorder.correct import calibrate_first_order, correct

@@ -8,7 +8,7 @@ import pytest
 from imuarray.engine.fusion import fuse
 from imuarray.errors import IdentifiabilityError
 from imuarray.motion import hand_twisting, normal_motion
-from imuarray.simulation.measure import measure
+from imuarray.simulation.recordings import measure
 from tests import oracles
 from tests.test_bound import model
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from imuarray.engine import clocks
-from imuarray.engine.clock_phases import with_phases
 from imuarray.engine.derivatives import no_derivatives
 from imuarray.engine.gyroscope_clocks import (
     Gyroscopes,
     ages_of,
     clocks_from_gyroscopes,
     moved,
+    with_phases,
 )
 from imuarray.engine.linearise import RoughPrior, State
 from imuarray.engine.readings import Readings

@@ -8,7 +8,7 @@ from imuarray.estimation.bcd import calibrate_bcd
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.motion import Motion
-from imuarray.motion.random import directions
+from imuarray.motion.state import directions
 from tests import oracles
 from tests.cases import measure, small_array
 

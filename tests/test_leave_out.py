@@ -8,9 +8,8 @@ import pytest
 from scipy.stats import multivariate_t
 
 from imuarray.analysis.calibration_dataset import engine_dataset
-from imuarray.analysis.held_out import located, predicted
-from imuarray.analysis.known import with_board
-from imuarray.engine.densities import block_scores, log_densities
+from imuarray.analysis.known import located, predicted, with_board
+from imuarray.engine.course import block_scores, log_densities
 from imuarray.engine.fit import at, flat_parameters
 from imuarray.engine.heldout import log_scores
 from imuarray.engine.linearise import linearise

@@ -11,7 +11,8 @@ import imuarray
 from imuarray import provenance
 from imuarray.cli import main
 from imuarray.engine.parameters import prior_precision
-from imuarray.model import DATA_EFFECTS, EFFECTS, own
+from imuarray.model import DATA_EFFECTS, EFFECTS
+from imuarray.model import effects as own
 from tests.test_bound import model
 
 CUBIC = '''

@@ -8,14 +8,13 @@ import pytest
 
 import imuarray
 from imuarray.analysis.beyond import posterior_beyond
+from imuarray.analysis.calibration import fitted_beyond
 from imuarray.analysis.density import traced
-from imuarray.analysis.fitting import fitted_beyond
-from imuarray.analysis.held_out import _choose, _hidden, past_rail
-from imuarray.analysis.known import fused
+from imuarray.analysis.known import _choose, _hidden, fused, past_rail
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.figures.board import draw_past_rail, table_past_rail
-from imuarray.model.names import parameter_names
+from imuarray.model.array_model import parameter_names
 from tests import cases
 from tests.test_bound import model
 

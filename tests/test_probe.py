@@ -6,8 +6,8 @@ import pytest
 from imuarray.errors import InputError
 from imuarray.geometry import mimu4444_corners
 from imuarray.model import EFFECTS, ArrayModel, effect
+from imuarray.model.array_model import component, parameter_names
 from imuarray.model.jax64 import jax, jnp
-from imuarray.model.names import component, parameter_names
 from imuarray.model.probe import probe
 
 

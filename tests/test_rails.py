@@ -12,7 +12,7 @@ from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.motion_ml import motion_from
 from imuarray.model import Noise
 from imuarray.motion import Motion, normal_motion
-from imuarray.simulation.measure import measure
+from imuarray.simulation.recordings import measure
 from tests.test_bound import model
 
 RAIL = 5.0

@@ -17,7 +17,7 @@ from imuarray.motion import normal_motion
 from imuarray.model.jax64 import jax
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.marginal import Marginal
-from imuarray.simulation.measure import measure
+from imuarray.simulation.recordings import measure
 
 model = ArrayModel.isotropic(mimu4444(), 0.04, 1e-3)
 rng = np.random.default_rng(1)

@@ -9,11 +9,12 @@ import xarray as xr
 import imuarray
 from imuarray.cli import main
 from imuarray.errors import InputError
-from imuarray.motion.smooth import hand_twisting
+from imuarray.motion.state import hand_twisting
 from imuarray.provenance import digest, is_damaged
-from imuarray.recording import read_recording, stored, validate, write_recording
+from imuarray.recording import read_recording, validate, write_recording
+from imuarray.recording import record as stored
 from imuarray.recording.channels import repeated
-from imuarray.simulation.measure import measure
+from imuarray.simulation.recordings import measure
 from tests.test_bound import model
 from tests.test_recording import make
 

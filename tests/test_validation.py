@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 import imuarray
-from imuarray.analysis.fitting import fitted
+from imuarray.analysis.calibration import fitted
 from imuarray.analysis.model import silent
 from imuarray.config import read_config
 from imuarray.estimation.newton import fisher_scoring

@@ -5,7 +5,7 @@ from imuarray.pipeline.job import job
 with job(snakemake):
     from functools import partial
 
-    from imuarray.analysis.held_out import ASSUMED, BINS, past_rail
+    from imuarray.analysis.known import ASSUMED, BINS, past_rail
     from imuarray.figures.board import draw_past_rail
     from imuarray.figures.style import write_figure
     from imuarray.recording import load_dataset, read_recording

@@ -5,8 +5,8 @@ from imuarray.pipeline.job import job
 with job(snakemake):
     from imuarray.firstorder import report
     from imuarray.firstorder.correct import calibrate_first_order
+    from imuarray.firstorder.report import write_corrected
     from imuarray.firstorder.still import SHORTEST
-    from imuarray.firstorder.store import write_corrected
     from imuarray.provenance import write_csv
     from imuarray.recording import read_recording
     from imuarray.recording.units import GRAVITY

@@ -3,7 +3,7 @@
 from imuarray.pipeline.job import job
 
 with job(snakemake):
-    from imuarray.analysis.held_out import left_out
+    from imuarray.analysis.known import left_out
     from imuarray.provenance import digest, stamp, write_netcdf
     from imuarray.recording import read_recording, write_recording
 

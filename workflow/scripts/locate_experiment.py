@@ -3,7 +3,7 @@
 from imuarray.pipeline.job import job
 
 with job(snakemake):
-    from imuarray.analysis.held_out import located
+    from imuarray.analysis.known import located
     from imuarray.provenance import write_netcdf
     from imuarray.recording import load_dataset, read_recording
 

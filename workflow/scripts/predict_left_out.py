@@ -3,7 +3,7 @@
 from imuarray.pipeline.job import job
 
 with job(snakemake):
-    from imuarray.analysis.held_out import predicted
+    from imuarray.analysis.known import predicted
     from imuarray.provenance import write_csv
     from imuarray.recording import load_dataset, read_recording
 

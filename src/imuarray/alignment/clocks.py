@@ -9,7 +9,7 @@ from scipy.signal import correlate
 
 from imuarray.alignment.resample import Sensor, Splines
 from imuarray.errors import InputError
-from imuarray.firstorder.relative import FEWEST, FLATTEST, SLOWEST
+from imuarray.firstorder.gyroscopes import FEWEST, FLATTEST, SLOWEST
 from imuarray.firstorder.turns import nearest_orthogonal, procrustes
 from imuarray.linear import scaled_inverse
 

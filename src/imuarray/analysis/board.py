@@ -7,8 +7,7 @@ from pathlib import Path
 from imuarray.analysis.calibration import calibrate
 from imuarray.analysis.logs import open_logs
 from imuarray.analysis.model import Say, silent
-from imuarray.analysis.poses import of_first_order, reasons_of_poses
-from imuarray.analysis.trust import reasons_of_calibration
+from imuarray.analysis.trust import of_first_order, reasons_of_calibration, reasons_of_poses
 from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.firstorder.correct import FirstOrder, calibrate_first_order, correct
 from imuarray.firstorder.still import still_poses

@@ -1,7 +1,8 @@
 """Positions of a board and parameters of its sensors from recordings, as one labelled dataset."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 
@@ -10,14 +11,84 @@ import xarray as xr
 
 from imuarray.analysis import methods
 from imuarray.analysis.calibration_dataset import engine_dataset, papers_dataset, with_readings
-from imuarray.analysis.fitting import fitted
-from imuarray.analysis.leak import less_leak_by_others
 from imuarray.analysis.model import Say, assumed, model_of, require_together, silent, usable
-from imuarray.errors import InputError, require_one_of
+from imuarray.analysis.prepare import less_leak_by_others
+from imuarray.engine.estimate import Estimate
+from imuarray.engine.ladder import Rung, climb, rungs_of, with_effects
+from imuarray.engine.readings import Readings, arrange, determined, most_informative
+from imuarray.errors import InputError, one_line, require_one_of
 from imuarray.model.effects import DATA_EFFECTS
 from imuarray.provenance import digest, stamp
-from imuarray.recording import Recording, stored
+from imuarray.recording import Recording, record
 from imuarray.recording.channels import require_apart, require_live
+
+
+def fitted(
+    recordings: Sequence[Recording], model: str, effects: Sequence[str], say: Say
+) -> tuple[Estimate, list[Rung]]:
+    """(estimate, the ladder's rungs) under a diagnosis.json, ``effects``, or the sensor model.
+
+    InputError where no model of the kind is near the readings.
+    """
+    if model.endswith(".json"):
+        from imuarray.diagnosis.extension import diagnosed_estimate
+
+        with _near_the_model():
+            return diagnosed_estimate(model, recordings[0]), []
+    readings = _arranged(recordings, say)
+    with _near_the_model():
+        if effects:
+            return with_effects(readings, effects), []
+        found, rungs = climb(readings)
+    _tell(rungs, say)
+    return found, rungs
+
+
+@contextmanager
+def _near_the_model() -> Iterator[None]:
+    """A search that diverges is bad input, in one line."""
+    try:
+        yield
+    except np.linalg.LinAlgError as error:
+        raise InputError(
+            "recording: expected readings near those of the model, found a search that diverges"
+            f" ({one_line(error)}); are they corrected (imuarray first-order), and units, axes and"
+            " times as declared?"
+        ) from error
+
+
+def fitted_beyond(
+    recording: Recording, model: str, effects: Sequence[str], say: Say
+) -> Estimate | None:
+    """The same of one recording, None where no more than positions and motion are in the model."""
+    if model.endswith(".json") or effects:
+        return fitted([recording], model, effects, say)[0]
+    readings = _arranged([recording], say)
+    if not rungs_of(readings):
+        return None
+    with _near_the_model():
+        found, rungs = climb(readings, bare=False)
+    _tell(rungs, say)
+    return found if any(rung.kept for rung in rungs) else None
+
+
+def _arranged(recordings, say: Say) -> list[Readings]:
+    arranged = [arrange(one, sparse=True) for one in recordings]
+    found = [most_informative(one.select(determined(one, 1)), say) for one in arranged]
+    for recording, one in zip(recordings, found, strict=True):
+        if not len(one.time):
+            rate = 1 / np.median(np.diff(recording.time)) if len(recording.time) > 1 else 0.0
+            raise InputError(
+                f"recording: expected samples that determine the motion, found none, at {rate:.4g}"
+                " samples a second; is the unit of time right?"
+            )
+    return found
+
+
+def _tell(rungs: Sequence[Rung], say: Say) -> None:
+    for rung in rungs:
+        verdict = "kept" if rung.kept else "left out"
+        say(f"{rung.name}: {verdict}, {rung.gain:.3g} ({rung.error:.2g}) nats on held-out time")
 
 
 def calibrate(
@@ -101,7 +172,7 @@ def _papers(recording: Recording, method: str, accelerometer_noise, say: Say) ->
 
     recording = assumed(usable(recording, say), accelerometer_noise)
     model = model_of(recording)
-    if method == "gauss-newton" and len(recording.time) > stored.PART:
+    if method == "gauss-newton" and len(recording.time) > record.PART:
         found = calibrate_parts(model, lambda: map(_readings, recording.parts()))
     else:
         force, rate, saturated = _readings(recording.in_memory())

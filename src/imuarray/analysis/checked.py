@@ -11,8 +11,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.errors import LARGEST, SMALLEST, InputError
-from imuarray.model.effects import DATA_EFFECTS, EFFECTS, KINDS
-from imuarray.model.own import own_version
+from imuarray.model.effects import DATA_EFFECTS, EFFECTS, KINDS, own_version
 from imuarray.recording import Recording
 from imuarray.recording.record import CLOCKS, CORRECTION, DIMENSIONS, MATRICES
 

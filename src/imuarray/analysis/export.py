@@ -8,7 +8,7 @@ import xarray as xr
 
 from imuarray.analysis import methods
 from imuarray.analysis.checked import require_fit
-from imuarray.analysis.frames import frames_of, left_of
+from imuarray.analysis.formats import frames_of, left_of
 from imuarray.errors import InputError, one_line, require_one_of
 from imuarray.firstorder.noise import TERMS, StillNoise
 from imuarray.geometry import Array

@@ -14,8 +14,7 @@ from imuarray.firstorder.correct import rails_shown
 from imuarray.recording import Recording, read_recording
 from imuarray.recording.channels import repeated
 from imuarray.recording.layout import read_layout, rotation
-from imuarray.recording.log import Log
-from imuarray.recording.rig import Rig, recording_of
+from imuarray.recording.rig import Log, Rig, recording_of
 
 RECORDINGS = (".nc", ".nc4", ".h5")
 PACKETS = (".bin", ".bin.xz")
@@ -82,8 +81,9 @@ def _require_paired(recording: Recording) -> None:
 
 
 def _opened(paths, columns, topics) -> Opened:
-    from imuarray.recording import bags, csv_logs
+    from imuarray.recording import bags
     from imuarray.recording.mimu_recording import read_board
+    from imuarray.recording.table import read_tables
 
     logs = [Path(path) for path in ([paths] if isinstance(paths, str | PathLike) else paths)]
     if len(logs) == 1 and logs[0].suffix in RECORDINGS:
@@ -99,7 +99,7 @@ def _opened(paths, columns, topics) -> Opened:
     if len(logs) == 1 and logs[0].name.endswith(PACKETS):
         recording, account = read_board(logs[0], Path(columns))
         return Opened(recording, account.lines())
-    found = csv_logs.read_tables(logs, columns)
+    found = read_tables(logs, columns)
     if isinstance(found, Recording):
         found = _with_rails(found, read_layout(columns))
     return _together(found)
@@ -128,8 +128,8 @@ def _together(found: Recording | Rig) -> Opened:
 
 def _sampled(recording: Recording, lines: list[str]) -> Opened:
     """Of samples as they are: even instants where stamps jitter, and the rails that show."""
+    from imuarray.alignment.align import SHORTEST, steadied
     from imuarray.alignment.found import JITTER
-    from imuarray.alignment.stamps import SHORTEST, steadied
 
     recording, more = _railed_triads(recording)
     if len(recording.time) < SHORTEST:

@@ -8,14 +8,14 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis.checked import require_fit, require_labels
-from imuarray.analysis.leak import less_leak
 from imuarray.analysis.model import assumed, model_of
+from imuarray.analysis.prepare import less_leak
 from imuarray.errors import InputError
 from imuarray.firstorder.correct import corrected, nearest_rail, rails_shown
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
+from imuarray.model.array_model import parameter_names
 from imuarray.model.effects import KINDS, find_effects
-from imuarray.model.names import parameter_names
 from imuarray.model.noise import Noise
 from imuarray.motion import Motion
 from imuarray.motion.state import UNITS
@@ -58,7 +58,7 @@ def motion_parts(
 
     Where samples depend on each other (two IMUs, IMUs on clocks of their own) there is one part.
     """
-    from imuarray.engine.clock_scan import CLOCK
+    from imuarray.engine.clocks import CLOCK
 
     recording = as_calibrated(assumed(recording, accelerometer_noise), calibration)
     require_fit(calibration, recording)
@@ -209,7 +209,7 @@ def motion_under(
 def _with_own_clocks(found, calibration: xr.Dataset, recording: Recording, covariance):
     """`Fused` with rough motion anew, by the recording's own biases and clocks; whether it is."""
     from imuarray.analysis.known import fused
-    from imuarray.engine.clock_scan import CLOCK
+    from imuarray.engine.clocks import CLOCK
 
     if CLOCK not in str(calibration.attrs.get("effects")).split(",") or covariance is None:
         return found, False

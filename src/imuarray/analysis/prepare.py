@@ -1,18 +1,66 @@
-"""A recording before it is calibrated: simulated, corrected triad by triad, its best samples."""
+"""Recordings before they are calibrated, from files or simulated, and results read back."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from imuarray.errors import InputError, require_integer
-from imuarray.firstorder.correct import calibrate_first_order, correct
+from imuarray.firstorder.correct import calibrate_first_order, correct, rails_shown
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting
-from imuarray.recording import Recording
+from imuarray.recording import Recording, load_dataset
 from imuarray.recording.units import GRAVITY
 from imuarray.streams import stream
+
+
+def read_mimu(
+    path: str | PathLike, positions: str | PathLike, underside: str | None = None,
+    accelerometer_noise: float = 0.04, gyroscope_noise: float = float(np.radians(0.06)),
+    position_prior: float = 3e-3, output_rate: float = 1000.0,
+) -> Recording:  # fmt: skip
+    """Packets of a MIMU board; damaged ones are left out.
+
+    ``positions``: CSV of nominal positions in m; ``underside``: labels of the IMUs turned over,
+    separated by commas, by default the even-numbered ones; noise sds in m/s^2 and rad/s, the
+    positions' prior sd in m; ``output_rate`` Hz, at which a sensor makes readings of which the host
+    takes the newest. InputError says what does not fit.
+    """
+    from imuarray.recording.mimu_recording import read_board
+
+    return read_board(
+        Path(path), Path(positions), underside, accelerometer_noise_sd=accelerometer_noise,
+        gyroscope_noise_sd=gyroscope_noise, position_prior_sd=position_prior,
+        output_rate=output_rate,
+    )[0]  # fmt: skip
+
+
+def read_calibration(path: str | PathLike) -> xr.Dataset:
+    """What `imuarray calibrate` has written; InputError for another file."""
+    found = load_dataset(Path(path))
+    if "position_covariance" not in found:
+        raise InputError(f"{path}: expected a calibration, found no position_covariance")
+    return found
+
+
+def read_posterior(path: str | PathLike) -> xr.DataTree:
+    """What `imuarray sample` has written; InputError for another file."""
+    from imuarray.posterior.chains import read_chains
+    from imuarray.provenance import is_damaged
+
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path}: expected a posterior (a NetCDF-4 file), found none")
+    if is_damaged(path):
+        raise InputError(f"{path}: expected a file as it was written, found it damaged")
+    try:
+        return read_chains(path)[1]
+    except (OSError, KeyError, ValueError) as error:
+        raise InputError(f"{path}: expected a posterior, found another file: {error}") from None
 
 
 def simulate(
@@ -109,3 +157,39 @@ def select(recording: Recording, samples: int | None = None) -> Recording:
     from imuarray.estimation.selection import select_dynamic
 
     return recording.select(select_dynamic(recording).spread(samples))
+
+
+def less_leak(
+    recording: Recording, correction: xr.Dataset, rate, saturated
+) -> tuple[Recording, np.ndarray]:
+    """As if axes at their rail had read the ``rate`` (T, 3), NaN where it is not known.
+
+    And (T, 3, 3), by how much the mean of the gyroscopes changes with the rate of such axes.
+    """
+    inverse, offset = (correction[f"gyroscope_{x}"].values for x in ("inverse", "offset"))
+    maps = np.linalg.inv(inverse)
+    read, true = (
+        np.einsum("kij,tkj->tki", maps, x) + offset
+        for x in (recording.angular_rate, np.asarray(rate)[:, None])
+    )
+    at_rail = rails_shown(np.swapaxes(inverse, 1, 2), saturated)  # back to the chip's own axes
+    short = np.where(at_rail & np.isfinite(true), true - read, 0.0)
+    free = ~saturated
+    mended = recording.angular_rate + free * np.einsum("kij,tkj->tki", inverse, short)
+    mixed = free[..., None] * inverse * at_rail[:, :, None]
+    leak = np.einsum("tkij,kjl->til", mixed, maps) / np.maximum(free.sum(axis=1), 1)[..., None]
+    return replace(recording, angular_rate=mended), leak
+
+
+def less_leak_by_others(recording: Recording) -> Recording:
+    """The same where gyroscopes without an axis at its rail say what the rate was."""
+    correction = recording.correction
+    if correction is None or not recording.at_rail("gyroscope").any():
+        return recording
+    recording = recording.in_memory()
+    saturated = recording.saturated_gyroscopes()
+    free = ~saturated.any(axis=2)
+    count = free.sum(axis=1)[:, None]
+    total = np.einsum("tk,tki->ti", free, recording.angular_rate)
+    rate = np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0)
+    return less_leak(recording, correction, rate, saturated)[0]

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from imuarray.motion.state import lever
 from imuarray.recording import Recording
 
 KNOWN = 0.03  # of the array's largest moment: turning about an axis with less is not seen
@@ -32,9 +33,8 @@ class Turning(NamedTuple):
 
     def at(self, positions) -> np.ndarray:
         """Specific force of triads at ``positions`` (A, 3) m, (T, A, 3) m/s^2."""
-        rate = self.rate[:, None]
-        euler = np.cross(self.acceleration[:, None], positions)
-        return np.cross(rate, np.cross(rate, positions)) + euler + self.force[:, None]
+        turned = lever(self.rate[:, None], self.acceleration[:, None], positions)
+        return turned + self.force[:, None]
 
 
 def turning(force, rate, positions) -> Turning:

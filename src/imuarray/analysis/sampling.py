@@ -11,6 +11,7 @@ import xarray as xr
 
 from imuarray.analysis import methods
 from imuarray.analysis.beyond import posterior_beyond
+from imuarray.analysis.calibration import fitted_beyond
 from imuarray.analysis.calibration_dataset import effects_of
 from imuarray.analysis.density import (
     NOT_CONVERGED,
@@ -20,11 +21,10 @@ from imuarray.analysis.density import (
     traced,
     tuned_target,
 )
-from imuarray.analysis.fitting import fitted_beyond
 from imuarray.analysis.model import Say, assumed, model_of, require_together, silent, usable
 from imuarray.errors import InputError, require_integer, require_one_of
 from imuarray.model import ArrayModel
-from imuarray.model.names import parameter_names
+from imuarray.model.array_model import parameter_names
 from imuarray.posterior.chains import Chains
 from imuarray.posterior.generic import SCALES
 from imuarray.posterior.pmmh import checkpoint_beside, run_chains, spread_starts

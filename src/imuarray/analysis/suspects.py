@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from imuarray.analysis.drawing import DEGREE, angle_words
 from imuarray.analysis.rigid import COHERENT, FEWEST, runs, slope, turning
 from imuarray.recording import Recording
-from imuarray.recording.stored import few
+from imuarray.recording.record import few
 from imuarray.recording.units import GRAVITY
 
 FAR = 4.0  # times the median triad's error, and the declared noise

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from imuarray.analysis.extension import diagnosed
+from imuarray.analysis.calibration_dataset import diagnosed
 from imuarray.analysis.model import assumed
 from imuarray.analysis.motion import as_calibrated, motion_parts
 from imuarray.analysis.trust import reasons_of_motion

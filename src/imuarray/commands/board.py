@@ -5,7 +5,7 @@ from pathlib import Path
 from imuarray.analysis.board import board as answered
 from imuarray.commands.calibrate import document, position_lines
 from imuarray.commands.output import Output
-from imuarray.report import board_words as said
+from imuarray.report import board as said
 from imuarray.report.board import Board, write_board
 
 TABLE = 8  # IMUs whose positions are printed; of more they are in positions.csv

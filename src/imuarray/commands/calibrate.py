@@ -5,10 +5,9 @@ import xarray as xr
 
 from imuarray.analysis.calibration import calibrate as calibrated
 from imuarray.analysis.model import assumed
-from imuarray.analysis.poses import of_file, reasons_of_poses
-from imuarray.analysis.trust import reasons_of_calibration
+from imuarray.analysis.trust import of_file, reasons_of_calibration, reasons_of_poses
 from imuarray.commands.output import Output
-from imuarray.diagnosis.quantities import number
+from imuarray.diagnosis.plain import number
 from imuarray.estimation.informative import position_sds, weakest_of
 from imuarray.model.effects import KINDS
 from imuarray.provenance import trust, write_netcdf

@@ -1,7 +1,6 @@
 """The work behind `imuarray diagnose`."""
 
-from imuarray.analysis.poses import of_file, reasons_of_poses
-from imuarray.analysis.trust import reasons_of_diagnosis
+from imuarray.analysis.trust import of_file, reasons_of_diagnosis, reasons_of_poses
 from imuarray.commands.output import Output
 from imuarray.diagnosis.document import diagnose as diagnosed
 from imuarray.errors import InputError

@@ -9,10 +9,14 @@ from imuarray.recording import read_recording, write_recording
 
 def first_order(arguments) -> None:
     """Calibration of each triad from poses and moves; the corrected recording carries it."""
-    from imuarray.analysis.poses import of_first_order, reasons_of_poses
+    from imuarray.analysis.trust import of_first_order, reasons_of_poses
     from imuarray.firstorder.correct import calibrate_first_order
-    from imuarray.firstorder.report import noise_table, residual_table, summary_lines
-    from imuarray.firstorder.store import write_corrected
+    from imuarray.firstorder.report import (
+        noise_table,
+        residual_table,
+        summary_lines,
+        write_corrected,
+    )
 
     recording, output = read_recording(arguments.recording), Output(arguments)
     found = calibrate_first_order(

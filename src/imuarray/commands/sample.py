@@ -7,10 +7,9 @@ import pandas as pd
 import xarray as xr
 
 from imuarray.analysis.model import assumed
-from imuarray.analysis.poses import of_file, reasons_of_poses
 from imuarray.analysis.sampling import sample as sampled
 from imuarray.analysis.sampling import summary
-from imuarray.analysis.trust import reasons_of_posterior
+from imuarray.analysis.trust import of_file, reasons_of_poses, reasons_of_posterior
 from imuarray.commands.output import Output
 from imuarray.provenance import trust, write_netcdf
 from imuarray.recording import read_recording

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 import imuarray
-from imuarray.diagnosis.elimination import heldout_gain, need
 from imuarray.diagnosis.extension import extended_estimate
 from imuarray.diagnosis.noise import per_triad, standardised
 from imuarray.diagnosis.noise_effects import held_out
@@ -18,6 +17,7 @@ from imuarray.diagnosis.scores import Information, information_at
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.shocks import SHOCK
 from imuarray.diagnosis.special import placebo_gain
+from imuarray.diagnosis.state import heldout_gain, need
 from imuarray.diagnosis.words import cause_in_words, parameters_of, sensors_of
 from imuarray.engine.estimate import Estimate
 from imuarray.engine.fit import Fit, at, fit

@@ -9,8 +9,7 @@ import numpy as np
 
 from imuarray.diagnosis.procedure import prepared
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.engine.clock_scan import CLOCK
-from imuarray.engine.clocks import timed
+from imuarray.engine.clocks import CLOCK, timed
 from imuarray.engine.estimate import Estimate, Recorded, estimate
 from imuarray.engine.fit import flat_parameters, from_flat, in_use
 from imuarray.engine.linearise import State
@@ -20,9 +19,8 @@ from imuarray.engine.start import start
 from imuarray.engine.widths import corrected, settled
 from imuarray.errors import LARGEST, SMALLEST, InputError
 from imuarray.model import EFFECTS, ArrayModel
-from imuarray.model.array_model import EffectPrior
+from imuarray.model.array_model import EffectPrior, parameter_ids
 from imuarray.model.effects import DATA_EFFECTS, KINDS
-from imuarray.model.names import parameter_ids
 from imuarray.model.noise import Noise
 from imuarray.recording import Recording
 

@@ -7,19 +7,21 @@ import numpy as np
 
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects
-from imuarray.diagnosis.adoption import adopt, proposals
-from imuarray.diagnosis.clipping import leave_out_clips, together
-from imuarray.diagnosis.elimination import eliminate
-from imuarray.diagnosis.final_checks import final_checks, within_tolerance
+from imuarray.diagnosis.adoption import adopt, proposals, rivals
+from imuarray.diagnosis.final_checks import (
+    final_checks,
+    leave_out_clips,
+    together,
+    within_tolerance,
+)
 from imuarray.diagnosis.noise_effects import COLOURED, SCALES, TAILS
 from imuarray.diagnosis.reading_effects import Structural, find_structural
 from imuarray.diagnosis.residual_checks import Check, all_checks
 from imuarray.diagnosis.scores import Score
-from imuarray.diagnosis.separability import rivals
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.shocks import SHOCK, find_shocks, with_neighbours
-from imuarray.diagnosis.state import Search
-from imuarray.engine.clock_scan import DELAY
+from imuarray.diagnosis.state import Search, eliminate
+from imuarray.engine.clocks import DELAY
 from imuarray.engine.fit import Fit, fit, flat_parameters
 from imuarray.engine.parameters import catalogue_effects, columns_of
 from imuarray.engine.readings import Readings, arrange, determined, few_at_once, part_of

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.diagnosis.noise import standardised
-from imuarray.diagnosis.quantities import first_up
+from imuarray.diagnosis.plain import first_up
 from imuarray.engine.fit import Fit
 from imuarray.model.effects import KINDS
 

@@ -10,13 +10,14 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import median_filter
 
-from imuarray.diagnosis.clocks import delay_score
 from imuarray.diagnosis.noise import Noise, standardised, tail_log_p
 from imuarray.diagnosis.replicates import motion_sizes
 from imuarray.diagnosis.scores import Information
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray.engine.clocks import delay_score
 from imuarray.engine.fit import Fit, seen_through
 from imuarray.linear import scaled_inverse, scaled_square
+from imuarray.motion.state import lever
 from imuarray.tails import log_chi_square, log_normal
 
 
@@ -33,7 +34,7 @@ def features(fit: Fit, imu: int) -> dict[str, np.ndarray]:
     """Groups of features of an IMU's own motion, each (T, n) with unit mean square."""
     motion, state = fit.state.motion, fit.state
     rate, turn = motion[:, :3], motion[:, 3:6]
-    force = lever(motion, state.positions[min(imu, len(state.positions) - 1)]) + motion[:, 6:9]
+    force = lever(rate, turn, state.positions[min(imu, len(state.positions) - 1)]) + motion[:, 6:9]
     jerk, force_rate = state.jerk
     time = 2 * fit.readings.time[:, None] / fit.readings.span - 1
     pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
@@ -64,15 +65,10 @@ def unit(values) -> np.ndarray:
     return values / np.where(size > 0, size, 1.0)
 
 
-def lever(motion, place) -> np.ndarray:
-    """Acceleration (T, 3) of a place (3,) m against the origin's."""
-    rate, turn = motion[:, :3], motion[:, 3:6]
-    return np.cross(rate, np.cross(rate, place)) + np.cross(turn, place)
-
-
 def displaced(motion, causes, axis: int) -> np.ndarray:
     """What an accelerometer's axis sees where ``causes`` (T, n) move it, (T, 3 n)."""
-    arms = np.stack([lever(motion, place)[:, axis] for place in np.eye(3)], axis=1)
+    rate, turn = motion[:, :3], motion[:, 3:6]
+    arms = np.stack([lever(rate, turn, place)[:, axis] for place in np.eye(3)], axis=1)
     return unit((arms[:, :, None] * causes[:, None, :]).reshape(len(motion), -1))
 
 

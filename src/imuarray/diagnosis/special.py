@@ -1,23 +1,122 @@
-"""What is special in the search for some effects: the one place that says so, by id."""
+"""What is special in the search for some effects: the one place that says so, by id.
+
+IMUs on clocks of their own (`sensor_clock`) are found by a scan (`imuarray.engine.clocks`).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis import clocks, shifts, warming
-from imuarray.diagnosis.elimination import need
 from imuarray.diagnosis.residual_checks import Check
-from imuarray.diagnosis.scores import Candidate, Scanned, score_all
+from imuarray.diagnosis.scans import (
+    SHIFT,
+    WARM_UP,
+    maybe_grown,
+    maybe_warming,
+    refine_instants,
+    scan_shifts,
+    scan_warming,
+)
+from imuarray.diagnosis.scores import Candidate, Information, Scanned, Score, score_all
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.engine.clock_scan import CLOCK, DELAY
-from imuarray.engine.fit import flat_parameters
+from imuarray.diagnosis.state import need
+from imuarray.engine.clocks import CLOCK, DELAY, age_of, delay_score, sawtooth, sawtooths
+from imuarray.engine.fit import Fit, flat_parameters
+from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.model.effects import EFFECTS
+from imuarray.model.timing import clock_turns
 from imuarray.tails import log_chi_square
 
 DRIFT = "bias_drift"
+
+
+def sawtooth_scan(fit: Fit, given: Information, imus, scores) -> list[Scanned]:
+    """A sawtooth age for each IMU, and for those together that show one beyond a constant delay.
+
+    The constant delays among the ``scores`` are what a clock must go beyond: its sawtooth counts
+    on top, and must gain a fair share of them (a delay that is large leaves a little that a
+    sawtooth can use, until it is adopted).
+    """
+    delays = {s.candidate.imus: s.statistic for s in scores if s.candidate.effect == DELAY}
+    score, information = delay_score(fit)
+    time = fit.readings.time
+    each = sawtooths(time, score, information, imus, delays, partial(wider, fit, given))
+    found = [
+        Scanned(_clock_score((imu,), gain, delays, len(time), len(imus)), {imu: values})
+        for imu, (gain, values) in each.items()
+    ]
+    if len(each) > 1:
+        gain = sum(gain for gain, _ in each.values())
+        several = _clock_score(tuple(each), gain, delays, len(time), 1)
+        found.append(Scanned(several, {imu: values for imu, (_, values) in each.items()}))
+    return found
+
+
+def wider(fit: Fit, given: Information, imu: int, clock) -> float:
+    """How much larger AR(1) noise makes the variance of a sawtooth's score than white noise does.
+
+    Its density at the sawtooth's frequency: the derivative by the delay is smooth in time. Of the
+    IMU's two triads the larger, and at least 1.
+    """
+    if given.correlation is None:
+        return 1.0
+    rho, step = given.correlation[imu], np.median(np.diff(fit.readings.time))
+    turn = 2 * np.pi * clock[1] * step
+    return float(max(1.0, np.max((1 - rho**2) / (1 + rho**2 - 2 * rho * np.cos(turn)))))
+
+
+def _clock_score(imus, gain, delays, samples, count) -> Score:
+    freedom = 4 * len(imus)
+    statistic = gain + delays.get(imus, sum(delays.get((imu,), 0.0) for imu in imus))
+    tried = len(imus) * (ENGINE.many + np.log(samples)) + np.log(count)
+    log_p = log_chi_square(statistic, freedom) + tried
+    return Score(Candidate(CLOCK, imus), float(statistic), freedom, min(log_p, 0.0))
+
+
+def maybe_clock(search, cause, own: float) -> bool:
+    """Whether a clock, whose sawtooth has a third of its constant's power, is not ruled out.
+
+    ``own``: chi-square of the delay that was adopted as ``cause``.
+    """
+    score, information = delay_score(search.fit)
+    total = 0.0
+    for imu in cause.imus:
+        gain, clock = sawtooth(search.readings.time, score[:, imu], information[:, imu])
+        total += gain / wider(search.fit, search.given, imu, clock)
+    return bool(total > own / 6)
+
+
+def placebo_of_ages(search) -> tuple[float, float]:
+    """(nats that all IMUs' ages gain at once, nats with each one's given to the next).
+
+    What they have in common the motion takes up; 0 for a single clock, which has no other to go to.
+    """
+    fit, column = search.fit, search.columns.of(DELAY)[0]
+    along, through = fit.whitened[..., column], fit.through([column])[..., 0]
+    score, _ = delay_score(fit)
+    clocks = search.columns.model.split(np.asarray(fit.state.parameters))[CLOCK]
+    readings = search.readings
+    delay = -age_of(clocks.T, clock_turns(clocks.T, readings.time[:, None], readings.span))
+
+    def informed(values):
+        common = np.einsum("tkd,tk->td", through, values)
+        own = np.sum(along**2, axis=2) * values
+        return own - np.einsum("tkd,td->tk", through, common)
+
+    imus = list(search.clocks)
+    own, moved = np.zeros_like(delay), np.zeros_like(delay)
+    own[:, imus] = delay[:, imus]
+    moved[:, imus] = np.roll(delay[:, imus], 1, axis=1)
+    bare = score + informed(own)
+
+    def nats(values):
+        return float(np.sum(values * (bare - informed(values) / 2)))
+
+    return nats(own), nats(moved) if len(imus) > 1 else 0.0
 
 
 class Special(NamedTuple):
@@ -50,18 +149,12 @@ def scans(fit, given, effects, scores, taken=lambda effect: ()) -> list[Scanned]
     return found
 
 
-def scan_clocks(fit, given, imus, scores) -> list[Scanned]:
-    """Clocks, beyond the constant delays that were tested."""
-    delays = {s.candidate.imus: s.statistic for s in scores if s.candidate.effect == DELAY}
-    return clocks.scan_clocks(fit, given, imus, delays)
-
-
 def maybe_drift(search, cause, own) -> bool:
     """Whether a bias may change through the recording: not enough to be adopted, but likely.
 
     Or as likely grows from nothing.
     """
-    if warming.maybe_grown(search, cause):
+    if maybe_grown(search, cause):
         return True
     kind = EFFECTS[cause.effect].sensors
     tried = [Candidate(DRIFT, cause.imus, f"{kind} {form}") for form in ("linear", "cubic")]
@@ -85,11 +178,11 @@ def drift_check(search, cause) -> list[Check]:
 
 SPECIAL = {
     CLOCK: Special(
-        scan=scan_clocks, linear=False, maybe=clocks.maybe_clock, placebo=clocks.placebo_of_ages
+        scan=sawtooth_scan, linear=False, maybe=maybe_clock, placebo=placebo_of_ages
     ),
-    shifts.SHIFT: Special(scan=lambda fit, given, imus, _: shifts.scan_shifts(fit, given, imus),
-                          refine=shifts.refine_instants),
-    warming.WARM_UP: Special(scan=warming.scan_warming, maybe=warming.maybe_warming),
+    SHIFT: Special(scan=lambda fit, given, imus, _: scan_shifts(fit, given, imus),
+                          refine=refine_instants),
+    WARM_UP: Special(scan=scan_warming, maybe=maybe_warming),
     DRIFT: Special(maybe=maybe_drift, check=drift_check),
 }  # fmt: skip
 

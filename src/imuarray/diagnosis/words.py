@@ -5,11 +5,12 @@ The sentences of `diagnosis.json` and of its page alike.
 
 import numpy as np
 
-from imuarray.diagnosis.plain import Sizes, plain
-from imuarray.diagnosis.quantities import (
+from imuarray.diagnosis.plain import (
     NARROW,
+    Sizes,
     first_up,
     joined,
+    plain,
     plus_minus,
     probability,
     quantity,
@@ -20,8 +21,8 @@ from imuarray.diagnosis.quantities import (
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Cause, Search
 from imuarray.engine.fit import flat_parameters
+from imuarray.model.array_model import component, unit_of
 from imuarray.model.effects import known_effect
-from imuarray.model.names import component, unit_of
 
 FEW = 3  # parameters that are stated one by one
 

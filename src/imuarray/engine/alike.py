@@ -8,8 +8,8 @@ from imuarray.engine.fit import Fit, flat_parameters, prior_means, scaled_solve
 from imuarray.engine.parameters import Columns, prior_precision
 from imuarray.engine.settings import SETTINGS
 from imuarray.linear import scaled_inverse
+from imuarray.model.array_model import unit_of
 from imuarray.model.effects import EFFECTS
-from imuarray.model.names import unit_of
 
 
 def sized_groups(columns: Columns) -> np.ndarray:

@@ -6,6 +6,7 @@ import numpy as np
 
 from imuarray.engine.readings import Readings
 from imuarray.model.effects import Prediction
+from imuarray.motion.state import lever
 
 
 def derivatives(readings: Readings, motion, positions) -> tuple:
@@ -15,11 +16,7 @@ def derivatives(readings: Readings, motion, positions) -> tuple:
     residual's; the ideal readings are those of the papers' model.
     """
     rate, turn, force = motion[:, :3], motion[:, 3:6], motion[:, 6:9]
-    ideal = (
-        np.cross(rate[:, None], np.cross(rate[:, None], positions))
-        + np.cross(turn[:, None], positions)
-        + force[:, None]
-    )
+    ideal = lever(rate[:, None], turn[:, None], positions) + force[:, None]
 
     def along(values, order):
         return polynomial_derivative(readings.time, readings.run, values, readings.window, order)

@@ -25,9 +25,8 @@ from imuarray.engine.fit import (
 )
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import Columns, prior_precision
-from imuarray.engine.passes import Pass, normal_pass
 from imuarray.engine.readings import Readings
-from imuarray.engine.robust import MEDIAN, distances, freedoms, judged
+from imuarray.engine.robust import MEDIAN, Pass, distances, freedoms, judged, normal_pass
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import is_smooth, start
 from imuarray.model.effects import EFFECTS

@@ -23,7 +23,7 @@ from imuarray.engine.linearise import (
 from imuarray.engine.parameters import POSITION, Columns, columns_of, prior_precision
 from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS
-from imuarray.engine.turning import turned
+from imuarray.engine.start import turned
 from imuarray.linear import scaled_eigh
 
 

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.engine import turning
 from imuarray.engine.derivatives import no_derivatives
 from imuarray.engine.fit import flat_parameters, pick, with_derivatives
 from imuarray.engine.linearise import (
@@ -25,6 +24,7 @@ from imuarray.engine.parameters import Columns, columns_of
 from imuarray.engine.readings import Readings, by_imu, measured
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import is_smooth, start
+from imuarray.engine.start import turned as with_slope
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.estimation.motion_ml import MotionEstimate, motion_at, motion_from
 from imuarray.geometry.array import positions_of, require_planar_extent
@@ -160,7 +160,7 @@ def _of_two(readings: Readings, model: ArrayModel, positions, effects, covarianc
         state = state._replace(motion=found.motion)
     whole = [np.full((samples, *values.shape[1:]), np.nan) for values in (found.motion, found.cost)]
     # the parameters' share: the prior's mean moves with them
-    spreads = covariances(part, model, turning.turned(part, state, follows=True), covariance)
+    spreads = covariances(part, model, with_slope(part, state, follows=True), covariance)
     both = [np.full((samples, 9, 9), np.nan) for _ in spreads]
     steps, converged = np.zeros(samples, int), np.zeros(samples, bool)
     for target, values in zip(

@@ -10,15 +10,14 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import chdtrc
 
-from imuarray.engine.clock_scan import CLOCK
-from imuarray.engine.clocks import refined, shown_clocks, timed, with_clocks
+from imuarray.engine.clocks import CLOCK, refined, shown_clocks, timed, with_clocks
 from imuarray.engine.estimate import Estimate, Recorded, estimate, places_of, tested
 from imuarray.engine.fit import flat_parameters, from_flat
 from imuarray.engine.heldout import gain_of
 from imuarray.engine.parameters import POSITION, Columns, columns_of
 from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS
-from imuarray.engine.turning import turned
+from imuarray.engine.start import turned
 from imuarray.engine.widths import (
     DRIFT,
     FIXED,

@@ -4,16 +4,130 @@ A triad's three readings of a sample share one weight, (nu + 3) / (nu + d^2) at 
 d^2: normal noise keeps weights near one, a reading far out loses its say.
 """
 
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
+
 import numpy as np
 from scipy.special import gammaln
 
-from imuarray.engine.passes import Pass
+from imuarray.engine.fit import normal
+from imuarray.engine.heldout import blocks_of
+from imuarray.engine.linearise import (
+    CHUNK,
+    KNOWN,
+    THREADS,
+    State,
+    chunk_at,
+    directions_of,
+    motion_step,
+)
+from imuarray.engine.parameters import Columns
 from imuarray.engine.readings import Readings
+from imuarray.estimation.threads import one_thread
 
+LEAST_FREE = 1e-3  # of a reading's variance that the motion leaves, or its size says nothing
 FREEDOMS = np.array([3.0, 4.0, 6.0, 10.0, 20.0, 50.0, np.inf])
 ROUNDS = 20  # of the scale that goes with each of them
 LEAST = 1e-4  # of the declared noise
 MEDIAN = 2.37  # of chi-square of three readings
+
+
+class Pass(NamedTuple):
+    """What a recording says of n parameters (N, m) bool, in blocks of time; whitened units."""
+
+    information: np.ndarray  # (B, n, n)
+    score: np.ndarray  # (B, n)
+    motion: np.ndarray  # (T, D), improved
+    misfit: float  # squared residuals, the motion's prior included
+    taken: float  # of them what the motion's last step took out
+    squares: np.ndarray  # (T, N, 2) squared residuals of each triad
+    freedom: np.ndarray  # (T, N, 2) their expectation where noise is as assumed
+    unit: np.ndarray  # (T, N, 2) the same squares, each reading's of unit expectation
+    rough: np.ndarray  # (2, G) of what rough motion adds: squares in prior sds, and how many it saw
+
+
+@one_thread()  # the chunks have one each
+def normal_pass(
+    readings: Readings, columns: Columns, state: State, active, improved: int = 1
+) -> Pass:
+    """The normal equations at a state, after ``improved`` Gauss-Newton steps of the motion.
+
+    Where that is none, the motion takes the step that they are linearised for: half the work, and
+    as good where it is small.
+
+    LinAlgError where the readings do not determine the motion.
+    """
+    samples, count = readings.values.shape[:2]
+    wanted = np.flatnonzero(active.any(axis=0))
+    directions = directions_of(columns, wanted)
+    few = active[:, wanted]
+    blocks = blocks_of(samples)
+    motion = state.motion.copy()
+    squares, freedom, unit = (np.empty((samples, count, 2)) for _ in range(3))
+
+    def one(start):
+        part = slice(start, min(start + CHUNK, samples))
+        here = state._replace(motion=motion)
+        for _ in range(improved):
+            motion[part] += motion_step(readings, columns, here, start)[: samples - start]
+        seen = chunk_at(readings, columns, here, directions, start)
+        used = part.stop - part.start
+        residual, leverage = seen.residual[:used], _leverage(seen.basis[:used], count)
+        left = np.where(readings.keep[part], 1.0 - leverage, 0.0)
+        squares[part], freedom[part] = by_triad(residual**2), by_triad(left)
+        unit[part] = by_triad(residual**2 / np.maximum(1.0 - leverage, LEAST_FREE))
+        if not improved:
+            step = np.swapaxes(seen.inverse[:used], 1, 2) @ seen.taken[:used, :, None]
+            motion[part] += step[..., 0]
+        rough = _seen_of_prior(here, motion[part], seen.inverse[:used], part)
+        known = [(block, *normal(seen, few, rows)) for block, rows in _inside(blocks, part)]
+        taken = float(np.sum(seen.taken[:used] ** 2))
+        return known, float(np.sum(seen.misfit[:used])), taken, rough
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        found = list(pool.map(one, range(0, samples, CHUNK)))
+    size = int(active.sum())
+    information, score = np.zeros((len(blocks), size, size)), np.zeros((len(blocks), size))
+    for block, inner, slope in (item for known, *_ in found for item in known):
+        # in order, whichever thread was first
+        information[block] += inner
+        score[block] += slope
+    misfit, taken, rough = (sum(f[part] for f in found) for part in (1, 2, 3))
+    return Pass(information, score, motion, misfit, taken, squares, freedom, unit, rough)
+
+
+def _seen_of_prior(state: State, motion, inverse, part) -> np.ndarray:
+    """(2, G) sums over a part's samples and each three components that rough motion adds.
+
+    Squares of their distance from the prior's mean in its sds; and of how many of them the readings
+    tell more than the prior does (1 less the posterior's share of its variance).
+    """
+    if state.rough_prior is None:
+        return np.zeros((2, 0))
+    sd = state.rough_prior.sd[part]
+    off = (motion[:, KNOWN:] - state.rough_prior.mean[part]) / sd
+    left = np.sum(inverse[..., KNOWN:] ** 2, axis=1) / sd**2
+    return np.array([np.sum(off**2, axis=0), np.sum(1.0 - left, axis=0)]).reshape(2, -1, 3).sum(-1)
+
+
+def _inside(blocks, part: slice) -> list[tuple[int, slice]]:
+    """(number, its rows of a chunk) of each block that meets the chunk."""
+    found = []
+    for number, block in enumerate(blocks):
+        first, last = max(block.start, part.start), min(block.stop, part.stop)
+        if first < last:
+            found.append((number, slice(first - part.start, last - part.start)))
+    return found
+
+
+def _leverage(basis, count) -> np.ndarray:
+    """Share of each reading's variance that the motion takes up, (T, N, 6)."""
+    return np.einsum("tij,tij->ti", basis, basis).reshape(len(basis), count, 6)
+
+
+def by_triad(values) -> np.ndarray:
+    """(T, N, 2) sums over the axes of (T, N, 6)."""
+    return values.reshape(*values.shape[:2], 2, 3).sum(axis=-1)
 
 
 def judged(readings: Readings, seen: Pass, owned, former: np.ndarray) -> Readings:
@@ -24,7 +138,7 @@ def judged(readings: Readings, seen: Pass, owned, former: np.ndarray) -> Reading
     """
     free = seen.freedom.sum(axis=0)
     free = np.maximum(free - owned, 0.1 * free)
-    number = readings.keep.reshape(*readings.keep.shape[:2], 2, 3).sum(axis=-1)
+    number = by_triad(readings.keep)
     trust = 1.0 if readings.trust is None else readings.trust
     squares, distance = seen.squares / trust**2, distances(readings, seen)
     ratio, weight, least = np.ones_like(free), np.ones_like(distance), least_ratio(readings)
@@ -59,7 +173,7 @@ def distances(readings: Readings, seen: Pass) -> np.ndarray:
 
 def freedoms(readings: Readings, seen: Pass) -> np.ndarray:
     """Degrees of freedom (2,) that make the triads' distances likeliest, of each kind of sensor."""
-    number = readings.keep.reshape(*readings.keep.shape[:2], 2, 3).sum(axis=-1)
+    number = by_triad(readings.keep)
     found, far = np.full(2, np.inf), distances(readings, seen)
     told = np.median(far, axis=0) / MEDIAN > least_ratio(readings)
     for kind in range(2):

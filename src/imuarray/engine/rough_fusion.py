@@ -1,6 +1,6 @@
 """Each sample's motion under a recording's own estimate, what rough motion adds beside it.
 
-What `known_board` has fitted to samples off the rails (noise and its tails, clocks, the size of
+What `analysis.known` has fitted to samples off the rails (noise and its tails, clocks, the size of
 what rough motion adds) holds for those at a rail, too.
 """
 
@@ -12,18 +12,16 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import expit
 
-from imuarray.engine.clock_phases import with_phases
-from imuarray.engine.clock_scan import CLOCK
-from imuarray.engine.clocks import clocks_in
+from imuarray.engine.clocks import CLOCK, clocks_in
 from imuarray.engine.derivatives import no_derivatives
 from imuarray.engine.estimate import Estimate, Recorded
 from imuarray.engine.fit import with_derivatives, with_free_gyroscopes, with_rough_prior
 from imuarray.engine.fusion import covariances, descend, fuse, one_sided
+from imuarray.engine.gyroscope_clocks import with_phases
 from imuarray.engine.linearise import CHUNK, State, chunk_at, predicted
 from imuarray.engine.parameters import Columns
-from imuarray.engine.passes import normal_pass
 from imuarray.engine.readings import Readings
-from imuarray.engine.robust import distances
+from imuarray.engine.robust import by_triad, distances, normal_pass
 from imuarray.engine.settings import SETTINGS
 from imuarray.model import ArrayModel
 from imuarray.model.jax64 import jax
@@ -92,7 +90,7 @@ class Rough(NamedTuple):
 
         ``least``: degrees of freedom, if the estimate has fewer.
         """
-        readings, number = self.readings, _by_triad(self.readings.keep)
+        readings, number = self.readings, by_triad(self.readings.keep)
         distance, trust = distances(readings, seen), np.ones(number.shape)
         for kind, nu in enumerate(np.maximum(self.freedoms, least)):
             if not np.isfinite(nu):
@@ -203,8 +201,3 @@ def _timed(readings: Readings, state: State, one: Recorded, same, clocks) -> Rea
     other[..., :3] = False
     found = with_phases(readings.without(other), state._replace(motion=motion), clocks)
     return replace(readings, wander=found.wander)
-
-
-def _by_triad(values) -> np.ndarray:
-    """(T, N, 2) sums over the axes of (T, N, 6)."""
-    return values.reshape(*values.shape[:2], 2, 3).sum(axis=-1)

@@ -62,7 +62,7 @@ class Settings:
     # Held-out time (`heldout`)
     blocks: int = 10  # blocks of time that are held out in turn
 
-    # Clocks by what a delay would gain (`clock_scan`)
+    # Clocks by what a delay would gain (`clocks`)
     sawtooth: float = -10.0  # log p of a sawtooth beyond a constant delay
     many: float = 2.6  # log of the independent sawtooths per sample, from simulated white scores
     fair: float = 0.05  # of the constant delay's chi-square that a sawtooth must add

@@ -1,15 +1,91 @@
-"""Where a fit begins: nominal positions, no effects, the motion that the readings say."""
+"""Where a fit begins: no effects, the motion as read, omega_dot from the rate's change too.
+
+On a small array the gyroscopes know omega_dot far better than the accelerometers do; two
+accelerometers leave it open about the line that joins them.
+"""
 
 import numpy as np
 
-from imuarray.engine.derivatives import no_derivatives, polynomial_derivative
-from imuarray.engine.linearise import State
+from imuarray.engine.derivatives import no_derivatives, polynomial_derivative, polynomial_taps
+from imuarray.engine.linearise import State, TurningPrior
 from imuarray.engine.parameters import Columns
 from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS
-from imuarray.engine.turning import turned
 from imuarray.errors import InputError
 from imuarray.model.structure import design, products
+
+CLEAR = 10.0  # times the noise's power, from which a frequency is motion
+COHERENT = 0.3  # sds of what a prior's samples say of one factor common to them all
+
+
+def turned(readings: Readings, state: State, follows: bool = False) -> State:
+    """A state with the slope of its own rate as prior mean of omega_dot.
+
+    The slope is a local sextic's, a quartic's in runs too short for that. The prior's sd is the
+    gyroscopes' noise in it, and what a quartic leaves out, as the sextic shows it; in still shorter
+    runs all that is known is omega_dot's size. A polynomial makes fast motion too small in all
+    samples alike: the sd is so wide that this is no more than `COHERENT` of what they say together.
+    ``follows``: as `TurningPrior` has it.
+    """
+    rate, quartic = state.motion[:, :3], readings.window
+    sextic = 3 * quartic // 4 * 2 + 1
+    used = readings.keep[..., 3:] / np.square(readings.sd[:, 1])[:, None]
+    noise = 1.0 / np.sqrt(np.maximum(used.sum(axis=1), used.max(initial=0.0)))
+    short, spread = _slope(readings, rate, quartic, 4)
+    slope, other = _slope(readings, rate, sextic, 6)
+    long, left = other > 0, 0.0
+    if long.any():
+        padded = np.pad(_taps(readings, quartic, 4), (sextic - quartic) // 2)
+        both = np.sum((_taps(readings, sextic, 6) - padded) ** 2)  # noise of the difference
+        left = max(np.mean((slope - short)[long] ** 2 - both * noise[long] ** 2), 0.0)
+        short[long], spread[long] = slope[long], other[long]
+    sd = np.sqrt((spread[:, None] * noise) ** 2 + left)
+    known = spread > 0.0
+    together = np.sqrt(np.sum((short[known] / sd[known]) ** 2))
+    window, degree = (sextic, 6) if long.any() else (quartic, 4)
+    sd *= max(1.0, abs(gain_error(readings, rate, window, degree)) * together / COHERENT)
+    alone = spread == 0.0  # in runs that are too short: as large as elsewhere
+    sd[alone] = np.sqrt(np.mean(short[~alone] ** 2)) if not alone.all() else np.inf
+    return state._replace(turning=TurningPrior(short, sd, np.full(len(sd), follows)))
+
+
+def gain_error(readings: Readings, rate, window, degree) -> float:
+    """By how much of itself a local polynomial's slope of ``rate`` (T, 3) is too large, coherently.
+
+    From the rate's spectrum in the longest run, where it is above the gyroscopes' noise, and from
+    the polynomial's frequency response.
+    """
+    numbers, lengths = np.unique(readings.run, return_counts=True)
+    values = rate[readings.run == numbers[np.argmax(lengths)]]
+    if len(values) < window:
+        return 0.0
+    taper = np.hanning(len(values))[:, None]
+    power = np.sum(np.abs(np.fft.rfft(taper * (values - values.mean(axis=0)), axis=0)) ** 2, axis=1)
+    precision = np.sum(readings.keep[..., 3] / np.square(readings.sd[:, 1]), axis=1)
+    power[power < CLEAR * 3 * np.sum(taper**2) / np.median(precision)] = 0.0
+    turns = 2 * np.pi * np.fft.rfftfreq(len(values))  # rad a sample
+    places = np.arange(window) - window // 2
+    response = np.sin(np.outer(turns, places)) @ polynomial_taps(window, window // 2, 1, degree)
+    squares = power * turns**2
+    return float(np.sum(power * turns * (response - turns)) / max(np.sum(squares), 1e-300))
+
+
+def _taps(readings: Readings, window, degree, place=None) -> np.ndarray:
+    """(window,) weights that give the slope at a place, by default the middle; 1/s."""
+    place = window // 2 if place is None else place
+    return polynomial_taps(window, place, 1, degree) / np.median(np.diff(readings.time))
+
+
+def _slope(readings: Readings, rate, window, degree) -> tuple[np.ndarray, np.ndarray]:
+    """The rate's slope (T, 3), and how noise of one reading shows in it (T,), 1/s; 0 for none."""
+    slope = polynomial_derivative(readings.time, readings.run, rate, window, 1, degree)
+    sizes = [np.linalg.norm(_taps(readings, window, degree, place)) for place in range(window)]
+    first, count = np.unique(readings.run, return_index=True, return_counts=True)[1:]
+    begin, length = np.repeat(first, count), np.repeat(count, count)
+    place = np.arange(len(rate)) - begin
+    left, half = length - 1 - place, window // 2
+    place = np.where(place < half, place, np.where(left < half, window - 1 - left, half))
+    return slope, np.where(length < window, 0.0, np.array(sizes)[np.clip(place, 0, window - 1)])
 
 
 def start(readings: Readings, columns: Columns) -> State:

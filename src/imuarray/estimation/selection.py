@@ -11,7 +11,7 @@ from imuarray.geometry.array import require_planar_extent
 from imuarray.model import ArrayModel
 from imuarray.recording import Recording, array_of
 from imuarray.recording.channels import require_once
-from imuarray.recording.stored import few
+from imuarray.recording.record import few
 
 SLOWEST = np.radians(100.0)  # rad/s; slower samples say nearly nothing of the positions
 SHAKEN = 3.0  # m/s^2, sd; a board in a hand that does not turn it has less

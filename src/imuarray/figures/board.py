@@ -93,7 +93,7 @@ EXPERIMENT = (
 def table_experiment(located: list, names: list[str], summary: pd.DataFrame, group: str):
     """Table II of 2021 once more: positions from T samples under the papers' and the sensor model.
 
-    ``located``: `analysis.held_out.located` of the recordings ``names`` of the board ``group``;
+    ``located``: `analysis.known.located` of the recordings ``names`` of the board ``group``;
     ``summary``: `measured.agreement` under the papers' model.
     """
     assumed = summary.assumed.astype(str)
@@ -137,7 +137,7 @@ PAST_RAIL = (
 
 
 def table_past_rail(tables: list[pd.DataFrame], names: list[str], group: str):
-    """Readings past a made-up rail by the board of the others; `analysis.held_out` of each."""
+    """Readings past a made-up rail by the others' board; `analysis.known.past_rail` of each."""
     parts = [
         table[table.model == "board"].assign(recording=name)
         for name, table in zip(names, tables, strict=True)
@@ -162,7 +162,7 @@ LEFT_OUT = (
 
 
 def table_left_out(tables: list[pd.DataFrame], names: list[str], group: str):
-    """What each recording gains by the others' board; `analysis.held_out.predicted` of each."""
+    """What each recording gains by the others' board; `analysis.known.predicted` of each."""
     rows = []
     for name, table in zip(names, tables, strict=True):
         by = table.set_index("model")

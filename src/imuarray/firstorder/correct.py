@@ -8,11 +8,17 @@ import xarray as xr
 from scipy.linalg import block_diag
 
 from imuarray.errors import InputError, require_one_of
-from imuarray.firstorder.allan import averaged_sd, lag_correlation, reading_sd
 from imuarray.firstorder.gyroscopes import Gyroscopes, Still, calibrate_gyroscopes
 from imuarray.firstorder.outliers import fit_triads
 from imuarray.firstorder.pose_noise import walked_mean
-from imuarray.firstorder.still import SHORTEST, still_poses, usual_step
+from imuarray.firstorder.still import (
+    SHORTEST,
+    averaged_sd,
+    lag_correlation,
+    reading_sd,
+    still_poses,
+    usual_step,
+)
 from imuarray.firstorder.triads import TriadFit
 from imuarray.firstorder.turns import nearest_orthogonal, shared_turn
 from imuarray.model.effects import KINDS

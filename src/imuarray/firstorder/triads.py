@@ -14,9 +14,8 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from imuarray.errors import IdentifiabilityError
-from imuarray.firstorder.parts import parts_sd_of
 from imuarray.firstorder.pose_noise import PoseNoise
-from imuarray.firstorder.turns import procrustes, require_rotations
+from imuarray.firstorder.turns import parts_sd_of, procrustes, require_rotations
 from imuarray.model.jax64 import jax, jnp
 
 UPPER = np.triu_indices(3)

@@ -15,7 +15,7 @@ from imuarray.measured.positions import LIMIT
 from imuarray.model import ArrayModel
 from imuarray.motion import Motion
 from imuarray.recording import Recording, array_of
-from imuarray.simulation.measure import clip, measure
+from imuarray.simulation.recordings import clip, measure
 
 # The shape of the picture, not the positions' last micrometre, is wanted.
 TOLERANCE = 0.05

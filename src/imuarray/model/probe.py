@@ -78,7 +78,7 @@ def _shape(item: Effect) -> tuple[int, ...]:
             f" {ACCELEROMETERS} accelerometers and {GYROSCOPES} gyroscopes"
         )
         raise _wrong(item, expected, shape)
-    # as `names.unit_of` takes them: commas count along the last axis, bars along the second
+    # as `unit_of` takes them: commas count along the last axis, bars along the second
     units, axis = item.unit.split("|"), 1
     if "|" not in item.unit:
         units, axis = item.unit.split(","), -1

@@ -18,8 +18,7 @@ from imuarray.engine.linearise import reading
 from imuarray.engine.readings import Readings
 from imuarray.errors import InputError
 from imuarray.model.effects import Prediction
-from imuarray.model.jax64 import jax, jnp
-from imuarray.model.small_linear import cholesky, log_determinant, solve_lower, solve_upper
+from imuarray.model.jax64 import cholesky, jax, jnp, log_determinant, solve_lower, solve_upper
 
 # Of noise and of the motion's prior; `posterior.marginal.scaled` has all but the last.
 SCALES = (

@@ -14,9 +14,10 @@ import numpy as np
 
 from imuarray.errors import InputError
 from imuarray.model import structure_tensor
-from imuarray.model.jax64 import jax, jnp
-from imuarray.model.small_linear import (
+from imuarray.model.jax64 import (
     cholesky,
+    jax,
+    jnp,
     log_determinant,
     solve_lower,
     solve_upper,

@@ -12,7 +12,7 @@ import xarray as xr
 
 from imuarray.errors import InputError
 from imuarray.provenance import is_damaged, write_netcdf_parts
-from imuarray.recording import stored as parts_of
+from imuarray.recording import record as parts_of
 from imuarray.recording import validate
 from imuarray.recording.record import (
     ALIGNMENT,
@@ -26,8 +26,8 @@ from imuarray.recording.record import (
     TEXTS,
     TRUTH,
     Recording,
+    Stored,
 )
-from imuarray.recording.stored import Stored
 from imuarray.recording.units import factor
 
 
@@ -81,7 +81,7 @@ def _labels(coordinate: xr.DataArray) -> tuple[str, ...]:
 def read_recording(path: str | Path, stored: bool = False) -> Recording:
     """Read and validate a recording; angular rates come out in rad/s.
 
-    With ``stored`` the readings of a long one stay in the file (`recording.stored`).
+    With ``stored`` the readings of a long one stay in the file (`Stored`).
 
     Raises InputError, with one line that says what was expected, what was found and where, if the
     file is missing, is not NetCDF-4 or is not a recording; raises IdentifiabilityError for fewer

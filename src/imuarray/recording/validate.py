@@ -21,6 +21,7 @@ from imuarray.recording.record import (
     DIMENSIONS,
     FLAGS,
     LABELS,
+    MAX_VALUES,
     MAY_BE_INFINITE,
     NUMBERS,
     OPTIONAL_NUMBERS,
@@ -28,8 +29,8 @@ from imuarray.recording.record import (
     SAMPLED,
     SI,
     Recording,
+    blocks,
 )
-from imuarray.recording.stored import MAX_VALUES, blocks
 
 # A file of a few bytes can declare far more than any memory or disk holds; deflate makes 1032 of 1.
 INFLATED = 1032

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis.quantities import (
+from imuarray.diagnosis.plain import (
     NARROW,
     joined,
     number,

@@ -11,19 +11,210 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from imuarray.estimation.informative import position_sds
+from imuarray.diagnosis.plain import Sizes, first_up, number, plainly, plus_minus, quantity
+from imuarray.diagnosis.words import split_name
+from imuarray.estimation.informative import position_sds, weakest_of
 from imuarray.firstorder.correct import FirstOrder
-from imuarray.firstorder.report import parameter_table
-from imuarray.firstorder.store import write_corrected
+from imuarray.firstorder.report import parameter_table, turned_lines, write_corrected
 from imuarray.model.effects import KINDS
 from imuarray.provenance import atomic_folder, trust, write_bytes, write_csv, write_netcdf
 from imuarray.recording import Recording, write_recording
-from imuarray.report import board_words as said
 from imuarray.report import pictures as pictured
-from imuarray.report.excitation import shown
 from imuarray.report.page import CAPTIONS, Drawing, beside, rendered, saved
+from imuarray.report.pictures import levelled, missing, shown
 
+SLOW = np.radians(300.0)  # rad/s rms, of motion that says little of positions
+MISFIT = 1.5  # times the noise: a residual that is looked into
+SHAKEN = 1.2  # times the smooth samples' residual: that of all is clearly above
+NOTHING = " Nothing speaks against them."
 SURE = 1.96  # sds: 95 %
+
+
+def verdict(board: Board) -> str:
+    """How good, in a sentence."""
+    sds = position_sds(board.calibration)[1:]
+    rms, worst = (size_in_words(size) for size in (np.sqrt(np.mean(sds**2)), sds.max()))
+    count = board.calibration.sizes["accelerometer"]
+    good = "The positions" if not board.reasons else "If the answer could be trusted: positions"
+    verb = "are known" if not board.reasons else "known"
+    doubted = board.reasons or misfit(board.calibration) > MISFIT or turned(board)
+    return (
+        f"{good} of {count} IMUs {verb} to {rms} (rms of the standard deviations; the worst"
+        f" coordinate {worst})." + ("" if doubted else NOTHING)
+    )
+
+
+def turned(board: Board) -> list[str]:
+    """Sensors whose axes are not those declared."""
+    if isinstance(board.first_order, str):
+        return []
+    return [f"{first_up(line)}." for line in turned_lines(board.first_order, board.recording)]
+
+
+def frame(calibration: xr.Dataset) -> str:
+    """Whose axes positions are in, and what taking the board's edges for them would cost."""
+    far = float(np.linalg.norm(calibration["position"].to_numpy(), axis=1).max())
+    first = calibration["accelerometer"].to_numpy()[0]
+    return (
+        f"The axes are those of IMU {first}'s accelerometer (its z, then the plane of its y and z),"
+        f" not the board's edges: 0.1 degrees between them moves the IMU that is"
+        f" {size_in_words(far)} away by {size_in_words(far * np.radians(0.1))}."
+    )
+
+
+def size_in_words(size: float) -> str:
+    """A length (m) to two digits."""
+    return quantity(float(f"{size:.2g}"), None, "m")
+
+
+def facts(board: Board) -> str:
+    """The log in a line."""
+    time, calibration = board.recording.time, board.calibration
+    rate, count = 1 / np.median(np.diff(time)), len(board.recording.accelerometer_labels)
+    found = board.first_order
+    still, noise = "", "declared noise"
+    if not isinstance(found, str):  # whose noise the corrected recording declares
+        still, noise = f" {len(found.poses)} still poses;", "noise of the still poses"
+    return (
+        f"{len(time)} samples of {count} IMUs at {rate:.4g} Hz, {time[-1] - time[0]:.1f} s;"
+        f"{still} positions from {calibration.attrs['samples']} moving samples, whose"
+        f" residual is {misfit(calibration):.2f} times the {noise}{_shaken(calibration)}."
+    )
+
+
+def misfit(calibration: xr.Dataset) -> float:
+    """Residual over the declared noise, where motion is rough that of smooth samples."""
+    if "gyroscope_smooth_residual" not in calibration:
+        return float(calibration.attrs["residual_ratio"])
+    return max(float(np.median(calibration[f"{kind}_smooth_residual"])) for kind in KINDS)
+
+
+def _shaken(calibration: xr.Dataset) -> str:
+    whole = float(calibration.attrs["residual_ratio"])
+    if "gyroscope_smooth_residual" not in calibration or whole < SHAKEN * misfit(calibration):
+        return ""
+    return (
+        f" where the motion is smooth ({number(whole)} times over all: shocks are faster than the"
+        " samples)"
+    )
+
+
+def advice(board: Board, folder: Path = Path()) -> list[str]:
+    """What to do next, the most urgent first; ``folder``: where the files are.
+
+    The motion of an answer that is not to be trusted is no ground for advice.
+    """
+    corrected, found = folder / "recording.nc", folder / "cal.nc"
+    said = [f"Mend this first: {reason}" for reason in board.reasons[:1]]
+    if isinstance(board.first_order, str):
+        said.append(
+            "Record again with still poses: a dozen or more directions, ten seconds each, the"
+            " logger on while the board is turned from one to the next, then a minute of hard"
+            " twisting. Without them offsets, scales and axes of the sensors are taken as read."
+        )
+    if board.reasons or misfit(board.calibration) > MISFIT:
+        said.append(
+            "Check units, signs, which IMU is which and the drawing in columns.yaml; then let"
+            f" imuarray diagnose {corrected} --out diagnosis name what the model misses."
+        )
+    if board.reasons:
+        return said
+    return [
+        *said,
+        *_wanting(board),
+        f"Use it: imuarray apply {found} {corrected} --out motion.nc makes one sensor of the"
+        f" array, imuarray export {found} --format kalibr --out imu.yaml a file for other tools.",
+        "Record a second time and calibrate both (imuarray calibrate): what two recordings"
+        " agree on is what can be relied on.",
+    ]
+
+
+def _wanting(board: Board) -> list[str]:
+    """What a better recording would have, by the motion that was found."""
+    said, calibration = [], board.calibration
+    gyroscopes = None if isinstance(board.first_order, str) else board.first_order.gyroscopes
+    if gyroscopes and isinstance(gyroscopes.common, str):
+        said.append(
+            "Leave the logger on while the board is turned from pose to pose: the size of the"
+            " array is as uncertain as the gyroscopes' scale, which is not known"
+            f" ({gyroscopes.common})."
+        )
+    said += [f"Record what is missing: {item}." for item in missing(board.corrected, calibration)]
+    speed = np.sqrt(np.mean(np.sum(calibration["angular_rate"].to_numpy() ** 2, axis=1)))
+    if speed < SLOW:
+        said.append(
+            f"Twist it harder: {np.degrees(speed):.0f} deg/s (rms) is slow, aim for"
+            f" {np.degrees(SLOW):.0f}; what is said of the positions grows with the square of the"
+            " angular rate."
+        )
+    worst = weakest_of(calibration)[0]
+    if worst.sd > board.corrected.position_prior_sd:
+        said.append(f"Turn the board faster, and about all axes: {worst.words} is hardly known.")
+    if levelled(calibration):
+        said.append(
+            "More motion of this kind gains little: what first order leaves of the sensors' scales"
+            " limits the positions. More still poses, and moves between them, would help."
+        )
+    return said
+
+
+def weakest(calibration: xr.Dataset) -> str:
+    """What is known worst."""
+    worst = weakest_of(calibration)[0]
+    return f"{worst.words}, to {size_in_words(worst.sd)}"
+
+
+def causes(calibration: xr.Dataset) -> list[str]:
+    """What the sensors do beside measuring, from the calibration's own parameters."""
+    labels = [str(k) for k in calibration["accelerometer"].to_numpy()]
+    found: dict[str, dict] = {}
+    if "effect_parameter" in calibration:
+        columns = (
+            calibration[n].to_numpy() for n in ("parameter", "effect_parameter", "effect_sd")
+        )
+        for name, value, sd in zip(*columns, strict=True):
+            effect, part, _ = str(name).split(" ", 2)
+            found.setdefault(effect, {})[split_name(part, labels)] = value, sd
+    said = [
+        line for effect, part in found.items() for line in plainly(effect, Sizes.of(part, labels))
+    ]
+    return [f"{first_up(line)}." for line in said]
+
+
+def before(board: Board) -> list[str]:
+    """What first order found."""
+    if isinstance(board.first_order, str):
+        return [f"First order was left out: {board.first_order}."]
+    found, said = board.first_order, []
+    gyroscopes = found.gyroscopes
+    worst = 1e3 * float(np.max(found.triads.residual_rms))
+    said.append(
+        f"{len(found.poses)} still poses show gravity to {number(worst, 2)} mm/s² at the worst"
+        " accelerometer; a few mm/s² is what good poses leave. Gravity is taken as"
+        f" {found.gravity:.6g} m/s²: 0.1 % off, it makes the array 0.1 % off."
+    )
+    said += turned(board)
+    if gyroscopes is not None and not isinstance(gyroscopes.common, str):
+        common = gyroscopes.common
+        before_, after = (
+            number(np.degrees(x), 2) for x in (common.before, np.median(common.error))
+        )
+        scale = 1 / common.scale - 1
+        error = plus_minus(100 * abs(scale), 100 * common.scale_sd)
+        said.append(
+            f"{len(common.first)} moves carry gravity from pose to pose to {after} degrees"
+            f" ({before_} before the gyroscopes were calibrated); together the gyroscopes read"
+            f" {error} % too {'much' if scale > 0 else 'little'}."
+        )
+    return said
+
+
+def account(board: Board) -> list[str]:
+    """What became of the logs, as a page has it."""
+    return [
+        f"{line.replace('+-', '±').replace('^2', '²').replace(' -', ' −')}."
+        for line in board.account
+    ]
 
 
 class Board(NamedTuple):
@@ -59,12 +250,12 @@ def write_board(board: Board, folder: Path) -> None:
 def html(board: Board) -> str:
     """report.html, every text escaped."""
     return rendered(
-        "board.html.j2", board=board, verdict=said.verdict(board), facts=said.facts(board),
-        advice=said.advice(board), causes=said.causes(board.calibration),
+        "board.html.j2", board=board, verdict=verdict(board), facts=facts(board),
+        advice=advice(board), causes=causes(board.calibration),
         turned=turn_table(board), positions=position_table(board.calibration), sure=SURE,
         prior=board.corrected.position_prior_sd, noise=noises(board), figures=draw(board),
-        weakest=said.weakest(board.calibration), frame=said.frame(board.calibration),
-        before=said.before(board), account=said.account(board),
+        weakest=weakest(board.calibration), frame=frame(board.calibration),
+        before=before(board), account=account(board),
         first_order=None if isinstance(board.first_order, str)
         else parameter_table(board.first_order, board.recording),
     )  # fmt: skip

@@ -4,7 +4,7 @@ import matplotlib.ticker as ticks
 import numpy as np
 import pandas as pd
 
-from imuarray.diagnosis.quantities import power_of_ten
+from imuarray.diagnosis.plain import power_of_ten
 from imuarray.diagnosis.words import words
 from imuarray.figures.style import (
     BLACK,

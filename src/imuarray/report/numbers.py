@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 from scipy.special import ndtri
 
+from imuarray.diagnosis.adoption import separability
 from imuarray.diagnosis.noise import standardised
 from imuarray.diagnosis.replicates import TESTS
-from imuarray.diagnosis.separability import separability
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.model.effects import KINDS
 

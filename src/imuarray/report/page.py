@@ -10,7 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 import imuarray
-from imuarray.diagnosis.quantities import (
+from imuarray.diagnosis.plain import (
     fixed,
     number,
     plus_minus,

@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pandas as pd
 
-from imuarray.diagnosis.clocks import delay_score
-from imuarray.engine.clock_scan import age_of
+from imuarray.engine.clocks import age_of, delay_score
 from imuarray.engine.fit import Fit, flat_parameters
 from imuarray.engine.heldout import blocks_of
 from imuarray.engine.parameters import POSITION
 from imuarray.linear import scaled_inverse
+from imuarray.model.array_model import component
 from imuarray.model.effects import EFFECTS, KINDS
-from imuarray.model.names import component
 from imuarray.model.timing import clock_turns
 from imuarray.recording.record import AXES
 

@@ -1,4 +1,7 @@
-"""Drawings of a calibration and its recording, each into given axes: for pages and notebooks."""
+"""Drawings of a calibration and its recording, each into given axes: for pages and notebooks.
+
+And how a recording has excited its board: directions of still poses, axes of rotation.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +11,15 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Ellipse
 from matplotlib.ticker import LogLocator
 
+from imuarray.diagnosis.plain import fixed, joined, number
 from imuarray.estimation.informative import position_sds
 from imuarray.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILLION, look
 from imuarray.recording import Recording
 from imuarray.recording.channels import runs
-from imuarray.report.excitation import poses_of
 
+GAP = 80.0  # deg, from a pose, of a direction that is missed; six faces leave 55
+LITTLE = 0.1  # of the squared rate about an axis; a third is even
+NEAR = 25.0  # deg, within which a direction has an axis' name
 SURE = 1.96  # sds: 95 %
 ELLIPSE = 5.991  # the same in a plane, squared
 BINS = 1200  # of time, that a page can show
@@ -27,6 +33,77 @@ WORST = 3  # IMUs whose residuals have colours
 ROOM, SMALL = 0.16, 0.08  # of the board's extent: the largest departure, an ellipse's half axis
 
 
+def poses_of(recording: Recording) -> np.ndarray:
+    """Where up was in each still pose, in the board's frame: unit vectors (P, 3)."""
+    if recording.stationary is None:
+        return np.zeros((0, 3))
+    force = np.median(recording.specific_force, axis=1)
+    means = [force[a:b].mean(axis=0) for a, b in runs(recording.stationary)]
+    ups = np.array(means).reshape(-1, 3)
+    return ups / np.linalg.norm(ups, axis=1, keepdims=True)
+
+
+def gap_of(poses) -> tuple[float, np.ndarray]:
+    """(deg, unit vector (3,)) of the direction farthest from all poses (P, 3)."""
+    tried = spiral(2000)
+    apart = np.degrees(np.arccos(np.clip(tried @ poses.T, -1, 1))).min(axis=1)
+    return float(apart.max()), tried[int(np.argmax(apart))]
+
+
+def spiral(count: int) -> np.ndarray:
+    """Directions spread evenly over the sphere, (count, 3)."""
+    z = 1 - (2 * np.arange(count) + 1) / count
+    angle = np.pi * (3 - np.sqrt(5)) * np.arange(count)
+    return np.stack([np.cos(angle), np.sin(angle), 0 * z], axis=1) * np.sqrt(1 - z**2)[:, None] + (
+        z[:, None] * np.array([0, 0, 1])
+    )
+
+
+def turning_of(calibration: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """Shares (3,) of the squared angular rate about its own axes (3, 3), the least first."""
+    rate = calibration["angular_rate"].to_numpy()
+    values, vectors = np.linalg.eigh(rate.T @ rate)
+    return values / values.sum(), vectors.T
+
+
+def missing(recording: Recording, calibration: xr.Dataset) -> list[str]:
+    """What has not been excited yet, in words; nothing where all has."""
+    said, poses = [], poses_of(recording)
+    if len(poses):
+        angle, where = gap_of(poses)
+        if angle > GAP:
+            components = ", ".join(fixed(value, 1) for value in where)
+            said.append(f"no still pose within {angle:.0f} degrees of ({components}) up")
+    shares, axes = turning_of(calibration)
+    if shares[0] < LITTLE:
+        share = number(100 * shares[0], 2)
+        said.append(f"hardly any turning about {direction(axes[0])}: {share} % of the squared rate")
+    return said
+
+
+def shown(recording: Recording, calibration: xr.Dataset) -> str:
+    """The same as a sentence of a caption."""
+    said = missing(recording, calibration)
+    if said:
+        return f"Not yet excited: {joined(said)}."
+    rate = calibration["angular_rate"].to_numpy() ** 2
+    parts = [f"{name} {100 * share:.0f} %" for name, share in
+             zip("xyz", rate.sum(axis=0) / rate.sum(), strict=True)]  # fmt: skip
+    turned = f"it was turned about all axes ({', '.join(parts)} of the squared rate)"
+    poses = poses_of(recording)
+    if not len(poses):
+        return f"There are no still poses; {turned}."
+    return f"No direction is more than {gap_of(poses)[0]:.0f} degrees from a still pose; {turned}."
+
+
+def direction(vector) -> str:
+    """'−z' of a unit vector near an axis, else its components."""
+    place = int(np.argmax(np.abs(vector)))
+    if np.degrees(np.arccos(min(abs(vector[place]), 1.0))) < NEAR:
+        return f"{'−' if vector[place] < 0 else '+'}{'xyz'[place]}"
+    return f"({', '.join(fixed(value, 1) for value in vector)})"
+
+
 def plain(text) -> str:
     """A recording's own text as matplotlib shows it: no mathematics in it."""
     return str(text).replace("$", r"\$")
@@ -38,10 +115,10 @@ def positions(calibration: xr.Dataset, axes: Axes) -> None:
     sds = position_sds(calibration)[1:]
     factor, unit = (1e3, "mm") if np.abs(moved).max() > 1e-3 else (1e6, "µm")
     places = np.arange(len(moved))
-    for number, name in enumerate("xyz"):
+    for which, name in enumerate("xyz"):
         axes.errorbar(
-            places + 0.2 * (number - 1), factor * moved[:, number], SURE * factor * sds[:, number],
-            label=name, **look(number, "linestyle") | {"linestyle": "none", "markersize": 3.5},
+            places + 0.2 * (which - 1), factor * moved[:, which], SURE * factor * sds[:, which],
+            label=name, **look(which, "linestyle") | {"linestyle": "none", "markersize": 3.5},
         )  # fmt: skip
     axes.axhline(0.0, color=GREY, linewidth=0.6)
     labels = [plain(label) for label in calibration["accelerometer"].to_numpy()]
@@ -136,10 +213,10 @@ def timeline(recording: Recording, calibration: xr.Dataset, axes: Axes) -> None:
     np.maximum.at(fastest, bins, speed)
     axes.plot((edges[1:] + edges[:-1]) / 2, fastest, color=BLACK, linewidth=0.7)
     top, names = float(fastest.max()), []
-    for number, (name, color, flags) in enumerate(_rows(recording, calibration)):
+    for which, (name, color, flags) in enumerate(_rows(recording, calibration)):
         shown = np.bincount(bins, flags, len(edges) - 1) > 0
         spans = [(edges[a], edges[b] - edges[a]) for a, b in runs(shown)]
-        place = -top * (0.1 + 0.11 * number)
+        place = -top * (0.1 + 0.11 * which)
         axes.broken_barh(spans, (place - 0.035 * top, 0.07 * top), color=color, linewidth=0)
         names.append((place, name if flags.any() else f"{name}: none"))
     step = round_factor(top / 2)
@@ -250,9 +327,9 @@ def residual_course(calibration: xr.Dataset, kind: str, axes: Axes) -> None:
     gaps = np.flatnonzero(steps > APART * np.median(steps)) + 1 if len(steps) else []
     time, rms = np.insert(time, gaps, np.nan), np.insert(rms, gaps, np.nan, axis=0)
     axes.plot(time, rms[:, others], color="0.75", linewidth=0.8)
-    for number, k in enumerate(worst):
+    for which, k in enumerate(worst):
         name = f"IMU {plain(labels[k])}"
-        style = look(number, "linestyle") | {"markersize": 2, "linewidth": 0.8}
+        style = look(which, "linestyle") | {"markersize": 2, "linewidth": 0.8}
         axes.plot(time, rms[:, k], label=name, **style)
     if len(others):
         axes.plot([], [], color="0.75", label="others")

@@ -21,9 +21,9 @@ from imuarray.report import drawings as drawn
 from imuarray.report import numbers, pictures
 from imuarray.report.answers import USUAL, answers, verdict
 from imuarray.report.drawings_model import ALIKE, cause_figure, position_figure, separability_figure
-from imuarray.report.excitation import shown
 from imuarray.report.page import CAPTIONS, Drawing, beside, files, rendered
 from imuarray.report.panels import cause_table
+from imuarray.report.pictures import shown
 
 if TYPE_CHECKING:
     from imuarray.diagnosis.document import Diagnosis

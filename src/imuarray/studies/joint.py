@@ -18,7 +18,7 @@ from imuarray.motion import normal_motion
 from imuarray.posterior.diagnostics import ess_of_mean
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.target import CompiledTarget, GaussianPrior
-from imuarray.simulation.measure import measure
+from imuarray.simulation.recordings import measure
 from imuarray.streams import stream
 from imuarray.studies.truths import misfit
 

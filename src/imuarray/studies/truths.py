@@ -12,7 +12,7 @@ from imuarray.model import ArrayModel
 from imuarray.motion import Motion, normal_motion, sphere_motion
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.target import GaussianPrior
-from imuarray.simulation.measure import measure
+from imuarray.simulation.recordings import measure
 from imuarray.streams import stream
 
 STARTS, GOOD = 50, 2.0  # of the search for a mode; mean square of residuals that ends it

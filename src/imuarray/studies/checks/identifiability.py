@@ -6,9 +6,9 @@ import pandas as pd
 from imuarray.estimation.bcd import calibrate_bcd
 from imuarray.estimation.motion_ml import estimate_motion
 from imuarray.motion import Motion, sphere_motion
-from imuarray.motion.random import directions
+from imuarray.motion.state import directions
 from imuarray.recording.units import GRAVITY
-from imuarray.simulation.measure import measure
+from imuarray.simulation.recordings import measure
 from imuarray.studies.checks.information import (
     NoiseLevels,
     joint_singular_values,

@@ -12,7 +12,7 @@ from imuarray.motion import normal_motion
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.rate_density import sample_covariance
 from imuarray.posterior.reference import draw_rates, log_likelihood, projection
-from imuarray.simulation.measure import measure
+from imuarray.simulation.recordings import measure
 
 TINY = np.array(
     [[0.0, 0.0, 0.0], [0.021, 0.002, -0.001], [-0.001, 0.019, 0.003], [0.017, 0.02, 0.002]]

@@ -8,7 +8,7 @@ import pandas as pd
 
 from imuarray.estimation.bcd import calibrate_bcd
 from imuarray.motion import sphere_motion
-from imuarray.simulation.measure import measure
+from imuarray.simulation.recordings import measure
 
 
 def _fastest(function, repeats: int) -> tuple[float, float]:
