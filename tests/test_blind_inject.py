@@ -10,20 +10,25 @@ from scipy.linalg import toeplitz
 from scipy.stats import multivariate_normal
 
 from imuarray.blind import cases as cases_module
-from imuarray.blind.added import ADDED, add, grade_added
-from imuarray.blind.cases import Case, make
+from imuarray.blind.cases import Case, make, matrix
 from imuarray.blind.change import draw_noise, finish, noiseless_readings, noisy_readings
 from imuarray.blind.inject import CATALOGUE, EFFECTS, GAUGE, OUTSIDE
-from imuarray.blind.matrix import matrix
-from imuarray.blind.measured import NOT_FROM_READINGS, inject_measured, measured_change
-from imuarray.blind.projection import below_rails, smallest_residual
+from imuarray.blind.measured import (
+    ADDED,
+    NOT_FROM_READINGS,
+    add,
+    grade_added,
+    inject_measured,
+    measured_change,
+)
 from imuarray.blind.scene import GYROSCOPE_RAIL, Pair, Scene
 from imuarray.blind.sizes import (
+    below_rails,
     draw_seeded,
-    is_of_noise,
     noise_divergence,
     scale_to,
     size_of,
+    smallest_residual,
 )
 from imuarray.estimation.reference import skew
 from imuarray.recording import Recording
@@ -500,7 +505,7 @@ def test_sizes_are_met_when_recomputed(name):
             if name not in NOISE_EFFECTS:
                 # minimised, not linear
                 assert size_of(again, change, 4) == pytest.approx(sigma, rel=0.05)
-            assert is_of_noise(change) == (name in NOISE_EFFECTS)
+            assert (change.divergence is not None) == (name in NOISE_EFFECTS)
 
 
 def test_effects_without_an_amplitude_or_a_size_say_so():
@@ -659,7 +664,7 @@ def test_measured_effects_are_those_of_the_scene_when_readings_are_exact():
     loud = inject_measured(exact, "gyroscope_noise", (3,), np.log(3.0), 5)
     added = (loud.angular_rate - exact.angular_rate)[:, 3]
     # sqrt(9 - 1) of the declared sd; 1500 values, 5 sd
-    expected = np.sqrt(8) * there.gyroscope_noise_sd
+    expected = np.sqrt(8) * there.noise[1]
     assert added.std() == pytest.approx(expected, rel=5 / np.sqrt(3000))
     smooth = CubicSpline(there.time, exact.angular_rate[:, 3])
     late = measured_change(exact, "gyroscope_delay", (3,), 1e-3, 5).parameters["delay"].value[0]

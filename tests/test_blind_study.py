@@ -9,10 +9,9 @@ import pandas as pd
 import pytest
 import yaml
 
-from imuarray.blind import criteria, grade, study, summary
-from imuarray.blind.cases import Case
+from imuarray.blind import criteria, study, summary
+from imuarray.blind.cases import Case, matrix
 from imuarray.blind.inject import CATALOGUE, EFFECTS
-from imuarray.blind.matrix import matrix
 from imuarray.figures import blind as drawing
 from imuarray.figures import blind_tables
 from imuarray.figures.style import write_figure
@@ -39,7 +38,7 @@ def model(error=1e-4, sd=1e-4, shift=0.0):
 
 
 def answer(causes=(), unexplained=False, gain=0.5):
-    keys = [f"{key}{end}" for key in grade.GAINS.values() for end in ("", "_se")]
+    keys = [f"{key}{end}" for key in study.GAINS.values() for end in ("", "_se")]
     return {
         "base": model(3e-4), "inflated": model(2e-4), "extended": model(), "causes": list(causes),
         "unexplained": unexplained, "remaining": [], "gain": dict(zip(keys, (gain, 0.1) * 2,
@@ -68,7 +67,7 @@ NUMBER = iter(range(10**6))
 def graded(kind, names, *given, size=20.0, seconds=20.0, **settings):
     """A row; ``given``: causes and unexplained, or "crash"."""
     crash = given == ("crash",)
-    return grade.grade(
+    return study.grade(
         {
             "case": f"{kind}-{next(NUMBER):04d}",
             "truth": truth_of(kind, names, size, **settings),
@@ -116,7 +115,7 @@ CLOCKLIKE = cause("sensor_clock", rivals=[DELAY])
 )
 def test_grades(kind, names, causes, unexplained, expected):
     row = graded(kind, names, causes, unexplained)
-    assert row["grade"] == expected and expected in grade.GRADES
+    assert row["grade"] == expected and expected in study.GRADES
     if kind in ("gauge", "outside", "struck"):
         assert row["confident"] == (expected == "confident")
     json.dumps(row, allow_nan=False)
@@ -150,12 +149,12 @@ def test_wrong_names_are_those_whose_class_has_nothing_of_the_truth():
 def test_accuracy_is_relative_to_the_first_triad():
     """Errors 1e-4 m: sds of 1e-4 / 1.96 cover just so."""
     sd = 1.001e-4 / 1.96
-    assert grade.accuracy(model(1e-4, sd), POSITIONS)["covered"] == 6
-    assert grade.accuracy(model(1e-4, 0.99 * sd), POSITIONS)["covered"] == 0
-    moved = grade.accuracy(model(1e-4, sd, shift=0.3), POSITIONS)
+    assert study.accuracy(model(1e-4, sd), POSITIONS)["covered"] == 6
+    assert study.accuracy(model(1e-4, 0.99 * sd), POSITIONS)["covered"] == 0
+    moved = study.accuracy(model(1e-4, sd, shift=0.3), POSITIONS)
     assert moved["coordinates"] == 6 and moved["position_rmse_m"] == pytest.approx(1e-4)
     with pytest.raises(ValueError, match="positions"):
-        grade.accuracy(model(), POSITIONS[:2])
+        study.accuracy(model(), POSITIONS[:2])
 
 
 def spy(document, seen):

@@ -22,10 +22,10 @@ from imuarray.config import model_from, read_config
 from imuarray.errors import InputError
 from imuarray.motion import normal_motion
 from imuarray.simulation.recordings import measure
-from imuarray.studies.checks import identifiability, marginalisation, proposal
-from imuarray.studies.checks.bound import bound_table
+from imuarray.studies.bound import bound_table
+from imuarray.studies.checks import identifiability, marginalisation
+from imuarray.studies.position_error import magnitudes
 from imuarray.studies.rate_error import accelerometers_only
-from imuarray.studies.settings2017 import magnitudes
 from tests.test_claims_measured import SETTINGS as MEASURED
 from tests.test_claims_measured import measured
 
@@ -142,7 +142,7 @@ def studies(settings):
         "unbiased": marginalisation.unbiased(rng, 1000),
         "effective_draws": marginalisation.effective_draws(rng, model, sds, 500, 3),
         "spread": marginalisation.spread_ratio(rng, model, sds, 20),
-        "theory": proposal.theory(), "random_walk": proposal.best_acceptance(rng, 20),
+        "theory": marginalisation.theory(), "random_walk": marginalisation.best_acceptance(rng, 20),
     }  # fmt: skip
     cases = [(n, *sizes) for n in (2, 1000)] + [(10, *sizes)]
     effect = {"method": "linearised", "shift_max_sd": 0.01, "shift_along_sd": 0.02}

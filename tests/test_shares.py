@@ -5,10 +5,9 @@ import pandas as pd
 import pytest
 
 from imuarray.config import read_config
-from imuarray.studies.batches import share
-from imuarray.studies.position_error import joined, realise
+from imuarray.studies.position_error import TABLES, joined, realise, study
 from imuarray.studies.sbc import pit_values
-from imuarray.studies.settings2017 import TABLES, study
+from imuarray.studies.truths import share
 from tests.test_bound import model
 from tests.test_validation import setting
 

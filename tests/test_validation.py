@@ -13,10 +13,11 @@ from imuarray.analysis.model import silent
 from imuarray.config import read_config
 from imuarray.estimation.newton import fisher_scoring
 from imuarray.figures import validation
+from imuarray.figures.validation import coverage
 from imuarray.geometry import positions_of, sub_array
 from imuarray.posterior.likelihood import Likelihood
-from imuarray.studies import by_default, joint, sbc, truths
-from imuarray.studies.sbc import METHODS, coverage
+from imuarray.studies import joint, sbc, truths
+from imuarray.studies.sbc import METHODS
 from imuarray.studies.truths import setting_from
 from tests.test_pipeline import ROOT
 
@@ -58,13 +59,13 @@ def test_widths_that_are_wrong_are_seen(monkeypatch, factor):
 
 def test_the_command_as_it_is_needs_neither_the_noise_nor_the_motions_size():
     """6 truths; told a quarter of the noise, its intervals are too narrow, and that is seen."""
-    values = by_default.pit_values(setting("default"), range(6), imuarray.sample)
+    values = sbc.pit_values_by_default(setting("default"), range(6), imuarray.sample)
     assert len(values) == 6 * 10
     row = coverage(values).iloc[0]
     assert row.p > 1e-3 and row.none == row.slow == 0
     assert np.all(np.abs(row[["shift_z", "width_z", "size_z"]].astype(float)) < 4)
     told = partial(imuarray.sample, model="papers", accelerometer_noise=0.01)
-    narrow = by_default.pit_values(setting("default"), range(6), told)
+    narrow = sbc.pit_values_by_default(setting("default"), range(6), told)
     assert coverage(narrow).width_z[0] > 3
 
 
@@ -179,7 +180,7 @@ def test_few_readings_that_lie_far_apart_are_not_taken_for_coarse_ones():
     """Fifty rates of 1000 deg/s lie 4 deg/s apart at least: the noise came out 20 times too large,
     and the posterior of gyroscopes' scales took NUTS a minute."""
     made = setting("extended", 50, 6)
-    recording = by_default.drawn(made, 2)[1]
+    recording = sbc.drawn(made, 2)[1]
     found = fitted([recording], "sensors", made.model.effects, silent)[0]
     sd = np.sqrt(made.model.noise.gyroscope[0, 0])
     np.testing.assert_allclose(found.noise_sd()[:, 1], sd, rtol=0.3)
@@ -187,7 +188,7 @@ def test_few_readings_that_lie_far_apart_are_not_taken_for_coarse_ones():
 
 def test_readings_in_steps_are_noise_of_a_step_at_least():
     made = setting("extended", 50, 6)
-    recording = by_default.drawn(made, 2)[1]
+    recording = sbc.drawn(made, 2)[1]
     recording = replace(recording, angular_rate=np.round(recording.angular_rate / 0.5) * 0.5)
     found = fitted([recording], "sensors", made.model.effects, silent)[0]
     assert (found.noise_sd()[:, 1] >= 0.99 * 0.5 / np.sqrt(12)).all()

@@ -3,7 +3,7 @@
 from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
-    from imuarray.blind.added import add
+    from imuarray.blind.measured import add
     from imuarray.provenance import stamp, write_json
     from imuarray.recording import read_recording, write_recording
 

@@ -5,7 +5,7 @@ from imuarray.pipeline.job import job
 with job(snakemake) as settings:
     from functools import partial
 
-    from imuarray.blind.matrix import matrix
+    from imuarray.blind.cases import matrix
     from imuarray.blind.study import batch_of, diagnosed
     from imuarray.diagnosis.document import diagnose
     from imuarray.provenance import stamp, write_json

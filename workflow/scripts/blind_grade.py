@@ -6,7 +6,7 @@ with job(snakemake) as settings:
     import json
     from pathlib import Path
 
-    from imuarray.blind.grade import GRADES, grade
+    from imuarray.blind.study import GRADES, grade
     from imuarray.blind.summary import recordings
     from imuarray.provenance import stamp, write_csv, write_json
 

@@ -6,7 +6,7 @@ with job(snakemake) as settings:
     from imuarray.config import model_from, motion_sds
     from imuarray.provenance import write_csv
     from imuarray.studies import bound
-    from imuarray.studies.settings2017 import magnitudes
+    from imuarray.studies.position_error import magnitudes
 
     cases = bound.rank_cases(
         model_from(settings), settings["seed"], magnitudes(settings["paper2017"]),

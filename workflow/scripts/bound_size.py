@@ -6,7 +6,7 @@ with job(snakemake) as settings:
     from imuarray.config import model_from
     from imuarray.provenance import write_csv
     from imuarray.studies import bound
-    from imuarray.studies.settings2017 import magnitudes
+    from imuarray.studies.position_error import magnitudes
 
     paper, theory, scale = settings["paper2017"], settings["theory"], settings["scale"]
     table = bound.against_size(

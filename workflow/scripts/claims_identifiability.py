@@ -9,7 +9,7 @@ with job(snakemake) as settings:
     from imuarray.provenance import stamp, write_csv, write_json
     from imuarray.streams import stream
     from imuarray.studies.checks import identifiability as checks
-    from imuarray.studies.settings2017 import magnitudes
+    from imuarray.studies.position_error import magnitudes
 
     model, paper, seed = model_from(settings), settings["paper2017"], settings["seed"]
     sizes, count = magnitudes(paper), settings["scale"]["realisations"]

@@ -8,7 +8,6 @@ with job(snakemake) as settings:
     from imuarray.recording import read_recording, read_truth
     from imuarray.streams import stream
     from imuarray.studies.checks import marginalisation as checks
-    from imuarray.studies.checks import proposal
 
     model, paper, seed = model_from(settings), settings["paper2021"], settings["seed"]
     sds = motion_sds(settings)
@@ -37,8 +36,8 @@ with job(snakemake) as settings:
         "unbiased": checks.unbiased(rng("unbiased"), count),
         "effective_draws": checks.effective_draws(rng("effective"), model, sds),
         "spread": checks.spread_ratio(rng("spread"), model, sds),
-        "theory": proposal.theory(),
-        "random_walk": proposal.best_acceptance(rng("walk"), model.array.parameters.size),
+        "theory": checks.theory(),
+        "random_walk": checks.best_acceptance(rng("walk"), model.array.parameters.size),
         "stamp": stamp(settings, seed),
     }
     write_json(found, snakemake.output[0])

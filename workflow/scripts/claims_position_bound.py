@@ -7,8 +7,8 @@ with job(snakemake) as settings:
 
     from imuarray.config import model_from
     from imuarray.provenance import write_csv
-    from imuarray.studies.checks.bound import bound_table
-    from imuarray.studies.settings2017 import magnitudes
+    from imuarray.studies.bound import bound_table
+    from imuarray.studies.position_error import magnitudes
 
     paper = settings["paper2017"]
     cases = [(samples, *magnitudes(paper)) for samples in paper["fig4_samples"]]

@@ -16,8 +16,8 @@ with job(snakemake) as settings:
     from imuarray.recording import read_recording, read_truth
     from imuarray.streams import stream
     from imuarray.studies.bayes import target_for
-    from imuarray.studies.checks import proposal, timing
-    from imuarray.studies.settings2017 import magnitudes
+    from imuarray.studies.checks import timing
+    from imuarray.studies.position_error import magnitudes
 
     seed, paper = settings["seed"], settings["paper2017"]
     longest = max(paper["fig4_samples"])
@@ -37,7 +37,7 @@ with job(snakemake) as settings:
     write_csv(pd.concat([costs, moves]), snakemake.output.timing)
     # the wide p(omega | y_g) of (30b) makes the variance really high
     sharp, wide = targets[samples], target_for(settings, read_recording(path), 1, spread=True)
-    table = proposal.acceptance_against_variance(
+    table = timing.acceptance_against_variance(
         {
             "tuned": sharp,
             "one draw": CompiledTarget(sharp.likelihood, sharp.prior, 1),

@@ -7,11 +7,8 @@ with job(snakemake) as settings:
 
     from imuarray.analysis.sampling import sample
     from imuarray.provenance import write_csv
-    from imuarray.studies import by_default
-    from imuarray.studies.batches import share
-    from imuarray.studies.pit import METHODS
-    from imuarray.studies.sbc import ML_MORE, pit_values
-    from imuarray.studies.truths import setting_from
+    from imuarray.studies.sbc import METHODS, ML_MORE, pit_values, pit_values_by_default
+    from imuarray.studies.truths import setting_from, share
 
     chosen = snakemake.wildcards
     setting = setting_from(settings, chosen.setting, int(chosen.samples))
@@ -20,7 +17,7 @@ with job(snakemake) as settings:
     asked = settings["validation"]["settings"][chosen.setting]
     few = share(range(count), *place)
     if asked.get("command", False):
-        table = by_default.pit_values(setting, few, sample, threads)
+        table = pit_values_by_default(setting, few, sample, threads)
     else:
         samplers = [method for method in METHODS if method != "ML"]
         many = share(range(ML_MORE * count), *place)

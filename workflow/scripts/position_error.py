@@ -6,8 +6,7 @@ with job(snakemake) as settings:
     import numpy as np
 
     from imuarray.provenance import write_csv
-    from imuarray.studies.position_error import Errors, joined
-    from imuarray.studies.settings2017 import TABLES, study
+    from imuarray.studies.position_error import TABLES, Errors, joined, study
 
     name = snakemake.wildcards.study
     cases, options = study(settings, name)

@@ -7,8 +7,7 @@ with job(snakemake) as settings:
 
     from imuarray.config import model_from
     from imuarray.provenance import atomic_write
-    from imuarray.studies.position_error import realise
-    from imuarray.studies.settings2017 import study
+    from imuarray.studies.position_error import realise, study
 
     cases, options = study(settings, snakemake.wildcards.study)
     errors = realise(

@@ -1,9 +1,10 @@
-"""A case by name, and the recording and the truth that a seed makes of it."""
+"""Cases by name, those that a scale asks for, and the recording and truth a seed makes of one."""
 
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 
 from imuarray.blind.change import Change, noisy_readings
-from imuarray.blind.inject import CATALOGUE, EFFECTS
+from imuarray.blind.inject import CATALOGUE, EFFECTS, GAUGE, OUTSIDE
 from imuarray.blind.scene import Scene
 from imuarray.blind.sizes import draw_seeded, scale_to, size_of
 from imuarray.recording import Recording
@@ -11,6 +12,28 @@ from imuarray.streams import stream
 
 KINDS = ("clean", "one", "pair", "gauge", "outside", "struck")
 EXACT_STEPS = 4  # Gauss-Newton steps behind `sigma_exact`
+SIZES = (4.0, 8.0, 12.0, 20.0, 50.0, None)
+OUTSIDE_SIZES = (20.0, 50.0)
+PAIR_SIZE, STRUCK_SIZE = 12.0, 20.0
+HOW_MANY = ("one", "all")
+
+# Repeats of each set: "one" per effect, size and number of IMUs; "gauge" per gauge; "outside" per
+# effect, size and number of IMUs; "struck" per effect and number of IMUs.
+REPEATS = {
+    "default": {"clean": 400, "one": 2, "pair": 120, "gauge": 4, "outside": 2, "struck": 1},
+    "paper": {"clean": 600, "one": 8, "pair": 800, "gauge": 20, "outside": 6, "struck": 4},
+}
+# The quick scale takes so many of the default one, evenly spread.
+QUICK = {"clean": 4, "one": 12, "pair": 4, "gauge": 3, "outside": 4, "struck": 3}
+
+# Settings and how often: the criteria are for 8 IMUs, 125 Hz, 24 s.
+SETTINGS = (
+    (0.68, {}),
+    (0.17, {"rails": True}),
+    (0.05, {"imus": 32, "duration": 8.0}),
+    (0.05, {"sampling_rate": 62.5, "duration": 8.0}),
+    (0.05, {"sampling_rate": 500.0, "duration": 8.0}),
+)
 
 
 @dataclass(frozen=True)
@@ -79,10 +102,10 @@ def make(case: Case, seed: int) -> tuple[Recording, dict]:
         accelerometer_position=scene.array.positions,
         accelerometer_labels=scene.array.labels,
         gyroscope_labels=scene.array.labels,
-        accelerometer_noise_sd=scene.accelerometer_noise_sd,
-        gyroscope_noise_sd=scene.gyroscope_noise_sd,
-        accelerometer_range=scene.accelerometer_range,
-        gyroscope_range=scene.gyroscope_range,
+        accelerometer_noise_sd=scene.noise[0],
+        gyroscope_noise_sd=scene.noise[1],
+        accelerometer_range=scene.limits[0],
+        gyroscope_range=scene.limits[1],
         position_prior_sd=scene.position_prior_sd,
         source="simulated",
         accelerometer_axes=scene.array.axes,
@@ -122,3 +145,75 @@ def _described(scene: Scene, change: Change) -> dict:
         "sigma": size_of(scene, change),
         "sigma_exact": size_of(scene, change, EXACT_STEPS),
     }
+
+
+def matrix(scale: str = "default") -> list[Case]:
+    """The cases of a scale, always the same: "quick" (30), "default" (1200), "paper" (4068).
+
+    Raises ValueError for another scale.
+    """
+    if scale not in ("quick", *REPEATS):
+        raise ValueError(f"scale: expected quick, default or paper, found {scale!r}")
+    repeats = REPEATS["default" if scale == "quick" else scale]
+    found = []
+    for kind, enumerated in _KINDS.items():
+        rng = stream(0, "blind", "matrix", kind)
+        plans = list(enumerated(repeats[kind], rng))
+        cases = [_case(kind, number, *plan, rng) for number, plan in enumerate(plans)]
+        if scale == "quick":
+            count = QUICK[kind]
+            cases = [cases[(2 * i + 1) * len(cases) // (2 * count)] for i in range(count)]
+        found += cases
+    return found
+
+
+def _case(kind: str, number: int, names, wanted, sigma, rng) -> Case:
+    """One case; ```wanted``` says for each effect on how many IMUs: one, two or all."""
+    shares, settings = zip(*SETTINGS, strict=True)
+    setting = settings[rng.choice(len(settings), p=shares)]
+    if "saturation" in names and "all" in wanted:
+        # where every IMU has lost the samples at the declared rail, no such effect is small
+        setting = {name: value for name, value in setting.items() if name != "rails"}
+    imus = setting.get("imus", 8)
+    counts = {"one": 1, "two": 2, "all": imus}
+    effects = tuple(
+        (name, tuple(sorted(int(k) for k in rng.permutation(imus)[: counts[how]])))
+        for name, how in zip(names, wanted, strict=True)
+    )
+    level = "realistic" if sigma is None else f"{sigma:g}sigma"
+    words = [kind, f"{number:04d}", *("+".join(pair) for pair in zip(names, wanted, strict=True))]
+    label = "-".join(words + ([level] if names else []))
+    return Case(label, effects, sigma, kind=kind, **setting)
+
+
+def _single(names, sizes, without: int, wanted=HOW_MANY) -> Callable:
+    """Each effect alone at each size, on as many IMUs as is ``wanted``, by turns.
+
+    An effect without an amplitude to set comes ``without`` times instead.
+    """
+
+    def plans(repeats: int, rng) -> Iterator[tuple]:
+        for name in names:
+            for sigma in sizes if EFFECTS[name].scalable else (None,) * without:
+                for how in wanted:
+                    yield from (((name,), (how,), sigma) for _ in range(repeats))
+
+    return plans
+
+
+def _pair(repeats: int, rng) -> Iterator[tuple]:
+    names = [name for name in CATALOGUE if EFFECTS[name].scalable]
+    for _ in range(repeats):
+        chosen = tuple(names[k] for k in sorted(rng.permutation(len(names))[:2]))
+        wanted = tuple(rng.choice(["one", "two", "all"], 2, p=[0.55, 0.15, 0.3]).tolist())
+        yield chosen, wanted, PAIR_SIZE
+
+
+_KINDS = {
+    "clean": lambda repeats, rng: [((), (), None)] * repeats,
+    "one": _single(CATALOGUE, SIZES, 3),
+    "pair": _pair,
+    "gauge": _single(GAUGE, (), 1, ("all",)),
+    "outside": _single(OUTSIDE, OUTSIDE_SIZES, 2),
+    "struck": _single(CATALOGUE, (STRUCK_SIZE,), 1),
+}

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from imuarray.blind.cases import KINDS
-from imuarray.blind.matrix import PAIR_SIZE
+from imuarray.blind.cases import KINDS, PAIR_SIZE
 from imuarray.blind.summary import LARGE, REACHED, coverage_limits, share_limits
 
 COVERAGE = (0.92, 0.98)  # of 95 % intervals

@@ -1,7 +1,8 @@
-"""Effects of the catalogue on the sensors' mean: bias, scale, axes, curvature, place.
+"""Errors of the sensors' mean: bias, scale, axes, curvature, place; of all sensors; and unknown.
 
 u is the true specific force at a triad and w the true angular rate, at the sensor's own instants.
-The drawn entries have the sd ``size``; see `change.error_of` and `change.effect`.
+The drawn entries have the sd ``size``; see `change.error_of` and `change.effect`. For ``gauge_``
+effects, which all sensors share, the sensors asked for are ignored.
 """
 
 import numpy as np
@@ -18,9 +19,10 @@ from imuarray.blind.change import (
     kind_names,
     matrices,
     of_kinds,
+    spread,
     which_kinds,
 )
-from imuarray.blind.scene import ACCELEROMETER_RAIL, GYROSCOPE_RAIL
+from imuarray.blind.scene import ACCELEROMETER_RAIL, GYROSCOPE_RAIL, Pair
 
 DEGREE = float(np.radians(1.0))
 GRAVITY = 9.80665  # m/s^2
@@ -28,6 +30,7 @@ GRAVITY = 9.80665  # m/s^2
 DRIFTS = 0.1, 0.3 * DEGREE
 UNLIKE = 0.04  # of an axis' place in its chip, from one chip to the other: 15 of 360 um
 WARMING = 0.05, 0.1 * DEGREE  # the same of a board that warms up
+COMMON = {"everywhere": True, "scalable": False}
 
 
 def _off_diagonal(rng, sensors, size) -> np.ndarray:
@@ -196,3 +199,117 @@ def position_shift(scene, rng, sensors, size):
         "parameters": said,
         "force_error": lambda field: np.where(later, field.lever(shift, sensors), 0.0),
     }
+
+
+def _signed(rng, sensors, size) -> float:
+    """One amplitude for all, of either sign."""
+    return size * float(rng.choice([-1.0, 1.0]))
+
+
+@error_of("rate", "scale", "1", 1e-3, 0.03, _signed, **COMMON)
+def gauge_gyroscope_scale(scale, field, sensors):
+    """(1 + c) w on all axes of all gyroscopes; the same as a dilation r / (1 + c)^2."""
+    return scale * field.rate
+
+
+@error_of("force", "scale", "1", 1e-3, 0.03, _signed, **COMMON)
+def gauge_accelerometer_scale(scale, field, sensors):
+    """(1 + c) u on all axes of all accelerometers; the same as a dilation (1 + c) r."""
+    return scale * field.force
+
+
+@effect("s", 1e-4, 5e-3, **COMMON)
+def gauge_sensor_delay(scene, rng, sensors, size):
+    """All IMUs sample at t + tau: another motion, as free as the first."""
+    delay = _signed(rng, sensors, size)
+    ages = spread(scene, sensors, delay)
+    return {"parameters": {"delay": Parameter(delay, "s")}, "ages": Pair(ages, ages)}
+
+
+@error_of(
+    "force", "bias", UNIT_FORCE, 0.01, 0.1,
+    lambda rng, sensors, size: size * rng.standard_normal(3), **COMMON,
+)  # fmt: skip
+def gauge_accelerometer_bias(bias, field, sensors):
+    """u + b, the same b on all triads: part of s."""
+    return bias
+
+
+@error_of(
+    "force", "lever_arm", "m", 1e-4, 1.5e-3,
+    lambda rng, sensors, size: size * rng.standard_normal((3, 3)), from_readings=False, **COMMON,
+)  # fmt: skip
+def gauge_lever_arm(arms, field, sensors):
+    """Axis i of every triad sits at r_k + d_i: one specific force for all, part of s."""
+    return apart(np.broadcast_to(arms, (len(sensors), 3, 3)), field, sensors)
+
+
+@error_of(
+    "force", "coefficient", "s4 m-2", 0.001 / ACCELEROMETER_RAIL**2, 0.01 / ACCELEROMETER_RAIL**2
+)  # fmt: skip
+def outside_cubic(coefficient, field, sensors):
+    """u_i + c_i u_i^3; size in (m/s^2)^-2."""
+    return coefficient * field.force[:, sensors] ** 3
+
+
+@error_of("force", "compliance", "s2", 1e-6, 3e-5, matrices, from_readings=False)
+def outside_flexible_board(compliance, field, sensors):
+    """The triad sits at r_k + K u_k, quasi-statically; size in metres per m/s^2."""
+    return field.lever(applied(compliance, field.force[:, sensors]), sensors)
+
+
+@error_of("force", "coefficient", "m s2", 1e-7, 3e-6, from_readings=False)
+def outside_vibration_rectification(coefficient, field, sensors):
+    """u + c |w'|^2; size in m/s^2 per (rad/s^2)^2."""
+    shaking = field.states.columns(sensors).acceleration
+    return coefficient * (shaking**2).sum(axis=-1, keepdims=True)
+
+
+@effect("m s-1", 1e-3, 0.05)
+def outside_cross_talk(scene, rng, sensors, size):
+    """A share of another IMU's gyroscope reading leaks into the accelerometer.
+
+    Leaked into a gyroscope it would be a scale error or a misalignment, as all gyroscopes measure
+    the same rate, and the catalogue holds those. size in m/s^2 per rad/s.
+    """
+    others = [int(rng.choice([j for j in range(scene.accelerometers) if j != k])) for k in sensors]
+    leak = matrices(rng, sensors, size)
+    said = {"leak": Parameter(leak, "m s-1"), "from": Parameter(others, "index")}
+    return {
+        "parameters": said,
+        "force_error": lambda field: applied(leak, field.rate[:, others]),
+    }
+
+
+@effect(UNIT_FORCE, 0.02, 0.3)
+def outside_hysteresis(scene, rng, sensors, size):
+    """u + h z, z a first-order lag behind the sign of du/dt; size in m/s^2."""
+    from scipy.signal import lfilter  # slow to import, and every run of Snakemake imports this
+
+    depth = entries(rng, sensors, size)
+    lag = float(np.exp(rng.uniform(np.log(0.02), np.log(0.1))))
+    keep = np.exp(-1 / (lag * scene.sampling_rate))
+
+    def error(field):
+        rising = np.sign(np.gradient(field.force[:, list(sensors)], axis=0))
+        return depth * lfilter([1 - keep], [1.0, -keep], rising, axis=0)
+
+    said = {"depth": Parameter(depth, UNIT_FORCE), "lag": Parameter(lag, "s")}
+    return {"parameters": said, "force_error": error}
+
+
+@effect("1", 1e-3, 0.03)
+def outside_scale_drift(scene, rng, sensors, size):
+    """(1 + c_i t / T) on accelerometers, gyroscopes or both; size at the end."""
+    kinds = which_kinds(rng)
+    past = scene.time - scene.time[0]
+    shape = (past / past[-1])[:, None, None]
+    parts = {"parameters": {}}
+    for what, chosen in zip(("force", "rate"), kinds, strict=True):
+        end = entries(rng, sensors, size)
+        if chosen:
+            parts["parameters"][f"{what}_scale_at_end"] = Parameter(end, "1")
+            parts[f"{what}_error"] = lambda field, end=end, what=what: (
+                end * shape * getattr(field, what)[:, list(sensors)]
+            )
+    return parts

@@ -1,8 +1,8 @@
-"""An effect added to a measured recording, from its readings alone."""
+"""An effect added to a measured recording, from its readings alone, and is it found?"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -10,13 +10,21 @@ from scipy.interpolate import CubicSpline
 
 from imuarray.blind.change import Change, Pair, with_errors
 from imuarray.blind.inject import EFFECTS
+from imuarray.blind.study import classes
 from imuarray.recording import Recording
 from imuarray.streams import stream
 
 NOT_FROM_READINGS = tuple(name for name, entry in EFFECTS.items() if not entry.from_readings)
+# Effects that a good board does not have already; each of the largest realistic size.
+ADDED = (
+    "accelerometer_bias",
+    "accelerometer_nonlinearity",
+    "gyroscope_g_sensitivity",
+    "stale_samples",
+    "axis_swap",
+)
 
 
-@dataclass(frozen=True, eq=False)
 class MeasuredScene:
     """A recording in the place of a `Scene`: its readings stand for the true quantities.
 
@@ -26,37 +34,21 @@ class MeasuredScene:
     time : ndarray (T,), seconds
     noise, limits : tuple of two floats
         Declared noise and ranges of accelerometers (m/s^2) and gyroscopes (rad/s).
+    duration : float, seconds from the first sample to the last
+    sampling_rate : float, Hz, of the usual step
+    accelerometers : int, number of IMUs
     """
 
-    readings: Pair
-    time: np.ndarray
-    noise: tuple[float, float]
-    limits: tuple[float, float]
     measured = True  # noise can be added, not taken away
 
-    @classmethod
-    def of(cls, recording: Recording) -> MeasuredScene:
-        """A recording as a scene."""
-        return cls(
-            Pair(recording.specific_force, recording.angular_rate), recording.time,
-            (recording.accelerometer_noise_sd, recording.gyroscope_noise_sd),
-            (recording.accelerometer_range, recording.gyroscope_range),
-        )  # fmt: skip
-
-    @property
-    def duration(self) -> float:
-        """Seconds from the first sample to the last."""
-        return float(self.time[-1] - self.time[0])
-
-    @property
-    def sampling_rate(self) -> float:
-        """Hz, of the usual step."""
-        return float(1 / np.median(np.diff(self.time)))
-
-    @property
-    def accelerometers(self) -> int:
-        """Number of IMUs."""
-        return self.readings.force.shape[1]
+    def __init__(self, recording: Recording):
+        self.readings = Pair(recording.specific_force, recording.angular_rate)
+        self.time = recording.time
+        self.noise = recording.accelerometer_noise_sd, recording.gyroscope_noise_sd
+        self.limits = recording.accelerometer_range, recording.gyroscope_range
+        self.duration = float(self.time[-1] - self.time[0])
+        self.sampling_rate = float(1 / np.median(np.diff(self.time)))
+        self.accelerometers = self.readings.force.shape[1]
 
     def ideal(self) -> Pair:
         """The readings as they are."""
@@ -120,7 +112,7 @@ def measured_change(
             f"{recording.angular_rate.shape[1]} and {recording.specific_force.shape[1]}"
         )
     rng = stream(seed, "blind", "measured", effect)
-    return EFFECTS[effect].draw(MeasuredScene.of(recording), rng, sensors, amplitude)
+    return EFFECTS[effect].draw(MeasuredScene(recording), rng, sensors, amplitude)
 
 
 def inject_measured(
@@ -133,7 +125,7 @@ def inject_measured(
     `measured_change`.
     """
     change = measured_change(recording, effect, sensors, amplitude, seed)
-    scene = MeasuredScene.of(recording)
+    scene = MeasuredScene(recording)
     readings = _with_noise(scene, change, with_errors(scene.field(change.ages), [change]), seed)
     flags = Pair(recording.saturated_accelerometers(), recording.saturated_gyroscopes())
     found = [
@@ -177,3 +169,48 @@ def _rebuilt(recording: Recording, readings: Pair, flags: Pair) -> Recording:
         if getattr(recording, name) is not None:
             parts[name] = flag
     return replace(recording, **parts)
+
+
+def add(recording: Recording, effect: str, seed: int) -> tuple[Recording, dict]:
+    """The recording with the effect on one IMU, and the truth as plain JSON.
+
+    ValueError as `inject_measured` raises it.
+    """
+    count = recording.specific_force.shape[1]
+    imu = int(stream(seed, "blind", "added", effect).integers(count))
+    size = float(EFFECTS[effect].high)
+    change = measured_change(recording, effect, (imu,), size, seed)
+    changed = inject_measured(recording, effect, (imu,), size, seed)
+    label = recording.accelerometer_labels[imu]
+    truth = {"effect": effect, "sensor": label, **change.described()}
+    return changed, truth
+
+
+def grade_added(truth: dict, before: dict, after: dict) -> dict:
+    """Is it named after, not before, and on its sensor? Both are `diagnosis.json`.
+
+    ``others``: names that came with it and hold nothing of the truth.
+    """
+    effect, sensor = truth["effect"], truth["sensor"]
+    named = classes(after["causes"])
+    mine = [
+        cause for cause in after["causes"]
+        if effect in (cause["effect"], *cause["indistinguishable_from"])
+    ]  # fmt: skip
+    sensors = sorted({name for cause in mine for name in cause["sensors"]})
+    earlier = classes(before["causes"])
+    return {
+        "effect": effect,
+        "sensor": sensor,
+        "amplitude": truth["amplitude"]["value"],
+        "unit": truth["amplitude"]["unit"],
+        "there_before": effect in earlier,
+        "found": bool(mine),
+        "named": any(cause["effect"] == effect for cause in mine),
+        "sensors": " ".join(sensors),
+        "sensor_right": sensors == [sensor],
+        "gain_nats": sum(cause["heldout_gain_nats"] for cause in mine),
+        "others": " ".join(
+            name for name, members in named.items() if name not in earlier and effect not in members
+        ),
+    }

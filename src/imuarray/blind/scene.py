@@ -76,8 +76,9 @@ class Scene:
     motion : SmoothMotion
     positions : ndarray (A, 3), metres
         True, relative to the reference triad; row 0 is zero.
-    accelerometer_noise_sd, gyroscope_noise_sd : float, m/s^2 and rad/s
-    accelerometer_range, gyroscope_range : float, m/s^2 and rad/s, may be infinite
+    noise, limits : tuple of two floats
+        Declared noise and ranges of accelerometers (m/s^2) and gyroscopes (rad/s); ranges may be
+        infinite.
     position_prior_sd : float, metres
     """
 
@@ -86,10 +87,8 @@ class Scene:
     duration: float
     motion: SmoothMotion
     positions: np.ndarray
-    accelerometer_noise_sd: float = 0.04
-    gyroscope_noise_sd: float = float(np.radians(0.06))
-    accelerometer_range: float = np.inf
-    gyroscope_range: float = np.inf
+    limits: tuple[float, float]
+    noise: tuple[float, float] = (0.04, float(np.radians(0.06)))
     position_prior_sd: float = 3e-3
     measured = False  # a class attribute: see `measured.MeasuredScene`
 
@@ -109,14 +108,11 @@ class Scene:
         array = replace(array, axes=axes)
         error = POSITION_ERROR_SD * rng.standard_normal((imus, 3))
         error[0] = 0.0
-        limits = {"accelerometer_range": ACCELEROMETER_RAIL, "gyroscope_range": GYROSCOPE_RAIL}
+        limits = (ACCELEROMETER_RAIL, GYROSCOPE_RAIL) if rails else (np.inf, np.inf)
         motion = _draw_motion(
             rng, np.arange(round(duration * sampling_rate)) / sampling_rate, rails
         )
-        return cls(
-            array, sampling_rate, duration, motion, array.relative + error,
-            **(limits if rails else {}),
-        )  # fmt: skip
+        return cls(array, sampling_rate, duration, motion, array.relative + error, limits)
 
     @cached_property
     def time(self) -> np.ndarray:
@@ -127,16 +123,6 @@ class Scene:
     def accelerometers(self) -> int:
         """Number A of accelerometer triads, and of gyroscope triads."""
         return len(self.positions)
-
-    @property
-    def noise(self) -> tuple[float, float]:
-        """Declared noise of accelerometers (m/s^2) and gyroscopes (rad/s)."""
-        return self.accelerometer_noise_sd, self.gyroscope_noise_sd
-
-    @property
-    def limits(self) -> tuple[float, float]:
-        """Declared ranges of accelerometers (m/s^2) and gyroscopes (rad/s)."""
-        return self.accelerometer_range, self.gyroscope_range
 
     def _states_at(self, time: np.ndarray) -> list[np.ndarray]:
         """w, w', s at ``time`` (T,), each (T, 3)."""

@@ -7,10 +7,9 @@ import pandas as pd
 from scipy.stats import binomtest
 from scipy.stats import t as student
 
-from imuarray.blind.cases import KINDS
-from imuarray.blind.grade import GAINS, MODELS
+from imuarray.blind.cases import KINDS, SIZES
 from imuarray.blind.inject import EFFECTS
-from imuarray.blind.matrix import SIZES
+from imuarray.blind.study import GAINS, MODELS
 
 NOTHING, UNEXPLAINED, CRASH = "nothing", "unexplained", "crash"
 ALL = "all effects"

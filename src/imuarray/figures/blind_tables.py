@@ -3,8 +3,8 @@
 import pandas as pd
 
 from imuarray.blind import summary
-from imuarray.blind.added import grade_added
 from imuarray.blind.criteria import criteria
+from imuarray.blind.measured import grade_added
 from imuarray.figures.tables import Column, scale_line
 
 YES_NO = {True: "yes", False: "no"}

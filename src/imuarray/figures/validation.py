@@ -8,10 +8,13 @@ from scipy import stats
 
 from imuarray.figures.style import BLACK, PAGE, SKY, look, new_figure, styled
 from imuarray.figures.tables import Column, scale_line
-from imuarray.studies.sbc import WHOLE, coverage
 
 BINS = 20
 ACROSS = 4  # panels in a line
+SHARES = (0.5, 0.9, 0.95)
+REFERENCE = "NUTS"  # whose PIT values the others' are compared with, replicate by replicate
+MIXED = 50  # independent draws of a posterior, of 199: fewer are a slow chain
+WHOLE = ("size", "misfit")  # quantities that hang on all coordinates
 
 COVERAGE = (
     Column("setting", "setting", "setting"),
@@ -61,6 +64,58 @@ JOINT_NOTE = (
     " against the prior's, of the misfit against the independent ones', in Monte Carlo standard"
     " errors; p: of the largest, times the number of comparisons."
 )
+
+
+def coverage(table: pd.DataFrame) -> pd.DataFrame:
+    """How often central intervals hold the truth, and whether PIT values are uniform.
+
+    A row for each setting, method and T: ``covered_50`` and so on of the coordinates with standard
+    errors over replicates (coordinates of one replicate are not independent); ``shift_z`` and
+    ``width_z``, the mean normal score and the mean squared one less 1 over all coordinates of a
+    replicate, ``size_z`` and ``misfit_z``, the mean scores of those, in standard errors; and
+    ``none``, replicates without intervals; ``slow``, chains with few independent draws; ``apart``,
+    how far from NUTS' a replicate's PIT values are at most (rms; 0.05 is their own noise); and
+    ``p``, the smallest Kolmogorov-Smirnov p-value of a quantity times their number.
+    """
+    rows = []
+    keys = ["setting", "method", "samples"]
+    for key, part in table.groupby(keys, sort=False):
+        grid = part.pivot(index="replicate", columns="quantity", values="pit")
+        grid = grid.dropna(axis="columns", how="all").dropna()
+        own = grid.drop(columns=[name for name in WHOLE if name in grid]).to_numpy()
+        mixed = part.groupby("replicate").independent.first()
+        row = dict(zip(keys, key, strict=True)) | {
+            "replicates": len(grid), "none": part.replicate.nunique() - len(grid),
+            "slow": int(np.sum(mixed < MIXED)), "apart": _apart(table, key),
+        }  # fmt: skip
+        for share in SHARES:
+            inside = (np.abs(own - 0.5) < share / 2).mean(axis=1)
+            row[f"covered_{100 * share:.0f}"] = inside.mean()
+            row[f"se_{100 * share:.0f}"] = inside.std(ddof=1) / np.sqrt(len(grid))
+        scores = stats.norm.ppf(own)
+        row |= {"shift_z": _mean_z(scores.mean(axis=1)),
+                "width_z": _mean_z(np.mean(scores**2, axis=1) - 1)}  # fmt: skip
+        for name in WHOLE:
+            row[f"{name}_z"] = _mean_z(stats.norm.ppf(grid[name])) if name in grid else np.nan
+        smallest = min(stats.kstest(grid[name], "uniform").pvalue for name in grid)
+        rows.append({**row, "p": min(1.0, smallest * grid.shape[1])})
+    return pd.DataFrame(rows)
+
+
+def _apart(table: pd.DataFrame, key) -> float:
+    """Largest rms difference of a replicate's coordinates' PIT values from `REFERENCE`'s."""
+    setting, method, samples = key
+    same = table[(table.setting == setting) & (table.samples == samples)]
+    same = same[~same.quantity.isin(WHOLE)]
+    places = ["replicate", "quantity"]
+    own, other = (same[same.method == name].set_index(places).pit for name in (method, REFERENCE))
+    square = ((own - other) ** 2).dropna().groupby("replicate").mean()
+    return float(np.sqrt(square.max())) if method != REFERENCE and len(square) else np.nan
+
+
+def _mean_z(scores) -> float:
+    """Mean of one score a replicate (R,) over its standard error."""
+    return float(np.mean(scores) / (np.std(scores, ddof=1) / np.sqrt(len(scores))))
 
 
 def table_validation_coverage(pit_values: list[pd.DataFrame], settings: dict):

@@ -80,7 +80,7 @@ class CoreBudget:
 
 def added_effects() -> tuple[str, ...]:
     """Effects that are added to measured recordings; slow to import, so only where asked for."""
-    from imuarray.blind.added import ADDED
+    from imuarray.blind.measured import ADDED
 
     return tuple(ADDED)
 

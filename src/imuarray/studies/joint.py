@@ -77,18 +77,15 @@ def started(target: CompiledTarget, theta, data: Round, rng) -> float:
     return target.prior.log_density(theta) + target.likelihood.on(positions, rates)
 
 
-def _walk(likelihood: Likelihood, model: ArrayModel, prior: GaussianPrior) -> CompiledTarget:
-    """The paper's."""
-    return CompiledTarget(likelihood, prior, DRAWS)
+def _target(name: str, likelihood: Likelihood, model: ArrayModel, prior) -> CompiledTarget:
+    """The paper's ("walk"); or with preconditioned proposals.
 
-
-def _preconditioned(likelihood, model, prior) -> CompiledTarget:
-    """Omega drawn around each integrand's mode, at positions that do not hang on theta."""
+    Omega is then drawn around each integrand's mode, at positions that do not hang on theta.
+    """
+    if name == "walk":
+        return CompiledTarget(likelihood, prior, DRAWS)
     centred = likelihood.centred(model.array.relative)
     return CompiledTarget(centred, prior, DRAWS, prior.mean, np.diag(prior.sd))
-
-
-TARGETS = {"walk": _walk, "pcn": _preconditioned}
 
 
 def pmmh_rounds(name: str, seed: int, rounds: int) -> Iterator[np.ndarray]:
@@ -99,7 +96,7 @@ def pmmh_rounds(name: str, seed: int, rounds: int) -> Iterator[np.ndarray]:
     theta = prior.mean + prior.sd * rng.standard_normal(prior.mean.size)
     for _ in range(rounds):
         data = simulated(model, theta, rng)
-        target = TARGETS[name](data.likelihood, model, prior)
+        target = _target(name, data.likelihood, model, prior)
         target.transitions(theta, started(target, theta, data, rng), step, count, rng)
         yield np.append(theta, misfit(data.likelihood, theta))
 

@@ -1,4 +1,4 @@
-"""RMSE of the calibrated positions: paper 2017, figures 4 and 5."""
+"""RMSE of the calibrated positions, and its settings: paper 2017, figures 4 and 5."""
 
 from typing import NamedTuple
 
@@ -9,25 +9,25 @@ from imuarray.estimation.bcd import block_descent
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.model import ArrayModel
 from imuarray.streams import stream
-from imuarray.studies.batches import batches, root_mean_square, run_batches, share
-from imuarray.studies.truths import realisations
+from imuarray.studies.truths import batches, realisations, root_mean_square, run_batches, share
 
 
-def calibrate_batch(model, rng, count, samples, motion, position_sd, rail, limit, tolerance, marks):
-    """ML-BCD on ``count`` realisations of ``samples`` samples.
+def calibrate_batch(model, rng, count, case, options):
+    """ML-BCD on ``count`` realisations of a `Case`; ``options`` as for `realise`.
 
     Returns mean squared position errors (count, marks) in m^2, iterations (count,) and the
     kernel's status (count,): 1 converged, 0 limit, negative not identifiable (NaN errors).
     """
-    made = realisations(model, rng, count, samples, motion, position_sd, rail)
+    given = options["position_sd"], options["rail"]
+    made = realisations(model, rng, count, case.samples, case.motion, *given)
+    marks = np.asarray(options["marks"], np.int64)
     squares = np.full((count, len(marks)), np.nan)
     iterations, status = np.zeros(count, int), np.zeros(count, int)
-    marks = np.asarray(marks, np.int64)
     for i in range(count):
         data = Collapsed.of(model, made.force[i], made.rate[i], made.saturated[i])
         positions = model.array.relative.copy()
         status[i], cost, _, snapshots = block_descent(
-            data.arrays, positions, tolerance, 0.0, limit, marks
+            data.arrays, positions, options["tolerance"], 0.0, max(options["marks"]), marks
         )
         iterations[i] = len(cost)
         if status[i] >= 0:
@@ -62,11 +62,7 @@ def realise(
     def of(case):
         def job(batch):
             number, size = batch
-            rng = stream(seed, *case.names, number)
-            return calibrate_batch(
-                model, rng, size, case.samples, case.motion, options["position_sd"],
-                options["rail"], max(options["marks"]), options["tolerance"], options["marks"],
-            )  # fmt: skip
+            return calibrate_batch(model, stream(seed, *case.names, number), size, case, options)
 
         mine = share(batches(options["realisations"]), part, parts)
         label = "/".join(map(str, case.names))
@@ -110,3 +106,54 @@ def against_motion(cases, errors: Errors, marks) -> pd.DataFrame:
     """Figure 5: RMSE for each case's |omega|, |omega_dot| and |s|."""
     last = Errors(errors.squares[..., -1:], errors.iterations, errors.status)
     return _table(cases, last, marks[-1:]).drop(columns=["not_identifiable", "median_iterations"])
+
+
+FORCES = (0.0, 1.0, 10.0, 100.0)  # m/s^2; section IV: |s| does not matter
+TABLES = {
+    "samples": against_samples,
+    "motion": against_motion,
+    "force": against_motion,
+}
+
+
+def magnitudes(paper: dict) -> tuple[float, float, float]:
+    """|omega| rad/s, |omega_dot| rad/s^2, |s| m/s^2 of figure 4."""
+    rate = np.radians(paper["angular_rate_dps"])
+    return rate, np.radians(paper["angular_acceleration_dps2"]), paper["specific_force"]
+
+
+def study(settings: dict, name: str) -> tuple[list[Case], dict]:
+    """Cases and options of the study: samples, motion or force.
+
+    Figure 4, figure 5, and figure 5's remark that the specific force does not matter.
+    """
+    paper = settings["paper2017"]
+    own = magnitudes(paper)
+    if name == "samples":
+        cases = [Case(("position", name, n), n, own) for n in paper["fig4_samples"]]
+        return cases, _options(settings, paper["fig4_iterations"])
+    if name == "motion":
+        marks = [paper["fig5_iterations"]]
+        motions = [
+            (np.radians(rate), np.radians(acceleration), own[2])
+            for acceleration in paper["fig5_accelerations_dps2"]
+            for rate in paper["fig5_rates_dps"]
+        ]
+    else:
+        marks, motions = [max(paper["fig4_iterations"])], [(*own[:2], force) for force in FORCES]
+    cases = [
+        Case(("position", name, number), paper["fig5_samples"], motion)
+        for number, motion in enumerate(motions)
+    ]
+    return cases, _options(settings, marks)
+
+
+def _options(settings: dict, marks) -> dict:
+    paper = settings["paper2017"]
+    return {
+        "realisations": settings["scale"]["realisations"],
+        "marks": sorted(marks),
+        "position_sd": paper["position_sd"],
+        "rail": np.radians(paper["gyroscope_range_dps"]),
+        "tolerance": paper["tolerance"],
+    }

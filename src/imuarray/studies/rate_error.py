@@ -6,8 +6,7 @@ import pandas as pd
 from imuarray.estimation.motion_ml import estimate_motion
 from imuarray.model import ArrayModel
 from imuarray.streams import stream
-from imuarray.studies.batches import batches, root_mean_square, run_batches
-from imuarray.studies.truths import realisations
+from imuarray.studies.truths import batches, realisations, root_mean_square, run_batches
 
 
 def square_errors(model, rng, count, motion, position_sd, rail, gyroscopes: bool = True):

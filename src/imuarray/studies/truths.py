@@ -1,8 +1,10 @@
-"""Truths drawn from their prior, what is measured of them, and where their posteriors are."""
+"""Truths drawn from their prior, what is measured of them, their posteriors; work in batches."""
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
+from tqdm import tqdm
 
 from imuarray.config import model_from, motion_sds
 from imuarray.errors import IdentifiabilityError
@@ -17,6 +19,7 @@ from imuarray.streams import stream
 
 STARTS, GOOD = 50, 2.0  # of the search for a mode; mean square of residuals that ends it
 SPARE = 2**40  # a replicate that no study counts: for pilots
+BATCH = 25  # realisations, a random stream for each batch: results hang on it
 
 
 class Realisations(NamedTuple):
@@ -113,14 +116,6 @@ def replicate(setting: Setting, number: int) -> Replicate:
     )  # fmt: skip
 
 
-def _descended(data, start, prior: GaussianPrior):
-    """The mode found from ``start`` (P,), or None where the search ran to positions all in line."""
-    try:
-        return fisher_scoring(data, positions_of(start), (prior.mean, np.diag(prior.sd**-2.0)))
-    except IdentifiabilityError:
-        return None
-
-
 def _without_prior(likelihood: Likelihood, start):
     """(most likely positions (P,), their covariance, converged); NaN where not determined."""
     try:
@@ -142,10 +137,40 @@ def _most_likely(setting: Setting, likelihood: Likelihood, rng):
     enough = GOOD * 3 * setting.model.array.accelerometers * setting.samples
     best, start = None, prior.mean
     for _ in range(STARTS):
-        found = _descended(data, start, prior)
-        if found is not None and (best is None or found.cost[-1] < best.cost[-1]):
-            best = found
+        try:
+            found = fisher_scoring(data, positions_of(start), (prior.mean, np.diag(prior.sd**-2.0)))
+            best = found if best is None or found.cost[-1] < best.cost[-1] else best
+        except IdentifiabilityError:
+            pass  # the search ran to positions all in line
         if best is not None and best.cost[-1] < enough:
             break
         start = prior.mean + prior.sd * rng.standard_normal(prior.mean.size)
     return best
+
+
+def run_batches(function, jobs, threads: int, quiet: bool, label: str) -> list:
+    """``function(job)`` for each job on ``threads`` threads, results in the jobs' order."""
+    with ThreadPoolExecutor(threads) as pool:
+        results = pool.map(function, jobs)
+        return list(tqdm(results, total=len(jobs), disable=quiet, desc=label, mininterval=15.0))
+
+
+def batches(realisations: int):
+    """(number, size) of each batch."""
+    full, rest = divmod(realisations, BATCH)
+    return [(i, BATCH) for i in range(full)] + ([(full, rest)] if rest else [])
+
+
+def share(jobs, part: int, parts: int) -> list:
+    """The jobs of one of ``parts`` neighbouring shares, as even as may be."""
+    jobs = list(jobs)
+    ends = [len(jobs) * number // parts for number in (part, part + 1)]
+    return jobs[slice(*ends)]
+
+
+def root_mean_square(squares) -> tuple[float, float]:
+    """RMSE and its Monte Carlo standard error from mean squared errors (realisations,)."""
+    squares = np.asarray(squares, float)
+    mean = squares.mean()
+    error = squares.std(ddof=1) / np.sqrt(squares.size) if squares.size > 1 else np.nan
+    return float(np.sqrt(mean)), float(error / (2 * np.sqrt(mean))) if mean > 0 else 0.0

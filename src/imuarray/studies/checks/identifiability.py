@@ -1,24 +1,63 @@
-"""What determines the positions and the motion: ranks, Lemma 1, invariances (paper 2017)."""
+"""What determines the positions and the motion: ranks, Lemma 1, invariances (paper 2017).
+
+The Fisher information is from the model's structure tensor alone.
+"""
 
 import numpy as np
 import pandas as pd
 
 from imuarray.estimation.bcd import calibrate_bcd
 from imuarray.estimation.motion_ml import estimate_motion
+from imuarray.model import structure_tensor
+from imuarray.model.structure import design, product_slopes, products
 from imuarray.motion import Motion, sphere_motion
 from imuarray.motion.state import directions
 from imuarray.recording.units import GRAVITY
 from imuarray.simulation.recordings import measure
-from imuarray.studies.checks.information import (
-    NoiseLevels,
-    joint_singular_values,
-    lever_matrices,
-    motion_jacobian,
-    numerical_rank,
-    state_of,
-)
 
-UNIT = NoiseLevels(1.0, 1.0)  # ranks do not depend on the noise; this keeps them well conditioned
+
+def lever_matrices(motion: Motion) -> np.ndarray:
+    """A_n = Omega(omega)^2 + Omega(omega_dot) of (8) in paper 2017, (T, 3, 3)."""
+    rate = np.asarray(motion.angular_rate)
+    state = np.hstack([products(rate), motion.angular_acceleration, motion.specific_force])
+    return np.einsum("ica,ta->tci", structure_tensor()[1:], state)
+
+
+def motion_jacobian(positions, rates) -> np.ndarray:
+    """Derivative of the stacked specific force in (omega, omega_dot, s), (T, 3A, 9)."""
+    whole, slopes = design(positions), product_slopes(rates)
+    linear = np.broadcast_to(whole[:, 6:], (len(rates), len(whole), 6))
+    return np.concatenate([whole[:, :6] @ slopes, linear], axis=2)
+
+
+def joint_singular_values(positions, motion: Motion) -> np.ndarray:
+    """Singular values of the derivative in theta with the motion projected out, decreasing.
+
+    Of unit noise: ranks do not depend on it, and this keeps them well conditioned.
+    """
+    rates = np.asarray(motion.angular_rate)
+    samples, count = len(rates), len(positions)
+    levers, force = lever_matrices(motion), motion_jacobian(positions, rates)
+    shared = np.zeros((samples, 3 * count + 3, 3 * (count - 1)))
+    moving = np.zeros((samples, 3 * count + 3, samples, 9))
+    for t in range(samples):
+        shared[t, 3 : 3 * count] = np.kron(np.eye(count - 1), levers[t])
+        moving[t, : 3 * count, t] = force[t]
+        moving[t, 3 * count :, t, :3] = np.eye(3)
+    shared = shared.reshape(-1, shared.shape[-1])
+    left, values, _ = np.linalg.svd(moving.reshape(len(shared), -1), full_matrices=False)
+    basis = left[:, values > 1e-12 * values[0]]
+    return np.linalg.svd(shared - basis @ (basis.T @ shared), compute_uv=False)
+
+
+def numerical_rank(values) -> int:
+    """How many of decreasing singular values exceed 1e-9 times the largest."""
+    return int(np.sum(values > 1e-9 * max(values[0], 1e-300)))
+
+
+def rank_of(matrix) -> int:
+    """Numerical rank of a matrix."""
+    return numerical_rank(np.linalg.svd(matrix, compute_uv=False))
 
 
 def lemma(rng, count: int) -> dict:
@@ -31,13 +70,10 @@ def lemma(rng, count: int) -> dict:
     free = 300 * rng.standard_normal((count, 3))
     nothing = np.zeros_like(rate)
     matrices = {
-        name: lever_matrices(state_of(Motion.of(rate, second, nothing)))
+        name: lever_matrices(Motion.of(rate, second, nothing))
         for name, second in (("parallel", factor * rate), ("free", free))
     }
-    ranks = {
-        name: [numerical_rank(np.linalg.svd(m, compute_uv=False)) for m in found]
-        for name, found in matrices.items()
-    }
+    ranks = {name: [rank_of(m) for m in found] for name, found in matrices.items()}
     area = np.sum(np.cross(rate, free) ** 2, axis=1)
     size = np.linalg.norm(rate, axis=1)
     expected = np.stack([-(size**2) + 1j * factor[:, 0] * size, 0 * size], axis=1)
@@ -62,7 +98,7 @@ def ranks(rng, array, triads=(3, 4, 5, 6, 8), samples=(1, 2, 3, 4)) -> pd.DataFr
                 positions = array.relative / np.abs(array.relative).max()
             else:
                 positions = np.vstack([np.zeros(3), rng.standard_normal((count - 1, 3))])
-            values = joint_singular_values(positions, motion, UNIT)
+            values = joint_singular_values(positions, motion)
             rows.append(
                 {
                     "triads": count,
@@ -91,14 +127,13 @@ def motion_needs(rng) -> dict:
         force = motion_jacobian(positions, rate)[0]
         gyroscope = np.eye(3, 9)
         for label, rows in (("with gyroscope", np.vstack([force, gyroscope])), ("without", force)):
-            values = np.linalg.svd(rows, compute_uv=False)
-            found[f"{name}, {label}"] = numerical_rank(values)
+            found[f"{name}, {label}"] = rank_of(rows)
     mirrored = motion_jacobian(plane, rate)[0] - motion_jacobian(plane, -rate)[0]
     found["sign_blind"] = bool(np.allclose(mirrored[:, 3:], 0) and np.allclose(
-        state_of(Motion.of(rate, rate, rate))[:, :6], state_of(Motion.of(-rate, rate, rate))[:, :6]
+        products(rate), products(-rate)
     ))  # fmt: skip
-    found["rank without gyroscope at rest"] = numerical_rank(
-        np.linalg.svd(motion_jacobian(arrays["four in space"], 0 * rate)[0], compute_uv=False)
+    found["rank without gyroscope at rest"] = rank_of(
+        motion_jacobian(arrays["four in space"], 0 * rate)[0]
     )
     return found
 
@@ -114,11 +149,11 @@ def common_axis(rng, positions, samples: int = 20) -> dict:
     found = {"unknowns": 3 * (len(positions) - 1)}
     for name, axis in axes.items():
         motion = Motion.of(size[0] * axis, size[1] * axis, nothing)
-        found[name] = numerical_rank(joint_singular_values(positions, motion, UNIT))
-        stack = lever_matrices(state_of(motion)).reshape(-1, 3)  # of (9)
-        found[f"{name}, motion known"] = numerical_rank(np.linalg.svd(stack, compute_uv=False))
+        found[name] = numerical_rank(joint_singular_values(positions, motion))
+        stack = lever_matrices(motion).reshape(-1, 3)  # of (9)
+        found[f"{name}, motion known"] = rank_of(stack)
     still = Motion.of(nothing, nothing, rng.standard_normal((samples, 3)))
-    found["no rotation"] = numerical_rank(joint_singular_values(positions, still, UNIT))
+    found["no rotation"] = numerical_rank(joint_singular_values(positions, still))
     return found
 
 
@@ -126,7 +161,7 @@ def invariances(rng, model, motion_sizes) -> dict:
     """What must not matter: the origin, the translation, theta for the gyroscopes; (9) once."""
     positions, samples = model.array.relative, 10
     motion = sphere_motion(rng, (samples,), *motion_sizes)
-    levers = lever_matrices(state_of(motion))
+    levers = lever_matrices(motion)
     shift = rng.standard_normal(3)
     moved = motion._replace(specific_force=motion.specific_force - levers @ shift)
     before = model.predict_many(motion, positions)

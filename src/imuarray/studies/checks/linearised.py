@@ -11,35 +11,56 @@ from imuarray.geometry import positions_of
 from imuarray.model.structure import design
 from imuarray.motion import Motion
 from imuarray.posterior.likelihood import Likelihood
-from imuarray.studies.checks.information import NoiseLevels, position_information
+from imuarray.studies.checks.identifiability import lever_matrices, motion_jacobian
 
 
-def true_motion(truth) -> Motion:
-    """`Motion` from the truth group of a recording."""
-    return Motion.of(*(truth[name].to_numpy() for name in Motion._fields[:3]))
+def position_information(positions, motion: Motion, force_sd, rate_information, residual, offset):
+    """Information on theta with the motion eliminated, and the score, by Schur complements.
+
+    ``positions`` (A, 3) m relative to the reference; ``force_sd`` m/s^2 and the gyroscopes'
+    ``rate_information`` on omega (s^2/rad^2); ``residual`` (T, A, 3) m/s^2 measured minus
+    predicted and ``offset`` (T, 3) rad/s, gyroscopes' mean minus omega. Returns
+    (3 (A - 1), 3 (A - 1)) and (3 (A - 1),).
+    """
+    rates = np.asarray(motion.angular_rate)
+    samples, count = len(rates), len(positions)
+    levers = lever_matrices(motion)
+    force = motion_jacobian(positions, rates)
+    weight = force_sd**-2.0
+    own = weight * np.swapaxes(force, 1, 2) @ force
+    own[:, :3, :3] += rate_information * np.eye(3)
+    split = force.reshape(samples, count, 3, 9)[:, 1:]
+    cross = weight * np.einsum("tci,tkcx->tkix", levers, split).reshape(samples, -1, 9)
+    gain = np.linalg.solve(own, np.swapaxes(cross, 1, 2))
+    shared = weight * np.einsum("tci,tcj->ij", levers, levers)
+    information = np.kron(np.eye(count - 1), shared) - np.einsum("tpx,txq->pq", cross, gain)
+    pull = weight * np.einsum("tnx,tn->tx", force, residual.reshape(samples, -1))
+    pull[:, :3] += rate_information * offset
+    direct = weight * np.einsum("tci,tkc->ki", levers, residual[:, 1:]).ravel()
+    return information, direct - np.einsum("txp,tx->p", gain, pull)
 
 
 def linearise(recording, truth, model, accelerometer_sd, gyroscopes: int):
-    """Mean error (3 (A - 1),) m, covariance and likelihood information at the truth.
+    """Mean error (3 (A - 1),) m and covariance of the posterior linearised at the truth.
 
     ``accelerometer_sd`` is what the analysis assumes, ``gyroscopes`` the number whose average
     p(omega | y_g) stands for: (30b) is the covariance of one.
     """
-    motion = true_motion(truth)
+    motion = Motion.of(*(truth[name].to_numpy() for name in Motion._fields[:3]))
     positions = truth["position"].to_numpy()
-    noise = NoiseLevels(accelerometer_sd, gyroscopes / model.noise.gyroscope[0, 0])
+    noise = accelerometer_sd, gyroscopes / model.noise.gyroscope[0, 0]
     residual = recording.specific_force - model.predict_many(motion, positions).specific_force
     offset = recording.angular_rate.mean(axis=1) - motion.angular_rate
-    information, score = position_information(positions, motion, noise, residual, offset)
+    information, score = position_information(positions, motion, *noise, residual, offset)
     weight = recording.position_prior_sd**-2.0
     pull = weight * (recording.relative_positions() - positions)[1:].ravel()
     covariance = np.linalg.inv(information + weight * np.eye(len(information)))
-    return covariance @ (score + pull), covariance, information
+    return covariance @ (score + pull), covariance
 
 
 def coordinates(recording, truth, model, accelerometer_sd, gyroscopes, name) -> pd.DataFrame:
     """Per coordinate: truth, mean and sd (m) of the linearised posterior called ``name``."""
-    error, covariance, _ = linearise(recording, truth, model, accelerometer_sd, gyroscopes)
+    error, covariance = linearise(recording, truth, model, accelerometer_sd, gyroscopes)
     labels = recording.accelerometer_labels[1:]
     table = pd.DataFrame([(name, label, axis) for label in labels for axis in "xyz"],
                          columns=["name", "accelerometer", "axis"])  # fmt: skip
@@ -90,7 +111,7 @@ def determinant_effect(covariance, theta, samples: int, precision) -> dict:
 def determinant_by_sampling(recording, truth, model, rng, count=4000, draws=64) -> dict:
     """The same change by importance sampling of the exact posterior, for a small array."""
     gyroscopes, sd = model.array.gyroscopes, np.sqrt(model.noise.accelerometer[0, 0])
-    error, covariance, _ = linearise(recording, truth, model, sd, gyroscopes)
+    error, covariance = linearise(recording, truth, model, sd, gyroscopes)
     positions = truth["position"].to_numpy()
     centre, factor = positions[1:].ravel() + error, 1.3 * np.linalg.cholesky(covariance)
     prior = recording.relative_positions()[1:].ravel()

@@ -1,4 +1,7 @@
-"""Processor time, by the clock: not reproducible to the byte, for rough comparisons only."""
+"""Processor time, and what a noisy estimate costs in acceptance.
+
+Times are by the clock: not reproducible to the byte, for rough comparisons only.
+"""
 
 import time
 from functools import partial
@@ -7,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from imuarray.estimation.bcd import calibrate_bcd
+from imuarray.geometry import positions_of
 from imuarray.motion import sphere_motion
 from imuarray.simulation.recordings import measure
 
@@ -61,3 +65,33 @@ def transition_costs(targets, thetas, step, rng, count=50, repeats=3) -> pd.Data
 
         rows.append(_row("transition", samples, *_fastest(run, repeats), count))
     return pd.DataFrame(rows)
+
+
+def acceptance_against_variance(targets, theta, step, count, rng) -> list[dict]:
+    """Acceptance at one step length for each target, with its variance of log p-hat at ``theta``.
+
+    ``targets`` maps a label to a `CompiledTarget`. The error allows for accepted proposals
+    coming in clusters: it is taken from 20 blocks of the run.
+    """
+    rows, blocks = [], 20
+    for label, target in targets.items():
+        state = np.array(theta)
+        positions = positions_of(state)
+        logs = target.likelihood.realisations(positions, target.draws, 200, rng)
+        value = target.log_target(state, rng)
+        _, value = target.transitions(state, value, step, count // 2, rng)
+        shares = np.empty(blocks)
+        for block in range(blocks):
+            accepted, value = target.transitions(state, value, step, count // blocks, rng)
+            shares[block] = accepted / (count // blocks)
+        rows.append(
+            {
+                "target": label,
+                "draws": target.draws,
+                "log_variance": logs.var(ddof=1),
+                "acceptance": shares.mean(),
+                "transitions": blocks * (count // blocks),
+                "acceptance_se": shares.std(ddof=1) / np.sqrt(blocks),
+            }  # fmt: skip
+        )
+    return rows
