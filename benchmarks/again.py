@@ -20,7 +20,7 @@ from scipy import stats  # noqa: E402
 from written import publish  # noqa: E402
 
 from imuarray.config import read_config  # noqa: E402
-from imuarray.figures.validation import WHOLE  # noqa: E402
+from imuarray.figures.uncertainty import WHOLE  # noqa: E402
 from imuarray.studies.joint import independent, scores_of  # noqa: E402
 from imuarray.studies.sbc import pit_values  # noqa: E402
 from imuarray.studies.truths import setting_from  # noqa: E402

@@ -13,9 +13,7 @@ from imuarray.blind import criteria, study, summary
 from imuarray.blind.cases import Case, matrix
 from imuarray.blind.inject import CATALOGUE, EFFECTS
 from imuarray.figures import blind as drawing
-from imuarray.figures import blind_tables
-from imuarray.figures.style import write_figure
-from imuarray.figures.tables import write_table
+from imuarray.figures.style import write_figure, write_table
 from imuarray.pipeline.rules import effective
 
 ROOT = Path(__file__).parents[1]
@@ -376,12 +374,12 @@ def test_figures_and_tables(tmp_path):
     write_figure(draw, confusion, **paths)
     assert all(path.stat().st_size > 1000 for path in paths.values())
     paths = {kind: tmp_path / f"bars.{kind}" for kind in ("csv", "tex", "md")}
-    write_table(*blind_tables.table_blind_bars(given, settings), **paths)
+    write_table(*drawing.table_blind_bars(given, settings), **paths)
     lines = [line for line in paths["md"].read_text().splitlines() if line.startswith("|")]
-    assert {line.count("|") for line in lines} == {len(blind_tables.CRITERIA) + 1}
+    assert {line.count("|") for line in lines} == {len(drawing.CRITERIA) + 1}
     assert any("short by" in line for line in lines)
     paths["tex"].read_text().encode("latin-1")  # what LaTeX reads as it is
-    write_table(*blind_tables.table_blind_gain(given, settings), **paths)
+    write_table(*drawing.table_blind_gain(given, settings), **paths)
     assert len(pd.read_csv(paths["csv"])) == len(EFFECTS) + len(CATALOGUE) + 5
 
 

@@ -4,7 +4,6 @@ What a block may be, and how a page runs: `tests/doc_pages.py`.
 """
 
 import ast
-import inspect
 import re
 import shlex
 import subprocess
@@ -229,9 +228,7 @@ def test_the_api_has_every_public_name():
     named = anchors(DOCS / "api.md")
     public = {f"imuarray.{name}": getattr(imuarray, name) for name in imuarray.__all__}
     del public["imuarray.plots"]
-    for name, member in vars(plots).items():
-        if inspect.isfunction(member) and member.__module__ == plots.__name__ and name[0] != "_":
-            public[f"{plots.__name__}.{name}"] = member
+    public |= {f"{plots.__name__}.{name}": getattr(plots, name) for name in plots.__all__}
     for name, member in public.items():
         # from its home where a module of the same name stands in a static reader's way
         home = f"{getattr(member, '__module__', '')}.{name.rpartition('.')[2]}"

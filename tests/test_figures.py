@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from imuarray.figures import paper2017, paper2021, paper2021_array, paper2021_tables, tables
+from imuarray.figures import paper2017, paper2021, paper2021_array, paper2021_tables, style
 from imuarray.figures.gallery import caption, gallery, title
 from imuarray.figures.style import rounded, significant, write_figure
 from imuarray.geometry import mimu4444
@@ -312,8 +312,8 @@ def test_underside_lies_beneath_and_is_turned():
 
 
 def test_only_converged_chains_are_called_so():
-    assert "converged" not in " ".join(tables.chain_lines({5: verdict(), 50: verdict(50)}))
-    lines = tables.chain_lines({5: verdict(converged=True), 50: verdict(50)})
+    assert "converged" not in " ".join(style.chain_lines({5: verdict(), 50: verdict(50)}))
+    lines = style.chain_lines({5: verdict(converged=True), 50: verdict(50)})
     assert "converged: T = 5." in lines[-1] and "preliminary: T = 50." in lines[-1]
     assert "0.20/0.19" in lines[0] and "0.41 µm" in lines[0] and "R-hat 1.700" in lines[1]
 
@@ -357,7 +357,7 @@ def two_tables():
 def test_tables(tmp_path):
     for number, (table, columns, heading, lines) in enumerate(two_tables()):
         paths = {kind: tmp_path / f"{number}.{kind}" for kind in ("csv", "tex", "md")}
-        tables.write_table(table, columns, f"{heading}, 50 %", lines, **paths)
+        style.write_table(table, columns, f"{heading}, 50 %", lines, **paths)
         read = pd.read_csv(paths["csv"])
         pd.testing.assert_frame_equal(read, rounded(table), check_dtype=False, check_exact=True)
         rows = [line for line in paths["md"].read_text().splitlines() if line.startswith("|")]
@@ -374,8 +374,8 @@ def test_table2_compares_with_the_last_source():
     np.testing.assert_allclose(table.sd_median_m[:3], [2e-4, 2.2e-4, 2e-6])
     assert table.source[0] == "experiment (measured)"
     assert "IMUs: 2 (experiment" in lines[1] and "recording exp_1" in lines[0]
-    assert tables.unfinished(table, 1.05) == []
-    assert "3 of 3" in tables.unfinished(first, 1.05)[0]
+    assert style.unfinished(table, 1.05) == []
+    assert "3 of 3" in style.unfinished(first, 1.05)[0]
 
 
 def test_captions_and_gallery():

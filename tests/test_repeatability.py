@@ -5,13 +5,13 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from imuarray.diagnosis.repeatability import (
+from imuarray.figures.repeatability import (
     MODELS,
+    figure_repeatability,
     parameters_agreement,
     positions_agreement,
     recordings_table,
 )
-from imuarray.report.repeatability import figure_repeatability
 
 
 def document(rng, scale):

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from imuarray.figures import theory
+from imuarray.figures import uncertainty
 from imuarray.studies import bound
 from tests.test_bound import MOTION, OPTIONS, model
 
@@ -20,7 +20,7 @@ def test_efficiency():
         bound.efficiency(model(), 2, [10, 30], MOTION, few),
         bound.efficiency(model(), 2, [10], MOTION, few, noise=10.0),
     ]
-    draw, table = theory.figure_theory_efficiency(pd.concat(tables), SETTINGS)
+    draw, table = uncertainty.figure_theory_efficiency(pd.concat(tables), SETTINGS)
     top, below, louder = draw(table).axes
     assert [len(line.get_xdata()) for line in louder.lines[:1]] == [2]
     assert len(top.get_legend().get_texts()) == 4
@@ -37,7 +37,7 @@ def test_convergence_shows_other_arrays_and_leaves_out_what_tells_nothing():
     table = pd.concat(tables)
     assert list(table.array) == [model().array.name] * 2 + ["4 triads"]
     assert table.bound_m.iloc[1] > OPTIONS["position_sd"] / 3
-    draw, table = theory.figure_theory_convergence(table, SETTINGS)
+    draw, table = uncertainty.figure_theory_convergence(table, SETTINGS)
     top, below = draw(table).axes
     drawn = [x for line in top.lines for x in line.get_xdata()]
     assert set(np.round(drawn)) == {round(np.degrees(MOTION[0]))}
@@ -46,7 +46,7 @@ def test_convergence_shows_other_arrays_and_leaves_out_what_tells_nothing():
 
 def test_size():
     table = bound.against_size(model(), 4, 30, MOTION, [1.0, 2.0], count=2)
-    draw, table = theory.figure_theory_size(table, SETTINGS)
+    draw, table = uncertainty.figure_theory_size(table, SETTINGS)
     top, below = draw(table).axes
     assert top.lines[0].get_ydata() == pytest.approx(1e6 * table.bound_m.to_numpy())
     assert "ppm" in below.get_ylabel()

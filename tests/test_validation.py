@@ -12,8 +12,8 @@ from imuarray.analysis.calibration import fitted
 from imuarray.analysis.model import silent
 from imuarray.config import read_config
 from imuarray.estimation.newton import fisher_scoring
-from imuarray.figures import validation
-from imuarray.figures.validation import coverage
+from imuarray.figures import uncertainty
+from imuarray.figures.uncertainty import coverage
 from imuarray.geometry import positions_of, sub_array
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.studies import joint, sbc, truths
@@ -164,12 +164,12 @@ def test_histogram_of_uniform_pit_values_is_flat():
         {"setting": "s", "method": "x", "samples": 5, "replicate": rows.ravel(),
          "quantity": columns.ravel(), "pit": rng.random(2400)}
     )  # fmt: skip
-    table = validation.histogram(values)
-    assert len(table) == validation.BINS
+    table = uncertainty.histogram(values)
+    assert len(table) == uncertainty.BINS
     assert table.density.mean() == pytest.approx(1.0)
     assert np.abs((table.density - 1) / table.se).max() < 4.5
     settings = {"scale": {"name": "quick"}, "seed": 1}
-    draw, same = validation.figure_validation_ranks([values], settings)
+    draw, same = uncertainty.figure_validation_ranks([values], settings)
     figure = draw(same)
     pd.testing.assert_frame_equal(same, table)
     [panel] = [axes for axes in figure.axes if axes.get_visible()]

@@ -9,74 +9,31 @@ import xarray as xr
 
 from imuarray.errors import require_one_of
 from imuarray.figures.style import GREY, look
-from imuarray.model.effects import KINDS
+from imuarray.report.pictures import (
+    board,
+    given_or_new,
+    length,
+    positions,
+    residual_course,
+    sphere,
+    timeline,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from imuarray.diagnosis.document import Diagnosis
     from imuarray.firstorder.noise import StillNoise
-    from imuarray.recording import Recording
 
+__all__ = [
+    "allan", "board", "discrepancies", "gains", "length", "motion", "positions", "posterior",
+    "residual_course", "sphere", "timeline", "trace",
+]  # fmt: skip
 MOTION = {
     "angular_rate": ("angular rate (deg/s)", np.degrees(1)),
     "angular_acceleration": ("angular acceleration (deg/s²)", np.degrees(1)),
     "specific_force": ("specific force (m/s²)", 1.0),
 }
-
-
-def _axes(axes: Axes | None) -> Axes:
-    if axes is not None:
-        return axes
-    import matplotlib.pyplot as plt
-
-    return plt.subplots(figsize=(5.5, 3.2), layout="constrained")[1]
-
-
-def positions(calibration: xr.Dataset, axes: Axes | None = None) -> Axes:
-    """Each triad's displacement from its nominal position, with 95 % intervals.
-
-    ``calibration``: what `imuarray.calibrate` gave, here and in those that follow.
-    """
-    return _drawn("positions", axes, calibration)
-
-
-def board(calibration: xr.Dataset, plane: str = "xy", axes: Axes | None = None) -> Axes:
-    """The board in a plane, nominal to found, departures and 95 % ellipses enlarged."""
-    require_one_of("plane", plane, ("xy", "xz", "yz"))
-    return _drawn("board", axes, calibration, plane)
-
-
-def timeline(recording: Recording, calibration: xr.Dataset, axes: Axes | None = None) -> Axes:
-    """The recording that was calibrated: speed, still poses, samples used, rails, shocks."""
-    return _drawn("timeline", axes, recording, calibration)
-
-
-def sphere(recording: Recording, calibration: xr.Dataset, axes: Axes | None = None) -> Axes:
-    """Directions of its still poses and axes of its rotation, from +z and from -z."""
-    return _drawn("sphere", axes, recording, calibration)
-
-
-def length(calibration: xr.Dataset, axes: Axes | None = None) -> Axes:
-    """Standard deviations of the positions, had the motion ended earlier."""
-    return _drawn("length", axes, calibration)
-
-
-def residual_course(
-    calibration: xr.Dataset, kind: str = "accelerometer", axes: Axes | None = None
-) -> Axes:
-    """Each triad's residual against time, in declared noise sds."""
-    require_one_of("kind", kind, KINDS)
-    return _drawn("residual_course", axes, calibration, kind)
-
-
-def _drawn(name: str, axes: Axes | None, *given) -> Axes:
-    """One of the pictures that the page of `imuarray board` has."""
-    from imuarray.report import pictures
-
-    axes = _axes(axes)
-    getattr(pictures, name)(*given, axes)
-    return axes
 
 
 def posterior(chains: xr.DataTree, accelerometer: str, axes: Axes | None = None) -> Axes:
@@ -85,7 +42,7 @@ def posterior(chains: xr.DataTree, accelerometer: str, axes: Axes | None = None)
     ``chains``: what `imuarray.sample` gave; InputError for a triad that it does not have.
     """
     draws, mean, sd = _of(chains, accelerometer)
-    axes = _axes(axes)
+    axes = given_or_new(axes)
     for number, name in enumerate("xyz"):
         values = 1e3 * (draws[..., number].ravel() - mean[number])
         style = look(number, "marker")
@@ -105,7 +62,7 @@ def posterior(chains: xr.DataTree, accelerometer: str, axes: Axes | None = None)
 def trace(chains: xr.DataTree, accelerometer: str, axis: str, axes: Axes | None = None) -> Axes:
     """The chains of one coordinate, in mm, against the transitions."""
     draws, _, _ = _of(chains, accelerometer)
-    axes, number = _axes(axes), "xyz".index(axis)
+    axes, number = given_or_new(axes), "xyz".index(axis)
     steps = np.arange(draws.shape[1]) * int(chains.attrs["thin"])
     for chain, values in enumerate(draws[..., number]):
         style = {"linewidth": 0.6, "label": f"chain {chain + 1}"}
@@ -133,7 +90,7 @@ def motion(dataset: xr.Dataset, quantity: str = "angular_rate", axes: Axes | Non
     ``dataset``: what `imuarray.apply` gave; InputError for another ``quantity``.
     """
     require_one_of("quantity", quantity, MOTION)
-    axes, (label, factor) = _axes(axes), MOTION[quantity]
+    axes, (label, factor) = given_or_new(axes), MOTION[quantity]
     time = dataset["time"].to_numpy()
     values, sds = (factor * dataset[name].to_numpy() for name in (quantity, f"{quantity}_sd"))
     for number, name in enumerate("xyz"):

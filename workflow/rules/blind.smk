@@ -96,7 +96,7 @@ rule table_blind_bars:
     benchmark:
         "results/blind/{scale}/benchmarks/tables/blind_bars.tsv"
     params:
-        **by("figures.blind_tables.table_blind_bars"),
+        **by("figures.blind.table_blind_bars"),
         settings=lambda wc: blind_settings(config, wc.scale),
     message:
         "table: blind study, acceptance criteria ({wildcards.scale})"
@@ -114,7 +114,7 @@ rule table_blind_gain:
     benchmark:
         "results/blind/{scale}/benchmarks/tables/blind_gain.tsv"
     params:
-        **by("figures.blind_tables.table_blind_gain"),
+        **by("figures.blind.table_blind_gain"),
         settings=lambda wc: blind_settings(config, wc.scale),
     message:
         "table: blind study, gain ({wildcards.scale})"

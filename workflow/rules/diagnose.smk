@@ -104,7 +104,7 @@ rule table_added:
     benchmark:
         "results/measured/benchmarks/added/{name}.tsv"
     params:
-        **by("figures.blind_tables.table_added"),
+        **by("figures.blind.table_added"),
     message:
         "table: effects added to {wildcards.name}"
     script:

@@ -91,7 +91,7 @@ rule figure_theory_efficiency:
     resources:
         mem_mb=3000,
     params:
-        **by("figures.theory.figure_theory_efficiency"),
+        **by("figures.uncertainty.figure_theory_efficiency"),
         settings=lambda wc: effective(config, wc.scale, "paper2017", "theory"),
     message:
         "figure: theory, efficiency ({wildcards.scale})"
@@ -111,7 +111,7 @@ rule figure_theory_convergence:
     resources:
         mem_mb=3000,
     params:
-        **by("figures.theory.figure_theory_convergence"),
+        **by("figures.uncertainty.figure_theory_convergence"),
         settings=lambda wc: effective(config, wc.scale, "paper2017", "theory"),
     message:
         "figure: theory, convergence ({wildcards.scale})"
@@ -131,7 +131,7 @@ rule figure_theory_size:
     resources:
         mem_mb=3000,
     params:
-        **by("figures.theory.figure_theory_size"),
+        **by("figures.uncertainty.figure_theory_size"),
         settings=lambda wc: effective(config, wc.scale, "paper2017", "theory"),
     message:
         "figure: theory, size of the array ({wildcards.scale})"
@@ -151,7 +151,7 @@ rule table_theory_ranks:
     resources:
         mem_mb=3000,
     params:
-        **by("figures.theory.table_theory_ranks"),
+        **by("figures.uncertainty.table_theory_ranks"),
         settings=lambda wc: effective(config, wc.scale, "paper2017", "theory"),
     message:
         "table: theory, ranks ({wildcards.scale})"

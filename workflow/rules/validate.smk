@@ -58,7 +58,7 @@ rule figure_validation_ranks:
     resources:
         mem_mb=3000,
     params:
-        **by("figures.validation.figure_validation_ranks"),
+        **by("figures.uncertainty.figure_validation_ranks"),
         settings=lambda wc: effective(config, wc.scale, "paper2021", "validation"),
     message:
         "figure: validation, ranks ({wildcards.scale})"
@@ -78,7 +78,7 @@ rule table_validation_coverage:
     resources:
         mem_mb=3000,
     params:
-        **by("figures.validation.table_validation_coverage"),
+        **by("figures.uncertainty.table_validation_coverage"),
         settings=lambda wc: effective(config, wc.scale, "paper2021", "validation"),
     message:
         "table: validation, coverage ({wildcards.scale})"
@@ -98,7 +98,7 @@ rule table_validation_joint:
     resources:
         mem_mb=3000,
     params:
-        **by("figures.validation.table_validation_joint"),
+        **by("figures.uncertainty.table_validation_joint"),
         settings=lambda wc: effective(config, wc.scale, "paper2021", "validation"),
     message:
         "table: validation, joint distribution test ({wildcards.scale})"

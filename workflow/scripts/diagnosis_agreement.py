@@ -6,14 +6,14 @@ with job(snakemake):
     import json
     from pathlib import Path
 
-    from imuarray.diagnosis.repeatability import (
+    from imuarray.figures.repeatability import (
+        figure_repeatability,
         parameters_agreement,
         positions_agreement,
         recordings_table,
     )
     from imuarray.figures.style import rounded, write_figure
     from imuarray.provenance import write_csv
-    from imuarray.report.repeatability import figure_repeatability
 
     documents = {
         Path(path).parent.name: json.loads(Path(path).read_text(encoding="utf-8"))

@@ -7,7 +7,7 @@ with job(snakemake) as settings:
     from pathlib import Path
 
     from imuarray.figures.gallery import caption, gallery
-    from imuarray.figures.tables import chain_lines
+    from imuarray.figures.style import chain_lines
     from imuarray.provenance import write_bytes
 
     output, given = Path(snakemake.output[0]), snakemake.params

@@ -19,7 +19,7 @@ from imuarray.engine.readings import Readings, arrange, determined, most_informa
 from imuarray.errors import InputError, one_line, require_one_of
 from imuarray.model.effects import DATA_EFFECTS
 from imuarray.provenance import digest, stamp
-from imuarray.recording import Recording, record
+from imuarray.recording import Recording
 from imuarray.recording.channels import require_apart, require_live
 
 
@@ -168,25 +168,18 @@ def _papers(recording: Recording, method: str, accelerometer_noise, say: Say) ->
     """By maximum likelihood with the declared noise (paper 2017)."""
     from imuarray.estimation.bcd import calibrate_bcd
     from imuarray.estimation.gauss_newton import calibrate_gauss_newton
-    from imuarray.estimation.streamed import calibrate_parts
 
     recording = assumed(usable(recording, say), accelerometer_noise)
     model = model_of(recording)
-    if method == "gauss-newton" and len(recording.time) > record.PART:
-        found = calibrate_parts(model, lambda: map(_readings, recording.parts()))
+    whole = recording.in_memory()
+    data = model, whole.specific_force, whole.angular_rate
+    if method == "bcd":
+        found = calibrate_bcd(*data, saturated=whole.saturated_gyroscopes(), tolerance=1e-9)
     else:
-        force, rate, saturated = _readings(recording.in_memory())
-        if method == "bcd":
-            found = calibrate_bcd(model, force, rate, saturated=saturated, tolerance=1e-9)
-        else:
-            found = calibrate_gauss_newton(model, force, rate, saturated=saturated)
+        found = calibrate_gauss_newton(*data, saturated=whole.saturated_gyroscopes())
     dataset = papers_dataset(recording, model, found)
     dataset.attrs["method"] = method
     return dataset
-
-
-def _readings(part: Recording):
-    return part.specific_force, part.angular_rate, part.saturated_gyroscopes()
 
 
 def _engine(recordings, model: str, effects, say: Say) -> xr.Dataset:

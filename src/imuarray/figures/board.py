@@ -9,12 +9,12 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from imuarray.figures.style import (
     PAGE,
+    Column,
     logarithmic,
     look,
     new_figure,
     styled,
 )
-from imuarray.figures.tables import Column
 from imuarray.measured.positions import agreement, pairwise
 
 SERIES = {

@@ -12,13 +12,13 @@ from imuarray.figures.style import (
     GREY,
     PAGE,
     VERMILLION,
+    Column,
     logarithmic,
     look,
     new_figure,
     panels,
     styled,
 )
-from imuarray.figures.tables import Column
 from imuarray.firstorder.noise import StillNoise
 
 SOURCES = {

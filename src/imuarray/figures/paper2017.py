@@ -15,9 +15,9 @@ from imuarray.figures.style import (
     logarithmic,
     new_figure,
     points,
+    scale_line,
     styled,
 )
-from imuarray.figures.tables import scale_line
 from imuarray.geometry import array_from_config
 
 MICROMETRE = 1e-6  # m, the level that the paper's conclusions speak of

@@ -13,16 +13,17 @@ from imuarray.figures.style import (
     GREY,
     PAGE,
     SKY,
+    chain_lines,
     legend_items,
     level,
     logarithmic,
     look,
     new_figure,
     points,
+    scale_line,
     significant,
     styled,
 )
-from imuarray.figures.tables import chain_lines, scale_line
 
 TRACE_POINTS = 1000  # drawn per chain; more would not be seen
 BINS = 40

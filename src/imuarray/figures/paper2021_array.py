@@ -16,11 +16,12 @@ from imuarray.figures.style import (
     GREY,
     PAGE,
     SKY,
+    chain_lines,
     look,
     new_figure,
+    scale_line,
     styled,
 )
-from imuarray.figures.tables import chain_lines, scale_line
 from imuarray.geometry import UNDERSIDE_ROTATION, Array, array_from_config
 
 # The orientation marker in a topside package, in units of the package's sides. The text does

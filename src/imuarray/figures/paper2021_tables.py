@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from imuarray.figures.tables import Column, scale_line, unfinished
+from imuarray.figures.style import Column, scale_line, unfinished
 
 NOT_IN_TEXT = "The paper's values are not in the extracted text; these are ours."
 

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from imuarray.figures.style import write_figure
-from imuarray.figures.tables import write_table
+from imuarray.figures.style import write_figure, write_table
 from imuarray.posterior.chains import read_chains
 from imuarray.recording import array_of, load_dataset, read_recording
 

@@ -72,11 +72,11 @@ class Drawing(NamedTuple):
 
 @styled
 def beside(height: float, drawings, footer=()) -> Figure:
-    """Pictures beside each other, each a function of the axes that it draws into."""
+    """Pictures beside each other, each a function of its ``axes``."""
     figure = new_figure(footer, PAGE, height)
     panels = figure.subplots(1, len(drawings), squeeze=False)[0]
     for drawing, axes in zip(drawings, panels, strict=True):
-        drawing(axes)
+        drawing(axes=axes)
     return figure
 
 

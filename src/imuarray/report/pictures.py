@@ -12,8 +12,10 @@ from matplotlib.patches import Circle, Ellipse
 from matplotlib.ticker import LogLocator
 
 from imuarray.diagnosis.plain import fixed, joined, number
+from imuarray.errors import require_one_of
 from imuarray.estimation.informative import position_sds
 from imuarray.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILLION, look
+from imuarray.model.effects import KINDS
 from imuarray.recording import Recording
 from imuarray.recording.channels import runs
 
@@ -31,6 +33,15 @@ LEVEL = 0.1  # of the length, a power: below it an error has levelled off; noise
 APART = 10.0  # times the usual distance of stretches: no line across
 WORST = 3  # IMUs whose residuals have colours
 ROOM, SMALL = 0.16, 0.08  # of the board's extent: the largest departure, an ellipse's half axis
+
+
+def given_or_new(axes: Axes | None) -> Axes:
+    """``axes``, or those of a new figure where None."""
+    if axes is not None:
+        return axes
+    import matplotlib.pyplot as plt
+
+    return plt.subplots(figsize=(5.5, 3.2), layout="constrained")[1]
 
 
 def poses_of(recording: Recording) -> np.ndarray:
@@ -109,8 +120,9 @@ def plain(text) -> str:
     return str(text).replace("$", r"\$")
 
 
-def positions(calibration: xr.Dataset, axes: Axes) -> None:
+def positions(calibration: xr.Dataset, axes: Axes | None = None) -> Axes:
     """Each IMU's displacement from its nominal position with 95 % intervals."""
+    axes = given_or_new(axes)
     moved = (calibration["position"] - calibration["nominal_position"]).to_numpy()[1:]
     sds = position_sds(calibration)[1:]
     factor, unit = (1e3, "mm") if np.abs(moved).max() > 1e-3 else (1e6, "µm")
@@ -125,13 +137,16 @@ def positions(calibration: xr.Dataset, axes: Axes) -> None:
     axes.set_xticks(places, labels[1:])
     axes.set(xlabel=f"IMU (relative to {labels[0]})", ylabel=f"from the drawing ({unit})")
     axes.legend(ncols=3)
+    return axes
 
 
-def board(calibration: xr.Dataset, plane: str, axes: Axes) -> None:
+def board(calibration: xr.Dataset, plane: str = "xy", axes: Axes | None = None) -> Axes:
     """The board in a plane ("xy", "xz" or "yz"), nominal to found, with 95 % ellipses.
 
     Departures and ellipses are enlarged by factors that its title says.
     """
+    require_one_of("plane", plane, ("xy", "xz", "yz"))
+    axes = given_or_new(axes)
     i, j = ("xyz".index(name) for name in plane)
     nominal = calibration["nominal_position"].to_numpy()
     moved = calibration["position"].to_numpy() - nominal
@@ -158,6 +173,7 @@ def board(calibration: xr.Dataset, plane: str, axes: Axes) -> None:
     axes.margins(0.18)
     _no_strip(axes)
     axes.set_title(f"departures × {by:g}, ellipses (95 %) × {wide:g}", size=7.5)
+    return axes
 
 
 def _together(places, close: float) -> list[list[int]]:
@@ -203,8 +219,9 @@ def _ellipse(centre, matrix) -> Ellipse:
 _RED = (0.835, 0.369, 0.0)
 
 
-def timeline(recording: Recording, calibration: xr.Dataset, axes: Axes) -> None:
+def timeline(recording: Recording, calibration: xr.Dataset, axes: Axes | None = None) -> Axes:
     """Angular speed against time; beneath it still poses, samples used, rails and shocks."""
+    axes = given_or_new(axes)
     time = recording.time - recording.time[0]
     edges = np.linspace(0, time[-1], min(BINS, len(time)) + 1)
     bins = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, len(edges) - 2)
@@ -226,6 +243,7 @@ def timeline(recording: Recording, calibration: xr.Dataset, axes: Axes) -> None:
     axes.grid(False, axis="y")
     axes.set(xlabel="time (s)", ylabel="angular speed (deg/s)", xlim=(0, time[-1]))
     axes.set_ylim(-0.52 * top, 1.05 * top)
+    return axes
 
 
 def _rows(recording: Recording, calibration: xr.Dataset) -> list[tuple[str, str, np.ndarray]]:
@@ -246,11 +264,12 @@ def _rows(recording: Recording, calibration: xr.Dataset) -> list[tuple[str, str,
     ]
 
 
-def sphere(recording: Recording, calibration: xr.Dataset, axes: Axes) -> None:
+def sphere(recording: Recording, calibration: xr.Dataset, axes: Axes | None = None) -> Axes:
     """Where up was in still poses, and about what axes the board turned, seen from +z and −z.
 
     Equal areas of the discs are equal areas of the sphere.
     """
+    axes = given_or_new(axes)
     rate = calibration["angular_rate"].to_numpy()
     rate = rate[:: max(len(rate) // POINTS, 1)]
     turn = rate / np.maximum(np.linalg.norm(rate, axis=1, keepdims=True), 1e-12)
@@ -280,6 +299,7 @@ def sphere(recording: Recording, calibration: xr.Dataset, axes: Axes) -> None:
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, -0.14), ncols=2, frameon=False)
     axes.set(xlim=(-2.65, 2.65), ylim=(-1.2, 1.2), aspect="equal")
     axes.set_axis_off()
+    return axes
 
 
 def _disc(vectors, side: int, centre: float) -> tuple[np.ndarray, np.ndarray]:
@@ -288,8 +308,9 @@ def _disc(vectors, side: int, centre: float) -> tuple[np.ndarray, np.ndarray]:
     return centre + side * radius * vectors[:, 0], radius * vectors[:, 1]
 
 
-def length(calibration: xr.Dataset, axes: Axes) -> None:
+def length(calibration: xr.Dataset, axes: Axes | None = None) -> Axes:
     """Sds of the positions had the motion ended earlier, by the information until then."""
+    axes = given_or_new(axes)
     seconds = calibration["length"].to_numpy()
     sds = 1e6 * calibration["position_sd_by_length"].to_numpy()[:, 1:]
     rms, worst = np.sqrt(np.mean(sds**2, axis=(1, 2))), sds.max(axis=(1, 2))
@@ -305,6 +326,7 @@ def length(calibration: xr.Dataset, axes: Axes) -> None:
         axis.set_major_formatter(lambda value, _: f"{value:g}")
         axis.set_minor_formatter(lambda value, _: "")
     axes.legend()
+    return axes
 
 
 def levelled(calibration: xr.Dataset) -> bool:
@@ -317,8 +339,12 @@ def levelled(calibration: xr.Dataset) -> bool:
     return bool(gained < LEVEL * np.log(seconds[-1] / half))
 
 
-def residual_course(calibration: xr.Dataset, kind: str, axes: Axes) -> None:
+def residual_course(
+    calibration: xr.Dataset, kind: str = "accelerometer", axes: Axes | None = None
+) -> Axes:
     """Residual of each "accelerometer" or "gyroscope" against time, over the declared noise."""
+    require_one_of("kind", kind, KINDS)
+    axes = given_or_new(axes)
     rms = calibration[f"{kind}_residual"].to_numpy()
     time, labels = calibration["stretch"].to_numpy(), calibration[kind].to_numpy()
     worst = np.argsort(-np.sqrt(np.mean(rms**2, axis=0)))[:WORST]
@@ -340,3 +366,4 @@ def residual_course(calibration: xr.Dataset, kind: str, axes: Axes) -> None:
         axes.set(yscale="log", ylim=(0.5, 1.5 * top))
         axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.legend(ncols=2, fontsize=6.5)
+    return axes
