@@ -23,9 +23,11 @@ from written import publish  # noqa: E402
 
 from imuarray.config import model_from, read_config  # noqa: E402
 from imuarray.estimation.bcd import calibrate_bcd  # noqa: E402
-from imuarray.estimation.collapsed import Collapsed  # noqa: E402
+from imuarray.estimation.collapsed import (
+    Collapsed,  # noqa: E402
+    estimate_motion,  # noqa: E402
+)
 from imuarray.estimation.kernels import reduced  # noqa: E402
-from imuarray.estimation.motion_ml import estimate_motion  # noqa: E402
 from imuarray.estimation.newton import fisher_scoring  # noqa: E402
 from imuarray.estimation.reference import most_likely_motion, skew  # noqa: E402
 from imuarray.geometry import positions_of, sub_array  # noqa: E402

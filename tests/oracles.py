@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import logsumexp
 
-from imuarray.estimation.motion_ml import estimate_motion
+from imuarray.estimation.collapsed import estimate_motion
 from imuarray.estimation.reference import linear_part, nonlinear_part, skew
 from imuarray.model import ArrayModel
 from imuarray.model.jax64 import jax, jnp

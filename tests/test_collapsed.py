@@ -9,9 +9,8 @@ from scipy.special import logsumexp
 
 from imuarray.errors import InputError
 from imuarray.estimation.bcd import calibrate_bcd
-from imuarray.estimation.collapsed import Collapsed
-from imuarray.estimation.gauss_newton import calibrate_gauss_newton
-from imuarray.estimation.motion_ml import estimate_motion
+from imuarray.estimation.collapsed import Collapsed, estimate_motion
+from imuarray.estimation.newton import calibrate_gauss_newton
 from imuarray.estimation.reference import linear_part, nonlinear_part
 from imuarray.geometry import mimu4444
 from imuarray.model import ArrayModel

@@ -17,7 +17,7 @@ from imuarray.cli import main
 from imuarray.config import read_config
 from imuarray.errors import InputError
 from imuarray.provenance import is_damaged
-from imuarray.recording import apart, read_recording, write_recording
+from imuarray.recording import channels, read_recording, write_recording
 from tests.test_convert_csv import HEADER, layout, table
 from tests.test_convert_csv import read as read_csv
 from tests.test_pipeline import ROOT
@@ -178,15 +178,15 @@ def test_what_hangs_or_ends_hdf5_is_refused(tmp_path, monkeypatch):
     """In a process of its own: here one that sleeps, or kills itself, stands for HDF5."""
     path = tmp_path / "rec.nc"
     make().to_dataset().to_netcdf(path, engine="h5netcdf")
-    apart.require_readable(path)
-    monkeypatch.setattr(apart, "LOOK", "import time; time.sleep(60)")
+    channels.require_readable(path)
+    monkeypatch.setattr(channels, "LOOK", "import time; time.sleep(60)")
     with pytest.raises(InputError, match="not through with after 1 s"):
-        apart.require_readable(path, 1.0)
-    monkeypatch.setattr(apart, "LOOK", "import os; os.kill(os.getpid(), 11)")
+        channels.require_readable(path, 1.0)
+    monkeypatch.setattr(channels, "LOOK", "import os; os.kill(os.getpid(), 11)")
     with pytest.raises(InputError, match="crashes"):
-        apart.require_readable(path)
+        channels.require_readable(path)
     write_recording(make(), path)  # sealed: not looked at
-    apart.require_readable(path)
+    channels.require_readable(path)
 
 
 def test_damaged_files_of_other_programs_end_in_a_line(tmp_path):

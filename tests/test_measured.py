@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 
 from imuarray.cli import main
 from imuarray.errors import InputError
-from imuarray.estimation.gauss_newton import calibrate_gauss_newton
+from imuarray.estimation.newton import calibrate_gauss_newton
 from imuarray.estimation.selection import neighbours, select_dynamic
 from imuarray.geometry import mimu4444_corners
 from imuarray.measured.positions import (
@@ -25,8 +25,7 @@ from imuarray.measured.residuals import compare
 from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting, normal_motion
 from imuarray.posterior.likelihood import Likelihood
-from imuarray.posterior.proposals import log_weights
-from imuarray.posterior.rate_density import sample_covariance
+from imuarray.posterior.proposals import log_weights, sample_covariance
 from imuarray.recording import write_recording
 from imuarray.simulation.recordings import simulate_recording, simulate_samples
 

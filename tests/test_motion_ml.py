@@ -6,8 +6,7 @@ from scipy.optimize import least_squares
 
 from imuarray.errors import IdentifiabilityError
 from imuarray.estimation import rates
-from imuarray.estimation.collapsed import Collapsed
-from imuarray.estimation.motion_ml import estimate_motion
+from imuarray.estimation.collapsed import Collapsed, estimate_motion
 from imuarray.estimation.reference import most_likely_motion
 from imuarray.geometry import mimu4444
 from imuarray.model import ArrayModel, Noise

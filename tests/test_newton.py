@@ -7,9 +7,8 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.estimation import newton
 from imuarray.estimation.collapsed import Collapsed
-from imuarray.estimation.gauss_newton import calibrate_gauss_newton
 from imuarray.estimation.information import arms, halves, information, information_at
-from imuarray.estimation.newton import fisher_scoring
+from imuarray.estimation.newton import calibrate_gauss_newton, fisher_scoring
 from imuarray.estimation.threads import one_thread
 from imuarray.model import ArrayModel, Noise
 from imuarray.model.structure import products

@@ -12,7 +12,7 @@ from imuarray.analysis.model import model_of
 from imuarray.blind.cases import Case, make
 from imuarray.cli import main
 from imuarray.errors import InputError
-from imuarray.estimation import gauss_newton
+from imuarray.estimation import newton
 from imuarray.geometry import positions_of, sub_array
 from imuarray.model.jax64 import jnp
 from imuarray.posterior.diagnostics import ess, rhat
@@ -118,8 +118,8 @@ def test_a_mode_that_was_not_reached_is_told(monkeypatch):
     said: list[str] = []
     posterior_of(recording, model_of(recording), say=said.append)
     assert not said
-    stopped = partial(gauss_newton.calibrate_gauss_newton, limit=1)
-    monkeypatch.setattr(gauss_newton, "calibrate_gauss_newton", stopped)
+    stopped = partial(newton.calibrate_gauss_newton, limit=1)
+    monkeypatch.setattr(newton, "calibrate_gauss_newton", stopped)
     posterior_of(recording, model_of(recording), say=said.append)
     (text,) = said
     assert "did not converge" in text

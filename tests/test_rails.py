@@ -8,8 +8,7 @@ from imuarray.engine.derivatives import no_derivatives
 from imuarray.engine.fusion import better, equations, fuse, one_sided, turned
 from imuarray.engine.linearise import State
 from imuarray.engine.readings import measured
-from imuarray.estimation.collapsed import Collapsed
-from imuarray.estimation.motion_ml import motion_from
+from imuarray.estimation.collapsed import Collapsed, motion_from
 from imuarray.model import Noise
 from imuarray.motion import Motion, normal_motion
 from imuarray.simulation.recordings import measure

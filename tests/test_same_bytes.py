@@ -10,7 +10,7 @@ SCRIPT = """
 import hashlib
 import numpy as np
 from imuarray.estimation.bcd import calibrate_bcd
-from imuarray.estimation.gauss_newton import calibrate_gauss_newton
+from imuarray.estimation.newton import calibrate_gauss_newton
 from imuarray.geometry import mimu4444
 from imuarray.model import ArrayModel
 from imuarray.motion import normal_motion

@@ -192,7 +192,7 @@ def _check_output(arguments: argparse.Namespace) -> None:
         if arguments.folder and source.name in PAGES and source.resolve().parent == out.resolve():
             raise InputError(f"--out {out}: expected a folder without the input {source.name}")
         if source.suffix in NETCDF:
-            from imuarray.recording.apart import require_readable
+            from imuarray.recording.channels import require_readable
 
             require_readable(source)
 

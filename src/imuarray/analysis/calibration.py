@@ -167,7 +167,7 @@ def calibrate(
 def _papers(recording: Recording, method: str, accelerometer_noise, say: Say) -> xr.Dataset:
     """By maximum likelihood with the declared noise (paper 2017)."""
     from imuarray.estimation.bcd import calibrate_bcd
-    from imuarray.estimation.gauss_newton import calibrate_gauss_newton
+    from imuarray.estimation.newton import calibrate_gauss_newton
 
     recording = assumed(usable(recording, say), accelerometer_noise)
     model = model_of(recording)

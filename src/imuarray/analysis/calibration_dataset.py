@@ -84,7 +84,7 @@ def _motion(fields) -> dict:
 
 def papers_dataset(recording: Recording, model: ArrayModel, found) -> xr.Dataset:
     """Of an estimator of the papers' model."""
-    from imuarray.estimation.gauss_newton import parameter_covariance
+    from imuarray.estimation.newton import parameter_covariance
 
     covariance = found.covariance
     if covariance is None:

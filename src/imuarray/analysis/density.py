@@ -19,7 +19,7 @@ from imuarray.posterior import tuning
 from imuarray.posterior.generic import SCALES, log_laplace, unknown
 from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.marginal import Marginal, log_posterior
-from imuarray.posterior.rate_density import sample_covariance
+from imuarray.posterior.proposals import sample_covariance
 from imuarray.posterior.target import GaussianPrior, TiedPrior
 from imuarray.recording import Recording
 from imuarray.streams import stream
@@ -144,7 +144,7 @@ def _fit(recording: Recording) -> Callable:
 
     The first time from elsewhere, too, where few samples leave local optima.
     """
-    from imuarray.estimation.gauss_newton import calibrate_gauss_newton
+    from imuarray.estimation.newton import calibrate_gauss_newton
 
     last: list[np.ndarray] = []
 

@@ -12,7 +12,7 @@ import xarray as xr
 from scipy.spatial.transform import Rotation
 
 from imuarray.errors import printable
-from imuarray.estimation.informative import position_sds
+from imuarray.estimation.selection import position_sds
 from imuarray.firstorder.turns import nearest_orthogonal, upper_times_rotation
 from imuarray.model.effects import KINDS
 from imuarray.recording.record import by_kind

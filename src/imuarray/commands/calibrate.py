@@ -8,7 +8,7 @@ from imuarray.analysis.model import assumed
 from imuarray.analysis.trust import of_file, reasons_of_calibration, reasons_of_poses
 from imuarray.commands.output import Output
 from imuarray.diagnosis.plain import number
-from imuarray.estimation.informative import position_sds, weakest_of
+from imuarray.estimation.selection import position_sds, weakest_of
 from imuarray.model.effects import KINDS
 from imuarray.provenance import trust, write_netcdf
 from imuarray.recording import read_recording

@@ -25,8 +25,7 @@ from imuarray.engine.readings import Readings, by_imu, measured
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import is_smooth, start
 from imuarray.engine.start import turned as with_slope
-from imuarray.estimation.collapsed import Collapsed
-from imuarray.estimation.motion_ml import MotionEstimate, motion_at, motion_from
+from imuarray.estimation.collapsed import Collapsed, MotionEstimate, motion_at, motion_from
 from imuarray.geometry.array import positions_of, require_planar_extent
 from imuarray.model import ArrayModel
 from imuarray.model.array_model import clock

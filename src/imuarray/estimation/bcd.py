@@ -8,8 +8,7 @@ import numpy as np
 from imuarray.compiled import njit
 from imuarray.errors import IdentifiabilityError, InputError, require_shape
 from imuarray.estimation import kernels
-from imuarray.estimation.collapsed import Collapsed
-from imuarray.estimation.motion_ml import MotionEstimate, motion_from
+from imuarray.estimation.collapsed import Collapsed, MotionEstimate, motion_from
 from imuarray.estimation.rates import most_likely, workspace
 from imuarray.geometry.array import require_planar_extent
 from imuarray.model import ArrayModel

@@ -9,10 +9,10 @@ from scipy.special import ndtri
 
 from imuarray.estimation.bcd import Calibration, calibrate_bcd
 from imuarray.estimation.collapsed import Collapsed
-from imuarray.estimation.gauss_newton import calibrate_gauss_newton
+from imuarray.estimation.newton import calibrate_gauss_newton
 from imuarray.model import ArrayModel
 from imuarray.model.structure import product_slopes
-from imuarray.posterior.rate_density import rate_distribution
+from imuarray.posterior.proposals import rate_distribution
 from imuarray.recording import Recording, array_of
 from imuarray.simulation.recordings import simulate_samples
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from imuarray.estimation.gauss_newton import calibrate_gauss_newton
+from imuarray.estimation.newton import calibrate_gauss_newton
 from imuarray.measured.positions import LIMIT
 from imuarray.model import ArrayModel
 from imuarray.motion import Motion

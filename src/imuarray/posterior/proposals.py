@@ -1,13 +1,39 @@
-"""Where the integrand of (26) is: a normal density around its mode in omega, per sample."""
+"""p(omega_t | y_g), (30a) and (30b); and a normal density like the integrand of (26)."""
 
 import numpy as np
 
-from imuarray.estimation.collapsed import Collapsed
-from imuarray.estimation.motion_ml import motion_from
+from imuarray.errors import InputError
+from imuarray.estimation.collapsed import Collapsed, motion_from
 from imuarray.model.structure import CURVATURES, PAIRS, product_slopes, products
+from imuarray.recording import Recording
 
+FEWEST = 4  # gyroscopes for a covariance (3, 3) of full rank
 # Wider than the curvature at the mode says, so that no weight is without bound in practice.
 WIDENING = 1.05
+
+
+def sample_covariance(angular_rate):
+    """Mean (T, 3) rad/s, (30a), and covariance (T, 3, 3), (30b), of rates (T, G, 3).
+
+    The covariance is that of one gyroscope, as the paper writes it. InputError where G < 4.
+    """
+    if angular_rate.shape[1] < FEWEST:
+        raise InputError(
+            f"gyroscopes: expected at least {FEWEST} for the spread among them (30b), found"
+            f" {angular_rate.shape[1]}"
+        )
+    mean = angular_rate.mean(axis=1)
+    off = angular_rate - mean[:, None]
+    return mean, np.einsum("tgi,tgj->tij", off, off) / (angular_rate.shape[1] - 1)
+
+
+def rate_distribution(recording: Recording):
+    """`sample_covariance`, or the declared noise where there are fewer than 4 gyroscopes."""
+    rate = recording.angular_rate
+    if rate.shape[1] >= FEWEST:
+        return sample_covariance(rate)
+    covariance = np.eye(3) * recording.gyroscope_noise_sd**2 / rate.shape[1]
+    return rate.mean(axis=1), np.broadcast_to(covariance, (len(rate), 3, 3))
 
 
 def proposals(collapsed: Collapsed, mean, covariance, positions, widening: float = WIDENING):

@@ -1,13 +1,17 @@
-"""Channels that cannot be what a live sensor reads: constant, copied, held, recorded twice.
+"""Channels that no live sensor gives: constant, copied, held, recorded twice; unreadable files.
 
 Equality tells: while an array turns, noise does not repeat a reading of three axes for long.
 """
 
+import subprocess
+import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from imuarray.errors import InputError
+from imuarray.provenance import seal_of
 from imuarray.recording.record import AXES, Recording
 
 LEAST = 10  # samples below which equal readings may be chance
@@ -17,6 +21,20 @@ FROZEN = 20  # readings in a row
 COARSE, MANY = 5, 100  # values of a dead axis that flickers, in at least so many samples
 ALIKE = 1e-6  # share of a triad's readings that is its own; noise is 2e-5 of a MEMS sensor's range
 _KINDS = {"accelerometer": "specific_force", "gyroscope": "angular_rate"}
+SIGNATURE = b"\x89HDF"
+PATIENCE = 60.0  # s, and as many again for each
+SIZE = 500e6  # bytes
+LOOK = """
+import sys, h5py
+def look(name, item):
+    # what declares more than it holds is refused before it is read
+    if isinstance(item, h5py.Dataset) and item.nbytes < 1e9:
+        item[()]
+    dict(item.attrs)
+with h5py.File(sys.argv[1], "r") as file:
+    dict(file.attrs)
+    file.visititems(look)
+"""
 
 
 def require_live(recording: Recording, where: str = "recording") -> None:
@@ -252,3 +270,24 @@ def _marks(rows) -> np.ndarray:
     """64 bits of each row of ``rows`` (N, M): equal for equal rows, else not (to 2**-64)."""
     odd = np.random.default_rng(0).integers(1, 2**63, rows.shape[1], dtype=np.uint64) * 2 + 1
     return np.sum(np.ascontiguousarray(rows, float).view(np.uint64) * odd, axis=1)
+
+
+def require_readable(path: Path, patience: float = PATIENCE) -> None:
+    """InputError for an HDF5 file without a seal at which HDF5 hangs or dies.
+
+    ``patience`` in s. What HDF5 refuses by itself, and what is no HDF5 file, is left to the reader.
+    """
+    with open(path, "rb") as handle:
+        if handle.read(len(SIGNATURE)) != SIGNATURE or seal_of(path) is not None:
+            return
+    limit = patience * (1 + path.stat().st_size / SIZE)
+    call = [sys.executable, "-c", LOOK, str(path)]
+    try:
+        status = subprocess.run(call, capture_output=True, timeout=limit, check=False).returncode
+    except subprocess.TimeoutExpired:
+        raise InputError(
+            f"{path}: expected a NetCDF-4 file, found one that HDF5 is not through with after"
+            f" {limit:.0f} s: damaged?"
+        ) from None
+    if status < 0:
+        raise InputError(f"{path}: expected a NetCDF-4 file, found one that HDF5 crashes at")

@@ -13,7 +13,7 @@ import xarray as xr
 
 from imuarray.diagnosis.plain import Sizes, first_up, number, plainly, plus_minus, quantity
 from imuarray.diagnosis.words import split_name
-from imuarray.estimation.informative import position_sds, weakest_of
+from imuarray.estimation.selection import position_sds, weakest_of
 from imuarray.firstorder.correct import FirstOrder
 from imuarray.firstorder.report import parameter_table, turned_lines, write_corrected
 from imuarray.model.effects import KINDS

@@ -13,7 +13,7 @@ from matplotlib.ticker import LogLocator
 
 from imuarray.diagnosis.plain import fixed, joined, number
 from imuarray.errors import require_one_of
-from imuarray.estimation.informative import position_sds
+from imuarray.estimation.selection import position_sds
 from imuarray.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILLION, look
 from imuarray.model.effects import KINDS
 from imuarray.recording import Recording
@@ -212,11 +212,8 @@ def _ellipse(centre, matrix) -> Ellipse:
     values, vectors = np.linalg.eigh(matrix)
     size = 2 * np.sqrt(np.maximum(values, 0.0))
     angle = np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1]))
-    return Ellipse(tuple(centre), size[1], size[0], angle=angle, facecolor=(*_RED, 0.15),
+    return Ellipse(tuple(centre), size[1], size[0], angle=angle, facecolor=(VERMILLION, 0.15),
                    edgecolor=VERMILLION, linewidth=0.9)  # fmt: skip
-
-
-_RED = (0.835, 0.369, 0.0)
 
 
 def timeline(recording: Recording, calibration: xr.Dataset, axes: Axes | None = None) -> Axes:

@@ -13,7 +13,7 @@ from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting, normal_motion
 from imuarray.posterior import tuning
 from imuarray.posterior.likelihood import Likelihood
-from imuarray.posterior.rate_density import rate_distribution
+from imuarray.posterior.proposals import rate_distribution
 from imuarray.posterior.target import CompiledTarget, GaussianPrior
 from imuarray.recording import Recording
 from imuarray.simulation.recordings import simulate_recording, simulate_samples

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from imuarray.estimation.motion_ml import estimate_motion
+from imuarray.estimation.collapsed import estimate_motion
 from imuarray.model import ArrayModel
 from imuarray.streams import stream
 from imuarray.studies.truths import batches, realisations, root_mean_square, run_batches

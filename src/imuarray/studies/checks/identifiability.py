@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from imuarray.estimation.bcd import calibrate_bcd
-from imuarray.estimation.motion_ml import estimate_motion
+from imuarray.estimation.collapsed import estimate_motion
 from imuarray.model import structure_tensor
 from imuarray.model.structure import design, product_slopes, products
 from imuarray.motion import Motion, sphere_motion

@@ -12,7 +12,7 @@ from imuarray.model import ArrayModel
 from imuarray.model.structure import design, products
 from imuarray.motion import normal_motion
 from imuarray.posterior.likelihood import Likelihood
-from imuarray.posterior.rate_density import sample_covariance
+from imuarray.posterior.proposals import sample_covariance
 from imuarray.posterior.reference import draw_rates, log_likelihood, projection
 from imuarray.simulation.recordings import measure
 
