@@ -3,9 +3,8 @@
 from imuarray.pipeline.job import job
 
 with job(snakemake) as settings:
-    from imuarray.pipeline.chains import sample_paired
     from imuarray.recording import read_recording
-    from imuarray.studies.bayes import tuned_experiment
+    from imuarray.studies.bayes import sample_paired, tuned_experiment
 
     kind, counts = snakemake.wildcards.kind, settings["paper2021"]["samples"]
     lengths = settings["scale"]["measured_transitions"]

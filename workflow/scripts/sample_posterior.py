@@ -5,9 +5,8 @@ from imuarray.pipeline.job import job
 with job(snakemake) as settings:
     import json
 
-    from imuarray.pipeline.chains import sample_paired
     from imuarray.recording import read_recording
-    from imuarray.studies.bayes import target_for
+    from imuarray.studies.bayes import sample_paired, target_for
 
     samples = int(snakemake.wildcards.samples)
     recording = read_recording(snakemake.input.recording)

@@ -194,9 +194,8 @@ def chain_lines(verdicts: dict[int, dict]) -> list[str]:
 def unfinished(table, threshold: float) -> list[str]:
     """A note on the rows whose chains fail the criterion; none if there are no such rows."""
     failed = (~table.converged).sum()
-    if not failed:
-        return []
-    return [f"R-hat is not below {threshold:g} in {failed} of {len(table)} rows: preliminary."]
+    said = f"R-hat is not below {threshold:g} in {failed} of {len(table)} rows: preliminary."
+    return [said] if failed else []
 
 
 @dataclass(frozen=True)
@@ -225,9 +224,7 @@ def write_table(table, columns, caption: str, notes, csv, tex, md) -> None:
 
 
 def _cells(table, columns) -> pd.DataFrame:
-    return pd.DataFrame(
-        {column.name: [column.text(value) for value in table[column.name]] for column in columns}
-    )
+    return pd.DataFrame({one.name: [one.text(x) for x in table[one.name]] for one in columns})
 
 
 def markdown(table, columns: Sequence[Column], caption: str, notes) -> str:

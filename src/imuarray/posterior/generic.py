@@ -101,8 +101,7 @@ def log_laplace(model, parameters, given: Unknown, steps: int = STEPS):
     """log p(y | theta) by Laplace's method over each sample's whole motion, to be differentiated.
 
     The search for the mode carries no derivative; one step of Newton's method from the mode,
-    its curvature fixed, has the mode's own. The derivative leaves out that of the residual's
-    second derivatives, which is far below what a sampler's steps would notice.
+    its curvature fixed, has the mode's own. That of the residual's second derivatives is left out.
     """
     residuals, volume = _whitened(model, parameters, given)
     still = jax.lax.stop_gradient
@@ -113,15 +112,23 @@ def log_laplace(model, parameters, given: Unknown, steps: int = STEPS):
         slope = jax.grad(lambda x: 0.5 * jnp.sum(residuals(x, data) ** 2))(mode)[:, None]
         x = mode - solve_upper(factor, solve_lower(factor, slope))[:, 0]
         value, jac = residuals(x, data), jax.jacfwd(lambda x: residuals(x, data))(x)
-        factor = cholesky(jac.T @ jac)
-        # the rest of the second derivative, to first order: it need not be positive far away;
-        # so small a term needs no derivative of its own
+        known = jac.T @ jac
+        factor = cholesky(still(known))
+        inverse = solve_upper(factor, solve_lower(factor, jnp.eye(x.size)))
+        # the determinant's derivative is that of the trace: none goes through the factor
+        spread = log_determinant(factor) + jnp.sum(inverse * (known - still(known)))
+        # the rest of the second derivative, to first order: it need not be positive far away; it
+        # is so small that it needs no derivative of its own
         bend = jax.hessian(lambda z: fixed(z, data) @ still(value))(still(x))
-        inner = solve_upper(still(factor), solve_lower(still(factor), bend))
-        return -0.5 * (value @ value + log_determinant(factor) + jnp.trace(inner))
+        return -0.5 * (value @ value + spread + jnp.sum(inverse * bend))
 
-    samples = given.start, given.readings
-    if len(given.start) <= CHUNK:
+    count = len(given.start)
+    parts = -(-count // CHUNK)
+    size = -(-count // parts)
+    # parts of one size, the last sample again and again: another size is compiled once more
+    index = np.minimum(np.arange(parts * size), count - 1)
+    samples = jax.tree.map(lambda values: values[index], (given.start, given.readings))
+    if parts == 1:
         return jnp.sum(jax.vmap(one)(*samples) - volume)
-    parts = jax.lax.map(jax.checkpoint(lambda s: one(*s)), samples, batch_size=CHUNK)
-    return jnp.sum(parts - volume)
+    found = jax.lax.map(jax.checkpoint(lambda s: one(*s)), samples, batch_size=size)
+    return jnp.sum(found[:count] - volume)

@@ -12,9 +12,12 @@ from imuarray.measured.positions import locate
 from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting, normal_motion
 from imuarray.posterior import tuning
+from imuarray.posterior.chains import write_chains
 from imuarray.posterior.likelihood import Likelihood
+from imuarray.posterior.pmmh import checkpoint_beside, run_chains, spread_starts
 from imuarray.posterior.proposals import rate_distribution
 from imuarray.posterior.target import CompiledTarget, GaussianPrior
+from imuarray.provenance import code_digest, digest, stamp
 from imuarray.recording import Recording
 from imuarray.simulation.recordings import simulate_recording, simulate_samples
 from imuarray.streams import stream
@@ -152,3 +155,23 @@ def tuned_experiment(settings: dict, recording: Recording, names, threads: int =
         "most_draws": int(sweeps.draws[-1]),
     }
     return found.target, found.step, record
+
+
+def sample_paired(settings, recording, target, step, transitions, names, path, attrs, threads):
+    """Two chains of ``transitions`` steps; the checkpoint is keyed by config, data and code."""
+    draws = settings["scale"]["draws"]
+    key = digest(
+        settings, recording.specific_force, recording.angular_rate, step, target.draws,
+        code_digest(),
+    )  # fmt: skip
+    checkpoint, seed = checkpoint_beside(path, key), settings["seed"]
+    starts = spread_starts(
+        target.prior.mean, settings["paper2021"]["start_sd"], stream(seed, *names, "starts")
+    )
+    chains = run_chains(
+        target, starts, step, draws, transitions // draws, seed, names,
+        checkpoint=checkpoint, key=key, threads=threads,
+    )  # fmt: skip
+    labels = recording.accelerometer_labels[1:]
+    write_chains(path, chains, labels, target.prior, {**stamp(settings, seed), **attrs})
+    checkpoint.unlink(missing_ok=True)
