@@ -14,10 +14,8 @@ from imuarray.blind.cases import Case, make, matrix
 from imuarray.blind.change import draw_noise, finish, noiseless_readings, noisy_readings
 from imuarray.blind.inject import CATALOGUE, EFFECTS, GAUGE, OUTSIDE
 from imuarray.blind.measured import (
-    ADDED,
     NOT_FROM_READINGS,
-    add,
-    grade_added,
+    hide,
     inject_measured,
     measured_change,
 )
@@ -676,29 +674,26 @@ def test_measured_effects_are_those_of_the_scene_when_readings_are_exact():
             inject_measured(exact, name, (3,), 1e-3, 5)
 
 
-def test_an_added_effect_is_graded():
-    """Truth, and found only where it is named on its own sensor."""
+def test_what_is_hidden_in_a_recording_follows_the_seed():
+    """On one IMU, of what it would show and does not have, twice as large as it must be."""
     there = scene(4, duration=4.0)
     before = as_recording(there, noisy_readings(there, [], np.random.default_rng(3)))
-    for effect in ADDED:
-        changed, truth = add(before, effect, 5)
-        again, same = add(before, effect, 5)
-        np.testing.assert_array_equal(changed.specific_force, again.specific_force)
-        assert truth == same == json.loads(json.dumps(truth))
-        differs = [
-            not np.array_equal(getattr(changed, name)[:, k], getattr(before, name)[:, k])
-            for k in range(8)
-            for name in ("specific_force", "angular_rate")
-        ]
-        own = before.accelerometer_labels.index(truth["sensor"])
-        assert any(differs[2 * own : 2 * own + 2]) and sum(differs) <= 2
-    cause = {"effect": "axis_swap", "sensors": [truth["sensor"]], "indistinguishable_from": [],
-             "heldout_gain_nats": 3.0}  # fmt: skip
-    other = cause | {"effect": "sensor_delay", "sensors": ["all"]}
-    nothing, right = {"causes": []}, {"causes": [cause, other]}
-    found = grade_added(truth, nothing, right)
-    assert found["found"] and found["sensor_right"] and found["others"] == "sensor_delay"
-    assert not grade_added(truth, nothing, {"causes": [other]})["found"]
-    assert grade_added(truth, right, right)["there_before"]
-    wrong = {"causes": [cause | {"sensors": ["all"]}]}
-    assert not grade_added(truth, nothing, wrong)["sensor_right"]
+    sizes = {label: {"x": 1e-3, "y": 2e-3, "z": 4e-3} for label in before.accelerometer_labels}
+    names = "accelerometer_bias", "gyroscope_bias", "gyroscope_scale", "size_effect"
+    document = {
+        "causes": [{"effect": "gyroscope_scale", "indistinguishable_from": ["gyroscope_bias"]}],
+        "detectable": {name: {"units": {}, "sizes": sizes} for name in names},
+    }
+    changed, truth = hide(before, document, 5)
+    again, same = hide(before, document, 5)
+    np.testing.assert_array_equal(changed.specific_force, again.specific_force)
+    assert truth == same == json.loads(json.dumps(truth))
+    [effect] = truth["effects"]
+    assert effect["effect"] == "accelerometer_bias"
+    own = before.accelerometer_labels.index(effect["sensors"][0])
+    moved = np.ptp(changed.specific_force - before.specific_force, axis=0).max(axis=1) > 1e-12
+    error = (changed.specific_force - before.specific_force)[0]
+    assert np.linalg.norm(error[own]) == pytest.approx(4e-3) and not moved.any()
+    assert np.count_nonzero(error.any(axis=1)) == 1
+    np.testing.assert_array_equal(changed.angular_rate, before.angular_rate)
+    assert {hide(before, document, s)[1]["effects"][0]["sensors"][0] for s in range(9)} > {"1"}

@@ -14,7 +14,7 @@ rule buy_causes:
         "results/measured/logs/causes/{name}.log",
     benchmark:
         "results/measured/benchmarks/causes/{name}.tsv"
-    threads: 2
+    threads: 1
     resources:
         mem_mb=4000,
     params:

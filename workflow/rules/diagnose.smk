@@ -1,4 +1,4 @@
-# What the papers' model gets wrong on each measured recording; its own target, `diagnose`.
+# What the papers' model gets wrong on each measured recording; all of them: the target `diagnose`.
 
 
 rule diagnose_recording:
@@ -15,7 +15,7 @@ rule diagnose_recording:
         "results/measured/logs/diagnosis/{name}.log",
     benchmark:
         "results/measured/benchmarks/diagnosis/{name}.tsv"
-    threads: 2
+    threads: 1
     resources:
         mem_mb=8000,
         runtime=60,
@@ -48,64 +48,3 @@ rule diagnosis_agreement:
         "diagnoses of {wildcards.group}, compared"
     script:
         "../scripts/diagnosis_agreement.py"
-
-
-rule add_effect:
-    input:
-        recording=lambda wc: MEASURED.recording(wc.name),
-    output:
-        recording="results/measured/added/{name}/{effect}.nc",
-        truth="results/measured/added/{name}/{effect}.json",
-    log:
-        "results/measured/logs/added/{name}_{effect}.log",
-    benchmark:
-        "results/measured/benchmarks/added/{name}_{effect}.tsv"
-    wildcard_constraints:
-        effect="[a-z_]+",
-    params:
-        settings=lambda wc: {"seed": config["seed"]},
-        code=code("add_effect"),
-    message:
-        "{wildcards.effect} added to {wildcards.name}"
-    script:
-        "../scripts/add_effect.py"
-
-
-use rule diagnose_recording as diagnose_added with:
-    input:
-        recording="results/measured/added/{name}/{effect}.nc",
-    output:
-        diagnosis="results/measured/added/{name}/{effect}/diagnosis.json",
-        report="results/measured/added/{name}/{effect}/report.html",
-    log:
-        "results/measured/logs/added/{name}_{effect}_diagnosis.log",
-    benchmark:
-        "results/measured/benchmarks/added/{name}_{effect}_diagnosis.tsv"
-    wildcard_constraints:
-        effect="[a-z_]+",
-    threads: 1
-    message:
-        "diagnosis of {wildcards.name} with {wildcards.effect} added"
-
-
-rule table_added:
-    input:
-        before="results/measured/diagnosis/{name}/diagnosis.json",
-        truths=lambda wc: expand(
-            "results/measured/added/{{name}}/{effect}.json", effect=added_effects()
-        ),
-        after=lambda wc: expand(
-            "results/measured/added/{{name}}/{effect}/diagnosis.json", effect=added_effects()
-        ),
-    output:
-        **table("added_{name}", folder="results/measured"),
-    log:
-        "results/measured/logs/added/{name}.log",
-    benchmark:
-        "results/measured/benchmarks/added/{name}.tsv"
-    params:
-        **by("figures.blind.table_added"),
-    message:
-        "table: effects added to {wildcards.name}"
-    script:
-        "../scripts/publish.py"

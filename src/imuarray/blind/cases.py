@@ -113,6 +113,25 @@ def make(case: Case, seed: int) -> tuple[Recording, dict]:
     return recording, _truth(scene, case, seed, changes, recording)
 
 
+HIDDEN = ("lever_arms", "drawn", "nothing")
+HIDDEN_SIZES = 12.0, 30.0  # sigma
+
+
+def hidden(which: str, seed: int) -> Case:
+    """One of `HIDDEN`: what is hidden, drawn from ``seed``, the scene and noise alike for all.
+
+    Lever arms are those of all IMUs, of a realistic size; "drawn" is any scalable effect of the
+    catalogue in one IMU.
+    """
+    rng, effects, sigma = stream(seed, "blind", "hidden", which), (), None
+    if which == "lever_arms":
+        effects = (("size_effect", tuple(range(8))),)
+    elif which == "drawn":
+        name = str(rng.choice([name for name in CATALOGUE if EFFECTS[name].scalable]))
+        effects, sigma = ((name, (int(rng.integers(8)),)),), float(rng.uniform(*HIDDEN_SIZES))
+    return Case("hidden", effects, sigma, kind="one" if effects else "clean")
+
+
 def _draw_effect(scene: Scene, case: Case, effect: str, sensors, rng) -> Change:
     """One effect of the case at its size, or at a realistic amplitude."""
     entry = EFFECTS[effect]

@@ -15,14 +15,7 @@ from imuarray.recording import Recording
 from imuarray.streams import stream
 
 NOT_FROM_READINGS = tuple(name for name, entry in EFFECTS.items() if not entry.from_readings)
-# Effects that a good board does not have already; each of the largest realistic size.
-ADDED = (
-    "accelerometer_bias",
-    "accelerometer_nonlinearity",
-    "gyroscope_g_sensitivity",
-    "stale_samples",
-    "axis_swap",
-)
+SHOWN = 2.0  # times the smallest size that a recording shows
 
 
 class MeasuredScene:
@@ -171,46 +164,24 @@ def _rebuilt(recording: Recording, readings: Pair, flags: Pair) -> Recording:
     return replace(recording, **parts)
 
 
-def add(recording: Recording, effect: str, seed: int) -> tuple[Recording, dict]:
-    """The recording with the effect on one IMU, and the truth as plain JSON.
+def hide(recording: Recording, document: dict, seed: int) -> tuple[Recording, dict]:
+    """The recording with an effect on one IMU, drawn from ``seed``, and the truth as plain JSON.
 
-    ValueError as `inject_measured` raises it.
+    ``document``: the recording's own `diagnosis.json`. Any effect that readings suffice for, that
+    it does not have already and that it would show; `SHOWN` times as large as it must be.
     """
-    count = recording.specific_force.shape[1]
-    imu = int(stream(seed, "blind", "added", effect).integers(count))
-    size = float(EFFECTS[effect].high)
-    change = measured_change(recording, effect, (imu,), size, seed)
-    changed = inject_measured(recording, effect, (imu,), size, seed)
-    label = recording.accelerometer_labels[imu]
-    truth = {"effect": effect, "sensor": label, **change.described()}
-    return changed, truth
-
-
-def grade_added(truth: dict, before: dict, after: dict) -> dict:
-    """Is it named after, not before, and on its sensor? Both are `diagnosis.json`.
-
-    ``others``: names that came with it and hold nothing of the truth.
-    """
-    effect, sensor = truth["effect"], truth["sensor"]
-    named = classes(after["causes"])
-    mine = [
-        cause for cause in after["causes"]
-        if effect in (cause["effect"], *cause["indistinguishable_from"])
-    ]  # fmt: skip
-    sensors = sorted({name for cause in mine for name in cause["sensors"]})
-    earlier = classes(before["causes"])
-    return {
-        "effect": effect,
-        "sensor": sensor,
-        "amplitude": truth["amplitude"]["value"],
-        "unit": truth["amplitude"]["unit"],
-        "there_before": effect in earlier,
-        "found": bool(mine),
-        "named": any(cause["effect"] == effect for cause in mine),
-        "sensors": " ".join(sensors),
-        "sensor_right": sensors == [sensor],
-        "gain_nats": sum(cause["heldout_gain_nats"] for cause in mine),
-        "others": " ".join(
-            name for name, members in named.items() if name not in earlier and effect not in members
-        ),
-    }
+    there = set().union(*classes(document["causes"]).values())
+    known = {
+        name: entry for name, entry in document["detectable"].items()
+        if name in EFFECTS and name not in (*NOT_FROM_READINGS, *there) and EFFECTS[name].scalable
+    }  # fmt: skip
+    rng = stream(seed, "blind", "hidden", "measured")
+    effect = str(rng.choice(sorted(known)))
+    label = str(rng.choice(sorted(known[effect]["sizes"])))
+    least = float(np.median(list(known[effect]["sizes"][label].values())))
+    given = recording, effect, (recording.accelerometer_labels.index(label),)
+    drawn = next(iter(measured_change(*given, 1.0, seed).parameters.values()))
+    size = SHOWN * least / float(np.linalg.norm(drawn.value))
+    change = measured_change(*given, size, seed)
+    truth = {"effect": effect, "sensors": [label], "least": least, **change.described()}
+    return inject_measured(*given, size, seed), {"effects": [truth]}

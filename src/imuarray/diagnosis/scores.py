@@ -58,6 +58,19 @@ class Conditional(NamedTuple):
     of: np.ndarray
 
 
+class Seen(NamedTuple):
+    """Of a candidate's k parameters, scaled, the d directions that a recording sees.
+
+    The information along them ``values`` (d,), themselves ``vectors`` (k, d), the parameters'
+    ``scale`` (k,) and the inverse of the score's covariance along them, ``precision`` (d, d).
+    """
+
+    values: np.ndarray
+    vectors: np.ndarray
+    scale: np.ndarray
+    precision: np.ndarray
+
+
 def variants(effect: str) -> tuple[str, ...]:
     """The forms an effect is tested in."""
     return tuple(name for name, _ in EFFECTS[effect].forms) or ("",)
@@ -146,20 +159,27 @@ class Information:
 
     def test(self, conditional: Conditional, chosen):
         """(chi-square, degrees of freedom) of the parameters at ``chosen`` places."""
-        information, score, meat, of = conditional
+        seen = self.seen(conditional, chosen)
+        mine = np.searchsorted(conditional.of, chosen)
+        along = seen.vectors.T @ (conditional.score[mine] / seen.scale)
+        return float(along @ seen.precision @ along), len(seen.values)
+
+    def seen(self, conditional: Conditional, chosen) -> Seen:
+        """The directions that are seen of the parameters at ``chosen`` places."""
+        information, _, meat, of = conditional
         mine = np.searchsorted(of, chosen)
         block = information[np.ix_(mine, mine)]
         values, vectors, scale = scaled_eigh(block, self.scale[chosen])
         # a parameter stays within its prior: near a gauge, data alone would take it anywhere
         ridge = vectors.T @ ((self.usual[chosen] / scale**2)[:, None] * vectors)
         seen = values > np.maximum(SETTINGS.seen, np.diag(ridge))
-        along, ridge = vectors[:, seen].T @ (score[mine] / scale), ridge[np.ix_(seen, seen)]
+        values, vectors, ridge = values[seen], vectors[:, seen], ridge[np.ix_(seen, seen)]
         if meat is information:
-            spread = np.diag(values[seen])
+            spread = np.diag(values)
         else:
-            spread = vectors[:, seen].T @ (meat[np.ix_(mine, mine)] / np.outer(scale, scale))
-            spread = spread @ vectors[:, seen]
-        return float(along @ scaled_inverse(spread + ridge) @ along), int(seen.sum())
+            spread = meat[np.ix_(mine, mine)] / np.outer(scale, scale)
+            spread = vectors.T @ spread @ vectors
+        return Seen(values, vectors, scale, scaled_inverse(spread + ridge))
 
 
 def information_at(fit: Fit) -> Information:

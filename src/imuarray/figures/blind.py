@@ -9,7 +9,6 @@ from matplotlib.ticker import NullFormatter
 from imuarray.blind import summary
 from imuarray.blind.criteria import criteria
 from imuarray.blind.inject import CATALOGUE
-from imuarray.blind.measured import grade_added
 from imuarray.blind.summary import ALL, CRASH, NOTHING, UNEXPLAINED
 from imuarray.figures.style import (
     BLACK,
@@ -79,17 +78,6 @@ GAIN = (
     ),
     Column("extended_coverage", "extended (%)", r"extended (\%)", "{:.1f}", 100.0),
 )  # fmt: skip
-
-ADDED = (
-    Column("effect", "added effect", "effect"),
-    Column("amplitude", "size", "size", "{:.3g}"),
-    Column("unit", "unit", "unit"),
-    Column("sensor", "on IMU", "IMU"),
-    Column("found", "found", "found"),
-    Column("sensors", "named on IMU", "named on"),
-    Column("gain_nats", "held-out gain (nats)", "gain", "{:.3g}"),
-    Column("others", "other new names", "others"),
-)
 
 
 def words(name: str) -> str:
@@ -267,23 +255,6 @@ def _separate(axes, lines, columns) -> None:
             axes.axhline(last + 0.5, color=BLACK, linewidth=0.8, zorder=4)
             axes.annotate(text, (1.005, 1 - ((first + last) / 2 + 0.5) / len(lines)),
                           xycoords="axes fraction", size=6, rotation=-90, va="center")  # fmt: skip
-
-
-def table_added(before: dict, truths: list[dict], after: list[dict], name: str):
-    """Effects added to the recording ``name``: found on top of what is there?
-
-    ``before``: the diagnosis of the recording as it is; ``truths``, ``after``: what was added, and
-    the diagnosis then.
-    """
-    pairs = zip(truths, after, strict=True)
-    table = pd.DataFrame([grade_added(truth, before, found) for truth, found in pairs])
-    table["found"] = table.found.map(YES_NO)
-    note = (
-        f"Recording {name}; each effect alone, of its largest realistic size, added to one IMU's"
-        " readings. Found: named, or among what the named one is indistinguishable from; other new"
-        " names are causes that the recording as it is does not have."
-    )
-    return table, ADDED, "Effects added to a measured recording.", [note]
 
 
 def table_blind_bars(rows: dict, settings: dict):

@@ -11,11 +11,19 @@ from imuarray.figures.style import write_figure, write_table
 from imuarray.posterior.chains import read_chains
 from imuarray.recording import array_of, load_dataset, read_recording
 
+
+def _diagnosis(path: str) -> tuple[dict, dict[str, pd.DataFrame]]:
+    """diagnosis.json, and the tables beside it by name."""
+    tables = {each.stem: pd.read_csv(each) for each in Path(path).parent.glob("*.csv")}
+    return json.loads(Path(path).read_text(encoding="utf-8")), tables
+
+
 # by an input's name, or else by its ending
 READERS = {
     "chains": read_chains,
     "recordings": lambda path: array_of(read_recording(path)),
     "located": load_dataset,
+    **dict.fromkeys(("diagnosis", "diagnoses", "controls"), _diagnosis),
     ".csv": pd.read_csv,
     ".json": lambda path: json.loads(Path(path).read_text(encoding="utf-8")),
 }

@@ -32,7 +32,8 @@ def bought(recording: Recording) -> pd.DataFrame:
     Columns step, accelerometer, axis, mean_m, sd_m; and of the step residual_ratio (rms residual
     over the declared noise), smooth_ratio (the same of smooth samples, median of all triads, as
     `Estimate.smooth_ratio`), nats and nats_error (a sample, on held-out time, what is new in it
-    over the step that it extends; NaN where that is another noise), converged.
+    over the step that it extends; NaN where that is another noise), converged; and
+    common_scale_sd of the recording's gyroscopes, whose square the array's size follows.
     """
     readings = arrange(recording, sparse=True)
     readings = most_informative(readings.select(determined(readings, 1)), lambda text: None)
@@ -49,6 +50,7 @@ def bought(recording: Recording) -> pd.DataFrame:
             "smooth_ratio": np.nan if smooth is None else np.median(smooth),
             "nats": gain[0] / len(readings.time),
             "nats_error": gain[1] / len(readings.time), "converged": found.converged,
+            "common_scale_sd": recording.gyroscope_common_scale_sd,
         }))  # fmt: skip
     return pd.concat(parts, ignore_index=True)
 
@@ -88,7 +90,8 @@ def repeated(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
 
     ``tables`` {recording: `bought`}. Differences of all pairs: rms_m, median_m, covered (share in
     95 % intervals), same_size_rms_m (each array brought to the mean size); size_sd (relative, of
-    the arrays' sizes); medians over recordings of residual_ratio, smooth_ratio and nats.
+    the arrays' sizes); common_size_m (rms of the coordinates' error by a scale that all share);
+    medians over recordings of residual_ratio, smooth_ratio and nats.
     """
     whole = pd.concat([table.assign(recording=name) for name, table in tables.items()])
     rows = []
@@ -104,6 +107,7 @@ def repeated(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
             "step": step, "model": STEPS[step], "recordings": len(wide),
             "rms_m": _rms(between.difference_m), "median_m": between.difference_m.abs().median(),
             "same_size_rms_m": _rms(pairwise(alike).difference_m),
+            "common_size_m": 2 * part.common_scale_sd.median() * _rms(mean),
             "size_sd": size.std(ddof=1), "covered": np.mean(between.z.abs() < 1.96),
             "residual_ratio": each.residual_ratio.first().median(),
             "smooth_ratio": each.smooth_ratio.first().median(),

@@ -35,12 +35,12 @@ PLACES = {
     "blind_confusion": ("blind/{scale}/figures/{name}", "blind"),
     "blind_bars": ("blind/{scale}/tables/{name}", "blind"),
     "diagnosis_(?:positions|parameters|recordings)_.*": ("measured/tables/{name}", "measured"),
-    "added_.*|(?:causes|experiment|past_rail)_table_.*|left_out_.*": (
+    "(?:causes|experiment|past_rail)_table_.*|left_out_.*": (
         "measured/tables/{name}", "measured"
     ),
     "diagnosis_.*|past_rail_.*|causes_.*|experiment_.*": ("measured/figures/{name}", "measured"),
     "cause_.*": ("", "measured"),
-    "measured_.*": ("", "measured"),
+    "measured_.*|criticism.*": ("", "measured"),
 }  # fmt: skip
 
 

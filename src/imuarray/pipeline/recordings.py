@@ -108,7 +108,24 @@ class Recordings:
         if group in self.groups():
             copies["measured_agreement"] = f"figures/agreement_{group}"
             copies["measured_agreement_table"] = f"tables/agreement_{group}"
+        names = [f"criticism{end}" for end in ("", "_hidden") if self.is_criticised or end]
+        copies |= {each: f"figures/{each}" for each in names}
+        copies |= {f"{each}_table": f"tables/{each}_table" for each in names}
         return copies
+
+    @property
+    def is_criticised(self) -> bool:
+        """Whether the recording shown has others of its board, all calibrated from still poses."""
+        group = self.group(self.shown)
+        return group in self.groups() and self.shown in self.board(group)
+
+    def hidden(self) -> list[str]:
+        """What effects are hidden in: simulated recordings, and the one that is shown."""
+        return ["lever_arms", "drawn", *["measured"] * self.is_criticised]
+
+    def control(self, hidden: str) -> str:
+        """The folder of the diagnosis without the hidden effect."""
+        return f"diagnosis/{self.shown}" if hidden == "measured" else "hidden/nothing"
 
     def published_names(self, folder: str) -> list[str]:
         """Those of them that are "figures", or "tables"."""
@@ -123,6 +140,6 @@ class Recordings:
         kinds |= {f"{part}_{name}": FIGURE for part in ("experiment", "past_rail")}
         kinds |= {f"{part}_table_{group}": TABLE for part in ("causes", "experiment", "past_rail")}
         return kinds | {
-            f"left_out_{group}": TABLE, f"added_{last}": TABLE,
+            f"left_out_{group}": TABLE,
             f"cause_sensor_clock_{last}": FIGURE,
         }  # fmt: skip

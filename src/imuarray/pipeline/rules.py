@@ -78,13 +78,6 @@ class CoreBudget:
         return self.scales[scale]["parts"] if study == "samples" else 1
 
 
-def added_effects() -> tuple[str, ...]:
-    """Effects that are added to measured recordings; slow to import, so only where asked for."""
-    from imuarray.blind.measured import ADDED
-
-    return tuple(ADDED)
-
-
 def contents(*paths: str) -> list[str]:
     """SHA-256 of files outside the pipeline: a parameter that changes when one does."""
     files = [Path(path) for path in paths]

@@ -1,0 +1,66 @@
+"""How small an effect a recording would have shown: minimal detectable bias (Baarda 1968)."""
+
+import numpy as np
+from scipy import special
+
+from imuarray.diagnosis.scores import Information, candidates, mask_of
+from imuarray.diagnosis.settings import SETTINGS
+from imuarray.diagnosis.state import Search
+from imuarray.engine.parameters import Columns
+from imuarray.model.array_model import component, unit_of
+
+POWER = 0.8  # chance to be named of an effect of the size that is stated
+
+
+def detectable(search: Search) -> dict[str, dict]:
+    """Sizes that would be named with `POWER`, of what is not adopted, one parameter at a time.
+
+    ``{effect: {"units": {parameter: unit}, "sizes": {sensor: {parameter: size}}}}``; parameters
+    that motion or positions take up are left out, as are effects that a scan looks for.
+    From the score test's noncentral chi-square: with the score's slope M, the inverse covariance
+    W along the directions seen and the least noncentrality that passes the level and the share of
+    the misfit that a cause must explain, size_i^2 = lambda / (M W M)_ii.
+    """
+    given, columns = search.given, search.columns
+    active = given.places(search.active)
+    conditional = given.conditional(active)
+    found: dict[str, dict] = {}
+    tried = candidates(columns, search.readings.exists, search.effects)
+    for candidate in tried:
+        mask = mask_of(columns, candidate)
+        chosen = np.setdiff1d(given.places(mask), active)
+        if len(candidate.imus) > 1 or not len(chosen):
+            continue
+        seen = given.seen(conditional, chosen)
+        tests = sum(other.effect == candidate.effect and not other.whole for other in tried)
+        least = max(noncentrality(search, candidate.effect, tests, len(seen.values)), search.least)
+        slope = (seen.vectors * seen.values) @ np.linalg.cholesky(seen.precision)
+        shown = np.sum(slope**2, axis=1)
+        sizes = np.sqrt(least / np.maximum(shown, 1e-30)) / seen.scale
+        label = search.readings.labels[candidate.imus[0]]
+        entry = found.setdefault(candidate.effect, {"units": {}, "sizes": {}})
+        own = entry["sizes"].setdefault(label, {})
+        for place, size, share in zip(
+            _places(given, columns, mask, chosen), sizes, shown, strict=True
+        ):
+            name = component(candidate.effect, place)
+            if share > SETTINGS.seen:  # of the parameter's own information
+                own[name] = min(float(size), own.get(name, np.inf))
+                entry["units"][name] = unit_of(candidate.effect, place)
+    return {effect: entry for effect, entry in found.items() if entry["units"]}
+
+
+def noncentrality(search: Search, effect: str, tests: int, freedom: int) -> float:
+    """That of a chi-square which passes the effect's critical value with `POWER`.
+
+    ``tests`` of the effect, of its IMUs and forms, all of which are allowed for.
+    """
+    log_p = SETTINGS.limit(effect, search.causes) - np.log(2 * max(tests, 1))
+    critical = special.chdtri(max(freedom, 1), np.exp(log_p))
+    return float(special.chndtrinc(critical, max(freedom, 1), 1 - POWER))
+
+
+def _places(given: Information, columns: Columns, mask, chosen) -> list[tuple[int, ...]]:
+    """Where in its effect each of the parameters at ``chosen`` places is."""
+    where = {int(given.index[k, column]): column for k, column in np.argwhere(mask)}
+    return [columns.places[where[int(place)]] for place in chosen]
