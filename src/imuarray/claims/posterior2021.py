@@ -174,7 +174,7 @@ def flat_prior(results):
     errors = {t: error / sd for t, (_, sd, error) in found.items()}
     percent = by_samples({t: 100 * mean for t, (mean, _, _) in found.items()}, 2)
     remark = (
-        f"our test of an unstated consequence: size off by {percent} %: |H'QH|^(-1/2) of every"
+        f"our test of an unstated consequence: size off by {percent} %: |H'ΛH|^(-1/2) of every"
         " sample pulls the array together, by a distance that does not fall with T"
         " (docs/findings.md)"
     )

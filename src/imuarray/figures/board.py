@@ -201,10 +201,10 @@ def _draw_causes(summary, footer):
     rows = np.arange(len(summary))[::-1]
     series = (("rms_m", "rms"), ("same_size_rms_m", "rms, at one size"), ("median_m", "median"))
     for number, (column, label) in enumerate(series):
-        panels[0].plot(1e6 * summary[column], rows, label=label, markersize=4, **look(number))
-    panels[1].plot(100 * summary.size_sd, rows, markersize=4, **look(3))
-    panels[2].plot(summary.residual_ratio, rows, label="all", markersize=4, **look(4))
-    panels[2].plot(summary.smooth_ratio, rows, label="smooth", markersize=4, **look(5))
+        panels[0].plot(1e6 * summary[column], rows, label=label, **_points(number))
+    panels[1].plot(100 * summary.size_sd, rows, **_points(3))
+    panels[2].plot(summary.residual_ratio, rows, label="all", **_points(4))
+    panels[2].plot(summary.smooth_ratio, rows, label="smooth", **_points(5))
     titles = "differences between recordings (µm)", "sd of the size (%)", "residual / still noise"
     for axes, title in zip(panels, titles, strict=True):
         axes.set(xscale="log", xlabel=title)
@@ -215,3 +215,8 @@ def _draw_causes(summary, footer):
     for axes in panels[::2]:
         axes.legend()
     return figure
+
+
+def _points(number: int) -> dict:
+    """No line: a row extends one above it, but not always the last."""
+    return look(number, "linestyle") | {"linestyle": "", "markersize": 4}

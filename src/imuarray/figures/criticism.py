@@ -96,14 +96,16 @@ def _causes(document: dict) -> pd.DataFrame:
     """A row a cause: sensors, mean, rms and median sd of the parameters that have one, its gain."""
     rows = []
     for cause in document["causes"]:
-        items = [item for item in cause["parameters"].values() if item["sd"]]
-        values, sds = (np.array([item[key] for item in items]) for key in ("value", "sd"))
-        sizes = {"mean": values.mean(), "rms": np.sqrt(np.mean(values**2)), "sd": np.median(sds)}
-        rows.append({
+        row = {
             "effect": cause["effect"], "sensors": " ".join(cause["sensors"]),
-            "unit": items[0]["unit"] if items else "", **(sizes if items else {}),
             "nats": cause["heldout_gain_nats"], "nats_error": cause["heldout_gain_se"],
-        })  # fmt: skip
+        }  # fmt: skip
+        items = [item for item in cause["parameters"].values() if item["sd"]]
+        if items:
+            values, sds = (np.array([item[key] for item in items]) for key in ("value", "sd"))
+            row |= {"unit": items[0]["unit"], "mean": values.mean(), "rms": _rms(values),
+                    "sd": np.median(sds)}  # fmt: skip
+        rows.append(row)
     return pd.DataFrame(rows)
 
 
@@ -332,7 +334,7 @@ def _draw_residuals(axes, rows) -> None:
             some = each[each.model == model]
             axes.plot(some.imu.astype(str), some.rms, **look(number, "linestyle"), linestyle="",
                       label=f"{kind}s, {MODELS[model]}", **fill)  # fmt: skip
-    axes.set(xlabel="IMU", ylabel="residual / noise")
+    axes.set(xlabel="IMU", ylabel="residual / noise", ylim=(0, 1.7 * rows.rms.max()))
     axes.legend(fontsize=6)
 
 
