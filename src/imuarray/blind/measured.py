@@ -164,16 +164,18 @@ def _rebuilt(recording: Recording, readings: Pair, flags: Pair) -> Recording:
     return replace(recording, **parts)
 
 
-def hide(recording: Recording, document: dict, seed: int) -> tuple[Recording, dict]:
+def hide(
+    recording: Recording, document: dict, seed: int, times: float = SHOWN, effects=EFFECTS
+) -> tuple[Recording, dict]:
     """The recording with an effect on one IMU, drawn from ``seed``, and the truth as plain JSON.
 
-    ``document``: the recording's own `diagnosis.json`. Any effect that readings suffice for, that
-    it does not have already and that it would show; `SHOWN` times as large as it must be.
+    ``document``: the recording's own `diagnosis.json`. Any of ``effects`` that readings suffice
+    for, that it does not have already and that it would show; ``times`` as large as it must be.
     """
     there = set().union(*classes(document["causes"]).values())
     known = {
         name: entry for name, entry in document["detectable"].items()
-        if name in EFFECTS and name not in (*NOT_FROM_READINGS, *there) and EFFECTS[name].scalable
+        if name in effects and name not in (*NOT_FROM_READINGS, *there) and EFFECTS[name].scalable
     }  # fmt: skip
     rng = stream(seed, "blind", "hidden", "measured")
     effect = str(rng.choice(sorted(known)))
@@ -181,7 +183,7 @@ def hide(recording: Recording, document: dict, seed: int) -> tuple[Recording, di
     least = float(np.median(list(known[effect]["sizes"][label].values())))
     given = recording, effect, (recording.accelerometer_labels.index(label),)
     drawn = next(iter(measured_change(*given, 1.0, seed).parameters.values()))
-    size = SHOWN * least / float(np.linalg.norm(drawn.value))
+    size = times * least / float(np.linalg.norm(drawn.value))
     change = measured_change(*given, size, seed)
     truth = {"effect": effect, "sensors": [label], "least": least, **change.described()}
     return inject_measured(*given, size, seed), {"effects": [truth]}

@@ -1,9 +1,12 @@
 """How small an effect a recording would have shown: minimal detectable bias (Baarda 1968)."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy import special
 
-from imuarray.diagnosis.scores import Information, candidates, mask_of
+from imuarray.diagnosis.adoption import tried
+from imuarray.diagnosis.scores import Information, mask_of
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Search
 from imuarray.engine.parameters import Columns
@@ -25,14 +28,14 @@ def detectable(search: Search) -> dict[str, dict]:
     active = given.places(search.active)
     conditional = given.conditional(active)
     found: dict[str, dict] = {}
-    tried = candidates(columns, search.readings.exists, search.effects)
-    for candidate in tried:
+    candidates = tried(replace(search, refused=frozenset()))
+    for candidate in candidates:
         mask = mask_of(columns, candidate)
         chosen = np.setdiff1d(given.places(mask), active)
         if len(candidate.imus) > 1 or not len(chosen):
             continue
         seen = given.seen(conditional, chosen)
-        tests = sum(other.effect == candidate.effect and not other.whole for other in tried)
+        tests = sum(other.effect == candidate.effect and not other.whole for other in candidates)
         least = max(noncentrality(search, candidate.effect, tests, len(seen.values)), search.least)
         slope = (seen.vectors * seen.values) @ np.linalg.cholesky(seen.precision)
         shown = np.sum(slope**2, axis=1)

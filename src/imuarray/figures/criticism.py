@@ -18,6 +18,7 @@ from imuarray.figures.style import (
     panels,
     styled,
 )
+from imuarray.geometry import Array
 
 KINDS = {"specific_force": "accelerometers", "angular_rate": "gyroscopes"}
 STEPS = {  # of `measured.causes.STEPS`
@@ -69,18 +70,14 @@ def _digits(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _against_acceleration(summary: pd.DataFrame, noise: pd.DataFrame) -> pd.DataFrame:
-    """x in 10^3 deg/s^2; rms, least and largest over the IMUs, in sds of the still noise."""
-    ratio = noise.assign(triad=noise.triad.astype(str)).groupby(["sensor", "triad"]).ratio
-    still = np.sqrt(ratio.apply(lambda each: np.mean(each**2)))
+    """x in 10^3 deg/s^2; rms, least and largest over the IMUs, over the noise of still poses."""
+    still = noise.groupby("sensor").ratio.apply(_rms)
     chosen = summary[summary["by"] == "angular_acceleration"]
-    keys = pd.MultiIndex.from_arrays([chosen.quantity, chosen.triad.astype(str)])
     # the simulation has the noise that was declared
-    scale = np.where(chosen.source == "measured", still.reindex(keys).to_numpy(), 1.0)
+    scale = np.where(chosen.source == "measured", chosen.quantity.map(still), 1.0)
     chosen = chosen.assign(size=chosen.rms / scale)
     chosen["x"] = np.degrees(chosen.bin_low + chosen.bin_high) / 2e3
-    rows = chosen.groupby(["source", "quantity", "x"])["size"].agg(
-        y=lambda each: np.sqrt(np.mean(each**2)), low="min", high="max"
-    )
+    rows = chosen.groupby(["source", "quantity", "x"])["size"].agg(y=_rms, low="min", high="max")
     return rows.reset_index()
 
 
@@ -101,10 +98,11 @@ def _causes(document: dict) -> pd.DataFrame:
             "nats": cause["heldout_gain_nats"], "nats_error": cause["heldout_gain_se"],
         }  # fmt: skip
         items = [item for item in cause["parameters"].values() if item["sd"]]
-        if items:
+        if len({item["unit"] for item in items}) == 1:
             values, sds = (np.array([item[key] for item in items]) for key in ("value", "sd"))
-            row |= {"unit": items[0]["unit"], "mean": values.mean(), "rms": _rms(values),
-                    "sd": np.median(sds)}  # fmt: skip
+            alike = abs(values.mean()) > 0.5 * _rms(values)
+            row |= {"unit": items[0]["unit"], "mean": values.mean() if alike else np.nan,
+                    "rms": _rms(values), "sd": np.median(sds)}  # fmt: skip
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -124,7 +122,9 @@ def _draw(table, footer):
 
 def _letters(axes) -> None:
     for letter, one in zip("abcd", axes, strict=True):
-        one.set_title(f"({letter}) {one.get_title()}", size=7.5)
+        said = one.get_title()
+        one.set_title("")
+        one.set_title(f"({letter}) {said}", size=7, loc="right")
 
 
 def _draw_wrong(axes, rows) -> None:
@@ -140,9 +140,9 @@ def _draw_wrong(axes, rows) -> None:
     logarithmic(axes, "angular acceleration (10³ deg/s²)", "residual / noise")
     axes.xaxis.set_major_formatter("{x:g}")
     axes.xaxis.set_minor_formatter("")
-    axes.legend(fontsize=6, loc="center left")
+    axes.legend(fontsize=6, loc="lower center", bbox_to_anchor=(0.5, 0.15))
     measured = rows[rows.source == "measured"].y
-    axes.set_title(f"Wrong: up to {measured.max():.0f} × the noise")
+    axes.set_title(f"Wrong: up to {measured.max():.0f} × noise")
 
 
 def _draw_clock(axes, rows, causes) -> None:
@@ -152,11 +152,11 @@ def _draw_clock(axes, rows, causes) -> None:
         axes.plot(some.x, some.model, color=BLACK, linewidth=0.8)
     imu = rows.title.iloc[0].split(",")[0]
     axes.set(xlabel=f"turns of {imu}'s clock", ylabel="age of a reading (ms)")
-    axes.set_title("Cause: each chip has its own clock")
+    axes.set_title("Cause: a clock in each chip")
     lag = causes[causes.effect == "gyroscope_delay"]
     if len(lag):
         value, sd = 1e3 * lag["mean"].iloc[0], 1e3 * lag.sd.iloc[0]
-        said = f"gyroscopes {abs(value):.2f} ± {sd:.2f} ms {'early' if value < 0 else 'late'}"
+        said = f"gyroscopes {abs(value):.2f} ± {sd:.2f} ms {'ahead' if value > 0 else 'behind'}"
         axes.text(0.04, 0.04, said, size=6, transform=axes.transAxes)
 
 
@@ -174,7 +174,7 @@ def _draw_extended(axes, rows) -> None:
     axes.yaxis.set_major_formatter("{x:g}")
     _models(axes, rows.model)
     axes.legend(fontsize=6)
-    axes.set_title(f"Extended: {rows.smooth.iloc[0]:.0f} to {rows.smooth.iloc[-1]:.2g}, smooth")
+    axes.set_title(f"Extended: {rows.smooth.iloc[0]:.0f} to {rows.smooth.iloc[-1]:.2g} × noise")
 
 
 def _draw_gained(axes, rows, said: str, ylabel: str) -> None:
@@ -215,11 +215,11 @@ CRITICISM = (
 
 def table_criticism(
     summary: pd.DataFrame, noise: pd.DataFrame, diagnosis: tuple, causes: pd.DataFrame,
-    predicted: pd.DataFrame, recordings: list, name: str, group: str,
+    predicted: pd.DataFrame, recordings: Array, name: str, group: str,
 ):  # fmt: skip
     """The four steps and what is left, a row each; arguments of `figure_criticism`.
 
-    ``recordings``: arrays as the recordings declare them.
+    ``recordings``: the array as the recording declares it.
     """
     wrong = _against_acceleration(summary, noise)
     force, rate = (wrong[(wrong.source == "measured") & (wrong.quantity == q)] for q in KINDS)
@@ -227,8 +227,7 @@ def table_criticism(
     lag, clock = found.loc["gyroscope_delay"], found.loc["sensor_clock"]
     last, first = (causes.set_index("step").loc[key] for key in ("common arms", "normal"))
     board = predicted.set_index("model").loc["board"]
-    arms = np.linalg.norm(recordings[0].relative[1:], axis=1)
-    turned = 1e6 * np.radians(0.1) * np.array([arms.min(), arms.max()])
+    turned = 1e6 * np.radians(0.1) * np.linalg.norm(recordings.relative, axis=1).max()
     several = f"{first.recordings:.0f} recordings of {group}"
     rows = (
         ("What is wrong? Residual over noise, fastest eighth of the samples",
@@ -236,8 +235,8 @@ def table_criticism(
          f"IMUs: {force.low.iloc[-1]:.0f} to {force.high.iloc[-1]:.0f},"
          f" {rate.low.iloc[-1]:.0f} to {rate.high.iloc[-1]:.0f}", name),
         ("Why? Each chip reads on its own clock, gyroscopes run ahead",
-         "one instant for all readings", f"clocks of 1 ms; {-1e3 * lag['mean']:.2f} ms ahead",
-         f"± {1e3 * lag.sd:.2f} ms; clocks +{clock.nats / 1e3:.0f} thousand nats", name),
+         "one instant for all readings", f"clocks of 1 ms; {1e3 * lag['mean']:.2f} ms ahead",
+         f"± {1e3 * lag.sd:.2f} ms; clocks +{clock.nats:.0f} nats", name),
         ("Extended: residual over noise, smooth and fast samples", f"{first.smooth_ratio:.1f}",
          f"{last.smooth_ratio:.2f}", "median", several),
         ("Gained: difference between recordings; nats a sample on a recording left out",
@@ -246,14 +245,14 @@ def table_criticism(
          f"{several}; {name} left out"),
         ("Left over: all samples, shocks with them; and what no agreement shows",
          f"{first.residual_ratio:.0f} × the noise", f"{last.residual_ratio:.0f} × the noise",
-         f"size, common to all: {1e6 * last.common_size_m:.0f} µm; frame: {turned[0]:.0f} to"
-         f" {turned[1]:.0f} µm for 0.1 degree", several),
+         f"size, common to all: {1e6 * last.common_size_m:.0f} µm rms; frame: up to"
+         f" {turned:.0f} µm for 0.1 degree", several),
     )  # fmt: skip
     table = pd.DataFrame(rows, columns=[column.name for column in CRITICISM])
     return table, CRITICISM, "What the papers' model gets wrong on a real board", []
 
 
-def figure_criticism_hidden(diagnosis: tuple, truth: dict, recordings):
+def figure_criticism_hidden(diagnosis: tuple, truth: dict, recordings: Array):
     """The same four panels where the truth is known: lever arms hidden in a simulated recording.
 
     ``diagnosis`` (diagnosis.json, tables); ``truth``: what `blind.cases.make` says;
