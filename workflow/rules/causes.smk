@@ -44,23 +44,6 @@ rule repeat_causes:
         "../scripts/repeat_causes.py"
 
 
-rule figure_causes:
-    input:
-        summary="results/measured/causes_{group}.csv",
-    output:
-        **figure("causes_{group}", "Diagnosis", caption="causes", folder="results/measured"),
-    log:
-        "results/measured/logs/figures/causes_{group}.log",
-    benchmark:
-        "results/measured/benchmarks/figures/causes_{group}.tsv"
-    params:
-        **by("figures.board.figure_causes"),
-    message:
-        "figure: what each cause buys on {wildcards.group}"
-    script:
-        "../scripts/publish.py"
-
-
 rule table_causes:
     input:
         summary="results/measured/causes_{group}.csv",

@@ -1,22 +1,20 @@
 """How small an effect a recording would have shown: minimal detectable bias (Baarda 1968)."""
 
-from dataclasses import replace
-
 import numpy as np
 from scipy import special
 
-from imuarray.diagnosis.adoption import tried
-from imuarray.diagnosis.scores import Information, mask_of
+from imuarray.diagnosis.scores import Information, candidates, mask_of
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Search
 from imuarray.engine.parameters import Columns
 from imuarray.model.array_model import component, unit_of
+from imuarray.model.effects import EFFECTS
 
 POWER = 0.8  # chance to be named of an effect of the size that is stated
 
 
 def detectable(search: Search) -> dict[str, dict]:
-    """Sizes that would be named with `POWER`, of what is not adopted, one parameter at a time.
+    """Sizes that would be named with `POWER`, one parameter at a time, all else refitted.
 
     ``{effect: {"units": {parameter: unit}, "sizes": {sensor: {parameter: size}}}}``; parameters
     that motion or positions take up are left out, as are effects that a scan looks for.
@@ -26,16 +24,16 @@ def detectable(search: Search) -> dict[str, dict]:
     """
     given, columns = search.given, search.columns
     active = given.places(search.active)
-    conditional = given.conditional(active)
+    inside = {part for c in search.causes for part in EFFECTS[c.effect].contains}
+    every = candidates(columns, search.readings.exists, set(search.effects) - inside)
     found: dict[str, dict] = {}
-    candidates = tried(replace(search, refused=frozenset()))
-    for candidate in candidates:
+    for candidate in sorted(every, key=lambda each: search.effects.index(each.effect)):
         mask = mask_of(columns, candidate)
-        chosen = np.setdiff1d(given.places(mask), active)
+        chosen = np.sort(given.places(mask))
         if len(candidate.imus) > 1 or not len(chosen):
             continue
-        seen = given.seen(conditional, chosen)
-        tests = sum(other.effect == candidate.effect and not other.whole for other in candidates)
+        seen = given.seen(given.conditional(np.setdiff1d(active, chosen), of=chosen), chosen)
+        tests = sum(each.effect == candidate.effect and not each.whole for each in every)
         least = max(noncentrality(search, candidate.effect, tests, len(seen.values)), search.least)
         slope = (seen.vectors * seen.values) @ np.linalg.cholesky(seen.precision)
         shown = np.sum(slope**2, axis=1)
@@ -43,9 +41,8 @@ def detectable(search: Search) -> dict[str, dict]:
         label = search.readings.labels[candidate.imus[0]]
         entry = found.setdefault(candidate.effect, {"units": {}, "sizes": {}})
         own = entry["sizes"].setdefault(label, {})
-        for place, size, share in zip(
-            _places(given, columns, mask, chosen), sizes, shown, strict=True
-        ):
+        places = _places(given, columns, mask, chosen)
+        for place, size, share in zip(places, sizes, shown, strict=True):
             name = component(candidate.effect, place)
             if share > SETTINGS.seen:  # of the parameter's own information
                 own[name] = min(float(size), own.get(name, np.inf))

@@ -1,11 +1,8 @@
 """A measured board under the sensor model: what each cause buys, prediction, past the rail."""
 
-from functools import partial
-
 import numpy as np
 import pandas as pd
 import xarray as xr
-from matplotlib.ticker import LogLocator, NullFormatter
 
 from imuarray.figures.style import (
     PAGE,
@@ -179,44 +176,3 @@ def table_left_out(tables: list[pd.DataFrame], names: list[str], group: str):
         " error between blocks. Last: what a fit of all parameters to the recording has beyond."
     )
     return pd.DataFrame(rows), LEFT_OUT, "Recordings predicted by the others", [note]
-
-
-def figure_causes(summary: pd.DataFrame, group: str):
-    """What each cause buys: repeatability, size and residual, a row a model.
-
-    ``summary``: `measured.causes.repeated` of the board ``group``.
-    """
-    footer = [
-        f"{summary.recordings.max()} recordings of board {group}, differences of all pairs in all"
-        " coordinates. Residual over the noise of still poses: rms of all samples, outliers with"
-        " them; robust, of the fifth of least jerk among those with most angular acceleration."
-    ]
-    return partial(_draw_causes, footer=footer), summary
-
-
-@styled
-def _draw_causes(summary, footer):
-    figure = new_figure(footer, PAGE, 2.9)
-    panels = figure.subplots(1, 3, sharey=True, width_ratios=(2, 1, 1))
-    rows = np.arange(len(summary))[::-1]
-    series = (("rms_m", "rms"), ("same_size_rms_m", "rms, at one size"), ("median_m", "median"))
-    for number, (column, label) in enumerate(series):
-        panels[0].plot(1e6 * summary[column], rows, label=label, **_points(number))
-    panels[1].plot(100 * summary.size_sd, rows, **_points(3))
-    panels[2].plot(summary.residual_ratio, rows, label="all", **_points(4))
-    panels[2].plot(summary.smooth_ratio, rows, label="smooth", **_points(5))
-    titles = "differences between recordings (µm)", "sd of the size (%)", "residual / still noise"
-    for axes, title in zip(panels, titles, strict=True):
-        axes.set(xscale="log", xlabel=title)
-        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axes.xaxis.set_major_formatter("{x:g}")
-        axes.xaxis.set_minor_formatter(NullFormatter())
-    panels[0].set_yticks(rows, summary.model)
-    for axes in panels[::2]:
-        axes.legend()
-    return figure
-
-
-def _points(number: int) -> dict:
-    """No line: a row extends one above it, but not always the last."""
-    return look(number, "linestyle") | {"linestyle": "", "markersize": 4}

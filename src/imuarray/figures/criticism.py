@@ -11,7 +11,6 @@ from imuarray.figures.style import (
     GREY,
     PAGE,
     Column,
-    level,
     logarithmic,
     look,
     new_figure,
@@ -152,6 +151,7 @@ def _draw_clock(axes, rows, causes) -> None:
         axes.plot(some.x, some.model, color=BLACK, linewidth=0.8)
     imu = rows.title.iloc[0].split(",")[0]
     axes.set(xlabel=f"turns of {imu}'s clock", ylabel="age of a reading (ms)")
+    axes.set_ylim(1.45 * rows.model.min(), 1.15 * rows.model.max())
     axes.set_title("Cause: a clock in each chip")
     lag = causes[causes.effect == "gyroscope_delay"]
     if len(lag):
@@ -200,7 +200,9 @@ def _draw_between(axes, rows, left_out) -> None:
     style = look(3, "linestyle") | {"linestyle": "", "markersize": 5}
     axes.plot(range(len(rows)), 1e6 * rows.same_size_rms_m, **style, markerfacecolor="none")
     common = 1e6 * rows.common_size_m.iloc[-1]
-    level(axes, common, "size, common to all", color=GREY, linestyle=(0, (4, 2)))
+    axes.axhline(common, color=GREY, linestyle=(0, (4, 2)), linewidth=0.8)
+    axes.annotate("size, in all", (0.03, common), (0, -8), xycoords=("axes fraction", "data"),
+                  textcoords="offset points", size=6, color="0.3")  # fmt: skip
     _draw_gained(axes, rows, said, "between recordings (µm)")
 
 

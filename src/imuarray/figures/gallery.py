@@ -21,6 +21,9 @@ The chains behind the figures and tables of 2021:
 """
 
 
+GROUPS = {"measured": "Measured data", "criticism": "What the papers' model gets wrong"}
+
+
 def caption(template: str, settings: dict) -> str:
     """The caption that the report shows too: a template that prints its parameters."""
     environment = Environment(undefined=StrictUndefined, autoescape=False)
@@ -31,8 +34,8 @@ def caption(template: str, settings: dict) -> str:
 def title(name: str) -> str:
     """'Paper 2021, figure 4' of '2021_fig4'."""
     year, *words = name.split("_")
-    if year == "measured":
-        return f"Measured data: {' '.join(words)}"
+    if year in GROUPS:
+        return ": ".join(filter(None, [GROUPS[year], " ".join(words)]))
     if found := re.fullmatch(r"(fig|table)(\d+)", words[0]):
         kind, number = found.groups()
         words = ["figure", number] if kind == "fig" else ["table", "I" * int(number)]

@@ -2,7 +2,7 @@
 
 FIGURE = ("pdf", "png", "csv")  # endings of what a drawing rule writes
 TABLE = ("csv", "tex", "md")
-DIAGNOSED = ("positions", "parameters", "recordings")  # tables of a board's diagnoses
+DIAGNOSED = ("parameters", "recordings")  # tables of a board's diagnoses
 
 
 class Recordings:
@@ -91,9 +91,8 @@ class Recordings:
     def causes(self) -> list[str]:
         """What each cause buys on each board with several recordings, and the experiment anew."""
         folder, groups = "results/measured", self.groups()
-        paths = [f"{folder}/figures/causes_{group}.{k}" for group in groups for k in FIGURE]
         tables = ("causes_table", "experiment_table", "left_out", "past_rail_table")
-        paths += [f"{folder}/tables/{name}_{group}.md" for name in tables for group in groups]
+        paths = [f"{folder}/tables/{name}_{group}.md" for name in tables for group in groups]
         if any(self.shown in self.board(group) for group in groups):
             paths += [f"{folder}/figures/experiment_{self.shown}.{kind}" for kind in FIGURE]
         return paths
@@ -136,7 +135,7 @@ class Recordings:
         name, group = self.shown, self.group(self.shown)
         last = self.board(group)[-1]
         kinds = {f"diagnosis_{part}_{group}": ("csv",) for part in DIAGNOSED}
-        kinds |= {f"{part}_{group}": FIGURE for part in ("causes", "diagnosis")}
+        kinds[f"diagnosis_{group}"] = FIGURE
         kinds |= {f"{part}_{name}": FIGURE for part in ("experiment", "past_rail")}
         kinds |= {f"{part}_table_{group}": TABLE for part in ("causes", "experiment", "past_rail")}
         return kinds | {

@@ -4,7 +4,7 @@ import matplotlib.ticker as ticks
 import numpy as np
 import pandas as pd
 
-from imuarray.diagnosis.plain import power_of_ten
+from imuarray.diagnosis.plain import number, power_of_ten
 from imuarray.diagnosis.words import words
 from imuarray.figures.style import (
     BLACK,
@@ -242,3 +242,27 @@ def _gain_legend(figure, axes, table):
         handles += axes.plot([], [], "x", color=VERMILLION,
                              label="placebo: its numbers at other IMUs")  # fmt: skip
     legend_above(figure, handles)
+
+
+@styled
+def detectable_figure(table: pd.DataFrame, footer=()):
+    """Smallest size that would be named, best to worst IMU, and what was found, over the usual.
+
+    ``table``: `imuarray.report.numbers.detectable_table`.
+    """
+    figure = new_figure(footer, PAGE, 0.75 + 0.2 * len(table))
+    axes = figure.subplots()
+    for place, row in enumerate(table.itertuples()):
+        ends = row.best / row.typical, row.worst / row.typical
+        axes.plot(ends, (place, place), color=BLUE, linewidth=4, solid_capstyle="butt")
+        said = (
+            f"{number(row.best, 2)} (IMU {plain(row.best_imu)}) to {number(row.worst, 2)} (IMU"
+            f" {plain(row.worst_imu)}) {row.unit if row.unit != '1' else ''}"
+        )
+        axes.annotate(said, (1.01, place), xycoords=("axes fraction", "data"), size=6.5,
+                      va="center")  # fmt: skip
+    axes.plot(table.found / table.typical, range(len(table)), "o", color=VERMILLION, label="found")
+    axes.set_yticks(range(len(table)), [words(effect) for effect in table.effect])
+    axes.set(xscale="log", xlabel="size over that of a common chip", ylim=(len(table) - 0.4, -0.6))
+    axes.legend()
+    return figure

@@ -53,6 +53,31 @@ def discrepancy_table(diagnosis: Diagnosis) -> pd.DataFrame:
     )
 
 
+def detectable_table(diagnosis: Diagnosis) -> pd.DataFrame:
+    """One row an effect: the smallest size that would be named (median of an IMU's parameters).
+
+    ``best`` and ``worst`` are those of the IMUs ``best_imu`` and ``worst_imu``; ``found`` is the
+    rms of the parameters of a cause, NaN of others; ``typical`` the prior sd; ``unit`` of all.
+    """
+    causes = {cause["effect"]: cause["parameters"] for cause in diagnosis.document["causes"]}
+    columns, rows = diagnosis.found.search.columns, []
+    for effect, entry in diagnosis.document["detectable"].items():
+        unit = next(iter(entry["units"].values()))
+        alike = [name for name, other in entry["units"].items() if other == unit]
+        sizes = {
+            imu: np.median([size for name, size in own.items() if name in alike])
+            for imu, own in entry["sizes"].items() if set(own) & set(alike)
+        }  # fmt: skip
+        best, worst = min(sizes, key=sizes.get), max(sizes, key=sizes.get)
+        items = [item["value"] for item in causes.get(effect, {}).values() if item["unit"] == unit]
+        rows.append({
+            "effect": effect, "best_imu": best, "best": sizes[best], "worst_imu": worst,
+            "worst": sizes[worst], "found": np.sqrt(np.mean(np.square(items))) if items else np.nan,
+            "unit": unit, "typical": float(np.ravel(columns.usual_sd)[columns.of(effect)[0]]),
+        })  # fmt: skip
+    return pd.DataFrame(rows)
+
+
 def residual_table(diagnosis: Diagnosis) -> pd.DataFrame:
     """One row for each model, IMU, kind and axis ("all": the triad): rms in declared noise sds.
 

@@ -115,6 +115,12 @@ FIGURES = {  # by name: table, drawing, title, caption
         " two most alike forms of two effects, above it the mean over the forms of the smaller"
         " effect: 1 below and little above means that a single form is a gauge.",
     ),
+    "detectable": (
+        numbers.detectable_table, drawn.detectable_figure, "How small an effect would have shown",
+        "Size from which an effect of one IMU would be named with a chance of 80 %, from the IMU"
+        " that shows it best to the one that shows it worst, over the prior sd of a common chip."
+        " Dots: what was found. Steps and clocks, which a scan looks for, are left out.",
+    ),
     "positions": (
         numbers.position_table, position_figure, "Positions",
         "Where the extended model puts each triad, relative to the papers' model; bars are 95 %"
@@ -176,7 +182,9 @@ def draw(diagnosis: Diagnosis) -> list[Drawing]:
             CAUSE_CAPTION.format(BESIDE.get(EFFECTS[cause.effect].against, PARAMETERS)),
             files(cause_figure(table, said), table),
         ))  # fmt: skip
-    found += [_drawing(name, diagnosis, said) for name in ("separability", "positions")]
+    found += [
+        _drawing(name, diagnosis, said) for name in ("separability", "detectable", "positions")
+    ]
     return found + drawn_alike(diagnosis, said)
 
 
