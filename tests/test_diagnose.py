@@ -126,11 +126,11 @@ def test_what_would_have_been_named_is():
         "detectable": found_in(Case("test-clean", duration=DURATION), 1)[0]["detectable"],
     }
     for times in (0.25, 4.0):
-        for effect in ("accelerometer_bias", "gyroscope_misalignment"):
-            changed, truth = hide(recording, known, SEED, times, (effect,))
+        for name in ("accelerometer_bias", "gyroscope_misalignment"):
+            changed, truth = hide(recording, known, SEED, times, (name,))
             causes = run_procedure(changed).search.causes
             imu = int(truth["effects"][0]["sensors"][0]) - 1
-            right = [(cause.effect, cause.imus) for cause in causes] == [(effect, (imu,))]
+            right = [(cause.effect, cause.imus) for cause in causes] == [(name, (imu,))]
             assert right if times > 1 else not causes
 
 

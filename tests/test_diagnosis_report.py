@@ -19,7 +19,7 @@ from imuarray.diagnosis.adoption import (
     squared_correlations,
 )
 from imuarray.diagnosis.document import diagnose
-from imuarray.diagnosis.plain import number, plus_minus, probability, quantity, span
+from imuarray.diagnosis.plain import number, plus_minus, probability, quantity, ratio, span
 from imuarray.diagnosis.replicates import _beside
 from imuarray.diagnosis.words import cause_in_words, equation, sizes, split_name
 from imuarray.model.effects import DATA_EFFECTS, EFFECTS
@@ -36,6 +36,7 @@ ALWAYS = {
     "discrepancies",
     "residual",
     "separability",
+    "detectable",
     "positions",
     "board",
     "course",
@@ -182,21 +183,38 @@ def test_nothing_and_unexplained_are_said(found):
     assert "nothing to explain" in why.lead and "as it stands" in extended.lead
     assert gained.lead.startswith("Nothing")
     left = of(found, unexplained=True, remaining=["residual against omega dot", "outliers"])
-    assert verdict(left).startswith("Unexplained:")
+    assert verdict(left).endswith("Unexplained: something is left that no known cause explains.")
     loud = answers(left)[1].loud
     assert "no known cause explains" in loud and "dω/dt and outliers" in loud
     assert loud in report.html(left, []) and '<p class="loud">' in report.html(left, [])
     assert not answers(found)[1].loud
     alone = of(found, causes=[], unexplained=True, remaining=["outliers"])
-    assert "no known cause was found" in verdict(alone)
+    assert verdict(alone).startswith("Unexplained:") and "no known cause" in verdict(alone)
     smooth = {
         "unexplained": False,
         "accelerometer": {"residual": 0.8},
         "gyroscope": {"residual": 2},
     }
     shaken = of(found, unexplained=True, remaining=["outliers"], smooth=smooth)
-    assert verdict(shaken).endswith(": in shocks; smooth samples are explained.")
+    assert "Smooth samples are explained" in verdict(shaken) and "Unexplained" not in verdict(
+        shaken
+    )
     assert "In smooth samples that turn fast the residual is 0.8" in answers(shaken)[1].lead
+
+
+def test_the_verdict_says_what_it_is_worth(found):
+    before, after = (numbers.in_noise_sds(m)["gyroscope"] for m in (found.base, found.extended))
+    said = verdict(found)
+    assert f"gyroscopes' residual falls from {ratio(before)} to {ratio(after)} times" in said
+    assert quantity(found.document["gain"]["position_change_m"], None, "m") in said
+
+
+def test_detectable_sizes_are_drawn_beside_what_was_found(found):
+    table = numbers.detectable_table(found).set_index("effect")
+    assert (table.best <= table.worst).all() and set(table.columns) >= {"unit", "typical"}
+    assert np.isfinite(table.found.gyroscope_scale) and table.found.notna().sum() == 1
+    assert table.found.gyroscope_scale > table.best.gyroscope_scale
+    drawn.detectable_figure(table.reset_index()).draw_without_rendering()
 
 
 def test_answers_hold_the_document_s_numbers(found):
@@ -235,7 +253,8 @@ def test_where_readings_count_is_said(found, effect, gain, words):
 def test_a_class_is_stated_as_one(found):
     cause = found.document["causes"][0] | {"indistinguishable_from": ["sensor_delay"]}
     assert "cannot be distinguished from sensor delay" in cause_in_words(cause, ("1", "2", "3"))
-    assert "gyroscope scale or sensor delay" in verdict(of(found, causes=[cause]))
+    said = verdict(of(found, causes=[cause]))
+    assert said.startswith("Gyroscope scale, IMU 3: ") and "sensor delay" not in said
     doubtful = cause | {"gain_in_sample_nats": 10.0, "placebo_gain_nats": 6.0}
     assert "doubtful" in cause_in_words(doubtful, ("3",))
     assert "doubtful" not in cause_in_words(cause, ("3",))
@@ -257,7 +276,7 @@ def test_a_class_is_stated_as_one(found):
         (quantity(0.003, None, "rad"), "3 mrad (0.172 deg)"),
         (span(1.0, 1.0, "1"), "1"),
         (span(0.038, 0.041, "m s-2"), "38 to 41 mm/s²"),
-        (probability(-103.9), "10⁻¹⁰³"),
+        (probability(-103.9), "< 10⁻⁶"),
         (probability(-2.0), "0.01"),
         (number(0.0), "0"),
         (number(float("nan")), "not known"),

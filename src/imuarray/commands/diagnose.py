@@ -10,7 +10,7 @@ from imuarray.report.write import write_report
 
 
 def diagnose(arguments) -> None:
-    """Name what the papers' model gets wrong on a recording; a folder with the report."""
+    """Name what the plain model misses on a recording; a folder with the report."""
     known = {*EFFECTS, *DATA_EFFECTS}
     for name in arguments.without:
         if name not in known:

@@ -129,10 +129,10 @@ def symbols(text: str) -> str:
 
 
 def probability(log10_p: float) -> str:
-    """'0.012', or a power of ten."""
+    """'0.012', a power of ten, or '< 10⁻⁶': no law of chance is known farther out."""
     if log10_p > -4:
         return number(10.0**log10_p, 2)
-    return power_of_ten(math.ceil(log10_p)) if log10_p > -1e5 else "0"
+    return power_of_ten(math.ceil(log10_p)) if log10_p > -6 else f"<{NARROW}{power_of_ten(-6)}"
 
 
 def joined(items) -> str:

@@ -67,19 +67,16 @@ def words(effect: str) -> str:
 
 def cause_in_words(cause: dict, labels, says: str = "") -> str:
     """A cause of `diagnosis.json` with its size, or what was read (``says``), test and class."""
-    effect, item = cause["effect"], known_effect(cause["effect"])
-    found = plain(effect, _sizes_of(cause, labels)) if cause["parameters"] else []
-    told = [says or sizes(cause, labels)] if says or not found else []
-    parts = found or [item.meaning or words(effect)]
-    text = f"{words(effect)}, {whose(cause['sensors'])}: {'; '.join(filter(None, parts + told))}"
+    text = f"{words(cause['effect'])}, {whose(cause['sensors'])}: {in_short(cause, labels, says)}"
     if stretches := cause.get("stretches_s"):
         first = [f"{a:.4g} to {b:.4g}" for a, b in stretches[:FEW]]
         text += f"; longest at {', '.join(first)} s"
     gain = plus_minus(cause["heldout_gain_nats"], cause["heldout_gain_se"])
     p_value = probability(cause["log10_p_value"])
-    text += f". Gain on held-out time {gain} nats, p{NARROW}={NARROW}{p_value}."
+    equals = "" if p_value.startswith("<") else f"={NARROW}"
+    text += f". Gain on held-out time {gain} nats, p{NARROW}{equals}{p_value}."
     true, placebo = cause.get("gain_in_sample_nats", 0.0), cause.get("placebo_gain_nats", 0.0)
-    if 0 < SETTINGS.doubtful * true < placebo:
+    if cause["sensors"] != ["all"] and 0 < SETTINGS.doubtful * true < placebo:
         text += (
             " Its placebo, the same numbers at other IMUs, gains too: it is doubtful whose it is."
         )
@@ -87,6 +84,15 @@ def cause_in_words(cause: dict, labels, says: str = "") -> str:
         rivals = joined(words(name) for name in cause["indistinguishable_from"])
         text += f" On this recording it cannot be distinguished from {rivals}: one class."
     return first_up(text)
+
+
+def in_short(cause: dict, labels, says: str = "") -> str:
+    """What a cause is, how large, in the words of one who holds the board."""
+    effect = cause["effect"]
+    found = plain(effect, _sizes_of(cause, labels)) if cause["parameters"] else []
+    told = [says or sizes(cause, labels)] if says or not found else []
+    parts = found or [known_effect(effect).meaning or words(effect)]
+    return "; ".join(filter(None, parts + told))
 
 
 def _sizes_of(cause: dict, labels) -> Sizes:

@@ -8,6 +8,7 @@ import numpy as np
 
 from imuarray.diagnosis.plain import (
     NARROW,
+    first_up,
     joined,
     number,
     plus_minus,
@@ -16,7 +17,7 @@ from imuarray.diagnosis.plain import (
     span,
     symbols,
 )
-from imuarray.diagnosis.words import equation, whose, words
+from imuarray.diagnosis.words import equation, in_short, whose, words
 from imuarray.model.effects import DATA_EFFECTS, KINDS
 from imuarray.report.numbers import in_noise_sds, position_table
 
@@ -44,35 +45,40 @@ def answers(diagnosis: Diagnosis) -> list[Answer]:
 
 
 def verdict(diagnosis: Diagnosis) -> str:
-    """The whole diagnosis in one sentence."""
+    """The whole diagnosis, a sentence a cause and what they are worth; what to do next."""
     document = diagnosis.document
-    named = [
-        f"{' or '.join(map(words, [c['effect'], *c['indistinguishable_from']]))}"
-        f" ({whose(c['sensors'])})"
-        for c in document["causes"]
-    ]
+    causes, labels = document["causes"], diagnosis.found.search.readings.labels
+    if not causes:
+        if document["unexplained"]:
+            return (
+                "Unexplained: the plain model differs from the recording, and no known cause does."
+            )
+        return "Nothing: the plain model simulates this recording as far as it can show."
+    said = [f"{words(c['effect'])}, {whose(c['sensors'])}: {in_short(c, labels)}" for c in causes]
+    parts = [f"{first_up(text)}." for text in said[:FEW]]
+    if len(causes) > FEW:
+        others = joined(words(cause["effect"]) for cause in causes[FEW:])
+        parts.append(f"And {others}.")
+    before, after = (in_noise_sds(model) for model in (diagnosis.base, diagnosis.extended))
+    worst = max(before, key=before.get)
+    moved = quantity(document["gain"]["position_change_m"], None, "m")
+    parts.append(
+        f"With {'that' if len(causes) == 1 else 'these'} in the model the {worst}s' residual falls"
+        f" from {ratio(before[worst])} to {ratio(after[worst])} times the noise, and positions move"
+        f" by {moved}."
+    )
     if document["unexplained"]:
-        left = "the simulation still differs from the recording"
-        if not named:
-            return f"Unexplained: {left}, and no known cause was found."
-        if len(named) > FEW:
-            named = [words(c["effect"]) for c in document["causes"]]
-        where = ": in shocks; smooth samples are explained" if _shaken(document) else ""
-        return f"Unexplained: {left} after {counted(named)} ({', '.join(named)}){where}."
-    if not named:
-        return "Nothing: the papers' model simulates this recording as far as it can show."
-    rest = "little else is left" if document["remaining"] else "nothing else is left"
-    return f"{counted(named)}: {joined(named)}; {rest}."
+        parts.append(
+            "Smooth samples are explained; what is left is motion faster than the samples."
+            if _shaken(document)
+            else "Unexplained: something is left that no known cause explains."
+        )
+    return " ".join(parts)
 
 
 def _shaken(document: dict) -> bool:
     """Whether smooth samples are explained, and shocks are what is left."""
     return bool(document["smooth"] and not document["smooth"]["unexplained"])
-
-
-def counted(named) -> str:
-    """'1 cause', '2 causes'."""
-    return f"{len(named)} cause{'s' * (len(named) > 1)}"
 
 
 def clean(document: dict) -> bool:
@@ -94,7 +100,7 @@ def wrong(diagnosis: Diagnosis) -> Answer:
     out = [check for check in checks if check["p_value"] <= USUAL]
     chance = max(round(USUAL * len(checks)), 1)
     lead = (
-        f"Fitted to the recording, the papers' model leaves a residual of"
+        f"Fitted to the recording, the plain model leaves a residual of"
         f" {of_noise(in_noise_sds(diagnosis.base))}. Of {len(checks)} checks of that residual"
         f" {len(out) or 'none'} {'lies' if len(out) == 1 else 'lie'} outside what 95 % of"
         f" simulations give; chance alone puts about {chance} there."
@@ -162,7 +168,7 @@ def extended(diagnosis: Diagnosis) -> Answer:
     question = "What does the extended model look like?"
     noise = noise_in_words(diagnosis)
     if not document["causes"]:
-        lead = f"It is the papers' model as it stands, {PAPERS}."
+        lead = f"It is the plain model as it stands, {PAPERS}."
         return Answer(question, lead, [noise])
     items = [
         f"{words(cause['effect'])} ({whose(cause['sensors'])}): {equation(cause['effect'])}"
@@ -171,7 +177,7 @@ def extended(diagnosis: Diagnosis) -> Answer:
     fits = diagnosis.base.fit, diagnosis.extended.fit
     more = int(fits[1].active.sum()) - int(fits[0].active.sum())
     lead = (
-        f"The papers' model, {PAPERS}, and {more or 'no'} more parameter{'s' * (more != 1)} beside"
+        f"The plain model, {PAPERS}, and {more or 'no'} more parameter{'s' * (more != 1)} beside"
         f" the {int(fits[0].active.sum())} of the positions. u is the true specific force at a"
         " triad:"
     )
@@ -213,8 +219,8 @@ def gained(diagnosis: Diagnosis) -> Answer:
     total = number(samples * gain["over_inflated_noise_nats_per_sample"])
     lead = (
         f"Each of the {samples} samples, predicted from the other stretches of time, is"
-        f" {over_base} nats more likely than under the papers' model, and {over_inflated} nats more"
-        f" than under its rival, the papers' model with noise inflated to its residual"
+        f" {over_base} nats more likely than under the plain model, and {over_inflated} nats more"
+        f" than under its rival, the plain model with noise inflated to its residual"
         f" ({total} nats in all). Readings that were left out as outliers are in no score."
     )
     items = [residual_in_words(diagnosis), positions_in_words(diagnosis)]
@@ -237,7 +243,7 @@ def readings_in_words(causes) -> list[str]:
         )
     if not all(item.left_out for item in mended):
         said.append(
-            "Axes that are turned back count in all of these numbers: the papers' model takes the"
+            "Axes that are turned back count in all of these numbers: the plain model takes the"
             " readings as they were recorded."
         )
     return said
@@ -271,7 +277,7 @@ def positions_in_words(diagnosis: Diagnosis) -> str:
     moved = quantity(gain["position_change_m"], None, "m")
     return (
         f"The positions moved by {moved} (rms), {number(gain['position_change_sd'], 2)} of the sds"
-        f" that the papers' model claims for them; most: {largest['axis']} of IMU {largest.imu}, by"
+        f" that the plain model claims for them; most: {largest['axis']} of IMU {largest.imu}, by"
         f" {quantity(float(largest.change), None, 'm')}. Claimed sds were {widths[0]} (rms),"
         f" {widths[2]} with inflated noise, now {widths[1]}."
     )

@@ -23,7 +23,7 @@ MODELS = {
     "base": {"color": VERMILLION, "marker": "o"},
     "extended": {"color": BLUE, "marker": "s"},
 }
-NAMES = {"base": "papers' model", "extended": "extended model"}
+NAMES = {"base": "plain model", "extended": "extended model"}
 PLAIN = 0.05  # p-value below which a mark is filled
 
 

@@ -14,7 +14,7 @@ DARK = 0.75  # from which numbers are white
 
 @styled
 def position_figure(table: pd.DataFrame, footer=()):
-    """Where the extended model puts each triad, from where the papers' model does, with 95 %.
+    """Where the extended model puts each triad, from where the plain model does, with 95 %.
 
     ``table``: `imuarray.report.numbers.position_table`.
     """

@@ -182,7 +182,7 @@ def separability_table(diagnosis: Diagnosis) -> pd.DataFrame:
 
 
 def score_table(diagnosis: Diagnosis) -> pd.DataFrame:
-    """The most significant test of each effect at the papers' model, before any cause is adopted.
+    """The most significant test of each effect at the plain model, before any cause is adopted.
 
     ``log10_p`` allows for its IMUs and forms; ``limit`` is the critical value.
     """

@@ -105,7 +105,7 @@ FIGURES = {  # by name: table, drawing, title, caption
     "gain": (
         numbers.gain_table, drawn.gain_figure, "What each cause gains",
         "Nats gained on blocks of time that the model was not trained on; above the line by each"
-        " cause, in the order of adoption, below it by the extended model over the papers' model"
+        " cause, in the order of adoption, below it by the extended model over the plain model"
         " with declared and with inflated noise. A placebo ought to gain nothing.",
     ),
     "separability": (
@@ -123,7 +123,7 @@ FIGURES = {  # by name: table, drawing, title, caption
     ),
     "positions": (
         numbers.position_table, position_figure, "Positions",
-        "Where the extended model puts each triad, relative to the papers' model; bars are 95 %"
+        "Where the extended model puts each triad, relative to the plain model; bars are 95 %"
         " intervals as each model claims them.",
     ),
 }  # fmt: skip
