@@ -55,6 +55,7 @@ rule hide:
         "results/measured/benchmarks/hidden/{hidden}.tsv"
     wildcard_constraints:
         hidden="lever_arms|drawn|nothing",
+    priority: 10
     params:
         settings={"seed": config["seed"]},
         code=code("hide"),

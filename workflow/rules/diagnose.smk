@@ -15,6 +15,7 @@ rule diagnose_recording:
         "results/measured/logs/diagnosis/{name}.log",
     benchmark:
         "results/measured/benchmarks/diagnosis/{name}.tsv"
+    priority: 10
     threads: 1
     resources:
         mem_mb=8000,
