@@ -18,7 +18,10 @@ SETTINGS = {
 VERDICT = {"converged": True, "burn_in_draws": 0, "most_draws": 100, "rhat_max": 1.0}
 
 
-def measured(coverage=0.5, residual=2.0, noise=0.04, rate=0.001, variance=300.0, under=-5e-4):
+def measured(
+    coverage=0.5, residual=2.0, noise=0.04, rate=0.001, variance=300.0, under=-5e-4,
+    correlation=0.2, spread=2.0,
+):  # fmt: skip
     """Contents by path: positions of a recording off by ``under`` on the underside, and so on."""
     rng = np.random.default_rng(0)
     nominal = BOARD.relative[1:]
@@ -29,11 +32,18 @@ def measured(coverage=0.5, residual=2.0, noise=0.04, rate=0.001, variance=300.0,
         columns=["accelerometer", "axis"],
     ).assign(nominal_m=nominal.ravel(), method="bcd", samples=500, mean_m=nominal.ravel())
     agreement = pd.DataFrame({
-        "samples": 500, "assumed": ["0.79", "residual"], "accelerometer_sd": [0.79, residual],
-        "recordings": 5, "coverage_95": [coverage, 0.95], "z_rms": [2.0, 1.0],
+        "samples": 500, "assumed": ["0.04", "0.79", "residual"],
+        "accelerometer_sd": [0.04, 0.79, residual], "recordings": 5,
+        "coverage_95": [coverage, coverage, 0.95], "z_rms": [20.0, spread, 1.0],
         "claimed_m": 1e-5, "spread_m": 2e-5,
     })  # fmt: skip
-    noises = pd.DataFrame({"sensor": ["specific_force", "angular_rate"], "sd": [noise, rate]})
+    noises = pd.DataFrame(
+        {
+            "sensor": ["specific_force", "angular_rate"],
+            "sd": [noise, rate],
+            "correlation": [-0.01, correlation],
+        }
+    )
     given = {
         "../measured/positions/mine": places, "../measured/agreement/board": agreement,
         "../measured/first_order/mine_noise": noises, "chains/mine_T500": draws.reshape(2, 400, 21),
@@ -61,8 +71,17 @@ def verdict(name, **changes):
         ("2021-52", {"coverage": 0.95}, "does not hold"),
         ("2021-55", {"residual": 2.0}, "does not hold"),
         ("2021-55", {"residual": 0.5}, "holds"),
-        ("2021-56", {"rate": 0.001}, "holds"),
-        ("2021-56", {"rate": 0.003}, "does not hold"),
+        ("2021-56", {"noise": 0.04}, "holds"),
+        ("2021-56", {"noise": 0.1}, "does not hold"),
+        ("2021-58", {"rate": 0.001}, "holds"),
+        ("2021-58", {"rate": 0.003}, "does not hold"),
+        ("2021-59", {}, "does not hold"),
+        ("2021-59", {"correlation": 0.01}, "holds"),
+        ("2021-60", {}, "does not hold"),
+        ("2021-60", {"residual": 0.05, "coverage": 0.95}, "holds"),
+        ("2021-60", {"residual": 0.05}, "does not hold"),
+        ("2021-61", {}, "does not hold"),
+        ("2021-61", {"spread": 1.1}, "holds"),
         ("2021-57", {"variance": 300.0}, "does not hold"),
         ("2021-57", {"variance": 0.1}, "holds"),
     ],

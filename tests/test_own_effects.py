@@ -181,9 +181,7 @@ def test_an_effect_with_a_gauge_of_its_own_is_one_place(tmp_path):
 def test_no_module_beside_the_finders_names_an_effect():
     """What an effect is stands with it; what is special in finding it, with its finder."""
     finders = {
-        "clocks",
-        "shifts",
-        "warming",
+        "scans",
         "shocks",
         "special",
         "reading_effects",
@@ -191,6 +189,7 @@ def test_no_module_beside_the_finders_names_an_effect():
         "generic",  # names of sds
         "plain",  # what the sensor model's own say in plain words; others are said by their names
         "export",  # what other tools have a place for
+        "known",  # how a recording's own clocks are found beside a known board
     }
     package = Path(imuarray.__file__).parent
     for folder in ("diagnosis", "report", "analysis", "commands", "estimation", "posterior"):
