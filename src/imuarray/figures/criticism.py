@@ -85,7 +85,8 @@ def _first_clock(clock: pd.DataFrame) -> pd.DataFrame:
     first = clock[clock.title.str.startswith("IMU")]
     first = first[first.title == first.title.iloc[0]]
     turn = first.x.iloc[len(first) // 2] - first.x.iloc[0]
-    return first[["y", "se", "model", "title"]].assign(x=first.x / turn)
+    named = first.rename(columns={"model": "predicted"})
+    return named[["y", "se", "predicted", "title"]].assign(x=first.x / turn)
 
 
 def _causes(document: dict) -> pd.DataFrame:
@@ -148,10 +149,10 @@ def _draw_clock(axes, rows, causes) -> None:
     axes.errorbar(rows.x, rows.y, rows.se, linestyle="", **look(0, "linestyle"), markersize=3)
     for turn in (0, 1):  # the sawtooth falls between them
         some = rows[(rows.x >= turn) & (rows.x < turn + 1)]
-        axes.plot(some.x, some.model, color=BLACK, linewidth=0.8)
+        axes.plot(some.x, some.predicted, color=BLACK, linewidth=0.8)
     imu = rows.title.iloc[0].split(",")[0]
     axes.set(xlabel=f"turns of {imu}'s clock", ylabel="age of a reading (ms)")
-    axes.set_ylim(1.45 * rows.model.min(), 1.15 * rows.model.max())
+    axes.set_ylim(1.45 * rows.predicted.min(), 1.15 * rows.predicted.max())
     axes.set_title("Cause: a clock in each chip")
     lag = causes[causes.effect == "gyroscope_delay"]
     if len(lag):
