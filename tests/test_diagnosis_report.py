@@ -120,7 +120,7 @@ def test_page_answers_the_four_questions(page):
         "What did it gain?",
     ):  # fmt: skip
         assert text.count(question) == 1
-    assert "1 cause: gyroscope scale (IMU 3)" in text
+    assert "Gyroscope scale, IMU 3: " in text and "times the noise, and positions move by" in text
     assert "(1 + c_i) ω_i" in text and "nats" in text and "µm" in text
     assert "{" not in text.split("Diagnosis of", 2)[2].replace(PATH, "").split("Tables")[0]
 
@@ -276,7 +276,7 @@ def test_a_class_is_stated_as_one(found):
         (quantity(0.003, None, "rad"), "3 mrad (0.172 deg)"),
         (span(1.0, 1.0, "1"), "1"),
         (span(0.038, 0.041, "m s-2"), "38 to 41 mm/s²"),
-        (probability(-103.9), "< 10⁻⁶"),
+        (probability(-103.9), "< 10⁻⁶"),
         (probability(-2.0), "0.01"),
         (number(0.0), "0"),
         (number(float("nan")), "not known"),
