@@ -130,12 +130,13 @@ def test_repeatability_is_that_of_pairs():
                 "step": step, "accelerometer": np.repeat(["2", "3"], 3), "axis": list("xyz") * 2,
                 "mean_m": found,
                 "sd_m": 1e-6, "residual_ratio": 2.0, "smooth_ratio": 1.0,
-                "nats": 1.0, "nats_error": 0.1, "converged": True,
+                "nats": 1.0, "nats_error": 0.1, "converged": True, "common_scale_sd": 5e-4,
             })
             for step in STEPS
         ]  # fmt: skip
         tables[f"exp_{number}"] = pd.concat(parts)
     found = repeated(tables).iloc[0]
+    assert found.common_size_m == pytest.approx(1e-3 * np.sqrt(np.mean(truth**2)), rel=2e-3)
     assert found.size_sd == pytest.approx(1e-3, rel=0.5)
     # brought to one size, a direction less is left
     assert found.same_size_rms_m == pytest.approx(np.sqrt(2 * 5 / 6) * 1e-6, rel=0.3)

@@ -64,7 +64,7 @@ def wrong(truth, document) -> str:
         return f"{hidden['effect']} of {hidden['sensors']}: named of {cause['sensors']}"
     if cause["heldout_gain_nats"] < 3 * cause["heldout_gain_se"]:
         return f"{hidden['effect']}: gains no more than its error on held-out time"
-    items = list(cause["parameters"].values())
+    items = [item for item in cause["parameters"].values() if item["sd"]]  # a scan fixes others
     true = next((np.ravel(p["value"]) for p in hidden["parameters"].values()
                  if np.size(p["value"]) == len(items)), None)  # fmt: skip
     if cause["effect"] != hidden["effect"] or true is None:
