@@ -1,13 +1,18 @@
 """What is wrong, why, extended, gained: the panels and tables say what their inputs say."""
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from imuarray.blind.cases import HIDDEN, hidden, make
 from imuarray.figures import criticism
+from imuarray.figures import hidden as hidden_figure
+from imuarray.figures.measured import QUANTITIES
 from imuarray.geometry import mimu4444_corners
 
+ROOT = Path(__file__).parents[1]
 STEPS = ("normal", "robust", "clocks", "no arms", "common arms")
 
 
@@ -25,15 +30,18 @@ def board():
     rows = [
         (source, quantity, "angular_acceleration", triad, low, low + 1.0, size * (1 + low))
         for source, size in (("measured", 4.0), ("simulated", 1.0))
-        for quantity in criticism.KINDS for triad in "12" for low in (0.0, 1.0)
+        for quantity in QUANTITIES for triad in "12" for low in (0.0, 1.0)
     ]  # fmt: skip
     names = ["source", "quantity", "by", "triad", "bin_low", "bin_high", "rms"]
-    noise = [(quantity, int(triad), 2.0) for quantity in criticism.KINDS for triad in "12"]
+    noise = [(quantity, int(triad), 2.0) for quantity in QUANTITIES for triad in "12"]
     turn = np.linspace(0.0, 9.0, 10)
     clock = pd.DataFrame({"x": [*turn, *(turn + 10)], "y": 0.1, "se": 0.01, "model": 0.1,
                           "title": "IMU 3, 100 Hz"})  # fmt: skip
     lag = {f"delay_{k}": (1.5e-3, 1e-5) for k in range(8)}
-    causes = [cause("gyroscope_delay", ["all"], lag), cause("sensor_clock", ["all"], {})]
+    causes = [
+        cause("gyroscope_delay", ["all"], lag),
+        cause("sensor_clock", ["all"], {"period_1": (1e-3, None)}),
+    ]
     model = pd.DataFrame({
         "step": STEPS, "rms_m": np.array([100, 50, 40, 12, 7]) * 1e-6, "same_size_rms_m": 4e-6,
         "covered": 0.95, "common_size_m": 1.3e-5, "smooth_ratio": [26.0, 20, 2, 1.9, 0.9],
@@ -85,7 +93,7 @@ def test_lever_arms_are_compared_by_the_axes_of_the_array():
         own[k, axis] = turns[k].T @ (true + unseen)[k, along]
     values = {str(i): (float(value), 1e-6) for i, value in enumerate(own.ravel())}
     document = {"causes": [cause("size_effect", ["all"], values)]}
-    table = criticism._arms(document, truth, turns)
+    table = hidden_figure._arms(document, truth, turns)
     np.testing.assert_allclose(table.found_m, table.true_m, atol=1e-12)
     assert np.std(table.true_m) > 0.5 * np.std(true)
 
@@ -117,9 +125,35 @@ def test_a_row_says_what_was_found_of_what_was_hidden():
     right = {"causes": [before, cause("accelerometer_bias", ["3"], found)]}
     cases = [right, {"causes": [before]}, {"causes": [before, other]}]
     control = {"causes": [before]}, {}
-    table, *_ = criticism.table_criticism_hidden(
+    table, *_ = hidden_figure.table_criticism_hidden(
         [(each, {}) for each in cases], [truth] * 3, [control] * 3, list("abc")
     )
     assert table.named.tolist() == ["accelerometer_bias", "nothing", "shock"]
     assert table.named_sensors[0] == "3" and table["size"][0] == "0.506 ± 0.01 m s-2"
     assert set(table.true_size) == {"0.5 m s-2"}
+    assert set(table.control) == {"1 of its own, not this"}
+        "1 of its own, not this"
+    }
+    there = hidden_figure.table_criticism_hidden(
+        [(right, {})], [truth], [({"causes": [before, right["causes"][1]]}, {})], ["a"]
+    )[0]
+    assert there.control[0] == "2 of its own, this too"
+
+
+def test_the_pages_say_what_was_published(committed):
+    """The paragraph of the README and of docs/measured.md, number by number."""
+    table = pd.read_csv(committed / "criticism.csv").set_index("panel")
+    wrong, smooth = table.loc["wrong"], table.loc["extended"].smooth.to_numpy()
+    apart = 1e6 * table.loc["gained"].rms_m.to_numpy()
+    lag = table.loc["causes"].set_index("effect").loc["gyroscope_delay"]
+    board = table.loc["left_out"].set_index("model").loc["board"]
+    said = (
+        f"up to {wrong[wrong.source == 'measured'].y.max():.0f} times the noise",
+        f"{1e3 * lag['mean']:.2f} ± {1e3 * lag.sd:.2f} ms ahead",
+        f"leave {smooth[-1]:.2f} times the noise instead of {smooth[0]:.0f}",
+        f"repeat to {apart[-1]:.1f} µm instead of {apart[0]:.0f}",
+        f"{board.over_inflated:.0f} ± {board.over_inflated_error:.0f} nats a sample better",
+    )
+    for page in ("README.md", "docs/measured.md"):
+        text = " ".join((ROOT / page).read_text(encoding="utf-8").split())
+        assert all(each in text for each in said), (page, said)

@@ -103,7 +103,7 @@ rule figure_criticism_hidden:
     benchmark:
         "results/measured/benchmarks/figures/criticism_hidden.tsv"
     params:
-        **by("figures.criticism.figure_criticism_hidden"),
+        **by("figures.hidden.figure_criticism_hidden"),
     message:
         "figure: an effect that was hidden, and found"
     script:
@@ -127,7 +127,7 @@ rule table_criticism_hidden:
     benchmark:
         "results/measured/benchmarks/tables/criticism_hidden_table.tsv"
     params:
-        **by("figures.criticism.table_criticism_hidden"),
+        **by("figures.hidden.table_criticism_hidden"),
         names=["simulated", "simulated", SHOWN][: len(MEASURED.hidden())],
     message:
         "table: effects that were hidden, and what was found"

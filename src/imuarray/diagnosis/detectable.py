@@ -25,9 +25,10 @@ def detectable(search: Search) -> dict[str, dict]:
     given, columns = search.given, search.columns
     active = given.places(search.active)
     inside = {part for c in search.causes for part in EFFECTS[c.effect].contains}
-    every = candidates(columns, search.readings.exists, set(search.effects) - inside)
+    effects = [effect for effect in search.effects if effect not in inside]
+    every = candidates(columns, search.readings.exists, effects)
     found: dict[str, dict] = {}
-    for candidate in sorted(every, key=lambda each: search.effects.index(each.effect)):
+    for candidate in every:
         mask = mask_of(columns, candidate)
         chosen = np.sort(given.places(mask))
         if len(candidate.imus) > 1 or not len(chosen):

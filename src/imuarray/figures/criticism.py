@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-from imuarray.blind.study import classes
+from imuarray.figures.measured import QUANTITIES
 from imuarray.figures.style import (
     BLACK,
     GREY,
@@ -15,18 +15,16 @@ from imuarray.figures.style import (
     look,
     new_figure,
     panels,
+    rms,
     styled,
 )
 from imuarray.geometry import Array
 
-KINDS = {"specific_force": "accelerometers", "angular_rate": "gyroscopes"}
 STEPS = {  # of `measured.causes.STEPS`
     "normal": "papers'", "clocks": "+ clocks", "no arms": "+ lag, maps",
     "common arms": "+ lever arms",
 }  # fmt: skip
-MODELS = {"base": "papers'", "inflated": "noise inflated", "extended": "extended"}
 DIGITS = 3  # significant: all else differs between recordings, or between processors
-SURE = 1.96  # sds: 95 %
 
 
 def figure_criticism(
@@ -58,25 +56,26 @@ def figure_criticism(
         " (a) rms residual over the noise of still poses, bars: range of the IMUs. (b) points:"
         " from the residuals alone, 1 sd; line: the clock that was found. (c) filled: smooth and"
         " fast samples; open: all samples, shocks with them. (d) rms of differences between"
-        " recordings; open: at one size."
+        " recordings; open: at one size; dashed: an error of the size that all of them share."
     ]
-    return partial(_draw, footer=footer), _digits(table)
+    return partial(_draw, footer=footer), three_digits(table)
 
 
-def _digits(table: pd.DataFrame) -> pd.DataFrame:
+def three_digits(table: pd.DataFrame) -> pd.DataFrame:
+    """To be published with `DIGITS`."""
     table.attrs["digits"] = dict.fromkeys(table.columns, DIGITS)
     return table
 
 
 def _against_acceleration(summary: pd.DataFrame, noise: pd.DataFrame) -> pd.DataFrame:
     """x in 10^3 deg/s^2; rms, least and largest over the IMUs, over the noise of still poses."""
-    still = noise.groupby("sensor").ratio.apply(_rms)
+    still = noise.groupby("sensor").ratio.apply(rms)
     chosen = summary[summary["by"] == "angular_acceleration"]
     # the simulation has the noise that was declared
     scale = np.where(chosen.source == "measured", chosen.quantity.map(still), 1.0)
     chosen = chosen.assign(size=chosen.rms / scale)
     chosen["x"] = np.degrees(chosen.bin_low + chosen.bin_high) / 2e3
-    rows = chosen.groupby(["source", "quantity", "x"])["size"].agg(y=_rms, low="min", high="max")
+    rows = chosen.groupby(["source", "quantity", "x"])["size"].agg(y=rms, low="min", high="max")
     return rows.reset_index()
 
 
@@ -100,9 +99,9 @@ def _causes(document: dict) -> pd.DataFrame:
         items = [item for item in cause["parameters"].values() if item["sd"]]
         if len({item["unit"] for item in items}) == 1:
             values, sds = (np.array([item[key] for item in items]) for key in ("value", "sd"))
-            alike = abs(values.mean()) > 0.5 * _rms(values)
+            alike = abs(values.mean()) > 0.5 * rms(values)
             row |= {"unit": items[0]["unit"], "mean": values.mean() if alike else np.nan,
-                    "rms": _rms(values), "sd": np.median(sds)}  # fmt: skip
+                    "rms": rms(values), "sd": np.median(sds)}  # fmt: skip
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -116,19 +115,20 @@ def _draw(table, footer):
     _draw_clock(axes[1], part["cause"], part["causes"])
     _draw_extended(axes[2], part["extended"])
     _draw_between(axes[3], part["gained"], part["left_out"].set_index("model"))
-    _letters(axes)
+    letter(axes)
     return figure
 
 
-def _letters(axes) -> None:
-    for letter, one in zip("abcd", axes, strict=True):
+def letter(axes) -> None:
+    """(a), (b), ... before the panels' titles."""
+    for name, one in zip("abcd", axes, strict=True):
         said = one.get_title()
         one.set_title("")
-        one.set_title(f"({letter}) {said}", size=7, loc="right")
+        one.set_title(f"({name}) {said}", size=7, loc="right")
 
 
 def _draw_wrong(axes, rows) -> None:
-    for number, (quantity, label) in enumerate(KINDS.items()):
+    for number, (quantity, label) in enumerate(QUANTITIES.items()):
         for source, fill in (("measured", {}), ("simulated", {"markerfacecolor": "none"})):
             some = rows[(rows.quantity == quantity) & (rows.source == source)]
             bars = some.y - some.low, some.high - some.y
@@ -152,16 +152,18 @@ def _draw_clock(axes, rows, causes) -> None:
         axes.plot(some.x, some.predicted, color=BLACK, linewidth=0.8)
     imu = rows.title.iloc[0].split(",")[0]
     axes.set(xlabel=f"turns of {imu}'s clock", ylabel="age of a reading (ms)")
-    axes.set_ylim(1.45 * rows.predicted.min(), 1.15 * rows.predicted.max())
+    axes.set_ylim(1.7 * rows.predicted.min(), 1.15 * rows.predicted.max())
     axes.set_title("Cause: a clock in each chip")
     lag = causes[causes.effect == "gyroscope_delay"]
     if len(lag):
         value, sd = 1e3 * lag["mean"].iloc[0], 1e3 * lag.sd.iloc[0]
-        said = f"gyroscopes {abs(value):.2f} ± {sd:.2f} ms {'ahead' if value > 0 else 'behind'}"
-        axes.text(0.04, 0.04, said, size=6, transform=axes.transAxes)
+        way = "ahead" if value > 0 else "behind"
+        said = f"gyroscopes\n{abs(value):.2f} ± {sd:.2f} ms {way}"
+        axes.text(0.04, 0.03, said, size=6, transform=axes.transAxes)
 
 
-def _models(axes, names) -> None:
+def name_models(axes, names) -> None:
+    """Models along the abscissa."""
     axes.set_xticks(range(len(names)), names, rotation=35, ha="right", size=6.5)
     axes.set_xlim(-0.5, len(names) - 0.5)
 
@@ -173,12 +175,12 @@ def _draw_extended(axes, rows) -> None:
     axes.axhline(1, color=BLACK, linewidth=0.6)
     axes.set(yscale="log", ylabel="residual / noise")
     axes.yaxis.set_major_formatter("{x:g}")
-    _models(axes, rows.model)
+    name_models(axes, rows.model)
     axes.legend(fontsize=6)
     axes.set_title(f"Extended: {rows.smooth.iloc[0]:.0f} to {rows.smooth.iloc[-1]:.2g} × noise")
 
 
-def _draw_gained(axes, rows, said: str, ylabel: str) -> None:
+def draw_gained(axes, rows, said: str, ylabel: str) -> None:
     """rms (µm) and cover of the 95 % intervals, model after model."""
     style = look(3, "linestyle") | {"linestyle": "", "markersize": 5}
     axes.plot(range(len(rows)), 1e6 * rows.rms_m, **style)
@@ -188,7 +190,7 @@ def _draw_gained(axes, rows, said: str, ylabel: str) -> None:
     axes.set(yscale="log", ylabel=ylabel)
     axes.yaxis.set_major_formatter("{x:g}")
     axes.margins(y=0.3)
-    _models(axes, rows.model)
+    name_models(axes, rows.model)
     axes.text(0.04, 0.04, said, size=6, transform=axes.transAxes)
     first, last = (1e6 * rows.rms_m.iloc[place] for place in (0, -1))
     axes.set_title(f"Gained: {first:.0f} to {last:.2g} µm")
@@ -202,9 +204,9 @@ def _draw_between(axes, rows, left_out) -> None:
     axes.plot(range(len(rows)), 1e6 * rows.same_size_rms_m, **style, markerfacecolor="none")
     common = 1e6 * rows.common_size_m.iloc[-1]
     axes.axhline(common, color=GREY, linestyle=(0, (4, 2)), linewidth=0.8)
-    axes.annotate("size, in all", (0.03, common), (0, -8), xycoords=("axes fraction", "data"),
+    axes.annotate("size, shared", (0.03, common), (0, -8), xycoords=("axes fraction", "data"),
                   textcoords="offset points", size=6, color="0.3")  # fmt: skip
-    _draw_gained(axes, rows, said, "between recordings (µm)")
+    draw_gained(axes, rows, said, "between recordings (µm)")
 
 
 CRITICISM = (
@@ -225,9 +227,11 @@ def table_criticism(
     ``recordings``: the array as the recording declares it.
     """
     wrong = _against_acceleration(summary, noise)
-    force, rate = (wrong[(wrong.source == "measured") & (wrong.quantity == q)] for q in KINDS)
+    force, rate = (wrong[(wrong.source == "measured") & (wrong.quantity == q)] for q in QUANTITIES)
     found = _causes(diagnosis[0]).set_index("effect")
     lag, clock = found.loc["gyroscope_delay"], found.loc["sensor_clock"]
+    clocks = next(c for c in diagnosis[0]["causes"] if c["effect"] == "sensor_clock")["parameters"]
+    period = np.median([item["value"] for name, item in clocks.items() if "period" in name])
     last, first = (causes.set_index("step").loc[key] for key in ("common arms", "normal"))
     board = predicted.set_index("model").loc["board"]
     turned = 1e6 * np.radians(0.1) * np.linalg.norm(recordings.relative, axis=1).max()
@@ -238,7 +242,8 @@ def table_criticism(
          f"IMUs: {force.low.iloc[-1]:.0f} to {force.high.iloc[-1]:.0f},"
          f" {rate.low.iloc[-1]:.0f} to {rate.high.iloc[-1]:.0f}", name),
         ("Why? Each chip reads on its own clock, gyroscopes run ahead",
-         "one instant for all readings", f"clocks of 1 ms; {1e3 * lag['mean']:.2f} ms ahead",
+         "one instant for all readings",
+         f"clocks of {1e3 * period:.3g} ms; {1e3 * lag['mean']:.2f} ms ahead",
          f"± {1e3 * lag.sd:.2f} ms; clocks +{clock.nats:.0f} nats", name),
         ("Extended: residual over noise, smooth and fast samples", f"{first.smooth_ratio:.1f}",
          f"{last.smooth_ratio:.2f}", "median", several),
@@ -253,160 +258,3 @@ def table_criticism(
     )  # fmt: skip
     table = pd.DataFrame(rows, columns=[column.name for column in CRITICISM])
     return table, CRITICISM, "What the papers' model gets wrong on a real board", []
-
-
-def figure_criticism_hidden(diagnosis: tuple, truth: dict, recordings: Array):
-    """The same four panels where the truth is known: lever arms hidden in a simulated recording.
-
-    ``diagnosis`` (diagnosis.json, tables); ``truth``: what `blind.cases.make` says;
-    ``recordings``: the array as the recording declares it.
-    """
-    document, tables = diagnosis
-    residual = tables["residual"]
-    cause = next(table for key, table in tables.items() if key.startswith("cause_01"))
-    cause = cause[cause.panel == cause.panel.min()]
-    places = np.array(truth["positions_m"])[1:]
-    rows = []
-    for model in MODELS:
-        found, sd = (np.array(document[model][f"positions{key}_m"])[1:] for key in ("", "_sd"))
-        off = found - places
-        rows.append({"model": MODELS[model], "rms_m": np.sqrt(np.mean(off**2)),
-                     "covered": np.mean(np.abs(off) < SURE * sd)})  # fmt: skip
-    gain = document["gain"]
-    nats = [gain[f"over_inflated_noise_nats_per_sample{end}"] for end in ("", "_se")]
-    table = panels(
-        wrong=residual[residual.axis == "all"][["model", "kind", "imu", "rms"]],
-        cause=cause[["x", "y", "se", "model", "series"]].rename(columns={"model": "predicted"}),
-        extended=_arms(document, truth, recordings.turns), gained=pd.DataFrame(rows),
-        left_out=pd.DataFrame([nats], columns=["over_inflated", "over_inflated_error"]),
-    )  # fmt: skip
-    hidden = truth["effects"][0]
-    size = 1e3 * hidden["amplitude"]["value"]
-    footer = [
-        f"Lever arms of all IMUs, {size:.2g} mm, hidden in a simulated recording by code that"
-        f" shares nothing with the model; named: {_named(document)}. (a) rms residual over the"
-        " declared noise. (b) what the cause predicts, and what is back in the residual without it,"
-        " in noise sds. (c) parameters less what motion and positions take up. (d) rms error of the"
-        " positions, and how many of the 95 % intervals hold the truth."
-    ]
-    return partial(_draw_hidden, footer=footer), _digits(table)
-
-
-def _named(document: dict) -> str:
-    """Causes with their sensors: 'size_effect (all)'."""
-    said = [f"{cause['effect']} ({' '.join(cause['sensors'])})" for cause in document["causes"]]
-    return ", ".join(said) or "nothing"
-
-
-def _arms(document: dict, truth: dict, turns) -> pd.DataFrame:
-    """Lever arms found and true, m, by the array's axes, less the means that nothing shows."""
-    cause = next(c for c in document["causes"] if c["effect"] == "size_effect")
-    found = np.array([item["value"] for item in cause["parameters"].values()]).reshape(-1, 3, 3)
-    true = np.array(truth["effects"][0]["parameters"]["lever_arm"]["value"])
-    # from each chip's axes to those of the array that they lie along
-    found = np.einsum("kia,kxj,kaj->kix", np.abs(turns), turns, found)
-    both = [x - x.mean(0) - x.mean(1, keepdims=True) + x.mean((0, 1)) for x in (found, true)]
-    return pd.DataFrame({"found_m": both[0].ravel(), "true_m": both[1].ravel()})
-
-
-@styled
-def _draw_hidden(table, footer):
-    figure = new_figure(footer, PAGE, 2.5)
-    axes = figure.subplots(1, 4)
-    part = {name: rows for name, rows in table.groupby("panel")}
-    sizes = part["wrong"].groupby("model").rms.max()
-    _draw_residuals(axes[0], part["wrong"])
-    axes[0].set_title(f"Wrong: {sizes.base:.1f} × the noise")
-    _draw_seen(axes[1], part["cause"])
-    arms = 1e3 * part["extended"][["true_m", "found_m"]]
-    axes[2].plot(arms.true_m, arms.found_m, **look(2, "linestyle"), linestyle="", markersize=3)
-    axes[2].axline((0, 0), slope=1, color=BLACK, linewidth=0.8)
-    axes[2].set(xlabel="true (mm)", ylabel="found (mm)")
-    axes[2].set_title(f"Extended: {sizes.extended:.1f} × the noise")
-    gain, error = part["left_out"][["over_inflated", "over_inflated_error"]].iloc[0]
-    said = f"held out: +{gain:.1f} ± {error:.1f} nats"
-    _draw_gained(axes[3], part["gained"], said, "error of positions (µm)")
-    _letters(axes)
-    return figure
-
-
-def _draw_residuals(axes, rows) -> None:
-    for number, (kind, each) in enumerate(rows.groupby("kind")):
-        for model, fill in (("base", {}), ("extended", {"markerfacecolor": "none"})):
-            some = each[each.model == model]
-            axes.plot(some.imu.astype(str), some.rms, **look(number, "linestyle"), linestyle="",
-                      label=f"{kind}s, {MODELS[model]}", **fill)  # fmt: skip
-    axes.set(xlabel="IMU", ylabel="residual / noise", ylim=(0, 1.7 * rows.rms.max()))
-    axes.legend(fontsize=6)
-
-
-def _draw_seen(axes, rows) -> None:
-    for number, (kind, each) in enumerate(rows.groupby("series")):
-        axes.errorbar(each.x, each.y, 2 * each.se, **look(number, "linestyle"), linestyle="",
-                      label=kind, markersize=3)  # fmt: skip
-    ends = rows.x.min(), rows.x.max()
-    axes.plot(ends, ends, color=BLACK, linewidth=0.8)
-    axes.set(xlabel="predicted (noise sds)", ylabel="seen (noise sds)", title="Cause: lever arms")
-    axes.legend(fontsize=6)
-
-
-HIDDEN = (
-    Column("recording", "recording", "recording"),
-    Column("hidden", "hidden", "hidden"),
-    Column("sensors", "in IMU", "in IMU"),
-    Column("named", "named", "named"),
-    Column("named_sensors", "in IMU", "in IMU"),
-    Column("size", "size ± sd", r"size $\pm$ sd"),
-    Column("true_size", "true size", "true size"),
-    Column("gain", "gain, held out (nats)", "gain, held out (nats)"),
-    Column("control", "the same without it", "the same without it"),
-)
-
-
-def table_criticism_hidden(diagnoses: list, truths: list, controls: list, names: list):
-    """What was hidden, and what the diagnosis says of it, a row a recording.
-
-    ``diagnoses``, ``controls`` (diagnosis.json, tables) with the effect and without;
-    ``truths``: what was hidden in the recordings ``names``.
-    """
-    rows = []
-    for name, truth, (document, _), (control, _) in zip(
-        names, truths, diagnoses, controls, strict=True
-    ):
-        hidden, before = truth["effects"][0], set(classes(control["causes"]))
-        new = [cause for cause in document["causes"] if cause["effect"] not in before]
-        mine = [c for c in new if hidden["effect"] in (c["effect"], *c["indistinguishable_from"])]
-        size, true_size = _sizes(mine, hidden)
-        rows.append({
-            "recording": name, "hidden": hidden["effect"], "sensors": " ".join(hidden["sensors"]),
-            "named": ", ".join(cause["effect"] for cause in new) or "nothing",
-            "named_sensors": ", ".join(" ".join(cause["sensors"]) for cause in new),
-            "size": size, "true_size": true_size,
-            "gain": f"{mine[0]['heldout_gain_nats']:.3g}" if mine else "",
-            "control": "nothing" if not before else "what it has, not this",
-        })  # fmt: skip
-    note = (
-        "Effect, IMU and size are drawn from the seed by code that shares nothing with the model;"
-        " the diagnosis sees the recording alone. Named: what the recording without the effect is"
-        " not said to have."
-    )
-    return pd.DataFrame(rows), HIDDEN, "Effects that were hidden, and what was found", [note]
-
-
-def _sizes(causes: list, hidden: dict) -> tuple[str, str]:
-    """(found ± its sd, true) along the true parameters; rms of both where these are others."""
-    parameters = [np.ravel(p["value"]) for p in hidden["parameters"].values()]
-    true = max(parameters, key=len).astype(float)
-    unit, size = hidden["amplitude"]["unit"], float(np.linalg.norm(true))
-    if not causes:
-        return "", f"{size:.3g} {unit}"
-    items = [item for item in causes[0]["parameters"].values() if item["sd"]]
-    values, sds = (np.array([item[key] for item in items]) for key in ("value", "sd"))
-    if len(values) != len(true) or hidden["effect"] != causes[0]["effect"] or len(true) > 9:
-        return f"{_rms(values):.3g} {unit} rms", f"{_rms(true):.3g} {unit} rms"
-    found, sd = values @ true / size, np.linalg.norm(sds * true) / size
-    return f"{found:.4g} ± {sd:.1g} {unit}", f"{size:.4g} {unit}"
-
-
-def _rms(values) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))

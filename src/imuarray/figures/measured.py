@@ -17,6 +17,7 @@ from imuarray.figures.style import (
     look,
     new_figure,
     panels,
+    rms,
     styled,
 )
 from imuarray.firstorder.noise import StillNoise
@@ -52,10 +53,6 @@ AGREEMENT = (
 )
 
 
-def _rms(values) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
-
-
 def table_measured_first_order(residuals: list, noise: list, names: list[str]):
     """First-order calibration of a board: residuals and noise of each IMU, a row for each.
 
@@ -75,7 +72,7 @@ def table_measured_first_order(residuals: list, noise: list, names: list[str]):
                 part = sizes.get((sensor, str(row.triad)))
                 if part is None:
                     continue
-                sd = _rms(part.sd)
+                sd = rms(part.sd)
                 entry |= {f"{short}_sd": sd, f"{short}_ratio": sd / part.declared.iloc[0]}
                 entry[f"{short}_correlation"] = part.correlation.mean()
             rows.append(entry)
@@ -168,7 +165,7 @@ def _against(axes, table, factor, label):
     for source, style in SOURCES.items():
         bins = table[table.source == source].groupby("bin_low")
         centre = factor * (bins.bin_low.first() + bins.bin_high.first()) / 2
-        size = bins.rms.apply(_rms)
+        size = bins.rms.apply(rms)
         axes.plot(centre, size, markersize=3, **style)
     axes.axhline(1, color=BLACK, linewidth=0.5)
     axes.set(yscale="log", xlabel=label)

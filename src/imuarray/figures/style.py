@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib.style
+import numpy as np
 import pandas as pd
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
@@ -122,6 +123,11 @@ def rounded(table: pd.DataFrame) -> pd.DataFrame:
         count = worth.get(name, ERROR_DIGITS if re.search("_(se|error)($|_)", name) else DIGITS)
         columns[name] = [float(f"{value:.{count}g}") for value in table[name]]
     return table.assign(**columns)
+
+
+def rms(values) -> float:
+    """Root of the mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def panels(**tables: pd.DataFrame) -> pd.DataFrame:
