@@ -132,8 +132,6 @@ def test_a_row_says_what_was_found_of_what_was_hidden():
     assert table.named_sensors[0] == "3" and table["size"][0] == "0.506 ± 0.01 m s-2"
     assert set(table.true_size) == {"0.5 m s-2"}
     assert set(table.control) == {"1 of its own, not this"}
-        "1 of its own, not this"
-    }
     there = hidden_figure.table_criticism_hidden(
         [(right, {})], [truth], [({"causes": [before, right["causes"][1]]}, {})], ["a"]
     )[0]

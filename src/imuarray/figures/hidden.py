@@ -43,7 +43,8 @@ def figure_criticism_hidden(diagnosis: tuple, truth: dict, recordings: Array):
         f" shares nothing with the model; named: {_named(document)}. (a) rms residual over the"
         " declared noise; open: under the extended model. (b) what the cause predicts, and what is"
         " back in the residual without it, in noise sds. (c) parameters less what motion and"
-        " positions take up. (d) rms error of the positions, and how many of the 95 % intervals hold the truth."
+        " positions take up. (d) rms error of the positions, and how many of the 95 % intervals"
+        " hold the truth."
     ]
     return partial(_draw_hidden, footer=footer), three_digits(table)
 
