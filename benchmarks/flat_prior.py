@@ -20,8 +20,8 @@ from written import publish  # noqa: E402
 
 import imuarray  # noqa: E402
 from imuarray.analysis.density import posterior_of, traced  # noqa: E402
-from imuarray.analysis.model import model_of  # noqa: E402
 from imuarray.config import read_config  # noqa: E402
+from imuarray.engine.parameters import model_of  # noqa: E402
 from imuarray.geometry import positions_of, sub_array  # noqa: E402
 from imuarray.model.jax64 import jax  # noqa: E402
 from imuarray.studies.bayes import simulate_dataset  # noqa: E402

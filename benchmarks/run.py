@@ -29,7 +29,7 @@ from imuarray.estimation.collapsed import (
 )
 from imuarray.estimation.kernels import reduced  # noqa: E402
 from imuarray.estimation.newton import fisher_scoring  # noqa: E402
-from imuarray.estimation.reference import most_likely_motion, skew  # noqa: E402
+from imuarray.estimation.reference import skew  # noqa: E402
 from imuarray.geometry import positions_of, sub_array  # noqa: E402
 from imuarray.model import ArrayModel  # noqa: E402
 from imuarray.model.jax64 import jax  # noqa: E402
@@ -41,7 +41,7 @@ from imuarray.posterior.marginal import Marginal  # noqa: E402
 from imuarray.posterior.target import CompiledTarget, GaussianPrior  # noqa: E402
 from imuarray.simulation.recordings import measure  # noqa: E402
 from imuarray.studies.bound import paths  # noqa: E402
-from tests.oracles import joint_jacobian  # noqa: E402
+from tests.oracles import joint_jacobian, most_likely_motion  # noqa: E402
 
 
 def interleaved(functions, repeats):

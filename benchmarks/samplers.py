@@ -23,8 +23,8 @@ from samplers_figure import CONVERGED, statistics
 from written import publish
 
 from imuarray.analysis.density import posterior_of, traced
-from imuarray.analysis.model import model_of
 from imuarray.config import read_config
+from imuarray.engine.parameters import model_of
 from imuarray.geometry import positions_of
 from imuarray.posterior import reference, tuning
 from imuarray.posterior.diagnostics import ess, find_burn_in, rhat

@@ -2,8 +2,10 @@
 
 import numpy as np
 
+from imuarray.engine.dataset import noise_variables, positions_dataset
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel, Noise
+from imuarray.model.array_model import parameter_names
 from imuarray.motion import normal_motion
 
 SHAPE = np.array(
@@ -61,20 +63,19 @@ def measure(rng, model, motion, noise=True):
     return force, turning
 
 
-def diagnosis(effect, parameters, positions, noise, span, sd=0.0, origin=0.0) -> dict:
-    """A diagnosis.json that says so: ``parameters`` {name: (value, sd)} of one effect.
+def known(recording, model, values, sd, positions, noise, origin, span):
+    """A calibration that says so: the effects' parameters (P,) with one ``sd``, positions (A, 3) m.
 
-    ``positions`` (A, 3) m of IMUs 1, 2, ... with one ``sd``; ``noise`` sds (m/s^2, rad/s); s.
+    ``noise`` sds (m/s^2, rad/s) of all triads; ``origin`` and ``span`` of time in s.
     """
-    labels = [str(k + 1) for k in range(len(positions))]
-    kinds = zip(("accelerometer", "gyroscope"), noise, strict=True)
-    named = {k: {"value": value, "sd": sd, "unit": "1"} for k, (value, sd) in parameters.items()}
-    return {
-        "extended": {
-            "positions_m": positions.tolist(),
-            "positions_sd_m": np.full(positions.shape, sd).tolist(),
-        },
-        "causes": [{"effect": effect, "parameters": named}],
-        "noise_sd": {kind: {label: {"sd": size} for label in labels} for kind, size in kinds},
-        "clock": {"origin_s": origin, "span_s": span},
-    }
+    labels = recording.accelerometer_labels, recording.gyroscope_labels
+    counts = [len(names) for names in labels]
+    size = 3 * (counts[0] - 1) + len(values)
+    places = positions_dataset(recording, positions, np.eye(3 * (counts[0] - 1)) * 1e-12)
+    return places.assign(
+        effect_parameter=("parameter", values), effect_sd=("parameter", np.full(len(values), sd)),
+        whole_covariance=(("unknown", "unknown_other"), np.eye(size) * 1e-12),
+        **noise_variables(Noise.of(*counts, *map(np.full, counts, noise))),
+    ).assign_coords(parameter=parameter_names(model, labels)).assign_attrs(
+        effects=",".join(model.effects), time_origin=origin, span=span
+    )  # fmt: skip

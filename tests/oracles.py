@@ -125,7 +125,7 @@ def joint_map(model, force, rate, saturated=None, prior=None, limit=40):
               for part in (model.noise.accelerometer, model.noise.gyroscope)]  # fmt: skip
     keep = np.ones(rate.shape) if saturated is None else 1.0 - saturated
     mean, sd = (np.zeros(split), np.inf) if prior is None else prior
-    mean = np.append(mean, model.effect_prior_mean)
+    mean = np.append(mean, np.zeros(model.effect_size))
     sd = np.append(np.broadcast_to(sd, split), model.effect_prior_sd)
 
     def one(x, p, force, rate, keep):
@@ -141,7 +141,7 @@ def joint_map(model, force, rate, saturated=None, prior=None, limit=40):
     slopes = jax.jit(jax.vmap(jax.jacfwd(one, (0, 1)), parts))
     first = estimate_motion(ArrayModel(model.array, model.noise), force, rate, None, saturated)
     x = np.hstack([*first.motion[:3], np.zeros((len(force), D - 9))])
-    p = np.append(model.array.relative[1:].ravel(), model.effect_start)
+    p = np.append(model.array.relative[1:].ravel(), np.zeros(model.effect_size))
 
     def cost(x, p):
         off = np.asarray(values(x, p, force, rate, keep))
@@ -170,3 +170,61 @@ def joint_map(model, force, rate, saturated=None, prior=None, limit=40):
             break
     places = np.vstack([np.zeros(3), p[:split].reshape(-1, 3)])
     return Joint(places, p[split:], covariance, x, float(best), bool(converged))
+
+
+def nonlinear_slope(rate, positions):
+    """dh / domega (3 K, 3) at one rate (3,)."""
+    turn = skew(rate)
+    columns = [positions @ (skew(e) @ turn + turn @ skew(e)).T for e in np.eye(3)]
+    return np.stack([column.ravel() for column in columns], axis=1)
+
+
+def most_likely_motion(force, rates, positions, accelerometer_sd, gyroscope_sd, steps=50):
+    """(5): (omega, omega_dot, s) of one sample, from force (K, 3) m/s^2 and rates (G, 3) rad/s.
+
+    Gauss-Newton in omega; at each omega the rest, in which the model is linear, is eliminated.
+    ``accelerometer_sd`` (K,) m/s^2 of each triad, ``gyroscope_sd`` rad/s.
+    """
+    weight = np.repeat(1.0 / np.asarray(accelerometer_sd), 3)
+    H = weight[:, None] * linear_part(positions)
+    unexplained = np.eye(len(H)) - H @ np.linalg.pinv(H)  # by any omega_dot and s
+    omega = rates.mean(axis=0)
+    for _ in range(steps):
+        off = weight * (force.ravel() - nonlinear_part(omega, positions))
+        slope = weight[:, None] * nonlinear_slope(omega, positions)
+        residual = np.concatenate([unexplained @ off, (rates - omega).ravel() / gyroscope_sd])
+        jacobian = [unexplained @ slope, np.tile(np.eye(3) / gyroscope_sd, (len(rates), 1))]
+        step = np.linalg.lstsq(np.vstack(jacobian), residual, rcond=None)[0]
+        omega = omega + step
+        if np.linalg.norm(step) < 1e-13 * np.linalg.norm(omega):
+            break
+    off = weight * (force.ravel() - nonlinear_part(omega, positions))
+    rest = np.linalg.lstsq(H, off, rcond=None)[0]
+    return omega, rest[:3], rest[3:]
+
+
+def positions_given_motion(forces, omega, omega_dot, s):
+    """(8), (9): positions (K, 3) m, r_1 = 0, from forces (N, K, 3) and the motion, (N, 3) each."""
+    A = skew(omega) @ skew(omega) + skew(omega_dot)
+    C = np.linalg.inv(sum(a.T @ a for a in A))
+    found = np.zeros((forces.shape[1], 3))
+    for k in range(1, len(found)):
+        found[k] = C @ sum(a.T @ (y - f) for a, y, f in zip(A, forces[:, k], s, strict=True))
+    return found
+
+
+def ml_bcd(forces, rates, positions, accelerometer_sd, gyroscope_sd, iterations):
+    """Algorithm 1: positions (iterations, K, 3) m after each iteration.
+
+    ``forces`` (N, K, 3) m/s^2, ``rates`` (N, G, 3) rad/s; ``positions`` (K, 3) m is the initial
+    guess, the reference first and at 0.
+    """
+    path = []
+    for _ in range(iterations):
+        motion = [
+            most_likely_motion(y, w, positions, accelerometer_sd, gyroscope_sd)
+            for y, w in zip(forces, rates, strict=True)
+        ]
+        positions = positions_given_motion(forces, *map(np.array, zip(*motion, strict=True)))
+        path.append(positions)
+    return np.array(path)

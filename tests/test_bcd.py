@@ -8,11 +8,11 @@ from scipy.optimize import least_squares
 
 from imuarray.errors import InputError
 from imuarray.estimation.bcd import calibrate_bcd
-from imuarray.estimation.reference import ml_bcd
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from tests import oracles
 from tests.cases import noises, simulate, small_array
+from tests.oracles import ml_bcd
 
 
 def problem(seed=1, samples=6, noise=True):

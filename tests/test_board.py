@@ -75,7 +75,7 @@ def page(found, folder):
 
 @pytest.fixture
 def no_pictures(monkeypatch):
-    monkeypatch.setattr("imuarray.report.board.draw", lambda _: [])
+    monkeypatch.setattr("imuarray.report.board.pictured", lambda *_, **_more: [])
 
 
 def words(page: str) -> str:

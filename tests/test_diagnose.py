@@ -8,12 +8,12 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
+from imuarray.analysis.calibration import calibrate
 from imuarray.blind.cases import Case, make
 from imuarray.blind.measured import hide
 from imuarray.cli import main
 from imuarray.diagnosis import state as elimination
 from imuarray.diagnosis.document import diagnose, precision_of, structural_gain
-from imuarray.diagnosis.extension import extended_model, read_extension
 from imuarray.diagnosis.final_checks import beside_left
 from imuarray.diagnosis.noise_effects import verdict
 from imuarray.diagnosis.procedure import run_procedure
@@ -27,9 +27,9 @@ from imuarray.engine.fit import flat_parameters
 from imuarray.engine.heldout import gain, log_scores
 from imuarray.engine.parameters import catalogue_effects, columns_of
 from imuarray.engine.readings import Left, arrange
-from imuarray.model import EFFECTS, ArrayModel
+from imuarray.model import EFFECTS
 from imuarray.model.effects import KINDS, effect, known_effect
-from imuarray.recording import write_recording
+from imuarray.recording import load_dataset, read_recording, write_recording
 from imuarray.streams import stream
 from imuarray.tails import log_chi_square
 
@@ -407,53 +407,40 @@ def test_the_command_writes_a_complete_folder(diagnosed):
     assert (diagnosed / "out" / "report.html").stat().st_size > 10_000
 
 
-def test_the_extended_model_is_one_option_away(diagnosed):
-    out = diagnosed / "cal.nc"
-    status = main([
-        "calibrate", str(diagnosed / "rec.nc"), "--quiet",
-        "--model", str(diagnosed / "out" / "diagnosis.json"), "--out", str(out),
-    ])  # fmt: skip
-    assert status == 0
-    import xarray as xr
-
+def test_the_extended_model_is_a_calibration(diagnosed):
     document = json.loads((diagnosed / "out" / "diagnosis.json").read_text())
-    with xr.open_dataset(out) as found:
-        place = [str(name).endswith("_3 1") for name in found.parameter.values]
-        values, sds = found.effect_parameter.values[place], found.effect_sd.values[place]
-        others = found.effect_parameter.values[~np.array(place)]
-        positions = found.position.values
-        position_sds = np.sqrt(np.einsum("kaka->ka", found.position_covariance.values))
-    wanted = [p["value"] for p in document["causes"][0]["parameters"].values()]
-    np.testing.assert_allclose(values, wanted, atol=0.2 * sds.max())
-    assert np.abs(others).max() < 1e-6
-    # one computation with the diagnosis' own
-    claimed = np.array(document["extended"]["positions_sd_m"])[1:]
-    away = (positions - np.array(document["extended"]["positions_m"]))[1:] / claimed
-    assert np.abs(away).max() < 0.05
-    np.testing.assert_allclose(position_sds[1:], claimed, rtol=0.05)
+    found = load_dataset(diagnosed / "out" / "cal.nc")
+    wanted = document["causes"][0]["parameters"]
+    mine = [str(name).endswith("_3 1") for name in found.parameter.values]
+    np.testing.assert_allclose(
+        found.effect_parameter.values[mine], [p["value"] for p in wanted.values()],
+        atol=0.2 * found.effect_sd.values.max(),
+    )  # fmt: skip
+    assert not found.effect_sd.values[~np.array(mine)].any()
+    section, places = document["extended"], found.position.values
+    np.testing.assert_allclose(places, section["positions_m"], rtol=0, atol=1e-12)
+    sds = np.sqrt(np.einsum("kaka->ka", found.position_covariance.values))
+    np.testing.assert_allclose(sds, section["positions_sd_m"], rtol=0, atol=1e-12)
 
 
-def test_a_noise_beside_a_diagnosis_is_refused(diagnosed, capsys):
-    """The diagnosis has the noise; two of them would leave one without a word."""
+def test_the_model_is_estimated_again_from_the_calibration(diagnosed):
+    path = diagnosed / "out" / "cal.nc"
+    found, again = load_dataset(path), calibrate(read_recording(diagnosed / "rec.nc"), path)
+    sds = np.sqrt(np.einsum("kaka->ka", found.position_covariance.values))[1:]
+    assert np.abs((again.position - found.position).values[1:] / sds).max() < 0.05
+    assert np.array_equal(again.effect_sd.values > 0, found.effect_sd.values > 0)
+
+
+def test_a_noise_beside_a_calibration_is_refused(diagnosed, capsys):
+    """The calibration has the noise; two of them would leave one without a word."""
     out = diagnosed / "noisy.nc"
     status = main([
         "calibrate", str(diagnosed / "rec.nc"), "--accelerometer-noise", "0.1", "--out", str(out),
-        "--model", str(diagnosed / "out" / "diagnosis.json"),
+        "--model", str(diagnosed / "out" / "cal.nc"),
     ])  # fmt: skip
     captured = capsys.readouterr().err
     assert status == 2 and captured.count("\n") == 1 and not out.exists()
     assert captured.startswith("imuarray: --accelerometer-noise: expected it with --model papers")
-
-
-def test_an_extension_of_another_board_is_refused(diagnosed):
-    from imuarray.errors import InputError
-    from imuarray.geometry import mimu4444_corners
-
-    extension = read_extension(diagnosed / "out" / "diagnosis.json")
-    model = ArrayModel.isotropic(mimu4444_corners(), 0.04, 1e-3)
-    labels = tuple("abcdefgh")
-    with pytest.raises(InputError, match="expected IMUs a, b"):
-        extended_model(extension, model, (labels, labels))
 
 
 @pytest.mark.parametrize(
@@ -477,10 +464,10 @@ def test_a_file_in_the_folder_s_place_is_refused(diagnosed, capsys):
     assert status == 2 and "expected a folder, found a file" in capsys.readouterr().err
 
 
-def test_a_diagnosis_that_is_none_is_refused(diagnosed, capsys):
+def test_a_calibration_that_is_none_is_refused(diagnosed, capsys):
     status = main([
         "calibrate", str(diagnosed / "rec.nc"),
         "--model", str(diagnosed / "rec.nc"), "--out", str(diagnosed / "never.nc"),
     ])  # fmt: skip
-    assert status == 2 and "expected any of sensors, papers, or a .json" in capsys.readouterr().err
+    assert status == 2 and "rec.nc: expected a calibration" in capsys.readouterr().err
     assert not (diagnosed / "never.nc").exists()

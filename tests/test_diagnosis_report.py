@@ -139,7 +139,7 @@ def test_files_are_complete(folder, found):
     names = {path.name for path in folder.iterdir()}
     expected = ALWAYS | {"gain", "cause_01_gyroscope_scale"}
     files = {f"{name}.{suffix}" for name in expected for suffix in ("pdf", "png", "csv")}
-    assert names == files | {"report.html", "diagnosis.json"}
+    assert names == files | {"report.html", "cal.nc", "diagnosis.json"}
     document = json.loads((folder / "diagnosis.json").read_text())
     assert document == json.loads(found.to_json())
     assert (folder / "residual.pdf").read_bytes().startswith(b"%PDF")
@@ -154,7 +154,7 @@ def test_an_error_leaves_a_former_report_alone(folder, found, monkeypatch):
     def fails(*_):
         raise RuntimeError
 
-    monkeypatch.setattr(report, "draw", lambda _: [])
+    monkeypatch.setattr(report, "draw", lambda *_: [])
     monkeypatch.setattr(report, "html", fails)
     with pytest.raises(RuntimeError):
         report.write_report(found, folder)
@@ -164,10 +164,11 @@ def test_an_error_leaves_a_former_report_alone(folder, found, monkeypatch):
 def test_figures_of_a_former_report_go(found, tmp_path, monkeypatch):
     for name in ("cause_07_size_effect.png", "gain.csv", "mine.png"):
         (tmp_path / name).write_text("old")
-    monkeypatch.setattr(report, "draw", lambda _: [])
+    monkeypatch.setattr(report, "draw", lambda *_: [])
     monkeypatch.setattr(report, "html", lambda *_: "page")
     report.write_report(found, tmp_path)
-    assert {p.name for p in tmp_path.iterdir()} == {"mine.png", "report.html", "diagnosis.json"}
+    kept = {"mine.png", "report.html", "cal.nc", "diagnosis.json"}
+    assert {path.name for path in tmp_path.iterdir()} == kept
 
 
 def of(found, **changed):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import imuarray
-from imuarray.analysis.calibration_dataset import engine_dataset
+from imuarray.engine.dataset import engine_dataset
 from imuarray.engine.estimate import Recorded, estimate, jackknifed, to_come
 from imuarray.engine.fit import flat_parameters
 from imuarray.engine.ladder import _of_one_truth, climb, mask_of

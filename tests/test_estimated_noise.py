@@ -5,7 +5,7 @@ import pytest
 
 import imuarray
 from imuarray.analysis.density import posterior_of
-from imuarray.analysis.model import model_of
+from imuarray.engine.parameters import model_of
 from imuarray.geometry import sub_array
 
 

@@ -14,14 +14,14 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 import imuarray
-from imuarray.analysis.calibration_dataset import (
+from imuarray.analysis.formats import _link_names
+from imuarray.cli import main
+from imuarray.engine.dataset import (
     noise_variables,
     positions_dataset,
     with_readings,
 )
-from imuarray.analysis.formats import _link_names
-from imuarray.analysis.model import model_of
-from imuarray.cli import main
+from imuarray.engine.parameters import model_of
 from imuarray.errors import InputError
 from imuarray.firstorder.turns import nearest_orthogonal
 from imuarray.model.array_model import parameter_names

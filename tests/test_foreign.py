@@ -1,10 +1,8 @@
-"""Calibrations and diagnoses that were damaged, edited or are another board's: one line, status 2.
+"""Calibrations that were damaged, edited or are another board's: one line, status 2.
 
 Where `apply` takes one all the same, what it writes are numbers.
 """
 
-import copy
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -16,9 +14,7 @@ from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.provenance import write_netcdf
 from imuarray.recording import read_recording, write_recording
-from tests.cases import diagnosis
 from tests.test_bound import model
-from tests.test_fuzz import damaged
 
 ALTERED = 20  # files of each kind
 VALUES = [np.nan, np.inf, -np.inf, 0.0, -1.0, 1e300, -1e300, 1e-300, 1e11, 5.0]
@@ -26,18 +22,13 @@ VALUES = [np.nan, np.inf, -np.inf, 0.0, -1.0, 1e300, -1e300, 1e-300, 1e11, 5.0]
 
 @pytest.fixture(scope="module")
 def board(tmp_path_factory):
-    """(folder with rec.nc, calibration with effects, one without, diagnosis as plain data)."""
+    """(folder with rec.nc, calibration with effects, one without)."""
     folder, own = tmp_path_factory.mktemp("foreign"), model()
     recording, truth = imuarray.simulate(own.array, 0.3, 100.0, seed=3, angular_rate=15.0)
     write_recording(recording, folder / "rec.nc")
     plain = imuarray.calibrate(recording, "papers", "gauss-newton")
     extended = imuarray.calibrate(recording, effects=("gyroscope_bias",))
-    parameters = {
-        f"{axis}_{label}": (1e-3, 1e-4) for label in recording.gyroscope_labels for axis in "xyz"
-    }
-    places = recording.relative_positions()
-    document = diagnosis("gyroscope_bias", parameters, places, (0.04, 0.001), 0.3)
-    return folder, extended, plain, document
+    return folder, extended, plain
 
 
 def applied(folder, calibration, capsys):
@@ -83,7 +74,7 @@ def altered(rng, dataset: xr.Dataset) -> xr.Dataset:
 
 
 def test_altered_calibrations(board, capsys):
-    folder, *calibrations, _ = board
+    folder, *calibrations = board
     rng, statuses = np.random.default_rng(7), []
     for number in range(ALTERED):
         path = folder / "cal.nc"
@@ -92,42 +83,12 @@ def test_altered_calibrations(board, capsys):
     assert {0, 2} <= set(statuses)
 
 
-def mutated(rng, document):
-    """A part of plain data gone, or in its place something else."""
-    found = copy.deepcopy(document)
-    place = found
-    while True:
-        keys = list(place) if isinstance(place, dict) else list(range(len(place)))
-        key = keys[rng.integers(len(keys))]
-        if not isinstance(place[key], dict | list) or not place[key] or rng.integers(4) == 0:
-            break
-        place = place[key]
-    wrong = [None, "text", [], {}, True, 10**400, -1, 0, *VALUES]
-    if rng.integers(4) == 0:
-        del place[key]
-    else:
-        place[key] = wrong[rng.integers(len(wrong))]
-    return found
-
-
-def test_altered_diagnoses(board, capsys):
-    folder, _, _, document = board
-    rng, statuses, path = np.random.default_rng(8), [], folder / "diagnosis.json"
-    path.write_text(json.dumps(document))
-    assert applied(folder, path, capsys)[0] in (0, 3)  # its positions are the drawing's
-    for number in range(ALTERED):
-        text = json.dumps(mutated(rng, document) if number % 2 else document)
-        path.write_bytes(text.encode() if number % 2 else damaged(rng, text.encode()))
-        statuses.append(applied(folder, path, capsys)[0])
-    assert statuses.count(2) > ALTERED // 3
-
-
 def with_value(calibration, name, value):
     return calibration.assign({name: calibration[name].copy(data=value)})
 
 
 def test_a_matrix_that_is_no_covariance(board):
-    folder, extended, plain, _ = board
+    folder, extended, plain = board
     recording = read_recording(folder / "rec.nc")
     for calibration, name in ((plain, "position_covariance"), (extended, "whole_covariance")):
         wrong = with_value(calibration, name, -calibration[name].to_numpy())
@@ -137,7 +98,7 @@ def test_a_matrix_that_is_no_covariance(board):
 
 def test_another_boards_calibration(board, capsys):
     """The same labels, another drawing."""
-    folder, _, plain, _ = board
+    folder, _, plain = board
     recording = read_recording(folder / "rec.nc")
     places = recording.accelerometer_position.copy()
     places[2, 1] += 0.02
@@ -145,25 +106,6 @@ def test_another_boards_calibration(board, capsys):
         imuarray.apply(plain, replace(recording, accelerometer_position=places))
     places[2, 1] -= 0.02 - recording.position_prior_sd  # the drawing mended
     imuarray.apply(plain, replace(recording, accelerometer_position=places))
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (lambda d: d["clock"].update(span_s=float("nan")), "found NaN, which is no number"),
-        (lambda d: d["noise_sd"]["gyroscope"]["1"].update(sd=float("inf")), "found Infinity"),
-        (lambda d: d["noise_sd"]["gyroscope"]["1"].update(sd=0.0), "found 0.0 for a number from"),
-        (lambda d: d["extended"]["positions_m"].pop(), "no sd, of 0 or more, for each position"),
-        (lambda d: d.pop("causes"), "found no 'causes'"),
-    ],
-)
-def test_what_is_wrong_in_a_diagnosis_is_said(board, capsys, change, words):
-    folder, _, _, document = board
-    wrong = copy.deepcopy(document)
-    change(wrong)
-    (folder / "diagnosis.json").write_text(json.dumps(wrong))
-    status, line = applied(folder, folder / "diagnosis.json", capsys)
-    assert status == 2 and words in line
 
 
 def test_samples_in_which_every_accelerometer_is_at_its_rail(board):

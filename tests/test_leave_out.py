@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 from scipy.stats import multivariate_t
 
-from imuarray.analysis.calibration_dataset import engine_dataset
 from imuarray.analysis.known import located, predicted, with_board
 from imuarray.engine.course import block_scores, log_densities
+from imuarray.engine.dataset import engine_dataset
 from imuarray.engine.fit import at, flat_parameters
 from imuarray.engine.heldout import log_scores
 from imuarray.engine.linearise import linearise

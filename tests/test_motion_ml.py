@@ -7,11 +7,11 @@ from scipy.optimize import least_squares
 from imuarray.errors import IdentifiabilityError
 from imuarray.estimation import rates
 from imuarray.estimation.collapsed import Collapsed, estimate_motion
-from imuarray.estimation.reference import most_likely_motion
 from imuarray.geometry import mimu4444
 from imuarray.model import ArrayModel, Noise
 from tests import oracles
 from tests.cases import measure, noises, random_covariance, simulate, small_array
+from tests.oracles import most_likely_motion
 
 
 def problem(form="isotropic", seed=1, samples=12):

@@ -8,9 +8,9 @@ import xarray as xr
 
 import imuarray
 from imuarray.analysis.density import posterior_of, traced
-from imuarray.analysis.model import model_of
 from imuarray.blind.cases import Case, make
 from imuarray.cli import main
+from imuarray.engine.parameters import model_of
 from imuarray.errors import InputError
 from imuarray.estimation import newton
 from imuarray.geometry import positions_of, sub_array

@@ -1,6 +1,5 @@
 """Readings that are withheld from the estimate and compared with it."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -14,8 +13,8 @@ from imuarray.analysis.known import _choose, _hidden, fused, past_rail
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.figures.board import draw_past_rail, table_past_rail
-from imuarray.model.array_model import parameter_names
-from tests import cases
+from imuarray.provenance import write_netcdf
+from tests.cases import known
 from tests.test_bound import model
 
 
@@ -30,27 +29,17 @@ def withheld():
     return recording, truth
 
 
-@pytest.fixture
-def diagnosis(withheld, tmp_path):
-    """What a diagnosis that found the truth would say."""
+@pytest.fixture(scope="module")
+def found(withheld):
+    """The calibration that knows the truth."""
     recording, truth = withheld
+    values, places = (truth[name].to_numpy() for name in ("effect_parameter", "position"))
     own = replace(model(), effects=("gyroscope_scale",))
-    labels = recording.accelerometer_labels, recording.gyroscope_labels
-    names = [name.split(" ")[1] for name in parameter_names(own, labels)]
-    values = truth["effect_parameter"].to_numpy()
-    parameters = {name: (value, 1e-4) for name, value in zip(names, values, strict=True)}
-    places = truth["position"].to_numpy()
-    document = cases.diagnosis("gyroscope_scale", parameters, places, (0.04, 0.005), 2.99, 1e-6)
-    path = tmp_path / "diagnosis.json"
-    path.write_text(json.dumps(document))
-    return path
+    return known(recording, own, values, 1e-4, places, (0.04, 0.005), 0.0, 2.99)
 
 
-def test_the_right_model_predicts_what_is_withheld(withheld, diagnosis):
-    recording, truth = withheld
-    found = imuarray.diagnosed(diagnosis, recording)
-    assert np.array_equal(found["effect_parameter"], truth["effect_parameter"])
-    assert np.allclose(found["effect_sd"], 1e-4)
+def test_the_right_model_predicts_what_is_withheld(withheld, found):
+    recording, _ = withheld
     table = past_rail(recording, found, bins=(300, 800, 2000), per_bin=30)
     errors = table.pivot(index="rate_dps", columns="model", values="median_dps")
     assert np.all(errors.board < 0.7 * errors.calibrated)
@@ -63,33 +52,28 @@ def test_the_right_model_predicts_what_is_withheld(withheld, diagnosis):
     assert len(rows) == 4 and "without the withheld readings" in notes[0]
 
 
-def test_what_a_diagnosis_doubts_goes_along(withheld, diagnosis, tmp_path, capsys):
+def test_effects_beside_a_calibration_s_model_are_refused(withheld, found, tmp_path, capsys):
     recording, _ = withheld
-    document = json.loads(diagnosis.read_text())
-    document["reasons"] = ["too slow"]
-    begins, lasts = float(recording.time[0]), float(np.ptp(recording.time))
-    document["clock"] = {"origin_s": begins, "span_s": lasts}
-    diagnosis.write_text(json.dumps(document))
-    found = imuarray.diagnosed(diagnosis, recording)
-    assert json.loads(found.attrs["reasons"]) == ["too slow"] and found.attrs["of_diagnosed"]
-    part = recording.select(slice(1, None))
-    assert not imuarray.diagnosed(diagnosis, part).attrs["of_diagnosed"]
-    document["causes"].append({"effect": "axis_swap", "sensors": ["2"], "parameters": {}})
-    diagnosis.write_text(json.dumps(document))
+    path, log = tmp_path / "cal.nc", tmp_path / "rec.nc"
+    write_netcdf(found, path)
+    with pytest.raises(InputError, match="expected none with the model of a calibration"):
+        imuarray.calibrate(recording, path, effects=["gyroscope_scale"])
+    imuarray.write_recording(recording, log)
+    command = ["sample", str(log), "--out", str(tmp_path / "chains.nc"), "--model", str(path)]
+    assert main([*command, "--effects", "gyroscope_scale"]) == 2
+    assert "expected none with the model of a calibration" in capsys.readouterr().err
+    write_netcdf(found.assign_attrs(mended="axis_swap"), path)
     with pytest.raises(InputError, match="right axes, found axis_swap"):
-        imuarray.diagnosed(diagnosis, recording)
-    with pytest.raises(InputError, match="expected none with a diagnosis.json"):
-        imuarray.calibrate(recording, diagnosis, effects=["gyroscope_scale"])
-    imuarray.write_recording(recording, tmp_path / "rec.nc")
-    command = ["sample", str(tmp_path / "rec.nc"), "--out", str(tmp_path / "chains.nc")]
-    assert main([*command, "--model", str(diagnosis), "--effects", "gyroscope_scale"]) == 2
-    assert "expected none with a diagnosis.json" in capsys.readouterr().err
+        imuarray.calibrate(recording, path)
+    bare = found.drop_vars(["effect_parameter", "effect_sd", "whole_covariance", "parameter"])
+    write_netcdf(bare, path)
+    with pytest.raises(InputError, match="a calibration with effects, found one without"):
+        imuarray.calibrate(recording, path)
 
 
-def test_the_withheld_readings_are_not_used(withheld, diagnosis):
+def test_the_withheld_readings_are_not_used(withheld, found):
     """Other readings in their place: the predictions are the same, so the errors differ by that."""
     recording, _ = withheld
-    found = imuarray.diagnosed(diagnosis, recording)
     index = _choose(recording, np.radians((300, 2000)), 20)
     hidden = np.zeros(recording.angular_rate.shape, bool)
     hidden[index] = (np.abs(recording.angular_rate[index]) > np.radians(300)).any(1, keepdims=True)
@@ -101,18 +85,18 @@ def test_the_withheld_readings_are_not_used(withheld, diagnosis):
     np.testing.assert_array_equal(*(one.predictions()[0] for one in predicted))
 
 
-def test_what_is_never_fast_is_refused(withheld, diagnosis):
+def test_what_is_never_fast_is_refused(withheld, found):
     recording, _ = withheld
-    found = imuarray.diagnosed(diagnosis, recording)
     with pytest.raises(InputError, match="beyond 9000 deg/s, found none"):
         past_rail(recording, found, bins=(9000, 9500))
 
 
-def test_a_diagnosis_is_a_model_to_sample(withheld, diagnosis):
+def test_a_calibration_is_a_model_to_sample(withheld, found, tmp_path):
     """The density stands at the estimate from its effects: all coordinates within 5 sds."""
     recording, truth = withheld
-    found = fitted_beyond(recording, str(diagnosis), (), print)
-    posterior = posterior_beyond(recording, found)
+    write_netcdf(found, tmp_path / "cal.nc")
+    estimate = fitted_beyond(recording, str(tmp_path / "cal.nc"), (), print)
+    posterior = posterior_beyond(recording, estimate)
     assert posterior.model.effects == ("gyroscope_scale",)
     off = posterior.mode[:12] - truth["position"].to_numpy()[1:].ravel()
     assert np.abs(off / np.sqrt(np.diag(posterior.covariance))[:12]).max() < 5

@@ -59,7 +59,7 @@ def test_skewed_gyroscopes_are_found_and_sampled():
         ({"method": "pmmh"}, "expected --model papers with it, found sensors"),
         ({"motion_prior": "flat"}, "expected --model papers with it, found sensors"),
         ({"model": "papers", "effects": ["size_effect"]}, "expected none with --model papers"),
-        ({"model": "guess"}, "expected any of sensors, papers or a diagnosis.json"),
+        ({"model": "guess"}, "expected any of sensors, papers or a calibration"),
     ],
 )
 def test_what_does_not_go_together_is_refused(options, said):

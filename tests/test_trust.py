@@ -392,7 +392,7 @@ def test_what_looks_at_the_time_is_of_its_own_recording(sound, effect):
     rate = np.median(sound.angular_rate, axis=1)[::2]
     calibration = xr.Dataset(
         {"angular_rate": (("time", "axis"), rate)}, {"time": sound.time[::2]},
-        {"effects": f"{effect},gyroscope_delay", "model": "diagnosis.json"},
+        {"effects": f"{effect},gyroscope_delay", "model": "diagnosis"},
     )  # fmt: skip
     part = sound.select(slice(100, 400))
     assert trust._of_another_time(sound, calibration, False) == []

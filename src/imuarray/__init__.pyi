@@ -1,6 +1,5 @@
 from . import plots as plots
 from .analysis.calibration import calibrate as calibrate
-from .analysis.calibration_dataset import diagnosed as diagnosed
 from .analysis.export import export as export
 from .analysis.logs import open_logs as open_logs
 from .analysis.motion import apply as apply
@@ -13,6 +12,7 @@ from .analysis.prepare import simulate as simulate
 from .analysis.sampling import sample as sample
 from .analysis.sampling import summary as summary
 from .diagnosis.document import diagnose as diagnose
+from .engine.dataset import diagnosed as diagnosed
 from .errors import InputError as InputError
 from .estimation.bcd import calibrate_bcd as calibrate_bcd
 from .estimation.collapsed import estimate_motion as estimate_motion

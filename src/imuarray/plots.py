@@ -22,11 +22,10 @@ from imuarray.report.pictures import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from imuarray.diagnosis.document import Diagnosis
     from imuarray.firstorder.noise import StillNoise
 
 __all__ = [
-    "allan", "board", "discrepancies", "gains", "length", "motion", "positions", "posterior",
+    "allan", "board", "length", "motion", "positions", "posterior",
     "residual_course", "sphere", "timeline", "trace",
 ]  # fmt: skip
 MOTION = {
@@ -108,19 +107,3 @@ def allan(noise: StillNoise) -> list[Axes]:
     from imuarray.figures.measured import noise_figure
 
     return noise_figure(noise).axes
-
-
-def discrepancies(diagnosis: Diagnosis) -> list[Axes]:
-    """Each check of the residual against simulations of the fitted model."""
-    from imuarray.report.drawings import discrepancy_figure
-    from imuarray.report.numbers import discrepancy_table
-
-    return discrepancy_figure(discrepancy_table(diagnosis)).axes
-
-
-def gains(diagnosis: Diagnosis) -> list[Axes]:
-    """What each cause gains on held-out time."""
-    from imuarray.report.drawings import gain_figure
-    from imuarray.report.numbers import gain_table
-
-    return gain_figure(gain_table(diagnosis)).axes

@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from imuarray.analysis.calibration_dataset import effects_of, parameters_of, places_among
 from imuarray.analysis.density import WIDE, Posterior, prior_of, unknown_scales
-from imuarray.analysis.model import model_of
 from imuarray.analysis.noise import Shown, factors, shown
+from imuarray.engine.dataset import effects_of, parameters_of, places_among
 from imuarray.engine.estimate import Estimate
 from imuarray.engine.fit import flat_parameters
 from imuarray.engine.linearise import State
-from imuarray.engine.parameters import gauge_masks, prior_precision
+from imuarray.engine.parameters import gauge_masks, model_of, prior_precision
 from imuarray.engine.readings import Readings
 from imuarray.linear import scaled_inverse
 from imuarray.model import ArrayModel, Noise

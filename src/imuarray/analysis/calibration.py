@@ -10,31 +10,33 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis import methods
-from imuarray.analysis.calibration_dataset import engine_dataset, papers_dataset, with_readings
-from imuarray.analysis.model import Say, assumed, model_of, require_together, silent, usable
+from imuarray.analysis.known import again
+from imuarray.analysis.model import Say, assumed, require_together, silent, usable
 from imuarray.analysis.prepare import less_leak_by_others
+from imuarray.engine.dataset import engine_dataset, papers_dataset, with_readings
 from imuarray.engine.estimate import Estimate
 from imuarray.engine.ladder import Rung, climb, rungs_of, with_effects
+from imuarray.engine.parameters import model_of
 from imuarray.engine.readings import Readings, arrange, determined, most_informative
 from imuarray.errors import InputError, one_line, require_one_of
-from imuarray.model.effects import DATA_EFFECTS
 from imuarray.provenance import digest, stamp
-from imuarray.recording import Recording
+from imuarray.recording import Recording, load_dataset
 from imuarray.recording.channels import require_apart, require_live
 
 
 def fitted(
     recordings: Sequence[Recording], model: str, effects: Sequence[str], say: Say
 ) -> tuple[Estimate, list[Rung]]:
-    """(estimate, the ladder's rungs) under a diagnosis.json, ``effects``, or the sensor model.
+    """(estimate, the ladder's rungs) under a calibration's model, ``effects``, or the sensor model.
 
     InputError where no model of the kind is near the readings.
     """
-    if model.endswith(".json"):
-        from imuarray.diagnosis.extension import diagnosed_estimate
-
+    if methods.is_file(model):
         with _near_the_model():
-            return diagnosed_estimate(model, recordings[0]), []
+            try:
+                return again(recordings[0], load_dataset(Path(model)), say), []
+            except InputError as error:
+                raise InputError(f"--model {model}: {error}") from None
     readings = _arranged(recordings, say)
     with _near_the_model():
         if effects:
@@ -61,7 +63,7 @@ def fitted_beyond(
     recording: Recording, model: str, effects: Sequence[str], say: Say
 ) -> Estimate | None:
     """The same of one recording, None where no more than positions and motion are in the model."""
-    if model.endswith(".json") or effects:
+    if methods.is_file(model) or effects:
         return fitted([recording], model, effects, say)[0]
     readings = _arranged([recording], say)
     if not rungs_of(readings):
@@ -106,7 +108,8 @@ def calibrate(
     model
         ``"sensors"``: the standard sensor model, each part kept where it gains on held-out time,
         with noise estimated for each triad; ``"papers"``: that of paper 2017, by ``method``, with
-        the declared noise; or the path of a ``diagnosis.json``: what a diagnosis found.
+        the declared noise; or the path of a calibration: its effects and sensors, estimated
+        again.
     method
         Of the papers' model. ``"gauss-newton"`` (default): the most likely positions in a few
         iterations, of any number of samples; ``"bcd"``: the same by block coordinate descent,
@@ -147,8 +150,8 @@ def calibrate(
     if method is not None:
         require_one_of("method", method, methods.CALIBRATION)
     require_together(model, recordings, effects, accelerometer_noise)
-    if effects and str(model).endswith(".json"):
-        raise InputError("--effects: expected none with a diagnosis.json, found some")
+    if effects and methods.is_file(model):
+        raise InputError("--effects: expected none with the model of a calibration, found some")
     if method is not None and model != "papers":
         raise InputError(f"--method {method}: expected it with --model papers, found {model}")
     if model == "papers":
@@ -183,13 +186,8 @@ def _papers(recording: Recording, method: str, accelerometer_noise, say: Say) ->
 
 
 def _engine(recordings, model: str, effects, say: Say) -> xr.Dataset:
-    """Robust least squares (`imuarray.engine`): a ladder, given effects, or a diagnosis'."""
-    from imuarray.diagnosis.extension import read_extension
-
+    """Robust least squares (`imuarray.engine`): a ladder, given effects, or a calibration's."""
     found, rungs = fitted(recordings, model, effects, say)
     dataset = engine_dataset(recordings, found)
     dataset.attrs["parts"] = json.dumps([rung._asdict() for rung in rungs])
-    if model.endswith(".json"):
-        mended = read_extension(Path(model)).before
-        dataset.attrs["mended"] = " ".join(n for n in mended if not DATA_EFFECTS[n].left_out)
     return dataset

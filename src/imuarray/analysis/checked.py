@@ -44,7 +44,7 @@ def require_fit(calibration: xr.Dataset, recording: Recording | None = None) -> 
             _require_numbers(calibration[name], dimensions)
         elif name in needed:
             raise InputError(f"expected a calibration (imuarray calibrate), found no {name}")
-    require_right_axes(str(calibration.attrs.get("mended", "")).split())
+    _require_right_axes(str(calibration.attrs.get("mended", "")).split())
     if recording is not None:
         require_labels(calibration, recording)
     if "effect_parameter" in calibration:
@@ -57,7 +57,7 @@ def require_fit(calibration: xr.Dataset, recording: Recording | None = None) -> 
         _require_board(calibration, recording)
 
 
-def require_right_axes(mended: Iterable[str]) -> None:
+def _require_right_axes(mended: Iterable[str]) -> None:
     """InputError where readings were mended in memory: those of the file are as they were.
 
     ``mended``: data effects that a diagnosis has found.
@@ -72,8 +72,6 @@ def require_right_axes(mended: Iterable[str]) -> None:
 
 def is_of(recording: Recording, calibration: xr.Dataset) -> bool:
     """Whether the calibration is of this recording, or of one that this is a part of."""
-    if "of_diagnosed" in calibration.attrs:
-        return bool(calibration.attrs["of_diagnosed"])
     if "angular_rate" not in calibration:
         return False
     time = calibration["time"].to_numpy()

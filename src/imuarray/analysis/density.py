@@ -133,7 +133,7 @@ def _spread(recording: Recording, model: ArrayModel, say: Say) -> Posterior:
 
 def prior_of(recording: Recording, model: ArrayModel) -> GaussianPrior:
     """Of the positions r_2 ... r_A, then of the effects' parameters."""
-    mean = np.concatenate([model.array.parameters, model.effect_prior_mean])
+    mean = np.append(model.array.parameters, np.zeros(model.effect_size))
     sd = np.full(mean.size, recording.position_prior_sd)
     sd[3 * (model.array.accelerometers - 1) :] = model.effect_prior_sd
     return GaussianPrior.of(mean, sd)

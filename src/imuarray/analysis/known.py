@@ -7,21 +7,23 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from imuarray.analysis.calibration_dataset import engine_dataset, places_among, positions_dataset
-from imuarray.analysis.model import model_of
+from imuarray.analysis.checked import require_fit
+from imuarray.analysis.model import Say, silent
 from imuarray.engine.clocks import CLOCK, refined, shown_clocks, timed, with_clocks
 from imuarray.engine.course import block_scores
+from imuarray.engine.dataset import engine_dataset, places_among, positions_dataset
 from imuarray.engine.estimate import Estimate, Recorded, estimate, stepped
 from imuarray.engine.fit import flat_parameters, prior_means
 from imuarray.engine.fusion import fuse
 from imuarray.engine.heldout import gain
-from imuarray.engine.ladder import DELAYS, RUNGS, Climbed, mask_of
+from imuarray.engine.ladder import DELAYS, RUNGS, Climbed, mask_of, resumed
 from imuarray.engine.linearise import State
-from imuarray.engine.parameters import POSITION, Columns, columns_of
+from imuarray.engine.parameters import POSITION, Columns, columns_of, model_of
 from imuarray.engine.readings import Readings, arrange, determined, measured, most_informative
 from imuarray.engine.robust import normal_pass
 from imuarray.engine.rough_fusion import Rough, roughly
 from imuarray.engine.settings import SETTINGS
+from imuarray.engine.start import start
 from imuarray.engine.widths import settled
 from imuarray.errors import InputError
 from imuarray.firstorder.correct import FirstOrder, calibrate_first_order, correct
@@ -81,6 +83,33 @@ def _finished(one: Recorded, columns: Columns, effects, own, imus) -> Estimate:
     mask[np.setdiff1d(np.arange(len(mask)), imus)] = False
     one = replace(one, state=one.state._replace(parameters=values))
     return estimate([one], columns, mask_of(columns, own) | mask)
+
+
+def again(recording: Recording, calibration: xr.Dataset, say: Say = silent) -> Estimate:
+    """The estimate of a recording from where a calibration has it.
+
+    Of the effects' parameters those are free that the calibration has estimated. InputError for
+    another dataset, or other IMUs.
+    """
+    require_fit(calibration, recording)
+    for name in str(calibration.attrs.get("mended", "")).split():
+        say(f"{name}: concerns readings, not the model; they are used as they are")
+    if "effect_parameter" not in calibration:
+        raise InputError("expected a calibration with effects, found one without")
+    effects, readings = calibration.attrs["effects"].split(","), used(recording)
+    origin, span = calibration.attrs["time_origin"], calibration.attrs["span"]
+    since = readings.time + readings.origin - origin
+    readings = replace(readings, time=since, span=span, origin=origin)
+    columns = columns_of(readings.array, effects, readings.position_prior_sd)
+    model, positions = model_of(recording, effects), calibration["position"].to_numpy()
+    values, free = (
+        columns.model.join(model.split(calibration[name].to_numpy()))
+        for name in ("effect_parameter", "effect_sd")
+    )
+    state = start(readings, columns)._replace(positions=positions, parameters=values)
+    active = flat_parameters(columns, state._replace(parameters=(free > 0).astype(float))) > 0
+    active[:, columns.of(POSITION)] = True
+    return resumed(readings, columns, active & columns.owner, state)
 
 
 def used(recording: Recording) -> Readings:

@@ -2,17 +2,14 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from os import PathLike
-from pathlib import Path
 
 import numpy as np
 
 from imuarray.analysis import methods
 from imuarray.errors import LARGEST, SMALLEST, InputError
 from imuarray.geometry.array import require_planar_extent
-from imuarray.model import DATA_EFFECTS, ArrayModel
 from imuarray.model.effects import find_effects
-from imuarray.recording import Recording, array_of
+from imuarray.recording import Recording
 from imuarray.recording.channels import require_live
 
 Say = Callable[[str], None]
@@ -20,13 +17,6 @@ Say = Callable[[str], None]
 
 def silent(text: str) -> None:
     """The default ``say``: what a notebook wants to hear of the work's course."""
-
-
-def model_of(recording: Recording, effects: Sequence[str] = ()) -> ArrayModel:
-    """The measurement model a recording declares: its geometry and noise."""
-    return ArrayModel.isotropic(
-        array_of(recording), recording.accelerometer_noise_sd, recording.gyroscope_noise_sd, effects
-    )
 
 
 def assumed(recording: Recording, accelerometer_noise: float | None) -> Recording:
@@ -69,9 +59,9 @@ def require_together(
 ) -> None:  # fmt: skip
     """InputError where a model, its effects, noise and recordings do not go together."""
     find_effects(effects)  # an unknown one is named before anything else
-    if model not in methods.MODELS and not str(model).endswith(".json"):
+    if model not in methods.MODELS and not methods.is_file(model):
         known = ", ".join(methods.MODELS)
-        raise InputError(f"model: expected any of {known} or a diagnosis.json, found {model!r}")
+        raise InputError(f"model: expected any of {known} or a calibration (.nc), found {model!r}")
     if model == "papers" and effects:
         raise InputError("--effects: expected none with --model papers, found some")
     if model != "papers" and accelerometer_noise is not None:
@@ -95,27 +85,3 @@ def require_together(
                 "recordings: expected all of them corrected alike (imuarray first-order), or none,"
                 " found some with maps of sensors taken out that others have"
             )
-
-
-def extender(diagnosis: str | PathLike | None, effects: Sequence[str] = (), say: Say = silent):
-    """What gives a model the effects and the noise of ``diagnosis`` (diagnosis.json), or None.
-
-    A function of the model and of the labels of accelerometers and gyroscopes, the model's own
-    by default.
-    """
-    if diagnosis is None:
-        return None
-    from imuarray.diagnosis.extension import extended_model, read_extension
-
-    if effects:
-        raise InputError("--effects: expected none beside --diagnosis, found some")
-    extension = read_extension(Path(diagnosis))
-    for name in extension.before:
-        if not DATA_EFFECTS[name].left_out:
-            raise InputError(f"{diagnosis}: expected right axes, found {name}; mend the recording")
-        say(f"{name}: concerns readings, not the model; they are used as they are")
-
-    def extended(model: ArrayModel, labels=None) -> ArrayModel:
-        return extended_model(extension, model, labels or (model.array.labels,) * 2)
-
-    return extended

@@ -8,8 +8,9 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis.checked import require_fit, require_labels
-from imuarray.analysis.model import assumed, model_of
+from imuarray.analysis.model import assumed
 from imuarray.analysis.prepare import less_leak
+from imuarray.engine.parameters import model_of
 from imuarray.errors import InputError
 from imuarray.firstorder.correct import corrected, nearest_rail, rails_shown
 from imuarray.geometry import Array

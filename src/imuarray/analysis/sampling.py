@@ -12,7 +12,6 @@ import xarray as xr
 from imuarray.analysis import methods
 from imuarray.analysis.beyond import posterior_beyond
 from imuarray.analysis.calibration import fitted_beyond
-from imuarray.analysis.calibration_dataset import effects_of
 from imuarray.analysis.density import (
     NOT_CONVERGED,
     Posterior,
@@ -21,7 +20,9 @@ from imuarray.analysis.density import (
     traced,
     tuned_target,
 )
-from imuarray.analysis.model import Say, assumed, model_of, require_together, silent, usable
+from imuarray.analysis.model import Say, assumed, require_together, silent, usable
+from imuarray.engine.dataset import effects_of
+from imuarray.engine.parameters import model_of
 from imuarray.errors import InputError, require_integer, require_one_of
 from imuarray.model import ArrayModel
 from imuarray.model.array_model import parameter_names

@@ -1,13 +1,11 @@
 """The work behind `imuarray apply`."""
 
 from itertools import chain
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from imuarray.analysis.calibration_dataset import diagnosed
 from imuarray.analysis.model import assumed
 from imuarray.analysis.motion import as_calibrated, motion_parts
 from imuarray.analysis.trust import reasons_of_motion
@@ -15,7 +13,7 @@ from imuarray.commands.output import Output
 from imuarray.errors import InputError
 from imuarray.motion.state import UNITS
 from imuarray.provenance import trust, write_netcdf_parts
-from imuarray.recording import Recording, load_dataset, read_recording
+from imuarray.recording import load_dataset, read_recording
 
 LATE = 1e-4  # s, worth a line
 
@@ -24,7 +22,7 @@ def apply(arguments) -> None:
     """The calibrated array's motion with covariances; see `imuarray.apply` for the output."""
     output = Output(arguments)
     read = read_recording(arguments.recording, stored=True)
-    calibration = _calibration(arguments.calibration, read)
+    calibration = load_dataset(arguments.calibration)
     noise, sums = arguments.accelerometer_noise, Sums()
     try:
         recording = as_calibrated(read, calibration)
@@ -47,13 +45,6 @@ def apply(arguments) -> None:
         "gyroscopes_averaged_sd_rad_s": average, "late_s": late, "out": str(arguments.out)
     }  # fmt: skip
     output.done(found, reasons)
-
-
-def _calibration(path: Path, recording: Recording) -> xr.Dataset:
-    """What `calibrate` has written, or the extended model of a diagnosis.json."""
-    if path.suffix == ".json":
-        return diagnosed(path, recording)
-    return load_dataset(path)
 
 
 class Sums:

@@ -36,12 +36,12 @@ def effects(text: str) -> tuple[str, ...]:
 
 
 def model(text: str) -> str | InputFile:
-    """A model's name, or the diagnosis.json that has one."""
+    """A model's name, or the calibration that has one."""
     if text in methods.MODELS:
         return text
-    if not text.endswith(".json"):
+    if not methods.is_file(text):
         known = ", ".join(methods.MODELS)
-        raise argparse.ArgumentTypeError(f"expected any of {known}, or a .json, found {text!r}")
+        raise argparse.ArgumentTypeError(f"expected {known} or a calibration (.nc), found {text!r}")
     return InputFile(text)
 
 

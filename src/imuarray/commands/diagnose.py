@@ -2,7 +2,7 @@
 
 from imuarray.analysis.trust import of_file, reasons_of_diagnosis, reasons_of_poses
 from imuarray.commands.output import Output
-from imuarray.diagnosis.document import diagnose as diagnosed
+from imuarray.diagnosis.document import diagnose as run
 from imuarray.errors import InputError
 from imuarray.model.effects import DATA_EFFECTS, EFFECTS
 from imuarray.recording import read_recording
@@ -16,9 +16,7 @@ def diagnose(arguments) -> None:
         if name not in known:
             raise InputError(f"--without: expected any of {', '.join(sorted(known))}, found {name}")
     recording, output = read_recording(arguments.recording), Output(arguments)
-    found = diagnosed(
-        recording, arguments.seed, arguments.without, arguments.recording, output.step
-    )
+    found = run(recording, arguments.seed, arguments.without, arguments.recording, output.step)
     reasons = reasons_of_poses(of_file(arguments.recording))
     reasons += reasons_of_diagnosis(recording, found.document)
     found.document.update(trusted=not reasons, reasons=reasons)

@@ -57,15 +57,13 @@ EFFECTS = (
         "--effects", "effects that extend the measurement model, separated by commas (default:"
         " none)", type=effects, default=(), metavar="A,B",
     ),
-    _file("--diagnosis", "diagnosis.json whose extended model to use: its effects, their values,"
-          " its noise"),
 )  # fmt: skip
 
 
 MODEL = (
     _option("--model", "sensors: what a standard sensor model needs, noise estimated (default);"
-            " papers: positions and motion alone, the declared noise; or the diagnosis.json of"
-            " `imuarray diagnose`", default="sensors", metavar="{sensors,papers,FILE.json}",
+            " papers: positions and motion alone, the declared noise; or a calibration's file:"
+            " its effects, estimated again", default="sensors", metavar="{sensors,papers,FILE.nc}",
             type=model),
     EFFECT_FILE,
     _option("--effects", "effects to have in the model instead, separated by commas",
@@ -200,8 +198,8 @@ COMMANDS = (
         " at each sample, with covariances.",
         "cal.nc rec.nc --out motion.nc", "motion to write (NetCDF-4)",
         (
-            _option("calibration", "what `imuarray calibrate` has written, or the diagnosis.json"
-                    " of `imuarray diagnose`", type=InputFile),
+            _option("calibration", "cal.nc of `imuarray calibrate`, `board` or `diagnose`",
+                    type=InputFile),
             RECORDING, EFFECT_FILE, NOISE,
         ),
     ),
@@ -251,7 +249,8 @@ COMMANDS = (
     Command(
         "diagnose", "diagnose.diagnose",
         "What the sensor model gets wrong on a recording, why, and what an extended model gains.",
-        "corrected.nc --out diagnosis/", "folder to write: diagnosis.json, report.html, figures",
+        "corrected.nc --out diagnosis/", "folder to write: diagnosis.json, cal.nc, report.html,"
+        " figures",
         (
             RECORDING, EFFECT_FILE,
             _option("--without", "effects to leave out of the catalogue, separated by commas"

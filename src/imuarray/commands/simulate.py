@@ -1,6 +1,5 @@
 """The work behind `imuarray simulate`."""
 
-from imuarray.analysis.model import extender
 from imuarray.commands.output import Output
 from imuarray.provenance import stamp
 from imuarray.recording import write_recording
@@ -14,8 +13,7 @@ def simulate(arguments) -> None:
     output = Output(arguments)
     config = read_config(arguments.config)
     noise = config["noise"]["accelerometer_sd"]
-    extended = extender(arguments.diagnosis, arguments.effects, say=output.say)
-    recording, truth = simulate_twisting(config, noise, arguments.effects, extended)
+    recording, truth = simulate_twisting(config, noise, arguments.effects)
     write_recording(recording, arguments.out, truth, stamp(config, config["seed"]))
     samples, accelerometers = recording.specific_force.shape[:2]
     output.say(f"{arguments.out}: {samples} samples of {accelerometers} accelerometer triads")

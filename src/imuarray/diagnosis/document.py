@@ -9,7 +9,6 @@ import numpy as np
 
 import imuarray
 from imuarray.diagnosis.detectable import detectable
-from imuarray.diagnosis.extension import extended_estimate
 from imuarray.diagnosis.noise import per_triad, standardised
 from imuarray.diagnosis.noise_effects import held_out
 from imuarray.diagnosis.procedure import Found, run_procedure
@@ -23,6 +22,7 @@ from imuarray.diagnosis.words import cause_in_words, parameters_of, sensors_of
 from imuarray.engine.estimate import Estimate
 from imuarray.engine.fit import Fit, at, fit
 from imuarray.engine.heldout import Scores, gain, log_scores
+from imuarray.engine.ladder import resumed
 from imuarray.engine.parameters import POSITION, prior_precision
 from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.engine.widths import widths
@@ -105,7 +105,7 @@ def diagnose(
     extended = fitted(search.fit, search.given)
     nats = extended.scores.nats + nats_beside(found)
     say("estimating the extended model's positions")
-    robust = extended_estimate(found.whole, search.columns, search.active, search.fit.state)
+    robust = resumed(found.whole, search.columns, search.active, search.fit.state)
     extended = replace(extended, scores=extended.scores._replace(nats=nats), robust=robust)
     base, inflated = rivals_of(found)
     rng = stream(seed, "diagnose", "replicates")

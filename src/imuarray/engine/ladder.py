@@ -12,10 +12,11 @@ from scipy.special import chdtrc
 
 from imuarray.engine.clocks import CLOCK, refined, shown_clocks, timed, with_clocks
 from imuarray.engine.estimate import Estimate, Recorded, estimate, places_of, tested
-from imuarray.engine.fit import flat_parameters, from_flat
+from imuarray.engine.fit import flat_parameters, from_flat, in_use
 from imuarray.engine.heldout import gain_of
+from imuarray.engine.linearise import State
 from imuarray.engine.parameters import POSITION, Columns, columns_of
-from imuarray.engine.readings import Readings
+from imuarray.engine.readings import Readings, most_informative
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import turned
 from imuarray.engine.widths import (
@@ -69,6 +70,23 @@ def with_effects(readings: Sequence[Readings], effects) -> Estimate:
     active = mask_of(columns, [POSITION, *effects])
     recorded = [Recorded.of(one, columns) for one in readings]
     return settled(estimate(recorded, columns, active))
+
+
+def resumed(readings: Readings, columns: Columns, active, state: State) -> Estimate:
+    """The robust estimate of the ``active`` parameters (N, m) bool, from ``state``.
+
+    With columns for what the model has, and for maps that first order may have left.
+    """
+    maps = corrected(readings.left)
+    few, kept = in_use(columns, active, state, maps)
+    state = from_flat(few, state, flat_parameters(columns, state)[:, kept])
+    columns, active = few, active[:, kept]
+    recorded = Recorded.of(most_informative(readings, lambda text: None), columns, state)
+    clocked = active[:, columns.of(CLOCK)].any(axis=1) if CLOCK in columns.names else []
+    imus = [int(k) for k in np.flatnonzero(clocked)]
+    if imus:
+        recorded = timed(recorded, recorded.readings.keep, columns, imus)
+    return settled(estimate([recorded], columns, active))
 
 
 def rungs_of(readings: Sequence[Readings]) -> list[str]:

@@ -9,6 +9,7 @@ directions wander as soon as anything else is misfitted; pinned they stay where 
 common part, and the reported sds say what the priors leave open.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,7 @@ from imuarray.geometry import Array
 from imuarray.model import EFFECTS, ArrayModel
 from imuarray.model.effects import Effect
 from imuarray.model.noise import Noise
+from imuarray.recording import Recording, array_of
 
 POSITION = "position"
 
@@ -115,3 +117,10 @@ def gauge_masks(columns: Columns, active) -> list[tuple[Effect, np.ndarray]]:
             mask[: shape[0], columns.of(item.id)] = np.reshape(own, (shape[0], -1))
             found.append((item, mask * columns.owner))
     return [(item, mask) for item, mask in found if mask.any() and active[mask != 0].all()]
+
+
+def model_of(recording: Recording, effects: Sequence[str] = ()) -> ArrayModel:
+    """The measurement model a recording declares: its geometry and noise."""
+    return ArrayModel.isotropic(
+        array_of(recording), recording.accelerometer_noise_sd, recording.gyroscope_noise_sd, effects
+    )

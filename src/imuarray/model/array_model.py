@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -27,14 +26,6 @@ def probed(item: Effect) -> bool:
     return item.apply.__module__.startswith("imuarray.") or probe(item)
 
 
-class EffectPrior(NamedTuple):
-    """Prior mean and sd of the effect parameters (P,), and where estimation begins."""
-
-    mean: np.ndarray
-    sd: np.ndarray
-    start: np.ndarray
-
-
 @dataclass(frozen=True)
 class ArrayModel:
     """y = predict(motion, positions, effect parameters) + noise (paper 2021, eq. 4 and 5).
@@ -52,8 +43,6 @@ class ArrayModel:
     motion_sd : (float, float, float)
         Prior sd of omega (rad/s), omega_dot (rad/s^2) and s (m/s^2), infinite as in paper 2021.
         With effects that have a gauge the flat prior is no posterior at all: see `with_motion`.
-    effect_prior : EffectPrior or None
-        Instead of the effects' own: zero mean, their prior sds, started at zero.
     clock : (float, float) or None
         Where time begins (s) and its span (s), which drifts, shifts and clocks look at; by
         default those of the times given, which a part of a recording does not share with it.
@@ -64,7 +53,6 @@ class ArrayModel:
     effects: tuple[str, ...] = ()
     derivative_sd: tuple[float, float] = (2e4, 600.0)
     motion_sd: tuple[float, float, float] = (np.inf, np.inf, np.inf)
-    effect_prior: EffectPrior | None = None
     clock: tuple[float, float] | None = None
 
     @classmethod
@@ -101,23 +89,11 @@ class ArrayModel:
     @cached_property
     def effect_prior_sd(self) -> np.ndarray:
         """Prior sd of every effect parameter, (P,), in the effects' units."""
-        if self.effect_prior is not None:
-            return self.effect_prior.sd
         parts = [
             np.broadcast_to(e.prior_sd, s).ravel()
             for e, s in zip(self.chain, self.shapes, strict=True)
         ]
         return np.concatenate([np.empty(0), *parts])
-
-    @property
-    def effect_prior_mean(self) -> np.ndarray:
-        """Prior mean of every effect parameter, (P,)."""
-        return np.zeros(self.effect_size) if self.effect_prior is None else self.effect_prior.mean
-
-    @property
-    def effect_start(self) -> np.ndarray:
-        """Where the estimation of the effect parameters begins, (P,)."""
-        return np.zeros(self.effect_size) if self.effect_prior is None else self.effect_prior.start
 
     @property
     def motion_size(self) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,9 +18,8 @@ from imuarray.firstorder.report import parameter_table, turned_lines, write_corr
 from imuarray.model.effects import KINDS
 from imuarray.provenance import atomic_folder, trust, write_bytes, write_csv, write_netcdf
 from imuarray.recording import Recording, write_recording
-from imuarray.report import pictures as pictured
-from imuarray.report.page import CAPTIONS, Drawing, beside, rendered, saved
-from imuarray.report.pictures import levelled, missing, shown
+from imuarray.report.page import PICTURES, pictured, rendered
+from imuarray.report.pictures import levelled, missing
 
 SLOW = np.radians(300.0)  # rad/s rms, of motion that says little of positions
 MISFIT = 1.5  # times the noise: a residual that is looked into
@@ -253,29 +251,13 @@ def html(board: Board) -> str:
         "board.html.j2", board=board, verdict=verdict(board), facts=facts(board),
         advice=advice(board), causes=causes(board.calibration),
         turned=turn_table(board), positions=position_table(board.calibration), sure=SURE,
-        prior=board.corrected.position_prior_sd, noise=noises(board), figures=draw(board),
+        prior=board.corrected.position_prior_sd, noise=noises(board),
+        figures=pictured(board.corrected, board.calibration, PICTURES, suffixes=["png"]),
         weakest=weakest(board.calibration), frame=frame(board.calibration),
         before=before(board), account=account(board),
         first_order=None if isinstance(board.first_order, str)
         else parameter_table(board.first_order, board.recording),
     )  # fmt: skip
-
-
-def draw(board: Board) -> list[Drawing]:
-    """The page's pictures in their order."""
-    found, corrected = board.calibration, board.corrected
-    pictures = (
-        ("board", 3.1, [partial(pictured.board, found, plane) for plane in ("xy", "xz")], ""),
-        ("timeline", 2.6, [partial(pictured.timeline, corrected, found)], ""),
-        ("sphere", 3.4, [partial(pictured.sphere, corrected, found)], shown(corrected, found)),
-        ("length", 2.5, [partial(pictured.length, found)], ""),
-        ("course", 2.4, [partial(pictured.residual_course, found, kind) for kind in KINDS], ""),
-    )
-    return [
-        Drawing(name, CAPTIONS[name][0], f"{CAPTIONS[name][1]} {more}",
-                {"png": saved(beside(height, parts))})
-        for name, height, parts, more in pictures
-    ]  # fmt: skip
 
 
 def position_table(calibration: xr.Dataset) -> pd.DataFrame:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import base64
+from functools import partial
 from typing import NamedTuple
 
 import pandas as pd
+import xarray as xr
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
@@ -21,39 +23,51 @@ from imuarray.diagnosis.plain import (
 )
 from imuarray.diagnosis.words import part_in_words, split_name, whose, words
 from imuarray.figures.style import PAGE, new_figure, saved, styled
+from imuarray.model.effects import KINDS
+from imuarray.recording import Recording
+from imuarray.report import pictures
 
 # What the templates' tables call.
 IN_TABLES = (fixed, number, part_in_words, plus_minus, probability, quantity, split_name, symbols,
              unit_shown, whose, words)  # fmt: skip
-# Titles and captions of the pictures that are not of one page alone.
-CAPTIONS = {
+# Pictures of a calibration: height, one drawing each panel, the variables shown, title, caption.
+PICTURES = {
     "board": (
+        3.1, [partial(pictures.board, plane=plane) for plane in ("xy", "xz")],
+        ["nominal_position", "position"],
         "The board, drawn and found",
         "Crosses: where the drawing has each IMU. Arrows: to where it was found. Ellipses: 95 %."
         " Both are enlarged as the titles say, or they could not be seen.",
     ),
     "timeline": (
+        2.6, [pictures.timeline], ["shaken"],
         "The recording",
         "Still poses calibrate each sensor, fast motion tells where it is. Samples at a rail are"
         " left out of the positions; shocks are samples in which several IMUs are far off at once.",
     ),
     "sphere": (
+        3.4, [pictures.sphere], ["angular_rate"],
         "Excitation",
         "Directions in the board's frame, from +z (left) and from −z. Poses ought to be all over"
         " the sphere, axes of rotation too.",
     ),
     "length": (
+        2.5, [pictures.length], ["position_sd_by_length"],
         "Standard deviation against recorded time",
         "Claimed standard deviation, had the motion ended earlier. Where it falls faster than"
         " 1/√length, the motion is getting better; where as fast, four times as long a motion"
         " halves the error; where it is level, noise is not what limits it.",
     ),
     "course": (
+        2.4, [partial(pictures.residual_course, kind=kind) for kind in KINDS],
+        [f"{kind}_residual" for kind in KINDS],
         "Residual against time",
         "Of each IMU, in sds of the noise that was declared: 1 is noise. The three largest are"
         " named. A rise that lasts is something that moved, warmed up or came loose.",
     ),
-}
+}  # fmt: skip
+OF_RECORDING = ("timeline", "sphere")  # which are of the recording, too
+SUFFIXES = ("pdf", "png", "csv")
 
 
 class Drawing(NamedTuple):
@@ -70,6 +84,23 @@ class Drawing(NamedTuple):
         return base64.b64encode(self.files["png"]).decode("ascii")
 
 
+def pictured(
+    recording: Recording, calibration: xr.Dataset, names, footer=(), suffixes=SUFFIXES
+) -> list[Drawing]:
+    """Pictures of a calibration and the recording that it is from."""
+    found = []
+    for name in names:
+        height, parts, shown, title, caption = PICTURES[name]
+        given = (recording, calibration) if name in OF_RECORDING else (calibration,)
+        if name == "sphere":
+            caption = f"{caption} {pictures.shown(recording, calibration)}"
+        figure = beside(height, [partial(part, *given) for part in parts], footer)
+        table = pd.concat([calibration[each].to_dataframe() for each in shown], axis=1)
+        drawn = files(figure, table.reset_index(), suffixes)
+        found.append(Drawing(name, title, caption, drawn))
+    return found
+
+
 @styled
 def beside(height: float, drawings, footer=()) -> Figure:
     """Pictures beside each other, each a function of its ``axes``."""
@@ -80,10 +111,10 @@ def beside(height: float, drawings, footer=()) -> Figure:
     return figure
 
 
-def files(figure: Figure, table: pd.DataFrame) -> dict[str, bytes]:
+def files(figure: Figure, table: pd.DataFrame, suffixes=SUFFIXES) -> dict[str, bytes]:
     """A figure as PDF and PNG, and its numbers as CSV."""
-    table_bytes = table.to_csv(index=False, lineterminator="\n").encode()
-    return {"csv": table_bytes} | {suffix: saved(figure, suffix) for suffix in ("pdf", "png")}
+    numbers = table.to_csv(index=False, lineterminator="\n").encode()
+    return {one: numbers if one == "csv" else saved(figure, one) for one in suffixes}
 
 
 def rendered(template: str, **given) -> str:

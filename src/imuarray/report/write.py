@@ -2,92 +2,26 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 
 from imuarray.diagnosis.words import sensors_of, whose, words
-from imuarray.engine.course import course
-from imuarray.engine.parameters import POSITION
-from imuarray.engine.widths import widths
+from imuarray.engine.dataset import diagnosed
 from imuarray.model import EFFECTS
-from imuarray.model.effects import KINDS
-from imuarray.provenance import atomic_folder, write_bytes
+from imuarray.provenance import atomic_folder, write_bytes, write_netcdf
 from imuarray.report import drawings as drawn
-from imuarray.report import numbers, pictures
+from imuarray.report import numbers
 from imuarray.report.answers import USUAL, answers, verdict
 from imuarray.report.drawings_model import ALIKE, cause_figure, position_figure, separability_figure
-from imuarray.report.page import CAPTIONS, Drawing, beside, files, rendered
+from imuarray.report.page import SUFFIXES, Drawing, files, pictured, rendered
 from imuarray.report.panels import cause_table
-from imuarray.report.pictures import shown
 
 if TYPE_CHECKING:
     from imuarray.diagnosis.document import Diagnosis
 
-
-def as_calibration(diagnosis: Diagnosis) -> xr.Dataset:
-    """What `imuarray.report.pictures` draws of a calibration: positions, its course in time."""
-    found = diagnosis.extended.robust
-    readings = found.recorded[0].readings
-    array, labels = readings.array, list(readings.labels)
-    place = np.full(found.active.shape, -1)
-    place[found.active] = found.places[0]
-    mine = place[: array.accelerometers, found.columns.of(POSITION)].ravel()
-    covariance = np.zeros((len(mine),) * 2)
-    free = np.flatnonzero(mine >= 0)
-    covariance[np.ix_(free, free)] = widths(found)[0][np.ix_(mine[free], mine[free])]
-    time = readings.time + readings.origin
-    variables, coordinates = course(found, time)
-    variables["angular_rate"] = ("time", "axis"), found.recorded[0].state.motion[:, :3]
-    own, other = ("accelerometer", "axis"), ("accelerometer_other", "axis_other")
-    shape = (array.accelerometers, 3) * 2
-    variables |= {
-        "position": (own, found.positions),
-        "nominal_position": (own, array.positions - array.positions[0]),
-        "position_covariance": ((*own, *other), covariance.reshape(shape)),
-    }
-    coordinates |= {
-        "accelerometer": labels[: array.accelerometers], "gyroscope": labels[: array.gyroscopes],
-        "axis": list("xyz"), "time": time,
-    }  # fmt: skip
-    return xr.Dataset(variables, coordinates)
-
-
-def drawn_alike(diagnosis: Diagnosis, footer) -> list[Drawing]:
-    """The board, the recording and the residual in time, as `imuarray board` has them."""
-    found, recording = as_calibration(diagnosis), diagnosis.recording
-    residuals = [f"{kind}_residual" for kind in KINDS]
-    parts = {
-        "board": (
-            3.1, [partial(pictures.board, found, plane) for plane in ("xy", "xz")],
-            found[["nominal_position", "position"]].to_dataframe(),
-        ),
-        "timeline": (
-            2.6, [partial(pictures.timeline, recording, found)], found["shaken"].to_dataframe(),
-        ),
-        "sphere": (
-            3.4, [partial(pictures.sphere, recording, found)],
-            found["angular_rate"].to_dataframe(),
-        ),
-        "course": (
-            2.4, [partial(pictures.residual_course, found, kind) for kind in KINDS],
-            pd.concat([found[name].to_dataframe() for name in residuals]),
-        ),
-    }  # fmt: skip
-    more = {"sphere": f" {shown(recording, found)}"}
-    return [
-        Drawing(name, CAPTIONS[name][0], CAPTIONS[name][1] + more.get(name, ""),
-                files(beside(height, drawings, footer), table.reset_index()))
-        for name, (height, drawings, table) in parts.items()
-    ]  # fmt: skip
-
-
-if TYPE_CHECKING:
-    from imuarray.diagnosis.document import Diagnosis
 
 FIGURES = {  # by name: table, drawing, title, caption
     "discrepancies": (
@@ -127,7 +61,6 @@ FIGURES = {  # by name: table, drawing, title, caption
         " intervals as each model claims them.",
     ),
 }  # fmt: skip
-SUFFIXES = ("pdf", "png", "csv")
 CAUSE_CAPTION = (
     "What would be back in the residual without this cause, motion and all else refitted (points:"
     " means of bins with two standard errors), and what the cause predicts (lines); where points"
@@ -144,16 +77,19 @@ BESIDE = {  # by what it is drawn against
 
 
 def write_report(diagnosis: Diagnosis, folder: str | Path) -> None:
-    """Write figures (PDF, PNG and the numbers as CSV), report.html and, last, diagnosis.json.
+    """Write figures (PDF, PNG, the numbers as CSV), report.html, cal.nc, and last diagnosis.json.
 
-    An error leaves the folder as it was; it is made if it does not exist.
+    cal.nc is `imuarray.diagnosed`. An error leaves the folder as it was; it is made if it does not
+    exist.
     """
-    drawings = draw(diagnosis)
+    calibration = diagnosed(diagnosis)
+    drawings = draw(diagnosis, calibration)
     page, document = html(diagnosis, drawings), diagnosis.to_json() + "\n"
     with atomic_folder(folder, last="diagnosis.json") as made:
         for drawing in drawings:
             for suffix, content in drawing.files.items():
                 write_bytes(content, made / f"{drawing.name}.{suffix}")
+        write_netcdf(calibration, made / "cal.nc")
         write_bytes(page.encode(), made / "report.html")
         write_bytes(document.encode(), made / "diagnosis.json")
     _remove_former(Path(folder), {drawing.name for drawing in drawings})
@@ -167,7 +103,7 @@ def _remove_former(folder: Path, names) -> None:
                 path.unlink(missing_ok=True)
 
 
-def draw(diagnosis: Diagnosis) -> list[Drawing]:
+def draw(diagnosis: Diagnosis, calibration: xr.Dataset) -> list[Drawing]:
     """All figures in the report's order; those of causes only where there are any."""
     document, said = diagnosis.document, footer(diagnosis.document)
     found = [_drawing("discrepancies", diagnosis, said), _drawing("residual", diagnosis, said)]
@@ -185,7 +121,8 @@ def draw(diagnosis: Diagnosis) -> list[Drawing]:
     found += [
         _drawing(name, diagnosis, said) for name in ("separability", "detectable", "positions")
     ]
-    return found + drawn_alike(diagnosis, said)
+    alike = "board", "timeline", "sphere", "course"
+    return found + pictured(diagnosis.recording, calibration, alike, said)
 
 
 def footer(document: dict) -> list[str]:

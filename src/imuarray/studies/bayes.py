@@ -1,7 +1,5 @@
 """The Bayesian studies of paper 2021: data, targets and chains from a configuration."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from imuarray.config import model_from, motion_sds
@@ -9,7 +7,6 @@ from imuarray.estimation.bcd import calibrate_bcd
 from imuarray.estimation.selection import disjoint, neighbours
 from imuarray.geometry import Array
 from imuarray.measured.positions import locate
-from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting, normal_motion
 from imuarray.posterior import tuning
 from imuarray.posterior.chains import write_chains
@@ -45,23 +42,16 @@ def prior_mean(array: Array, error_sd: float, rng) -> np.ndarray:
     return array.positions + errors
 
 
-def simulate_twisting(
-    settings: dict, accelerometer_sd: float, effects=(),
-    extended: Callable[[ArrayModel], ArrayModel] | None = None,
-):  # fmt: skip
+def simulate_twisting(settings: dict, accelerometer_sd: float, effects=()):
     """A recording of the board twisted by hand, as section IV-C describes the experiment.
 
     Stands in for measured data until there are some. ``accelerometer_sd`` (m/s^2) is the
     noise that is really there; effects get parameters drawn from their priors.
-    ``extended`` gives the model effects and noise of its own, whose starting values are the truth.
     """
     paper, experiment, seed = settings["paper2021"], settings["experiment"], settings["seed"]
     model = model_from(settings, accelerometer_sd, effects)
     sizes = model.effect_prior_sd
     parameters = sizes * stream(seed, "effects").standard_normal(sizes.shape)
-    if extended is not None:
-        model = extended(model)
-        parameters = model.effect_start
     motion = hand_twisting(
         stream(seed, "twisting"),
         np.radians(paper["angular_rate_sd_dps"]) / 2,

@@ -2,24 +2,19 @@
 
 import json
 from collections.abc import Sequence
-from os import PathLike
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
-from imuarray.analysis.checked import require_right_axes
-from imuarray.analysis.model import model_of
-from imuarray.diagnosis.extension import extended_model, read_extension
 from imuarray.engine.course import course
 from imuarray.engine.estimate import Estimate
-from imuarray.engine.parameters import POSITION
+from imuarray.engine.parameters import POSITION, model_of
 from imuarray.engine.widths import widths
-from imuarray.errors import InputError
 from imuarray.model import ArrayModel, Noise
 from imuarray.model.array_model import parameter_ids, parameter_names
-from imuarray.model.effects import EFFECTS, KINDS
+from imuarray.model.effects import DATA_EFFECTS, EFFECTS, KINDS
 from imuarray.motion.state import UNITS
+from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording
 from imuarray.recording.record import CLOCKS, DIMENSIONS, MATRICES
 
@@ -236,42 +231,21 @@ def _by_triad(place, values, count) -> np.ndarray:
     return out.reshape(-1, 3)
 
 
-def diagnosed(diagnosis: str | PathLike, recording: Recording) -> xr.Dataset:
-    """Positions and effects of a ``diagnosis.json``, as `calibrate` would give them.
+def diagnosed(diagnosis) -> xr.Dataset:
+    """The extended model that `imuarray.diagnose` came to, as `imuarray.calibrate` would give it.
 
-    ``recording`` should be the one that was diagnosed: clocks and drifts are its own; the
-    attribute ``of_diagnosed`` says whether it is. The diagnosis states sds but not how positions
-    and effects go together, without which they tell nothing of the motion's error:
-    ``whole_covariance`` is not there. InputError for another file, or other IMUs, and where the
-    diagnosis has found exchanged axes.
+    Attribute ``mended``: effects whose readings were put right in memory, or left out.
     """
-    extension = read_extension(Path(diagnosis))
-    require_right_axes(extension.before)
-    labels = recording.accelerometer_labels, recording.gyroscope_labels
-    model = extended_model(extension, model_of(recording), labels)
-    positions, sds = extension.positions, extension.positions_sd
-    names = parameter_names(model, labels)
-    # 0 where the diagnosis states none
-    effect_sds = np.array([
-        extension.values[effect].get(name, (0.0, None))[1] or 0.0
-        for effect, name in parameter_ids(model, labels)
-    ])  # fmt: skip
-    count = len(labels[0])
-    if not positions.shape == sds.shape == (count, 3):
-        raise InputError(
-            f"{diagnosis}: expected positions of {count} accelerometers, as in the recording, found"
-            f" {len(positions)}"
-        )
-    found = positions_dataset(recording, positions - positions[0], np.diag(sds[1:].ravel() ** 2))
-    found = found.assign(
-        effect_parameter=("parameter", model.effect_start), effect_sd=("parameter", effect_sds),
-        **noise_variables(model.noise),
-    ).assign_coords(parameter=names)  # fmt: skip
-    origin, span = extension.clock
-    begins, lasts = recording.time[0], np.ptp(recording.time)
-    document = json.loads(Path(diagnosis).read_text(encoding="utf-8"))
+    recording, document = diagnosis.recording, diagnosis.document
+    found = with_readings(engine_dataset([recording], diagnosis.extended.robust), [recording])
+    named = [cause["effect"] for cause in document["causes"]]
+    data = recording.specific_force, recording.angular_rate
     return found.assign_attrs(
-        effects=",".join(model.effects), time_origin=origin, span=span,
-        of_diagnosed=int(np.allclose([begins, lasts], extension.clock, rtol=1e-9, atol=1e-9)),
+        model="diagnosis", mended=" ".join(name for name in named if _readings_effect(name)),
         reasons=json.dumps(document.get("reasons", [])),
+        **stamp({"recording": digest(*data)}, document["seed"]),
     )  # fmt: skip
+
+
+def _readings_effect(name: str) -> bool:
+    return name in DATA_EFFECTS and DATA_EFFECTS[name].kind == "readings"
