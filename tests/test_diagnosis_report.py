@@ -179,7 +179,8 @@ def of(found, **changed):
 def test_nothing_and_unexplained_are_said(found):
     nothing = of(found, causes=[], unexplained=False, remaining=[])
     assert verdict(nothing).startswith("Nothing:")
-    wrong, why, extended, gained = answers(nothing)
+    wrong, why, extended, gained, onward = answers(nothing)
+    assert onward.lead == "The plain model is enough for this recording."
     assert wrong.lead.startswith("Nothing that this recording shows")
     assert "nothing to explain" in why.lead and "as it stands" in extended.lead
     assert gained.lead.startswith("Nothing")
@@ -201,6 +202,20 @@ def test_nothing_and_unexplained_are_said(found):
         shaken
     )
     assert "In smooth samples that turn fast the residual is 0.8" in answers(shaken)[1].lead
+    assert not any(answer.loud for answer in answers(shaken))
+    assert "faster than the samples: outliers" in answers(shaken)[1].items[-1]
+    assert 'class="loud"' not in report.html(shaken, [])
+
+
+def test_what_to_do_next_follows_from_what_was_found(found):
+    assert "cal.nc" in answers(found)[4].items[0]
+    cause = found.document["causes"][0]
+    drifting = of(found, causes=[cause | {"effect": "bias_drift"}], reasons=["too slow"])
+    first, use, *_ = answers(drifting)[4].items
+    assert first == "Mend this first: too slow" and "Without bias drift" in use
+    swapped = of(found, causes=[cause | {"effect": "axis_swap"}], unexplained=True)
+    axes, unknown, again = answers(swapped)[4].items
+    assert "columns.yaml" in axes and "effect of your own" in unknown and "second" in again
 
 
 def test_the_verdict_says_what_it_is_worth(found):

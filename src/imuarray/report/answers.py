@@ -18,7 +18,7 @@ from imuarray.diagnosis.plain import (
     symbols,
 )
 from imuarray.diagnosis.words import equation, in_short, whose, words
-from imuarray.model.effects import DATA_EFFECTS, KINDS
+from imuarray.model.effects import DATA_EFFECTS, EFFECTS, KINDS
 from imuarray.report.numbers import in_noise_sds, position_table
 
 if TYPE_CHECKING:
@@ -40,8 +40,8 @@ class Answer(NamedTuple):
 
 
 def answers(diagnosis: Diagnosis) -> list[Answer]:
-    """What is wrong, why, the extended model, its gain."""
-    return [wrong(diagnosis), why(diagnosis), extended(diagnosis), gained(diagnosis)]
+    """What is wrong, why, the extended model, its gain, and what to do with them."""
+    return [part(diagnosis) for part in (wrong, why, extended, gained, onward)]
 
 
 def verdict(diagnosis: Diagnosis) -> str:
@@ -79,6 +79,11 @@ def verdict(diagnosis: Diagnosis) -> str:
 def _shaken(document: dict) -> bool:
     """Whether smooth samples are explained, and shocks are what is left."""
     return bool(document["smooth"] and not document["smooth"]["unexplained"])
+
+
+def alarming(document: dict) -> bool:
+    """Whether something is left that is not motion faster than the samples."""
+    return document["unexplained"] and not _shaken(document)
 
 
 def clean(document: dict) -> bool:
@@ -130,7 +135,7 @@ def why(diagnosis: Diagnosis) -> Answer:
     document = diagnosis.document
     items = [cause["says"] for cause in document["causes"]]
     loud = ""
-    if document["unexplained"]:
+    if alarming(document):
         loud = (
             "Something is left that no known cause explains. Checks that still fail:"
             f" {some(document['remaining'])}. Take the causes named here with caution: an unknown"
@@ -146,7 +151,9 @@ def why(diagnosis: Diagnosis) -> Answer:
     if document["smooth"]:
         sizes = {kind: document["smooth"][kind]["residual"] for kind in KINDS}
         lead = f"In smooth samples that turn fast the residual is {of_noise(sizes)}. {lead}"
-    if document["remaining"] and not loud:
+    if document["unexplained"] and not loud:
+        items = [*items, f"Left is motion faster than the samples: {some(document['remaining'])}."]
+    elif document["remaining"] and not loud:
         left = number(100 * max(1 - diagnosis.found.explained, 0.0), 2)
         lead = (
             f"The causes below leave {left} % of the excess misfit: within tolerance, though it"
@@ -226,7 +233,7 @@ def gained(diagnosis: Diagnosis) -> Answer:
     items = [residual_in_words(diagnosis), positions_in_words(diagnosis)]
     items += readings_in_words(document["causes"])
     loud = ""
-    if document["unexplained"]:
+    if alarming(document):
         loud = "Widths are those of the extended model: what is unexplained is not in them."
     return Answer(question, lead, items, loud)
 
@@ -281,3 +288,33 @@ def positions_in_words(diagnosis: Diagnosis) -> str:
         f" {quantity(float(largest.change), None, 'm')}. Claimed sds were {widths[0]} (rms),"
         f" {widths[2]} with inflated noise, now {widths[1]}."
     )
+
+
+def onward(diagnosis: Diagnosis) -> Answer:
+    """What to do next."""
+    document, named = diagnosis.document, [c["effect"] for c in diagnosis.document["causes"]]
+    items = [f"Mend this first: {reason}" for reason in document.get("reasons", [])[:1]]
+    if "axis_swap" in named:
+        items.append(
+            "Give the axes in columns.yaml, convert the log again and calibrate that: here they"
+            " were turned back in memory only."
+        )
+    elif named:
+        own = [words(name) for name in named if name in EFFECTS and EFFECTS[name].own]
+        less = f" Without {joined(own)}: that is of this recording alone." if own else ""
+        items.append(
+            "Use the model that has the causes, cal.nc beside this page: imuarray apply cal.nc and"
+            f" the recording make one sensor of the array.{less}"
+        )
+    if alarming(document):
+        items.append(
+            "Look for what no effect of the catalogue is: the pictures of the residual say in which"
+            " IMU and with what motion it grows. Ten lines make an effect of your own"
+            " (docs/effects.md)."
+        )
+    items.append(
+        "Diagnose a second recording of the board: what a sensor does comes back with the same"
+        " size, what happened once does not."
+    )
+    lead = "" if named or alarming(document) else "The plain model is enough for this recording."
+    return Answer("What to do next?", lead, items)

@@ -14,7 +14,7 @@ from imuarray.model import EFFECTS
 from imuarray.provenance import atomic_folder, write_bytes, write_netcdf
 from imuarray.report import drawings as drawn
 from imuarray.report import numbers
-from imuarray.report.answers import USUAL, answers, verdict
+from imuarray.report.answers import USUAL, alarming, answers, verdict
 from imuarray.report.drawings_model import ALIKE, cause_figure, position_figure, separability_figure
 from imuarray.report.page import SUFFIXES, Drawing, files, pictured, rendered
 from imuarray.report.panels import cause_table
@@ -155,6 +155,7 @@ def html(diagnosis: Diagnosis, drawings: list[Drawing]) -> str:
         recording=str(document["recording"]) or "a recording",
         facts=facts(diagnosis),
         verdict=verdict(diagnosis),
+        alarming=alarming(document),
         answers=answers(diagnosis),
         figures=drawings,
         usual=USUAL,
