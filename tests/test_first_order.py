@@ -251,7 +251,7 @@ def test_recordings_of_a_board_share_matrices_and_have_offsets_of_their_own():
     assert both.residual_ratio == pytest.approx(1.0, abs=0.25)
     narrower = both.parts_sd()["scale"] / both.residual_ratio < alone.parts_sd()["scale"]
     assert narrower.all()
-    own = both.first()
+    own = both.of(0)
     assert own.residual.shape == (9, 3, 3) and own.direction_covariance.shape == (27, 27)
 
 

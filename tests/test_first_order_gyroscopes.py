@@ -11,7 +11,7 @@ from benchmarks.board import GRAVITY, Options, draw_board, draw_hand
 from imuarray.analysis.trust import POSES, Poses, of_file, reasons_of_poses
 from imuarray.cli import main
 from imuarray.errors import InputError
-from imuarray.firstorder.correct import calibrate_first_order, correct
+from imuarray.firstorder.correct import calibrate_first_order, calibrate_together, correct
 from imuarray.firstorder.moves import Move, _carried, _to_end, common_map
 from imuarray.firstorder.report import gyroscope_lines, parameter_table, turned_lines
 from imuarray.firstorder.still import still_poses
@@ -50,6 +50,25 @@ def test_known_maps_are_found_whatever_the_mounts(different):
     assert common.ravel() @ np.linalg.solve(known, common.ravel()) < 28  # chi-squared, 9: 0.1 %
     rates = corrected.angular_rate
     assert rms(rates[:, 0] - board.truth.rate) < 2.5e-3  # noise of 1e-3, offsets
+
+
+def test_recordings_calibrated_together_are_each_as_beside_the_others():
+    one, rng = draw_board(1, SHORT).recording(), np.random.default_rng(4)
+    force, rate = (2e-3 * rng.standard_normal(x.shape) for x in (one.specific_force,) * 2)
+    two = replace(
+        one, specific_force=one.specific_force + force, angular_rate=one.angular_rate + rate / 4
+    )
+    for own, other, found in zip(
+        (one, two), (two, one), calibrate_together([one, two]), strict=True
+    ):
+        alone = calibrate_first_order(own, others=[other])
+        for name in ("matrix", "offset", "residual", "covariance"):
+            new, old = (getattr(each.triads, name) for each in (found, alone))
+            np.testing.assert_allclose(new, old, rtol=0, atol=1e-5 * np.abs(old).max())
+        new, old = (each.gyroscopes for each in (found, alone))
+        np.testing.assert_allclose(new.matrix, old.matrix, atol=1e-6)
+        np.testing.assert_array_equal(new.common.first, old.common.first)
+        assert found.poses == alone.poses
 
 
 def moves_of(hand, options, change, rng=None, sd=1e-3):

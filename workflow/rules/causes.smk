@@ -2,23 +2,39 @@
 # out; its own target, `causes`.
 
 
+rule correct_together:
+    input:
+        lambda wc: expand("results/measured/recordings/{name}.nc", name=MEASURED.board(wc.group)),
+    output:
+        directory("results/measured/together/{group}"),
+    log:
+        "results/measured/logs/together/{group}.log",
+    benchmark:
+        "results/measured/benchmarks/together/{group}.tsv"
+    priority: 10
+    params:
+        entries=lambda wc: {name: RECORDINGS[name] for name in MEASURED.board(wc.group)},
+        code=code("correct_together"),
+    message:
+        "all recordings of {wildcards.group}, corrected by the poses of them all"
+    script:
+        "../scripts/correct_together.py"
+
+
 rule buy_causes:
     input:
-        recording="results/measured/recordings/{name}.nc",
-        others=lambda wc: expand(
-            "results/measured/recordings/{name}.nc", name=MEASURED.others(wc.name)
-        ),
+        lambda wc: f"results/measured/together/{MEASURED.group(wc.name)}",
     output:
         "results/measured/causes/{name}.csv",
     log:
         "results/measured/logs/causes/{name}.log",
     benchmark:
         "results/measured/benchmarks/causes/{name}.tsv"
+    priority: 9
     threads: 1
     resources:
         mem_mb=4000,
     params:
-        entry=lambda wc: RECORDINGS[wc.name],
         code=code("buy_causes"),
     message:
         "what each cause buys on {wildcards.name}"
@@ -75,6 +91,7 @@ rule leave_out:
         "results/measured/logs/left_out/{name}.log",
     benchmark:
         "results/measured/benchmarks/left_out/{name}.tsv"
+    priority: 9
     threads: 2
     resources:
         mem_mb=4000,
@@ -97,6 +114,7 @@ rule predict_left_out:
         "results/measured/logs/predicted/{name}.log",
     benchmark:
         "results/measured/benchmarks/predicted/{name}.tsv"
+    priority: 9
     threads: 2
     resources:
         mem_mb=4000,

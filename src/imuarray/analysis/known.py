@@ -26,7 +26,12 @@ from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import start
 from imuarray.engine.widths import settled
 from imuarray.errors import InputError
-from imuarray.firstorder.correct import FirstOrder, calibrate_first_order, correct
+from imuarray.firstorder.correct import (
+    FirstOrder,
+    calibrate_first_order,
+    calibrate_together,
+    correct,
+)
 from imuarray.model import ArrayModel
 from imuarray.model.effects import EFFECTS
 from imuarray.recording import Recording, array_of
@@ -153,10 +158,7 @@ def left_out(
     All raw; ``options`` of `calibrate_first_order`. Of the recording itself its still poses alone
     are used, for its offsets and its noise.
     """
-    firsts = []
-    for one in others:
-        rest = [other for other in others if other is not one]
-        firsts.append(calibrate_first_order(one, others=rest, **options))
+    firsts = calibrate_together(others, **options)
     corrected = [correct(one, first) for one, first in zip(others, firsts, strict=True)]
     own = calibrate_first_order(recording, gyroscopes="offset", **options)
     calibration = engine_dataset(corrected, settled(board_of([used(one) for one in corrected])))

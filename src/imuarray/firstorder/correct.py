@@ -8,6 +8,7 @@ import xarray as xr
 from scipy.linalg import block_diag
 
 from imuarray.errors import InputError, require_one_of
+from imuarray.estimation.threads import one_thread
 from imuarray.firstorder.gyroscopes import Gyroscopes, Still, calibrate_gyroscopes
 from imuarray.firstorder.outliers import fit_triads
 from imuarray.firstorder.pose_noise import walked_mean
@@ -124,19 +125,38 @@ def calibrate_first_order(
     InputError or IdentifiabilityError where there are no poses, too few or too similar ones, and
     where axes are mirrored, rates have another unit, or channels or samples are copied.
     """
-    require_one_of("gyroscopes", gyroscopes, GYROSCOPES)
-    for other in others:
-        if _labels(other) != _labels(recording):
-            raise InputError("recordings: expected one board, found sensors of other labels")
-    require_apart([recording, *others])
-    every = [_still(one, shortest_pose) for one in (recording, *others)]
+    every = _all_still([recording, *others], gyroscopes, shortest_pose)
     spare = tuple(k for k, one in enumerate(every[1:], 1) if not _tells(one))
-    if len(every) > len(spare) + 1 and not _tells(every[0]):
+    every = [one for k, one in enumerate(every) if k not in spare]
+    return replace(_calibrated(every, gravity, gyroscopes)[0], spare=spare)
+
+
+def calibrate_together(
+    recordings: Sequence[Recording], gravity: float = GRAVITY, gyroscopes: str = GYROSCOPES[0],
+    shortest_pose: float = SHORTEST,
+) -> list[FirstOrder]:  # fmt: skip
+    """`calibrate_first_order` of each of several recordings beside all others, at once."""
+    return _calibrated(_all_still(recordings, gyroscopes, shortest_pose), gravity, gyroscopes)
+
+
+def _all_still(recordings: Sequence[Recording], gyroscopes: str, shortest: float) -> list[Still]:
+    require_one_of("gyroscopes", gyroscopes, GYROSCOPES)
+    for other in recordings[1:]:
+        if _labels(other) != _labels(recordings[0]):
+            raise InputError("recordings: expected one board, found sensors of other labels")
+    require_apart(recordings)
+    return [_still(one, shortest) for one in recordings]
+
+
+@one_thread()  # of matrices this small, more of them only spin
+def _calibrated(every: Sequence[Still], gravity: float, gyroscopes: str) -> list[FirstOrder]:
+    """Of each recording, by the poses of all."""
+    if len(every) > 1 and not all(map(_tells, every)):
         raise InputError(
             "recording: expected still poses in three orientations or more beside those of others,"
-            f" as its offsets are its own, found {len(every[0].poses)} poses in fewer"
+            f" as its offsets are its own, found {min(len(one.poses) for one in every)} poses in"
+            " fewer"
         )
-    every = [one for k, one in enumerate(every) if k not in spare]
     triads, maps = _triads(every, gravity), None
     if gyroscopes == "calibrate":
         try:
@@ -146,7 +166,12 @@ def calibrate_first_order(
             if failed:
                 raise InputError(failed[0]) from None
             raise
-    return replace(_of_poses(every[0], triads.first(), gravity), gyroscopes=maps, spare=spare)
+    found, first = [], 0
+    for number, one in enumerate(every):
+        poses = range(first, first := first + len(one.poses))
+        own = _of_poses(one, triads.of(number), gravity)
+        found.append(replace(own, gyroscopes=None if maps is None else maps.between(poses)))
+    return found
 
 
 def _labels(recording: Recording) -> tuple:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -165,6 +165,15 @@ class Gyroscopes:
         """Sd of the scale that all gyroscopes share; NaN where the moves did not tell it."""
         return np.nan if isinstance(self.common, str) else self.common.scale_sd
 
+    def between(self, poses: range) -> Self:
+        """The same with the moves between some of the poses, numbered from the first of them."""
+        if isinstance(self.common, str):
+            return self
+        own = np.isin(self.common.first, poses)
+        moves = {name: getattr(self.common, name)[own] for name in ("error", "weight")}
+        first = self.common.first[own] - poses.start
+        return replace(self, common=replace(self.common, first=first, **moves))
+
 
 class Still(NamedTuple):
     """A recording's P still poses, and what the gyroscopes read in them.
@@ -203,8 +212,8 @@ def calibrate_gyroscopes(every: Sequence[Still], triads: TriadFit) -> tuple[Gyro
 
     And the accelerometers' fit, which learns of the moves what directions the poses have.
 
-    An IMU's gyroscope starts turned as its accelerometer is. ``every``: recordings of one board,
-    the one to be corrected first; ``triads`` are of all their poses, one recording after the other.
+    An IMU's gyroscope starts turned as its accelerometer is. ``every``: recordings of one board;
+    ``triads`` are of all their poses, one recording after the other.
 
     InputError for a gyroscope that is mirrored or dead, for wrong units and for left-handed axes.
     """
@@ -244,16 +253,12 @@ def _moves(one: Still, matrix) -> list[Move]:
 
 
 def _common(several, triads: TriadFit) -> CommonMap | str:
-    """The map common to all gyroscopes from [(recording, moves)]; its moves are the first one's."""
+    """The map common to all gyroscopes from [(recording, moves)]."""
     moves, poses = [], 0
     for one, own in several:
         moves += [move._replace(first=move.first + poses) for move in own]
         poses += len(one.poses)
-    found = common_map(moves, triads.direction, triads.direction_covariance)
-    if isinstance(found, str):
-        return found
-    own = found.first < len(several[0][0].poses)
-    return replace(found, first=found.first[own], error=found.error[own], weight=found.weight[own])
+    return common_map(moves, triads.direction, triads.direction_covariance)
 
 
 def _start(recording: Recording, triads: TriadFit) -> np.ndarray:

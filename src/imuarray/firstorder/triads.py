@@ -98,12 +98,14 @@ class TriadFit:
         """(P, A) bool: used, in a pose that fits the others."""
         return self.used & (self.doubtful == 1)[:, None]
 
-    def first(self) -> Self:
-        """The same with the poses of the first recording only."""
-        own = self.recording == 0
+    def of(self, number: int) -> Self:
+        """The same with one recording's poses only, and its offsets."""
+        own = self.recording == number
         both = np.ix_(np.repeat(own, 3), np.repeat(own, 3))
+        offset, covariance = _offset_of(self.fitted, self.used.shape, number)
         return replace(
-            self, direction=self.direction[own], residual=self.residual[own], used=self.used[own],
+            self, offset=offset, covariance=covariance, direction=self.direction[own],
+            residual=self.residual[own], used=self.used[own],
             direction_covariance=self.direction_covariance[both], recording=self.recording[own],
             doubtful=self.doubtful[own],
         )  # fmt: skip
@@ -267,15 +269,24 @@ def _places(triads: int) -> np.ndarray:
     )
 
 
+def _offset_of(own: Fitted, shape, number: int) -> tuple[np.ndarray, np.ndarray]:
+    """A recording's offsets (A, 3), and the covariance (12 A, 12 A) of matrices and these."""
+    poses, triads = shape
+    place, split = _places(triads), 6 + 9 * (triads - 1)
+    mine = split + 3 * triads * number + np.arange(3 * triads)
+    index = np.ix_(*2 * [np.concatenate([np.arange(split), mine])])
+    covariance = np.zeros((12 * triads, 12 * triads))
+    covariance[np.ix_(place, place)] = own.covariance[index]
+    return own.values[mine].reshape(triads, 3), covariance
+
+
 def _result(own: Fitted, used, recording, ratio: float, walk, doubtful) -> TriadFit:
     poses, triads = used.shape
-    matrices, offsets, directions = (np.asarray(x) for x in _unpack(own.values, triads, poses))
-    place = _places(triads)
-    covariance = np.zeros((12 * triads, 12 * triads))
-    covariance[np.ix_(place, place)] = own.covariance[: len(place), : len(place)]
+    matrices, _, directions = (np.asarray(x) for x in _unpack(own.values, triads, poses))
+    offset, covariance = _offset_of(own, used.shape, 0)
     direction = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     residual = own.mean - np.asarray(_predict(own.values, triads, own.magnitude, recording))
     return TriadFit(
-        matrices, offsets[0], direction, residual, covariance, ratio, used,
+        matrices, offset, direction, residual, covariance, ratio, used,
         own.covariance[-3 * poses :, -3 * poses :], recording, walk, doubtful, own,
     )  # fmt: skip
