@@ -101,6 +101,7 @@ def parts(name, section=None):
         "2017_fig3": (paper2017.figure_2017_fig3, rate_errors()),
         "2017_fig4": (paper2017.figure_2017_fig4, sample_errors()),
         "2017_fig5": (paper2017.figure_2017_fig5, motion_errors()),
+        "2017_fig2": (paper2021_array.figure_2017_fig2,),
         "2021_fig1": (paper2021_array.figure_2021_fig1,),
         "2021_fig2": (paper2021.figure_2021_fig2, [sweep(samples) for samples in SAMPLES]),
     }
@@ -296,7 +297,7 @@ def test_ellipse_holds_its_share():
     assert abs(outline.contains_points(draws).mean() - 0.5) < 4.5 * 0.5 / np.sqrt(20000)
 
 
-@pytest.mark.parametrize("name", ["2021_fig1", "2021_fig5"])
+@pytest.mark.parametrize("name", ["2017_fig2", "2021_fig1", "2021_fig5"])
 def test_other_arrays_can_be_drawn(name, tmp_path):
     flat = {"positions": [[0, 0, 0], [0.01, 0, 0], [0, 0.01, 0], [0.01, 0.02, 0]]}
     for section in ({"board": "mimu4444_corners"}, flat):

@@ -4,6 +4,22 @@ SHOWN_CAPTIONS = [
 ]
 
 
+rule figure_2017_fig2:
+    output:
+        **figure("2017_fig2", "Paper 2017"),
+    log:
+        "results/{scale}/logs/figures/2017_fig2.log",
+    benchmark:
+        "results/{scale}/benchmarks/figures/2017_fig2.tsv"
+    params:
+        **by("figures.paper2021_array.figure_2017_fig2"),
+        settings=lambda wc: effective(config, wc.scale),
+    message:
+        "figure 2 of 2017 ({wildcards.scale})"
+    script:
+        "../scripts/publish.py"
+
+
 rule figure_2017_fig3:
     input:
         rates="results/{scale}/calibration/rate_error.csv",

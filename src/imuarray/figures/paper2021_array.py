@@ -1,4 +1,4 @@
-"""Paper 2021, figures 1 and 5: the array, and where in its package each triad is."""
+"""Figure 2 of 2017, 1 and 5 of 2021: the array, and where in its package each triad is."""
 
 from functools import partial
 
@@ -16,6 +16,7 @@ from imuarray.figures.style import (
     GREY,
     PAGE,
     SKY,
+    VERMILLION,
     chain_lines,
     look,
     new_figure,
@@ -28,6 +29,7 @@ from imuarray.geometry import UNDERSIDE_ROTATION, Array, array_from_config
 # not say in which corner it is; on the axis that the underside is turned around, as here, both
 # sides' markers lie one above the other.
 MARKER = np.array([0.36, -0.36, 0.0])
+OBLIQUE = np.array([[1.0, 0.0], [0.45, -0.4], [0.0, 5.5]])  # where x, y, z go on the paper
 ARROW = {"arrowstyle": "<->", "linewidth": 0.7, "shrinkA": 0, "shrinkB": 0}
 
 
@@ -55,12 +57,45 @@ def layout_table(array: Array) -> pd.DataFrame:
     return table
 
 
-def figure_2021_fig1(settings: dict):
+def figure_2021_fig1(settings: dict, draw=None):
     """Layout and dimensions: top view (y axis downwards) with numbers and pitch, and side view."""
     array = array_from_config(settings["array"])
-    table = layout_table(array)
     footer = [scale_line(settings, f"array {array.name}, nominal")]
-    return partial(_draw_fig1, footer=footer), table
+    return partial(draw or _draw_fig1, footer=footer), layout_table(array)
+
+
+def figure_2017_fig2(settings: dict):
+    """The array of the simulations, seen obliquely; crosses: where its sensing elements are."""
+    return figure_2021_fig1(settings, _draw_oblique)
+
+
+@styled
+def _draw_oblique(table, footer):
+    figure = new_figure(footer, height=2.9)
+    axes = figure.subplots()
+    mm = table[[c for c in table if c.endswith("_m")]] * 1e3
+    size = mm[["package_length_m", "package_width_m"]].iloc[0].to_numpy()
+    places = mm[["x_m", "y_m", "z_m"]].to_numpy()
+    low, high = places.min(axis=0), places.max(axis=0)
+    square = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)])
+
+    def outline(middle, half, z, **style):
+        flat = np.column_stack([middle + square * half, np.full(len(square), z)])
+        axes.fill(*(flat @ OBLIQUE).T, linewidth=0.6, **style)
+
+    under = (table.side == "underside").to_numpy()
+    for side, z, style in ((under, low[2], ":"), (~under, high[2], "-")):
+        for place in places[side]:
+            outline(place[:2], size / 2, z, facecolor="none", edgecolor=GREY, linestyle=style)
+        if side.any():
+            axes.plot(*(places[side] @ OBLIQUE).T, "x", color=VERMILLION, markersize=4)
+        middle, half = (low + high)[:2] / 2, (high - low)[:2] / 2 + 0.8 * size
+        outline(middle, half, z, facecolor="#BFD8C6", edgecolor="0.4", alpha=0.35)
+    axes.set(aspect="equal", xticks=[], yticks=[])
+    axes.set_title(f"{(~under).sum()} IMUs on the topside (solid), {under.sum()} on the underside;"
+                   f" height × {OBLIQUE[2, 1]:g}", size=7)  # fmt: skip
+    axes.axis("off")
+    return figure
 
 
 @styled

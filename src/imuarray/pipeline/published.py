@@ -19,8 +19,8 @@ FOLDER = "paper_figures"
 # By pattern of its name, what a published file copies and the sections of the configuration that
 # it rests on; the first that fits counts.
 PLACES = {
+    "2017_fig2|2021_fig1": ("{scale}/figures/{name}", ""),
     r"2017_fig(\d)": ("{scale}/figures/{name}", "paper2017.fig{0}"),
-    "2021_fig1": ("{scale}/figures/{name}", ""),
     r"2021_fig[234]": ("{scale}/figures/{name}", "paper2021"),
     "2021_fig5": ("{scale}/figures/{name}", "paper2017 paper2021 experiment recordings"),
     "2021_table1": ("{scale}/tables/{name}", "paper2021"),
