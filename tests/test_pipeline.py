@@ -15,7 +15,8 @@ import xarray as xr
 ROOT = Path(__file__).parents[1]
 
 DRAWN = {f"figure_{name}" for name in (
-    *(f"2017_fig{number}" for number in range(2, 6)), *(f"2021_fig{number}" for number in range(1, 6))
+    *(f"2017_fig{number}" for number in range(2, 6)),
+    *(f"2021_fig{number}" for number in range(1, 6)),
 )} | {"table_2021_table1", "table_2021_table2"}  # fmt: skip
 
 pytestmark = pytest.mark.slow

@@ -7,7 +7,6 @@ import pytest
 
 from imuarray.figures.repeatability import (
     MODELS,
-    figure_repeatability,
     parameters_agreement,
     positions_agreement,
     recordings_table,
@@ -57,16 +56,6 @@ def test_a_cause_s_numbers_repeat_by_their_spread(documents):
     assert (row.effect, row.recordings, row.parameters) == ("gyroscope_scale", 3, 2)
     assert row["size"] == pytest.approx(0.02)
     assert row.spread == pytest.approx(0.01 * np.sqrt(2 / 3))
-
-
-def test_the_figure_has_every_coordinate(documents):
-    draw, table = figure_repeatability(documents, positions_agreement(documents), "board")
-    figure = draw(table)
-    figure.draw_without_rendering()
-    left = figure.axes[0]
-    assert sum(len(line.get_ydata()) for line in left.lines if len(line.get_ydata()) > 2) == (
-        3 * 3 * 30
-    )
 
 
 def test_a_row_says_what_a_recording_s_causes_leave(documents):

@@ -35,7 +35,6 @@ rule diagnosis_agreement:
             "results/measured/diagnosis/{name}/diagnosis.json", name=MEASURED.groups()[wc.group]
         ),
     output:
-        **figure("diagnosis_{group}", "Diagnosis", caption="diagnosis", folder="results/measured"),
         positions="results/measured/tables/diagnosis_positions_{group}.csv",
         parameters="results/measured/tables/diagnosis_parameters_{group}.csv",
         recordings="results/measured/tables/diagnosis_recordings_{group}.csv",

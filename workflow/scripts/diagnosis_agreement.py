@@ -1,4 +1,4 @@
-"""Do diagnoses of one board's recordings agree? -> tables of positions and parameters, figure."""
+"""Do diagnoses of one board's recordings agree? -> tables of positions and parameters."""
 
 from imuarray.pipeline.job import job
 
@@ -7,12 +7,11 @@ with job(snakemake):
     from pathlib import Path
 
     from imuarray.figures.repeatability import (
-        figure_repeatability,
         parameters_agreement,
         positions_agreement,
         recordings_table,
     )
-    from imuarray.figures.style import rounded, write_figure
+    from imuarray.figures.style import rounded
     from imuarray.provenance import write_csv
 
     documents = {
@@ -24,5 +23,3 @@ with job(snakemake):
     write_csv(rounded(positions), made.positions)
     write_csv(rounded(parameters), made.parameters)
     write_csv(rounded(recordings_table(documents)), made.recordings)
-    drawn = figure_repeatability(documents, positions, snakemake.wildcards.group)
-    write_figure(*drawn, pdf=made.pdf, png=made.png, csv=made.csv)

@@ -34,11 +34,11 @@ PLACES = {
     "validation_(?:coverage|joint)": ("{scale}/tables/{name}", "paper2021 validation"),
     "blind_confusion": ("blind/{scale}/figures/{name}", "blind"),
     "blind_bars": ("blind/{scale}/tables/{name}", "blind"),
-    "diagnosis_(?:parameters|recordings)_.*": ("measured/tables/{name}", "measured"),
+    "diagnosis_.*": ("measured/tables/{name}", "measured"),
     "(?:causes|experiment|past_rail)_table_.*|left_out_.*": (
         "measured/tables/{name}", "measured"
     ),
-    "diagnosis_.*|past_rail_.*|experiment_.*": ("measured/figures/{name}", "measured"),
+    "past_rail_.*|experiment_.*": ("measured/figures/{name}", "measured"),
     "cause_.*": ("", "measured"),
     "measured_.*|criticism.*": ("", "measured"),
 }  # fmt: skip

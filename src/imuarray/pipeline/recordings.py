@@ -2,7 +2,7 @@
 
 FIGURE = ("pdf", "png", "csv")  # endings of what a drawing rule writes
 TABLE = ("csv", "tex", "md")
-DIAGNOSED = ("parameters", "recordings")  # tables of a board's diagnoses
+DIAGNOSED = ("positions", "parameters", "recordings")  # tables of a board's diagnoses
 
 
 class Recordings:
@@ -85,8 +85,9 @@ class Recordings:
         folder = "results/measured"
         paths = [f"{folder}/diagnosis/{name}/diagnosis.json" for name in self.entries]
         return paths + [
-            f"{folder}/figures/diagnosis_{g}.{k}" for g in self.groups() for k in FIGURE
-        ]
+            f"{folder}/tables/diagnosis_{part}_{group}.csv"
+            for group in self.groups() for part in DIAGNOSED
+        ]  # fmt: skip
 
     def causes(self) -> list[str]:
         """What each cause buys on each board with several recordings, and the experiment anew."""
@@ -135,7 +136,6 @@ class Recordings:
         name, group = self.shown, self.group(self.shown)
         last = self.board(group)[-1]
         kinds = {f"diagnosis_{part}_{group}": ("csv",) for part in DIAGNOSED}
-        kinds[f"diagnosis_{group}"] = FIGURE
         kinds |= {f"{part}_{name}": FIGURE for part in ("experiment", "past_rail")}
         kinds |= {f"{part}_table_{group}": TABLE for part in ("causes", "experiment", "past_rail")}
         return kinds | {
