@@ -44,7 +44,7 @@ def check_config(config, where: str = "config") -> dict:
 
 
 def _completed(given, schema: dict):
-    """What is ``given`` before the defaults of the schema, key by key.
+    """The values ``given`` before the defaults of the schema, key by key.
 
     A default stands for all that is below it: of an array or of recordings none is added to the
     user's own. Those of scales are completed, too.

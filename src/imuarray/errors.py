@@ -1,4 +1,4 @@
-"""What goes wrong because of the input, as opposed to because of a defect."""
+"""Errors because of the input, as opposed to because of a defect."""
 
 from collections.abc import Iterable
 from numbers import Integral

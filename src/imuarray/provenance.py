@@ -43,7 +43,7 @@ def add_code(name: str, place: str, text: str) -> None:
 
 
 def code_version(place: str) -> str:
-    """What `versions` says of the code that `add_code` was given at ``place``."""
+    """Entry of `versions` on the code that `add_code` was given at ``place``."""
     return f"sha256 {hashlib.sha256(_ADDED[place][1].encode()).hexdigest()}"
 
 
@@ -72,7 +72,7 @@ def digest(*objects: Any) -> str:
 
 
 def _fingerprint(value: Any) -> Any:
-    """What JSON does not know, as it does; of an array type, shape and SHA-256."""
+    """Plain JSON for what JSON does not know; of an array type, shape and SHA-256."""
     array = isinstance(value, np.ndarray) or getattr(value, "left_in_file", False)
     if array and value.dtype.kind in "biufcUS":
         found, kind, shape = hashlib.sha256(), value.dtype.newbyteorder("<"), value.shape
@@ -180,7 +180,7 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
 
 
 def target_of(path: str | Path) -> Path:
-    """What is written for ``path``: links are followed, and only a file is ever replaced.
+    """The file that is written for ``path``: links are followed, and only a file is ever replaced.
 
     Raises OSError for a folder, a device, a pipe, a socket, and where standard output goes.
     """
@@ -237,7 +237,7 @@ def write_netcdf_parts(
     parts: Iterable[xr.Dataset], length: int, path: str | Path,
     groups: Mapping[str, xr.Dataset] | None = None,
 ) -> None:  # fmt: skip
-    """The same of a dataset that comes in ``parts`` along time, ``length`` samples in all.
+    """Write a dataset that comes in ``parts`` along time, ``length`` samples in all.
 
     Attributes and what has no time are the first part's. The room is taken on the disk before HDF5
     writes to it: OSError where there is too little.
@@ -302,7 +302,7 @@ def seal_of(path: str | Path) -> bytes | None:
 
 
 def is_damaged(path: str | Path) -> bool:
-    """Whether a sealed file is not as `write_netcdf` wrote it; without a seal this is unknown.
+    """True where a sealed file is not as `write_netcdf` wrote it; without a seal this is unknown.
 
     To be asked before HDF5 reads the file: wrong bytes make it read wrong numbers, or loop.
     """
@@ -313,7 +313,7 @@ def is_damaged(path: str | Path) -> bool:
 
 
 def _sha256(path: str | Path, size: int) -> bytes:
-    """Of a file's first ``size`` bytes."""
+    """SHA-256 of a file's first ``size`` bytes."""
     found = hashlib.sha256()
     with open(path, "rb") as handle:
         while size and (part := handle.read(min(size, 2**20))):

@@ -79,7 +79,7 @@ def _line(time, number, pace: float) -> tuple[float, np.ndarray]:
 
 
 def _roughness(time, values) -> float:
-    """How far every other reading is off a spline through the rest, where readings change fast."""
+    """Distance of every other reading from a spline through the rest, at fast changes."""
     change = np.linalg.norm(np.diff(values, axis=0), axis=1)[:-1:2]
     spline = make_interp_spline(time[::2], values[::2], 3)
     odd = slice(1, 2 * len(change), 2)
@@ -180,7 +180,7 @@ def _ahead(logs, gyroscopes, origins) -> list[float]:
 
 
 def _ends(sensors: Sequence[Sensor]) -> Iterator[str]:
-    """Which sensors end long before the others, or begin long after them."""
+    """A line for each sensor that ends long before the others, or begins long after them."""
     first, last = min(s.time[0] for s in sensors), max(s.time[-1] for s in sensors)
     for sensor in sensors:
         for late, what in (

@@ -1,4 +1,4 @@
-"""How one gyroscope's clock and axes lie against another's, from the rates of one rigid body."""
+"""Clock and axes of one gyroscope against another's, from the rates of one rigid body."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Clock(NamedTuple):
         return stamps - self.offset - self.drift * (stamps - self.middle)
 
     def of_stamps(self, own: float, first: float, unsure: float) -> Clock:
-        """The same for stamps that count from ``own`` and, the first's, from ``first`` s.
+        """The clock for stamps that count from ``own`` and, the first's, from ``first`` s.
 
         ``unsure`` s: sd of the whole log's stamps against its readings.
         """

@@ -1,4 +1,4 @@
-"""What was found of logs that were aligned: in lines for a person, and as a file keeps it."""
+"""Results of aligning logs: in lines for a person, and as a file keeps them."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -17,7 +17,7 @@ SMALLEST = 1e-4  # degrees, ms or ppm: an sd that is shown
 
 
 class Carried(NamedTuple):
-    """Of one sensor: ``rate`` Hz by the first log's clock, ``jitter`` s of its stamps.
+    """One sensor: ``rate`` Hz by the first log's clock, ``jitter`` s of its stamps.
 
     ``error`` is the rms of what interpolation misses in motion, ``noise_sd`` the declared noise in
     an interpolated reading, both m/s^2 or rad/s.
@@ -40,7 +40,7 @@ class Carried(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
-    """How K logs lie to one another.
+    """Clocks and axes of K logs against one another.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ class Alignment:
         return text
 
     def dataset(self) -> xr.Dataset:
-        """The same as the recording's file keeps it: dimensions imu, axis, kind."""
+        """Dataset of the alignment for the recording's file: dimensions imu, axis, kind."""
         sds = np.sqrt([np.diag(clock.covariance)[:2] for clock in self.clocks])
         clocks = {"offset": "s", "drift": "1", "middle": "s"}
         begun = {"offset": self.epochs - self.epochs[0], "drift": 0.0, "middle": self.epochs}

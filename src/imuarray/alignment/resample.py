@@ -85,7 +85,7 @@ class Sensor:
         return frequency, power[moving] - level
 
     def runs(self, longest: float) -> list[slice]:
-        """Of readings no further apart than ``longest`` usual steps."""
+        """Slices of readings no further apart than ``longest`` usual steps."""
         cuts = np.flatnonzero(np.diff(self.time) > longest * self.step) + 1
         ends = [0, *cuts, len(self.time)]
         return [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]

@@ -1,4 +1,4 @@
-"""What a person does with one recording: from a `Recording` to labelled datasets.
+"""The analyses of one recording: from a `Recording` to labelled datasets.
 
 The commands and the notebook call the same functions.
 """

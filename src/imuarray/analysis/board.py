@@ -64,7 +64,7 @@ def board(
 
 
 def _first_order(recording: Recording, gravity: float) -> FirstOrder | str:
-    """What still poses and moves say, or why they do not."""
+    """First order from still poses and moves, or the reason why there is none."""
     try:
         still_poses(recording)
     except InputError as error:

@@ -62,7 +62,7 @@ def _near_the_model() -> Iterator[None]:
 def fitted_beyond(
     recording: Recording, model: str, effects: Sequence[str], say: Say
 ) -> Estimate | None:
-    """The same of one recording, None where no more than positions and motion are in the model."""
+    """`fitted` of one recording, None where no more than positions and motion are in the model."""
     if methods.is_file(model) or effects:
         return fitted([recording], model, effects, say)[0]
     readings = _arranged([recording], say)

@@ -1,4 +1,4 @@
-"""Whether a calibration is whole, and one of the recording's IMUs, before it is used.
+"""Checks that a calibration is whole, and one of the recording's IMUs, before it is used.
 
 A file may have been cut, edited, or belong to another board; what is computed with it would be
 numbers all the same.
@@ -71,7 +71,7 @@ def _require_right_axes(mended: Iterable[str]) -> None:
 
 
 def is_of(recording: Recording, calibration: xr.Dataset) -> bool:
-    """Whether the calibration is of this recording, or of one that this is a part of."""
+    """True where the calibration is of this recording, or of one that this is a part of."""
     if "angular_rate" not in calibration:
         return False
     time = calibration["time"].to_numpy()

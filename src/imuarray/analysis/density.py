@@ -33,7 +33,7 @@ FEW, STARTS = 50, 8  # samples; searches for the mode where there are no more
 
 
 class Posterior(NamedTuple):
-    """What a sampler needs of a recording, by `posterior_of` or `posterior_beyond`."""
+    """Density, mode and covariance for a sampler, by `posterior_of` or `posterior_beyond`."""
 
     recording: Recording
     model: ArrayModel  # with the noise, and the motion's prior, that belong to ``scales`` = 0
@@ -51,7 +51,7 @@ class Posterior(NamedTuple):
 
     @property
     def flat(self) -> bool:
-        """Whether the motion's prior is the papers'."""
+        """True where the motion's prior is the papers'."""
         return not np.isfinite(self.model.motion_sd[0])
 
     def likelihood(self, rates: str = "declared") -> Likelihood:
@@ -132,7 +132,7 @@ def _spread(recording: Recording, model: ArrayModel, say: Say) -> Posterior:
 
 
 def prior_of(recording: Recording, model: ArrayModel) -> GaussianPrior:
-    """Of the positions r_2 ... r_A, then of the effects' parameters."""
+    """Prior of the positions r_2 ... r_A, then of the effects' parameters."""
     mean = np.append(model.array.parameters, np.zeros(model.effect_size))
     sd = np.full(mean.size, recording.position_prior_sd)
     sd[3 * (model.array.accelerometers - 1) :] = model.effect_prior_sd
@@ -172,7 +172,7 @@ def _fit(recording: Recording) -> Callable:
 
 @cache
 def log_extended(model: ArrayModel) -> Callable:
-    """The same under a model with effects; one function for models that predict the same."""
+    """Log density under a model with effects; one function for models that predict the same."""
 
     def log_density(theta, data, mean, root):
         prior = -0.5 * ((root @ (theta - mean)) ** 2).sum()
@@ -208,7 +208,7 @@ def traced(posterior: Posterior, rates: str = "declared", say: Say = silent):
 
 
 def at_estimate(posterior: Posterior) -> Posterior:
-    """The same with noise and motion's size at their estimates, for the compiled likelihood."""
+    """The posterior with noise and motion's size at their estimates, for compiled code."""
     size, prior = len(posterior.mode) - len(posterior.scales), posterior.prior
     return posterior._replace(
         prior=GaussianPrior(prior.mean[:size], prior.sd[:size]), mode=posterior.mode[:size],

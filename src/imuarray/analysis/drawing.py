@@ -50,7 +50,7 @@ class Places(NamedTuple):
     hand: int = 0
 
     def learnt(self) -> bool:
-        """Whether the positions are known better than by the drawing."""
+        """True where the positions are known better than by the drawing."""
         coordinates = 3 * (len(self.found) - 1)
         return float(np.trace(self.covariance)) < coordinates * self.prior_sd**2
 
@@ -60,7 +60,7 @@ class Places(NamedTuple):
 
 
 class Explanation(NamedTuple):
-    """What a mistake would make of the drawing, (A, 3) m, in words; ``unknowns`` fitted."""
+    """A mistake in words, and the drawing (A, 3) m that it would make; ``unknowns`` fitted."""
 
     words: str
     places: np.ndarray
@@ -73,7 +73,7 @@ def centred(places) -> np.ndarray:
 
 
 def precision(places: Places, prior_sd: float | None = None) -> np.ndarray:
-    """Of found less nominal positions, (3 A, 3 A) 1/m^2, whatever the place of the origin."""
+    """Precision of found less nominal positions, (3 A, 3 A) 1/m^2, wherever the origin."""
     sd = places.prior_sd if prior_sd is None else prior_sd
     inverse = np.linalg.inv(places.covariance + sd**2 * np.eye(len(places.covariance)))
     moved = np.tile(np.eye(3), (len(places.found), 1))
@@ -137,7 +137,7 @@ def another_size(places: Places) -> str | None:
 
 
 def size_words(size: float) -> str:
-    """How far off a size is, and which mistake would make it so."""
+    """Words on how far off a size is, and which mistake would make it so."""
     small = size < 1
     said = f"the array comes out {(1 / size if small else size):.4g} times too "
     said += "small" if small else "large"
@@ -228,7 +228,7 @@ def small_words(size: float) -> str:
 
 
 def _unnamed(places: Places, alone, p: float) -> str:
-    """Which triad departs most, and by how much."""
+    """Words on the triad that departs most, and by how much."""
     off = centred(places.found) - centred(places.nominal)
     worst = int(np.argmax(alone))
     distance = float(np.linalg.norm(_apart(places, worst)))

@@ -153,7 +153,7 @@ def _values(calibration: xr.Dataset, model: ArrayModel) -> dict:
 
 
 def _steps(calibration: xr.Dataset, model: ArrayModel) -> dict[str, list[dict]]:
-    """Of each kind the corrections in turn, arrays with triads first."""
+    """Corrections of each kind in turn, arrays with triads first."""
     out: dict[str, list[dict]] = {kind: [] for kind in KINDS}
     if set(CORRECTION) <= set(calibration):
         first = calibration[list(CORRECTION)].isel(recording=0)
@@ -193,7 +193,7 @@ def _step(step: dict, k: int) -> dict[str, Any]:
 
 
 def _times(calibration: xr.Dataset, model: ArrayModel) -> dict[str, tuple]:
-    """Of each kind time offsets (n,) s against the first accelerometer, and their sds."""
+    """Time offsets (n,) s of each kind against the first accelerometer, and their sds."""
     size = model.effect_size
     places: dict[str, Any] = model.split(np.arange(size))
     weights = {kind: np.zeros((calibration.sizes[kind], size)) for kind in KINDS}

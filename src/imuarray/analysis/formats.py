@@ -39,7 +39,7 @@ def left_of(calibration: xr.Dataset) -> dict[str, np.ndarray]:
 
 
 def frames_of(calibration: xr.Dataset, steps: dict, positions) -> list[dict]:
-    """Of each IMU its place, its turn, and what its chips read, in their own axes."""
+    """Place and turn of each IMU, and the readings of its chips, in their own axes."""
     sensed = {kind: _sensed(steps[kind], calibration.sizes[kind]) for kind in KINDS}
     chips = calibration.get("accelerometer_axes")
     axes = np.tile(np.eye(3), (len(positions), 1, 1)) if chips is None else chips.to_numpy()

@@ -242,8 +242,7 @@ def _positions(found: Estimate, calibration: xr.Dataset) -> tuple[np.ndarray, np
 
 
 def _sensors(found: Estimate, calibration: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Of k parameters that are the board's: (n, k) their information with positions; (k, k) their
-    covariance in the calibration."""
+    """The board's k parameters: (n, k) information with positions, (k, k) covariance."""
     (one,), columns = found.recorded, found.columns
     effects = calibration.attrs["effects"].split(",")
     shared = [name for name in effects if not EFFECTS[name].own]

@@ -127,7 +127,7 @@ def _together(found: Recording | Rig) -> Opened:
 
 
 def _sampled(recording: Recording, lines: list[str]) -> Opened:
-    """Of samples as they are: even instants where stamps jitter, and the rails that show."""
+    """Samples as they are: even instants where stamps jitter, and the rails that show."""
     from imuarray.alignment.align import SHORTEST, steadied
     from imuarray.alignment.found import JITTER
 
@@ -180,7 +180,7 @@ def _railed(log: Log) -> tuple[Log, list[str]]:
 
 
 def _railed_triads(recording: Recording) -> tuple[Recording, list[str]]:
-    """The same of a board's triads, each with rails of its own."""
+    """A board's triads, each with rails of its own, and lines that say so."""
     changed: dict[str, Any] = {}
     lines = []
     for kind, name in READ.items():

@@ -9,5 +9,5 @@ RATES = ("declared", "spread")  # what p(omega | y_g) is made from
 
 
 def is_file(model) -> bool:
-    """Whether this is no name of a model, but the path of a calibration that has one."""
+    """True of the path of a calibration, which has a model; False of a model's name."""
     return str(model).endswith(".nc")

@@ -1,4 +1,4 @@
-"""How far a recording's triads are from a rigid array: residuals over noise, and whose they are."""
+"""Distance of a recording's triads from a rigid array: residuals over noise, and whose they are."""
 
 import numpy as np
 import xarray as xr
@@ -16,7 +16,7 @@ RESIDUAL = 3.0  # times the declared noise: widths are too small, or scaled by w
 
 
 def is_papers(calibration: xr.Dataset) -> bool:
-    """Whether it is of the papers' model, in which nothing but noise is between the triads."""
+    """True of the papers' model, in which nothing but noise is between the triads."""
     return calibration.attrs.get("model") == "papers"
 
 
@@ -98,7 +98,7 @@ def unsteady(calibration: xr.Dataset, corrected: bool, recordings: int = 1) -> l
 
 
 def rigid(recording: Recording, places: Places, spread: bool = False) -> dict[str, float]:
-    """The same for a rigid array without any errors, by plain least squares.
+    """Residuals by triad for a rigid array without any errors, by plain least squares.
 
     ``spread``: of the accelerometers alone.
     """

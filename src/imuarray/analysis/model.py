@@ -1,4 +1,4 @@
-"""What the analyses work on: the recording's usable samples, and the model asked for."""
+"""The input of the analyses: the recording's usable samples, and the model asked for."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace

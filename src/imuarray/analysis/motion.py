@@ -169,7 +169,7 @@ def _with_common_map(found, calibration: xr.Dataset, recording: Recording):
 
 
 def _noise(calibration: xr.Dataset, array: Array, accelerometer_noise: float | None) -> Noise:
-    """That of the calibration, unless another is assumed."""
+    """Noise of the calibration, unless another is assumed."""
     sds = [calibration[f"{kind}_sd"].to_numpy()[:, 0] for kind in ("accelerometer", "gyroscope")]
     if accelerometer_noise is not None:
         sds[0] = np.full(len(sds[0]), accelerometer_noise)

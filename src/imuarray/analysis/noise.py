@@ -36,7 +36,7 @@ class Fitted(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """What residuals and motion of a fit show."""
+    """Noise and motion's size by residuals and motion of a fit."""
 
     squares: np.ndarray  # (N, 2) of each triad's residuals, in their sds
     freedom: np.ndarray  # (N, 2) degrees that motion and shared parameters leave them
@@ -44,7 +44,7 @@ class Shown(NamedTuple):
 
 
 def shown(readings: Readings, columns: Columns, state: State, active, covariance) -> Shown:
-    """Of a fit's state, the ``active`` (N, m) parameters' covariance (n, n) allowed for."""
+    """Noise and motion's size of a fit, for the ``active`` (N, m) parameters' covariance."""
     wanted = np.flatnonzero(active.any(axis=0))
     directions = directions_of(columns, wanted)
     few = active[:, wanted]
@@ -91,7 +91,7 @@ def factors(seen: Shown, exists, known=(False, False)) -> np.ndarray:
 
 
 def _factors(squares, freedom, apart: int) -> np.ndarray:
-    """Of one kind of sensor, (n,): each its own, or one for all."""
+    """Factors (n,) of one kind of sensor: each its own, or one for all."""
     if len(squares) < apart or freedom.min() < FREEDOM:
         squares, freedom = np.full(len(squares), squares.sum()), freedom.sum()
         if np.all(freedom < 1):

@@ -40,7 +40,7 @@ def read_mimu(
 
 
 def read_calibration(path: str | PathLike) -> xr.Dataset:
-    """What `imuarray calibrate` has written; InputError for another file."""
+    """A calibration from the file that `imuarray calibrate` has written; InputError for another."""
     found = load_dataset(Path(path))
     if "position_covariance" not in found:
         raise InputError(f"{path}: expected a calibration, found no position_covariance")
@@ -48,7 +48,7 @@ def read_calibration(path: str | PathLike) -> xr.Dataset:
 
 
 def read_posterior(path: str | PathLike) -> xr.DataTree:
-    """What `imuarray sample` has written; InputError for another file."""
+    """A posterior from the file that `imuarray sample` has written; InputError for another."""
     from imuarray.posterior.chains import read_chains
     from imuarray.provenance import is_damaged
 
@@ -162,7 +162,7 @@ def select(recording: Recording, samples: int | None = None) -> Recording:
 def less_leak(
     recording: Recording, correction: xr.Dataset, rate, saturated
 ) -> tuple[Recording, np.ndarray]:
-    """As if axes at their rail had read the ``rate`` (T, 3), NaN where it is not known.
+    """The recording as if axes at their rail had read the ``rate`` (T, 3), NaN if unknown.
 
     And (T, 3, 3), by how much the mean of the gyroscopes changes with the rate of such axes.
     """
@@ -182,7 +182,7 @@ def less_leak(
 
 
 def less_leak_by_others(recording: Recording) -> Recording:
-    """The same where gyroscopes without an axis at its rail say what the rate was."""
+    """`less_leak` where gyroscopes without an axis at its rail say what the rate was."""
     correction = recording.correction
     if correction is None or not recording.at_rail("gyroscope").any():
         return recording

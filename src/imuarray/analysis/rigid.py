@@ -77,7 +77,7 @@ class Slope(NamedTuple):
 
     @property
     def off(self) -> bool:
-        """Whether no errors of measurement explain that it is not 1."""
+        """True where no errors of measurement explain that it is not 1."""
         if self.correlation < COHERENT:
             return self.correlation < -COHERENT
         margin = SLOPE + 5 * self.sd + self.coarse
@@ -119,7 +119,7 @@ def slope(time, motion: Turning) -> Slope | None:
 
 
 def elsewhere(recording: Recording, positions) -> tuple[float, float]:
-    """How much better accelerometers (A, 3) m off ``positions`` fit: ratio of residuals, rms move.
+    """Gain of accelerometers (A, 3) m off ``positions``: ratio of residuals, rms move.
 
     By moving each in turn with the motion; what other errors leave is left in both residuals.
     """

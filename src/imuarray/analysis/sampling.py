@@ -43,7 +43,7 @@ FLAT = 0.03  # of the mode's distance from a line: nearer the flat prior has its
 
 
 class Asked(NamedTuple):
-    """How to sample; ``beside`` is the file beside which a checkpoint is kept, if any."""
+    """Options of a sampler; ``beside`` is the file beside which a checkpoint is kept, if any."""
 
     method: str
     motion_prior: str

@@ -58,7 +58,7 @@ def _gyroscopes(recording: Recording) -> list[Suspect]:
     rates = recording.angular_rate
 
     def others(left):
-        """What each gyroscope should read by the others that are left (T, G, 3)."""
+        """Readings of each gyroscope by the others that are left (T, G, 3)."""
         parts = [np.setdiff1d(left, [k]) for k in range(rates.shape[1])]
         return np.stack([np.median(rates[:, part], axis=1) for part in parts], axis=1)
 
@@ -72,7 +72,7 @@ def _accelerometers(recording: Recording) -> list[Suspect]:
     rate = np.median(recording.angular_rate, axis=1)
 
     def others(left):
-        """What each accelerometer should read by the others that are left (T, A, 3)."""
+        """Readings of each accelerometer by the others that are left (T, A, 3)."""
         found = np.empty(force.shape)
         for k in range(force.shape[1]):
             part = np.setdiff1d(left, [k])
@@ -105,7 +105,7 @@ def _search(recording, kind, readings, others, sd, rise=None) -> list[Suspect]:
 
 
 def explain(readings, expected, chain, rise=None) -> str:
-    """What would make ``readings`` (T, 3) of ``expected`` ones; empty if nothing here does.
+    """A change that makes ``readings`` (T, 3) of ``expected`` ones, in words; empty if none does.
 
     ``chain``: first indices of four samples in a row; ``rise`` (T, 3): the expected ones' change
     per second, where it is known without neighbours.
@@ -222,7 +222,7 @@ def common(recording: Recording) -> list[str]:
 
 
 def _wrong_signs(signs) -> list[str]:
-    """Of all gyroscopes' axes against the accelerometers'."""
+    """Words on all gyroscopes' axes against the accelerometers'."""
     wrong, right = (
         [name for name, s in zip("xyz", signs, strict=True) if s == which] for which in (-1, 1)
     )

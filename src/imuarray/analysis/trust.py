@@ -43,7 +43,7 @@ AS_READ = (
 
 
 class Poses(NamedTuple):
-    """What a first-order calibration came to: NaN where it does not say."""
+    """Results of a first-order calibration: NaN where it has none."""
 
     ratio: float = 1.0  # residual of the poses over their noise
     residual: float = np.nan  # m/s^2, rms of the worst triad
@@ -135,7 +135,7 @@ def reasons_of_calibration(
 
 
 def _drifts(recording: Recording) -> list[str]:
-    """What a model with steady offsets leaves out, where first order saw them drift."""
+    """Words on drifts that a model with steady offsets leaves out, where first order saw them."""
     if recording.correction is None:
         return []
     walk = float(recording.correction["accelerometer_offset_walk"].max())
@@ -310,7 +310,7 @@ def _of_another_time(recording: Recording, calibration: xr.Dataset, own_clocks: 
 
 
 def _looks_at_time(effect: Effect) -> bool:
-    """Whether a recording's own effect is another at each instant: its function reads the time."""
+    """True where a recording's own effect differs between instants: its function reads the time."""
     return effect.own and effect.apply is not None and "time" in effect.apply.__code__.co_names
 
 

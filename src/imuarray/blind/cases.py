@@ -38,7 +38,7 @@ SETTINGS = (
 
 @dataclass(frozen=True)
 class Case:
-    """What to inject, and into what.
+    """A recording to be made: effects, and what they are injected into.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What an effect does to the readings, and how several effects compose.
+"""Changes that an effect makes in the readings, and how several effects compose.
 
 The order is that of the hardware: the instants at which the sensors sample, the errors of the
 sensors (computed from the true quantities, and added up), the axes' labels, the noise, the rails,
@@ -178,7 +178,7 @@ def spread(scene: Scene, sensors, values: np.ndarray, rest: float = 0.0) -> np.n
 
 
 def which_kinds(rng) -> tuple[bool, bool]:
-    """Whether accelerometers, gyroscopes or both are affected, a third of the time each."""
+    """(accelerometers, gyroscopes) affected: one or both, a third of the time each."""
     return [(True, False), (False, True), (True, True)][rng.integers(3)]
 
 
@@ -299,11 +299,11 @@ def finish(scene: Scene, changes: Sequence[Change], readings: Pair) -> Pair:
 
 
 def noisy_readings(scene: Scene, changes: Sequence[Change], rng) -> Pair:
-    """What the host records, (T, A, 3) m/s^2 and (T, G, 3) rad/s."""
+    """Readings as the host records them, (T, A, 3) m/s^2 and (T, G, 3) rad/s."""
     mean, noise = mean_readings(scene, changes), draw_noise(scene, changes, rng)
     return finish(scene, changes, Pair(mean.force + noise.force, mean.rate + noise.rate))
 
 
 def noiseless_readings(scene: Scene, changes: Sequence[Change]) -> Pair:
-    """What would be recorded without noise; its difference to no changes is the mean effect."""
+    """Readings without noise; their difference to no changes is the mean effect."""
     return finish(scene, changes, mean_readings(scene, changes))

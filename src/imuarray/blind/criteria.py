@@ -135,7 +135,7 @@ def _covered(part: pd.DataFrame) -> tuple:
 
 
 def _upper_line(first: dict) -> dict:
-    """That on the upper limit of the false alarms' share, where there are enough recordings."""
+    """The criterion on the upper limit of the false alarms' share, of enough recordings."""
     aim = (0.0, UPPER_LIMIT)
     line = {**first, "id": "false_alarms_limit", "aim": _aim_text(aim), "sure": None}
     line["bar"] = f"the same: upper 95 % limit, over {UPPER_COUNT} or more recordings"
@@ -166,7 +166,7 @@ def verdict(aim: tuple | None, number: int, share: float) -> str:
 
 
 def is_sure(aim: tuple | None, number: int, low: float, high: float) -> bool | None:
-    """Whether the verdict holds anywhere between the limits; None where there is none."""
+    """The verdict where it holds anywhere between the limits, else None."""
     if aim is None or not number or np.isnan(low):
         return None
     inside = aim[0] <= low and high <= aim[1]

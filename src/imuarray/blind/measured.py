@@ -74,7 +74,7 @@ class MeasuredField:
 
     @cached_property
     def force_at_gyroscopes(self) -> np.ndarray:
-        """Of each IMU at its gyroscope's instants, (T, G, 3) m/s^2."""
+        """Specific force of each IMU at its gyroscope's instants, (T, G, 3) m/s^2."""
         return self._at(self.scene.readings.force, self.ages.rate)
 
     def _at(self, values: np.ndarray, ages: np.ndarray | None) -> np.ndarray:

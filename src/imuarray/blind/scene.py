@@ -65,7 +65,7 @@ def _waves(waves, time: np.ndarray, orders) -> list[np.ndarray]:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What is there before any effect is injected.
+    """The motion and the board before any effect is injected.
 
     Attributes
     ----------
@@ -152,7 +152,7 @@ class Scene:
         return Pair(here.force, here.rate)
 
     def field(self, ages: Pair) -> Field:
-        """What the sensors meet at their own instants, the host's plus ``ages``."""
+        """Specific force and rates at the sensors' own instants, the host's plus ``ages``."""
         return Field(self, ages)
 
 

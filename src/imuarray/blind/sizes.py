@@ -1,4 +1,4 @@
-"""How large an effect is, in sigma: what a test that knows it could see of it at best.
+"""Sizes of effects in sigma: the most that a test which knows them could see.
 
 That is what of a change in the readings no motion and no positions can absorb.
 """

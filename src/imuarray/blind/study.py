@@ -91,7 +91,7 @@ def sensors_of(sensors, imus: int) -> frozenset[str]:
 
 
 def right_set(wanted: list[str], named: dict[str, set[str]]) -> bool:
-    """Whether each effect of the truth has a named cause of its own and no cause is left over."""
+    """True where each effect of the truth has a cause of its own and none is left over."""
     if len(wanted) != len(named):
         return False
     return any(
@@ -106,7 +106,7 @@ def wrong_names(wanted: list[str], named: dict[str, set[str]]) -> list[str]:
 
 
 def is_confident(kind: str, causes: list[dict], unexplained: bool) -> bool:
-    """Whether a name is given without reserve.
+    """True of a name that is given without reserve.
 
     For gauges a class is reserve enough; for what the catalogue does not hold only
     ``unexplained`` is.
@@ -223,7 +223,7 @@ def _answered(truth: dict, answer: dict) -> dict:
 
 
 def _seen(effect: dict, causes: list[dict], imus: int) -> dict:
-    """Whether an effect of the truth is found, named itself, and on the right sensors."""
+    """Found, named itself, on the right sensors: True or False for an effect of the truth."""
     name = effect["effect"]
     of_it = [c for c in causes if name in (c["effect"], *c["indistinguishable_from"])]
     itself = [c for c in of_it if c["effect"] == name]

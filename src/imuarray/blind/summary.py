@@ -90,7 +90,7 @@ def effects(rows: list[dict]) -> pd.DataFrame:
 
 
 def detection(table: pd.DataFrame, against: str) -> pd.DataFrame:
-    """How often single effects are found, by size; ``table`` as `effects` returns it.
+    """Rates of single effects found, by size; ``table`` as `effects` returns it.
 
     ``against``: "sigma" (bins around the sizes of the matrix, and all effects together too) or
     "amplitude" (bins of equal counts, in each effect's own unit). Crashes count as missed.
@@ -146,7 +146,7 @@ def _detected(name: str, against: str, members: pd.DataFrame) -> dict:
 
 
 def confusion(rows: list[dict]) -> pd.DataFrame:
-    """What is named where, a line for each truth and each name that occurs (or `NOTHING`, ...).
+    """Names by truth, a line for each truth and each name that occurs (or `NOTHING`, ...).
 
     Of single effects, those of 8 sigma or more. ``right``, ``wrong``: numbers of recordings with
     the name, where its class holds an effect of the truth and where it does not; a recording with

@@ -143,7 +143,7 @@ def faster_rotation(results):
 
 
 def _beyond(table, limit) -> str:
-    """What our rows of figure 5 at accelerations above ``limit`` (deg/s^2) do: a remark."""
+    """A remark on our rows of figure 5 at accelerations above ``limit`` (deg/s^2)."""
     levels = {a: row.set_index("angular_rate_dps")
               for a, row in table.groupby("angular_acceleration_dps2")}  # fmt: skip
     text, near = "", levels[max(a for a in levels if a <= limit)]

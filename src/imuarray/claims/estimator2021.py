@@ -96,7 +96,7 @@ def printed_power(results):
 
 
 def _printed(results, prefix, remark):
-    """Whether (26a) as printed moves or widens the linearised posteriors; ``remark(rows)``."""
+    """Verdict on (26a) as printed: does it move or widen posteriors? ``remark(rows)``."""
     table = results.table("claims/determinant")
     names = [f"{prefix}T{samples}" for samples in results.samples]
     rows = table[table.name.isin(names) & (table.method == "linearised")]

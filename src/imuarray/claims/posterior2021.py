@@ -102,7 +102,7 @@ def efficient(results):
 
 
 def covered(draws, points, level=1 - 1 / 31):
-    """How many ellipses in x and y at ``level``, of draws (n, k, 3), hold the points (k, 3)."""
+    """Number of ellipses in x, y at ``level``, of draws (n, k, 3), that hold points (k, 3)."""
     inside = 0
     for k in range(draws.shape[1]):
         off = points[k, :2] - draws[:, k, :2].mean(axis=0)

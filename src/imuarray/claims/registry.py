@@ -41,19 +41,19 @@ def power_law(x, y, error) -> tuple[float, float]:
 
 
 def rises(values, errors, z: float = 3.0) -> int:
-    """How many steps of a sequence go up by more than ``z`` combined standard errors."""
+    """Number of steps of a sequence that go up by more than ``z`` combined standard errors."""
     values, errors = np.asarray(values, float), np.asarray(errors, float)
     limit = z * np.hypot(errors[1:], errors[:-1])
     return int(np.sum(np.diff(values) > limit))
 
 
 def near(value: float, wanted: float, error: float, least: float) -> bool:
-    """Whether a value is within ``least`` or three standard errors of what is wanted."""
+    """True of a value within ``least`` or three standard errors of what is wanted."""
     return abs(value - wanted) <= max(least, 3 * error)
 
 
 def falls(values) -> bool:
-    """Whether each of a sequence (of numbers or of arrays) is below the one before."""
+    """True where each of a sequence (of numbers or of arrays) is below the one before."""
     return bool(np.all(np.diff(np.asarray(list(values), float), axis=0) < 0))
 
 

@@ -57,7 +57,7 @@ class Sums:
         self.squares = {name: [0, np.zeros(len(UNITS))] for name in ("off_the_rail", "at_the_rail")}
 
     def add(self, part: xr.Dataset) -> xr.Dataset:
-        """The same part, counted."""
+        """The part, counted."""
         lost = np.isnan(part["angular_rate"].to_numpy()).any(axis=1)
         railed = part["gyroscope_at_rail"].to_numpy() & ~lost
         missed = ~part["converged"].to_numpy() & ~lost
@@ -91,7 +91,7 @@ def late_lines(late: float) -> list[str]:
 
 
 def report(found: dict, average: float) -> list[str]:
-    """The same for a person; ``average`` (rad/s) is the sd of the gyroscopes' mean."""
+    """Lines on the motion for a person; ``average`` (rad/s) is the sd of the gyroscopes' mean."""
     lines = [
         f"{found['samples']} samples: {found['left_out']} left out, at a rail;"
         f" {found['gyroscope_at_rail']} with a gyroscope at its rail"

@@ -1,4 +1,4 @@
-"""What a command line's texts become; each refuses a wrong one with what was expected."""
+"""Types of a command line's texts; each refuses a wrong one with what was expected."""
 
 import argparse
 from pathlib import Path
@@ -14,7 +14,7 @@ class InputFile(type(Path())):  # type: ignore[misc]
 
 
 class InputLog(InputFile):
-    """What a logger wrote, a file or a folder of files, that a command reads."""
+    """A logger's output, a file or a folder of files, that a command reads."""
 
 
 def bag(text: str) -> InputLog:

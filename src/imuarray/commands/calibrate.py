@@ -55,7 +55,7 @@ def document(dataset: xr.Dataset) -> dict:
 
 
 def report(dataset: xr.Dataset) -> str:
-    """The same for a person."""
+    """Lines on a calibration for a person."""
     state = "converged" if dataset.attrs["converged"] else "NOT converged"
     count, samples = dataset.sizes["iteration"], dataset.attrs["samples"]
     lines = [f"{state} after {count} iterations, {samples} samples", *position_lines(dataset)]
@@ -86,7 +86,7 @@ def _effects(dataset: xr.Dataset) -> list[str]:
 
 
 def _informative(dataset: xr.Dataset) -> list[str]:
-    """How well the recording determines the positions, and which combinations of them worst."""
+    """Lines on how well the recording determines the positions, and which combinations worst."""
     worst, prior = weakest_of(dataset), dataset.attrs["position_prior_sd"]
     rms = np.sqrt(np.mean(position_sds(dataset)[1:] ** 2))
     said = ", ".join(f"{item.words} ({1e6 * item.sd:.2g} um)" for item in worst)

@@ -1,4 +1,4 @@
-"""What a command prints: text for a person, or one JSON object for a program."""
+"""Output of a command: text for a person, or one JSON object for a program."""
 
 import json
 import math
@@ -28,7 +28,7 @@ class Output:
             print(printable(text), flush=True)
 
     def step(self, text: str) -> None:
-        """What is done next, with the seconds so far; on standard error."""
+        """Prints the next step, with the seconds so far, on standard error."""
         if self.progress:
             seconds = time.monotonic() - self._start
             print(f"{seconds:6.1f} s  {printable(text)}", file=sys.stderr, flush=True)

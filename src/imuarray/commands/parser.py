@@ -22,7 +22,7 @@ from imuarray.errors import InputError
 
 
 class Option(NamedTuple):
-    """What argparse's ``add_argument`` is called with."""
+    """Arguments of argparse's ``add_argument``."""
 
     name: str
     given: dict[str, Any]
@@ -277,7 +277,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """What it parses has the command's function as ``run``; a wrong line is an InputError."""
+    """A parser that gives the command's function as ``run``; a wrong line is an InputError."""
     parser = Parser(
         prog="imuarray",
         description="Calibrate the geometry of inertial sensor arrays.",

@@ -53,7 +53,7 @@ def document(posterior: xr.DataTree, table: pd.DataFrame) -> dict:
 
 
 def report(posterior: xr.DataTree, table: pd.DataFrame) -> str:
-    """The same for a person."""
+    """Lines on the chains for a person."""
     attrs = posterior.attrs
     lines = ["triad axis   mean mm   sd um"]
     for row in table.itertuples():

@@ -40,7 +40,7 @@ from imuarray.tails import log_chi_square
 
 
 def tried(search: Search) -> list[Candidate]:
-    """What may be adopted: neither refused before, nor there already."""
+    """Candidates for adoption: neither refused before, nor there already."""
     there = {(c.effect, k, v) for c in search.causes for k in c.imus for v in c.variants}
     # what a scanned cause contains is its own
     inside = {
@@ -92,7 +92,7 @@ def adopt(search: Search, proposed=None) -> Search:
 
 
 def likely(search: Search, score) -> bool:
-    """Whether a test is significant: beside causes of other effects more is asked."""
+    """True of a significant test: beside causes of other effects more is asked."""
     effect = score.candidate.effect
     beside = search.causes and not search.imus_with(effect)
     return log_odds(search, score) <= SETTINGS.limit(effect, beside)
@@ -125,7 +125,7 @@ def attempt(search: Search, score, values) -> Search:
 
 
 def keeps(search: Search, score, gain: float, error: float) -> bool:
-    """Whether a gain on held-out time is clear, and a fair part of what the test predicted."""
+    """True of a gain on held-out time that is clear, and a fair part of what the test predicted."""
     least = SETTINGS.least_z if search.smooth else SETTINGS.rough_z
     predicted = score.statistic / 2 - SETTINGS.uncertain
     return gain > least * error and gain > SETTINGS.kept * predicted
@@ -195,7 +195,7 @@ class Separability:
 
 
 def separability(given: Information, fit: Fit, adopted=()) -> Separability:
-    """How alike the effects are on this recording, each on all IMUs that can have it.
+    """Likeness of the effects on this recording, each on all IMUs that can have it.
 
     ``given`` is the `Information` at ``fit``, ``adopted`` its causes, as (effect, imus) pairs.
     Effects that only a scan sees (a clock, a step) have a direction once they are adopted, on the
@@ -288,7 +288,7 @@ def rivals(search: Search, cause: Cause) -> list[str]:
 
 
 def nested(effect: str, other: str) -> bool:
-    """Whether another effect contains an adopted one, or is contained in it or for it."""
+    """True where another effect contains an adopted one, or is contained in it or for it."""
     one = EFFECTS[effect]
     return other in (*one.contains, *one.resembles) or effect in EFFECTS[other].contains
 
@@ -305,7 +305,7 @@ def wider(search: Search, cause: Cause, own: float) -> list[str]:
 
 
 def _shared(given, fit_, candidate, left, signal) -> float:
-    """How much of a signal's power a candidate could explain."""
+    """Share of a signal's power that a candidate could explain."""
     chosen = given.places(mask_of(fit_.columns, candidate))
     block = left[np.ix_(chosen, chosen)]
     return scaled_square(block, signal[chosen], SETTINGS.seen, given.scale[chosen])[0]

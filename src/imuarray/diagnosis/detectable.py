@@ -1,4 +1,4 @@
-"""How small an effect a recording would have shown: minimal detectable bias (Baarda 1968)."""
+"""Smallest size of each effect that a recording would have shown (Baarda 1968)."""
 
 import numpy as np
 from scipy import special
@@ -52,7 +52,7 @@ def detectable(search: Search) -> dict[str, dict]:
 
 
 def noncentrality(search: Search, effect: str, tests: int, freedom: int) -> float:
-    """That of a chi-square which passes the effect's critical value with `POWER`.
+    """Noncentrality of a chi-square that passes the effect's critical value with `POWER`.
 
     ``tests`` of the effect, of its IMUs and forms, all of which are allowed for.
     """

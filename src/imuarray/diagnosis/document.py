@@ -58,7 +58,7 @@ class Fitted:
         return self.robust.positions, whole[: len(found), self.robust.columns.of(POSITION)]
 
     def section(self) -> dict:
-        """As `diagnosis.json` has it."""
+        """Section of `diagnosis.json`."""
         positions, sds = self.positions
         return {
             "heldout_log_score_per_sample": self.scores.per_sample,
@@ -70,7 +70,7 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What `imuarray diagnose` writes, and what its figures are drawn from.
+    """A diagnosis as `imuarray diagnose` writes it and as its figures draw it.
 
     ``base`` is the papers' model with the declared noise, ``inflated`` the same with the noise
     that its residual shows (paper 2021's way out), ``extended`` has the causes.

@@ -1,4 +1,4 @@
-"""What is left after the last cause: is it within tolerance, and are the causes what they seem?
+"""Checks after the last cause: is what is left within tolerance, are causes what they seem?
 
 Where a rail clips several readings they pile up at one value, which needs no model
 (`imuarray.diagnosis.reading_effects`); one alone is seen only beside its prediction.
@@ -45,7 +45,7 @@ class Peak(NamedTuple):
 
 
 def peaks(search: Search) -> list[Peak]:
-    """Of every triad."""
+    """Peaks of every triad."""
     residual, readings, found = search.fit.residual, search.readings, []
     for imu, kind in np.argwhere(readings.exists):
         block = np.s_[:, imu, 3 * kind : 3 * kind + 3]
@@ -65,7 +65,7 @@ def peaks(search: Search) -> list[Peak]:
 
 
 def clipped(found: list[Peak], limit: float) -> tuple[list[Peak], float]:
-    """Those that fall short far more than anything else does, or all of a kind together."""
+    """Peaks that fall short far more than anything else does, or all of a kind together."""
     logs = {id(p): float(log_normal(p.inward) + np.log(len(found))) for p in found}
     # two at one value are more than an outlier
     least_off = {id(p): p.others * (SETTINGS.alone if p.at.sum() == 1 else 1.0) for p in found}

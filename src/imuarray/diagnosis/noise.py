@@ -25,7 +25,7 @@ INFLATION = float(1 + 2 * np.sum(AUTOCORRELATION**2))
 
 
 class Noise(NamedTuple):
-    """What the fast part of the residual says of each triad; arrays are (N, 2)."""
+    """Noise of each triad by the fast part of the residual; arrays are (N, 2)."""
 
     sd: np.ndarray  # noise sd, m/s^2 and rad/s
     error: np.ndarray  # relative standard error of it
@@ -61,7 +61,7 @@ def standardised(fit: Fit) -> np.ndarray:
 
 
 def to_unit(readings: Readings, residual, basis) -> np.ndarray:
-    """The same from residual (T, N, 6) and the motion's basis (T, 6 N, D)."""
+    """Residual of unit variance from residual (T, N, 6) and the motion's basis (T, 6 N, D)."""
     leverage = np.einsum("tij,tij->ti", basis, basis).reshape(residual.shape)
     share = np.sqrt(np.maximum(1.0 - leverage, 1e-6))
     return np.where(readings.keep, residual / share, np.nan)

@@ -160,7 +160,7 @@ def scales(fit: Fit, noise: Noise, untied: bool) -> tuple[np.ndarray, np.ndarray
 
 
 def alike(fit: Fit, noise: Noise, imu: int, kind: int) -> bool:
-    """Whether a triad's spectrum has the slope that its lag-one correlation implies."""
+    """True where a triad's spectrum has the slope that its lag-one correlation implies."""
     rho = autocorrelation(fit, imu, kind)[0]
     return bool(
         abs(noise.slope[imu, kind] - expected_ratio(rho, len(fit.residual))) < SETTINGS.agree

@@ -174,12 +174,12 @@ def plain(effect: str, sizes: Sizes) -> list[str]:
 
 
 def plainly(effect: str, sizes: Sizes) -> list[str]:
-    """The same, with an effect's own meaning where there are none."""
+    """`plain`, with an effect's own meaning where there are no plainer words."""
     return plain(effect, sizes) or [f"{known_effect(effect).meaning or effect.replace('_', ' ')}"]
 
 
 def standing_out(values, sds) -> tuple[np.ndarray, float]:
-    """Which of (K,) values stand out (K,) bool, and the mean of the others.
+    """(K,) bool, the values that stand out of (K,), and the mean of the others.
 
     Of two the second is held against the first.
     """
@@ -198,7 +198,7 @@ def _late(sizes: Sizes) -> list[str]:
 
 
 def _read(labels, ages, sds) -> list[str]:
-    """Which IMUs are read late, by their ages (K,) s at the stamps."""
+    """Words on IMUs that are read late, by their ages (K,) s at the stamps."""
     if len(ages) < 2:
         return []
     out, usual = standing_out(ages, sds)

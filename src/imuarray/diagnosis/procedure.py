@@ -32,7 +32,7 @@ from imuarray.recording import Recording
 
 @dataclass(frozen=True)
 class Found:
-    """What a diagnosis came to: its last `Search`, the base model's fit, tests, checks, all causes.
+    """A diagnosis' end: its last `Search`, the base model's fit, tests, checks, all causes.
 
     ``explained``: share of the base model's excess misfit; ``unexplained``: whether checks fail
     beyond tolerance; ``raw``: the search's readings as recorded; ``whole``: all readings, put
@@ -119,12 +119,12 @@ def ended(search: Search, without, tailed) -> tuple[Search, list[Check], list[no
 
 
 def sure(item: noise_effects.Named) -> bool:
-    """Whether a cause in the noise gains on held-out time; a shock is in few stretches of it."""
+    """True of a cause in the noise that gains on held-out time; a shock is in little of it."""
     return item.effect == SHOCK or item.gain > SETTINGS.least_z * item.gain_se
 
 
 def weak(item: noise_effects.Named, causes: int) -> bool:
-    """Whether a cause in the noise is not worth a name beside others; it is there all the same."""
+    """True of a cause in the noise that is there, but not worth a name beside others."""
     return item.log_p > SETTINGS.limit(item.effect, causes > 1)
 
 

@@ -126,7 +126,7 @@ def rails_cause(found, log_p: float, says: str) -> Structural:
 
 
 def _piles(size, at) -> bool:
-    """Whether so many of a triad's sizes (T, 3) are ``at`` the largest that it is no chance."""
+    """True where so many of a triad's sizes (T, 3) are ``at`` the largest that it is no chance."""
     count = int(at.sum())
     if count < SETTINGS.least_clipped:
         return False
@@ -196,7 +196,7 @@ def _is_straight(turn) -> bool:
 
 
 def _lever(readings: Readings, rate) -> np.ndarray:
-    """What rotation adds to the specific force at the nominal places, (T, N, 3)."""
+    """Specific force that rotation adds at the nominal places, (T, N, 3)."""
     turning = polynomial_derivative(readings.time, readings.run, rate, readings.window, 1)
     places = np.zeros((len(readings.exists), 3))
     places[: readings.array.accelerometers] = readings.array.relative

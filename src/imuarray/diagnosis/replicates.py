@@ -29,7 +29,7 @@ class Quantity(NamedTuple):
 
 
 class Test(NamedTuple):
-    """How a quantity is made: ``function`` (`Part`) -> values or None.
+    """A test quantity: ``function`` (`Part`) -> values or None.
 
     ``label`` in figures, ``words`` with a place for whose residual, ``by_axis`` or by triad.
     """
@@ -51,7 +51,7 @@ class Discrepancy(NamedTuple):
     says: str
 
     def as_dict(self) -> dict:
-        """As `diagnosis.json` has it."""
+        """Entry of `diagnosis.json`."""
         return dict(self._asdict())
 
 
@@ -84,7 +84,7 @@ class Replicator:
 
 
 class Seen:
-    """What the test quantities of one fit's residuals have in common, whatever the residual."""
+    """Parts that the test quantities of one fit have in common, whatever the residual."""
 
     def __init__(self, fit: Fit):
         self.keep = fit.readings.keep.astype(float)
@@ -122,7 +122,7 @@ class Part(NamedTuple):
         return of.reshape(len(of), -1)[:, self.there].reshape(len(of), -1, 3)
 
     def mean(self, values) -> np.ndarray:
-        """Of what is zero where readings are left out, by triad."""
+        """Mean by triad of values that are zero where readings are left out."""
         return values.sum(axis=(0, 2)) / self.kept(self.seen.keep).sum(axis=(0, 2))
 
 
@@ -146,7 +146,7 @@ def quantities(fit: Fit, unit, seen: Seen | None = None) -> dict[str, Quantity]:
 
 
 def motion_sizes(fit: Fit) -> dict[str, np.ndarray]:
-    """What a residual may grow with, (T, 3) each; of the jerk zeros where it is not known."""
+    """Sizes that a residual may grow with, (T, 3) each; of the jerk zeros where it is not known."""
     motion = fit.state.motion
     return {
         "omega": motion[:, :3], "omega dot": motion[:, 3:6], "specific force": motion[:, 6:9],

@@ -66,7 +66,7 @@ def unit(values) -> np.ndarray:
 
 
 def displaced(motion, causes, axis: int) -> np.ndarray:
-    """What an accelerometer's axis sees where ``causes`` (T, n) move it, (T, 3 n)."""
+    """Readings of an accelerometer's axis where ``causes`` (T, n) move it, (T, 3 n)."""
     rate, turn = motion[:, :3], motion[:, 3:6]
     arms = np.stack([lever(rate, turn, place)[:, axis] for place in np.eye(3)], axis=1)
     return unit((arms[:, :, None] * causes[:, None, :]).reshape(len(motion), -1))

@@ -1,4 +1,4 @@
-"""What is scanned for along time: a triad that moves, biases that follow one temperature.
+"""Scans along time: a triad that moves, biases that follow one temperature.
 
 How `position_shift` is found and its instant refined; how `warm_up` is found by its course.
 """
@@ -123,7 +123,7 @@ def refine_instants(search, imus, times=3):
 
 
 class Courses:
-    """What all biases along a course of time gain, all else that is fitted projected out.
+    """Gains of all biases along a course of time, all else that is fitted projected out.
 
     From blocks of time, in each of which the course is taken for constant. ``back``: whether
     biases that are fitted go back to zero.
@@ -168,7 +168,7 @@ class Courses:
         return float(score @ values), values
 
     def course(self, pace: float, zero: float) -> np.ndarray:
-        """Of the blocks, (B,)."""
+        """Course of the blocks, (B,)."""
         return np.asarray(warming(pace / self.span, self.time, self.span)) - zero
 
     def best_zero(self, pace: float) -> tuple[float, float]:
@@ -229,7 +229,7 @@ def scan_warming(fit: Fit, given: Information, imus, _=None) -> list[Scanned]:
 
 
 def maybe_grown(search, cause) -> bool:
-    """Whether the biases that a cause is may as well have grown from zero as be constant."""
+    """True where the biases that a cause is may as well have grown from zero as be constant."""
     imus = list(cause.imus)
     courses = Courses(search.fit, search.given, imus, back=True)
     own = courses.kind == KINDS.index(EFFECTS[cause.effect].sensors)
@@ -239,7 +239,7 @@ def maybe_grown(search, cause) -> bool:
 
 
 def maybe_warming(search, cause, own: float) -> bool:
-    """Whether the biases of all sensors of a kind may as well follow one course as be constant.
+    """True where the biases of all sensors of a kind may as well follow one course as be constant.
 
     Those of the other kind, found or not, follow it as well.
     """

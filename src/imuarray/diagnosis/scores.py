@@ -47,7 +47,7 @@ class Scanned(NamedTuple):
 
 
 class Conditional(NamedTuple):
-    """What is left of an `Information` at the places ``of`` (k,), in order, others refitted.
+    """An `Information` at the places ``of`` (k,), in order, others refitted.
 
     ``information`` (k, k), ``score`` (k,) and the score's covariance ``meat`` (k, k).
     """
@@ -59,7 +59,7 @@ class Conditional(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """Of a candidate's k parameters, scaled, the d directions that a recording sees.
+    """The d directions that a recording sees of a candidate's k parameters, scaled.
 
     The information along them ``values`` (d,), themselves ``vectors`` (k, d), the parameters'
     ``scale`` (k,) and the inverse of the score's covariance along them, ``precision`` (d, d).

@@ -31,7 +31,7 @@ class Misfit(NamedTuple):
 
 
 def misfits(fit: Fit) -> Misfit:
-    """Of a fit, its motion estimated again without the IMU."""
+    """Misfits of a fit, its motion estimated again without the IMU."""
     samples, count = fit.residual.shape[:2]
     basis = fit.basis.reshape(samples, count, 6, -1)
     left = np.eye(6) - basis @ np.swapaxes(basis, 2, 3)
@@ -94,7 +94,7 @@ def _by_chance(shaken, alone, worst, size) -> float:
 
 
 def _likeness(fit: Fit, shaken) -> float:
-    """How far a sample's residual is that of the next one, where both are shaken: 1 if the same."""
+    """Correlation of a sample's residual with the next one's, where both are shaken."""
     pairs = np.flatnonzero(shaken[1:] & shaken[:-1] & (np.diff(fit.readings.run) == 0))
     before, after = fit.residual[pairs], fit.residual[pairs + 1]
     sizes = np.sqrt(np.sum(before**2, axis=(1, 2)) * np.sum(after**2, axis=(1, 2)))

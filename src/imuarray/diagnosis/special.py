@@ -1,4 +1,4 @@
-"""What is special in the search for some effects: the one place that says so, by id.
+"""Special cases of the search for some effects: the one place that has them, by id.
 
 IMUs on clocks of their own (`sensor_clock`) are found by a scan (`imuarray.engine.clocks`).
 """
@@ -57,7 +57,7 @@ def sawtooth_scan(fit: Fit, given: Information, imus, scores) -> list[Scanned]:
 
 
 def wider(fit: Fit, given: Information, imu: int, clock) -> float:
-    """How much larger AR(1) noise makes the variance of a sawtooth's score than white noise does.
+    """Factor by which AR(1) noise widens the variance of a sawtooth's score against white noise.
 
     Its density at the sawtooth's frequency: the derivative by the delay is smooth in time. Of the
     IMU's two triads the larger, and at least 1.
@@ -78,7 +78,7 @@ def _clock_score(imus, gain, delays, samples, count) -> Score:
 
 
 def maybe_clock(search, cause, own: float) -> bool:
-    """Whether a clock, whose sawtooth has a third of its constant's power, is not ruled out.
+    """True where a clock, whose sawtooth has a third of its constant's power, is not ruled out.
 
     ``own``: chi-square of the delay that was adopted as ``cause``.
     """
@@ -150,7 +150,7 @@ def scans(fit, given, effects, scores, taken=lambda effect: ()) -> list[Scanned]
 
 
 def maybe_drift(search, cause, own) -> bool:
-    """Whether a bias may change through the recording: not enough to be adopted, but likely.
+    """True where a bias may change through the recording: not enough to be adopted, but likely.
 
     Or as likely grows from nothing.
     """

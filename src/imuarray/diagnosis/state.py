@@ -69,7 +69,7 @@ class Weighed:
 
     @cached_property
     def given(self) -> Information:
-        """Of all parameters that the fit has derivatives by."""
+        """Information of all parameters that the fit has derivatives by."""
         plain = information_at(self.fit)
         meat = noises.coloured_meat(self.fit, plain.information, self.correlation)
         if meat is None:
@@ -135,7 +135,7 @@ class Search:
 
     @property
     def left(self) -> float:
-        """What the misfit is larger than its degrees of freedom."""
+        """Excess of the misfit over its degrees of freedom."""
         return max(self.fit.misfit - self.fit.free, 0.0)
 
     @property
@@ -162,7 +162,7 @@ class Search:
         return replace(search, excess=search.left)
 
     def light(self) -> Search:
-        """The same without the derivatives that its next fit makes anew."""
+        """The search without the derivatives that its next fit makes anew."""
         return replace(self, fit=self.fit.only_active(), weighed=None)
 
     def refit(
@@ -268,7 +268,7 @@ def heldout_gain(search: Search, effect: str, parts=None) -> tuple[float, float]
 
 
 def prune(search: Search, effect: str) -> Search:
-    """Of an effect adopted for many IMUs, keep those that need it, where they are the fewer."""
+    """The search with an effect kept for those IMUs that need it, where they are the fewer."""
     imus = search.imus_with(effect)
     if len(imus) < 3:
         return search
@@ -288,7 +288,7 @@ def prune(search: Search, effect: str) -> Search:
 
 
 def needed(search: Search, effect: str, limit: float, imus=None) -> bool:
-    """Whether an adopted effect is significant beside all else."""
+    """True where an adopted effect is significant beside all else."""
     statistic, freedom = need(search, effect, imus)
     return bool(freedom) and log_chi_square(statistic, freedom) < limit
 

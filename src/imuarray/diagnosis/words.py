@@ -87,7 +87,7 @@ def cause_in_words(cause: dict, labels, says: str = "") -> str:
 
 
 def in_short(cause: dict, labels, says: str = "") -> str:
-    """What a cause is, how large, in the words of one who holds the board."""
+    """Kind and size of a cause, in the words of one who holds the board."""
     effect = cause["effect"]
     found = plain(effect, _sizes_of(cause, labels)) if cause["parameters"] else []
     told = [says or sizes(cause, labels)] if says or not found else []
@@ -158,7 +158,7 @@ def part_in_words(part: str) -> str:
 
 
 def equation(effect: str) -> str:
-    """What an effect does to a reading, in the model's own words."""
+    """Change that an effect makes in a reading, in the model's own words."""
     item = known_effect(effect)
     if item.apply is None:
         return item.remedy or words(effect)

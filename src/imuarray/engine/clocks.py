@@ -29,7 +29,7 @@ def delay_of(readings: Readings, columns: Columns, state: State) -> tuple[np.nda
 
 
 def delay_parts(residual, along, through) -> tuple[np.ndarray, np.ndarray]:
-    """The same from the residual and the derivative by the delay, whitened and projected."""
+    """Parts from the residual and the derivative by the delay, whitened and projected."""
     score = np.einsum("tki,tki->tk", along, residual)
     information = np.sum(along**2, axis=2) - np.sum(through**2, axis=2)
     return score, np.maximum(information, 1e-300)
@@ -57,7 +57,7 @@ def sawtooths(time, score, information, imus, delays: dict, wider=lambda imu, cl
 
 
 def _echo(one, other) -> bool:
-    """Whether a sawtooth is what a far stronger one of the same frequency leaves elsewhere."""
+    """True of a sawtooth that a far stronger one of the same frequency leaves elsewhere."""
     same = abs(abs(one[1][1]) - abs(other[1][1])) < 0.1
     return same and one[0] < 0.2 * other[0]
 
@@ -97,7 +97,7 @@ def _shape(turns, score, information, start):
 
 
 def _of_phases(turns, score, information):
-    """The same at all of `PHASES`, whose sums are those of so many parts of a turn."""
+    """Scores and information at all of `PHASES`, by sums of so many parts of a turn."""
     number, part = len(PHASES), turns - np.floor(turns)
     place = np.minimum((number * part).astype(int), number - 1)
     weights = (information, information * part, information * part**2, score, score * part)

@@ -78,7 +78,7 @@ def _motion(fields) -> dict:
 
 
 def papers_dataset(recording: Recording, model: ArrayModel, found) -> xr.Dataset:
-    """Of an estimator of the papers' model."""
+    """Calibration of an estimator of the papers' model."""
     from imuarray.estimation.newton import parameter_covariance
 
     covariance = found.covariance
@@ -113,7 +113,7 @@ def residual_ratio(recording: Recording, model: ArrayModel, found) -> float:
 
 
 def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
-    """Of the engine's estimate."""
+    """Calibration of the engine's estimate."""
     first, readings = recordings[0], found.recorded[0].readings
     covariance, *sds = widths(found)
     effects = effects_of(found)
@@ -201,7 +201,7 @@ def parameters_of(found: Estimate, model: ArrayModel, number: int = 0) -> np.nda
 
 
 def places_among(found: Estimate, effects, recording: int = 0) -> tuple[np.ndarray, int]:
-    """Of each of the n parameters its place among r_2 ... r_A and the effects'; -1 for none.
+    """Places of the n parameters among r_2 ... r_A and the effects'; -1 for none.
 
     Another recording's own ones have none. Also the number of places.
     """

@@ -70,7 +70,7 @@ class Recorded:
 
 @dataclass(frozen=True)
 class Estimate:
-    """What `estimate` came to; n parameters: those shared, then each recording's own.
+    """Result of `estimate`; n parameters: those shared, then each recording's own.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class Estimate:
 
     @property
     def scale_sd(self) -> float:
-        """Of the scale common to all gyroscopes: the least that a recording knows, or NaN."""
+        """Sd of the scale common to all gyroscopes: the least that a recording knows, or NaN."""
         return float(np.fmin.reduce([one.readings.scale_sd for one in self.recorded]))
 
     def residual_ratio(self) -> float:
@@ -216,7 +216,7 @@ def estimate(
 
 
 def places_of(columns: Columns, active, recordings: int) -> tuple[np.ndarray, ...]:
-    """Of each recording's active parameters (n_a,): where they are among all n."""
+    """Places of each recording's active parameters (n_a,) among all n."""
     own = np.array([name in EFFECTS and EFFECTS[name].own for name in columns.names])
     mine = np.broadcast_to(own, active.shape)[active]
     shared = int(np.sum(~mine))

@@ -60,7 +60,7 @@ class Fit:
 
     @property
     def misfit(self) -> float:
-        """Of all samples."""
+        """Misfit of all samples."""
         return float(np.sum(self.misfits))
 
     @property
@@ -80,7 +80,7 @@ class Fit:
         return self.columns.owner & np.isin(np.arange(self.columns.size), self.wanted)
 
     def only_active(self) -> Fit:
-        """The same with derivatives by the active parameters' columns alone."""
+        """The fit with derivatives by the active parameters' columns alone."""
         kept = self.active.any(axis=0)[self.wanted]
         return replace(
             self,
@@ -123,7 +123,7 @@ def pick(through, chosen) -> tuple[np.ndarray, np.ndarray]:
 
 
 def seen_through(whitened, basis, chosen):
-    """What the motion sees of the n ``chosen`` (N, m) bool: (T, D, n), and [(imu, places, block)].
+    """The n ``chosen`` (N, m) bool in the motion's basis: (T, D, n), and [(imu, places, block)].
 
     A block is an IMU's own part of the derivatives ``whitened`` (T, N, 6, m), (T, 6, n_imu).
     """
@@ -141,7 +141,7 @@ def seen_through(whitened, basis, chosen):
 
 
 def summed_normal(seen, chosen, part=slice(None)):
-    """What `normal` gives of many samples, chunk by chunk: what is made of each is small."""
+    """`normal` of many samples, chunk by chunk: what is made of each is small."""
     first, last, _ = part.indices(len(seen.residual))
 
     def over(starts):

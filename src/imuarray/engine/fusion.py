@@ -121,7 +121,7 @@ def fuse(
 
 
 def _followed(readings: Readings) -> bool:
-    """Whether samples follow each other closely enough for neighbours to tell derivatives."""
+    """True where samples follow each other closely enough for neighbours to tell derivatives."""
     step = np.median(np.diff(readings.time)) if len(readings.time) > 1 else 0.0
     close = 0.0 < step < SETTINGS.longest_step
     return bool(close and np.bincount(readings.run).max() >= readings.window)
@@ -261,7 +261,7 @@ def equations(readings: Readings, model: ArrayModel, state: State, index, rails=
 
 
 def covariances(readings: Readings, model: ArrayModel, state: State, spread):
-    """Of each sample's motion: the whole (T, 9, 9), and the parameters' share of it."""
+    """Covariances of each sample's motion: the whole (T, 9, 9), and the parameters' share of it."""
     columns = columns_of(model.array, model.effects, np.inf)
     noise, shared = np.empty((2, len(readings.time), 9, 9))
     active, place = _places(columns, 3 * (model.array.accelerometers - 1), model.effect_size)

@@ -84,7 +84,7 @@ def as_much(turn, acceleration) -> float:
 
 
 def enough_gyroscopes(readings: Readings, imus) -> bool:
-    """Whether there are gyroscopes and samples enough."""
+    """True where there are gyroscopes and samples enough."""
     together = readings.keep[:, sorted(imus), 3:].all(axis=(1, 2))
     return len(imus) >= SETTINGS.enough and together.sum() >= SETTINGS.least_gyroscope_samples
 

@@ -90,7 +90,7 @@ def resumed(readings: Readings, columns: Columns, active, state: State) -> Estim
 
 
 def rungs_of(readings: Sequence[Readings]) -> list[str]:
-    """Those that recordings may determine: none of fewer samples than two in a block."""
+    """Rungs that recordings may determine: none of fewer samples than two in a block."""
     if sum(len(one.time) for one in readings) < 2 * SETTINGS.blocks:
         return []
     smooth = all(one.gapless for one in readings)
@@ -170,7 +170,7 @@ class Climbed(NamedTuple):
         return now._replace(found=replace(self.found, recorded=recorded))
 
     def tried(self, names) -> list[Rung]:
-        """What rungs gain, but those of which a clock is the whole."""
+        """Gains of the rungs, but those of which a clock is the whole."""
         part = EFFECTS[CLOCK].contains if CLOCKS in self.kept else ()
         asked = [n for n in names if n != CLOCKS and not set(RUNGS[n]) <= set(part)]
         masks = {name: mask_of(self.found.columns, RUNGS[name]) for name in asked}
@@ -193,7 +193,7 @@ class Climbed(NamedTuple):
         return (now._replace(kept={CLOCKS: mask} | self.kept) if rung.kept else self), [rung]
 
     def clocks_beside_delays(self) -> bool:
-        """Whether ages show clocks once IMUs' delays are fitted: a late IMU's misfit may, too."""
+        """True where ages show clocks once delays are fitted: a late IMU's misfit may, too."""
         if not all(one.smooth for one in self.found.recorded):
             return True
         found = self.with_kept([DELAYS]).fitted(SETTINGS.rung_again).found
@@ -242,7 +242,7 @@ def _left(found: Estimate) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def _of_one_truth(found: Estimate, more: Estimate) -> bool:
-    """Whether positions by a prior beside the readings are where the readings alone may have them.
+    """True where positions by a prior are where the readings alone may have them.
 
     Hausman's test (Econometrica 46, 1978): what differs has the difference of the covariances.
     """
@@ -258,7 +258,7 @@ def _of_one_truth(found: Estimate, more: Estimate) -> bool:
 
 
 def _contradicted(parts, ridge, values, freed, spread) -> bool:
-    """Whether parameters that are known to be zero within ``spread`` (f, f) come out as others."""
+    """True where parameters known to be zero within ``spread`` (f, f) come out as others."""
     spread = spread + scaled_inverse(sum(part[0] for part in parts) + ridge)[np.ix_(freed, freed)]
     step = np.linalg.solve(sum(part[0] for part in parts) + ridge, sum(part[1] for part in parts))
     off = (step + values)[freed]
@@ -275,7 +275,7 @@ def mask_of(columns: Columns, effects) -> np.ndarray:
 
 
 def gains(found: Estimate, masks: dict, kept: dict | None = None) -> list[Rung]:
-    """What each rung gains on held-out time beside those kept, and those before it that gain.
+    """Gain of each rung on held-out time beside those kept, and those before it that gain.
 
     ``masks``, ``kept`` {rung: (N, m) bool}. By one linearisation with all of them. Maps that first
     order has left are beside them all, as uncertain as it left them: what they explain is no rung's
@@ -295,7 +295,7 @@ def gains(found: Estimate, masks: dict, kept: dict | None = None) -> list[Rung]:
 
 
 class _Given(NamedTuple):
-    """What `tested` says of n parameters, and which they are."""
+    """Information by block of n parameters, as `tested` gives it, and which they are."""
 
     blocks: list
     precision: np.ndarray

@@ -44,7 +44,7 @@ class RoughPrior(NamedTuple):
 
     @property
     def free(self) -> bool:
-        """Whether the gyroscopes' omega dot is free."""
+        """True where the gyroscopes' omega dot is free."""
         return bool(np.any(self.sd[:, 6:9] == self.own))
 
 
@@ -78,7 +78,7 @@ class State(NamedTuple):
 
     @property
     def gyroscopes_free(self) -> bool:
-        """Whether the angular acceleration seen by the gyroscopes is free."""
+        """True where the angular acceleration seen by the gyroscopes is free."""
         return self.rough_prior is not None and self.rough_prior.free
 
     @property
@@ -116,7 +116,7 @@ class Eliminated(NamedTuple):
 
 
 def _instant(x, positions, extra, time, span) -> Instant:
-    """What effects may look at, at one sample."""
+    """Quantities that effects may look at, at one sample."""
     jerk, force_rate, second, third, wander = (*extra, 0.0)[:5]
     own = None
     if len(x) > KNOWN:
@@ -326,7 +326,7 @@ def _chunk_of(readings: Readings, state: State, start):
 
 
 def _rows_of(readings: Readings, state: State, index):
-    """The same of any samples."""
+    """`_chunk_of` for any samples."""
     extra = jax.tree.map(lambda field: field[index], (*state.derivatives, readings.wandered))
     nothing = np.zeros((len(index), 0))
     prior = (nothing, nothing)
@@ -350,7 +350,7 @@ def motion_step(readings: Readings, columns: Columns, state: State, start) -> np
 
 
 def motion_equations(readings: Readings, model: ArrayModel, state: State, index, rails=None):
-    """Of the motion of the samples ``index`` (CHUNK,): (CHUNK, D, D), (CHUNK, D), costs (CHUNK,).
+    """Normal equations of the motion of samples ``index``: (n, D, D), (n, D), costs (n,).
 
     Information, score and squared residuals, the prior's included. ``rails`` (T, N, 6): weights of
     readings that count as far as the prediction falls short of them.

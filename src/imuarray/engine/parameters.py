@@ -1,4 +1,4 @@
-"""Which parameter is which: columns of an IMU's derivative block, where they live, their priors.
+"""Columns of an IMU's derivative block: which parameter is which, where it lives, its prior.
 
 Every parameter of the model, positions included, belongs to one IMU, and concerns its readings
 alone. So the derivative of a sample by all parameters is a block per IMU, (N, 6, m).

@@ -26,7 +26,7 @@ FEW_STEPS, OFF_STEP, SELDOM = 5.5, 0.12, 0.05
 
 
 class Left(NamedTuple):
-    """What a first-order correction left in the readings, as uncertain as it says.
+    """Maps and offsets that a first-order correction left in the readings, as uncertain as it says.
 
     ``maps`` covariance (n, n) as `Recording.map_covariance`; ``offsets`` (N, 6, 4, 4) of each
     channel's offset as a polynomial of time, as `bias_drift` has it, of degree 0 where none
@@ -39,11 +39,11 @@ class Left(NamedTuple):
 
     @property
     def walks(self) -> bool:
-        """Whether some offset changes along the recording."""
+        """True where some offset changes along the recording."""
         return bool(self.offsets[..., 1:, 1:].any())
 
     def is_of(self, other: Left) -> bool:
-        """Whether one calibration corrected both: each may have made it, begun with its own."""
+        """True where one calibration corrected both: each may have made it, begun with its own."""
         if self.maps.shape != other.maps.shape:
             return False
         if self.taken is None or other.taken is None:
@@ -102,7 +102,7 @@ class Readings:
         return self.weights_of(slice(None))
 
     def weights_of(self, index) -> np.ndarray:
-        """The same of some samples."""
+        """Weights of some samples."""
         found = self.keep[index] / np.repeat(self.sd, 3, axis=1)
         return found if self.trust is None else found * np.repeat(self.trust[index], 3, axis=2)
 
@@ -113,7 +113,7 @@ class Readings:
 
     @property
     def pair(self) -> bool:
-        """Whether two accelerometers leave omega_dot open about the line that joins them."""
+        """True where two accelerometers leave omega_dot open about the line that joins them."""
         return self.array.accelerometers == 2
 
     @property
@@ -128,11 +128,11 @@ class Readings:
         return odd_window(self.time)
 
     def with_sd(self, sd) -> Readings:
-        """The same with another noise sd (N, 2)."""
+        """The readings with another noise sd (N, 2)."""
         return self.with_noise(sd, self.trust)
 
     def with_noise(self, sd, trust) -> Readings:
-        """The same with another noise sd (N, 2), and a robust loss' weights (T, N, 2) or None.
+        """The readings with another noise sd (N, 2), and a robust loss' weights (T, N, 2) or None.
 
         Two triads of a kind share their sd: the motion leaves but their difference.
         """
@@ -143,7 +143,7 @@ class Readings:
         return replace(self, sd=sd, trust=trust)
 
     def without(self, lost) -> Readings:
-        """The same without the readings in ``lost`` (T, N, 6) bool."""
+        """The readings without those in ``lost`` (T, N, 6) bool."""
         return replace(self, keep=self.keep & ~lost)
 
     def select(self, used) -> Readings:
@@ -195,7 +195,7 @@ def part_of(readings: Readings, most: int) -> Readings:
 
 
 def most_informative(readings: Readings, say: Callable[[str], None]) -> Readings:
-    """Of a long recording the stretches that say most of the positions, by their rates' squares.
+    """Stretches of a long recording that say most of the positions, by their rates' squares.
 
     A third of them for each coordinate: a board that spins for long about one axis tells two.
     """

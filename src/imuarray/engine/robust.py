@@ -33,7 +33,7 @@ MEDIAN = 2.37  # of chi-square of three readings
 
 
 class Pass(NamedTuple):
-    """What a recording says of n parameters (N, m) bool, in blocks of time; whitened units."""
+    """Normal equations of n parameters (N, m) bool, in blocks of time; whitened units."""
 
     information: np.ndarray  # (B, n, n)
     score: np.ndarray  # (B, n)
@@ -185,7 +185,7 @@ def freedoms(readings: Readings, seen: Pass) -> np.ndarray:
 
 
 def _log_likelihood(d, nu) -> float:
-    """Of squared distances (n,) of three readings each, at the scale that suits them best."""
+    """Log likelihood of squared distances (n,) of three readings, at the best scale."""
     scale = np.mean(d) / 3
     if np.isinf(nu):
         return float(-1.5 * len(d) * np.log(scale) - np.sum(d) / (2 * scale))

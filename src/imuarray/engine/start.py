@@ -127,6 +127,6 @@ def _linear_motion(readings, positions, rate) -> np.ndarray:
 
 
 def is_smooth(readings: Readings, motion) -> bool:
-    """Whether neighbouring samples determine its derivatives: omega's slope is omega_dot."""
+    """True where neighbouring samples determine derivatives: omega's slope is omega_dot."""
     slope = polynomial_derivative(readings.time, readings.run, motion[:, :3], readings.window, 1)
     return bool(np.corrcoef(slope.ravel(), motion[:, 3:6].ravel())[0, 1] > SETTINGS.smooth)

@@ -1,4 +1,4 @@
-"""How well an estimate's parameters are known: formal, by a jackknife, and what was corrected."""
+"""Covariance of an estimate's parameters: formal, by a jackknife, and with what was corrected."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -189,7 +189,7 @@ def mask_of_left(lefts: Sequence[Left | None], columns: Columns, active) -> np.n
 
 
 def _accelerometers(columns: Columns) -> int:
-    """How many entries the accelerometers' maps have."""
+    """Number of entries of the accelerometers' maps."""
     return 9 * columns.model.array.accelerometers
 
 
@@ -216,7 +216,7 @@ def _entry(left: Left, columns: Columns, imu: int, column: int) -> int:
 
 
 def _with_maps(found: Estimate) -> Estimate:
-    """The same with columns for all maps and offsets."""
+    """The estimate with columns for all maps and offsets."""
     old, lefts = found.columns, [one.readings.left for one in found.recorded]
     missing = [name for name in corrected(*lefts) if name not in old.names]
     if not missing:

@@ -54,7 +54,7 @@ def _weighted(precision, force) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Collapsed:
-    """What every estimator of the papers' model needs of the data, computed once.
+    """Data of every estimator of the papers' model, computed once.
 
     Attributes (T samples, A accelerometer triads; time last)
     ----------
@@ -83,7 +83,7 @@ class Collapsed:
 
     @property
     def arrays(self) -> Arrays:
-        """The same for compiled code; ``weights`` must not be None."""
+        """Arrays for compiled code; ``weights`` must not be None."""
         return Arrays(
             self.specific_force, self.energy, self.base, self.mean, self.gyroscope_information,
             self.weights, tables(),
@@ -131,7 +131,7 @@ class Collapsed:
         return self.weights[:, None, None] * self.specific_force
 
     def with_rates(self, covariance, mean=None) -> Collapsed:
-        """The same with the covariance (T, 3, 3) (rad/s)^2, and mean (T, 3), of angular rates."""
+        """The data with the covariance (T, 3, 3) (rad/s)^2, and mean (T, 3), of angular rates."""
         require_shape("rate_covariance", np.asarray(covariance), (self.samples, 3, 3))
         precision = np.linalg.inv(covariance).transpose(1, 2, 0)
         return replace(

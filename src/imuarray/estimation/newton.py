@@ -295,7 +295,7 @@ def calibrate_gauss_newton(
 
 
 def apart(model: ArrayModel, data: Collapsed, angular_rate, saturated=None) -> float:
-    """How the gyroscopes differ among themselves, which the collapsed cost leaves out."""
+    """Cost of the gyroscopes' differences among themselves, which the collapsed cost leaves out."""
     spread = angular_rate - data.mean.T[:, None]
     nothing = np.zeros((len(spread), 3 * model.array.accelerometers))
     return model.noise.misfit(nothing, spread, saturated)

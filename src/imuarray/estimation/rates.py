@@ -212,7 +212,7 @@ def angular_rates(rate, C, b, mean, P, tolerance, limit, cost, iterations):
 
 
 class Work(NamedTuple):
-    """What `most_likely` fills, ``arms`` excepted: the motion at some positions, what led to it."""
+    """Arrays that `most_likely` fills, ``arms`` excepted: the motion, and what led to it."""
 
     reduced: Reduced
     cost: np.ndarray  # (T,) of omega, without the reduction's const

@@ -1,4 +1,4 @@
-"""Which samples to calibrate with: moving, off the rails, informative; and what they leave open."""
+"""Selection of samples: moving, off the rails, informative; what they leave open."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -46,7 +46,7 @@ class Selection:
 
 
 def disjoint(left: np.ndarray, counts) -> dict[int, np.ndarray]:
-    """Of the samples ``left``, disjoint subsets of ``counts`` each, the largest first.
+    """Disjoint subsets of the samples ``left``, of ``counts`` each, the largest first.
 
     InputError where there are too few.
     """
@@ -185,7 +185,7 @@ def weak_directions(positions, covariance, labels, count: int = 3) -> list[Direc
 
 
 def position_sds(calibration: xr.Dataset) -> np.ndarray:
-    """Of what `imuarray.calibrate` gave, (A, 3) m."""
+    """Sds of the positions that `imuarray.calibrate` gave, (A, 3) m."""
     return np.sqrt(np.einsum("kaka->ka", calibration["position_covariance"].to_numpy()))
 
 

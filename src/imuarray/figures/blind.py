@@ -258,7 +258,7 @@ def _separate(axes, lines, columns) -> None:
 
 
 def table_blind_bars(rows: dict, settings: dict):
-    """What was asked of the diagnosis and what was measured; ``rows``: graded recordings."""
+    """Bars of the diagnosis beside what was measured; ``rows``: graded recordings."""
     found = summary.recordings(rows["rows"])
     table = criteria(found)
     # empty where there is no verdict to be sure of

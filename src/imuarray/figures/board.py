@@ -67,7 +67,7 @@ CAUSES = (
 
 
 def table_causes(summary: pd.DataFrame, group: str):
-    """What each cause buys; ``summary``: `measured.causes.repeated` of the board ``group``."""
+    """Gain of each cause; ``summary``: `measured.causes.repeated` of the board ``group``."""
     note = (
         f"{summary.recordings.max()} recordings of board {group}; differences of all pairs, all"
         " coordinates. Nats: what is new in a row gains on held-out time over the row that it"
@@ -159,7 +159,7 @@ LEFT_OUT = (
 
 
 def table_left_out(tables: list[pd.DataFrame], names: list[str], group: str):
-    """What each recording gains by the others' board; `analysis.known.predicted` of each."""
+    """Gain of each recording by the others' board; `analysis.known.predicted` of each."""
     rows = []
     for name, table in zip(names, tables, strict=True):
         by = table.set_index("model")

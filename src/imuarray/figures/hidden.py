@@ -14,7 +14,7 @@ MODELS = {"base": "papers'", "inflated": "noise inflated", "extended": "extended
 
 
 def figure_criticism_hidden(diagnosis: tuple, truth: dict, recordings: Array):
-    """The same four panels where the truth is known: lever arms hidden in a simulated recording.
+    """Four panels where the truth is known: lever arms hidden in a simulated recording.
 
     ``diagnosis`` (diagnosis.json, tables); ``truth``: what `blind.cases.make` says;
     ``recordings``: the array as the recording declares it.
@@ -121,7 +121,7 @@ HIDDEN = (
 
 
 def table_criticism_hidden(diagnoses: list, truths: list, controls: list, names: list):
-    """What was hidden, and what the diagnosis says of it, a row a recording.
+    """Hidden effects, and what the diagnosis says of them, a row a recording.
 
     ``diagnoses``, ``controls`` (diagnosis.json, tables) with the effect and without;
     ``truths``: what was hidden in the recordings ``names``.
@@ -151,7 +151,7 @@ def table_criticism_hidden(diagnoses: list, truths: list, controls: list, names:
 
 
 def _there(effect: str, named: dict[str, set[str]]) -> str:
-    """What the recording without the effect is said to have of it, beside its own causes."""
+    """Words on what the recording without the effect has of it, beside its own causes."""
     there = effect in set().union(*named.values())
     return f"{len(named)} of its own, {'this too' if there else 'not this'}"
 

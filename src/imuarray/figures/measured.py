@@ -100,7 +100,7 @@ def table_measured_agreement(summary: pd.DataFrame):
 def figure_measured_residuals(
     summary: pd.DataFrame, histogram: pd.DataFrame, name: str, settings: dict
 ):
-    """What the simulation gets wrong; `measured.residuals.compare` of the recording ``name``."""
+    """Errors of the simulation; `measured.residuals.compare` of the recording ``name``."""
     noise = settings["noise"]
     footer = [
         f"Recording {name}, seed {settings['seed']}. Papers' model with"
@@ -172,7 +172,7 @@ def _against(axes, table, factor, label):
 
 
 def figure_measured_agreement(summary: pd.DataFrame, pairs: pd.DataFrame, group: str):
-    """How far recordings of one board lie apart, in claimed widths, and the intervals' coverage.
+    """Distance of one board's recordings, in claimed widths, and the intervals' coverage.
 
     ``summary``, ``pairs``: `measured.agreement`, one row each per number of samples and assumed
     sigma_a (and pair); ``group``: the board.

@@ -34,7 +34,7 @@ ARROW = {"arrowstyle": "<->", "linewidth": 0.7, "shrinkA": 0, "shrinkB": 0}
 
 
 def below(array: Array) -> np.ndarray:
-    """Which triads (A,) lie on the underside: those below the middle of the board's height."""
+    """(A,) bool, the triads on the underside: those below the middle of the board's height."""
     height = array.positions[:, 2]
     return height < (height.min() + height.max()) / 2 - 1e-9
 

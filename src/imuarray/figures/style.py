@@ -167,7 +167,7 @@ def scale_line(settings: dict, *more: str) -> str:
 
 
 def chain_line(samples: int, verdict: dict) -> str:
-    """How the chains of one T ran and how far they got, from `posterior/*.json`.
+    """Course and end of the chains of one T, from `posterior/*.json`.
 
     R-hat and ESS are the largest and the smallest over all coordinates.
     """

@@ -214,7 +214,7 @@ def _draw_size(table, footer):
 
 
 def coverage(table: pd.DataFrame) -> pd.DataFrame:
-    """How often central intervals hold the truth, and whether PIT values are uniform.
+    """Share of central intervals that hold the truth, and uniformity of PIT values.
 
     A row for each setting, method and T: ``covered_50`` and so on of the coordinates with standard
     errors over replicates (coordinates of one replicate are not independent); ``shift_z`` and
@@ -266,7 +266,7 @@ def _mean_z(scores) -> float:
 
 
 def table_validation_coverage(pit_values: list[pd.DataFrame], settings: dict):
-    """How often intervals hold the truth, by method and T; ``pit_values``: `studies.sbc`."""
+    """Share of intervals that hold the truth, by method and T; ``pit_values``: `studies.sbc`."""
     table = coverage(pd.concat(pit_values))
     notes = [COVERAGE_NOTE, scale_line(settings)]
     return table, COVERAGE, "How often intervals hold the truth.", notes

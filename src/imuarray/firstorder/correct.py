@@ -150,7 +150,7 @@ def _all_still(recordings: Sequence[Recording], gyroscopes: str, shortest: float
 
 @one_thread()  # of matrices this small, more of them only spin
 def _calibrated(every: Sequence[Still], gravity: float, gyroscopes: str) -> list[FirstOrder]:
-    """Of each recording, by the poses of all."""
+    """First order of each recording, by the poses of all."""
     if len(every) > 1 and not all(map(_tells, every)):
         raise InputError(
             "recording: expected still poses in three orientations or more beside those of others,"
@@ -188,14 +188,14 @@ def _still(recording: Recording, shortest: float) -> Still:
 
 
 def _tells(still: Still) -> bool:
-    """Whether poses say more than offsets of their own: in two orientations they do not."""
+    """True where poses say more than offsets of their own: in two orientations they do not."""
     means = np.array([f[:, 0].mean(axis=0) for f in still.pieces(still.recording.specific_force)])
     apart = means - means.mean(axis=0)
     return len(means) > 2 and np.linalg.svd(apart, compute_uv=False)[1] > APART * GRAVITY
 
 
 def _triads(every: Sequence[Still], gravity: float) -> TriadFit:
-    """Of the poses of all recordings, one recording after the other."""
+    """Fit of the poses of all recordings, one recording after the other."""
     mean, sd = [], []
     for one in every:
         force = one.pieces(one.recording.specific_force)
@@ -220,7 +220,7 @@ def _after_moving(still: Still) -> np.ndarray:
 
 
 def _of_poses(still: Still, triads: TriadFit, gravity: float) -> FirstOrder:
-    """What the still poses alone say: nothing of the gyroscopes' maps."""
+    """First order by the still poses alone, which say nothing of the gyroscopes' maps."""
     force = still.pieces(still.recording.specific_force)
     rate, step = still.pieces(still.recording.angular_rate), usual_step(still.recording.time)
     return FirstOrder(
@@ -282,7 +282,7 @@ def corrected(inverse, offset, readings) -> np.ndarray:
 
 
 def _correction(recording: Recording, found: FirstOrder, *inverses) -> xr.Dataset:
-    """What `Recording.correction` holds; after a former correction, both as one."""
+    """Contents of `Recording.correction`; after a former correction, both as one."""
     offsets = (found.triads.offset, found.triads.parts_sd()["offset"], found.triads.walk), (
         found.gyroscope_offset, found.gyroscope_offset_sd, found.gyroscope_walk,
     )  # fmt: skip

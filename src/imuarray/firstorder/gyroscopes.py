@@ -137,7 +137,7 @@ def _regress(columns, wanted, block) -> tuple[np.ndarray, np.ndarray]:
 
 @dataclass(frozen=True)
 class Gyroscopes:
-    """What the rates, and the poses between which they carry gravity, say of G gyroscopes.
+    """Maps of G gyroscopes by the rates, and by the poses between which they carry gravity.
 
     Attributes
     ----------
@@ -166,7 +166,7 @@ class Gyroscopes:
         return np.nan if isinstance(self.common, str) else self.common.scale_sd
 
     def between(self, poses: range) -> Self:
-        """The same with the moves between some of the poses, numbered from the first of them."""
+        """The maps with the moves between some of the poses, numbered from the first of them."""
         if isinstance(self.common, str):
             return self
         own = np.isin(self.common.first, poses)

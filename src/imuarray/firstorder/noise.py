@@ -65,7 +65,7 @@ class Terms(NamedTuple):
 
 
 def spectrum(pieces, step: float) -> Spectrum:
-    """Of still pieces (n, ...), readings ``step`` s apart, pooled."""
+    """Spectrum of still pieces (n, ...), readings ``step`` s apart, pooled."""
     lowest = 0.5 / (step * max(len(piece) for piece in pieces))
     size = int(BINS * np.log2(0.5 / step / lowest)) + 1
     count, sums = np.zeros(size), np.zeros((size, 4))

@@ -1,4 +1,4 @@
-"""How still poses' averages scatter: noise of the readings, and offsets that walk.
+"""Noise of still poses' averages: that of the readings, and offsets that walk.
 
 Offsets do as sensors warm up. They are pinned where the board moves: there the offset is a
 parameter of the fit. The walks' variances in a second are estimated by restricted maximum
@@ -24,7 +24,7 @@ STEPS, CLOSE = 60, 0.02  # of each triad's own walk, relative
 
 
 class PoseNoise(NamedTuple):
-    """Of the averages (P, A, 3) in P poses.
+    """Noise of the averages (P, A, 3) in P poses.
 
     ``sd`` (P, A, 3) of the readings' noise; ``walked`` (P, P) s, how long each two poses' offsets
     have walked together; ``walk`` (A,), their variance in a second; ``factor`` (A,) of the
@@ -119,7 +119,7 @@ class _Rows(NamedTuple):
         return cls(np.moveaxis(misfit, 0, -1), own, columns, fixed)
 
     def free(self, used) -> int:
-        """How many misfits more than parameters that they determine."""
+        """Number of misfits more than parameters that they determine."""
         return 3 * int(used.sum()) - (len(self.fixed) - np.linalg.matrix_rank(self.fixed))
 
     def solved(self, white):

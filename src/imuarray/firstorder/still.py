@@ -54,12 +54,12 @@ def allan_deviation(pieces, step: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _sums(piece) -> np.ndarray:
-    """Of its readings less their mean, before each of them and after all."""
+    """Sums of a piece's readings less their mean, before each of them and after all."""
     return np.concatenate([np.zeros((1, *piece.shape[1:])), np.cumsum(piece - piece.mean(0), 0)])
 
 
 def _deviation(sums, width: int) -> np.ndarray:
-    """Of averages over ``width`` samples, from the pieces that are long enough."""
+    """Deviation of averages over ``width`` samples, from the pieces that are long enough."""
     total, count = 0.0, 0
     for s in sums:
         if len(s) > 2 * width:

@@ -38,7 +38,7 @@ class Fitted(NamedTuple):
 
 @dataclass(frozen=True)
 class TriadFit:
-    """What the P still poses of a recording, or of several, say of A accelerometer triads.
+    """Fit of A accelerometer triads to the P still poses of a recording, or of several.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class TriadFit:
         return out
 
     def carried(self, score, information) -> TriadFit:
-        """What is left once rates have carried gravity from pose to pose.
+        """The fit once rates have carried gravity from pose to pose.
 
         ``score`` (3 P,) and ``information`` (3 P, 3 P) of the directions, as `CommonMap` has them.
         """
@@ -99,7 +99,7 @@ class TriadFit:
         return self.used & (self.doubtful == 1)[:, None]
 
     def of(self, number: int) -> Self:
-        """The same with one recording's poses only, and its offsets."""
+        """The fit with one recording's poses only, and its offsets."""
         own = self.recording == number
         both = np.ix_(np.repeat(own, 3), np.repeat(own, 3))
         offset, covariance = _offset_of(self.fitted, self.used.shape, number)
@@ -118,7 +118,7 @@ class TriadFit:
 
     @property
     def residual_rms_all(self) -> np.ndarray:
-        """The same over all poses, those left out included."""
+        """Residual rms over all poses, those left out included."""
         return np.sqrt(np.mean(self.residual**2, axis=(0, 2)))
 
     def parts_sd(self) -> dict[str, np.ndarray]:
@@ -172,7 +172,7 @@ def doubted(noise: PoseNoise, doubtful) -> PoseNoise:
 
 
 def turns_of(mean, labels) -> np.ndarray:
-    """How far each triad is turned against the first, (A, 3, 3); small turns are the fit's own."""
+    """Turns of the triads against the first, (A, 3, 3); small turns are the fit's own."""
     turns = np.array([procrustes(own, mean[:, 0]) for own in np.moveaxis(mean, 1, 0)])
     require_rotations(turns, labels, "accelerometer")
     small = (np.einsum("kii->k", turns) - 1) / 2 > np.cos(SMALL)

@@ -1,4 +1,4 @@
-"""What each cause buys: a board's recordings fitted rung by rung, and how the positions repeat."""
+"""Gain of each cause: a board's recordings fitted rung by rung, and how the positions repeat."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -86,7 +86,7 @@ def _more(now: Climbed, names) -> tuple[Climbed, Estimate, tuple[float, float]]:
 
 
 def repeated(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
-    """How positions repeat between recordings, a row for each of `STEPS`.
+    """Repeatability of positions between recordings, a row for each of `STEPS`.
 
     ``tables`` {recording: `bought`}. Differences of all pairs: rms_m, median_m, covered (share in
     95 % intervals), same_size_rms_m (each array brought to the mean size); size_sd (relative, of

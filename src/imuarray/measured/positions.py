@@ -37,7 +37,7 @@ class Positions:
 
     @property
     def sd(self) -> np.ndarray:
-        """Of r_2 ... r_A, (A - 1, 3) m."""
+        """Sds of r_2 ... r_A, (A - 1, 3) m."""
         return np.sqrt(np.diag(self.covariance)).reshape(-1, 3)
 
 
@@ -166,7 +166,7 @@ def agreement(pairs: pd.DataFrame, table: pd.DataFrame) -> dict:
 
 
 def simulate_subset(recording: Recording, accelerometer_sd: float, rng):
-    """The same samples as the model would have given them: (recording, truth dataset).
+    """The samples as the model would have given them: (recording, truth dataset).
 
     Motion and positions are those of `locate`; accelerometers get the noise that the analysis
     assumes (paper 2021, section IV-C), gyroscopes that which the recording declares.

@@ -71,7 +71,7 @@ class ArrayModel:
 
     @cached_property
     def apart(self) -> bool:
-        """Whether a triad's parameters, its position among them, change its own readings alone."""
+        """True where a triad's parameters, its position too, change its own readings alone."""
         fewer = self.array.gyroscopes <= self.array.accelerometers  # each beside one of its own
         return fewer and all(probed(item) for item in self.chain)
 
@@ -102,7 +102,7 @@ class ArrayModel:
 
     @property
     def needs_derivatives(self) -> bool:
-        """Whether an effect looks at omega double dot and s dot."""
+        """True where an effect looks at omega double dot and s dot."""
         return any(item.derivatives for item in self.chain)
 
     def split(self, parameters) -> dict[str, object]:
@@ -146,7 +146,7 @@ class ArrayModel:
         return instant._replace(axes=self.array.turns)
 
     def ideal(self, instant: Instant) -> Prediction:
-        """The same without effects: what they are applied to."""
+        """The prediction without effects: what they are applied to."""
         seen = instant.gyroscopes or instant.motion
         rate = jnp.broadcast_to(seen[0], (self.array.gyroscopes, 3))
         return Prediction(kinematics.specific_force(instant.motion, instant.positions), rate)
@@ -173,7 +173,7 @@ class ArrayModel:
         return np.asarray(time, float) - self.clock[0], self.clock[1]
 
     def with_motion(self, motion: Motion) -> ArrayModel:
-        """The same model with the motion prior of a recording: zero mean, its own size.
+        """The model with the motion prior of a recording: zero mean, its own size.
 
         Under a flat prior each sample of the likelihood carries a power of the array's
         size and of a common gyroscope scale, which the data do not push back; a prior of

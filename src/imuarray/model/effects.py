@@ -153,17 +153,17 @@ class Effect:
 
     @property
     def scope(self) -> str:
-        """Whose its parameters are, as files have it: the "recording"'s, or the "imu"'s."""
+        """Owner of its parameters, as files have it: the "recording", or the "imu"."""
         return "recording" if self.own else "imu"
 
     @property
     def shifts_time(self) -> bool:
-        """Whether it says when a triad samples: its first parameter is a time."""
+        """True where it says when a triad samples: its first parameter is a time."""
         return self.sampling and self.unit.split(",")[0] == "s"
 
     @property
     def kinds(self) -> list[int]:
-        """Which of `KINDS` it changes the readings of."""
+        """Numbers of the `KINDS` that it changes the readings of."""
         return [0, 1] if self.sensors == "imu" else [KINDS.index(self.sensors)]
 
 
@@ -210,7 +210,7 @@ def common_mean(shape, axes=None) -> list[np.ndarray]:
 
 
 def _again(old, new) -> bool:
-    """Whether a notebook's cell is run once more: its new effect replaces the old one."""
+    """True where a notebook's cell is run once more: its new effect replaces the old one."""
     return old.__module__ == new.__module__ == "__main__"
 
 

@@ -11,7 +11,7 @@ from imuarray.errors import InputError
 
 
 def _inverse(covariance) -> np.ndarray:
-    """Of a covariance; what is written as diagonal, as most are, needs no factorisation."""
+    """Inverse of a covariance; what is written as diagonal, as most are, needs no factorisation."""
     diagonal = np.diag(covariance)
     if np.count_nonzero(covariance) == len(diagonal):
         return np.diag(1.0 / diagonal)
@@ -72,7 +72,7 @@ class Noise:
         return 1.0 / variances[:, 0] if np.array_equal(scalar, self.accelerometer) else None
 
     def times(self, factor) -> Noise:
-        """The same with all sds ``factor`` times as large."""
+        """The noise with all sds ``factor`` times as large."""
         return Noise(factor**2 * self.accelerometer, factor**2 * self.gyroscope)
 
     def draw(self, rng, shape) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Whether an effect is what it declares: found out once, before anything rests on it."""
+"""A test that an effect is what it declares: made once, before anything rests on it."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ ACCELEROMETERS, GYROSCOPES = 7, 5  # of the array that effects are tried on
 
 
 def probe(item: Effect) -> bool:
-    """Whether a triad's own position is all that matters to it.
+    """True where a triad's own position is all that matters to an effect.
 
     InputError, with the effect's id, where declaration and function do not agree.
     Tried on a small array: shapes; no effect at the value zero; no use of omega double dot

@@ -26,7 +26,7 @@ def later(delay, instant, predicted, accelerometers=True):
 
 
 def _rate_later(tau, instant, common):
-    """What the angular rate gains in ``tau`` (n, 1) s.
+    """Gain of the angular rate in ``tau`` (n, 1) s.
 
     Where the angular acceleration seen by the gyroscopes is free, a delay against the
     accelerometers (``common``) is the integral between both, any other has the gyroscopes'.
@@ -105,7 +105,7 @@ DRIFT_SD = (((0.1,) * 4,) * 3, ((0.005,) * 4,) * 3)
 
 
 def _drift_form(kind, highest):
-    """Whether a parameter is of a kind of sensor, and of no higher degree."""
+    """True of a parameter of a kind of sensor, and of no higher degree."""
     return lambda place: place[0] == kind and place[2] <= highest
 
 

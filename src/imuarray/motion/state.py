@@ -39,7 +39,7 @@ class Motion(NamedTuple):
 
 
 def lever(rate, acceleration, arm) -> np.ndarray:
-    """What turning adds at the end of an arm: omega x (omega x r) + omega_dot x r, (..., 3)."""
+    """Specific force that turning adds at an arm: omega x (omega x r) + omega_dot x r, (..., 3)."""
     return np.cross(rate, np.cross(rate, arm)) + np.cross(acceleration, arm)
 
 

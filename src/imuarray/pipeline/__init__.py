@@ -1,1 +1,1 @@
-"""What the workflow's rules and scripts share: names of files, settings, sources, jobs."""
+"""Parts that the workflow's rules and scripts share: names of files, settings, sources, jobs."""

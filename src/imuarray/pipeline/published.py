@@ -56,7 +56,7 @@ class Published:
         return "paper" if name == "claims_paper" else self.config["scale"]
 
     def origin(self, name: str, kind: str) -> str:
-        """What paper_figures/<name>.<kind> copies."""
+        """The file that paper_figures/<name>.<kind> copies."""
         copies = self.recordings.published()
         if name in copies:
             return f"results/measured/{copies[name]}.{kind}"

@@ -14,7 +14,7 @@ class Recordings:
         self.samples = config["paper2021"]["samples"]
 
     def is_first_order(self, name: str) -> bool:
-        """Whether each triad of a recording is calibrated from still poses first."""
+        """True where each triad of a recording is calibrated from still poses first."""
         return self.entries[name].get("first_order", True)
 
     def recording(self, name: str) -> str:
@@ -54,7 +54,7 @@ class Recordings:
         return [f"results/measured/subsets/{self.shown}_T{samples}.nc" for samples in self.samples]
 
     def claims(self, scale: str) -> list[str]:
-        """What the claims on the experiment read."""
+        """Files that the claims on the experiment read."""
         name, group = self.shown, self.group(self.shown)
         paths = [f"results/measured/positions/{name}.csv"]
         if self.is_first_order(name):
@@ -67,7 +67,7 @@ class Recordings:
         return paths
 
     def targets(self) -> list[str]:
-        """What the default target asks of the measured data, for each recording and group."""
+        """Files of the measured data in the default target, for each recording and group."""
         paths = []
         for name in self.entries:
             paths += [f"results/measured/figures/residuals_{name}.{kind}" for kind in FIGURE]
@@ -90,7 +90,7 @@ class Recordings:
         ]  # fmt: skip
 
     def causes(self) -> list[str]:
-        """What each cause buys on each board with several recordings, and the experiment anew."""
+        """Files on each cause's gain on boards of several recordings, and the experiment anew."""
         folder, groups = "results/measured", self.groups()
         tables = ("causes_table", "experiment_table", "left_out", "past_rail_table")
         paths = [f"{folder}/tables/{name}_{group}.md" for name in tables for group in groups]
@@ -115,12 +115,12 @@ class Recordings:
 
     @property
     def is_criticised(self) -> bool:
-        """Whether the recording shown has others of its board, all calibrated from still poses."""
+        """True where the recording shown has others of its board, all of first order."""
         group = self.group(self.shown)
         return group in self.groups() and self.shown in self.board(group)
 
     def hidden(self) -> list[str]:
-        """What effects are hidden in: simulated recordings, and the one that is shown."""
+        """Recordings in which effects are hidden: simulated ones, and the one that is shown."""
         return ["lever_arms", "drawn", *["measured"] * self.is_criticised]
 
     def control(self, hidden: str) -> str:
@@ -128,7 +128,7 @@ class Recordings:
         return f"diagnosis/{self.shown}" if hidden == "measured" else "hidden/nothing"
 
     def published_names(self, folder: str) -> list[str]:
-        """Those of them that are "figures", or "tables"."""
+        """Names of the published "figures", or "tables"."""
         return [name for name, of in self.published().items() if of.startswith(folder)]
 
     def studied(self) -> dict[str, tuple[str, ...]]:

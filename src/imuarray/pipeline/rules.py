@@ -1,4 +1,4 @@
-"""What the rules share: the settings they depend on, outputs, cores, files from elsewhere."""
+"""Parts that the rules share: settings they depend on, outputs, cores, files from elsewhere."""
 
 import hashlib
 import re
@@ -63,13 +63,13 @@ def table(
 
 
 class CoreBudget:
-    """How work is shared: among ``cores`` of this machine, or a cluster's (None)."""
+    """Shares of the work: among ``cores`` of this machine, or a cluster's (None)."""
 
     def __init__(self, config: dict, cores: int | None):
         self.scales, self.cores = config["scales"], cores
 
     def threads(self, scale: str) -> int:
-        """Of a heavy job: at most half of the cores, or others wait through its serial parts."""
+        """Threads of a heavy job: half of the cores, or others wait through its serial parts."""
         wanted = self.scales[scale]["threads"]
         return wanted if self.cores is None else max(1, min(wanted, self.cores // 2))
 

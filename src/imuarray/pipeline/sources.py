@@ -50,7 +50,7 @@ class Sources:
 
 
 def _imported(text: str) -> set[str]:
-    """What a script imports: modules, and names in them, which may be modules."""
+    """Imports of a script: modules, and names in them, which may be modules."""
     found = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.ImportFrom)]
     names = {f"{node.module}.{alias.name}" for node in found for alias in node.names}
     return names | {node.module for node in found}

@@ -1,4 +1,4 @@
-"""What a sampler hands back, and its file: an `xarray.DataTree` in NetCDF-4."""
+"""Chains of a sampler, and their file: an `xarray.DataTree` in NetCDF-4."""
 
 from dataclasses import dataclass
 

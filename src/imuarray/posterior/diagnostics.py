@@ -33,7 +33,7 @@ def ess(draws) -> np.ndarray:
 
 
 def ess_of_mean(draws) -> np.ndarray:
-    """The same for the plain mean: how many independent draws would estimate it as well."""
+    """Effective sample size of the plain mean: independent draws that would estimate it as well."""
     return _arviz("ess", draws, method="mean")
 
 

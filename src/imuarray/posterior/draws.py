@@ -1,4 +1,4 @@
-"""What draws of omega make of the likelihood's exponents, a tile of samples at a time.
+"""Exponents of the likelihood by draws of omega, a tile of samples at a time.
 
 The inner loops run over a tile's samples and have no branch, so compilers turn them into vector
 instructions; an exponential of our own keeps calls of the C library out of them.

@@ -50,7 +50,7 @@ class Unknown(NamedTuple):
 
 
 def unknown(readings: Readings, start, logs=None) -> Unknown:
-    """What `log_laplace` is given; ``start`` (T, 9 or 15) is where each sample's search begins.
+    """Arguments of `log_laplace`; ``start`` (T, 9 or 15) is where each sample's search begins.
 
     ``logs`` (5, K) maps the last K parameters to logs of factors on the sds that `SCALES` names.
     Raises InputError for a sample without gyroscopes.

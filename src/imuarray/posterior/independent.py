@@ -59,7 +59,7 @@ def run_independent(
 
 
 def _settled(chains: Chains, batches: int) -> bool:
-    """Whether they are enough, or so many as may be will hardly be."""
+    """True where the chains are enough, or so many as may be will hardly be."""
     size = ess(chains.draws).min()
     return bool(
         (size >= ENOUGH and rhat(chains.draws).max() <= RHAT) or size * BATCHES < ENOUGH * batches

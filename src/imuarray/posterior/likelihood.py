@@ -78,7 +78,7 @@ class Likelihood:
         )
 
     def centred(self, positions, widening: float = WIDENING) -> Likelihood:
-        """The same likelihood, estimated with draws from where its integrand is.
+        """The likelihood estimated with draws from where its integrand is.
 
         omega_t is drawn around the integrand's mode at ``positions`` (A, 3) m, weighted by
         p(omega_t | y_g) over that density: unbiased at every theta, and of far smaller

@@ -173,7 +173,7 @@ def _positions(theta):
 
 
 def _exponent(rate, C, b, constant, data):
-    """That of (26a) at omega (T, N, 3) of each sample, (T, N)."""
+    """Exponent of (26a) at omega (T, N, 3) of each sample, (T, N)."""
     w = _products(rate)
     away = rate - data.mean[:, None]
     prior = jnp.einsum("tni,tij,tnj->tn", away, data.information, away)
@@ -196,7 +196,7 @@ def _quadrature(rate, factor, C, b, constant, data, nodes, log_weights):
 
 
 def _laplace(rate, C, b, constant, data):
-    """The same by the mode alone; the volume's derivative follows the mode as theta moves."""
+    """Integral by the mode alone; the volume's derivative follows the mode as theta moves."""
 
     def volume(rate, b, mean, information):
         # one step more is nothing at the mode, but its derivative is the mode's
@@ -229,7 +229,7 @@ class Marginal:
         cls, likelihood: Likelihood, positions, nodes: int | None = None, spread=(0.0, 0),
         enough: float = ENOUGH,
     ) -> Marginal:  # fmt: skip
-        """Of the same recording as a `Likelihood`; modes are searched from those at ``positions``.
+        """Marginal of a `Likelihood`'s recording; modes are searched from those at ``positions``.
 
         Parameters
         ----------
@@ -273,5 +273,5 @@ class Marginal:
         return float(_value(positions - positions[0], self.data, self.nodes, self.log_weights))
 
     def log_density(self, theta):
-        """The same of theta (3 (A - 1),), to be traced and differentiated by JAX."""
+        """Log density of theta (3 (A - 1),), to be traced and differentiated by JAX."""
         return log_marginal(_positions(theta), self.data, self.nodes, self.log_weights)

@@ -140,7 +140,7 @@ def _save(path, key, thin, past, accepted) -> None:
 
 
 def _load(path, key, shape, thin, draws):
-    """What `_begin` returns, from a checkpoint; None where there is none."""
+    """Result of `_begin`, from a checkpoint; None where there is none."""
     if not Path(path).exists():
         return None
     try:

@@ -1,4 +1,4 @@
-"""What a chain samples: prior times estimated likelihood, as a function of theta."""
+"""Target of a chain: prior times estimated likelihood, as a function of theta."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class GaussianPrior:
 
 @dataclass(frozen=True)
 class TiedPrior(GaussianPrior):
-    """The same with precision ``root``' ``root`` (size, size)."""
+    """A Gaussian prior with precision ``root``' ``root`` (size, size)."""
 
     root: np.ndarray
 

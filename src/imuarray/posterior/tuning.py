@@ -12,7 +12,7 @@ from imuarray.posterior.target import CompiledTarget, GaussianPrior, Target
 
 
 class Sweeps(NamedTuple):
-    """What is tried to choose N and sigma_q, and what is aimed at."""
+    """Grids that are tried to choose N and sigma_q, and the aim."""
 
     steps: Sequence[float] | np.ndarray  # m, sigma_q
     draws: Sequence[int] = (1, 2, 5, 10, 20, 50, 100)  # N

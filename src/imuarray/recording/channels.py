@@ -163,7 +163,7 @@ def _copied(recording: Recording, kind: str) -> list[str]:
 
 
 def _sums(recording: Recording, kind: str):
-    """Of each axis (3 K,): whether it is live, its sd, correlations, and a mark up to its sign."""
+    """Sums by axis (3 K,): whether it is live, its sd, correlations, and a mark up to its sign."""
     middle, sign, rng = None, None, np.random.default_rng(0)
     total, square, mark, free, low, high = 0.0, 0.0, np.uint64(0), 0, np.inf, -np.inf
     for values, railed in _parts(recording, kind):

@@ -98,7 +98,7 @@ def read_recording(path: str | Path, stored: bool = False) -> Recording:
 
 
 def has_truth(path: str | Path) -> bool:
-    """Whether a recording is simulated and says from what; InputError if it can not be read."""
+    """True where a recording is simulated and says from what; InputError if it can not be read."""
     return _has_group(_existing(path), TRUTH)
 
 

@@ -115,7 +115,7 @@ def _listed(keys: dict[str, bool]) -> str:
 
 
 def _is_number(value) -> bool:
-    """Of a size that can be computed with: YAML has .nan, .inf, integers of any length."""
+    """True of numbers that can be computed with: YAML has .nan, .inf, integers of any length."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     return abs(value) <= LARGEST

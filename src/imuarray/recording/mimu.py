@@ -29,7 +29,7 @@ LISTED = 5  # places of damage named in a summary
 
 @dataclass(frozen=True)
 class Account:
-    """What became of every byte of the file.
+    """Fate of every byte of the file.
 
     ``bad``, ``garbage`` and ``out_of_sequence`` are lists of byte offsets (of garbage:
     offset and length), ``lost`` of (index of the sample after the gap, packets missing).
@@ -231,7 +231,7 @@ def _period(steps, passed) -> float:
 
 
 def _agree(steps, passed, period) -> np.ndarray:
-    """Whether so many packets and so many ticks (modulo the clock's wrap) belong together."""
+    """True where so many packets and so many ticks (modulo the clock's wrap) belong together."""
     off = (passed - np.round(steps * period).astype(np.int64) + WRAP // 2) % WRAP - WRAP // 2
     # a long gap lets the period's own error add up
     allowed = period * (0.5 + PERIOD_ERROR * steps)

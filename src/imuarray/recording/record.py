@@ -161,13 +161,13 @@ def blocks(values) -> Iterator[tuple[int, np.ndarray]]:
 
 
 def few(index: np.ndarray) -> np.ndarray:
-    """Of many samples' indices a part, spread over them."""
+    """Some of many samples' indices, spread over them."""
     return index[:: max(1, -(-len(index) // PART))]
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What the triads of one rigid array measured, in one array frame.
+    """Readings of the triads of one rigid array, in one array frame.
 
     The readings of a long one may have stayed in its file (`Stored`): `parts` are
     in memory.
@@ -275,7 +275,7 @@ class Recording:
 
     @property
     def gyroscope_common_scale_sd(self) -> float:
-        """Of the scale error that all gyroscopes share, no unit; NaN if not known."""
+        """Sd of the scale error that all gyroscopes share, no unit; NaN if not known."""
         common = self.gyroscope_common_covariance
         return np.nan if common is None else float(np.sqrt(common[::4, ::4].sum())) / 3
 
@@ -284,13 +284,13 @@ class Recording:
         return self.accelerometer_position - self.accelerometer_position[0]
 
     def saturated_gyroscopes(self) -> np.ndarray:
-        """Which rates are at the gyroscopes' rail, (T, G, 3) bool."""
+        """Rates at the gyroscopes' rail, (T, G, 3) bool."""
         if self.angular_rate_saturated is not None:
             return self.angular_rate_saturated
         return np.abs(self.angular_rate) >= self.gyroscope_range * (1 - _RAIL_TOLERANCE)
 
     def saturated_accelerometers(self) -> np.ndarray:
-        """Which specific forces are at the accelerometers' rail, (T, A, 3) bool."""
+        """Specific forces at the accelerometers' rail, (T, A, 3) bool."""
         if self.specific_force_saturated is not None:
             return self.specific_force_saturated
         return np.abs(self.specific_force) >= self.accelerometer_range * (1 - _RAIL_TOLERANCE)
@@ -315,7 +315,7 @@ class Recording:
             yield self._at(slice(first, first + size))
 
     def in_memory(self) -> Recording:
-        """The same with its readings read; InputError where they are too many."""
+        """The recording with its readings read; InputError where they are too many."""
         return self._at(slice(None))
 
     def _at(self, index: Any) -> Recording:

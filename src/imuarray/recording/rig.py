@@ -114,7 +114,7 @@ def pair(value: Any) -> list:
 
 
 def _origins(imus: list[list[Readings]]) -> tuple[list[Readings], list[bool]]:
-    """What begins each IMU's time, and whether that is another clock's than the first IMU's."""
+    """Readings that begin each IMU's time, and whether by a clock of their own."""
     begin = [min(kinds, key=lambda r: r.unit * r.stamps[0]) for kinds in imus]
     start = np.array([r.unit * r.stamps[0] for r in begin])
     end = np.array([max(r.unit * r.stamps[-1] for r in kinds) for kinds in imus])

@@ -148,7 +148,7 @@ def _sensors(table, layout, kind, where, layout_name):
 
 
 def unit_of(section, kind, where: str) -> tuple[float, float]:
-    """What a kind's unit is in SI units, and how many units a count is."""
+    """A kind's unit in SI units, and how many units a count is."""
     unit = factor(QUANTITIES[kind], section["unit"], f"{where}: {kind}: unit")
     return unit, positive(section.get("scale", 1.0), f"{where}: {kind}: scale")
 

@@ -50,7 +50,7 @@ def _long(seconds: float) -> str:
 
 
 def factor(quantity: str, unit: object, where: str) -> float:
-    """What one ``unit`` of a ``quantity`` of `UNITS` is in SI units; InputError if unknown."""
+    """One ``unit`` of a ``quantity`` of `UNITS` in SI units; InputError if unknown."""
     known = UNITS[quantity]
     if not isinstance(unit, str) or unit not in known:
         found = "none" if unit is None else repr(unit)

@@ -1,4 +1,4 @@
-"""What makes a file a recording: names, dimensions, units, values.
+"""Checks of a recording's file: names, dimensions, units, values.
 
 Every error says what was expected, what was found and where.
 """
@@ -218,7 +218,7 @@ def _check_correction(dataset: xr.Dataset, name: str, where: str) -> None:
 
 
 def is_rotation(matrices) -> np.ndarray:
-    """Whether matrices (..., 3, 3) are rotations, to six digits."""
+    """True of matrices (..., 3, 3) that are rotations, to six digits."""
     unit = np.abs(matrices @ np.swapaxes(matrices, -1, -2) - np.eye(3)).max(axis=(-2, -1)) < 1e-6
     return unit & (np.linalg.det(matrices) > 0)
 

@@ -40,7 +40,7 @@ class Answer(NamedTuple):
 
 
 def answers(diagnosis: Diagnosis) -> list[Answer]:
-    """What is wrong, why, the extended model, its gain, and what to do with them."""
+    """Answers: what is wrong, why, the extended model, its gain, and what to do with them."""
     return [part(diagnosis) for part in (wrong, why, extended, gained, onward)]
 
 
@@ -77,12 +77,12 @@ def verdict(diagnosis: Diagnosis) -> str:
 
 
 def _shaken(document: dict) -> bool:
-    """Whether smooth samples are explained, and shocks are what is left."""
+    """True where smooth samples are explained, and shocks are what is left."""
     return bool(document["smooth"] and not document["smooth"]["unexplained"])
 
 
 def alarming(document: dict) -> bool:
-    """Whether something is left that is not motion faster than the samples."""
+    """True where something is left that is not motion faster than the samples."""
     return document["unexplained"] and not _shaken(document)
 
 
@@ -99,7 +99,7 @@ def of_noise(sizes: dict[str, float]) -> str:
 
 
 def wrong(diagnosis: Diagnosis) -> Answer:
-    """What does the simulation get wrong?"""
+    """Answer to: what does the simulation get wrong?"""
     document = diagnosis.document
     checks = document["discrepancies"]
     out = [check for check in checks if check["p_value"] <= USUAL]
@@ -170,7 +170,7 @@ def some(checks, most=8) -> str:
 
 
 def extended(diagnosis: Diagnosis) -> Answer:
-    """What does the extended model look like?"""
+    """Answer to: what does the extended model look like?"""
     document = diagnosis.document
     question = "What does the extended model look like?"
     noise = noise_in_words(diagnosis)
@@ -208,7 +208,7 @@ def noise_in_words(diagnosis: Diagnosis) -> str:
 
 
 def gained(diagnosis: Diagnosis) -> Answer:
-    """What did it gain? Prediction, residual, positions and their widths."""
+    """Answer to: what did it gain? Prediction, residual, positions and their widths."""
     document, gain = diagnosis.document, diagnosis.document["gain"]
     question, samples = "What did it gain?", document["samples"]
     over_base, over_inflated = (
@@ -270,7 +270,7 @@ def residual_in_words(diagnosis: Diagnosis) -> str:
 
 
 def positions_in_words(diagnosis: Diagnosis) -> str:
-    """How far the positions moved, and their widths before and after."""
+    """Words on how far the positions moved, and their widths before and after."""
     gain, table = diagnosis.document["gain"], position_table(diagnosis)
     widths = [
         quantity(float(np.sqrt(np.mean(np.square(sds)))), None, "m")
@@ -291,7 +291,7 @@ def positions_in_words(diagnosis: Diagnosis) -> str:
 
 
 def onward(diagnosis: Diagnosis) -> Answer:
-    """What to do next."""
+    """Answer to: what to do next?"""
     document, named = diagnosis.document, [c["effect"] for c in diagnosis.document["causes"]]
     items = [f"Mend this first: {reason}" for reason in document.get("reasons", [])[:1]]
     if "axis_swap" in named:

@@ -29,7 +29,7 @@ SURE = 1.96  # sds: 95 %
 
 
 def verdict(board: Board) -> str:
-    """How good, in a sentence."""
+    """The quality of the positions, in a sentence."""
     sds = position_sds(board.calibration)[1:]
     rms, worst = (size_in_words(size) for size in (np.sqrt(np.mean(sds**2)), sds.max()))
     count = board.calibration.sizes["accelerometer"]
@@ -50,7 +50,7 @@ def turned(board: Board) -> list[str]:
 
 
 def frame(calibration: xr.Dataset) -> str:
-    """Whose axes positions are in, and what taking the board's edges for them would cost."""
+    """Words on the axes of the positions, and what taking the board's edges for them would cost."""
     far = float(np.linalg.norm(calibration["position"].to_numpy(), axis=1).max())
     first = calibration["accelerometer"].to_numpy()[0]
     return (
@@ -98,7 +98,7 @@ def _shaken(calibration: xr.Dataset) -> str:
 
 
 def advice(board: Board, folder: Path = Path()) -> list[str]:
-    """What to do next, the most urgent first; ``folder``: where the files are.
+    """Advice, the most urgent first; ``folder``: where the files are.
 
     The motion of an answer that is not to be trusted is no ground for advice.
     """
@@ -128,7 +128,7 @@ def advice(board: Board, folder: Path = Path()) -> list[str]:
 
 
 def _wanting(board: Board) -> list[str]:
-    """What a better recording would have, by the motion that was found."""
+    """Words on what a better recording would have, by the motion that was found."""
     said, calibration = [], board.calibration
     gyroscopes = None if isinstance(board.first_order, str) else board.first_order.gyroscopes
     if gyroscopes and isinstance(gyroscopes.common, str):
@@ -157,13 +157,13 @@ def _wanting(board: Board) -> list[str]:
 
 
 def weakest(calibration: xr.Dataset) -> str:
-    """What is known worst."""
+    """The direction known worst, in words."""
     worst = weakest_of(calibration)[0]
     return f"{worst.words}, to {size_in_words(worst.sd)}"
 
 
 def causes(calibration: xr.Dataset) -> list[str]:
-    """What the sensors do beside measuring, from the calibration's own parameters."""
+    """Words on what the sensors do beside measuring, from the calibration's own parameters."""
     labels = [str(k) for k in calibration["accelerometer"].to_numpy()]
     found: dict[str, dict] = {}
     if "effect_parameter" in calibration:
@@ -180,7 +180,7 @@ def causes(calibration: xr.Dataset) -> list[str]:
 
 
 def before(board: Board) -> list[str]:
-    """What first order found."""
+    """Words on what first order found."""
     if isinstance(board.first_order, str):
         return [f"First order was left out: {board.first_order}."]
     found, said = board.first_order, []
@@ -208,7 +208,7 @@ def before(board: Board) -> list[str]:
 
 
 def account(board: Board) -> list[str]:
-    """What became of the logs, as a page has it."""
+    """Lines on what became of the logs, as a page has them."""
     return [
         f"{line.replace('+-', '±').replace('^2', '²').replace(' -', ' −')}."
         for line in board.account
@@ -274,7 +274,7 @@ def position_table(calibration: xr.Dataset) -> pd.DataFrame:
 
 
 def turn_table(board: Board) -> pd.DataFrame | None:
-    """How each triad is turned against the frame, deg: sensor, imu, x, y, z, sd_x, sd_y, sd_z."""
+    """Turns of the triads against the frame, deg: sensor, imu, x, y, z, sd_x, sd_y, sd_z."""
     if isinstance(board.first_order, str):
         return None
     table = parameter_table(board.first_order, board.recording)

@@ -1,4 +1,4 @@
-"""What a diagnosis draws of one recording: what is wrong, and what its causes gain."""
+"""Drawings of one recording's diagnosis: what is wrong, and what its causes gain."""
 
 import matplotlib.ticker as ticks
 import numpy as np

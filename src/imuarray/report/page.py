@@ -1,4 +1,4 @@
-"""What the pages are made of: drawings as they embed them, and the templates filled in."""
+"""Parts of the pages: drawings as they embed them, and the templates filled in."""
 
 from __future__ import annotations
 

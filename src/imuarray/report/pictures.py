@@ -78,7 +78,7 @@ def turning_of(calibration: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 
 
 def missing(recording: Recording, calibration: xr.Dataset) -> list[str]:
-    """What has not been excited yet, in words; nothing where all has."""
+    """Words on what has not been excited yet; nothing where all has."""
     said, poses = [], poses_of(recording)
     if len(poses):
         angle, where = gap_of(poses)
@@ -93,7 +93,7 @@ def missing(recording: Recording, calibration: xr.Dataset) -> list[str]:
 
 
 def shown(recording: Recording, calibration: xr.Dataset) -> str:
-    """The same as a sentence of a caption."""
+    """`missing` as a sentence of a caption."""
     said = missing(recording, calibration)
     if said:
         return f"Not yet excited: {joined(said)}."
@@ -244,7 +244,7 @@ def timeline(recording: Recording, calibration: xr.Dataset, axes: Axes | None = 
 
 
 def _rows(recording: Recording, calibration: xr.Dataset) -> list[tuple[str, str, np.ndarray]]:
-    """What a timeline shows: name, colour, (T,) bool."""
+    """Rows of a timeline: name, colour, (T,) bool."""
     count = len(recording.time)
     still = np.zeros(count, bool) if recording.stationary is None else recording.stationary
     places = np.searchsorted(recording.time, calibration["time"].to_numpy() - 1e-9)
@@ -327,7 +327,7 @@ def length(calibration: xr.Dataset, axes: Axes | None = None) -> Axes:
 
 
 def levelled(calibration: xr.Dataset) -> bool:
-    """Whether the second half of the motion has gained next to nothing: noise is not the limit."""
+    """True where the second half of the motion has gained next to nothing."""
     seconds = calibration["length"].to_numpy()
     sds = calibration["position_sd_by_length"].to_numpy()[:, 1:]
     rms = np.log(np.sqrt(np.mean(sds**2, axis=(1, 2))))

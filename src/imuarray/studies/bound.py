@@ -27,7 +27,7 @@ REPEATS = 20  # motions averaged over; the bound varies little between them
 
 
 def block_information(model: ArrayModel, motion) -> np.ndarray:
-    """The same were the motion known: what a step of ML-BCD assumes."""
+    """Information were the motion known: what a step of ML-BCD assumes."""
     state = np.zeros((12, len(motion.angular_rate)))
     state[:6], state[6:9] = (
         products(motion.angular_rate).T,
@@ -133,7 +133,7 @@ def convergence(
 
 
 class Paths(NamedTuple):
-    """How ML-BCD and Gauss-Newton come to the same optimum from the nominal positions.
+    """Paths of ML-BCD and Gauss-Newton to the same optimum from the nominal positions.
 
     Without marks and iterations where there is no optimum that is found.
     """

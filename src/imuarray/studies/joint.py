@@ -102,7 +102,7 @@ def pmmh_rounds(name: str, seed: int, rounds: int) -> Iterator[np.ndarray]:
 
 
 def nuts_rounds(name: str, seed: int, rounds: int) -> Iterator[np.ndarray]:
-    """The same by NUTS, its step fixed, on the exact marginal likelihood."""
+    """Rounds of NUTS, its step fixed, on the exact marginal likelihood."""
     from numpyro.infer.hmc import hmc
 
     from imuarray.model.jax64 import jax, jnp

@@ -133,7 +133,7 @@ def _walk(setting: Setting, pilot: Replicate, rng):
 
 
 def _preconditioned(setting: Setting, pilot: Replicate, rng):
-    """The same likelihood, proposals of the posterior's shape.
+    """The likelihood with proposals of the posterior's shape.
 
     Omega is drawn as the paper has it: draws around the integrand's mode at one theta are too
     narrow for others as far off as these posteriors are wide, and chains stick.
@@ -277,7 +277,7 @@ def drawn(setting: Setting, number: int) -> tuple[np.ndarray, Recording]:
 def pit_values_by_default(
     setting: Setting, replicates: Sequence[int], sample: Callable, threads: int = 1
 ) -> pd.DataFrame:
-    """As `pit_values` has it; ``sample`` is `imuarray.sample`.
+    """`pit_values` of the command as it is; ``sample`` is `imuarray.sample`.
 
     Coordinates, the effects' parameters, and the array's size along its nominal shape.
     """

@@ -44,7 +44,7 @@ def realisations(model: ArrayModel, rng, count, samples, motion, position_sd, ra
 
 
 class Setting(NamedTuple):
-    """What is simulated: model, prior sd (m), motion sds (rad/s, rad/s^2, m/s^2), T, seed."""
+    """A simulation: model, prior sd (m), motion sds (rad/s, rad/s^2, m/s^2), T, seed."""
 
     name: str
     model: ArrayModel
@@ -55,12 +55,12 @@ class Setting(NamedTuple):
 
     @property
     def prior(self) -> GaussianPrior:
-        """Of r_2 ... r_A, around the nominal ones."""
+        """Prior of r_2 ... r_A, around the nominal ones."""
         return GaussianPrior.of(self.model.array.parameters, self.prior_sd)
 
 
 def setting_from(settings: dict, name: str, samples: int) -> Setting:
-    """Of ``validation.settings`` of a configuration; motion and prior are those of ``paper2021``.
+    """Setting from ``validation.settings`` of a configuration; motion and prior: ``paper2021``.
 
     Noise is the configuration's where the setting has none of its own.
     """
@@ -92,7 +92,7 @@ class Replicate(NamedTuple):
 
 
 def misfit(likelihood: Likelihood, theta) -> float:
-    """How badly theta (P,) fits the measurements: -log p-hat at the gyroscopes' own omega.
+    """Misfit of theta (P,) to the measurements: -log p-hat at the gyroscopes' own omega.
 
     A function of both: a sampler that does not look at the data, or not at all of them, is wrong
     in it, though right in theta.

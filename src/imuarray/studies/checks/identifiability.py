@@ -1,4 +1,4 @@
-"""What determines the positions and the motion: ranks, Lemma 1, invariances (paper 2017).
+"""Conditions for the positions and the motion: ranks, Lemma 1, invariances (paper 2017).
 
 The Fisher information is from the model's structure tensor alone.
 """
@@ -51,7 +51,7 @@ def joint_singular_values(positions, motion: Motion) -> np.ndarray:
 
 
 def numerical_rank(values) -> int:
-    """How many of decreasing singular values exceed 1e-9 times the largest."""
+    """Number of decreasing singular values that exceed 1e-9 times the largest."""
     return int(np.sum(values > 1e-9 * max(values[0], 1e-300)))
 
 
@@ -158,7 +158,7 @@ def common_axis(rng, positions, samples: int = 20) -> dict:
 
 
 def invariances(rng, model, motion_sizes) -> dict:
-    """What must not matter: the origin, the translation, theta for the gyroscopes; (9) once."""
+    """Things that must not matter: origin, translation, theta for gyroscopes; (9) once."""
     positions, samples = model.array.relative, 10
     motion = sphere_motion(rng, (samples,), *motion_sizes)
     levers = lever_matrices(motion)

@@ -109,7 +109,7 @@ def determinant_effect(covariance, theta, samples: int, precision) -> dict:
 
 
 def determinant_by_sampling(recording, truth, model, rng, count=4000, draws=64) -> dict:
-    """The same change by importance sampling of the exact posterior, for a small array."""
+    """The determinant's effect by importance sampling of the exact posterior, for a small array."""
     gyroscopes, sd = model.array.gyroscopes, np.sqrt(model.noise.accelerometer[0, 0])
     error, covariance = linearise(recording, truth, model, sd, gyroscopes)
     positions = truth["position"].to_numpy()
