@@ -29,7 +29,7 @@ from imuarray.commands.board import answer
 from imuarray.commands.calibrate import position_lines
 from imuarray.diagnosis.plain import Sizes, plain
 from imuarray.engine.estimate import Recorded, estimate
-from imuarray.engine.ladder import GYROSCOPES, RUNGS, gains, mask_of
+from imuarray.engine.forward import EFFECT_GROUPS, GYROSCOPES, gains, mask_of
 from imuarray.engine.parameters import POSITION, columns_of
 from imuarray.engine.readings import arrange
 from imuarray.engine.widths import corrected
@@ -237,12 +237,12 @@ def test_offsets_that_corrections_left_are_each_recording_s_own(found):
     moving = np.flatnonzero(~found.corrected.stationary)
     parts = [found.corrected.select(part) for part in np.array_split(moving, 2)]
     readings = [arrange(one, sparse=True) for one in parts]
-    names = dict.fromkeys([*RUNGS[GYROSCOPES], *corrected(readings[0].left)])
+    names = dict.fromkeys([*EFFECT_GROUPS[GYROSCOPES], *corrected(readings[0].left)])
     columns = columns_of(readings[0].array, names, readings[0].position_prior_sd)
     begun = [Recorded.of(one, columns) for one in readings]
     both = estimate(begun, columns, mask_of(columns, [POSITION]), steps=3)
-    masks = {rung: mask_of(columns, RUNGS[rung]) for rung in ("offsets", GYROSCOPES)}
-    assert [rung.name for rung in gains(both, masks)] == ["offsets", GYROSCOPES]
+    masks = {group: mask_of(columns, EFFECT_GROUPS[group]) for group in ("offsets", GYROSCOPES)}
+    assert [group.name for group in gains(both, masks)] == ["offsets", GYROSCOPES]
 
 
 def test_a_corrected_recording_is_for_calibrate(folder, tmp_path):

@@ -10,7 +10,7 @@ import imuarray
 from imuarray.engine.dataset import engine_dataset
 from imuarray.engine.estimate import Recorded, estimate, jackknifed, to_come
 from imuarray.engine.fit import flat_parameters
-from imuarray.engine.ladder import _of_one_truth, climb, mask_of
+from imuarray.engine.forward import _of_one_truth, mask_of, select_forward
 from imuarray.engine.linearise import linearise, reading, seen_again
 from imuarray.engine.parameters import POSITION, columns_of
 from imuarray.engine.readings import arrange, most_informative, resolution
@@ -333,16 +333,16 @@ def test_a_prior_that_the_accelerometers_contradict_is_not_taken():
 
 def test_the_ladder_keeps_what_gains():
     recording, truth = simulated(3.0, effects=("gyroscope_delay",))
-    found, rungs = climb([arrange(recording, sparse=True)])
+    found, groups = select_forward([arrange(recording, sparse=True)])
     # simulated to first order in the lag: what the fit has beyond looks like delays of IMUs
-    kept = {rung.name for rung in rungs if rung.kept} - {"delay of each IMU"}
+    kept = {group.name for group in groups if group.kept} - {"delay of each IMU"}
     assert kept == {"lag of the gyroscopes"}
     assert np.sqrt(np.mean((errors(found, truth) / position_sds(found)) ** 2)) < 2
     few = imuarray.select(simulated(3.0)[0], 60)
-    found, rungs = climb([arrange(few, sparse=True)])
-    assert not any(rung.kept for rung in rungs)
+    found, groups = select_forward([arrange(few, sparse=True)])
+    assert not any(group.kept for group in groups)
     # samples without neighbours say nothing of delays
-    assert "delay of each IMU" not in {rung.name for rung in rungs}
+    assert "delay of each IMU" not in {group.name for group in groups}
 
 
 def test_a_long_recording_keeps_its_most_informative_stretches(monkeypatch):

@@ -1,4 +1,4 @@
-# What each cause buys on a board of several recordings, and what the others say of one that is left
+# What each cause gains on a board of several recordings, and what the others say of one that is left
 # out; its own target, `causes`.
 
 
@@ -21,7 +21,7 @@ rule correct_together:
         "../scripts/correct_together.py"
 
 
-rule buy_causes:
+rule fit_stepwise:
     input:
         lambda wc: f"results/measured/together/{MEASURED.group(wc.name)}",
     output:
@@ -35,11 +35,11 @@ rule buy_causes:
     resources:
         mem_mb=4000,
     params:
-        code=code("buy_causes"),
+        code=code("fit_stepwise"),
     message:
-        "what each cause buys on {wildcards.name}"
+        "{wildcards.name}, fitted cause after cause"
     script:
-        "../scripts/buy_causes.py"
+        "../scripts/fit_stepwise.py"
 
 
 rule repeat_causes:
@@ -72,7 +72,7 @@ rule table_causes:
     params:
         **by("figures.board.table_causes"),
     message:
-        "table: what each cause buys on {wildcards.group}"
+        "table: what each cause gains on {wildcards.group}"
     script:
         "../scripts/publish.py"
 

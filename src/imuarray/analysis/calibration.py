@@ -15,7 +15,7 @@ from imuarray.analysis.model import Say, assumed, require_together, silent, usab
 from imuarray.analysis.prepare import less_leak_by_others
 from imuarray.engine.dataset import engine_dataset, papers_dataset, with_readings
 from imuarray.engine.estimate import Estimate
-from imuarray.engine.ladder import Rung, climb, rungs_of, with_effects
+from imuarray.engine.forward import EffectGroup, groups_of, select_forward, with_effects
 from imuarray.engine.parameters import model_of
 from imuarray.engine.readings import Readings, arrange, determined, most_informative
 from imuarray.errors import InputError, one_line, require_one_of
@@ -26,8 +26,8 @@ from imuarray.recording.channels import require_apart, require_live
 
 def fitted(
     recordings: Sequence[Recording], model: str, effects: Sequence[str], say: Say
-) -> tuple[Estimate, list[Rung]]:
-    """(estimate, the ladder's rungs) under a calibration's model, ``effects``, or the sensor model.
+) -> tuple[Estimate, list[EffectGroup]]:
+    """(estimate, groups tried) under a calibration's model, ``effects``, or the sensor model.
 
     InputError where no model of the kind is near the readings.
     """
@@ -41,9 +41,9 @@ def fitted(
     with _near_the_model():
         if effects:
             return with_effects(readings, effects), []
-        found, rungs = climb(readings)
-    _tell(rungs, say)
-    return found, rungs
+        found, groups = select_forward(readings)
+    _tell(groups, say)
+    return found, groups
 
 
 @contextmanager
@@ -66,12 +66,12 @@ def fitted_beyond(
     if methods.is_file(model) or effects:
         return fitted([recording], model, effects, say)[0]
     readings = _arranged([recording], say)
-    if not rungs_of(readings):
+    if not groups_of(readings):
         return None
     with _near_the_model():
-        found, rungs = climb(readings, bare=False)
-    _tell(rungs, say)
-    return found if any(rung.kept for rung in rungs) else None
+        found, groups = select_forward(readings, bare=False)
+    _tell(groups, say)
+    return found if any(group.kept for group in groups) else None
 
 
 def _arranged(recordings, say: Say) -> list[Readings]:
@@ -87,10 +87,10 @@ def _arranged(recordings, say: Say) -> list[Readings]:
     return found
 
 
-def _tell(rungs: Sequence[Rung], say: Say) -> None:
-    for rung in rungs:
-        verdict = "kept" if rung.kept else "left out"
-        say(f"{rung.name}: {verdict}, {rung.gain:.3g} ({rung.error:.2g}) nats on held-out time")
+def _tell(groups: Sequence[EffectGroup], say: Say) -> None:
+    for group in groups:
+        verdict = "kept" if group.kept else "left out"
+        say(f"{group.name}: {verdict}, {group.gain:.3g} ({group.error:.2g}) nats on held-out time")
 
 
 def calibrate(
@@ -186,8 +186,8 @@ def _papers(recording: Recording, method: str, accelerometer_noise, say: Say) ->
 
 
 def _engine(recordings, model: str, effects, say: Say) -> xr.Dataset:
-    """Robust least squares (`imuarray.engine`): a ladder, given effects, or a calibration's."""
-    found, rungs = fitted(recordings, model, effects, say)
+    """Robust least squares: forward selection, given effects, or those of a calibration."""
+    found, groups = fitted(recordings, model, effects, say)
     dataset = engine_dataset(recordings, found)
-    dataset.attrs["parts"] = json.dumps([rung._asdict() for rung in rungs])
+    dataset.attrs["parts"] = json.dumps([group._asdict() for group in groups])
     return dataset

@@ -14,9 +14,9 @@ from imuarray.engine.course import block_scores
 from imuarray.engine.dataset import engine_dataset, places_among, positions_dataset
 from imuarray.engine.estimate import Estimate, Recorded, estimate, stepped
 from imuarray.engine.fit import flat_parameters, prior_means
+from imuarray.engine.forward import DELAYS, EFFECT_GROUPS, Selected, mask_of, resumed
 from imuarray.engine.fusion import fuse
 from imuarray.engine.heldout import gain
-from imuarray.engine.ladder import DELAYS, RUNGS, Climbed, mask_of, resumed
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import POSITION, Columns, columns_of, model_of
 from imuarray.engine.readings import Readings, arrange, determined, measured, most_informative
@@ -44,15 +44,15 @@ ASSUMED = 0.79  # m/s^2, the accelerometers' noise in paper 2021's experiment
 
 
 def board_of(readings: Sequence[Readings]) -> Estimate:
-    """All rungs of the sensor model but the IMUs' delays, from recordings of rough motion."""
+    """All groups of the sensor model but the IMUs' delays, from recordings of rough motion."""
     columns = columns_of(
-        readings[0].array, [effect for ids in RUNGS.values() for effect in ids],
+        readings[0].array, [effect for ids in EFFECT_GROUPS.values() for effect in ids],
         readings[0].position_prior_sd,
     )  # fmt: skip
     begun = [Recorded.of(one, columns) for one in readings]
-    found = estimate(begun, columns, mask_of(columns, [POSITION]), steps=SETTINGS.rung_steps)
-    now, _ = Climbed(found, tuple(one.readings.keep for one in begun), {}).clocked()
-    return now.with_kept([n for n in RUNGS if n not in (*now.kept, DELAYS)]).fitted().found
+    found = estimate(begun, columns, mask_of(columns, [POSITION]), steps=SETTINGS.group_steps)
+    now, _ = Selected(found, tuple(one.readings.keep for one in begun), {}).clocked()
+    return now.with_kept([n for n in EFFECT_GROUPS if n not in (*now.kept, DELAYS)]).fitted().found
 
 
 def with_own(readings: Readings, effects, positions, values: dict) -> Estimate:
@@ -71,7 +71,7 @@ def with_own(readings: Readings, effects, positions, values: dict) -> Estimate:
     free = mask_of(columns, [name for name in own if name != CLOCK])
     if CLOCK not in own:
         return estimate([one], columns, free)
-    one = estimate([one], columns, free, steps=SETTINGS.rung_steps).recorded[0]
+    one = estimate([one], columns, free, steps=SETTINGS.group_steps).recorded[0]
     clocks, keep = shown_clocks(one, columns), readings.keep
     imus = sorted(clocks)
     one = with_clocks(one, columns, clocks)

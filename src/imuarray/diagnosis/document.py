@@ -21,8 +21,8 @@ from imuarray.diagnosis.state import heldout_gain, need
 from imuarray.diagnosis.words import cause_in_words, parameters_of, sensors_of
 from imuarray.engine.estimate import Estimate
 from imuarray.engine.fit import Fit, at, fit
+from imuarray.engine.forward import resumed
 from imuarray.engine.heldout import Scores, gain, log_scores
-from imuarray.engine.ladder import resumed
 from imuarray.engine.parameters import POSITION, prior_precision
 from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.engine.widths import widths

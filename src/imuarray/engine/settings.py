@@ -47,7 +47,7 @@ class Settings:
 
     # Robust estimation of several recordings (`estimate`)
     iterations: int = 40  # Gauss-Newton steps at most
-    rung_steps: int = 6  # the same of the bare model, before rungs of the sensor model are tried
+    group_steps: int = 6  # the same of the bare model, before groups of the sensor model are tried
     rung_again: int = 4  # the same while they are tried
     robust_first: int = 4  # of them with Student's t of 4, until readings far out are seen
     alternating: float = 0.3  # of a step that the next one goes back: the valley is crossed

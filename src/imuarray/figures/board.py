@@ -1,4 +1,4 @@
-"""A measured board under the sensor model: what each cause buys, prediction, past the rail."""
+"""A measured board under the sensor model: what each cause gains, prediction, past the rail."""
 
 import numpy as np
 import pandas as pd
@@ -73,7 +73,7 @@ def table_causes(summary: pd.DataFrame, group: str):
         " coordinates. Nats: what is new in a row gains on held-out time over the row that it"
         " extends, median over recordings."
     )
-    return summary, CAUSES, "How positions repeat, and what each cause buys", [note]
+    return summary, CAUSES, "How positions repeat, and what each cause gains", [note]
 
 
 EXPERIMENT = (

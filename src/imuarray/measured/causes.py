@@ -1,4 +1,4 @@
-"""Gain of each cause: a board's recordings fitted rung by rung, and how the positions repeat."""
+"""Gain of each cause: a board's recordings fitted group by group, and how the positions repeat."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from imuarray.engine.estimate import Estimate, Recorded, estimate
-from imuarray.engine.ladder import GYROSCOPES, RUNGS, Climbed, gains, mask_of
+from imuarray.engine.forward import EFFECT_GROUPS, GYROSCOPES, Selected, gains, mask_of
 from imuarray.engine.parameters import POSITION, columns_of
 from imuarray.engine.readings import arrange, determined, most_informative
 from imuarray.engine.widths import widths
@@ -26,7 +26,7 @@ STEPS = {
 }
 
 
-def bought(recording: Recording) -> pd.DataFrame:
+def stepwise(recording: Recording) -> pd.DataFrame:
     """Positions of a corrected recording under each of `STEPS`, a row a coordinate.
 
     Columns step, accelerometer, axis, mean_m, sd_m; and of the step residual_ratio (rms residual
@@ -57,18 +57,18 @@ def bought(recording: Recording) -> pd.DataFrame:
 
 def _fits(readings) -> Iterator[tuple[str, Estimate, tuple[float, float]]]:
     """(step, its estimate, (nats gained, their error)), all of `STEPS` in order."""
-    effects = [effect for ids in RUNGS.values() for effect in ids]
+    effects = [effect for ids in EFFECT_GROUPS.values() for effect in ids]
     columns = columns_of(readings.array, effects, readings.position_prior_sd)
     apart = replace(columns, common_sd=np.zeros(columns.size))
     begun, nothing = [Recorded.of(readings, columns)], (np.nan, np.nan)
     placed = mask_of(columns, [POSITION])
     yield "normal", estimate(begun, columns, placed, robust=False), nothing
-    robust = Climbed(estimate(begun, apart, placed), (readings.keep,), {})
+    robust = Selected(estimate(begun, apart, placed), (readings.keep,), {})
     yield "robust", robust.found, nothing
     yield "no clocks", *_more(robust, [LAG, GYROSCOPES, ARMS])[1:]
-    clocked, rungs = robust.clocked()
+    clocked, groups = robust.clocked()
     clocked = clocked.fitted()
-    yield "clocks", clocked.found, (rungs[0].gain, rungs[0].error)
+    yield "clocks", clocked.found, (groups[0].gain, groups[0].error)
     lagging, found, gain = _more(clocked, [LAG, GYROSCOPES])
     yield "no arms", found, gain
     own, found, gain = _more(lagging, [ARMS])
@@ -77,18 +77,18 @@ def _fits(readings) -> Iterator[tuple[str, Estimate, tuple[float, float]]]:
     yield "common arms", common.fitted().found, nothing
 
 
-def _more(now: Climbed, names) -> tuple[Climbed, Estimate, tuple[float, float]]:
-    """With more rungs, and what they gain."""
-    mask = mask_of(now.found.columns, [effect for name in names for effect in RUNGS[name]])
-    rung = gains(now.found, {"all": mask}, now.kept)[0]
+def _more(now: Selected, names) -> tuple[Selected, Estimate, tuple[float, float]]:
+    """With more groups, and what they gain."""
+    mask = mask_of(now.found.columns, [effect for name in names for effect in EFFECT_GROUPS[name]])
+    group = gains(now.found, {"all": mask}, now.kept)[0]
     now = now.with_kept(names).fitted()
-    return now, now.found, (rung.gain, rung.error)
+    return now, now.found, (group.gain, group.error)
 
 
 def repeated(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
     """Repeatability of positions between recordings, a row for each of `STEPS`.
 
-    ``tables`` {recording: `bought`}. Differences of all pairs: rms_m, median_m, covered (share in
+    ``tables`` {recording: `stepwise`}. Differences of all pairs: rms_m, median_m, covered (share in
     95 % intervals), same_size_rms_m (each array brought to the mean size); size_sd (relative, of
     the arrays' sizes); common_size_m (rms of the coordinates' error by a scale that all share);
     medians over recordings of residual_ratio, smooth_ratio and nats.

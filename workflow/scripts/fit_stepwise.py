@@ -1,13 +1,13 @@
-"""One corrected recording fitted rung by rung -> CSV."""
+"""One corrected recording fitted group by group -> CSV."""
 
 from imuarray.pipeline.job import job
 
 with job(snakemake):
     from pathlib import Path
 
-    from imuarray.measured.causes import bought
+    from imuarray.measured.causes import stepwise
     from imuarray.provenance import write_csv
     from imuarray.recording import read_recording
 
     recording = read_recording(Path(snakemake.input[0]) / f"{snakemake.wildcards.name}.nc")
-    write_csv(bought(recording), snakemake.output[0])
+    write_csv(stepwise(recording), snakemake.output[0])

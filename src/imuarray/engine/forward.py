@@ -1,4 +1,4 @@
-"""The standard sensor model: what most boards need, each rung kept where held-out time gains."""
+"""The standard sensor model: what most boards need, each group kept where held-out time gains."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from imuarray.linear import scaled_inverse
 from imuarray.model.effects import EFFECTS
 
 CLOCKS, DELAYS, GYROSCOPES = "clocks of the IMUs", "delay of each IMU", "gyroscope maps"
-RUNGS = {
+EFFECT_GROUPS = {
     CLOCKS: (CLOCK,),
     "offsets": OFFSETS,
     DELAYS: ("sensor_delay",),
@@ -47,11 +47,11 @@ RUNGS = {
 AGREES = 1.02  # times the residual that a prior of omega_dot may make
 CHANCE = 1e-3  # of maps as far from those of first order, of positions as far apart
 LEAST_SHARE = 0.03  # of the variance, by which two estimates may differ at least
-LEAST_Z, LEAST_NATS = 2.0, 2.0  # standard errors of a gain, and nats, from which a rung is kept
+LEAST_Z, LEAST_NATS = 2.0, 2.0  # standard errors of a gain, and nats, from which a group is kept
 
 
-class Rung(NamedTuple):
-    """A rung and what it gains on held-out time: nats, their standard error; whether it is kept."""
+class EffectGroup(NamedTuple):
+    """A group and its gain on held-out time: nats, their standard error; whether it is kept."""
 
     name: str
     gain: float
@@ -89,49 +89,53 @@ def resumed(readings: Readings, columns: Columns, active, state: State) -> Estim
     return settled(estimate([recorded], columns, active))
 
 
-def rungs_of(readings: Sequence[Readings]) -> list[str]:
+def groups_of(readings: Sequence[Readings]) -> list[str]:
     """Rungs that recordings may determine: none of fewer samples than two in a block."""
     if sum(len(one.time) for one in readings) < 2 * SETTINGS.blocks:
         return []
     smooth = all(one.gapless for one in readings)
-    return [n for n, ids in RUNGS.items() if smooth or not any(map(_needs_neighbours, ids))]
+    return [n for n, ids in EFFECT_GROUPS.items() if smooth or not any(map(_needs_neighbours, ids))]
 
 
-def climb(readings: Sequence[Readings], bare: bool = True) -> tuple[Estimate, list[Rung]]:
-    """The sensor model of a board from its recordings, rung by rung.
+def select_forward(
+    readings: Sequence[Readings], bare: bool = True
+) -> tuple[Estimate, list[EffectGroup]]:
+    """The sensor model of a board from its recordings, group by group.
 
-    Each sweep tests the rungs in order, beside those that it has kept before; what is kept is
+    Each sweep tests the groups in order, beside those that it has kept before; what is kept is
     fitted, then the others are tested again. At last each must still gain beside all others, but
     for clocks, whose jumps a fit does not move. Gyroscope maps at odds with those of first order
     are estimated, too. Where motion is smooth and no sensor late, the rate's own change is then a
-    prior of omega_dot. ``bare``: whether the last fit is wanted where no rung is kept. InputError
+    prior of omega_dot. ``bare``: whether the last fit is wanted where no group is kept. InputError
     or LinAlgError where the readings do not determine positions or motion.
     """
-    names = rungs_of(readings)
-    effects = [effect for name in names for effect in RUNGS[name]]
+    names = groups_of(readings)
+    effects = [effect for name in names for effect in EFFECT_GROUPS[name]]
     effects += [name for name in corrected(*(one.left for one in readings)) if name not in effects]
     columns = columns_of(readings[0].array, effects, readings[0].position_prior_sd)
     begun = [Recorded.of(one, columns) for one in readings]
-    found = estimate(begun, columns, mask_of(columns, [POSITION]), steps=SETTINGS.rung_steps)
-    now = Climbed(found, tuple(one.readings.keep for one in begun), {})
-    clocks, rungs = [], []
+    found = estimate(begun, columns, mask_of(columns, [POSITION]), steps=SETTINGS.group_steps)
+    now = Selected(found, tuple(one.readings.keep for one in begun), {})
+    clocks, groups = [], []
     for _ in names:
         before = set(now.kept)
         if CLOCKS in names and CLOCKS not in now.kept:
             now, clocks = now.clocked()
-        rungs = now.tried(names)
-        now = now.with_kept([rung.name for rung in rungs if rung.kept])
+        groups = now.tried(names)
+        now = now.with_kept([group.name for group in groups if group.kept])
         if set(now.kept) == before:
             if GYROSCOPES in names and beside_maps(now.found)[1].get("gyroscope", 1.0) < CHANCE:
-                rungs = [rung._replace(kept=rung.kept or rung.name == GYROSCOPES) for rung in rungs]
+                groups = [
+                    group._replace(kept=group.kept or group.name == GYROSCOPES) for group in groups
+                ]
                 now = now.with_kept([GYROSCOPES])
             break
         now = now.fitted(SETTINGS.rung_again)
-    now = now.without([rung.name for rung in rungs if not rung.kept])
+    now = now.without([group.name for group in groups if not group.kept])
     if not (now.kept or bare):
-        return now.found, clocks + rungs
+        return now.found, clocks + groups
     found = now.fitted().found
-    late = any(_needs_neighbours(effect) for name in now.kept for effect in RUNGS[name])
+    late = any(_needs_neighbours(effect) for name in now.kept for effect in EFFECT_GROUPS[name])
     pair = readings[0].pair
     if all(one.smooth for one in found.recorded) and (pair or not late):
         begun = [
@@ -142,11 +146,11 @@ def climb(readings: Sequence[Readings], bare: bool = True) -> tuple[Estimate, li
         alike = better.residual_ratio() < AGREES * found.residual_ratio()
         if pair or (alike and _of_one_truth(found, better)):
             found = better
-    return settled(found), clocks + rungs
+    return settled(found), clocks + groups
 
 
-class Climbed(NamedTuple):
-    """The ladder so far: ``kept`` {rung: (N, m) bool}, ``keep`` of each recording all readings."""
+class Selected(NamedTuple):
+    """Forward selection so far: ``kept`` {group: (N, m) bool}, ``keep`` of each recording."""
 
     found: Estimate
     keep: tuple[np.ndarray, ...]
@@ -158,39 +162,39 @@ class Climbed(NamedTuple):
         placed = mask_of(self.found.columns, [POSITION])
         return np.any([placed, *self.kept.values()], axis=0)
 
-    def with_kept(self, names) -> Climbed:
-        """With more rungs kept."""
-        new = {name: mask_of(self.found.columns, RUNGS[name]) for name in names}
+    def with_kept(self, names) -> Selected:
+        """With more groups kept."""
+        new = {name: mask_of(self.found.columns, EFFECT_GROUPS[name]) for name in names}
         return self._replace(kept=new | self.kept)
 
-    def without(self, names) -> Climbed:
+    def without(self, names) -> Selected:
         """Without some of those kept, their parameters back at zero."""
         now = self._replace(kept={n: mask for n, mask in self.kept.items() if n not in names})
         recorded = tuple(without(self.found, now.active))
         return now._replace(found=replace(self.found, recorded=recorded))
 
-    def tried(self, names) -> list[Rung]:
-        """Gains of the rungs, but those of which a clock is the whole."""
+    def tried(self, names) -> list[EffectGroup]:
+        """Gains of the groups, but those of which a clock is the whole."""
         part = EFFECTS[CLOCK].contains if CLOCKS in self.kept else ()
-        asked = [n for n in names if n != CLOCKS and not set(RUNGS[n]) <= set(part)]
-        masks = {name: mask_of(self.found.columns, RUNGS[name]) for name in asked}
+        asked = [n for n in names if n != CLOCKS and not set(EFFECT_GROUPS[n]) <= set(part)]
+        masks = {name: mask_of(self.found.columns, EFFECT_GROUPS[name]) for name in asked}
         return gains(self.found, masks, self.kept)
 
-    def clocked(self) -> tuple[Climbed, list[Rung]]:
-        """With clocks, if IMUs' ages show some and these gain; and that rung, if there is one."""
+    def clocked(self) -> tuple[Selected, list[EffectGroup]]:
+        """With clocks, if IMUs' ages show some and these gain; and that group, if there is one."""
         columns, recorded = self.found.columns, self.found.recorded
         each = [shown_clocks(one, columns) for one in recorded]
         imus = sorted(set().union(*each))
         if not imus or not self.clocks_beside_delays():
-            return self, [Rung(CLOCKS, 0.0, 0.0, False)]
+            return self, [EffectGroup(CLOCKS, 0.0, 0.0, False)]
         hinted = tuple(
             with_clocks(one, columns, own) for one, own in zip(recorded, each, strict=True)
         )
         now = self._replace(found=replace(self.found, recorded=hinted))
         mask = mask_of(columns, [CLOCK])
         mask[np.setdiff1d(np.arange(len(mask)), imus)] = False
-        rung = gains(now.found, {CLOCKS: mask}, self.kept)[0]
-        return (now._replace(kept={CLOCKS: mask} | self.kept) if rung.kept else self), [rung]
+        group = gains(now.found, {CLOCKS: mask}, self.kept)[0]
+        return (now._replace(kept={CLOCKS: mask} | self.kept) if group.kept else self), [group]
 
     def clocks_beside_delays(self) -> bool:
         """True where ages show clocks once delays are fitted: a late IMU's misfit may, too."""
@@ -199,7 +203,7 @@ class Climbed(NamedTuple):
         found = self.with_kept([DELAYS]).fitted(SETTINGS.rung_again).found
         return any(shown_clocks(one, found.columns) for one in found.recorded)
 
-    def fitted(self, steps: int = SETTINGS.iterations) -> Climbed:
+    def fitted(self, steps: int = SETTINGS.iterations) -> Selected:
         """With all that is kept estimated, each reading in its clock's turn."""
         columns, recorded = self.found.columns, list(self.found.recorded)
         if CLOCKS in self.kept:
@@ -274,12 +278,12 @@ def mask_of(columns: Columns, effects) -> np.ndarray:
     return np.isin(columns.names, list(effects)) & columns.owner
 
 
-def gains(found: Estimate, masks: dict, kept: dict | None = None) -> list[Rung]:
-    """Gain of each rung on held-out time beside those kept, and those before it that gain.
+def gains(found: Estimate, masks: dict, kept: dict | None = None) -> list[EffectGroup]:
+    """Gain of each group on held-out time beside those kept, and those before it that gain.
 
-    ``masks``, ``kept`` {rung: (N, m) bool}. By one linearisation with all of them. Maps that first
-    order has left are beside them all, as uncertain as it left them: what they explain is no rung's
-    gain.
+    ``masks``, ``kept`` {group: (N, m) bool}. By one linearisation with all of them. Maps that first
+    order has left are beside them all, as uncertain as it left them: what they explain is no
+    group's gain.
     """
     kept = kept or {}
     left = _left(found)
@@ -311,8 +315,8 @@ class _Given(NamedTuple):
         return found
 
 
-def _tried(name: str, given: _Given, own, beside, left) -> Rung:
-    """A rung's gain, and whether it is kept; ``own`` and ``beside`` (N, m) bool."""
+def _tried(name: str, given: _Given, own, beside, left) -> EffectGroup:
+    """A group's gain, and whether it is kept; ``own`` and ``beside`` (N, m) bool."""
     freed, used, ridge = given.chosen(own), given.chosen(beside | own), given.precision.copy()
     spare, known = np.zeros(len(used), bool), None
     for mask, spread in left:
@@ -328,4 +332,6 @@ def _tried(name: str, given: _Given, own, beside, left) -> Rung:
     system = parts, ridge[square], given.values[used], freed[used]
     nats, error = gain_of(*system, spare[used])
     good = nats > max(LEAST_Z * error, LEAST_NATS)
-    return Rung(name, nats, error, bool(good and (known is None or _contradicted(*system, known))))
+    return EffectGroup(
+        name, nats, error, bool(good and (known is None or _contradicted(*system, known)))
+    )
