@@ -25,6 +25,10 @@ def test_bags(tmp_path, kind):
     assert 0 < read
 
 
+def tables(*given):
+    return read_tables(*given)[0]
+
+
 def attempts(folder, kind: str, count: int, seed: int) -> int:
     """How many of ``count`` damaged bags are read, each in one of its files."""
     rng, read = np.random.default_rng([seed, KINDS.index(kind)]), 0
@@ -63,7 +67,7 @@ def descriptions(folder, kind: str, count: int, seed: int) -> int:
     if kind == "csv":
         stamps, files = three()
         put_tables(folder, files)
-        logs, reader = [folder / f"{name}.csv" for name in stamps], read_tables
+        logs, reader = [folder / f"{name}.csv" for name in stamps], tables
     else:
         put(folder, rig())
         logs, reader = [write(folder / "run", kind, readings(4))], read_bags

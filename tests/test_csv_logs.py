@@ -44,7 +44,7 @@ def put(folder, files: dict, columns=None) -> Recording | rig.Rig:
         paths[-1].write_text("\n".join(",".join(map(str, row)) for row in rows) + "\n")
     columns = description() if columns is None else columns
     (folder / "rig.yaml").write_text(yaml.safe_dump(columns, sort_keys=False))
-    return read_tables(paths, folder / "rig.yaml")
+    return read_tables(paths, folder / "rig.yaml")[0]
 
 
 def log(stamps, values, names="t,ax,ay,az,gx,gy,gz"):

@@ -99,10 +99,11 @@ def _opened(paths, columns, topics) -> Opened:
     if len(logs) == 1 and logs[0].name.endswith(PACKETS):
         recording, account = read_board(logs[0], Path(columns))
         return Opened(recording, account.lines())
-    found = read_tables(logs, columns)
+    found, lines = read_tables(logs, columns)
     if isinstance(found, Recording):
         found = _with_rails(found, read_layout(columns))
-    return _together(found)
+    opened = _together(found)
+    return opened._replace(lines=[*lines, *opened.lines])
 
 
 def _together(found: Recording | Rig) -> Opened:

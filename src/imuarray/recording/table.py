@@ -26,12 +26,20 @@ from imuarray.recording.layout import (
 from imuarray.recording.record import Recording
 from imuarray.recording.rig import Readings, Rig, pair, to_rig
 from imuarray.recording.units import factor, require_plausible_rate
+from imuarray.recording.written import (
+    form_of,
+    in_order,
+    numbering,
+    seconds_of_dates,
+    shared_words,
+)
 
 LEAVE_OUT = "leave out"  # what `incomplete_rows` may be
 FEW = 20  # stamps, of which a rate is worth looking at
 OFTEN = 0.1  # share of blank cells from which a sensor is slower than the log
 BLANK = "; `incomplete_rows: leave out` keeps the rows that are whole"
 WHITESPACE = r"\s+"  # the one delimiter longer than a character
+HALF = 0.5  # of the rows share their stamps: one row for each sensor, perhaps
 LONG = 400  # rows, in which missed readings are bridged; blanks in fewer are a damaged table
 
 
@@ -41,39 +49,44 @@ def read_csv(path: str | PathLike, columns: str | PathLike) -> Recording:
     InputError, with the row or the key, for anything that does not fit.
     """
     layout = read_layout(columns)
-    return recording_of(load(path, layout, columns), layout, path, columns)
+    return recording_of(load(path, layout, columns)[0], layout, path, columns)[0]
 
 
-def recording_of(table: pd.DataFrame, layout, path, columns) -> Recording:
-    """The rows of a board's table as samples; InputError as `read_csv`."""
+def recording_of(table: pd.DataFrame, layout, path, columns) -> tuple[Recording, list[str]]:
+    """A board's table as samples, and what was done to its rows; InputError as `read_csv`."""
     if "imus" in layout:
         raise InputError(f"{columns}: expected triads, found IMUs, each with its own stamps")
     where, name = str(path), str(columns)
     table, account = _whole(table, layout, name)
+    time, rows, lines = _time(table, layout["time"], where, name)
+    table = table.iloc[rows]
     force, labels = _sensors(table, layout, "accelerometers", where, name)
     rate, rate_labels = _sensors(table, layout, "gyroscopes", where, name)
     given = numbers(layout, name)
     if "output_rate" in layout:
         given["output_period"] = 1 / positive(layout["output_rate"], f"{name}: output_rate")
     triads = layout["accelerometers"]["triads"]
-    return Recording(
-        time=_time(table, layout["time"], where, name), specific_force=force, angular_rate=rate,
+    found = Recording(
+        time=time, specific_force=force, angular_rate=rate,
         accelerometer_position=positions(triads, layout, f"{name}: accelerometers"),
         accelerometer_labels=labels, gyroscope_labels=rate_labels,
         accelerometer_axes=np.array([_turn(triad, f"{name}: {x}") for x, triad in triads.items()]),
         source=Path(path).name, selected=account, **given,
     )  # fmt: skip
+    return found, lines
 
 
-def load(path, layout, columns) -> pd.DataFrame:
-    """The table; its columns are as the header names them, so that two of a name are seen."""
-    options = {"sep": layout.get("delimiter", ","), "comment": layout.get("comment")}
-    comment = "#" if options["comment"] is None else options["comment"]
-    for key, value in (("delimiter", options["sep"]), ("comment", comment)):
+def load(path, layout, columns) -> tuple[pd.DataFrame, list[str]]:
+    """The table, and how it is written; columns as its header has them: twins are seen."""
+    options = {"sep": layout.get("delimiter"), "comment": layout.get("comment")}
+    given = (("delimiter", options["sep"], ","), ("comment", options["comment"], "#"))
+    for key, value, usual in given:
+        value = usual if value is None and key not in layout else value
         runs = key == "delimiter" and value == WHITESPACE
         if not isinstance(value, str) or (len(value) != 1 and not runs):
             raise InputError(f"{columns}: {key}: expected one character, found {value!r}")
     try:
+        options, lines = form_of(Path(path), _named(layout), options)
         # Two rows: a first data row longer than the header is an error here, while with a header
         # pandas would take its first cell for an index and move every name by one column.
         head = pd.read_csv(path, skipinitialspace=True, header=None, nrows=2, dtype=str, **options)
@@ -82,7 +95,18 @@ def load(path, layout, columns) -> pd.DataFrame:
     except (OSError, ValueError, UnicodeDecodeError) as error:
         message = " ".join(str(error).split())
         raise InputError(f"{path}: expected a CSV file with a header, found {message}") from None
-    return table
+    return table, lines
+
+
+def _named(section) -> set[str]:
+    """Columns that a layout names, anywhere in it."""
+    if isinstance(section, list):
+        return set().union(*map(_named, section))
+    if not isinstance(section, dict):
+        return set()
+    own = [section[key] for key in ("column", "columns") if key in section]
+    names = {str(x) for one in own for x in (one if isinstance(one, list) else [one])}
+    return names.union(*map(_named, section.values()))
 
 
 def used(table: pd.DataFrame, layout) -> pd.DataFrame:
@@ -166,20 +190,28 @@ def stamps_of(table, section, where, layout_name, blank: bool = False) -> tuple[
         raise InputError(
             f"{layout_name}: time: expected 'column' and 'unit', or 'rate' in Hz, found {section!r}"
         )
-    unit = factor("time", section["unit"], f"{layout_name}: time: unit")
-    stamps = column(table, str(section["column"]), where, blank)
+    name, dated = str(section["column"]), None
+    if list(table.columns).count(name) == 1:
+        dated = seconds_of_dates(table[name])
+    unit = 1e-9
+    if dated is None:
+        unit = factor("time", section["unit"], f"{layout_name}: time: unit")
+    stamps = column(table, name, where, blank) if dated is None else dated
     known = stamps[np.isfinite(stamps)]
     if len(known) >= FEW:
-        place = f"{where}: column {section['column']!r}"
+        place = f"{where}: column {name!r}"
         require_plausible_rate(unit * (known - known[0]), place, section["unit"])
     return stamps, unit
 
 
-def _time(table, section, where, layout_name) -> np.ndarray:
+def _time(table, section, where, layout_name) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """Times (T,) s, the rows that they are of, and lines on what was done to the stamps."""
     values, unit = stamps_of(table, section, where, layout_name)
+    rows, lines = np.arange(len(values)), []
     if "rate" in section:
-        return values
-    values = values.astype(float)
+        return values, rows, lines
+    values, rows, lines = in_order(values, table, f"{where}: column {section['column']!r}")
+    table = table.iloc[rows]
     back = np.flatnonzero(np.diff(values) <= 0)
     if back.size:
         i = back[0]
@@ -189,11 +221,13 @@ def _time(table, section, where, layout_name) -> np.ndarray:
             f" ({back.size} such steps)"
         )
     # from the first sample: microseconds since 1970 would cost the last digits
-    return unit * (values - values[0]) if values.size else values
+    return unit * (values - values[:1]).astype(float), rows, lines
 
 
-def read_tables(paths: Sequence[str | PathLike], columns: str | PathLike) -> Recording | Rig:
-    """One table of a board with whole rows, or logs with stamps of their own.
+def read_tables(
+    paths: Sequence[str | PathLike], columns: str | PathLike
+) -> tuple[Recording | Rig, list[str]]:
+    """One table of a board with whole rows, or logs with stamps of their own; how it is written.
 
     ``columns`` is the YAML of docs/convert.md. InputError, with the row or the key, for anything
     that does not fit.
@@ -201,9 +235,12 @@ def read_tables(paths: Sequence[str | PathLike], columns: str | PathLike) -> Rec
     layout, files = read_layout(columns), [Path(path) for path in paths]
     if "imus" not in layout and len(files) > 1:
         raise InputError(f"{columns}: expected 'imus', one for each log, found triads of one table")
-    loaded = {path: load(path, layout, columns) for path in files}
+    loaded, lines = {}, []
+    for path in files:
+        loaded[path], said = load(path, layout, columns)
+        lines += said
     if "imus" in layout:
-        return _read(loaded, layout, layout["imus"], str(columns))
+        return _read(loaded, layout, layout["imus"], str(columns)), lines
     table = loaded[files[0]]
     blank = used(table, layout).isna().mean()
     slow = (blank > (0.0 if len(table) > LONG else OFTEN)).any()
@@ -212,8 +249,9 @@ def read_tables(paths: Sequence[str | PathLike], columns: str | PathLike) -> Rec
             raise InputError(
                 f"{columns}: output_rate: expected none where cells are blank, found one"
             )
-        return _read(loaded, layout, _imus(layout, str(columns)), str(columns))
-    return recording_of(table, layout, files[0], columns)
+        return _read(loaded, layout, _imus(layout, str(columns)), str(columns)), lines
+    found, said = recording_of(table, layout, files[0], columns)
+    return found, lines + said
 
 
 def _read(loaded, layout, imus: dict[str, dict], name: str) -> Rig:
@@ -261,6 +299,9 @@ def _readings(table, path: str, names, time, unit: float, where: str) -> Reading
     names = three_columns(names, where)
     values = [column(table, name, path, blank=True).astype(float) for name in names]
     stamps, second = stamps_of(table, time, path, where, blank=True)
+    steps = np.diff(stamps[np.isfinite(stamps)])
+    if len(steps) and np.mean(steps == 0) > HALF and numbering(table):
+        raise InputError(f"{path}: {shared_words(steps, table)}")
     return Readings(stamps, second, unit * np.stack(values, axis=1), f"{path}: {', '.join(names)}")
 
 

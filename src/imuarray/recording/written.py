@@ -1,0 +1,158 @@
+"""Tables as loggers and spreadsheets write them: encoding, heads, decimal marks, dates, stamps."""
+
+import re
+from itertools import islice
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from imuarray.errors import InputError
+
+SNIFFED, HEAD = 1 << 16, 60  # bytes that tell an encoding; lines among which the header is
+DELIMITERS = ",", ";", "\t", "|"
+DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
+MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
+WIDTHS = 16, 32  # bits of counters that begin anew
+OFTEN = 0.05  # share of rows from which equal stamps are how the logger stamps
+FEW = 20  # rows, of which nothing is sure
+SENSORS = 64  # distinct values of a column that may number the sensors
+
+
+class Form(NamedTuple):
+    """Options of `pandas.read_csv`, and lines that say what was found."""
+
+    options: dict
+    lines: list[str]
+
+
+def form_of(path: Path, named: set[str], given: dict) -> Form:
+    """Form of a table; ``named``: columns that it must have, ``given``: the YAML's own options.
+
+    The header is the first line that has the most of the columns, as its delimiter parts them.
+    """
+    encoding = _encoding(path)
+    with open(path, encoding=encoding, errors="replace", newline=None) as file:
+        lines = [line.rstrip("\n") for line in islice(file, HEAD)]
+    asked = given.get("sep")
+    best, skip, sep = 0, 0, asked or ","
+    for number, line in enumerate(lines):
+        for delimiter in [asked] if asked else DELIMITERS:
+            found = len(named & set(_cells(line, delimiter)))
+            if found > best:
+                best, skip, sep = found, number, delimiter
+    comma = sep != "," and any(
+        DECIMAL_COMMA.fullmatch(cell) for line in lines[skip + 1 :] for cell in _cells(line, sep)
+    )
+    said = [f"encoding {encoding}"] * (encoding != "utf-8")
+    said += [f"{skip} lines before the header left out"] * (skip > 0)
+    said += [f"columns parted by {sep!r}"] * (sep != (asked or ","))
+    said += ["decimal commas"] * comma
+    options = given | {
+        "sep": sep, "skiprows": skip, "encoding": encoding, "decimal": "," if comma else ".",
+    }  # fmt: skip
+    return Form(options, [f"{path.name}: {', '.join(said)}"] if said else [])
+
+
+def _cells(line: str, delimiter: str) -> list[str]:
+    parts = line.split() if delimiter == r"\s+" else line.split(delimiter)
+    return [part.strip().strip('"') for part in parts]
+
+
+def _encoding(path: Path) -> str:
+    with open(path, "rb") as file:
+        start = file.read(SNIFFED)
+    for mark, name in MARKS.items():
+        if start.startswith(mark):
+            return name
+    try:
+        start[:-4].decode("utf-8")  # the last character may be cut
+    except UnicodeDecodeError:
+        return "utf-8" if b"\0" in start else "cp1252"
+    return "utf-8"
+
+
+def seconds_of_dates(cells: pd.Series) -> np.ndarray | None:
+    """Nanoseconds (N,) of cells that are dates or times of day; None where one is not."""
+    if cells.dtype.kind != "O" or not len(cells):
+        return None
+    if re.match(r"\d+:\d+:", str(cells.iloc[0])):
+        found = pd.to_timedelta(cells, errors="coerce").to_numpy("timedelta64[ns]")
+    else:
+        dates = pd.to_datetime(cells, format="ISO8601", utc=True, errors="coerce")
+        found = dates.dt.tz_localize(None).to_numpy("datetime64[ns]")
+    return None if np.isnat(found).any() else found.astype("int64")
+
+
+def in_order(stamps, table: pd.DataFrame, where: str) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """(stamps that increase, their rows, lines that say what was done) of a table's stamps (N,).
+
+    A counter that begins anew is carried on; rows out of order are sorted where that leaves even
+    steps; of rows with the stamp of the row before, copies are left out, others put midway. Where
+    none of that does it stamps stay as they are. InputError where many rows share their stamps.
+    """
+    rows, said = np.arange(len(stamps)), []
+    stamps, bits = _carried_on(stamps)
+    if bits:
+        said.append(f"{where}: a counter of {bits} bits began anew: carried on")
+    steps, few = np.diff(stamps), OFTEN * len(stamps)
+    if np.sum(steps == 0) > few and len(stamps) > FEW:
+        raise InputError(f"{where}: {shared_words(steps, table)}")
+    usual = np.median(steps) if len(steps) else 0.0
+    if 0 < np.sum(steps < 0) < few:
+        order = np.argsort(stamps, kind="stable")
+        left = np.diff(stamps[order])
+        if not np.any((left > 0) & (left < usual / 2)):  # a clock set back would leave such
+            rows, stamps = order, stamps[order]
+            said.append(f"{where}: {np.sum(steps < 0)} rows out of order: sorted by their stamps")
+    again = np.flatnonzero(np.diff(stamps) == 0) + 1
+    if not 0 < len(again) < few:
+        return stamps, rows, said
+    same = table.iloc[rows[again]].to_numpy() == table.iloc[rows[again - 1]].to_numpy()
+    copies = again[same.all(axis=1)]
+    if len(copies):
+        rows, stamps = (np.delete(part, copies) for part in (rows, stamps))
+        said.append(f"{where}: {len(copies)} rows are there twice: left out")
+    again = np.flatnonzero(np.diff(stamps) == 0) + 1
+    again = again[again < len(stamps) - 1]
+    wide = again[stamps[again + 1] - stamps[again] > 1.5 * usual]
+    if len(wide):
+        stamps = stamps + np.zeros(len(stamps), stamps.dtype)
+        stamps[wide] = stamps[wide] + (stamps[wide + 1] - stamps[wide]) // 2
+        said.append(f"{where}: {len(wide)} rows with the stamp of the row before: put midway")
+    return stamps, rows, said
+
+
+def _carried_on(stamps) -> tuple[np.ndarray, int]:
+    """Stamps of a counter that begins anew at 2^bits, and the bits; 0 where it does not."""
+    if stamps.dtype.kind == "i" and len(stamps) > 1:
+        steps = np.diff(stamps)
+        for bits in WIDTHS:
+            if 0 <= stamps.min() and stamps.max() < 2**bits and steps.min() < -(2**bits) / 2:
+                turns = np.concatenate([[0], np.cumsum(steps < -(2**bits) / 2)])
+                return stamps + turns * 2**bits, bits
+    return stamps, 0
+
+
+def shared_words(steps, table: pd.DataFrame) -> str:
+    """Words on many rows that share their stamps: bursts, ticks, or one row for each sensor."""
+    share = f"expected a stamp of its own for each row, found {np.mean(steps == 0):.0%} of the rows"
+    if name := numbering(table):
+        return (
+            f"{share} with the same stamp, and a column {name!r} that numbers the sensors: one row"
+            " for each sensor; expected one row for all, or a log of each sensor"
+        )
+    return (
+        f"{share} with the same stamp: bursts of packets, or ticks of a coarse clock; log the"
+        " sensors' own clock, or declare `time: rate`"
+    )
+
+
+def numbering(table: pd.DataFrame) -> str:
+    """The column whose few values come equally often, as numbers of sensors do, or ""."""
+    for place, name in enumerate(table.columns):
+        counts = table.iloc[:, place].value_counts()
+        if 1 < len(counts) <= SENSORS and counts.min() > 0.9 * counts.max() > FEW:
+            return str(name)
+    return ""
