@@ -18,6 +18,7 @@ ALARM = 1e-6  # p value from which a departure is no chance: 4.9 sds
 SIZES = 0.5, 2.0  # beyond these the size is the first thing to be said
 FAR = 5.0  # sds
 ALIKE = 0.3  # of the drawing's own size: shapes that agree to this are one shape
+FLAT = 0.02  # of the largest extent: a board in one plane
 LEFT = 0.1  # of chi-square may an explanation leave
 AS_GOOD = 10.0  # chi-square by which another explanation may be worse and still be named
 DEGREE = np.degrees(1.0)
@@ -181,12 +182,11 @@ def _explanations(places: Places) -> list[Explanation]:
     ]  # fmt: skip
     if size > 0:
         found.append(Explanation(small_words(size), size * nominal, 1))
-    if places.hand <= 0:
-        found += [
-            Explanation(f"the array comes out mirrored in {axis}: left-handed axes?",
-                        nominal * (1 - 2 * np.eye(3)[i]), 1)
-            for i, axis in enumerate("xyz")
-        ]  # fmt: skip
+    found += [
+        Explanation(f"the array comes out mirrored in {axis}: {_mirrored_words(places)}?",
+                    nominal * (1 - 2 * np.eye(3)[i]), 1)
+        for i, axis in enumerate("xyz")
+    ]  # fmt: skip
     for i, j in combinations(range(len(nominal)), 2):
         order = np.arange(len(nominal))
         order[[i, j]] = j, i
@@ -201,6 +201,15 @@ def _explanations(places: Places) -> list[Explanation]:
         said = f"IMU {label} comes out {distance:.3g} mm from its place: is it the one drawn there?"
         found.append(Explanation(said, moved, 3))
     return found
+
+
+def _mirrored_words(places: Places) -> str:
+    """Mistakes that mirror a drawing; of a flat board half a turn does the same."""
+    sizes = np.linalg.svd(centred(places.nominal), compute_uv=False)
+    words = ["left-handed axes"] if places.hand <= 0 else []
+    words += ["was it drawn from the other side"] if places.hand >= 0 else []
+    words += ["or turned by 180 degrees"] if sizes[-1] < FLAT * sizes[0] else []
+    return ", ".join(words)
 
 
 def _apart(places: Places, k: int) -> np.ndarray:

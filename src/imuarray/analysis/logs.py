@@ -21,6 +21,8 @@ PACKETS = (".bin", ".bin.xz")
 RAIL = 1 - 1e-6  # of the range
 READ = {"accelerometer": "specific_force", "gyroscope": "angular_rate"}
 SURE = 0.8  # of the rates' roughness is left at even instants; a motion too slow shows nothing
+RARE = 0.05  # of the rows: more are no garbage
+SPIKE = 60.0  # times what a triad usually departs from its neighbours in time, or its noise
 LARGE = 0.5  # of the largest reading, from which an abrupt end is a rail and no rest
 
 
@@ -132,7 +134,9 @@ def _sampled(recording: Recording, lines: list[str]) -> Opened:
     from imuarray.alignment.align import SHORTEST, steadied
     from imuarray.alignment.found import JITTER
 
+    recording, cleaned = _less_garbage(recording)
     recording, more = _railed_triads(recording)
+    more = cleaned + more
     if len(recording.time) < SHORTEST:
         return Opened(recording, [*lines, *more])
     time, off = steadied(recording.time, recording.angular_rate.mean(axis=1), SURE)
@@ -143,6 +147,47 @@ def _sampled(recording: Recording, lines: list[str]) -> Opened:
             " even"
         )
     return Opened(recording, [*lines, *more])
+
+
+def _less_garbage(recording: Recording) -> tuple[Recording, list[str]]:
+    """Without rows of zeros; spikes of one triad bridged and marked as lost; lines that say so."""
+    lines: list[str] = []
+    changed: dict[str, Any] = {}
+    empty = ~(recording.specific_force.any(axis=(1, 2)) | recording.angular_rate.any(axis=(1, 2)))
+    if 0 < empty.sum() < RARE * empty.size:
+        recording = recording.select(~empty)
+        lines.append(f"{empty.sum()} rows of zeros left out")
+    for kind, name in READ.items():
+        values = getattr(recording, name)
+        spikes = _spikes(values, getattr(recording, f"{kind}_noise_sd"))
+        if not 0 < spikes.sum() < RARE * len(values):
+            continue
+        t, k = np.nonzero(spikes)
+        values = values.copy()
+        values[t, k] = (values[t - 1, k] + values[t + 1, k]) / 2
+        lost = getattr(recording, f"saturated_{kind}s")().copy()
+        lost[t, k] = True
+        changed |= {name: values, f"{name}_saturated": lost}
+        labels = getattr(recording, f"{kind}_labels")
+        whose = ", ".join(labels[i] for i in np.unique(k))
+        lines.append(f"{kind} {whose}: {len(t)} spikes left out")
+    return replace(recording, **changed) if changed else recording, lines
+
+
+def _spikes(values, noise: float) -> np.ndarray:
+    """(T, K) bool: one reading of one triad far from its neighbours, where the others are not."""
+    found = np.zeros(values.shape[:2], bool)
+    if values.shape[1] < 3 or len(values) < 5:
+        return found
+    apart = values - np.median(values, axis=1, keepdims=True)
+    bend = apart[1:-1] - (apart[:-2] + apart[2:]) / 2
+    usual = np.maximum(np.median(np.abs(bend), axis=0), noise)
+    size = np.max(np.abs(bend) / usual, axis=2)
+    beside = np.maximum(np.pad(size, ((1, 0), (0, 0)))[:-1], np.pad(size, ((0, 1), (0, 0)))[1:])
+    # a spike of one reading bends its neighbours by half, and moves what the others are held against
+    largest = size == size.max(axis=1, keepdims=True)
+    found[1:-1] = (size > SPIKE) & (beside < 0.6 * size) & largest
+    return found
 
 
 def _require_own(log: Log) -> None:

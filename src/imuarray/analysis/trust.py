@@ -13,6 +13,7 @@ from typing import NamedTuple
 import h5py
 import numpy as np
 import xarray as xr
+from scipy.special import stdtr
 
 from imuarray.analysis.checked import FEW, is_of
 from imuarray.analysis.drawing import FAR, Places, another_size, departures, size_of
@@ -28,6 +29,7 @@ from imuarray.recording.record import FIRST_ORDER
 POSES = 3.0  # times the noise of a pose's mean; real boards have up to 1.9
 BENT = 0.01  # m/s^2, a residual that matters: 0.1 % of gravity
 SCALED = 0.03  # of all gyroscopes' common scale: three of its prior's sds
+SEEN, ODD = 5e-3, 1e-4  # the same, where the axes' own scales scatter by less than their mean
 TRIAD = 10.0  # the same of one triad where the noise of each is estimated
 DRIFT = 3.0  # sds of the mean of all samples; offsets that differ by more bias positions
 LEARNT = 0.5  # of the drawing's sd: positions known worse are hardly known from the recording
@@ -48,6 +50,7 @@ class Poses(NamedTuple):
     ratio: float = 1.0  # residual of the poses over their noise
     residual: float = np.nan  # m/s^2, rms of the worst triad
     scale: float = np.nan  # of the map that all gyroscopes share
+    chance: float = 1.0  # of such a mean of all axes' scales, by their own spread
 
 
 def of_first_order(found: FirstOrder) -> Poses:
@@ -55,7 +58,8 @@ def of_first_order(found: FirstOrder) -> Poses:
     common = None if found.gyroscopes is None else found.gyroscopes.common
     scale = np.nan if common is None or isinstance(common, str) else common.scale
     fit = found.triads
-    return Poses(fit.residual_ratio, _worst(fit.residual, fit.relied), scale)
+    chance = _chance(found.gyroscope_matrix) if scale == scale else 1.0
+    return Poses(fit.residual_ratio, _worst(fit.residual, fit.relied), scale, chance)
 
 
 def of_file(path) -> Poses:
@@ -67,8 +71,16 @@ def of_file(path) -> Poses:
         ratio = float(np.ravel(stored.attrs.get("residual_ratio", 1.0))[0])
         residual = _worst(stored["residual"][:], stored["used"][:] != 0)
         common = stored["gyroscope_common"][:] if "gyroscope_common" in stored else [[np.nan]]
-        scale = np.trace(common) / 3
-    return Poses(ratio, residual, float(scale))
+        scale = float(np.trace(common) / 3)
+        chance = _chance(stored["gyroscope_matrix"][:]) if scale == scale else 1.0
+    return Poses(ratio, residual, scale, chance)
+
+
+def _chance(matrices) -> float:
+    """Chance (t distribution) of such a mean of the scales of axes, of maps (G, 3, 3)."""
+    scales = np.linalg.norm(matrices, axis=1).ravel() - 1
+    sd = scales.std(ddof=1) / np.sqrt(scales.size)
+    return float(2 * stdtr(scales.size - 1, -abs(scales.mean()) / max(sd, 1e-300)))
 
 
 def _worst(residual, used) -> float:
@@ -88,8 +100,9 @@ def reasons_of_poses(*several: Poses) -> list[str]:
             " diagnose tells), or recordings are of other boards; sds do not cover that: record"
             " again"
         )
-    scale = max((x.scale for x in several), key=lambda x: abs(x - 1) if x == x else 0.0)
-    if abs(scale - 1) > SCALED:
+    worst = max(several, key=lambda x: abs(x.scale - 1) if x.scale == x.scale else 0.0)
+    scale, odd = worst.scale, worst.chance < ODD
+    if abs(scale - 1) > SCALED or (odd and abs(scale - 1) > SEEN):
         off = 100 * abs(1 / scale - 1)
         much, large = ("much", "small") if scale < 1 else ("little", "large")
         found.append(

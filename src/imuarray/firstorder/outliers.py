@@ -12,6 +12,7 @@ from imuarray.firstorder.triads import Poses, TriadFit, doubted, least_squares, 
 
 OUTLIER = 5.0  # times the median size of a residual
 SHARED = 5.0  # times the median of what leaving out a pose gains, the worst of its triads apart
+GONE = 0.2  # of gravity: readings without it
 MOST_OFF = 0.5  # relative, of a pose's mean specific force from gravity
 MOST_LEFT_OUT = 0.2  # of a triad's poses
 NEARLY = 0.5  # of the largest gain: as many triads leave out a reading at once
@@ -41,10 +42,16 @@ def fit_triads(mean, sd, magnitude: float, labels=None, recording=None, time=Non
     Raises
     ------
     InputError
-        Where the mean over triads is nowhere near ``magnitude``, or a triad is mirrored.
+        Where the mean over triads is nowhere near ``magnitude``, gravity was taken out, or a triad
+        is mirrored.
     IdentifiabilityError
         Where the poses are too few or too alike to determine all parameters.
     """
+    if (size := np.median(np.linalg.norm(mean, axis=2))) < GONE * magnitude:
+        raise InputError(
+            f"still poses: expected gravity in the readings, found {size:.2g} m/s^2: it was taken"
+            " out (linear acceleration); log the raw accelerometers"
+        )
     recording = np.zeros(len(mean), int) if recording is None else np.asarray(recording)
     time = np.zeros(len(mean)) if time is None else np.asarray(time)
     turns = turns_of(mean, labels or [str(k + 1) for k in range(mean.shape[1])])
