@@ -184,7 +184,7 @@ def _spikes(values, noise: float) -> np.ndarray:
     usual = np.maximum(np.median(np.abs(bend), axis=0), noise)
     size = np.max(np.abs(bend) / usual, axis=2)
     beside = np.maximum(np.pad(size, ((1, 0), (0, 0)))[:-1], np.pad(size, ((0, 1), (0, 0)))[1:])
-    # a spike of one reading bends its neighbours by half, and moves what the others are held against
+    # a spike bends its neighbours by half, and moves what the others are held against
     largest = size == size.max(axis=1, keepdims=True)
     found[1:-1] = (size > SPIKE) & (beside < 0.6 * size) & largest
     return found
