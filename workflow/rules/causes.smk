@@ -92,7 +92,7 @@ rule leave_out:
     benchmark:
         "results/measured/benchmarks/left_out/{name}.tsv"
     priority: 9
-    threads: 2
+    threads: 1
     resources:
         mem_mb=4000,
     params:
@@ -115,7 +115,7 @@ rule predict_left_out:
     benchmark:
         "results/measured/benchmarks/predicted/{name}.tsv"
     priority: 9
-    threads: 2
+    threads: 1
     resources:
         mem_mb=4000,
     params:
@@ -157,7 +157,7 @@ rule locate_experiment:
         "results/measured/logs/located/{name}.log",
     benchmark:
         "results/measured/benchmarks/located/{name}.tsv"
-    threads: 2
+    threads: 1
     resources:
         mem_mb=4000,
     params:
