@@ -21,7 +21,7 @@ from imuarray.posterior.target import GaussianPrior
 
 ROOT = Path(__file__).parents[1]
 SAMPLES = (5, 50, 500)
-NAMES = [f"2017_fig{n}" for n in (3, 4, 5)] + [f"2021_fig{n}" for n in (1, 2, 3, 4, 5)]
+NAMES = [f"2017_fig{n}" for n in (2, 3, 4, 5)] + [f"2021_fig{n}" for n in (1, 2, 3, 4, 5)]
 
 
 def verdict(samples=5, converged=False, **more):
@@ -145,7 +145,7 @@ def test_labels_name_their_units(name):
     figure, _ = case(name)
     labels = [text for axes in figure.axes for text in (axes.get_xlabel(), axes.get_ylabel())]
     labels = [text for text in labels if text]
-    assert len(labels) >= 2
+    assert len(labels) >= 2 or name == "2017_fig2"  # seen obliquely, it has no axes
     assert all(re.search(r"\(.+\)", text) for text in labels), labels
     assert "Scale test" in figure.texts[0].get_text()
 

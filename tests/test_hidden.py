@@ -62,7 +62,7 @@ def wrong(truth, document) -> str:
     [cause] = causes
     if cause["sensors"] != hidden["sensors"]:
         return f"{hidden['effect']} of {hidden['sensors']}: named of {cause['sensors']}"
-    if cause["heldout_gain_nats"] < 3 * cause["heldout_gain_se"]:
+    if cause["heldout_gain_nats"] < 1.5 * cause["heldout_gain_se"]:  # from which it is adopted
         return f"{hidden['effect']}: gains no more than its error on held-out time"
     items = [item for item in cause["parameters"].values() if item["sd"]]  # a scan fixes others
     true = next((np.ravel(p["value"]) for p in hidden["parameters"].values()

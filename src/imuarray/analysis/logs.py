@@ -183,10 +183,12 @@ def _spikes(values, noise: float) -> np.ndarray:
     bend = apart[1:-1] - (apart[:-2] + apart[2:]) / 2
     usual = np.maximum(np.median(np.abs(bend), axis=0), noise)
     size = np.max(np.abs(bend) / usual, axis=2)
-    beside = np.maximum(np.pad(size, ((1, 0), (0, 0)))[:-1], np.pad(size, ((0, 1), (0, 0)))[1:])
-    # a spike bends its neighbours by half, and moves what the others are held against
+    # a spike bends its neighbours by half the other way, and moves what the others are held against
+    square = np.maximum(np.sum(bend**2, axis=2), 1e-300)[1:-1]
+    halves = [np.sum(bend[1:-1] * part, axis=2) / square for part in (bend[:-2], bend[2:])]
+    alone = np.all([(part > -0.8) & (part < -0.2) for part in halves], axis=0)
     largest = size == size.max(axis=1, keepdims=True)
-    found[1:-1] = (size > SPIKE) & (beside < 0.6 * size) & largest
+    found[2:-2] = ((size > SPIKE) & largest)[1:-1] & alone
     return found
 
 

@@ -23,6 +23,7 @@ TAKEN = 0.35  # of the error must be left at most
 LAGS = range(-3, 4)  # samples
 LEAST_LAG = 0.3  # samples
 STILL = 0.05  # of gravity; raw accelerometers are off by some per cent
+JUMP, TWICE = 1.6, 3  # of the largest reading, a jump that is a wrap; how many are no chance
 ENDS, NEXT = 10, 5  # readings at a channel's end, and times those at the values next to it
 ALIKE = 9  # decimals to which equal readings are equal again when a correction is undone
 
@@ -263,6 +264,24 @@ def clipped(recording: Recording) -> list[str]:
                 found.append(f"{kind} {label}, axis {'xyz'[axis]}, is clipped at"
                              f" {' and '.join(f'{end:.4g}' for end in rails)}, within its declared"
                              " range")  # fmt: skip
+    return found
+
+
+def wrapped(recording: Recording) -> list[str]:
+    """A sentence for each gyroscope axis that jumps from one end of its readings to the other."""
+    step, found = np.diff(recording.time), []
+    near = step < 1.5 * np.median(step) if len(step) else step > 0
+    rates = _as_read(recording, "gyroscope")
+    for k, axis in np.ndindex(rates.shape[1:]):
+        values = rates[:, k, axis]
+        jump, end = np.abs(np.diff(values)), np.abs(values).max()
+        beside = np.maximum(np.r_[0, jump[:-1]], np.r_[jump[1:], 0])
+        if np.sum(near & (jump > JUMP * end) & (beside < (2 - JUMP) * end)) >= TWICE:
+            label = recording.gyroscope_labels[k]
+            found.append(
+                f"gyroscope {label}, axis {'xyz'[axis]}, jumps from one end of its readings to the"
+                f" other: it wraps at {np.degrees(end):.4g} deg/s, beyond its range"
+            )
     return found
 
 

@@ -19,7 +19,7 @@ from imuarray.analysis.checked import FEW, is_of
 from imuarray.analysis.drawing import FAR, Places, another_size, departures, size_of
 from imuarray.analysis.misfit import RESIDUAL, is_papers, residuals, rigid, unfitting, unsteady
 from imuarray.analysis.rigid import SLOPE, Slope, elsewhere, kept, slope, turning
-from imuarray.analysis.suspects import MIRRORED, clipped, common, gravity
+from imuarray.analysis.suspects import MIRRORED, clipped, common, gravity, wrapped
 from imuarray.firstorder.correct import FirstOrder
 from imuarray.model.effects import EFFECTS, Effect
 from imuarray.recording import Recording
@@ -30,6 +30,7 @@ POSES = 3.0  # times the noise of a pose's mean; real boards have up to 1.9
 BENT = 0.01  # m/s^2, a residual that matters: 0.1 % of gravity
 SCALED = 0.03  # of all gyroscopes' common scale: three of its prior's sds
 SEEN, ODD = 5e-3, 1e-4  # the same, where the axes' own scales scatter by less than their mean
+HOLD = 1e-6  # chance of maps that still poses gave; 0.97 and more of real and clean boards
 TRIAD = 10.0  # the same of one triad where the noise of each is estimated
 DRIFT = 3.0  # sds of the mean of all samples; offsets that differ by more bias positions
 LEARNT = 0.5  # of the drawing's sd: positions known worse are hardly known from the recording
@@ -136,6 +137,14 @@ def reasons_of_calibration(
         judged += _drifts(recording) if is_papers(calibration) else []
         for reason in [*units, *known] if units else [*little, *known, *judged]:
             found.setdefault(reason, []).append(str(number))
+    for kind in ("accelerometer", "gyroscope"):
+        if not found and calibration.attrs.get(f"{kind}_maps_hold", 1.0) < HOLD:
+            farthest = calibration.attrs[f"{kind}_maps_farthest"]
+            found[
+                f"the map that still poses gave {kind} {farthest} does not hold while the board is"
+                " twisted: did it turn or come loose in between, or does its scale change with the"
+                " rate, the force or the warmth? Record again, poses before and after"
+            ] = list(map(str, range(1, len(several) + 1)))
     judged = [
         reason if len(whose) == len(several) else f"recording {', '.join(whose)}: {reason}"
         for reason, whose in found.items()
@@ -246,7 +255,7 @@ def _judged(
     found = repeated(recording) + gravity(recording)
     if len(moving.time) < FEW:
         return found + _drawn(places, None)
-    found += clipped(moving)
+    found += clipped(moving) + wrapped(moving)
     size = another_size(places)
     alike = [size] if size else [f"{said}?" for said in common(moving)]
     if alike:

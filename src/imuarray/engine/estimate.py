@@ -8,7 +8,7 @@ Effects that a recording has of its own (biases, clocks) have parameters in each
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
@@ -94,6 +94,8 @@ class Estimate:
     freedoms: np.ndarray
     steps: tuple[float, ...]
     converged: bool
+    # by kind of sensor: chance that the correction's maps hold in this motion, the farthest IMU
+    maps_hold: dict[str, tuple[float, int]] = field(default_factory=dict)
 
     @property
     def positions(self) -> np.ndarray:

@@ -144,6 +144,8 @@ def judged(readings: Readings, seen: Pass, owned, former: np.ndarray) -> Reading
     ratio, weight, least = np.ones_like(free), np.ones_like(distance), least_ratio(readings)
     for kind, nu in enumerate(former):
         own = readings.exists[:, kind] & (free[:, kind] > 0)
+        if readings.exists[:, kind].sum() == 1:  # nothing to hold it against: as declared
+            continue
         d, n, s = (part[:, own, kind] for part in (distance, number, squares))
         if not np.isfinite(nu):
             ratio[own, kind] = np.maximum(s.sum(axis=0) / free[own, kind], least[own, kind])

@@ -71,13 +71,16 @@ def beside_maps(found: Estimate) -> tuple[Estimate, dict[str, float]]:
     slope = sum(score for _, score in blocks)
     slope[:count] -= found.precision @ (found.values - means(found))
     whole = scaled_solve(information + precision, slope)[0]
-    step, off, likely = whole[:count], whole[count:], {}
+    step, off, likely, farthest = whole[:count], whole[count:], {}, {}
     for kind in KINDS:
-        own = np.char.startswith(names, kind) & np.isin(names, MAPS)
-        own = np.unique([place[own] - count for place in places])
+        mine = np.char.startswith(names, kind) & np.isin(names, MAPS)
+        own = np.unique([place[mine] - count for place in places])
         if own.size:
-            distance = off[own] @ np.linalg.solve(spread[np.ix_(own, own)], off[own])
-            likely[kind] = float(chdtrc(own.size, distance))
+            likely[kind] = float(chdtrc(own.size, _distance(off, spread, own)))
+            imus = np.nonzero(maps)[0]
+            farthest[kind] = max(set(imus[mine]), key=lambda imu, mine=mine: _distance(
+                off, spread, np.unique([place[mine & (imus == imu)] - count for place in places])
+            ))  # fmt: skip
     recorded = tuple(
         replace(one, state=stepped(one.state, found.columns, found.active, step[place]))
         for one, place in zip(found.recorded, found.places, strict=True)
@@ -85,9 +88,15 @@ def beside_maps(found: Estimate) -> tuple[Estimate, dict[str, float]]:
     # what the blocks say where the step ends: a jackknife takes the rest for their scatter
     blocks = [(inner, score - inner @ whole) for inner, score in blocks]
     found = replace(
-        found, recorded=recorded, information=information, precision=precision, blocks=blocks
-    )
+        found, recorded=recorded, information=information, precision=precision, blocks=blocks,
+        maps_hold={kind: (p, int(farthest[kind])) for kind, p in likely.items()},
+    )  # fmt: skip
     return found, likely
+
+
+def _distance(off, spread, own) -> float:
+    """Chi-square of the deviations ``own`` of all ``off`` (k,) with covariance (k, k)."""
+    return float(off[own] @ np.linalg.solve(spread[np.ix_(own, own)], off[own]))
 
 
 def _places_left(lefts, spreads, of_maps, begin):

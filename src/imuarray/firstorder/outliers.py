@@ -12,7 +12,7 @@ from imuarray.firstorder.triads import Poses, TriadFit, doubted, least_squares, 
 
 OUTLIER = 5.0  # times the median size of a residual
 SHARED = 5.0  # times the median of what leaving out a pose gains, the worst of its triads apart
-GONE = 0.2  # of gravity: readings without it
+GONE = 0.07  # of gravity: readings without it; those in g have a tenth
 MOST_OFF = 0.5  # relative, of a pose's mean specific force from gravity
 MOST_LEFT_OUT = 0.2  # of a triad's poses
 NEARLY = 0.5  # of the largest gain: as many triads leave out a reading at once
@@ -47,7 +47,7 @@ def fit_triads(mean, sd, magnitude: float, labels=None, recording=None, time=Non
     IdentifiabilityError
         Where the poses are too few or too alike to determine all parameters.
     """
-    if (size := np.median(np.linalg.norm(mean, axis=2))) < GONE * magnitude:
+    if 0 < (size := np.median(np.linalg.norm(mean, axis=2))) < GONE * magnitude:
         raise InputError(
             f"still poses: expected gravity in the readings, found {size:.2g} m/s^2: it was taken"
             " out (linear acceleration); log the raw accelerometers"

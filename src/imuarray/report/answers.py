@@ -294,7 +294,8 @@ def onward(diagnosis: Diagnosis) -> Answer:
     """Answer to: what to do next?"""
     document, named = diagnosis.document, [c["effect"] for c in diagnosis.document["causes"]]
     items = [f"Mend this first: {reason}" for reason in document.get("reasons", [])[:1]]
-    if "axis_swap" in named:
+    data = [DATA_EFFECTS[name] for name in named if name in DATA_EFFECTS]
+    if any(item.kind == "readings" and not item.left_out for item in data):
         items.append(
             "Give the axes in columns.yaml, convert the log again and calibrate that: here they"
             " were turned back in memory only."
