@@ -16,6 +16,7 @@ from imuarray.firstorder.still import (
     allan_deviation,
     lag_correlation,
     reading_sd,
+    steps_sd,
     still_poses,
     window_spread,
 )
@@ -401,3 +402,12 @@ def test_readings_in_g_or_dead_are_refused(factor):
     mean = factor * np.einsum("kij,pj->pki", matrix, GRAVITY * directions(15, rng))
     with pytest.raises(InputError, match="are the units right"):
         fit_triads(mean, np.full(mean.shape, 1e-3), GRAVITY)
+
+
+def test_poses_read_in_coarse_steps_are_as_uncertain_as_a_step():
+    rng = np.random.default_rng(6)
+    fine = [9.8 + 0.04 * rng.standard_normal((300, 2, 3)) for _ in range(3)]
+    assert not steps_sd(fine).any()
+    found = steps_sd([np.round(piece / 0.5) * 0.5 for piece in fine])
+    np.testing.assert_allclose(found[found > 0], 0.5 / np.sqrt(12))
+    assert (found > 0).all(axis=(0, 2)).any()

@@ -320,7 +320,7 @@ def test_the_file_and_the_report_carry_it(tmp_path, recording, capsys):
 def test_a_common_scale_far_from_one_is_told():
     """Stamps and gyroscopes' scale look alike in the moves; accelerometers do not decide."""
     (said,) = reasons_of_poses(Poses(1.0, 0.001, 0.999), Poses(1.0, 0.001, 0.96))
-    assert "read 4.2 % too much" in said and "8.3 % too small" in said
+    assert "read 4.2 % too much" in said and "time base" in said and "8.3 % too small" in said
     # a residual of many sds that is nothing: sensors behind a filter, long poses
     assert reasons_of_poses(Poses(7.0, 0.004, 1.01)) == []
     assert "fit 7 times worse" in reasons_of_poses(Poses(7.0, 0.04, 1.01))[0]

@@ -21,7 +21,7 @@ from imuarray.analysis.misfit import RESIDUAL, is_papers, residuals, rigid, unfi
 from imuarray.analysis.rigid import SLOPE, Slope, elsewhere, kept, slope, turning
 from imuarray.analysis.suspects import MIRRORED, clipped, common, gravity, wrapped
 from imuarray.firstorder.correct import FirstOrder
-from imuarray.model.effects import EFFECTS, Effect
+from imuarray.model.effects import EFFECTS, KINDS, Effect
 from imuarray.recording import Recording
 from imuarray.recording.channels import repeated
 from imuarray.recording.record import FIRST_ORDER
@@ -108,8 +108,9 @@ def reasons_of_poses(*several: Poses) -> list[str]:
         much, large = ("much", "small") if scale < 1 else ("little", "large")
         found.append(
             f"all gyroscopes together read {off:.2g} % too {much} by the moves between poses: is"
-            f" that their scale, or are the steps of time (a rate that is declared, not measured)?"
-            f" If it is time, the array comes out {2 * off:.2g} % too {large}"
+            " that their scale, or is it the time base: a clock that runs wrong, a declared rate of"
+            f" the log that is not its own, rows that were lost? If so, the array comes out"
+            f" {2 * off:.2g} % too {large}"
         )
     return found
 
@@ -137,23 +138,26 @@ def reasons_of_calibration(
         judged += _drifts(recording) if is_papers(calibration) else []
         for reason in [*units, *known] if units else [*little, *known, *judged]:
             found.setdefault(reason, []).append(str(number))
-    for kind in ("accelerometer", "gyroscope"):
-        if not found and calibration.attrs.get(f"{kind}_maps_hold", 1.0) < HOLD:
-            farthest = calibration.attrs[f"{kind}_maps_farthest"]
-            found[
-                f"the map that still poses gave {kind} {farthest} does not hold while the board is"
-                " twisted: did it turn or come loose in between, or does its scale change with the"
-                " rate, the force or the warmth? Record again, poses before and after"
-            ] = list(map(str, range(1, len(several) + 1)))
     judged = [
         reason if len(whose) == len(several) else f"recording {', '.join(whose)}: {reason}"
         for reason, whose in found.items()
     ]
+    judged += _moved_maps(calibration)
     if not judged:
         corrected = all(one.correction is not None for one in several)
         judged = unsteady(calibration, corrected, len(several))
     root = little or any(map(UNIT.search, found))
     return judged + ([] if root else _not_converged(calibration.attrs))
+
+
+def _moved_maps(calibration: xr.Dataset) -> list[str]:
+    """Words on maps that still poses gave and the twisting contradicts."""
+    return [
+        f"the map that still poses gave {kind} {calibration.attrs[f'{kind}_maps_farthest']} does"
+        " not hold while the board is twisted: did it turn or come loose in between, or does its"
+        " scale change with the rate, the force or the warmth? Record again, poses before and after"
+        for kind in KINDS if calibration.attrs.get(f"{kind}_maps_hold", 1.0) < HOLD
+    ]  # fmt: skip
 
 
 def _drifts(recording: Recording) -> list[str]:

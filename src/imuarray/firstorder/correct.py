@@ -17,6 +17,7 @@ from imuarray.firstorder.still import (
     averaged_sd,
     lag_correlation,
     reading_sd,
+    steps_sd,
     still_poses,
     usual_step,
 )
@@ -203,7 +204,10 @@ def _triads(every: Sequence[Still], gravity: float) -> TriadFit:
         # a quantised reading that never changes has no spread of its own
         noise = np.maximum(averaged_sd(force, step), 1e-6 * GRAVITY)
         mean += [piece.mean(axis=0) for piece in force]
-        sd += [noise / np.sqrt(len(piece)) for piece in force]
+        least = steps_sd(force)
+        sd += [
+            np.maximum(noise / np.sqrt(len(p)), own) for p, own in zip(force, least, strict=True)
+        ]
     recording = np.repeat(np.arange(len(every)), [len(one.poses) for one in every])
     labels = every[0].recording.accelerometer_labels
     time = np.concatenate([_after_moving(one) for one in every])

@@ -244,3 +244,20 @@ def _quiet(recording: Recording, width: int) -> np.ndarray:
             )
         still &= spread <= THRESHOLD * max(floor, 0.1 * declared / np.sqrt(readings.shape[1]))
     return still
+
+
+def steps_sd(pieces) -> np.ndarray:
+    """Sds (P, A, 3) of the means of P still pieces (n, A, 3) whose readings are one or two steps.
+
+    0 where they are more: noise then carries the mean between the steps.
+    """
+    whole, out = np.concatenate(pieces), np.zeros((len(pieces), *pieces[0].shape[1:]))
+    for k, axis in np.ndindex(whole.shape[1:]):
+        found = [np.unique(piece[:, k, axis]) for piece in pieces]
+        if min(map(len, found)) > 2:
+            continue
+        levels = np.unique(whole[:, k, axis])
+        step = np.diff(levels).min(initial=np.inf)
+        few = np.array([len(values) for values in found]) <= 2
+        out[few, k, axis] = step / np.sqrt(12) if np.isfinite(step) else 0.0
+    return out
