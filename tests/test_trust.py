@@ -494,3 +494,17 @@ def test_a_search_that_diverges_is_bad_input(monkeypatch, sound):
     monkeypatch.setattr("imuarray.analysis.calibration.select_forward", diverge)
     with pytest.raises(InputError, match="search that diverges.*imuarray first-order"):
         imuarray.calibrate(sound)
+
+
+def test_a_map_that_does_not_hold_while_twisting_is_named(sound):
+    """A triad that turned between the poses and the twisting; one that did not is no matter."""
+    count = len(sound.accelerometer_labels)
+    sound = replace(sound, map_covariance=1e-8 * np.eye(9 * count))
+    found = imuarray.calibrate(sound)
+    assert found.attrs["accelerometer_maps_hold"] > trust.HOLD
+    assert trust._moved_maps(found) == []
+    turn = Rotation.from_rotvec([0, 0, np.radians(1.0)]).as_matrix()
+    force = sound.specific_force.copy()
+    force[:, 2] = force[:, 2] @ turn
+    said = trust._moved_maps(imuarray.calibrate(replace(sound, specific_force=force)))
+    assert len(said) == 1 and f"accelerometer {sound.accelerometer_labels[2]} does not" in said[0]

@@ -156,9 +156,9 @@ def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
         if len(recordings) > 1 and len(theirs):
             variables |= _of_recordings(found, model, theirs, np.sqrt(np.diag(covariance)))
             coords["own"] = [names[number] for number in theirs]
-    for kind, (chance, imu) in found.maps_hold.items():
+    for kind, (chance, imus) in found.maps_hold.items():
         dataset.attrs[f"{kind}_maps_hold"] = chance
-        dataset.attrs[f"{kind}_maps_farthest"] = readings.labels[imu]
+        dataset.attrs[f"{kind}_maps_farthest"] = ", ".join(readings.labels[k] for k in imus)
     smooth = found.smooth_ratio()
     if smooth is not None:
         for which, kind in enumerate(KINDS):

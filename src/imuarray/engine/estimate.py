@@ -94,8 +94,8 @@ class Estimate:
     freedoms: np.ndarray
     steps: tuple[float, ...]
     converged: bool
-    # by kind of sensor: chance that the correction's maps hold in this motion, the farthest IMU
-    maps_hold: dict[str, tuple[float, int]] = field(default_factory=dict)
+    # by kind of sensor: chance that the correction's maps hold in this motion, the farthest IMUs
+    maps_hold: dict[str, tuple[float, list[int]]] = field(default_factory=dict)
 
     @property
     def positions(self) -> np.ndarray:

@@ -27,6 +27,7 @@ from imuarray.model.effects import KINDS
 SCALES, SKEWS = ("accelerometer_scale", "gyroscope_scale"), (
     "accelerometer_misalignment", "gyroscope_misalignment",
 )  # fmt: skip
+NEARLY = 0.25  # of the largest distance of an IMU's map: as likely the one
 FIXED = 1e-7  # sd of a map's entry that is known
 MAPS = SCALES + SKEWS  # effects that are 3 x 3 maps, which first order corrects
 OFFSETS = "accelerometer_bias", "gyroscope_bias"
@@ -77,10 +78,11 @@ def beside_maps(found: Estimate) -> tuple[Estimate, dict[str, float]]:
         own = np.unique([place[mine] - count for place in places])
         if own.size:
             likely[kind] = float(chdtrc(own.size, _distance(off, spread, own)))
-            imus = np.nonzero(maps)[0]
-            farthest[kind] = max(set(imus[mine]), key=lambda imu, mine=mine: _distance(
-                off, spread, np.unique([place[mine & (imus == imu)] - count for place in places])
-            ))  # fmt: skip
+            imus, far = np.nonzero(maps)[0], {}
+            for imu in np.unique(imus[mine]):
+                its = [place[mine & (imus == imu)] - count for place in places]
+                far[int(imu)] = _distance(off, spread, np.unique(its))
+            farthest[kind] = [k for k, each in far.items() if each > NEARLY * max(far.values())]
     recorded = tuple(
         replace(one, state=stepped(one.state, found.columns, found.active, step[place]))
         for one, place in zip(found.recorded, found.places, strict=True)
@@ -89,7 +91,7 @@ def beside_maps(found: Estimate) -> tuple[Estimate, dict[str, float]]:
     blocks = [(inner, score - inner @ whole) for inner, score in blocks]
     found = replace(
         found, recorded=recorded, information=information, precision=precision, blocks=blocks,
-        maps_hold={kind: (p, int(farthest[kind])) for kind, p in likely.items()},
+        maps_hold={kind: (p, farthest[kind]) for kind, p in likely.items()},
     )  # fmt: skip
     return found, likely
 
