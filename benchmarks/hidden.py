@@ -29,7 +29,7 @@ def named(found) -> dict[str, tuple]:
     return {i.effect: ({i.effect, *found.rivals.get(i.effect, ())}, i.imus) for i in items}
 
 
-def tried(given, seconds, seed, times, effects, drawn):
+def tried(given, place, seconds, seed, times, effects, drawn):
     """Rows of one recording: {effect, times, named, right, others, recording}."""
     from imuarray.diagnosis.detectable import detectable
     from imuarray.diagnosis.procedure import run_procedure
@@ -50,7 +50,9 @@ def tried(given, seconds, seed, times, effects, drawn):
     for number, among in wanted:
         for factor in times:
             try:
-                changed, truth = hide(recording, document, seed + 1000 * number, factor, among)
+                changed, truth = hide(
+                    recording, document, seed + 1000 * number + place, factor, among
+                )
             except ValueError:  # it has none of them that would show
                 continue
             [hidden] = truth["effects"]
@@ -82,9 +84,9 @@ def main():
     rows = []
     with ProcessPoolExecutor(given.cores) as pool:
         jobs = [
-            pool.submit(tried, one, given.seconds, given.seed, given.times, given.effects,
+            pool.submit(tried, one, place, given.seconds, given.seed, given.times, given.effects,
                         given.drawn)
-            for one in asked
+            for place, one in enumerate(asked)
         ]  # fmt: skip
         for job in jobs:
             rows += job.result()
