@@ -135,7 +135,9 @@ def calibrate(
         ``own_parameter``, ``own_sd`` (recording, own), the latter ones of each; how each recording
         was corrected before (`Recording.correction`, recording first). Attributes
         ``converged`` (0 or 1), ``residual_ratio`` (rms residual over the declared noise),
-        ``model``, ``parts`` (json), and the origin (config, seed, versions).
+        ``model``, ``parts`` (json), ``accelerometer_maps_hold`` (chance that the maps of first
+        order are those of this motion) and ``accelerometer_maps_farthest`` (the IMUs that are
+        least so), the same of gyroscopes, and the origin (config, seed, versions).
 
     Raises
     ------
