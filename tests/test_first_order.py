@@ -411,3 +411,9 @@ def test_poses_read_in_coarse_steps_are_as_uncertain_as_a_step():
     found = steps_sd([np.round(piece / 0.5) * 0.5 for piece in fine])
     np.testing.assert_allclose(found[found > 0], 0.5 / np.sqrt(12))
     assert (found > 0).all(axis=(0, 2)).any()
+
+
+def test_gravity_that_was_taken_out_is_named():
+    mean = 0.3 * directions(15, np.random.default_rng(16))[:, None] * np.ones((1, 3, 1))
+    with pytest.raises(InputError, match="gravity .* found 0.3 m/s.2: it was taken out"):
+        fit_triads(mean, np.full(mean.shape, 1e-3), GRAVITY)

@@ -13,7 +13,7 @@ from imuarray.analysis import trust
 from imuarray.analysis.drawing import Places, departures
 from imuarray.analysis.misfit import residuals, unsteady
 from imuarray.analysis.rigid import slope, turning
-from imuarray.analysis.suspects import clipped, suspects, told
+from imuarray.analysis.suspects import clipped, suspects, told, wrapped
 from imuarray.blind.cases import Case, make
 from imuarray.cli import main
 from imuarray.errors import InputError
@@ -508,3 +508,30 @@ def test_a_map_that_does_not_hold_while_twisting_is_named(sound):
     force[:, 2] = force[:, 2] @ turn
     said = trust._moved_maps(imuarray.calibrate(replace(sound, specific_force=force)))
     assert len(said) == 1 and f"accelerometer {sound.accelerometer_labels[2]} does not" in said[0]
+
+
+def test_an_odd_scale_of_all_gyroscopes_is_the_time_base_or_theirs():
+    rng, maps = np.random.default_rng(3), np.tile(np.eye(3), (6, 1, 1))
+    maps += 0.005 * rng.standard_normal((6, 3, 1)) * np.eye(3)
+    chances = [trust._chance(part * maps) for part in (1.0, 1.015)]
+    assert chances[0] > trust.ODD > chances[1]
+    assert trust.reasons_of_poses(trust.Poses(scale=1.0, chance=chances[0])) == []
+    (said,) = trust.reasons_of_poses(trust.Poses(scale=1 / 1.015, chance=chances[1]))
+    assert "read 1.5 % too much" in said and "time base" in said
+    assert trust.reasons_of_poses(trust.Poses(scale=1.003, chance=1e-9)) == []
+
+
+def test_gyroscopes_that_wrap_are_named(sound):
+    end = 0.5 * np.abs(sound.angular_rate).max()
+    said = wrapped(one(sound, 1, lambda x: (x + end) % (2 * end) - end, ("angular_rate",)))
+    assert said and all(f"gyroscope {sound.gyroscope_labels[1]}, axis" in each for each in said)
+    ends = [float(each.split("wraps at ")[1].split()[0]) for each in said]
+    assert max(ends) == pytest.approx(np.degrees(end), rel=0.05)
+    assert wrapped(sound) == []
+
+
+def test_a_flat_drawing_from_the_other_side_is_named():
+    nominal = np.array([[0, 0, 0], [20, 0, 0], [0, 25, 0], [22, 31, 0]]) * 1e-3
+    found, covariance = nominal * [-1, 1, 1], 1e-12 * np.eye(12)
+    said = departures(Places(("1", "2", "3", "4"), found, nominal, covariance, 1e-4, hand=1))
+    assert "mirrored in x: was it drawn from the other side, or turned by 180 degrees?" in said

@@ -10,6 +10,7 @@ from tests.test_convert_csv import HEADER, layout, table
 
 ROWS = 200
 PERIOD = 10  # ms
+IN_SECONDS = {"column": "t", "unit": "s"}
 
 
 def read(folder, content, columns=None):
@@ -83,6 +84,8 @@ def test_a_stamp_given_twice_is_put_midway_and_a_copied_row_left_out(tmp_path, p
     found, lines = read(tmp_path, text(stamped(stamps)))
     np.testing.assert_allclose(found.time, plain.time)
     assert "1 rows with the stamp of the row before" in lines[0]
+    seconds = read(tmp_path, text(stamped(stamps / 1e3)), layout() | {"time": IN_SECONDS})[0]
+    np.testing.assert_allclose(seconds.time, plain.time, atol=1e-9)
     rows = table(ROWS)
     found, lines = read(tmp_path, text([*rows[:60], rows[59], *rows[60:]]))
     np.testing.assert_array_equal(found.specific_force, plain.specific_force)

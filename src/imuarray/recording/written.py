@@ -118,8 +118,9 @@ def in_order(stamps, table: pd.DataFrame, where: str) -> tuple[np.ndarray, np.nd
     again = again[again < len(stamps) - 1]
     wide = again[stamps[again + 1] - stamps[again] > 1.5 * usual]
     if len(wide):
-        stamps = stamps + np.zeros(len(stamps), stamps.dtype)
-        stamps[wide] = stamps[wide] + (stamps[wide + 1] - stamps[wide]) // 2
+        half = (stamps[wide + 1] - stamps[wide]) / 2
+        stamps = stamps.copy()
+        stamps[wide] += half.astype(stamps.dtype)
         said.append(f"{where}: {len(wide)} rows with the stamp of the row before: put midway")
     return stamps, rows, said
 

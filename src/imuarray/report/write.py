@@ -53,8 +53,7 @@ FIGURES = {  # by name: table, drawing, title, caption
         numbers.detectable_table, drawn.detectable_figure, "How small an effect would have shown",
         "Size from which an effect of one IMU passes the test with a chance of 80 %, from the IMU"
         " that shows it best to the one that shows it worst, over the prior sd of a common chip."
-        " The gain on held-out time asks more: in a trial 15 of 29 so large were named, and 14 of"
-        " 14 twice as large."
+        " The gain on held-out time asks more: it takes up to twice that size to be named."
         " Dots: what was found. Steps and clocks, which a scan looks for, are left out.",
     ),
     "positions": (
