@@ -535,3 +535,13 @@ def test_a_flat_drawing_from_the_other_side_is_named():
     found, covariance = nominal * [-1, 1, 1], 1e-12 * np.eye(12)
     said = departures(Places(("1", "2", "3", "4"), found, nominal, covariance, 1e-4, hand=1))
     assert "mirrored in x: was it drawn from the other side, or turned by 180 degrees?" in said
+
+
+def test_the_noise_of_the_only_gyroscope_stays_as_declared(sound):
+    """There is nothing to hold it against; estimated it came out 24 times as large."""
+    alone = replace(
+        sound, angular_rate=sound.angular_rate[:, :1], gyroscope_labels=sound.gyroscope_labels[:1]
+    )
+    found = imuarray.calibrate(alone)
+    np.testing.assert_allclose(found.gyroscope_sd, alone.gyroscope_noise_sd)
+    assert trust.reasons_of_calibration(alone, found) == []
