@@ -180,7 +180,7 @@ def freedoms(readings: Readings, seen: Pass) -> np.ndarray:
     told = np.median(far, axis=0) / MEDIAN > least_ratio(readings)
     for kind in range(2):
         used = (number[..., kind] == 3) & told[:, kind]
-        if used.any():
+        if used.any() and readings.exists[:, kind].sum() > 1:  # one alone is normal, as declared
             d = far[..., kind][used]
             found[kind] = FREEDOMS[np.argmax([_log_likelihood(d, nu) for nu in FREEDOMS])]
     return found
