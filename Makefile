@@ -63,7 +63,7 @@ publish: $(READY)
 	$(SNAKEMAKE) publish
 
 crate: $(READY)
-	$(BIN)/python -m imuarray.pipeline.crate
+	$(BIN)/python -m imuarray_papers.pipeline.crate
 
 test: $(READY)
 	$(BIN)/python -m pytest -q -n $(CORES) --dist loadfile --no-loadscope-reorder $(PYTEST_ARGS)

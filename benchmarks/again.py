@@ -19,11 +19,11 @@ import numpy as np  # noqa: E402
 from scipy import stats  # noqa: E402
 from written import publish  # noqa: E402
 
-from imuarray.config import read_config  # noqa: E402
-from imuarray.figures.uncertainty import WHOLE  # noqa: E402
-from imuarray.studies.joint import independent, scores_of  # noqa: E402
-from imuarray.studies.sbc import pit_values  # noqa: E402
-from imuarray.studies.truths import setting_from  # noqa: E402
+from imuarray_papers.config import read_config  # noqa: E402
+from imuarray_papers.figures.uncertainty import WHOLE  # noqa: E402
+from imuarray_papers.studies.joint import independent, scores_of  # noqa: E402
+from imuarray_papers.studies.sbc import pit_values  # noqa: E402
+from imuarray_papers.studies.truths import setting_from  # noqa: E402
 
 ROUNDS = 20_000
 SEEDS = 31, 78  # of the joint test's first run and of the truths, not the configuration's

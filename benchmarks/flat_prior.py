@@ -20,11 +20,12 @@ from written import publish  # noqa: E402
 
 import imuarray  # noqa: E402
 from imuarray.analysis.density import posterior_of, traced  # noqa: E402
-from imuarray.config import read_config  # noqa: E402
 from imuarray.engine.parameters import model_of  # noqa: E402
 from imuarray.geometry import positions_of, sub_array  # noqa: E402
 from imuarray.model.jax64 import jax  # noqa: E402
-from imuarray.studies.bayes import simulate_dataset  # noqa: E402
+from imuarray_papers.config import read_config
+from imuarray_papers.sampling import sample  # noqa: E402
+from imuarray_papers.studies.bayes import simulate_dataset  # noqa: E402
 
 LEFT = (
     1.0,
@@ -101,14 +102,7 @@ def main():
     array = sub_array(imuarray.mimu4444(), 4)
     few = imuarray.select(imuarray.simulate(array, 5.0, 50.0, seed=1)[0], 20)
     lines.append(fall("4 triads of a diagonal, T = 20", few, rise=True))
-    chains = imuarray.sample(
-        few,
-        "papers",
-        steps=300,
-        seed=1,
-        motion_prior="flat",
-        accelerometer_noise=few.accelerometer_noise_sd,
-    ).attrs
+    chains = sample(few, "nuts", 300, 1, accelerometer_noise=few.accelerometer_noise_sd).attrs
     lines.append(
         f"| NUTS there | R-hat {chains['rhat_max']:.2f}, on a line: {chains['on_a_line']} |"
     )

@@ -15,10 +15,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from imuarray.blind.cases import Case, make
-from imuarray.blind.inject import CATALOGUE, EFFECTS
-from imuarray.blind.measured import NOT_FROM_READINGS, hide
 from imuarray.recording import read_recording
+from imuarray_papers.blind.cases import Case, make
+from imuarray_papers.blind.inject import CATALOGUE, EFFECTS
+from imuarray_papers.blind.measured import NOT_FROM_READINGS, hide
 
 SCALABLE = [n for n in CATALOGUE if n not in NOT_FROM_READINGS and EFFECTS[n].scalable]
 

@@ -13,12 +13,12 @@ import numpy as np
 
 from benchmarks.growth import spent
 from benchmarks.written import publish
-from imuarray.config import model_from, read_config
 from imuarray.motion.state import hand_twisting
 from imuarray.provenance import stamp, write_netcdf_parts
 from imuarray.recording import Recording
 from imuarray.recording.record import PART
 from imuarray.simulation.recordings import measure
+from imuarray_papers.config import model_from, read_config
 
 RATE = 1000.0  # Hz
 COMMANDS = {

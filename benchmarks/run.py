@@ -21,26 +21,27 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from written import publish  # noqa: E402
 
-from imuarray.config import model_from, read_config  # noqa: E402
-from imuarray.estimation.bcd import calibrate_bcd  # noqa: E402
 from imuarray.estimation.collapsed import (
     Collapsed,  # noqa: E402
     estimate_motion,  # noqa: E402
 )
 from imuarray.estimation.kernels import reduced  # noqa: E402
 from imuarray.estimation.newton import fisher_scoring  # noqa: E402
-from imuarray.estimation.reference import skew  # noqa: E402
 from imuarray.geometry import positions_of, sub_array  # noqa: E402
 from imuarray.model import ArrayModel  # noqa: E402
 from imuarray.model.jax64 import jax  # noqa: E402
 from imuarray.motion import normal_motion, sphere_motion  # noqa: E402
-from imuarray.posterior import kernels, normals, reference
-from imuarray.posterior.draws import TILE  # noqa: E402
-from imuarray.posterior.likelihood import Likelihood  # noqa: E402
 from imuarray.posterior.marginal import Marginal  # noqa: E402
-from imuarray.posterior.target import CompiledTarget, GaussianPrior  # noqa: E402
 from imuarray.simulation.recordings import measure  # noqa: E402
-from imuarray.studies.bound import paths  # noqa: E402
+from imuarray_papers import reference
+from imuarray_papers.config import model_from, read_config  # noqa: E402
+from imuarray_papers.estimation.bcd import calibrate_bcd  # noqa: E402
+from imuarray_papers.posterior import kernels, normals
+from imuarray_papers.posterior.draws import TILE  # noqa: E402
+from imuarray_papers.posterior.likelihood import Likelihood  # noqa: E402
+from imuarray_papers.posterior.target import CompiledTarget, GaussianPrior  # noqa: E402
+from imuarray_papers.reference import skew  # noqa: E402
+from imuarray_papers.studies.bound import paths  # noqa: E402
 from tests.oracles import joint_jacobian, most_likely_motion  # noqa: E402
 
 

@@ -15,9 +15,9 @@ from pathlib import Path
 
 from benchmarks.cost import cost
 from benchmarks.written import publish
-from imuarray.config import read_config
 from imuarray.recording import write_recording
-from imuarray.studies.bayes import simulate_dataset
+from imuarray_papers.config import read_config
+from imuarray_papers.studies.bayes import simulate_dataset
 
 HEAD = (
     "| T | sampler | core seconds | s | GB | ESS | R-hat | Pareto's k |\n"

@@ -23,16 +23,17 @@ from samplers_figure import CONVERGED, statistics
 from written import publish
 
 from imuarray.analysis.density import posterior_of, traced
-from imuarray.config import read_config
 from imuarray.engine.parameters import model_of
 from imuarray.geometry import positions_of
-from imuarray.posterior import reference, tuning
 from imuarray.posterior.diagnostics import ess, find_burn_in, rhat
-from imuarray.posterior.likelihood import Likelihood
-from imuarray.posterior.pmmh import run_chains
-from imuarray.posterior.target import GaussianPrior
+from imuarray.posterior.prior import GaussianPrior
 from imuarray.provenance import write_csv
-from imuarray.studies.bayes import simulate_dataset
+from imuarray_papers import reference
+from imuarray_papers.config import read_config
+from imuarray_papers.posterior import tuning
+from imuarray_papers.posterior.likelihood import Likelihood
+from imuarray_papers.posterior.pmmh import run_chains
+from imuarray_papers.studies.bayes import simulate_dataset
 
 WIDER = 1.05  # than the mode's curvature, for pCN proposals
 WIDENING = 1.005  # of the draws of omega beyond the integrand's curvature

@@ -18,10 +18,10 @@ import numpy as np
 import pandas as pd
 from scipy.stats import beta
 
-from imuarray.blind.cases import Case, make
 from imuarray.diagnosis.adoption import proposals
 from imuarray.diagnosis.procedure import run_procedure
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray_papers.blind.cases import Case, make
 
 
 def one(seed: int) -> dict:

@@ -37,9 +37,6 @@ UNTRUSTED = "# status 3"  # what a command of such a block gives is not to be tr
 FILE = re.compile(r"^`([\w.-]+)`$")
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
-# docs/recording.md says to set these in a copy of config.yaml for a quick look.
-QUICK = (("board: mimu4444 ", "board: mimu4444_corners "), ("duration: 100.0", "duration: 5.0"))
-
 
 @dataclass(frozen=True)
 class Block:
@@ -103,6 +100,19 @@ def commands(text: str) -> Iterator[str]:
             yield shlex.join(words)
 
 
+def parsed(command: str):
+    """(parser, arguments) of a command of the tool or of the papers; None for another."""
+    from imuarray.commands.parser import make_parser
+    from imuarray_papers.__main__ import papers_parser
+
+    words = shlex.split(command)
+    if words[0] == "imuarray":
+        return make_parser(), words[1:]
+    if words[:3] == ["python", "-m", "imuarray_papers"]:
+        return papers_parser(), words[3:]
+    return None
+
+
 def run(page: Path) -> None:
     """Run a page's blocks in the current folder; an error has the page's line."""
     namespace, printed = {"__name__": "__main__"}, None
@@ -129,11 +139,12 @@ def _run_shell(block: Block, namespace: dict) -> None:
     from imuarray.cli import main
 
     for command in commands(block.text):
-        program, *arguments = shlex.split(command)
-        if program != "imuarray":
+        found = parsed(command)
+        if found is None:
             raise ValueError(f"{block.where}: expected imuarray commands, found {command}")
         expected = 3 if UNTRUSTED in block.text else 0
-        if (status := main(arguments)) != expected:
+        parser, arguments = found
+        if (status := main(arguments, parser)) != expected:
             raise ValueError(
                 f"{block.where}: expected status {expected}, found {status}: {command}"
             )
@@ -155,16 +166,6 @@ def _close(shown: str, printed: str) -> bool:
     return math.isclose(float(shown), float(printed), rel_tol=0.2, abs_tol=2 * last)
 
 
-def prepare(folder: Path) -> None:
-    """What a page may take for granted: a quick config.yaml."""
-    config = (ROOT / "config.yaml").read_text(encoding="utf-8")
-    for old, new in QUICK:
-        if config.count(old) != 1:
-            raise ValueError(f"config.yaml: expected {old!r} once, found {config.count(old)}")
-        config = config.replace(old, new)
-    (folder / "config.yaml").write_text(config, encoding="utf-8")
-
-
 def main() -> None:
     """Run one page in a folder of its own."""
     parser = argparse.ArgumentParser(description=main.__doc__)
@@ -174,7 +175,6 @@ def main() -> None:
     page = arguments.page.resolve()
     figures = arguments.figures and arguments.figures.resolve()
     with tempfile.TemporaryDirectory() as name:
-        prepare(Path(name))
         os.chdir(name)
         run(page)
         for drawn in sorted(Path(name).glob("*.png")) if figures else ():

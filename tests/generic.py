@@ -10,7 +10,8 @@ from imuarray.model import ArrayModel
 from imuarray.model.jax64 import cholesky, jax, jnp, log_determinant, solve_lower
 from imuarray.posterior import generic
 from imuarray.posterior.generic import Unknown
-from imuarray.posterior.target import GaussianPrior, Target
+from imuarray.posterior.prior import GaussianPrior
+from imuarray_papers.posterior.target import Target
 
 
 def _log_weight(flat, x, scale, draw):

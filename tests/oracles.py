@@ -6,11 +6,10 @@ import numpy as np
 from scipy.special import logsumexp
 
 from imuarray.estimation.collapsed import estimate_motion
-from imuarray.estimation.reference import linear_part, nonlinear_part, skew
 from imuarray.model import ArrayModel
 from imuarray.model.jax64 import jax, jnp
 from imuarray.motion import Motion
-from imuarray.posterior.reference import projection
+from imuarray_papers.reference import linear_part, nonlinear_part, projection, skew
 
 
 def proper_log_likelihood(specific_force, positions, covariance, rates, phi_sd):

@@ -7,9 +7,9 @@ from scipy.spatial.transform import Rotation
 from imuarray.engine.alike import with_likely_spread
 from imuarray.engine.parameters import POSITION, columns_of, gauge_masks, prior_precision
 from imuarray.geometry import Array
-from imuarray.measured.causes import STEPS, repeated
 from imuarray.model import ArrayModel
 from imuarray.motion.state import Motion
+from imuarray_papers.measured.causes import STEPS, repeated
 
 POSITIONS = np.array([[0.0, 0, 0], [0.02, 0, 0], [0, 0.02, 0], [0.02, 0.02, -0.002]])
 TURNED = np.array([[0.0, -1, 0], [-1, 0, 0], [0, 0, -1]])

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from imuarray.blind.cases import Case, make
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects
 from imuarray.diagnosis.reading_effects import find_rails, find_repeats
@@ -15,6 +14,7 @@ from imuarray.diagnosis.state import Cause, Search
 from imuarray.engine.heldout import gain_of
 from imuarray.engine.parameters import catalogue_effects, columns_of
 from imuarray.engine.readings import arrange
+from imuarray_papers.blind.cases import Case, make
 
 EVERY, LIMIT = tuple(range(8)), -7.5
 

@@ -35,7 +35,7 @@ def files(tmp_path_factory):
     )  # fmt: skip
     write_recording(recording, folder / "rec.nc")
     given = [str(folder / "rec.nc"), "--out", str(folder / "cal.nc"), "--quiet"]
-    assert main(["calibrate", *given, "--model", "papers", "--method", "gauss-newton"]) == 0
+    assert main(["calibrate", *given, "--model", "papers"]) == 0
     return folder / "cal.nc", folder / "rec.nc", motion
 
 

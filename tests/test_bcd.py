@@ -7,9 +7,9 @@ import pytest
 from scipy.optimize import least_squares
 
 from imuarray.errors import InputError
-from imuarray.estimation.bcd import calibrate_bcd
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
+from imuarray_papers.estimation.bcd import calibrate_bcd
 from tests import oracles
 from tests.cases import noises, simulate, small_array
 from tests.oracles import ml_bcd

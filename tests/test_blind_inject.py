@@ -9,18 +9,20 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import toeplitz
 from scipy.stats import multivariate_normal
 
-from imuarray.blind import cases as cases_module
-from imuarray.blind.cases import Case, make, matrix
-from imuarray.blind.change import draw_noise, finish, noiseless_readings, noisy_readings
-from imuarray.blind.inject import CATALOGUE, EFFECTS, GAUGE, OUTSIDE
-from imuarray.blind.measured import (
+from imuarray.recording import Recording
+from imuarray.recording.format import from_dataset
+from imuarray_papers.blind import cases as cases_module
+from imuarray_papers.blind.cases import Case, make, matrix
+from imuarray_papers.blind.change import draw_noise, finish, noiseless_readings, noisy_readings
+from imuarray_papers.blind.inject import CATALOGUE, EFFECTS, GAUGE, OUTSIDE
+from imuarray_papers.blind.measured import (
     NOT_FROM_READINGS,
     hide,
     inject_measured,
     measured_change,
 )
-from imuarray.blind.scene import GYROSCOPE_RAIL, Pair, Scene
-from imuarray.blind.sizes import (
+from imuarray_papers.blind.scene import GYROSCOPE_RAIL, Pair, Scene
+from imuarray_papers.blind.sizes import (
     below_rails,
     draw_seeded,
     noise_divergence,
@@ -28,9 +30,7 @@ from imuarray.blind.sizes import (
     size_of,
     smallest_residual,
 )
-from imuarray.estimation.reference import skew
-from imuarray.recording import Recording
-from imuarray.recording.format import from_dataset
+from imuarray_papers.reference import skew
 
 NOISE_EFFECTS = {
     "accelerometer_noise",

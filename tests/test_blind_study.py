@@ -9,12 +9,12 @@ import pandas as pd
 import pytest
 import yaml
 
-from imuarray.blind import criteria, study, summary
-from imuarray.blind.cases import Case, matrix
-from imuarray.blind.inject import CATALOGUE, EFFECTS
-from imuarray.figures import blind as drawing
-from imuarray.figures.style import write_figure, write_table
-from imuarray.pipeline.rules import effective
+from imuarray_papers.blind import criteria, study, summary
+from imuarray_papers.blind.cases import Case, matrix
+from imuarray_papers.blind.inject import CATALOGUE, EFFECTS
+from imuarray_papers.figures import blind as drawing
+from imuarray_papers.figures.style import write_figure, write_table
+from imuarray_papers.pipeline.rules import effective
 
 ROOT = Path(__file__).parents[1]
 POSITIONS = [[0.0, 0.0, 0.0], [0.02, 0.0, 0.0], [0.0, 0.02, 0.001]]

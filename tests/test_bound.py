@@ -5,7 +5,7 @@ import pytest
 
 from imuarray.model import ArrayModel
 from imuarray.motion import normal_motion
-from imuarray.studies import bound
+from imuarray_papers.studies import bound
 from tests.cases import small_array
 
 MOTION = (20.0, 300.0, 10.0)  # rad/s, rad/s^2, m/s^2

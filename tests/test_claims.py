@@ -6,7 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from imuarray.claims.registry import (
+from imuarray.errors import InputError
+from imuarray.motion import normal_motion
+from imuarray.simulation.recordings import measure
+from imuarray_papers.claims.registry import (
     CLAIMS,
     FAILS,
     HOLDS,
@@ -17,15 +20,12 @@ from imuarray.claims.registry import (
     evaluate,
     markdown,
 )
-from imuarray.claims.results import Results
-from imuarray.config import model_from, read_config
-from imuarray.errors import InputError
-from imuarray.motion import normal_motion
-from imuarray.simulation.recordings import measure
-from imuarray.studies.bound import bound_table
-from imuarray.studies.checks import identifiability, marginalisation
-from imuarray.studies.position_error import magnitudes
-from imuarray.studies.rate_error import accelerometers_only
+from imuarray_papers.claims.results import Results
+from imuarray_papers.config import model_from, read_config
+from imuarray_papers.studies.bound import bound_table
+from imuarray_papers.studies.checks import identifiability, marginalisation
+from imuarray_papers.studies.position_error import magnitudes
+from imuarray_papers.studies.rate_error import accelerometers_only
 from tests.test_claims_measured import SETTINGS as MEASURED
 from tests.test_claims_measured import measured
 

@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from imuarray.claims.registry import CLAIMS
-from imuarray.claims.results import Results
 from imuarray.geometry import mimu4444_corners
+from imuarray_papers.claims.registry import CLAIMS
+from imuarray_papers.claims.results import Results
 
 BOARD = mimu4444_corners()
 SETTINGS = {

@@ -48,17 +48,17 @@ def error_line(capsys):
 
 
 def test_simulate(calls):
-    assert main(["simulate", "--config", "c.yaml", "--out", "new.nc"]) == 0
+    assert main(["simulate", "--duration", "5", "--out", "new.nc"]) == 0
     [(name, arguments)] = calls
     assert name == "simulate" and not arguments.quiet
-    assert (str(arguments.config), str(arguments.out)) == ("c.yaml", "new.nc")
+    assert (arguments.duration, str(arguments.out)) == (5.0, "new.nc")
 
 
 def test_calibrate(calls):
-    command = "calibrate rec.nc --method bcd --out cal.nc --quiet"
+    command = "calibrate rec.nc --out cal.nc --quiet"
     assert main([*command.split(), "--effects", "size_effect, gyroscope_bias"]) == 0
     [(name, arguments)] = calls
-    assert (name, arguments.method, arguments.quiet) == ("calibrate", "bcd", True)
+    assert (name, arguments.model, arguments.quiet) == ("calibrate", "sensors", True)
     assert arguments.effects == ("size_effect", "gyroscope_bias")
 
 
@@ -73,9 +73,8 @@ def test_sample(calls):
 BAD = {
     "": "required: command",
     "frobnicate": "invalid choice",
-    "simulate --out new.nc": "required: --config",
-    "simulate --config c.yaml": "required: --out",
-    "simulate --config no.yaml --out new.nc": "no.yaml: expected a file to read, found none",
+    "simulate --out new.nc --board my": "invalid choice: 'my'",
+    "simulate": "required: --out",
     "calibrate --out new.nc": "required: recording",
     "calibrate no.nc --out new.nc": "no.nc: expected a file to read, found none",
     "calibrate folder --out new.nc": "folder: expected a file to read, found a folder",
@@ -84,7 +83,7 @@ BAD = {
     "calibrate rec.nc --out /dev/null": "expected a file to write, found a device",
     "calibrate rec.nc --out folder": "expected a file to write, found a folder",
     "calibrate rec.nc --out rec.nc": "expected another file than the input",
-    "calibrate rec.nc --out new.nc --method magic": "invalid choice: 'magic'",
+    "sample rec.nc --out new.nc --method magic": "invalid choice: 'magic'",
     "calibrate rec.nc --out new.nc --effects a,b,a": "expected each effect once, found 'a,b,a'",
     "calibrate rec.nc --out new.nc --steps 3": "--steps 3 (see 'imuarray calibrate --help')",
     "sample rec.nc --out new.nc --steps 0": "an integer of at least 1, found '0'",

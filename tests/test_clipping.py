@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from imuarray.blind.cases import Case, make
 from imuarray.diagnosis.final_checks import Peak, clipped, together
 from imuarray.diagnosis.procedure import run_procedure
 from imuarray.diagnosis.reading_effects import Structural
+from imuarray_papers.blind.cases import Case, make
 
 LIMIT = -7.5
 

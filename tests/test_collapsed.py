@@ -8,16 +8,17 @@ from hypothesis.extra.numpy import arrays
 from scipy.special import logsumexp
 
 from imuarray.errors import InputError
-from imuarray.estimation.bcd import calibrate_bcd
 from imuarray.estimation.collapsed import Collapsed, estimate_motion
 from imuarray.estimation.newton import calibrate_gauss_newton
-from imuarray.estimation.reference import linear_part, nonlinear_part
 from imuarray.geometry import mimu4444
 from imuarray.model import ArrayModel
 from imuarray.motion import normal_motion
-from imuarray.posterior import draws, kernels, reference
-from imuarray.posterior.likelihood import Likelihood
 from imuarray.simulation.recordings import measure
+from imuarray_papers import reference
+from imuarray_papers.estimation.bcd import calibrate_bcd
+from imuarray_papers.posterior import draws, kernels
+from imuarray_papers.posterior.likelihood import Likelihood
+from imuarray_papers.reference import linear_part, nonlinear_part
 from tests import oracles
 from tests.cases import noises, simulate, small_array
 

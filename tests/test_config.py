@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 import yaml
 
-from imuarray.config import check_config, describe_schema, model_from, read_config
 from imuarray.errors import InputError
 from imuarray.geometry.boards import BOARDS
-from imuarray.studies.bayes import simulate_twisting
+from imuarray_papers.config import check_config, describe_schema, model_from, read_config
+from imuarray_papers.studies.bayes import simulate_twisting
 
 ROOT = Path(__file__).parents[1]
 
@@ -34,7 +34,7 @@ def test_documentation_agrees_with_the_schema():
 
 
 def test_schema_knows_every_board():
-    schema = yaml.safe_load((ROOT / "src/imuarray/schemas/config.schema.yaml").read_text())
+    schema = yaml.safe_load((ROOT / "src/imuarray_papers/schemas/config.schema.yaml").read_text())
     assert schema["properties"]["array"]["properties"]["board"]["enum"] == list(BOARDS)
 
 

@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from imuarray.blind.cases import HIDDEN, hidden, make
-from imuarray.figures import criticism
-from imuarray.figures import hidden as hidden_figure
-from imuarray.figures.measured import QUANTITIES
 from imuarray.geometry import mimu4444_corners
+from imuarray_papers.blind.cases import HIDDEN, hidden, make
+from imuarray_papers.figures import criticism
+from imuarray_papers.figures import hidden as hidden_figure
+from imuarray_papers.figures.measured import QUANTITIES
 
 ROOT = Path(__file__).parents[1]
 STEPS = ("normal", "robust", "clocks", "no arms", "common arms")

@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 
 from imuarray.analysis.calibration import calibrate
-from imuarray.blind.cases import Case, make
-from imuarray.blind.measured import hide
 from imuarray.cli import main
 from imuarray.diagnosis import state as elimination
 from imuarray.diagnosis.document import diagnose, precision_of, structural_gain
@@ -32,6 +30,8 @@ from imuarray.model.effects import KINDS, effect, known_effect
 from imuarray.recording import load_dataset, read_recording, write_recording
 from imuarray.streams import stream
 from imuarray.tails import log_chi_square
+from imuarray_papers.blind.cases import Case, make
+from imuarray_papers.blind.measured import hide
 
 pytestmark = pytest.mark.slow
 

@@ -10,7 +10,6 @@ from scipy.sparse import lil_matrix
 from scipy.stats import chi2, norm, poisson
 
 import imuarray
-from imuarray.blind.cases import Case, make
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects as variance
 from imuarray.diagnosis.replicates import Replicator, discrepancies
@@ -41,6 +40,7 @@ from imuarray.engine.start import start
 from imuarray.errors import InputError
 from imuarray.geometry import sub_array
 from imuarray.tails import QUARTILE, log_chi_square, log_normal, log_poisson
+from imuarray_papers.blind.cases import Case, make
 
 SHORT = 4.0  # s
 

@@ -11,7 +11,6 @@ import pandas as pd
 import pytest
 from scipy.linalg import subspace_angles
 
-from imuarray.blind.cases import Case, make
 from imuarray.diagnosis.adoption import (
     conditional,
     orthonormal,
@@ -29,6 +28,7 @@ from imuarray.report import write as report
 from imuarray.report.answers import answers, verdict
 from imuarray.report.drawings_model import cause_figure
 from imuarray.report.panels import abscissa, binned, cause_table, signal_of
+from imuarray_papers.blind.cases import Case, make
 from tests.browser import in_browser, needs_browser
 
 PATH = "a folder/<script>alert(1)</script> & $x$_{.nc"

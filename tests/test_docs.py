@@ -8,18 +8,20 @@ import re
 import shlex
 import subprocess
 import sys
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 import imuarray
+import imuarray_papers
 import mkdocs_hooks
 from imuarray import plots
 from imuarray.commands.parser import make_parser
 from imuarray.model import EFFECTS
 from tests import oracles
-from tests.doc_pages import FENCE, PAGES, ROOT, Block, blocks, commands, compare
+from tests.doc_pages import FENCE, PAGES, ROOT, Block, blocks, commands, compare, parsed
 
 DOCS = ROOT / "docs"
 SLOW = ("recording.md", "effects.md", "tutorial_recording.md", "tutorial_simulated.md")
@@ -95,8 +97,9 @@ def test_every_command_line_parses():
         for block in blocks(page):
             lines = commands(block.text) if block.language == "sh" else ()
             for line in lines:
-                if line.startswith("imuarray "):
-                    make_parser().parse_args(shlex.split(line)[1:])
+                if (known := parsed(line)) is not None:
+                    parser, arguments = known
+                    parser.parse_args(arguments)
                     found += 1
     assert found > 20
 
@@ -190,13 +193,15 @@ def test_the_picture_has_every_package():
 
 
 def resolve(name: str):
-    """What a dotted name below imuarray stands for; AttributeError where nothing does."""
-    found = imuarray
-    for part in name.split("."):
-        if not hasattr(found, part):
-            import_module(f"{found.__name__}.{part}")
-        found = getattr(found, part)
-    return found
+    """What a dotted name below a package stands for; None where nothing does."""
+    for found in (imuarray, imuarray_papers):
+        with suppress(ImportError, AttributeError):
+            for part in name.split("."):
+                if not hasattr(found, part):
+                    import_module(f"{found.__name__}.{part}")
+                found = getattr(found, part)
+            return found
+    return None
 
 
 def theory_rows() -> list[list[str]]:

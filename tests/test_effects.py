@@ -9,10 +9,10 @@ from imuarray.geometry import mimu4444_corners
 from imuarray.model import EFFECTS, ArrayModel, Noise
 from imuarray.model.effects import effect
 from imuarray.motion import Motion, hand_twisting
-from imuarray.posterior.likelihood import Likelihood
-from imuarray.posterior.pmmh import run_chains
-from imuarray.posterior.target import GaussianPrior
+from imuarray.posterior.prior import GaussianPrior
 from imuarray.simulation.recordings import measure
+from imuarray_papers.posterior.likelihood import Likelihood
+from imuarray_papers.posterior.pmmh import run_chains
 from tests import oracles
 from tests.generic import GenericLikelihood, GenericTarget
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from imuarray.posterior import draws
-from imuarray.posterior import normals as elementary
+from imuarray_papers.posterior import draws
+from imuarray_papers.posterior import normals as elementary
 
 
 def test_exponential():

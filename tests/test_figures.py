@@ -12,12 +12,12 @@ import pandas as pd
 import pytest
 import yaml
 
-from imuarray.figures import paper2017, paper2021, paper2021_array, paper2021_tables, style
-from imuarray.figures.gallery import caption, gallery, title
-from imuarray.figures.style import rounded, significant, write_figure
 from imuarray.geometry import mimu4444
 from imuarray.posterior.chains import Chains, chain_tree
-from imuarray.posterior.target import GaussianPrior
+from imuarray.posterior.prior import GaussianPrior
+from imuarray_papers.figures import paper2017, paper2021, paper2021_array, paper2021_tables, style
+from imuarray_papers.figures.gallery import caption, gallery, title
+from imuarray_papers.figures.style import rounded, significant, write_figure
 
 ROOT = Path(__file__).parents[1]
 SAMPLES = (5, 50, 500)
@@ -326,7 +326,7 @@ def test_significant():
 DRAW_ALONE = """
 import sys
 import pandas as pd
-from imuarray.figures import gallery, paper2017, paper2021, paper2021_array, paper2021_tables
+from imuarray_papers.figures import gallery, paper2017, paper2021, paper2021_array, paper2021_tables
 settings = {"array": {"board": "mimu4444"}, "scale": {"name": "test"}, "seed": 1}
 paper2021_array.figure_2021_fig1(settings)
 rows = {"samples": [1, 2], "draws": 1, "variance": 1.0, "variance_se": 0.1, "realisations": 9}

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from imuarray.config import read_config
-from imuarray.pipeline.rules import read_by
+from imuarray_papers.config import read_config
+from imuarray_papers.pipeline.rules import read_by
 
 ROOT = Path(__file__).parents[1]
 SCRIPTS = ROOT / "workflow" / "scripts"

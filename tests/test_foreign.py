@@ -26,7 +26,7 @@ def board(tmp_path_factory):
     folder, own = tmp_path_factory.mktemp("foreign"), model()
     recording, truth = imuarray.simulate(own.array, 0.3, 100.0, seed=3, angular_rate=15.0)
     write_recording(recording, folder / "rec.nc")
-    plain = imuarray.calibrate(recording, "papers", "gauss-newton")
+    plain = imuarray.calibrate(recording, "papers")
     extended = imuarray.calibrate(recording, effects=("gyroscope_bias",))
     return folder, extended, plain
 

@@ -14,10 +14,10 @@ import pytest
 import yaml
 
 from imuarray.cli import main
-from imuarray.config import read_config
 from imuarray.errors import InputError
 from imuarray.provenance import is_damaged
 from imuarray.recording import channels, read_recording, write_recording
+from imuarray_papers.config import read_config
 from tests.test_convert_csv import HEADER, layout, table
 from tests.test_convert_csv import read as read_csv
 from tests.test_pipeline import ROOT

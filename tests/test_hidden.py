@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from imuarray.blind.cases import Case, make
-from imuarray.blind.inject import CATALOGUE, EFFECTS
 from imuarray.recording import write_recording
+from imuarray_papers.blind.cases import Case, make
+from imuarray_papers.blind.inject import CATALOGUE, EFFECTS
 
 pytestmark = pytest.mark.slow
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from imuarray.errors import IdentifiabilityError
-from imuarray.estimation.bcd import calibrate_bcd
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.motion import Motion
 from imuarray.motion.state import directions
+from imuarray_papers.estimation.bcd import calibrate_bcd
 from tests import oracles
 from tests.cases import measure, small_array
 

@@ -15,13 +15,14 @@ SETUP = """
 import faulthandler
 from concurrent.futures import ThreadPoolExecutor
 import numpy as np
-from imuarray.estimation.bcd import calibrate_bcd
+from imuarray_papers.estimation.bcd import calibrate_bcd
 from imuarray.estimation.collapsed import estimate_motion
 from imuarray.model import ArrayModel, kinematics
 from imuarray.model.jax64 import jax
 from imuarray.model.structure import _force
-from imuarray.posterior.target import CompiledTarget, GaussianPrior
-from imuarray.posterior.likelihood import Likelihood
+from imuarray_papers.posterior.target import CompiledTarget
+from imuarray.posterior.prior import GaussianPrior
+from imuarray_papers.posterior.likelihood import Likelihood
 from tests.cases import noises, simulate, small_array
 
 faulthandler.dump_traceback_later({limit} - 10, exit=True)

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.integrate import solve_ivp
 
-from imuarray.estimation import reference
 from imuarray.model import ArrayModel, kinematics, structure_tensor
 from imuarray.model.structure import design, products
 from imuarray.motion import Motion, hand_twisting, normal_motion, sphere_motion
+from imuarray_papers import reference
 from tests.cases import small_array
 
 STEP = 1e-3  # s; error of the stencils below: about (100 rad/s x 1 ms)^8

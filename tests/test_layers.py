@@ -5,51 +5,69 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import imuarray
+import imuarray_papers
 
-PACKAGE = Path(imuarray.__file__).parent
+TOOL, PAPERS = (Path(package.__file__).parent for package in (imuarray, imuarray_papers))
 # Each rests on those above it, or beside it; the injector of the blind study on no model at all.
-LAYERS = (
-    ("errors", "caches", "linear", "tails", "walk"), ("compiled",),
-    ("streams", "provenance", "geometry"), ("motion",), ("model", "config"),
-    ("recording",), ("simulation", "firstorder", "estimation"), ("alignment", "engine"),
-    ("posterior",), ("studies", "measured"), ("blind", "diagnosis"), ("claims", "figures"),
-    ("report",), ("analysis",), ("plots", "pipeline"), ("commands",), ("cli",), ("__main__",),
-)  # fmt: skip
-PLACE = {name: number for number, names in enumerate(LAYERS) for name in names}
+LAYERS = {
+    TOOL: (
+        ("errors", "caches", "linear", "tails", "walk"), ("compiled",),
+        ("streams", "provenance", "geometry"), ("motion",), ("model",),
+        ("recording",), ("simulation", "firstorder", "estimation"), ("alignment", "engine"),
+        ("posterior",), ("diagnosis",), ("report",), ("analysis",), ("plots",), ("commands",),
+        ("cli",), ("__main__",),
+    ),
+    PAPERS: (
+        ("config", "reference", "estimation", "blind"), ("posterior",), ("measured",),
+        ("studies", "sampling"), ("claims", "figures"), ("pipeline", "commands"), ("__main__",),
+    ),
+}  # fmt: skip
 
 
-def imported(path: Path) -> set[str]:
-    """The package's parts that a file of it imports, inside functions too."""
+def imported(path: Path, package: str = "imuarray") -> set[str]:
+    """The parts of a package that a file imports, inside functions too."""
     names = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom):
             names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
         elif isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
-    parts = [name.split(".") for name in names if name.startswith("imuarray.")]
+    parts = [name.split(".") for name in names if name.startswith(f"{package}.")]
     return {part[1] for part in parts} - {"__version__"}
 
 
-def test_imports_run_one_way():
+@pytest.mark.parametrize("package", LAYERS, ids=lambda package: package.name)
+def test_imports_run_one_way(package):
+    place = {name: number for number, names in enumerate(LAYERS[package]) for name in names}
     wrong, seen = [], set()
-    for path in PACKAGE.rglob("*.py"):
-        own = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+    for path in package.rglob("*.py"):
+        own = path.relative_to(package).parts[0].removesuffix(".py")
         if own == "__init__":
             continue
         seen.add(own)
-        wrong += [(path.name, name) for name in imported(path) if PLACE[name] > PLACE[own]]
-    assert not wrong and seen <= set(PLACE)
+        found = imported(path, package.name)
+        wrong += [(path.name, name) for name in found if place[name] > place[own]]
+    assert not wrong and seen <= set(place)
+
+
+def test_the_tool_knows_nothing_of_the_papers():
+    assert not [path for path in TOOL.rglob("*.py") if imported(path, "imuarray_papers")]
 
 
 def test_the_injector_shares_no_code_with_the_model():
-    found = set().union(*(imported(path) for path in (PACKAGE / "blind").glob("*.py")))
-    assert found == {"blind", "geometry", "motion", "recording", "streams"}
+    files = list((PAPERS / "blind").glob("*.py"))
+    assert set().union(*(imported(path, "imuarray_papers") for path in files)) == {"blind"}
+    found = set().union(*map(imported, files))
+    assert found == {"geometry", "motion", "recording", "streams"}
 
 
 def test_short_jobs_do_not_wait_for_scipy_stats():
     """It is slow to import, and scipy.special has the laws that they need."""
-    parts = "estimation.selection", "measured.positions", "measured.residuals", "claims"
-    names = [f"imuarray.{part}" for part in (*parts, "figures.measured", "studies.checks.timing")]
+    parts = "measured.positions", "measured.residuals", "claims", "figures.measured"
+    papers = [f"imuarray_papers.{part}" for part in (*parts, "studies.checks.timing")]
+    names = ["imuarray.estimation.selection", *papers]
     code = f"import sys, {', '.join(names)}; sys.exit('scipy.stats' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0

@@ -13,7 +13,7 @@ from imuarray.engine.dataset import engine_dataset
 from imuarray.engine.fit import at, flat_parameters
 from imuarray.engine.heldout import log_scores
 from imuarray.engine.linearise import linearise
-from imuarray.figures.board import table_experiment, table_left_out
+from imuarray_papers.figures.board import table_experiment, table_left_out
 from tests.test_engine import fitted, simulated
 
 

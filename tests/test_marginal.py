@@ -7,12 +7,12 @@ from scipy.special import logsumexp
 
 from imuarray.engine.readings import measured
 from imuarray.errors import InputError
-from imuarray.estimation.reference import linear_part, nonlinear_part
 from imuarray.model import ArrayModel
 from imuarray.model.jax64 import jax, jnp
 from imuarray.posterior import generic as generic_likelihood
-from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.marginal import Marginal, grid, log_marginal, scaled
+from imuarray_papers.posterior.likelihood import Likelihood
+from imuarray_papers.reference import linear_part, nonlinear_part
 from tests import oracles, test_pmmh_targets
 from tests.cases import noises, simulate, small_array
 from tests.generic import GenericLikelihood
@@ -37,7 +37,7 @@ def test_is_quadrature_of_the_direct_form(form):
     nodes, logs = oracles.gauss_hermite(mean, covariance, 25)
     theta = positions[1:].ravel()[None]
     direct = oracles.exact_log_likelihood(force, theta, model.noise.accelerometer, nodes, logs)
-    found = Marginal.of(likelihood, positions, 7)(positions)
+    found = likelihood.marginal(positions, 7)(positions)
     assert found == pytest.approx(float(direct[0]), abs=1e-6)
 
 
@@ -51,7 +51,7 @@ def test_gyroscopes_that_hardly_see_the_motion():
     direct += 0.5 * np.sum(((thetas - prior.mean) / prior.sd) ** 2, axis=1)
     positions = np.concatenate([np.zeros((3, 1, 3)), thetas.reshape(3, 2, 3)], axis=1)
     for nodes, within in ((1, 0.05), (3, 2e-3), (7, 1e-5)):
-        marginal = Marginal.of(likelihood, positions[0], nodes)
+        marginal = likelihood.marginal(positions[0], nodes)
         assert np.abs([marginal(p) for p in positions] - direct).max() < within
 
 
@@ -62,7 +62,7 @@ def test_against_importance_sampling():
     rng = np.random.default_rng(4)
     values = np.array([centred.estimate(positions, 4000, rng) for _ in range(8)])
     error = values.std(ddof=1) / np.sqrt(len(values))
-    found = Marginal.of(likelihood, positions)(positions)
+    found = likelihood.marginal(positions)(positions)
     assert abs(found - values.mean()) < 5 * error
     assert error < 0.02
 
@@ -71,7 +71,7 @@ def test_against_importance_sampling():
 def test_within_a_thousandth_of_a_nat(gyroscope_sd):
     """In total at T = 500, as many nodes as are taken by default, at four places."""
     likelihood, *_, positions = case(seed=2, samples=500, gyroscope_sd=gyroscope_sd)
-    marginal, fine = Marginal.of(likelihood, positions), Marginal.of(likelihood, positions, 13)
+    marginal, fine = likelihood.marginal(positions), likelihood.marginal(positions, 13)
     rng = np.random.default_rng(1)
     for scale in (0, 1, 1, 1):
         moved = positions + 2e-4 * scale * rng.standard_normal(positions.shape)
@@ -82,26 +82,26 @@ def test_within_a_thousandth_of_a_nat(gyroscope_sd):
 def test_a_quadrature_that_is_not_enough_says_so():
     """Gyroscopes of 1 rad/s, T = 500."""
     likelihood, *_, positions = case(seed=2, samples=500, gyroscope_sd=1.0)
-    assert Marginal.of(likelihood, positions).gap > 1e-3
+    assert likelihood.marginal(positions).gap > 1e-3
 
 
 def test_the_printed_determinant_is_refused():
     _, force, rate, model, positions = case()
     likelihood = Likelihood.of(model, force, rate, determinant="printed")
     with pytest.raises(InputError, match="printed"):
-        Marginal.of(likelihood, positions)
+        likelihood.marginal(positions)
 
 
 def test_nodes_are_taken_where_they_are_needed():
     for gyroscope_sd, several in ((0.02, False), (1.0, True)):
         likelihood, *_, positions = case(gyroscope_sd=gyroscope_sd)
-        assert (len(Marginal.of(likelihood, positions).nodes) > 1) == several
+        assert (len(likelihood.marginal(positions).nodes) > 1) == several
 
 
 def test_start_of_the_modes_hardly_matters():
     likelihood, *_, positions = case()
     far = positions + 2e-3 * np.random.default_rng(5).standard_normal(positions.shape)
-    near, other = Marginal.of(likelihood, positions), Marginal.of(likelihood, far)
+    near, other = likelihood.marginal(positions), likelihood.marginal(far)
     assert near(positions) == pytest.approx(other(positions), abs=1e-8)
 
 
@@ -109,7 +109,7 @@ def test_start_of_the_modes_hardly_matters():
 def test_gradient(nodes):
     """Laplace's too, where its volume moves with theta: gyroscopes that see little."""
     likelihood, *_, positions = case(gyroscope_sd=0.05 if nodes > 1 else 1.0)
-    marginal = Marginal.of(likelihood, positions, nodes)
+    marginal = likelihood.marginal(positions, nodes)
     theta = positions[1:].ravel()
     slope, value = jax.jit(jax.grad(marginal.log_density))(theta), jax.jit(marginal.log_density)
     for place in range(theta.size):
@@ -146,7 +146,9 @@ def proper(seed=1, gyroscope_sd=0.05):
     likelihood = Likelihood.of(model, force, rate, motion_sd=MOTION_SD)
     off = rate - rate.mean(axis=1, keepdims=True)
     apart = model.noise.misfit(np.zeros((len(force), 15)), off)
-    return Marginal.of(likelihood, positions, 7, (apart, rate.size)), force, rate, model, positions
+    spread = apart, rate.size
+    marginal = Marginal.of(likelihood.collapsed, positions, None, MOTION_SD, 7, spread)
+    return marginal, force, rate, model, positions
 
 
 def test_unknown_noise_and_motion_against_dense_normals():
@@ -194,7 +196,7 @@ def test_proper_motion_prior_of_the_estimator():
     rng = np.random.default_rng(8)
     values = likelihood.centred(positions).realisations(positions, 2000, 20, rng)
     error = values.std(ddof=1) / np.sqrt(len(values))
-    assert Marginal.of(likelihood, positions, 5)(positions) == pytest.approx(
+    assert likelihood.marginal(positions, 5)(positions) == pytest.approx(
         values.mean(), abs=5 * error + 1e-6
     )
     assert error < 0.01

@@ -13,7 +13,11 @@ from imuarray.errors import InputError
 from imuarray.estimation.newton import calibrate_gauss_newton
 from imuarray.estimation.selection import neighbours, select_dynamic
 from imuarray.geometry import mimu4444_corners
-from imuarray.measured.positions import (
+from imuarray.model import ArrayModel
+from imuarray.motion import hand_twisting, normal_motion
+from imuarray.recording import write_recording
+from imuarray.simulation.recordings import simulate_recording, simulate_samples
+from imuarray_papers.measured.positions import (
     agreement,
     bcd_positions,
     locate,
@@ -21,13 +25,9 @@ from imuarray.measured.positions import (
     pairwise,
     simulate_subset,
 )
-from imuarray.measured.residuals import compare
-from imuarray.model import ArrayModel
-from imuarray.motion import hand_twisting, normal_motion
-from imuarray.posterior.likelihood import Likelihood
-from imuarray.posterior.proposals import log_weights, sample_covariance
-from imuarray.recording import write_recording
-from imuarray.simulation.recordings import simulate_recording, simulate_samples
+from imuarray_papers.measured.residuals import compare
+from imuarray_papers.posterior.likelihood import Likelihood
+from imuarray_papers.posterior.proposals import log_weights, sample_covariance
 
 BOARD = mimu4444_corners()
 

@@ -11,7 +11,7 @@ from numba.core.errors import TypingError
 from scipy import stats
 
 from imuarray import compiled
-from imuarray.posterior import normals
+from imuarray_papers.posterior import normals
 
 
 def filled(count, seed=1):
@@ -78,7 +78,7 @@ def test_room_is_checked():
 def test_other_processors_give_the_same_numbers(tmp_path):
     """To the last bits, one without vectors of 32 bytes and fused multiplications among them."""
     code = (
-        "import numpy as np; from imuarray.posterior import normals;"
+        "import numpy as np; from imuarray_papers.posterior import normals;"
         "source = normals.source(np.random.default_rng(1), 6400); out = np.zeros(6400);"
         f"normals.fill(source, 6400, out); np.save({str(tmp_path / 'out.npy')!r}, out)"
     )

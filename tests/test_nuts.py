@@ -7,8 +7,7 @@ import pytest
 import xarray as xr
 
 import imuarray
-from imuarray.analysis.density import posterior_of, traced
-from imuarray.blind.cases import Case, make
+from imuarray.analysis.density import posterior_of
 from imuarray.cli import main
 from imuarray.engine.parameters import model_of
 from imuarray.errors import InputError
@@ -16,10 +15,11 @@ from imuarray.estimation import newton
 from imuarray.geometry import positions_of, sub_array
 from imuarray.model.jax64 import jnp
 from imuarray.posterior.diagnostics import ess, rhat
-from imuarray.posterior.likelihood import Likelihood
-from imuarray.posterior.marginal import Marginal
 from imuarray.posterior.nuts import White, run_nuts
 from imuarray.recording import write_recording
+from imuarray_papers import sampling
+from imuarray_papers.blind.cases import Case, make
+from imuarray_papers.posterior.likelihood import Likelihood
 from tests import test_pmmh_targets
 
 pytestmark = pytest.mark.slow
@@ -33,7 +33,7 @@ def chains():
     thetas, weights = test_pmmh_targets.exact(0.5)
     mean = weights @ thetas
     covariance = (thetas - mean).T @ (weights[:, None] * (thetas - mean))
-    marginal = Marginal.of(likelihood, np.vstack([np.zeros(3), mean.reshape(-1, 3)]), 7)
+    marginal = likelihood.marginal(np.vstack([np.zeros(3), mean.reshape(-1, 3)]), 7)
 
     def density(theta):
         return marginal.log_density(theta) - 0.5 * jnp.sum(((theta - prior.mean) / prior.sd) ** 2)
@@ -100,15 +100,8 @@ def test_a_chain_that_falls_into_the_flat_priors_hole_is_told():
     array = sub_array(imuarray.mimu4444(), 4)
     recording, _ = imuarray.simulate(array, duration=5.0, sampling_rate=50.0, seed=1)
     said = []
-    found = imuarray.sample(
-        imuarray.select(recording, 20),
-        "papers",
-        steps=100,
-        seed=1,
-        motion_prior="flat",
-        accelerometer_noise=0.04,
-        say=said.append,
-    )
+    few = imuarray.select(recording, 20)
+    found = sampling.sample(few, "nuts", 100, 1, accelerometer_noise=0.04, say=said.append)
     assert found.attrs["on_a_line"] and not found.attrs["converged"]
     assert any("no bound" in text for text in said)
 
@@ -130,14 +123,14 @@ def test_the_density_has_no_bound_towards_triads_on_one_line():
     array = sub_array(imuarray.mimu4444(), 4)
     recording, _ = imuarray.simulate(array, duration=5.0, sampling_rate=50.0, seed=1)
     recording = imuarray.select(recording, 20)
-    posterior = posterior_of(recording, model_of(recording), flat=True)
-    log_density, data = traced(posterior)
+    target = sampling.flat(recording)
+    posterior, log_density = target.posterior, target.exact()
     positions = positions_of(posterior.mode)
     centred = positions - positions.mean(axis=0)
     along = np.linalg.svd(centred)[2][0]
     line = centred @ np.outer(along, along)
     values = [
-        float(log_density((d * positions + (1 - d) * (line - line[0]))[1:].ravel(), *data))
+        float(log_density((d * positions + (1 - d) * (line - line[0]))[1:].ravel()))
         for d in (1e-3, 1e-4)
     ]
     assert values[1] - values[0] == pytest.approx(20 * np.log(10), abs=1.0)

@@ -12,8 +12,8 @@ from imuarray.analysis.density import traced
 from imuarray.analysis.known import _choose, _hidden, fused, past_rail
 from imuarray.cli import main
 from imuarray.errors import InputError
-from imuarray.figures.board import draw_past_rail, table_past_rail
 from imuarray.provenance import write_netcdf
+from imuarray_papers.figures.board import draw_past_rail, table_past_rail
 from tests.cases import known
 from tests.test_bound import model
 

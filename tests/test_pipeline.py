@@ -128,14 +128,14 @@ def test_a_changed_source_reruns_what_rests_on_it(quick, tmp_path):
     shutil.copytree(ROOT / "src", tmp_path / "src", ignore=shutil.ignore_patterns("__pycache__"))
     assert rerun(quick.parents[1], tmp_path / "src") == set()
     for names, rules in (
-        (("blind/scene.py", "report/write.py", "report/report.html.j2", "studies/joint.py"),
-         set()),
-        (("studies/rate_error.py",), {"rate_error", "claims_accelerometers_only",
+        (("imuarray_papers/blind/scene.py", "imuarray/report/write.py",
+          "imuarray/report/report.html.j2", "imuarray_papers/studies/joint.py"), set()),
+        (("imuarray_papers/studies/rate_error.py",), {"rate_error", "claims_accelerometers_only",
                                       "figure_2017_fig3", "claims", "quick"}),
-        (("studies/checks/timing.py",), {"claims_timing", "claims", "quick"}),
-        (("figures/imuarray.mplstyle",), {*DRAWN, "quick"}),
+        (("imuarray_papers/studies/checks/timing.py",), {"claims_timing", "claims", "quick"}),
+        (("imuarray/report/imuarray.mplstyle",), {*DRAWN, "quick"}),
     ):  # fmt: skip
-        texts = {tmp_path / "src" / "imuarray" / name: "" for name in names}
+        texts = {tmp_path / "src" / name: "" for name in names}
         for path in texts:
             texts[path] = path.read_text(encoding="utf-8")
             added = "\nADDED = 1\n" if path.suffix == ".py" else "\n"

@@ -12,12 +12,10 @@ import pytest
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.posterior.diagnostics import ess
-from imuarray.posterior.likelihood import Likelihood
-from imuarray.posterior.pmmh import run_chains
-from imuarray.posterior.target import (
-    CompiledTarget,
-    GaussianPrior,
-)
+from imuarray.posterior.prior import GaussianPrior
+from imuarray_papers.posterior.likelihood import Likelihood
+from imuarray_papers.posterior.pmmh import run_chains
+from imuarray_papers.posterior.target import CompiledTarget
 from tests import oracles
 from tests.cases import SHAPE, simulate
 from tests.generic import GenericTarget

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from imuarray.config import check_config, read_config
-from imuarray.pipeline.published import Published
-from imuarray.pipeline.recordings import Recordings
+from imuarray_papers.config import check_config, read_config
+from imuarray_papers.pipeline.published import Published
+from imuarray_papers.pipeline.recordings import Recordings
 from tests.test_pipeline import ROOT, started
 
 MODULE = """

@@ -7,9 +7,8 @@ import pytest
 
 import imuarray
 from imuarray.errors import InputError
+from imuarray_papers.sampling import sample
 from tests.test_bound import model
-
-PAPERS = {"model": "papers", "rates": "spread", "motion_prior": "flat"}
 
 
 def railed(rail):
@@ -26,16 +25,11 @@ def test_samples_at_a_rail_are_left_out():
     recording, said = railed(15.0), []
     lost = recording.saturated_gyroscopes().any(axis=(1, 2))
     assert 0 < lost.sum() < lost.size
-    found = imuarray.sample(recording, method="pmmh", steps=20, say=said.append, **PAPERS)
+    found = sample(recording, steps=20, rates="spread", say=said.append)
     assert any(f"left out {lost.sum()} of {lost.size}" in line for line in said)
     assert np.all(np.isfinite(found["posterior"]["position"]))
 
 
 def test_without_any_other_sample_it_is_said():
     with pytest.raises(InputError, match="off their rail, found none"):
-        imuarray.sample(railed(0.01), steps=20, **PAPERS)
-
-
-def test_the_proper_motion_prior_is_refused():
-    with pytest.raises(InputError, match="expected --motion-prior flat with it"):
-        imuarray.sample(railed(15.0), "papers", rates="spread")
+        sample(railed(0.01), steps=20, rates="spread")

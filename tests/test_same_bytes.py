@@ -9,13 +9,13 @@ import pytest
 SCRIPT = """
 import hashlib
 import numpy as np
-from imuarray.estimation.bcd import calibrate_bcd
+from imuarray_papers.estimation.bcd import calibrate_bcd
 from imuarray.estimation.newton import calibrate_gauss_newton
 from imuarray.geometry import mimu4444
 from imuarray.model import ArrayModel
 from imuarray.motion import normal_motion
 from imuarray.model.jax64 import jax
-from imuarray.posterior.likelihood import Likelihood
+from imuarray_papers.posterior.likelihood import Likelihood
 from imuarray.posterior.marginal import Marginal
 from imuarray.simulation.recordings import measure
 
@@ -30,7 +30,7 @@ found = [
     likelihood.estimate(model.array.relative, 25, np.random.default_rng(3)),
     slow.positions, slow.cost, fast.positions, fast.covariance,
 ]
-marginal, theta = Marginal.of(likelihood, fast.positions, 3), fast.positions[1:].ravel()
+marginal, theta = likelihood.marginal(fast.positions, 3), fast.positions[1:].ravel()
 found += jax.jit(jax.value_and_grad(marginal.log_density))(theta)
 for part in found:
     print(hashlib.sha256(np.asarray(part).tobytes()).hexdigest())

@@ -56,8 +56,6 @@ def test_skewed_gyroscopes_are_found_and_sampled():
     ("options", "said"),
     [
         ({"accelerometer_noise": 0.1}, "expected it with --model papers only"),
-        ({"method": "pmmh"}, "expected --model papers with it, found sensors"),
-        ({"motion_prior": "flat"}, "expected --model papers with it, found sensors"),
         ({"model": "papers", "effects": ["size_effect"]}, "expected none with --model papers"),
         ({"model": "guess"}, "expected any of sensors, papers or a calibration"),
     ],

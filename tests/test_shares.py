@@ -4,10 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from imuarray.config import read_config
-from imuarray.studies.position_error import TABLES, joined, realise, study
-from imuarray.studies.sbc import pit_values
-from imuarray.studies.truths import share
+from imuarray_papers.config import read_config
+from imuarray_papers.studies.position_error import TABLES, joined, realise, study
+from imuarray_papers.studies.sbc import pit_values
+from imuarray_papers.studies.truths import share
 from tests.test_bound import model
 from tests.test_validation import setting
 

@@ -5,13 +5,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from imuarray.blind.cases import Case, make
 from imuarray.diagnosis.procedure import unshaken
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.shocks import SHOCK, find_shocks, misfits, with_neighbours
 from imuarray.diagnosis.state import Search
 from imuarray.engine.parameters import columns_of
 from imuarray.engine.readings import arrange
+from imuarray_papers.blind.cases import Case, make
 
 ALL = tuple(range(8))
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from imuarray.pipeline import sources as of_package
-from imuarray.pipeline.sources import Sources
+from imuarray_papers.pipeline import sources as of_package
+from imuarray_papers.pipeline.sources import Sources
 
 WORKFLOW = Path(__file__).parents[1] / "workflow"
 SCRIPTS = {path.stem: path.read_text("utf-8") for path in (WORKFLOW / "scripts").glob("*.py")}
@@ -33,13 +33,17 @@ def sources():
 def files(sources, name):
     """The package's files that a script rests on, or a rule that draws."""
     if name in DRAWN:
-        return sources.files("publish", f"imuarray.{DRAWN[name].rpartition('.')[0]}")
+        return sources.files("publish", f"imuarray_papers.{DRAWN[name].rpartition('.')[0]}")
     return sources.files(name)
 
 
 def resting_on(sources, name):
     """The scripts and the rules that draw that rest on a file of the package."""
-    found = {one for one in [*SCRIPTS, *DRAWN] if f"imuarray/{name}" in files(sources, one)}
+    found = {
+        one
+        for one in [*SCRIPTS, *DRAWN]
+        if any(file.endswith(name) for file in files(sources, one))
+    }
     assert found, f"no script rests on {name}"
     return found
 
@@ -62,7 +66,7 @@ def test_what_one_stage_needs_is_that_stages_alone(sources, name, scripts):
     assert not any(name.startswith(("figure_2", "table_2", "simulate_")) for name in found)
 
 
-@pytest.mark.parametrize("name", ["figures/style.py", "figures/imuarray.mplstyle"])
+@pytest.mark.parametrize("name", ["report/style.py", "report/imuarray.mplstyle"])
 def test_drawings_rest_on_their_style(sources, name):
     drawn = {one for one in [*SCRIPTS, *DRAWN] if one.startswith("figure_")}
     assert len(drawn) > 15 and drawn <= resting_on(sources, name)
@@ -96,7 +100,7 @@ def test_a_digest_follows_what_the_code_does(sources, monkeypatch, tmp_path):
     """Not its remarks, layout and docstrings."""
     before, other = sources.digest("claims"), sources.digest("tune")
     place, changed = (
-        sources.files("claims")["imuarray/claims/registry.py"],
+        sources.files("claims")["imuarray_papers/claims/registry.py"],
         tmp_path / "registry.py",
     )
     text = place.read_text(encoding="utf-8")
@@ -124,5 +128,5 @@ def test_rules_take_the_digest_of_the_script_they_run():
 def test_a_figures_rule_and_function_have_its_name():
     for rule, name in DRAWN.items():
         module, _, function = name.rpartition(".")
-        assert callable(getattr(import_module(f"imuarray.{module}"), function))
+        assert callable(getattr(import_module(f"imuarray_papers.{module}"), function))
         assert function == rule

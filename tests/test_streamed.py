@@ -89,7 +89,7 @@ def test_readings_left_in_the_file(recording, tmp_path, monkeypatch):
     assert sum(sizes) == SAMPLES and all(a == SMALL for a, _ in pairwise(sizes))
     monkeypatch.setattr(stored, "MAX_VALUES", 100)
     with pytest.raises(InputError, match="expected at most 100 values to hold in memory"):
-        imuarray.calibrate(found, "papers", "bcd")
+        imuarray.calibrate(found)
 
 
 def test_faults_are_told_of_every_part(recording, tmp_path, monkeypatch):

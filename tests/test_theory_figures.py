@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from imuarray.figures import uncertainty
-from imuarray.studies import bound
+from imuarray_papers.figures import uncertainty
+from imuarray_papers.studies import bound
 from tests.test_bound import MOTION, OPTIONS, model
 
 SETTINGS = {

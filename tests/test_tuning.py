@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from imuarray.model import ArrayModel
-from imuarray.posterior.likelihood import Likelihood
-from imuarray.posterior.target import GaussianPrior
-from imuarray.posterior.tuning import (
+from imuarray.posterior.prior import GaussianPrior
+from imuarray_papers.posterior.likelihood import Likelihood
+from imuarray_papers.posterior.tuning import (
     acceptance,
     acceptance_sweep,
     choose_draws,

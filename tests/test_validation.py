@@ -10,15 +10,15 @@ import pytest
 import imuarray
 from imuarray.analysis.calibration import fitted
 from imuarray.analysis.model import silent
-from imuarray.config import read_config
 from imuarray.estimation.newton import fisher_scoring
-from imuarray.figures import uncertainty
-from imuarray.figures.uncertainty import coverage
 from imuarray.geometry import positions_of, sub_array
-from imuarray.posterior.likelihood import Likelihood
-from imuarray.studies import joint, sbc, truths
-from imuarray.studies.sbc import METHODS
-from imuarray.studies.truths import setting_from
+from imuarray_papers.config import read_config
+from imuarray_papers.figures import uncertainty
+from imuarray_papers.figures.uncertainty import coverage
+from imuarray_papers.posterior.likelihood import Likelihood
+from imuarray_papers.studies import joint, sbc, truths
+from imuarray_papers.studies.sbc import METHODS
+from imuarray_papers.studies.truths import setting_from
 from tests.test_pipeline import ROOT
 
 pytestmark = pytest.mark.slow

@@ -71,19 +71,20 @@ def _share_heap() -> None:
         ctypes.CDLL(None).mallopt(M_ARENA_MAX, 2)
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str] | None = None, parser: argparse.ArgumentParser | None = None) -> int:
     """Run one command; returns the exit status.
 
     0; 2 for bad input, nothing written; 3 where what was written is not to be trusted (the last
     line says why); 130 when interrupted or terminated; 141 when nobody reads its output any more;
     1 for what was not foreseen, whose traceback ``--debug`` shows.
 
-    `argv` are the arguments without the program's name, by default the process's own.
+    `argv` are the arguments without the program's name, by default the process's own; ``parser``
+    is by default that of `imuarray`.
     """
     arguments = argparse.Namespace()
     try:
         with _warnings_in_one_line(), _interruptions():
-            make_parser().parse_args(argv, arguments)
+            (parser or make_parser()).parse_args(argv, arguments)
             _check_output(arguments)
             _read_effects(arguments)
             arguments.run(arguments)

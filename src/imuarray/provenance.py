@@ -87,12 +87,13 @@ def _fingerprint(value: Any) -> Any:
 
 
 def code_digest() -> str:
-    """SHA-256, in hexadecimal, of the names and the text of the package's Python files.
+    """SHA-256, in hexadecimal, of the names and the text of the project's Python files.
 
     And of what `add_code` was given, if anything.
     """
-    root = Path(__file__).parent
-    sources = sorted((path.relative_to(root).as_posix(), path) for path in root.rglob("*.py"))
+    root = Path(__file__).parents[1]
+    files = root.glob("imuarray*/**/*.py")  # the papers' package, too, where it is
+    sources = sorted((path.relative_to(root).as_posix(), path) for path in files)
     # a checkout may have changed the line ends
     texts = [[name, path.read_text(encoding="utf-8")] for name, path in sources]
     return digest(texts + sorted([name, text] for name, text in _ADDED.values()))

@@ -19,8 +19,8 @@ from tests.trees import differences
 SIZES = 4, 40, 400, 4000  # kB that commands get
 ROOM = 200, 1000, 3000  # kB that the pipeline gets, before it gets enough
 COMMANDS = (
-    "simulate --config {config} --out {out}",
-    "calibrate {recording} --method gauss-newton --out {out}",
+    "simulate --out {out}",
+    "calibrate {recording} --model papers --out {out}",
     "sample {recording} --steps 2000 --out {out}",
     "select {recording} --out {out}",
     "board {recording} --out {folder}/answer",
@@ -112,7 +112,7 @@ def main() -> None:
         config, recording = fresh("given", where) / "config.yaml", where / "rec.nc"
         text = config.read_text(encoding="utf-8")
         config.write_text(text.replace("duration: 100.0", "duration: 5.0"), encoding="utf-8")
-        if imuarray(f"simulate --config {config} --out {recording}").returncode:
+        if imuarray(f"simulate --out {recording}").returncode:
             raise SystemExit("disk: expected a recording to try with, found none")
         names = {"config": config, "recording": recording}
         wrong = commands(where / "small", names) + pipeline(where)

@@ -14,7 +14,7 @@ def code(script, *modules):
 
 def by(name):
     """Parameters of a rule whose figure or table a function of the package makes."""
-    return {"by": name, "code": code("publish", f"imuarray.{name.rpartition('.')[0]}")}
+    return {"by": name, "code": code("publish", f"imuarray_papers.{name.rpartition('.')[0]}")}
 
 
 def asked():

@@ -1,12 +1,12 @@
 """Do recordings of one board agree within their claimed widths? -> summary and all pairs, CSV."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     import pandas as pd
 
-    from imuarray.measured.positions import agreement, pairwise
     from imuarray.provenance import write_csv
+    from imuarray_papers.measured.positions import agreement, pairwise
 
     table = pd.concat([pd.read_csv(path, dtype={"accelerometer": str, "assumed": str})
                        for path in snakemake.input.positions])  # fmt: skip

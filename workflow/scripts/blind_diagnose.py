@@ -1,14 +1,14 @@
 """Diagnoses of one batch of blind cases, with the truth beside them -> JSON."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     from functools import partial
 
-    from imuarray.blind.cases import matrix
-    from imuarray.blind.study import batch_of, diagnosed
     from imuarray.diagnosis.document import diagnose
     from imuarray.provenance import stamp, write_json
+    from imuarray_papers.blind.cases import matrix
+    from imuarray_papers.blind.study import batch_of, diagnosed
 
     cases = batch_of(
         matrix(settings["scale"]["cases"]), int(snakemake.wildcards.batch), snakemake.params.batches

@@ -1,14 +1,14 @@
 """Diagnoses of all batches compared with the truth: graded rows -> JSON, and flat as CSV."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     import json
     from pathlib import Path
 
-    from imuarray.blind.study import GRADES, grade
-    from imuarray.blind.summary import recordings
     from imuarray.provenance import stamp, write_csv, write_json
+    from imuarray_papers.blind.study import GRADES, grade
+    from imuarray_papers.blind.summary import recordings
 
     entries = []
     for path in snakemake.input.batches:

@@ -1,6 +1,6 @@
 """Iterations to 1.01 times the bound, ML-BCD and Gauss-Newton, by motion -> CSV."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     from itertools import product
@@ -8,10 +8,10 @@ with job(snakemake) as settings:
     import numpy as np
     import pandas as pd
 
-    from imuarray.config import model_from
     from imuarray.provenance import write_csv
-    from imuarray.studies import bound
-    from imuarray.studies.position_error import magnitudes
+    from imuarray_papers.config import model_from
+    from imuarray_papers.studies import bound
+    from imuarray_papers.studies.position_error import magnitudes
 
     paper, theory, scale = settings["paper2017"], settings["theory"], settings["scale"]
     motions = [

@@ -1,12 +1,12 @@
 """The Cramer-Rao bound against the size of the array -> CSV."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
-    from imuarray.config import model_from
     from imuarray.provenance import write_csv
-    from imuarray.studies import bound
-    from imuarray.studies.position_error import magnitudes
+    from imuarray_papers.config import model_from
+    from imuarray_papers.studies import bound
+    from imuarray_papers.studies.position_error import magnitudes
 
     paper, theory, scale = settings["paper2017"], settings["theory"], settings["scale"]
     table = bound.against_size(

@@ -1,13 +1,13 @@
 """Every claim of the two papers against the results -> CSV and Markdown."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     from pathlib import Path
 
-    from imuarray.claims.registry import evaluate, markdown
-    from imuarray.claims.results import Results
     from imuarray.provenance import write_bytes, write_csv
+    from imuarray_papers.claims.registry import evaluate, markdown
+    from imuarray_papers.claims.results import Results
 
     root = Path(snakemake.output.table).parents[1]
     results = Results(root, settings)

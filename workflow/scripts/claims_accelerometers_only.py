@@ -1,13 +1,13 @@
 """RMSE of the angular rate without gyroscopes, over |omega| and position error -> CSV."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     import numpy as np
 
-    from imuarray.config import model_from
     from imuarray.provenance import write_csv
-    from imuarray.studies.rate_error import accelerometers_only
+    from imuarray_papers.config import model_from
+    from imuarray_papers.studies.rate_error import accelerometers_only
 
     paper = settings["paper2017"]
     span, rail = paper["fig3_rates_dps"], paper["gyroscope_range_dps"]

@@ -1,15 +1,15 @@
 """Ranks, Lemma 1, invariances, accelerations -> JSON; ranks over K and N, inner steps -> CSV."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     import numpy as np
 
-    from imuarray.config import model_from
     from imuarray.provenance import stamp, write_csv, write_json
     from imuarray.streams import stream
-    from imuarray.studies.checks import identifiability as checks
-    from imuarray.studies.position_error import magnitudes
+    from imuarray_papers.config import model_from
+    from imuarray_papers.studies.checks import identifiability as checks
+    from imuarray_papers.studies.position_error import magnitudes
 
     model, paper, seed = model_from(settings), settings["paper2017"], settings["seed"]
     sizes, count = magnitudes(paper), settings["scale"]["realisations"]

@@ -1,20 +1,20 @@
 """Linearised posteriors of every recording, and the printed determinant's effect -> CSV, CSV."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     import numpy as np
     import pandas as pd
 
-    from imuarray.config import model_from, motion_sds
     from imuarray.motion import normal_motion
     from imuarray.provenance import write_csv
     from imuarray.recording import read_recording, read_truth
     from imuarray.simulation.recordings import simulate_samples
     from imuarray.streams import stream
-    from imuarray.studies.bayes import select_disjoint
-    from imuarray.studies.checks import linearised
-    from imuarray.studies.checks.marginalisation import tiny_model
+    from imuarray_papers.config import model_from, motion_sds
+    from imuarray_papers.studies.bayes import select_disjoint
+    from imuarray_papers.studies.checks import linearised
+    from imuarray_papers.studies.checks.marginalisation import tiny_model
 
     paper, sd = settings["paper2021"], settings["noise"]["accelerometer_sd"]
     assumed = settings["experiment"]["accelerometer_sd"]

@@ -1,13 +1,13 @@
 """Algebra, limits and unbiasedness of the estimator of 2021, its tuning rules -> JSON."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
-    from imuarray.config import model_from, motion_sds
     from imuarray.provenance import stamp, write_json
     from imuarray.recording import read_recording, read_truth
     from imuarray.streams import stream
-    from imuarray.studies.checks import marginalisation as checks
+    from imuarray_papers.config import model_from, motion_sds
+    from imuarray_papers.studies.checks import marginalisation as checks
 
     model, paper, seed = model_from(settings), settings["paper2021"], settings["seed"]
     sds = motion_sds(settings)

@@ -1,14 +1,14 @@
 """Cramer-Rao bound of the positions in the settings of figures 4 and 5 of 2017 -> CSV."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     import numpy as np
 
-    from imuarray.config import model_from
     from imuarray.provenance import write_csv
-    from imuarray.studies.bound import bound_table
-    from imuarray.studies.position_error import magnitudes
+    from imuarray_papers.config import model_from
+    from imuarray_papers.studies.bound import bound_table
+    from imuarray_papers.studies.position_error import magnitudes
 
     paper = settings["paper2017"]
     cases = [(samples, *magnitudes(paper)) for samples in paper["fig4_samples"]]

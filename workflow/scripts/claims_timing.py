@@ -3,21 +3,21 @@
 Also how the acceptance depends on the variance at the longest T -> CSV (that one is reproducible).
 """
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     import json
 
     import pandas as pd
 
-    from imuarray.config import model_from
-    from imuarray.posterior.target import CompiledTarget
     from imuarray.provenance import write_csv
     from imuarray.recording import read_recording, read_truth
     from imuarray.streams import stream
-    from imuarray.studies.bayes import target_for
-    from imuarray.studies.checks import timing
-    from imuarray.studies.position_error import magnitudes
+    from imuarray_papers.config import model_from
+    from imuarray_papers.posterior.target import CompiledTarget
+    from imuarray_papers.studies.bayes import target_for
+    from imuarray_papers.studies.checks import timing
+    from imuarray_papers.studies.position_error import magnitudes
 
     seed, paper = settings["seed"], settings["paper2017"]
     longest = max(paper["fig4_samples"])

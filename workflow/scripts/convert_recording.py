@@ -1,6 +1,6 @@
 """A configured recording's file -> recording (NetCDF)."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake):
     from imuarray.analysis.logs import open_logs

@@ -1,6 +1,6 @@
 """All recordings of a board, corrected by the poses of them all -> a folder of NetCDF files."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake):
     from pathlib import Path

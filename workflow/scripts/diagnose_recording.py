@@ -1,6 +1,6 @@
 """What the papers' model gets wrong on a recording -> diagnosis.json, report, figures."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     from pathlib import Path

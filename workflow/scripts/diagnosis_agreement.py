@@ -1,18 +1,18 @@
 """Do diagnoses of one board's recordings agree? -> tables of positions and parameters."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake):
     import json
     from pathlib import Path
 
-    from imuarray.figures.repeatability import (
+    from imuarray.provenance import write_csv
+    from imuarray_papers.figures.repeatability import (
         parameters_agreement,
         positions_agreement,
         recordings_table,
     )
-    from imuarray.figures.style import rounded
-    from imuarray.provenance import write_csv
+    from imuarray_papers.figures.style import rounded
 
     documents = {
         Path(path).parent.name: json.loads(Path(path).read_text(encoding="utf-8"))

@@ -1,14 +1,14 @@
 """Withheld gyroscope readings predicted by several models -> table, PDF, PNG, CSV."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake):
     from functools import partial
 
     from imuarray.analysis.known import ASSUMED, BINS, past_rail
-    from imuarray.figures.board import draw_past_rail
-    from imuarray.figures.style import write_figure
     from imuarray.recording import load_dataset, read_recording
+    from imuarray_papers.figures.board import draw_past_rail
+    from imuarray_papers.figures.style import write_figure
 
     recording = read_recording(snakemake.input.recording)
     table = past_rail(recording, load_dataset(snakemake.input.calibration))

@@ -1,6 +1,6 @@
 """The findings as a paper: its page with the published files that it reads -> PDF."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     import shutil

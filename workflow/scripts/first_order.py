@@ -1,6 +1,6 @@
 """Per-triad calibration from still poses -> corrected recording, and its tables."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake):
     from imuarray.firstorder import report

@@ -1,14 +1,14 @@
 """paper_figures/README.md from the captions, the tables and the chains' verdicts."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     import json
     from pathlib import Path
 
-    from imuarray.figures.gallery import caption, gallery
-    from imuarray.figures.style import chain_lines
     from imuarray.provenance import write_bytes
+    from imuarray_papers.figures.gallery import caption, gallery
+    from imuarray_papers.figures.style import chain_lines
 
     output, given = Path(snakemake.output[0]), snakemake.params
     captions = {

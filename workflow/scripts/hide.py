@@ -1,15 +1,15 @@
 """An effect in a simulated recording, or on one IMU of a measured one -> recording, truth."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     import json
     from pathlib import Path
 
-    from imuarray.blind.cases import hidden, make
-    from imuarray.blind.measured import hide
     from imuarray.provenance import stamp, write_json
     from imuarray.recording import read_recording, write_recording
+    from imuarray_papers.blind.cases import hidden, make
+    from imuarray_papers.blind.measured import hide
 
     made, seed = snakemake.output, settings["seed"]
     if snakemake.input:

@@ -1,6 +1,6 @@
 """Burn-in, R-hat and ESS of paired chains -> per file: verdict JSON, coordinates, burn-in CSV."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     from imuarray.posterior.chains import read_chains

@@ -1,6 +1,6 @@
 """A board from all recordings but one, which is corrected by their maps -> two NetCDF files."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake):
     from imuarray.analysis.known import left_out

@@ -1,6 +1,6 @@
 """Positions from few samples of a recording whose sensors are known from others -> NetCDF."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake):
     from imuarray.analysis.known import located

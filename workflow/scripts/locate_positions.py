@@ -1,13 +1,13 @@
 """Positions of each subset for each sigma_a, assumed or estimated, and by ML-BCD -> CSV."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     import pandas as pd
 
-    from imuarray.measured.positions import locate_table
     from imuarray.provenance import write_csv
     from imuarray.recording import read_recording
+    from imuarray_papers.measured.positions import locate_table
 
     name, sigmas = snakemake.wildcards.name, settings["experiment"]["sigmas"]
     parts = []

@@ -1,14 +1,14 @@
 """PIT values of a share of the truths drawn from the prior, for each method -> CSV."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     import pandas as pd
 
     from imuarray.analysis.sampling import sample
     from imuarray.provenance import write_csv
-    from imuarray.studies.sbc import METHODS, ML_MORE, pit_values, pit_values_by_default
-    from imuarray.studies.truths import setting_from, share
+    from imuarray_papers.studies.sbc import METHODS, ML_MORE, pit_values, pit_values_by_default
+    from imuarray_papers.studies.truths import setting_from, share
 
     chosen = snakemake.wildcards
     setting = setting_from(settings, chosen.setting, int(chosen.samples))

@@ -1,12 +1,12 @@
 """RMSE of ML-BCD positions (2017, figures 4 and 5) from the shares of its realisations -> CSV."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     import numpy as np
 
     from imuarray.provenance import write_csv
-    from imuarray.studies.position_error import TABLES, Errors, joined, study
+    from imuarray_papers.studies.position_error import TABLES, Errors, joined, study
 
     name = snakemake.wildcards.study
     cases, options = study(settings, name)

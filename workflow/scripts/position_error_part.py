@@ -1,13 +1,13 @@
 """A share of the realisations of ML-BCD's position errors (2017, figures 4 and 5) -> NPZ."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     import numpy as np
 
-    from imuarray.config import model_from
     from imuarray.provenance import atomic_write
-    from imuarray.studies.position_error import realise, study
+    from imuarray_papers.config import model_from
+    from imuarray_papers.studies.position_error import realise, study
 
     cases, options = study(settings, snakemake.wildcards.study)
     errors = realise(

@@ -1,6 +1,6 @@
 """A recording's held-out log density under the board of the others and other models -> CSV."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake):
     from imuarray.analysis.known import predicted

@@ -1,6 +1,6 @@
 """One cause of a diagnosis, drawn from its numbers as they are published -> PDF, PNG, CSV."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake):
     import json
@@ -10,9 +10,9 @@ with job(snakemake):
 
     import pandas as pd
 
-    from imuarray.figures.style import write_figure
     from imuarray.report.drawings_model import cause_figure
     from imuarray.report.write import footer
+    from imuarray_papers.figures.style import write_figure
 
     made, output = Path(snakemake.input.made), dict(snakemake.output.items())
     (numbers,) = made.parent.glob(f"cause_*_{snakemake.wildcards.effect}.csv")

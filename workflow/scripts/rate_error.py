@@ -1,13 +1,13 @@
 """RMSE of the angular rate when positions are wrong (2017, figure 3) -> CSV."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     import numpy as np
 
-    from imuarray.config import model_from
     from imuarray.provenance import write_csv
-    from imuarray.studies.rate_error import rmse_against_rate
+    from imuarray_papers.config import model_from
+    from imuarray_papers.studies.rate_error import rmse_against_rate
 
     paper, scale = settings["paper2017"], settings["scale"]
     span = paper["fig3_rates_dps"]

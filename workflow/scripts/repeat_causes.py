@@ -1,12 +1,12 @@
 """How positions repeat under each model -> CSV."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake):
     import pandas as pd
 
-    from imuarray.measured.causes import repeated
     from imuarray.provenance import write_csv
+    from imuarray_papers.measured.causes import repeated
 
     tables = {
         name: pd.read_csv(path, dtype={"accelerometer": str})

@@ -1,6 +1,6 @@
 """Residuals beside the simulation's, in assumed sigmas -> summary and histogram, CSV."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     from dataclasses import replace
@@ -8,10 +8,10 @@ with job(snakemake) as settings:
     import numpy as np
 
     from imuarray.estimation.selection import select_dynamic
-    from imuarray.measured.residuals import compare
     from imuarray.provenance import write_csv
     from imuarray.recording import read_recording
     from imuarray.streams import stream
+    from imuarray_papers.measured.residuals import compare
 
     noise = settings["noise"]
     whole = replace(

@@ -3,11 +3,11 @@
 N and sigma_q are tuned here, on the subset itself, as in section III-C.
 """
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     from imuarray.recording import read_recording
-    from imuarray.studies.bayes import sample_paired, select_disjoint, tuned_experiment
+    from imuarray_papers.studies.bayes import sample_paired, select_disjoint, tuned_experiment
 
     kind, lengths = snakemake.wildcards.kind, settings["scale"]["experiment_transitions"]
     whole = read_recording(snakemake.input.recording)

@@ -1,10 +1,10 @@
 """Chains of measured subsets or of their simulations, sigma_a enlarged: figure 5 and table II."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     from imuarray.recording import read_recording
-    from imuarray.studies.bayes import sample_paired, tuned_experiment
+    from imuarray_papers.studies.bayes import sample_paired, tuned_experiment
 
     kind, counts = snakemake.wildcards.kind, settings["paper2021"]["samples"]
     lengths = settings["scale"]["measured_transitions"]

@@ -1,12 +1,12 @@
 """Paired PmMH chains of one T -> DataTree (NetCDF); checkpoints beside the results."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     import json
 
     from imuarray.recording import read_recording
-    from imuarray.studies.bayes import sample_paired, target_for
+    from imuarray_papers.studies.bayes import sample_paired, target_for
 
     samples = int(snakemake.wildcards.samples)
     recording = read_recording(snakemake.input.recording)

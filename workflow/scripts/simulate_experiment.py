@@ -4,12 +4,12 @@ kind ``quiet`` has the sensors' declared noise and is analysed as the paper anal
 experiment; ``simulation`` really has the large noise that the analysis assumes.
 """
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     from imuarray.provenance import stamp
     from imuarray.recording import write_recording
-    from imuarray.studies.bayes import simulate_twisting
+    from imuarray_papers.studies.bayes import simulate_twisting
 
     noise = {
         "quiet": settings["noise"]["accelerometer_sd"],

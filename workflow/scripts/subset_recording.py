@@ -1,15 +1,15 @@
 """Dynamic samples of a recording -> disjoint subsets, their simulations, counts removed."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     import pandas as pd
 
     from imuarray.estimation.selection import select_dynamic
-    from imuarray.measured.positions import simulate_subset
     from imuarray.provenance import stamp, write_csv
     from imuarray.recording import read_recording, write_recording
     from imuarray.streams import stream
+    from imuarray_papers.measured.positions import simulate_subset
 
     name, seed, made = snakemake.wildcards.name, settings["seed"], snakemake.output
     whole = read_recording(snakemake.input.recording)

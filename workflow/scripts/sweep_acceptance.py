@@ -1,16 +1,16 @@
 """Acceptance against sigma_q -> CSV per T, with the variance of log p-hat at the chosen N."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     import numpy as np
     import pandas as pd
 
-    from imuarray.posterior.tuning import acceptance_sweep, choose_draws
     from imuarray.provenance import write_csv
     from imuarray.recording import read_recording
     from imuarray.streams import stream
-    from imuarray.studies.bayes import mode_of, target_for
+    from imuarray_papers.posterior.tuning import acceptance_sweep, choose_draws
+    from imuarray_papers.studies.bayes import mode_of, target_for
 
     paper, count = settings["paper2021"], settings["scale"]["acceptance_steps"]
     steps = np.geomspace(*(paper["sweep_steps"][key] for key in ("first", "last", "count")))

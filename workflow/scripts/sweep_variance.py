@@ -1,16 +1,16 @@
 """Variance of log p-hat at the prior mean -> CSV per T: samples, draws, variance, variance_se."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     import numpy as np
     import pandas as pd
 
-    from imuarray.posterior.tuning import variance_sweep
     from imuarray.provenance import write_csv
     from imuarray.recording import read_recording
     from imuarray.streams import stream
-    from imuarray.studies.bayes import target_for
+    from imuarray_papers.posterior.tuning import variance_sweep
+    from imuarray_papers.studies.bayes import target_for
 
     paper, count = settings["paper2021"], settings["scale"]["variance_realisations"]
     files = zip(paper["samples"], snakemake.input.recordings, snakemake.output, strict=True)

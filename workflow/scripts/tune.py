@@ -1,12 +1,12 @@
 """Choose N and sigma_q from the sweeps -> JSON per T: samples, draws, step_length_m, ..."""
 
-from imuarray.pipeline.job import job
+from imuarray_papers.pipeline.job import job
 
 with job(snakemake) as settings:
     import pandas as pd
 
-    from imuarray.posterior.tuning import choose_step
     from imuarray.provenance import stamp, write_json
+    from imuarray_papers.posterior.tuning import choose_step
 
     paper = settings["paper2021"]
     given = snakemake.input.acceptances, snakemake.output

@@ -16,7 +16,7 @@ from imuarray.engine.readings import Readings
 from imuarray.linear import scaled_inverse
 from imuarray.model import ArrayModel, Noise
 from imuarray.posterior.generic import SCALES
-from imuarray.posterior.target import TiedPrior
+from imuarray.posterior.prior import TiedPrior
 from imuarray.recording import Recording
 
 HELD = 1e-3  # of its prior's sd: the sd of a parameter that the estimate does not free

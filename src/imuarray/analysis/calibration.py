@@ -18,7 +18,7 @@ from imuarray.engine.estimate import Estimate
 from imuarray.engine.forward import EffectGroup, groups_of, select_forward, with_effects
 from imuarray.engine.parameters import model_of
 from imuarray.engine.readings import Readings, arrange, determined, most_informative
-from imuarray.errors import InputError, one_line, require_one_of
+from imuarray.errors import InputError, one_line
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording, load_dataset
 from imuarray.recording.channels import require_apart, require_live
@@ -95,8 +95,8 @@ def _tell(groups: Sequence[EffectGroup], say: Say) -> None:
 
 def calibrate(
     recording: Recording | Sequence[Recording], model: str | PathLike = "sensors",
-    method: str | None = None, effects: Sequence[str] = (),
-    accelerometer_noise: float | None = None, say: Say = silent,
+    effects: Sequence[str] = (), accelerometer_noise: float | None = None,
+    say: Say = silent,
 ) -> xr.Dataset:  # fmt: skip
     """Accelerometer positions, sensor parameters and motion (docs/models.md).
 
@@ -107,13 +107,9 @@ def calibrate(
         positions are the same and whose biases and clocks are each its own.
     model
         ``"sensors"``: the standard sensor model, each part kept where it gains on held-out time,
-        with noise estimated for each triad; ``"papers"``: that of paper 2017, by ``method``, with
-        the declared noise; or the path of a calibration: its effects and sensors, estimated
-        again.
-    method
-        Of the papers' model. ``"gauss-newton"`` (default): the most likely positions in a few
-        iterations, of any number of samples; ``"bcd"``: the same by block coordinate descent,
-        algorithm 1 of paper 2017, all samples in memory.
+        with noise estimated for each triad; ``"papers"``: that of paper 2017, with the declared
+        noise, any number of samples; or the path of a calibration: its effects and sensors,
+        estimated again.
     effects
         Names of effects (docs/effects.md) to have in the model instead of those of ``model``.
     accelerometer_noise
@@ -149,42 +145,41 @@ def calibrate(
     for one in recordings:
         require_live(one)
     require_apart(recordings)
-    if method is not None:
-        require_one_of("method", method, methods.CALIBRATION)
     require_together(model, recordings, effects, accelerometer_noise)
     if effects and methods.is_file(model):
         raise InputError("--effects: expected none with the model of a calibration, found some")
-    if method is not None and model != "papers":
-        raise InputError(f"--method {method}: expected it with --model papers, found {model}")
     if model == "papers":
-        dataset = _papers(recordings[0], method or methods.CALIBRATION[0], accelerometer_noise, say)
-    else:
-        whole = [less_leak_by_others(one) for one in recordings]
-        dataset = _engine(whole, str(model), tuple(effects), say)
+        return calibrate_papers(recordings[0], accelerometer_noise, say)
+    whole = [less_leak_by_others(one) for one in recordings]
+    return _finished(_engine(whole, str(model), tuple(effects), say), recordings, str(model))
+
+
+def _finished(dataset: xr.Dataset, recordings, model: str) -> xr.Dataset:
+    """With what the recordings say of themselves, and the origin."""
     if not all(np.isfinite(dataset[f"position{name}"]).all() for name in ("", "_covariance")):
         raise InputError("recording: expected one that determines the positions, found no solution")
     dataset = with_readings(dataset, recordings)
     data = [part for one in recordings for part in (one.specific_force, one.angular_rate)]
-    dataset.attrs |= {"model": str(model), **stamp({"recording": digest(*data)}, 0)}
+    dataset.attrs |= {"model": model, **stamp({"recording": digest(*data)}, 0)}
     return dataset
 
 
-def _papers(recording: Recording, method: str, accelerometer_noise, say: Say) -> xr.Dataset:
-    """By maximum likelihood with the declared noise (paper 2017)."""
-    from imuarray.estimation.bcd import calibrate_bcd
+def calibrate_papers(
+    recording: Recording, accelerometer_noise: float | None = None, say: Say = silent, search=None
+) -> xr.Dataset:
+    """`calibrate` by maximum likelihood with the declared noise (paper 2017).
+
+    ``search``: by default `calibrate_gauss_newton`, or another of its arguments.
+    """
     from imuarray.estimation.newton import calibrate_gauss_newton
 
-    recording = assumed(usable(recording, say), accelerometer_noise)
+    given, recording = recording, assumed(usable(recording, say), accelerometer_noise)
     model = model_of(recording)
     whole = recording.in_memory()
-    data = model, whole.specific_force, whole.angular_rate
-    if method == "bcd":
-        found = calibrate_bcd(*data, saturated=whole.saturated_gyroscopes(), tolerance=1e-9)
-    else:
-        found = calibrate_gauss_newton(*data, saturated=whole.saturated_gyroscopes())
-    dataset = papers_dataset(recording, model, found)
-    dataset.attrs["method"] = method
-    return dataset
+    found = (search or calibrate_gauss_newton)(
+        model, whole.specific_force, whole.angular_rate, saturated=whole.saturated_gyroscopes()
+    )
+    return _finished(papers_dataset(recording, model, found), [given], "papers")
 
 
 def _engine(recordings, model: str, effects, say: Say) -> xr.Dataset:

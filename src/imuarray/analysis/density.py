@@ -13,14 +13,12 @@ from imuarray.analysis.model import Say, silent
 from imuarray.analysis.noise import estimated_noise
 from imuarray.engine.readings import Readings
 from imuarray.errors import IdentifiabilityError
+from imuarray.estimation.collapsed import Collapsed
 from imuarray.geometry import positions_of
 from imuarray.model import ArrayModel
-from imuarray.posterior import tuning
 from imuarray.posterior.generic import SCALES, log_laplace, unknown
-from imuarray.posterior.likelihood import Likelihood
 from imuarray.posterior.marginal import Marginal, log_posterior
-from imuarray.posterior.proposals import sample_covariance
-from imuarray.posterior.target import GaussianPrior, TiedPrior
+from imuarray.posterior.prior import GaussianPrior, TiedPrior
 from imuarray.recording import Recording
 from imuarray.streams import stream
 
@@ -49,49 +47,24 @@ class Posterior(NamedTuple):
         """(5, K) from the unknown logs to those of `SCALES`."""
         return np.eye(len(SCALES))[:, [SCALES.index(name) for name in self.scales]]
 
-    @property
-    def flat(self) -> bool:
-        """True where the motion's prior is the papers'."""
-        return not np.isfinite(self.model.motion_sd[0])
-
-    def likelihood(self, rates: str = "declared") -> Likelihood:
-        """(26a) for the papers' model."""
-        recording = self.recording
-        return Likelihood.of(
-            self.model, recording.specific_force, recording.angular_rate,
-            recording.saturated_gyroscopes(), motion_sd=self.model.motion_sd[:2],
-            rate_distribution=sample_covariance(recording.angular_rate)
-            if rates == "spread" else None,
-        )  # fmt: skip
-
 
 def posterior_of(
-    recording: Recording, model: ArrayModel, flat: bool = False, rates: str = "declared",
-    known: tuple[bool, bool] = (False, False), say: Say = silent,
+    recording: Recording, model: ArrayModel, known: tuple[bool, bool] = (False, False),
+    say: Say = silent,
 ) -> Posterior:  # fmt: skip
     """The posterior of a recording under the papers' model, around its mode.
 
-    Parameters
-    ----------
-    flat
-        Whether omega and omega_dot have the papers' prior, and the noise is at its estimate. By
-        default they are normal of the recording's own size; that and the noise are unknown, with
-        log-normal priors a factor of twenty wide.
-    rates
-        As `imuarray.sample` has it; the noise is the model's where it is ``"spread"``.
-    known
-        Whether the accelerometers' noise, the gyroscopes', is the model's own.
+    omega and omega_dot are normal of the recording's own size; that and the noise are unknown, with
+    log-normal priors a factor of twenty wide. ``known``: whether the accelerometers' noise, the
+    gyroscopes', is the model's own.
     """
-    if rates == "spread":
-        return _spread(recording, model, say)
-    fitted = estimated_noise(recording, model, _fit(recording), known, say)
+    fitted = estimated_noise(recording, model, mode_search(recording), known, say)
     found, chosen = fitted.calibration, fitted.model
     if not found.converged:
         say(NOT_CONVERGED)
-    sizes = np.array(fitted.motion_sd)
-    if not flat:  # s is flat: differences between triads do not show it
-        chosen = replace(chosen, motion_sd=(*sizes[:2], np.inf))
-    free = [not flat and not fixed for fixed in known] + [not flat] * 2 + [False]
+    # s is flat: differences between triads do not show it
+    chosen = replace(chosen, motion_sd=(*fitted.motion_sd[:2], np.inf))
+    free = [*np.logical_not(known), True, True, False]
     unknown = unknown_scales(model, chosen, fitted.freedom, np.zeros(3), len(recording.time))
     before, freedom = (part[free] for part in unknown)
     prior = prior_of(recording, chosen)
@@ -120,17 +93,6 @@ def unknown_scales(declared: ArrayModel, chosen: ArrayModel, freedom, own, sampl
     return np.append(before, own), np.append(freedom, np.full(3, 3.0 * samples))
 
 
-def _spread(recording: Recording, model: ArrayModel, say: Say) -> Posterior:
-    """The papers' experiment: the noise is the model's, omega's density the gyroscopes' spread."""
-    from imuarray.measured.positions import locate
-
-    found = locate(recording, recording.accelerometer_noise_sd)
-    if not found.converged:
-        say(NOT_CONVERGED)
-    prior, mode = prior_of(recording, model), found.mean[1:].ravel()
-    return Posterior(recording, model, prior, mode, found.covariance, ())
-
-
 def prior_of(recording: Recording, model: ArrayModel) -> GaussianPrior:
     """Prior of the positions r_2 ... r_A, then of the effects' parameters."""
     mean = np.append(model.array.parameters, np.zeros(model.effect_size))
@@ -139,7 +101,7 @@ def prior_of(recording: Recording, model: ArrayModel) -> GaussianPrior:
     return GaussianPrior.of(mean, sd)
 
 
-def _fit(recording: Recording) -> Callable:
+def mode_search(recording: Recording) -> Callable:
     """A function of the model that searches the posterior's mode, from where it was last found.
 
     The first time from elsewhere, too, where few samples leave local optima.
@@ -181,7 +143,7 @@ def log_extended(model: ArrayModel) -> Callable:
     return log_density
 
 
-def traced(posterior: Posterior, rates: str = "declared", say: Say = silent):
+def traced(posterior: Posterior, say: Say = silent):
     """(log density, data): a function of theta (P,) and of arrays, to be compiled by JAX."""
     prior = posterior.prior
     if isinstance(prior, TiedPrior):
@@ -189,14 +151,16 @@ def traced(posterior: Posterior, rates: str = "declared", say: Say = silent):
         given = unknown(posterior.readings, posterior.motion, posterior.spread)
         return log_extended(posterior.model), (given, prior.mean, prior.root)
     recording = posterior.recording
-    likelihood = posterior.likelihood(rates)
     saturated = recording.saturated_gyroscopes()
-    own = likelihood.collapsed.mean.T[:, None]
+    collapsed = Collapsed.of(
+        posterior.model, recording.specific_force, recording.angular_rate, saturated
+    )
+    own = collapsed.mean.T[:, None]
     nothing = np.zeros((len(own), 3 * posterior.model.array.accelerometers))
     apart = posterior.model.noise.misfit(nothing, recording.angular_rate - own, saturated)
     size = 3 * (posterior.model.array.accelerometers - 1)
     found = Marginal.of(
-        likelihood, positions_of(posterior.mode[:size]),
+        collapsed, positions_of(posterior.mode[:size]), motion_sd=posterior.model.motion_sd[:2],
         spread=(apart, saturated.size - saturated.sum()), enough=GAP,
     )  # fmt: skip
     if found.gap > GAP:
@@ -205,29 +169,3 @@ def traced(posterior: Posterior, rates: str = "declared", say: Say = silent):
     return log_posterior, (
         found.data, found.nodes, found.log_weights, posterior.spread, prior.mean, prior.sd
     )  # fmt: skip
-
-
-def at_estimate(posterior: Posterior) -> Posterior:
-    """The posterior with noise and motion's size at their estimates, for compiled code."""
-    size, prior = len(posterior.mode) - len(posterior.scales), posterior.prior
-    return posterior._replace(
-        prior=GaussianPrior(prior.mean[:size], prior.sd[:size]), mode=posterior.mode[:size],
-        covariance=posterior.covariance[:size, :size], scales=(),
-    )  # fmt: skip
-
-
-def tuned_target(posterior: Posterior, rates: str, rng, say: Say = silent):
-    """(target, step length, N) of the paper's walk.
-
-    N and the walk's length as in section III-C; where not even the largest N brings the variance of
-    log p-hat near what is aimed at, omega is drawn around the integrand's mode.
-    """
-    prior, mode, likelihood = posterior.prior, posterior.mode, posterior.likelihood(rates)
-    sweeps = tuning.Sweeps(posterior.recording.position_prior_sd * np.geomspace(1e-6, 0.3, 16))
-    found = tuning.tune(
-        likelihood, prior, posterior.model.array.relative, lambda _: mode, sweeps, lambda _: rng
-    )
-    if found.centred:
-        say(f"variance of log p-hat {found.variances[-1]:.3g} at N = {sweeps.draws[-1]}: omega is"
-            " drawn around the integrand's mode instead")  # fmt: skip
-    return found.target, found.step, found.target.draws

@@ -17,7 +17,7 @@ from imuarray.engine.linearise import (
 )
 from imuarray.engine.parameters import Columns, columns_of
 from imuarray.engine.readings import Readings, measured
-from imuarray.estimation.bcd import Calibration
+from imuarray.estimation.identifiability import Calibration
 from imuarray.model import ArrayModel, Noise
 from imuarray.recording import Recording
 

@@ -35,7 +35,6 @@ TRIAD = 10.0  # the same of one triad where the noise of each is estimated
 DRIFT = 3.0  # sds of the mean of all samples; offsets that differ by more bias positions
 LEARNT = 0.5  # of the drawing's sd: positions known worse are hardly known from the recording
 OTHER = 1.2  # times less residual elsewhere; 1.003 at most for the right board, 2 for another
-SHRUNK = 1.0  # sds: 95 % intervals then cover 83 %
 UNIT = re.compile(r"\bin \S+ declared ")  # in a reason that names a unit
 SHORT = 60.0  # s
 AS_READ = (
@@ -178,25 +177,19 @@ def _drifts(recording: Recording) -> list[str]:
 
 
 def reasons_of_posterior(
-    recording: Recording, posterior: xr.DataTree, rates: str = "declared"
+    recording: Recording, posterior: xr.DataTree, spread: bool = False
 ) -> list[str]:
     """Why `imuarray.sample`'s answer for this recording is not to be trusted.
 
-    With ``rates="spread"`` the gyroscopes' disagreement is allowed for.
+    ``spread``: whether the gyroscopes' disagreement is allowed for.
     """
     draws = posterior["posterior"]["position"].to_numpy().reshape(-1, _size(recording))
     covariance = np.zeros((_size(recording) + 3,) * 2)
     covariance[3:, 3:] = np.cov(draws, rowvar=False)
     places = _places(recording, np.vstack([np.zeros(3), draws.mean(0).reshape(-1, 3)]), covariance)
     plain = "effect_parameter" not in posterior["posterior"]
-    residual = rigid(recording, places, rates == "spread") if plain else {}
+    residual = rigid(recording, places, spread) if plain else {}
     found = _little(recording, places) + _judged(recording, places, residual) + _drifts(recording)
-    shrunk = posterior.attrs.get("shrunk_by_sds", 0.0)
-    if shrunk > SHRUNK:
-        found.append(
-            f"the flat motion prior makes the array {shrunk:.2g} posterior sds smaller than it is:"
-            " take --motion-prior proper"
-        )
     return found + _not_converged(posterior.attrs)
 
 

@@ -22,11 +22,16 @@ def calibrate(arguments) -> None:
     papers = arguments.model == "papers"
     recordings = [read_recording(path, papers) for path in arguments.recordings]
     noise = arguments.accelerometer_noise
-    dataset = calibrated(
-        recordings, arguments.model, arguments.method, arguments.effects, noise, output.say
-    )
+    dataset = calibrated(recordings, arguments.model, arguments.effects, noise, output.say)
+    written(dataset, recordings, arguments, output)
+
+
+def written(dataset: xr.Dataset, recordings, arguments, output: Output) -> None:
+    """Writes a calibration and reports on it."""
     known = reasons_of_poses(*map(of_file, arguments.recordings))
-    reasons = reasons_of_calibration([assumed(one, noise) for one in recordings], dataset, known)
+    reasons = reasons_of_calibration(
+        [assumed(one, arguments.accelerometer_noise) for one in recordings], dataset, known
+    )
     write_netcdf(dataset.assign_attrs(trust(reasons)), arguments.out)
     output.say(report(dataset))
     output.done(document(dataset) | {"out": str(arguments.out)}, reasons)

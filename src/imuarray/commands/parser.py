@@ -1,7 +1,7 @@
 """The command line's parser: commands, options and their help; nothing heavy loads here."""
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
@@ -28,32 +28,32 @@ class Option(NamedTuple):
     given: dict[str, Any]
 
 
-def _option(name: str, help: str, **given: Any) -> Option:
+def option(name: str, help: str, **given: Any) -> Option:
     return Option(name, {"help": help, **given})
 
 
-def _number(name: str, metavar: str, help: str, default: Any = None, type=positive) -> Option:
-    return _option(name, help, metavar=metavar, default=default, type=type)
+def number(name: str, metavar: str, help: str, default: Any = None, type=positive) -> Option:
+    return option(name, help, metavar=metavar, default=default, type=type)
 
 
-def _file(name: str, help: str, type=InputFile, **given: Any) -> Option:
-    return _option(name, help, metavar="FILE", type=type, **given)
+def file_option(name: str, help: str, type=InputFile, **given: Any) -> Option:
+    return option(name, help, metavar="FILE", type=type, **given)
 
 
-RECORDING = _option("recording", "NetCDF-4 recording to read", type=InputFile)
-SEED = _number("--seed", "S", "seed of the random numbers (default: 0)", 0, seed)
-NOISE = _number(
+RECORDING = option("recording", "NetCDF-4 recording to read", type=InputFile)
+SEED = number("--seed", "S", "seed of the random numbers (default: 0)", 0, seed)
+NOISE = number(
     "--accelerometer-noise",
     "SD",
     "assumed sd, m/s^2, of the papers' model (default: the declared one)",
 )
-EFFECT_FILE = _file(
+EFFECT_FILE = file_option(
     "--effect-file", "Python file with effects of your own, which is run: they join the catalogue;"
     " may be given again", action="append",
 )  # fmt: skip
 EFFECTS = (
     EFFECT_FILE,
-    _option(
+    option(
         "--effects", "effects that extend the measurement model, separated by commas (default:"
         " none)", type=effects, default=(), metavar="A,B",
     ),
@@ -61,18 +61,18 @@ EFFECTS = (
 
 
 MODEL = (
-    _option("--model", "sensors: what a standard sensor model needs, noise estimated (default);"
+    option("--model", "sensors: what a standard sensor model needs, noise estimated (default);"
             " papers: positions and motion alone, the declared noise; or a calibration's file:"
             " its effects, estimated again", default="sensors", metavar="{sensors,papers,FILE.nc}",
             type=model),
     EFFECT_FILE,
-    _option("--effects", "effects to have in the model instead, separated by commas",
+    option("--effects", "effects to have in the model instead, separated by commas",
             type=effects, default=(), metavar="A,B"),
 )  # fmt: skip
 
 
 class Command(NamedTuple):
-    """One command; ``run`` is its function's place in `imuarray.commands`."""
+    """One command; ``run`` is its function's place in ``package``."""
 
     name: str
     run: str
@@ -81,11 +81,12 @@ class Command(NamedTuple):
     out: str
     options: tuple[Option, ...]
     folder: bool = False
+    package: str = "imuarray.commands"
 
 
-TOPICS = _option("--topics", "of ROS bags, the reference first (default: those of the YAML)",
+TOPICS = option("--topics", "of ROS bags, the reference first (default: those of the YAML)",
                  nargs="+", default=(), metavar="/imu0")  # fmt: skip
-GRAVITY = _number("--gravity", "G", "magnitude of gravity where it was recorded, m/s^2 (default:"
+GRAVITY = number("--gravity", "G", "magnitude of gravity where it was recorded, m/s^2 (default:"
                   " 9.80665)", 9.80665)  # fmt: skip
 
 COMMANDS = (
@@ -95,10 +96,10 @@ COMMANDS = (
         "log.csv --columns columns.yaml --gravity 9.81 --out answer/",
         "folder to write: report.html, cal.nc, positions.csv, recording.nc",
         (
-            _option("logs", "of one recording (docs/convert.md): a table, a log of each IMU,"
+            option("logs", "of one recording (docs/convert.md): a table, a log of each IMU,"
                     " ROS bags, MIMU packets, or NetCDF-4",
                     type=InputLog, nargs="+", metavar="log"),
-            _file("--columns", "YAML: columns, units, positions; of MIMU packets a CSV"),
+            file_option("--columns", "YAML: columns, units, positions; of MIMU packets a CSV"),
             TOPICS, GRAVITY,
         ),
         folder=True,
@@ -106,26 +107,31 @@ COMMANDS = (
     Command(
         "simulate", "simulate.simulate",
         "Simulate a recording; its truth is stored in the group 'truth'.",
-        "--config config.yaml --out rec.nc", "recording to write (NetCDF-4)",
-        (_file("--config", "configuration (YAML)", required=True), *EFFECTS),
+        "--out rec.nc", "recording to write (NetCDF-4)",
+        (
+            option("--board", "its array (default: mimu4444_corners, 8 IMUs)",
+                    choices=methods.BOARDS, default="mimu4444_corners"),
+            number("--duration", "S", "s of motion (default: 10)", 10.0),
+            number("--rate", "HZ", "samples a second (default: 100)", 100.0), SEED, *EFFECTS,
+        ),
     ),
     Command(
         "convert mimu", "convert.convert_mimu",
         "Read the packets of a MIMU board; damage is located and counted.",
         "data.bin --positions IMU_positions.csv --out rec.nc", "recording to write (NetCDF-4)",
         (
-            _option("data", "binary file of packets", type=InputFile),
-            _file("--positions", "CSV of nominal positions in m: header 'axes, IMU 1, ...', rows x,"
-                  " y, z", required=True),
-            _option("--underside", "IMUs turned over (default: the even-numbered ones)",
+            option("data", "binary file of packets", type=InputFile),
+            file_option("--positions", "CSV of nominal positions in m: header 'axes, IMU 1, ...',"
+                  " rows x, y, z", required=True),
+            option("--underside", "IMUs turned over (default: the even-numbered ones)",
                     metavar="2,4"),
-            _number("--accelerometer-noise", "SD", "sd of one reading, m/s^2 (default: 0.04)",
+            number("--accelerometer-noise", "SD", "sd of one reading, m/s^2 (default: 0.04)",
                     0.04),
-            _number("--gyroscope-noise-dps", "SD", "sd of one reading, deg/s (default: 0.06)",
+            number("--gyroscope-noise-dps", "SD", "sd of one reading, deg/s (default: 0.06)",
                     0.06),
-            _number("--position-prior", "SD", "sd of the nominal positions, m (default: 0.003)",
+            number("--position-prior", "SD", "sd of the nominal positions, m (default: 0.003)",
                     3e-3),
-            _number("--output-rate", "HZ", "readings that a sensor makes in a second, of which the"
+            number("--output-rate", "HZ", "readings that a sensor makes in a second, of which the"
                     " host takes the newest (default: 1000)", 1000.0),
         ),
     ),
@@ -135,9 +141,9 @@ COMMANDS = (
         " (docs/convert.md).",
         "log.csv --columns columns.yaml --out rec.nc", "recording to write (NetCDF-4)",
         (
-            _option("data", "CSV file with a header; several where IMUs logged each by itself",
+            option("data", "CSV file with a header; several where IMUs logged each by itself",
                     type=InputFile, nargs="+"),
-            _file("--columns", "YAML: columns, units, positions", required=True),
+            file_option("--columns", "YAML: columns, units, positions", required=True),
         ),
     ),
     Command(
@@ -146,9 +152,9 @@ COMMANDS = (
         " (docs/convert.md).",
         "run.bag --columns rig.yaml --out rec.nc", "recording to write (NetCDF-4)",
         (
-            _option("data", "ROS 1 bag, ROS 2 bag's folder or file (.db3, .mcap); one after the"
+            option("data", "ROS 1 bag, ROS 2 bag's folder or file (.db3, .mcap); one after the"
                     " other of a rig are joined", type=bag, nargs="+", metavar="bag"),
-            _file("--columns", "YAML: positions, noise, range"), TOPICS,
+            file_option("--columns", "YAML: positions, noise, range"), TOPICS,
         ),
     ),
     Command(
@@ -158,12 +164,12 @@ COMMANDS = (
         "corrected recording to write (NetCDF-4), with the calibration in group 'first_order'",
         (
             RECORDING, GRAVITY,
-            _option("--gyroscopes", "calibrate: scales, misalignments, orientations, from the moves"
+            option("--gyroscopes", "calibrate: scales, misalignments, orientations, from the moves"
                     " between poses (default); offset: only their offsets, as in the 2021 paper",
                     choices=("calibrate", "offset"), default="calibrate"),
-            _number("--shortest-pose", "S", "shortest still pose, s (default: 3)",
+            number("--shortest-pose", "S", "shortest still pose, s (default: 3)",
                     3.0),
-            _option("--with", "further recordings of the board, made at the same place: maps, and"
+            option("--with", "further recordings of the board, made at the same place: maps, and"
                     " so the array's frame and size, are from the poses and moves of all",
                     type=InputFile, nargs="+", default=[], dest="others", metavar="other.nc"),
         ),
@@ -174,7 +180,7 @@ COMMANDS = (
         "corrected.nc --samples 500 --out subset.nc", "recording to write (NetCDF-4)",
         (
             RECORDING,
-            _number("--samples", "T", "how many, spread evenly (default: all informative ones)",
+            number("--samples", "T", "how many, spread evenly (default: all informative ones)",
                     type=count),
         ),
     ),
@@ -183,13 +189,9 @@ COMMANDS = (
         "Estimate the accelerometer positions, the sensors' parameters and the motion.",
         "corrected.nc --out cal.nc", "estimates to write (NetCDF-4)",
         (
-            _option("recordings", "recording to read (NetCDF-4), or several of one board",
+            option("recordings", "recording to read (NetCDF-4), or several of one board",
                     type=InputFile, nargs="+", metavar="recording"),
-            *MODEL,
-            _option("--method", "the search under --model papers. gauss-newton (default): for any"
-                    " length; bcd: block coordinate descent (2017), all samples in memory",
-                    choices=methods.CALIBRATION),
-            NOISE,
+            *MODEL, NOISE,
         ),
     ),
     Command(
@@ -198,7 +200,7 @@ COMMANDS = (
         " at each sample, with covariances.",
         "cal.nc rec.nc --out motion.nc", "motion to write (NetCDF-4)",
         (
-            _option("calibration", "cal.nc of `imuarray calibrate`, `board` or `diagnose`",
+            option("calibration", "cal.nc of `imuarray calibrate`, `board` or `diagnose`",
                     type=InputFile),
             RECORDING, EFFECT_FILE, NOISE,
         ),
@@ -211,20 +213,11 @@ COMMANDS = (
         "posterior to write (NetCDF-4)",
         (
             RECORDING, *MODEL, NOISE,
-            _option("--method", "independent: proposals from the normal density about the mode, on"
+            option("--method", "independent: proposals from the normal density about the mode, on"
                     " the exact marginal likelihood; nuts: the no-U-turn sampler on the same; auto"
-                    " (default): the former where it is enough, else the latter; pmmh:"
-                    " pseudo-marginal Metropolis-Hastings, as in the 2021 paper, of its model",
+                    " (default): the former where it is enough, else the latter",
                     choices=methods.SAMPLING, default="auto"),
-            _option("--motion-prior", "proper (default): angular rate and acceleration are normal,"
-                    " of the recording's own size; flat: as in the 2021 paper, under the papers'"
-                    " model, which shrinks the array",
-                    choices=methods.MOTION_PRIORS, default="proper"),
-            _option("--rates", "p(omega | y_g) from the gyroscopes' noise (default: declared), or"
-                    " from the spread among the gyroscopes of each sample, as the 2021 paper does"
-                    " with measured data (30), with --motion-prior flat",
-                    choices=methods.RATES, default="declared"),
-            _number("--steps", "N", "steps of each chain", type=count),
+            number("--steps", "N", "steps of each chain", type=count),
             SEED,
         ),
     ),
@@ -233,10 +226,10 @@ COMMANDS = (
         "A calibration in another tool's format, with sds and the formula that corrects readings.",
         "cal.nc --format kalibr --out imu.yaml", "file to write",
         (
-            _option("calibration", "what `imuarray calibrate` has written", type=InputFile),
-            _option("--format", "json: everything; kalibr: imu.yaml of several IMUs; urdf: links"
+            option("calibration", "what `imuarray calibrate` has written", type=InputFile),
+            option("--format", "json: everything; kalibr: imu.yaml of several IMUs; urdf: links"
                     " and fixed joints; csv: positions", choices=methods.EXPORTS, required=True),
-            _file("--noise", "recording of the same IMUs lying still, for noise and random walk"),
+            file_option("--noise", "recording of the same IMUs lying still: noise, random walk"),
             EFFECT_FILE,
         ),
     ),
@@ -253,7 +246,7 @@ COMMANDS = (
         " figures",
         (
             RECORDING, EFFECT_FILE,
-            _option("--without", "effects to leave out of the catalogue, separated by commas"
+            option("--without", "effects to leave out of the catalogue, separated by commas"
                     " (default: none)", type=effects, default=(), metavar="A,B"),
             SEED,
         ),
@@ -276,22 +269,24 @@ class Parser(argparse.ArgumentParser):
         return found, unknown
 
 
-def make_parser() -> argparse.ArgumentParser:
+def make_parser(
+    commands_given: Sequence[Command] = COMMANDS, name: str = "imuarray"
+) -> argparse.ArgumentParser:
     """A parser that gives the command's function as ``run``; a wrong line is an InputError."""
     parser = Parser(
-        prog="imuarray",
+        prog=name,
         description="Calibrate the geometry of inertial sensor arrays.",
-        epilog="example: imuarray calibrate corrected.nc --out cal.nc;"
-        " every command has its own: imuarray calibrate --help",
+        epilog=f"example: {name} calibrate corrected.nc --out cal.nc;"
+        f" every command has its own: {name} calibrate --help",
     )
     parser.add_argument("--version", action="version", version=f"imuarray {imuarray.__version__}")
     commands = parser.add_subparsers(dest="command", metavar="command", required=True)
     kinds = None
-    for command in COMMANDS:
-        name, _, kind = command.name.partition(" ")
+    for command in commands_given:
+        first, _, kind = command.name.partition(" ")
         if kind and kinds is None:
             kinds = _add_convert(commands)
-        _add(kinds if kind else commands, kind or name, command)
+        _add(kinds if kind else commands, kind or first, command)
     return parser
 
 
@@ -308,8 +303,8 @@ def _add(commands, name: str, command: Command) -> None:
     """One subcommand, with what all of them have."""
     parser = commands.add_parser(
         name, help=command.summary, description=command.summary,
-        epilog=f"example: imuarray {command.name} {command.example}",
     )  # fmt: skip
+    parser.epilog = f"example: {parser.prog} {command.example}"
     parser.add_argument(
         "--out",
         required=True,
@@ -324,15 +319,18 @@ def _add(commands, name: str, command: Command) -> None:
     parser.add_argument(
         "--debug", action="store_true", help="the traceback of an error that was not foreseen"
     )
-    for option in command.options:
-        parser.add_argument(option.name, **option.given)
-    parser.set_defaults(run=_later(*command.run.split(".")), folder=command.folder, reasons=())
+    for one in command.options:
+        parser.add_argument(one.name, **one.given)
+    parser.set_defaults(
+        run=_later(f"{command.package}.{command.run}"), folder=command.folder, reasons=()
+    )
 
 
-def _later(module: str, name: str) -> Callable[[argparse.Namespace], None]:
-    """The function ``name`` of ``imuarray.commands.<module>``, loaded when it is called."""
+def _later(place: str) -> Callable[[argparse.Namespace], None]:
+    """The function at ``place``, its module loaded when it is called."""
+    module, _, name = place.rpartition(".")
 
     def run(arguments: argparse.Namespace) -> None:
-        getattr(import_module(f"imuarray.commands.{module}"), name)(arguments)
+        getattr(import_module(module), name)(arguments)
 
     return run

@@ -16,7 +16,7 @@ from imuarray.recording import read_recording
 
 VERDICT = (
     "sampler", "converged", "rhat_max", "ess_min", "burn_in_steps", "steps", "divergent",
-    "on_a_line", "shrunk_by_sds", "accelerometer_noise_sd", "gyroscope_noise_sd",
+    "accelerometer_noise_sd", "gyroscope_noise_sd",
 )  # fmt: skip
 TOLD = "pareto_k", "instead_of"  # by samplers that have them
 
@@ -27,26 +27,27 @@ def sample(arguments) -> None:
     recording = read_recording(arguments.recording)
     posterior = sampled(
         recording, arguments.model, arguments.method, arguments.steps, arguments.seed,
-        arguments.rates, arguments.effects, arguments.accelerometer_noise,
-        arguments.motion_prior, output.progress, output.say, beside=arguments.out,
+        arguments.effects, arguments.accelerometer_noise, output.progress, output.say,
     )  # fmt: skip
-    checkpoint = posterior.attrs.pop("checkpoint", None)
     recording = assumed(recording, arguments.accelerometer_noise)
     reasons = reasons_of_poses(of_file(arguments.recording))
-    reasons += reasons_of_posterior(recording, posterior, arguments.rates)
+    reasons += reasons_of_posterior(recording, posterior)
+    written(posterior, reasons, arguments.out, output)
+
+
+def written(posterior: xr.DataTree, reasons: list[str], out: Path, output: Output) -> None:
+    """Writes the chains and reports on them."""
     posterior.attrs |= trust(reasons)
-    write_netcdf(posterior, arguments.out)
-    if checkpoint is not None:  # the chains are safe
-        Path(checkpoint).unlink(missing_ok=True)
+    write_netcdf(posterior, out)
     table = summary(posterior)
     output.say(report(posterior, table))
-    output.done(document(posterior, table) | {"out": str(arguments.out)}, reasons)
+    output.done(document(posterior, table) | {"out": str(out)}, reasons)
 
 
 def document(posterior: xr.DataTree, table: pd.DataFrame) -> dict:
     """The chains' verdict, and mean and sd of each coordinate."""
     found = {name: posterior.attrs[name] for name in VERDICT}
-    found |= {name: bool(found[name]) for name in ("converged", "on_a_line")}
+    found["converged"] = bool(found["converged"])
     found |= {name: posterior.attrs[name] for name in TOLD if name in posterior.attrs}
     columns = ["accelerometer", "axis", "mean_m", "sd_m", "rhat", "ess"]
     return found | {"coordinates": table[columns].to_dict(orient="records")}
@@ -64,8 +65,6 @@ def report(posterior: xr.DataTree, table: pd.DataFrame) -> str:
         f" {np.degrees(attrs['gyroscope_noise_sd']):.3g} deg/s"
     )
     state = "converged" if attrs["converged"] else "NOT converged: take more --steps"
-    if attrs["on_a_line"]:
-        state = "NOT converged: a chain is where the triads lie on one line (docs/findings.md)"
     lines.append(
         f"{attrs['sampler']}, {state}: R-hat {attrs['rhat_max']:.3f}, smallest ESS"
         f" {attrs['ess_min']:.0f}, burn-in {attrs['burn_in_steps']} of {attrs['steps']} steps"

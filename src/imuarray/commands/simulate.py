@@ -1,20 +1,20 @@
 """The work behind `imuarray simulate`."""
 
+from imuarray.analysis.prepare import simulate as simulated
 from imuarray.commands.output import Output
+from imuarray.geometry.boards import BOARDS
 from imuarray.provenance import stamp
 from imuarray.recording import write_recording
 
 
 def simulate(arguments) -> None:
-    """A recording of hand twisting with the config's array, noise and sampling."""
-    from imuarray.config import read_config
-    from imuarray.studies.bayes import simulate_twisting
-
+    """A recording of a board twisted by hand; see `imuarray.simulate`."""
     output = Output(arguments)
-    config = read_config(arguments.config)
-    noise = config["noise"]["accelerometer_sd"]
-    recording, truth = simulate_twisting(config, noise, arguments.effects)
-    write_recording(recording, arguments.out, truth, stamp(config, config["seed"]))
+    given = {"duration": arguments.duration, "sampling_rate": arguments.rate}
+    board = BOARDS[arguments.board]()
+    recording, truth = simulated(board, **given, seed=arguments.seed, effects=arguments.effects)
+    origin = stamp({"board": arguments.board, **given}, arguments.seed)
+    write_recording(recording, arguments.out, truth, origin)
     samples, accelerometers = recording.specific_force.shape[:2]
     output.say(f"{arguments.out}: {samples} samples of {accelerometers} accelerometer triads")
     output.done({"out": str(arguments.out), "samples": samples, "accelerometers": accelerometers})

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.errors import IdentifiabilityError, require_shape
+from imuarray.errors import IdentifiabilityError, InputError, require_shape
 from imuarray.estimation import kernels
 from imuarray.estimation.rates import angular_rates
 from imuarray.geometry.array import require_planar_extent
@@ -138,6 +138,24 @@ class Collapsed:
             self, gyroscope_information=np.ascontiguousarray(precision),
             mean=self.mean if mean is None else np.ascontiguousarray(mean.T),
         )  # fmt: skip
+
+    def rate_density(self, sd: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
+        """Mean (T, 3) rad/s and covariance (T, 3, 3) of p(omega | y_g), (15) of paper 2021.
+
+        ``sd`` (rad/s) of omega's prior, infinite as in the paper. InputError where an axis of some
+        sample has no unsaturated gyroscope.
+        """
+        information = self.gyroscope_information.transpose(2, 0, 1)
+        bad = np.flatnonzero(np.linalg.matrix_rank(information) < 3)
+        if bad.size:
+            raise InputError(
+                "gyroscopes: expected one unsaturated per axis in every sample, found none in"
+                f" sample {bad[0]} (and {bad.size - 1} more)"
+            )
+        if not np.isfinite(sd):
+            return self.mean.T, np.linalg.inv(information)
+        covariance = np.linalg.inv(information + np.eye(3) / sd**2)
+        return np.einsum("tij,tjk,kt->ti", covariance, information, self.mean), covariance
 
     def reduce(self, positions) -> tuple[kernels.Reduced, float]:
         """(the recording with phi eliminated at ``positions`` (A, 3), log |H' Lambda H|)."""

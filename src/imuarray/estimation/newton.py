@@ -13,8 +13,8 @@ import scipy.linalg
 
 from imuarray.compiled import njit
 from imuarray.errors import IdentifiabilityError, require_shape
-from imuarray.estimation.bcd import Calibration, arranged, require_rotation
 from imuarray.estimation.collapsed import Arrays, Collapsed, motion_estimate
+from imuarray.estimation.identifiability import Calibration, arranged, require_rotation
 from imuarray.estimation.information import Halves, fisher, halves, information_at, slope
 from imuarray.estimation.rates import Work, most_likely, workspace
 from imuarray.estimation.threads import one_thread

@@ -13,7 +13,6 @@ from scipy.linalg import block_diag
 from scipy.spatial.transform import Rotation
 
 from imuarray.errors import InputError
-from imuarray.estimation.reference import skew
 
 FEWEST = 4  # moves
 LONGEST, FARTHEST = 30.0, 30.0  # s and rad of a move; drift and other errors are too large beyond
@@ -215,7 +214,7 @@ def _linear(moves, direction, change):
         carried = turned.T @ direction[move.first]
         across = np.linalg.svd(carried[None])[2][1:]  # two directions across it
         errors.append(across @ (direction[move.first + 1] - carried))
-        by_turn = across @ skew(carried)
+        by_turn = np.cross(across, carried)
         slopes.append(by_turn @ slope)
         own.append(by_turn @ np.diag(move.sd**2) @ by_turn.T)
         rows, place = slice(2 * i, 2 * i + 2), 3 * move.first

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.errors import InputError
+from imuarray.estimation.collapsed import Collapsed, motion_from
 from imuarray.model import structure_tensor
 from imuarray.model.jax64 import (
     cholesky,
@@ -23,7 +23,6 @@ from imuarray.model.jax64 import (
     solve_upper,
 )
 from imuarray.model.structure import CURVATURES, PAIRS
-from imuarray.posterior.likelihood import DETERMINANTS, Likelihood
 
 NODE_COUNTS = (1, 3, 5, 7, 9, 11)  # nodes on each axis of omega
 ENOUGH = 1e-4  # nats in total between one count and the next: then the former is taken
@@ -226,13 +225,17 @@ class Marginal:
 
     @classmethod
     def of(
-        cls, likelihood: Likelihood, positions, nodes: int | None = None, spread=(0.0, 0),
-        enough: float = ENOUGH,
+        cls, collapsed: Collapsed, positions, rates=None, motion_sd=(np.inf, np.inf),
+        nodes: int | None = None, spread=(0.0, 0), enough: float = ENOUGH,
     ) -> Marginal:  # fmt: skip
-        """Marginal of a `Likelihood`'s recording; modes are searched from those at ``positions``.
+        """Marginal of a recording; modes are searched from those at ``positions`` (A, 3) m.
 
         Parameters
         ----------
+        rates : (mean (T, 3) rad/s, covariance (T, 3, 3))
+            p(omega | y_g); by default `Collapsed.rate_density`.
+        motion_sd : (float, float)
+            Prior sds of omega (rad/s) and omega_dot (rad/s^2), infinite as in the paper.
         nodes : int
             On each axis of omega; 1 is Laplace's method. By default the fewest of `NODE_COUNTS`
             that differ by less than ``enough`` nats in total from the next at ``positions``, or
@@ -241,17 +244,16 @@ class Marginal:
             Chi-square of the gyroscopes about their mean and the number of their readings, which
             `scaled` needs.
         """
-        if likelihood.power != DETERMINANTS["derived"]:
-            raise InputError("marginal: expected the derived determinant, found the printed one")
-        collapsed = likelihood.collapsed
-        start = likelihood.centred(positions).data.mean.T  # the modes there
+        mean, covariance = collapsed.rate_density(motion_sd[0]) if rates is None else rates
+        relative = np.ascontiguousarray(np.asarray(positions, float) - positions[0])
+        start = motion_from(collapsed.with_rates(covariance, mean), relative).motion.angular_rate
         weighted = collapsed.weighted.reshape(-1, collapsed.samples).T
-        information = np.linalg.inv(likelihood.rate_covariance)
-        prior = float(likelihood.rate_sd) ** -2.0
-        seen = collapsed.mean.T if prior else likelihood.rate_mean
+        information = np.linalg.inv(covariance)
+        prior = float(motion_sd[0]) ** -2.0
+        seen = collapsed.mean.T if prior else mean
         parts = (
-            weighted, collapsed.energy, collapsed.precision, likelihood.rate_mean, information,
-            seen, prior, np.append(likelihood.data.ridge, np.zeros(3)), start,
+            weighted, collapsed.energy, collapsed.precision, mean, information,
+            seen, prior, np.repeat([float(motion_sd[1]) ** -2.0, 0.0], 3), start,
             0.5 * np.sum(np.linalg.slogdet(information)[1]), np.array(spread, float),
         )  # fmt: skip
         data = MarginalData(*map(jnp.asarray, parts))
@@ -268,7 +270,7 @@ class Marginal:
         return replace(coarser, gap=gap)
 
     def __call__(self, positions) -> float:
-        """log p(y_a | theta, y_g) at positions (A, 3) m, as `Likelihood.estimate` estimates it."""
+        """log p(y_a | theta, y_g) at positions (A, 3) m, (26a) in the limit of many draws."""
         positions = np.asarray(positions, float)
         return float(_value(positions - positions[0], self.data, self.nodes, self.log_weights))
 

@@ -22,10 +22,10 @@ from imuarray.diagnosis.plain import (
     unit_shown,
 )
 from imuarray.diagnosis.words import part_in_words, split_name, whose, words
-from imuarray.figures.style import PAGE, new_figure, saved, styled
 from imuarray.model.effects import KINDS
 from imuarray.recording import Recording
 from imuarray.report import pictures
+from imuarray.report.style import PAGE, new_figure, saved, styled
 
 # What the templates' tables call.
 IN_TABLES = (fixed, number, part_in_words, plus_minus, probability, quantity, split_name, symbols,

@@ -1,0 +1,41 @@
+"""Normal priors of a posterior's parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class GaussianPrior:
+    """Independent normal prior of theta: ``mean`` and ``sd`` (size,), metres for positions."""
+
+    mean: np.ndarray
+    sd: np.ndarray
+
+    @classmethod
+    def of(cls, mean, sd) -> GaussianPrior:
+        """Spread a scalar sd over all parameters."""
+        mean = np.asarray(mean, float)
+        return cls(mean, np.broadcast_to(np.asarray(sd, float), mean.shape).copy())
+
+    def log_density(self, theta) -> float:
+        """Up to its constant."""
+        return -0.5 * float(np.sum(((theta - self.mean) / self.sd) ** 2))
+
+
+@dataclass(frozen=True)
+class TiedPrior(GaussianPrior):
+    """A Gaussian prior with precision ``root``' ``root`` (size, size)."""
+
+    root: np.ndarray
+
+    @classmethod
+    def of(cls, mean, root) -> TiedPrior:
+        """With the sds that follow."""
+        return cls(mean, np.sqrt(np.sum(np.linalg.inv(root) ** 2, axis=1)), root)
+
+    def log_density(self, theta) -> float:
+        """Up to its constant."""
+        return -0.5 * float(np.sum((self.root @ (theta - self.mean)) ** 2))

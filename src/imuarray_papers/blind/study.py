@@ -1,0 +1,256 @@
+"""The blind study: recordings go to a diagnosis that learns nothing else of their cases; grades.
+
+An effect is *found* if its id is named or in ``indistinguishable_from`` of a named one: the answer
+is then the class. A *wrong name* is a named effect that is not in the truth and whose class holds
+no effect of the truth. Whether the right sensors are named counts apart.
+"""
+
+import json
+import time
+import traceback
+from collections.abc import Callable, Sequence
+from itertools import permutations
+
+import numpy as np
+
+from imuarray_papers.blind.cases import Case, make
+
+# What grading reads of `diagnosis.json`; the figures' discrepancies would be most of the file.
+KEPT = ("base", "inflated", "extended", "gain", "causes", "unexplained", "remaining")
+QUANTILE = 1.96  # of the normal law, for 95 % intervals
+MODELS = ("base", "inflated", "extended")  # sections of a diagnosis that have positions
+# Names in a row, and in the diagnosis' section "gain"; each has its standard error beside it.
+GAINS = {
+    "gain": "heldout_log_score_nats_per_sample",
+    "gain_over_inflated": "over_inflated_noise_nats_per_sample",
+}
+
+
+def batch_of(cases: Sequence[Case], batch: int, batches: int) -> list[Case]:
+    """Cases of one job out of ``batches``; dealt in turn, so that all last about as long."""
+    if not 0 <= batch < batches:
+        raise ValueError(f"batch: expected 0 to {batches - 1}, found {batch}")
+    return list(cases[batch::batches])
+
+
+def ask(diagnose: Callable, recording, without, seed: int) -> dict:
+    """The diagnosis of a recording: the entries `KEPT` of its `diagnosis.json`.
+
+    Raises ValueError where they are not plain JSON, KeyError where one is missing.
+    """
+    document = diagnose(recording, seed=seed, without=without).document
+    kept = {name: document[name] for name in KEPT}
+    return json.loads(json.dumps(kept, allow_nan=False))
+
+
+def diagnosed(case: Case, seed: int, diagnose: Callable) -> dict:
+    """A case's truth and its diagnosis, made without the truth.
+
+    Parameters
+    ----------
+    case, seed : as for `make`
+    diagnose : callable (recording, seed, without) -> object with attribute ``document``
+
+    Returns
+    -------
+    dict
+        ``case`` (id), ``truth`` (see `make`), ``diagnosis`` (see `ask`; None after a crash),
+        ``error`` (text of a crash, or None); ``seconds`` of wall time and ``cpu_seconds`` of all
+        threads that it took.
+    """
+    recording, truth = make(case, seed)
+    answer, error = None, None
+    start, cpu_start = time.perf_counter(), time.process_time()
+    try:
+        answer = ask(diagnose, recording, case.struck, seed)
+    except Exception as crash:  # whatever it is, it is a result of the study
+        error = f"{type(crash).__name__}: {crash}"
+        traceback.print_exc()
+    return {
+        "case": case.id,
+        "truth": truth,
+        "diagnosis": answer,
+        "error": error,
+        "seconds": time.perf_counter() - start,
+        "cpu_seconds": time.process_time() - cpu_start,
+    }
+
+
+def classes(causes: list[dict]) -> dict[str, set[str]]:
+    """By named effect, the effects that the name stands for: itself and what it might be too."""
+    found: dict[str, set[str]] = {}
+    for cause in causes:
+        found.setdefault(cause["effect"], {cause["effect"]}).update(cause["indistinguishable_from"])
+    return found
+
+
+def sensors_of(sensors, imus: int) -> frozenset[str]:
+    """Sensors to be compared: all of them are "all", however they are listed."""
+    found = frozenset(map(str, sensors))
+    return frozenset({"all"}) if "all" in found or len(found) == imus else found
+
+
+def right_set(wanted: list[str], named: dict[str, set[str]]) -> bool:
+    """True where each effect of the truth has a cause of its own and none is left over."""
+    if len(wanted) != len(named):
+        return False
+    return any(
+        all(effect in named[name] for effect, name in zip(wanted, order, strict=True))
+        for order in permutations(named)
+    )
+
+
+def wrong_names(wanted: list[str], named: dict[str, set[str]]) -> list[str]:
+    """Named effects whose class holds nothing of the truth."""
+    return [name for name, members in named.items() if not members & set(wanted)]
+
+
+def is_confident(kind: str, causes: list[dict], unexplained: bool) -> bool:
+    """True of a name that is given without reserve.
+
+    For gauges a class is reserve enough; for what the catalogue does not hold only
+    ``unexplained`` is.
+    """
+    firm = [c for c in causes if kind != "gauge" or not c["indistinguishable_from"]]
+    return bool(firm) and not unexplained
+
+
+def _grade(kind: str, wanted, causes, unexplained) -> str:
+    """One word for a recording; see `GRADES`."""
+    named = classes(causes)
+    if not named:
+        if unexplained:
+            return "unexplained"
+        return "clean" if kind == "clean" else "nothing"
+    if kind == "clean":
+        return "false alarm"
+    if kind in ("gauge", "outside", "struck"):
+        if is_confident(kind, causes, unexplained):
+            return "confident"
+        return "flagged" if unexplained else "class"
+    if right_set(wanted, named):
+        return "right"
+    wrong = wrong_names(wanted, named)
+    if not wrong:
+        return "inexact"
+    return "right and wrong" if len(wrong) < len(named) else "wrong"
+
+
+GRADES = {
+    "clean": "nothing named in a clean recording",
+    "false alarm": "a cause named in a clean recording",
+    "right": "exactly the right set, by class",
+    "inexact": "no wrong name, but not exactly the set: one missing, or one named twice",
+    "right and wrong": "one found and a wrong name given",
+    "wrong": "wrong names only",
+    "nothing": "there is something, nothing is named and nothing is unexplained",
+    "unexplained": "nothing named, `unexplained` raised",
+    "confident": "named without reserve what is not identifiable or not in the catalogue",
+    "flagged": "named, with `unexplained` raised",
+    "class": "named, but only as one of a class",
+    "crash": "no answer",
+}
+
+
+def grade(entry: dict) -> dict:
+    """The graded row of a case.
+
+    Parameters
+    ----------
+    entry : dict
+        As `diagnosed` returns it.
+
+    Returns
+    -------
+    dict
+        ``case``, ``kind``, ``imus``, ``sampling_rate`` (Hz), ``duration`` (s), ``rails``,
+        ``requested_sigma``, ``sigma`` and ``sigma_exact`` (of all effects), ``struck``; ``truth``:
+        for each effect sensors, sizes, amplitude with unit, and ``found`` (by class), ``named``
+        (itself), ``sensors_right``; ``causes``: the named ones with sensors and class;
+        ``wrong_names``, ``right_set``, ``confident``, ``unexplained``, ``grade`` (a key of
+        `GRADES`); `GAINS` of the extended model over the base model and over the base model
+        with larger noise (nats per sample, held out) and their ``_se``; `accuracy` of each of
+        `MODELS`; ``seconds``, ``cpu_seconds``; ``error``. After a crash the diagnosis' are None.
+    """
+    truth, answer = entry["truth"], entry["diagnosis"]
+    case = truth["case"]
+    row = {"case": entry["case"]}
+    row |= {name: case[name] for name in ("kind", "imus", "sampling_rate", "duration", "rails")}
+    row |= {"requested_sigma": case["sigma"]}
+    row |= {name: truth[name] for name in ("sigma", "sigma_exact", "struck")}
+    row |= _crashed(truth) if answer is None else _answered(truth, answer)
+    return row | {name: entry[name] for name in ("seconds", "cpu_seconds", "error")}
+
+
+def _described(effect: dict) -> dict:
+    """An effect of the truth in a row."""
+    row = {name: effect[name] for name in ("effect", "sensors", "sigma", "sigma_exact")}
+    return row | {"amplitude": effect["amplitude"]["value"], "unit": effect["amplitude"]["unit"]}
+
+
+def _crashed(truth: dict) -> dict:
+    lost = {"found": False, "named": False, "sensors_right": False}
+    return {
+        "truth": [_described(effect) | lost for effect in truth["effects"]],
+        "causes": [], "wrong_names": [], "right_set": False, "confident": False,
+        "unexplained": None, "grade": "crash",
+        **{f"{name}{end}": None for name in GAINS for end in ("", "_se")},
+        **dict.fromkeys(MODELS),
+    }  # fmt: skip
+
+
+def _answered(truth: dict, answer: dict) -> dict:
+    kind, imus = truth["case"]["kind"], truth["case"]["imus"]
+    causes, unexplained = answer["causes"], bool(answer["unexplained"])
+    named = classes(causes)
+    wanted = [effect["effect"] for effect in truth["effects"]]
+    keys = ("effect", "sensors", "indistinguishable_from")
+    return {
+        "truth": [_described(effect) | _seen(effect, causes, imus) for effect in truth["effects"]],
+        "causes": [{key: cause[key] for key in keys} for cause in causes],
+        "wrong_names": wrong_names(wanted, named),
+        "right_set": right_set(wanted, named),
+        "confident": is_confident(kind, causes, unexplained),
+        "unexplained": unexplained,
+        "grade": _grade(kind, wanted, causes, unexplained),
+        **{
+            f"{name}{end}": answer["gain"][f"{key}{end}"]
+            for name, key in GAINS.items()
+            for end in ("", "_se")
+        },
+        **{name: accuracy(answer[name], truth["positions_m"]) for name in MODELS},
+    }
+
+
+def _seen(effect: dict, causes: list[dict], imus: int) -> dict:
+    """Found, named itself, on the right sensors: True or False for an effect of the truth."""
+    name = effect["effect"]
+    of_it = [c for c in causes if name in (c["effect"], *c["indistinguishable_from"])]
+    itself = [c for c in of_it if c["effect"] == name]
+    # named twice, it is on all the sensors named
+    named = sensors_of({s for cause in itself or of_it for s in cause["sensors"]}, imus)
+    return {
+        "found": bool(of_it),
+        "named": bool(itself),
+        "sensors_right": bool(of_it) and named == sensors_of(effect["sensors"], imus),
+    }
+
+
+def accuracy(model: dict, positions) -> dict:
+    """Positions against the true ones (A, 3) m, relative to the first triad.
+
+    ``position_rmse_m`` over the 3 (A - 1) ``coordinates``, and how many of their 95 % intervals
+    have ``covered`` the truth; an sd that is missing covers nothing.
+    """
+    found, sd = (np.asarray(model[key], float) for key in ("positions_m", "positions_sd_m"))
+    truth = np.asarray(positions, float)
+    if found.shape != truth.shape or sd.shape != truth.shape:
+        raise ValueError(
+            f"positions: expected shape {truth.shape}, found {found.shape} and {sd.shape}"
+        )
+    error = (found - found[0] - truth + truth[0])[1:]
+    return {
+        "position_rmse_m": float(np.sqrt(np.mean(error**2))),
+        "covered": int(np.sum(np.abs(error) <= QUANTILE * sd[1:])),
+        "coordinates": error.size,
+    }

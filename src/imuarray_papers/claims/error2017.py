@@ -1,0 +1,213 @@
+"""Paper 2017, figures 4 and 5: the error of the calibrated positions."""
+
+import numpy as np
+from scipy.special import chdtrc
+
+from imuarray_papers.claims.registry import (
+    claim,
+    judged,
+    listed,
+    near,
+    power_law,
+    ratio,
+    rises,
+    show,
+)
+
+SAMPLES = "calibration/position_error_samples"
+MOTION = "calibration/position_error_motion"
+
+
+def _curve(results, iterations=None):
+    """RMSE over N after ``iterations``, or after the most there are."""
+    table = results.table(SAMPLES)
+    return table[table.iterations == (iterations or table.iterations.max())].sort_values("samples")
+
+
+def _exponent(results):
+    """Exponent of RMSE against N >= 10, its error, and a remark on that for N >= 3.
+
+    Below N = 10 too many runs stop at the last iteration without having converged.
+    """
+    curve = _curve(results)
+    every, late = curve[curve.samples >= 3], curve[curve.samples >= 10]
+    fits = [power_law(c.samples, c.rmse_m, c.rmse_se_m) for c in (late, every)]
+    shares = [100 * c.converged_share.min() for c in (late, every)]
+    remark = (
+        f"at least {show(shares[0])} % of the runs converged for each N >= 10; over N >= 3"
+        f" {show(fits[1][0])} +- {show(fits[1][1], 2)}, where as few as {show(shares[1])} % have"
+    )
+    return *fits[0], remark
+
+
+@claim("2017-01")
+def inverse_root(results):
+    slope, error, late = _exponent(results)
+    return judged(slope, error, near(slope, -0.5, error, 0.05), late)
+
+
+@claim("2017-02")
+def inverse(results):
+    slope, error, _ = _exponent(results)
+    remark = (
+        "the abstract's word is right for the variance, not for the error; section IV says -1/2"
+    )
+    return judged(slope, error, near(slope, -1, error, 0.05), remark)
+
+
+@claim("2017-03")
+def variance_inverse(results):
+    slope, error, _ = _exponent(results)
+    return judged(2 * slope, 2 * error, near(2 * slope, -1, 2 * error, 0.1))
+
+
+def _thousand(results) -> tuple[float, float, tuple[str, str]]:
+    """RMSE at N = 1000 and its error, m; both as they are shown."""
+    row = _curve(results).set_index("samples").loc[1000]
+    return row.rmse_m, row.rmse_se_m, (f"{show(row.rmse_m)} m", f"{show(row.rmse_se_m, 2)} m")
+
+
+@claim("2017-04")
+def micrometre(results):
+    rmse, _, shown = _thousand(results)
+    return judged(*shown, 1e-6 / np.sqrt(10) <= rmse <= 1e-6 * np.sqrt(10))
+
+
+@claim("2017-05")
+def two_samples(results):
+    table = results.table(SAMPLES)
+    two = table[table.samples == 2].sort_values("iterations")
+    first, last = two.iloc[0], two.iloc[-1]
+    value, error = ratio(last.rmse_m, last.rmse_se_m, first.rmse_m, first.rmse_se_m)
+    remark = (
+        f"RMSE {show(first.rmse_m)} m after {first.iterations:.0f}, {show(last.rmse_m)} m after"
+        f" {last.iterations:.0f} iterations; {100 * last.converged_share:.0f} % of the runs had"
+        " converged by then: slower than for N > 2, and heavy-tailed"
+    )
+    return judged(value, error, value >= 1 - 3 * error, remark)
+
+
+@claim("2017-06")
+def two_ill_posed(results):
+    ranks = results.table("claims/ranks")
+    two = ranks[ranks.samples == 2]
+    deficient = int(np.sum(two["rank"] < two.unknowns))
+    bound = results.table("claims/position_bound").iloc[0]
+    remark = (
+        f"Cramer-Rao bound at N = 2: {show(bound.bound_m)} +- {show(bound.bound_se_m, 2)} m; slow"
+        " convergence, not a missing condition, keeps the RMSE up"
+    )
+    return judged(f"{deficient} of {len(two)} arrays deficient", "", deficient > 0, remark)
+
+
+@claim("2017-07")
+def more_iterations(results):
+    table = results.table(SAMPLES)
+    worst, up = 0.0, 0
+    for _, curve in table[table.samples > 2].groupby("samples"):
+        curve = curve.sort_values("iterations")
+        up += rises(curve.rmse_m, curve.rmse_se_m)
+        a, b = curve.iloc[-1], curve.iloc[0]
+        value, error = ratio(a.rmse_m, a.rmse_se_m, b.rmse_m, b.rmse_se_m)
+        worst = max(worst, value + 3 * error)
+    text = f"largest (last / first + 3 errors) {show(worst)}; {up} steps up"
+    return judged(text, "in the value", up == 0 and worst < 1)
+
+
+@claim("2017-08")
+def more_samples(results):
+    curve = _curve(results)
+    curve = curve[curve.samples > 2]
+    up = rises(curve.rmse_m, curve.rmse_se_m)
+    falls = curve.rmse_m.iloc[-1] < curve.rmse_m.iloc[0]
+    few = _curve(results, results.table(SAMPLES).iterations.min())
+    spread = few.rmse_m.max() / few.rmse_m.min()
+    remark = (
+        f"not so after the first iteration, where all N agree within a factor {show(spread, 2)}"
+    )
+    value = f"{listed(curve.rmse_m)} m for N = {listed(curve.samples, 4)}"
+    return judged(value, f"{listed(curve.rmse_se_m, 2)} m", up == 0 and falls, remark)
+
+
+def _steps_up(results, table, along, across):
+    """Over figure 5's grid: what is said of its steps up, how many, where, the bound's own."""
+    table = table.sort_values(along)
+    up = {level: rises(line.rmse_m, line.rmse_se_m) for level, line in table.groupby(across)}
+    bound = results.table("claims/position_bound")
+    grid = bound[bound.samples == results.settings["paper2017"]["fig5_samples"]].iloc[1:]
+    lines = grid.sort_values(along).groupby(grid[across].round(3))
+    bounds = sum(rises(line.bound_m, line.bound_se_m) for _, line in lines)
+    count = sum(up.values())
+    text = f"{count} of {len(table) - table[across].nunique()} steps go up"
+    return text, count, ", ".join(show(level, 6) for level in up if up[level]), bounds
+
+
+@claim("2017-09")
+def faster_rotation(results):
+    names = ("angular_rate_dps", "angular_acceleration_dps2")
+    text, up, where, bounds = _steps_up(results, results.table(MOTION), *names)
+    remark = f"at {where} deg/s^2; " if where else ""
+    remark += f"the Cramer-Rao bound itself goes up in {bounds} steps"
+    return judged(text, "3 errors a step", up == 0, remark)
+
+
+def _beyond(table, limit) -> str:
+    """A remark on our rows of figure 5 at accelerations above ``limit`` (deg/s^2)."""
+    levels = {a: row.set_index("angular_rate_dps")
+              for a, row in table.groupby("angular_acceleration_dps2")}  # fmt: skip
+    text, near = "", levels[max(a for a in levels if a <= limit)]
+    for level in (a for a in levels if a > limit):
+        row = levels[level]
+        higher = row.rmse_m - near.rmse_m > 3 * np.hypot(row.rmse_se_m, near.rmse_se_m)
+        worse = (row.rmse_m / near.rmse_m)[higher]
+        text += f"; our extension to {show(level, 6)} deg/s^2, not judged: "
+        text += (
+            f"the RMSE is {listed(worse)} times larger at {listed(worse.index, 6)} deg/s, where"
+            f" {100 * row.converged_share[worse.index].mean():.0f} % of the runs have converged"
+            " after 200 iterations"
+            if len(worse)
+            else "no step up"
+        )
+    return text
+
+
+@claim("2017-10")
+def faster_acceleration(results):
+    names = ("angular_acceleration_dps2", "angular_rate_dps")
+    whole = results.table(MOTION)
+    hand = results.settings["paper2021"]["angular_acceleration_sd_dps2"]
+    table = whole[whole.angular_acceleration_dps2 <= hand]
+    text, up, where, bounds = _steps_up(results, table, *names)
+    remark = f"at {where} deg/s; " if where else ""
+    remark += "figure 5's axes are not in the text; the Cramer-Rao bound goes up in"
+    remark += f" {bounds} steps of our whole grid{_beyond(whole, hand)}"
+    return judged(text, "3 errors a step", up == 0, remark)
+
+
+@claim("2017-11")
+def translation(results):
+    table = results.table("calibration/position_error_force")
+    weight = table.rmse_se_m**-2.0
+    mean = np.sum(weight * table.rmse_m) / weight.sum()
+    statistic = float(np.sum(weight * (table.rmse_m - mean) ** 2))
+    p = float(chdtrc(len(table) - 1, statistic))
+    value = (
+        f"{listed(table.rmse_m)} m at {listed(table.specific_force_mps2)} m/s^2 (p = {show(p, 2)})"
+    )
+    return judged(value, f"{listed(table.rmse_se_m, 2)} m", p > 0.001)
+
+
+@claim("2017-12")
+def efficient(results):
+    last = _curve(results).iloc[-1]
+    bound = results.table("claims/position_bound")
+    row = bound[bound.samples == last.samples].iloc[0]
+    value, error = ratio(last.rmse_m, last.rmse_se_m, row.bound_m, row.bound_se_m)
+    remark = "the paper leaves the bound for the calibration problem open; here it is computed"
+    return judged(value, error, value + 3 * error < 1.1, remark)
+
+
+@claim("2017-13")
+def reliable(results):
+    rmse, error, shown = _thousand(results)
+    return judged(*shown, rmse + 3 * error < 1e-5)

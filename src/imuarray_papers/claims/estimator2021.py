@@ -1,0 +1,160 @@
+"""Paper 2021, sections II and III-A, III-B and the appendix: model, algebra, estimator."""
+
+import numpy as np
+import pandas as pd
+
+from imuarray_papers.claims.registry import claim, judged, listed, near, power_law, show, tiny
+
+EXACT = "rounding only"
+UNBIASED = "four triads, T = 2; p from plain normal densities, none of the estimator's code"
+
+
+def _found(results, part):
+    return results.json("claims/marginalisation")[part]
+
+
+@claim("2021-01")
+def dimensions(results):
+    size = len(results.table(f"posterior/T{results.samples[0]}"))
+    return judged(str(size), "none", size == 93)
+
+
+@claim("2021-02")
+def gyroscopes(results):
+    change = results.json("claims/identifiability")["invariances"]["gyroscope_change"]
+    return judged(f"{change:g} rad/s", EXACT, change == 0.0)
+
+
+@claim("2021-03")
+def naive(results):
+    found = _found(results, "effective_draws")
+    value = f"{show(found['naive'])} of {found['draws']} draws count"
+    return judged(value, "", found["naive"] < 10, "prior sds as simulated, not even flat")
+
+
+@claim("2021-04")
+def rao_blackwell(results):
+    found = _found(results, "effective_draws")
+    ours, drawn = found["rao_blackwellised"], found["conditioned"]
+    value = f"{show(ours, 4)} against {show(drawn)} of {found['draws']}"
+    return judged(value, "", ours > 10 * drawn)
+
+
+@claim("2021-05")
+def unbiased(results):
+    rows = _found(results, "unbiased")
+    off = [(row["mean_ratio"] - 1) / row["mean_se"] for row in rows]
+    value = ", ".join(f"{row['mean_ratio']:.5f}" for row in rows)
+    value += f" for N = {listed([row['draws'] for row in rows])}"
+    errors = listed([row["mean_se"] for row in rows], 2)
+    return judged(value, errors, np.max(np.abs(off)) < 4, UNBIASED)
+
+
+@claim("2021-06")
+def variance_of_estimate(results):
+    rows = pd.DataFrame(_found(results, "unbiased"))
+    errors = rows.relative_variance * np.sqrt(2 / (rows.realisations - 1))
+    slope, error = power_law(rows.draws, rows.relative_variance, errors)
+    return judged(slope, error, near(slope, -1, error, 0.05))
+
+
+@claim("2021-07")
+def null_space(results):
+    found = _found(results, "limits")
+    value = f"{tiny(found['SH_relative'], 1e-9)}; rank {found['rank_S']} of {found['size']}"
+    stands = found["SH_relative"] < 1e-9 and found["rank_S"] == found["size"] - 6
+    return judged(value, EXACT, stands)
+
+
+@claim("2021-08")
+def identities(results):
+    found = _found(results, "limits")
+    worst = max(found["inverse_identity"], abs(found["determinant_identity"]))
+    return judged(tiny(worst, 1e-9), EXACT, worst < 1e-9)
+
+
+@claim("2021-09", column=1)
+@claim("2021-10", column=2)
+def limit(results, column):
+    table = np.array(_found(results, "limits")["beta_quadratic_determinant"])
+    # exponent in beta of the distance from the limit
+    slope = np.polyfit(np.log(table[3:9, 0]), np.log(table[3:9, column]), 1)[0]
+    beta, last = table[-1, [0, column]]
+    value = (
+        f"exponent {show(slope, 4)}; relative distance {tiny(last, 1e-4)} at beta = {show(beta)}"
+    )
+    return judged(value, EXACT, abs(slope + 1) < 0.05 and last < 1e-4)
+
+
+@claim("2021-11")
+def printed_power(results):
+    found = _found(results, "determinant")
+    remark = "(19) has the root of |M_t|, so (23) enters with power -1/2: print lost the root"
+    stands = abs(found["power"] - 1) < 0.01
+    value = f"{show(-found['power'])}; misfit {tiny(found['misfit'], 0.01)}"
+    return judged(value, EXACT, stands, remark)
+
+
+def _printed(results, prefix, remark):
+    """Verdict on (26a) as printed: does it move or widen posteriors? ``remark(rows)``."""
+    table = results.table("claims/determinant")
+    names = [f"{prefix}T{samples}" for samples in results.samples]
+    rows = table[table.name.isin(names) & (table.method == "linearised")]
+    value = (
+        f"mean moves by up to {listed(rows.shift_max_sd, 2)} sd; sds by a factor"
+        f" {listed(rows.width_ratio_min, 5)} for T = {listed(rows.samples)}"
+    )
+    stands = rows.shift_max_sd.max() < 0.1 and np.all(np.abs(rows.width_ratio_min - 1) < 0.1)
+    return judged(value, "none: linearised", stands, remark(rows))
+
+
+@claim("2021-12")
+def printed_small_noise(results):
+    table = results.table("claims/determinant")
+    tiny = table[table.name.str.startswith("tiny") & (table.samples == table.samples.min())]
+    shifts = zip(tiny.name, tiny.method, tiny.shift_max_sd, strict=True)
+    checked = "; ".join(f"{name} {method} {show(shift, 2)}" for name, method, shift in shifts)
+    remark = f"four triads, T = {results.samples[0]}, largest shift: {checked}"
+    return _printed(results, "", lambda rows: remark)
+
+
+@claim("2021-13")
+def printed_large_noise(results):
+    words = "along the worst direction, the array's size, {} sd; it grows with T"
+    return _printed(
+        results, "simulation_", lambda rows: words.format(listed(rows.shift_along_sd, 2))
+    )
+
+
+@claim("2021-14")
+def six(results):
+    found = _found(results, "six_dimensions")
+    value = f"{found['dimensions']} of {found['full']} dimensions"
+    limit = 1e-6 * max(1, abs(found["value"]))
+    value += f"; difference {tiny(found['difference'], float(show(limit)))}"
+    return judged(value, EXACT, found["dimensions"] == 6 and found["difference"] < limit)
+
+
+@claim("2021-15")
+def log_sum_exp(results):
+    found = _found(results, "log_sum_exp")
+    worst = found["worst_relative"]
+    return judged(tiny(worst, 1e-12), EXACT, worst < 1e-12)
+
+
+@claim("2021-16")
+def underflow(results):
+    found = _found(results, "underflow")
+    value = "; ".join(
+        f"{row['place']}: {row['fails']} of {row['sums']} sums (median exponent"
+        f" {show(row['median_exponent'])})"
+        for row in found
+    )
+    return judged(value, "", any(row["fails"] > 0 for row in found))
+
+
+@claim("2021-17")
+def no_rotation(results):
+    found = results.json("claims/identifiability")["common_axis"]
+    value = f"rank {found['no rotation']} of {found['unknowns']}"
+    return judged(value, EXACT, found["no rotation"] == 0)

@@ -1,0 +1,1 @@
+"""ML-BCD, the search of paper 2017."""

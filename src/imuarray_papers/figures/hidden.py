@@ -1,0 +1,172 @@
+"""Effects that were hidden in recordings: what was found, and what it is worth."""
+
+from functools import partial
+
+import numpy as np
+import pandas as pd
+
+from imuarray.geometry import Array
+from imuarray.report.style import BLACK, PAGE, look, new_figure, styled
+from imuarray_papers.blind.study import accuracy, classes
+from imuarray_papers.figures.criticism import draw_gained, letter, three_digits
+from imuarray_papers.figures.style import Column, panels, rms
+
+MODELS = {"base": "papers'", "inflated": "noise inflated", "extended": "extended"}
+
+
+def figure_criticism_hidden(diagnosis: tuple, truth: dict, recordings: Array):
+    """Four panels where the truth is known: lever arms hidden in a simulated recording.
+
+    ``diagnosis`` (diagnosis.json, tables); ``truth``: what `blind.cases.make` says;
+    ``recordings``: the array as the recording declares it.
+    """
+    document, tables = diagnosis
+    residual = tables["residual"]
+    cause = next(table for key, table in tables.items() if key.startswith("cause_01"))
+    cause = cause[cause.panel == cause.panel.min()]
+    rows = []
+    for model, name in MODELS.items():
+        off = accuracy(document[model], truth["positions_m"])
+        covered = off["covered"] / off["coordinates"]
+        rows.append({"model": name, "rms_m": off["position_rmse_m"], "covered": covered})
+    gain = document["gain"]
+    nats = [gain[f"over_inflated_noise_nats_per_sample{end}"] for end in ("", "_se")]
+    table = panels(
+        wrong=residual[residual.axis == "all"][["model", "kind", "imu", "rms"]],
+        cause=cause[["x", "y", "se", "model", "series"]].rename(columns={"model": "predicted"}),
+        extended=_arms(document, truth, recordings.turns), gained=pd.DataFrame(rows),
+        left_out=pd.DataFrame([nats], columns=["over_inflated", "over_inflated_error"]),
+    )  # fmt: skip
+    hidden = truth["effects"][0]
+    size = 1e3 * hidden["amplitude"]["value"]
+    footer = [
+        f"Lever arms of all IMUs, {size:.2g} mm, hidden in a simulated recording by code that"
+        f" shares nothing with the model; named: {_named(document)}. (a) rms residual over the"
+        " declared noise; open: under the extended model. (b) what the cause predicts, and what is"
+        " back in the residual without it, in noise sds. (c) parameters less what motion and"
+        " positions take up. (d) rms error of the positions, and how many of the 95 % intervals"
+        " hold the truth."
+    ]
+    return partial(_draw_hidden, footer=footer), three_digits(table)
+
+
+def _named(document: dict) -> str:
+    """Causes with their sensors: 'size_effect (all)'."""
+    said = [f"{cause['effect']} ({' '.join(cause['sensors'])})" for cause in document["causes"]]
+    return ", ".join(said) or "nothing"
+
+
+def _arms(document: dict, truth: dict, turns) -> pd.DataFrame:
+    """Lever arms found and true, m, by the array's axes, less the means that nothing shows."""
+    cause = next(c for c in document["causes"] if c["effect"] == "size_effect")
+    found = np.array([item["value"] for item in cause["parameters"].values()]).reshape(-1, 3, 3)
+    true = np.array(truth["effects"][0]["parameters"]["lever_arm"]["value"])
+    # from each chip's axes to those of the array that they lie along
+    found = np.einsum("kia,kxj,kaj->kix", np.abs(turns), turns, found)
+    both = [x - x.mean(0) - x.mean(1, keepdims=True) + x.mean((0, 1)) for x in (found, true)]
+    return pd.DataFrame({"found_m": both[0].ravel(), "true_m": both[1].ravel()})
+
+
+@styled
+def _draw_hidden(table, footer):
+    figure = new_figure(footer, PAGE, 2.5)
+    axes = figure.subplots(1, 4)
+    part = {name: rows for name, rows in table.groupby("panel")}
+    sizes = part["wrong"].groupby("model").rms.max()
+    _draw_residuals(axes[0], part["wrong"])
+    axes[0].set_title(f"Wrong: {sizes.base:.1f} × the noise")
+    _draw_seen(axes[1], part["cause"])
+    arms = 1e3 * part["extended"][["true_m", "found_m"]]
+    axes[2].plot(arms.true_m, arms.found_m, **look(2, "linestyle"), linestyle="", markersize=3)
+    axes[2].axline((0, 0), slope=1, color=BLACK, linewidth=0.8)
+    axes[2].set(xlabel="true (mm)", ylabel="found (mm)")
+    axes[2].set_title(f"Extended: {sizes.extended:.1f} × the noise")
+    gain, error = part["left_out"][["over_inflated", "over_inflated_error"]].iloc[0]
+    said = f"held out: +{gain:.1f} ± {error:.1f} nats"
+    draw_gained(axes[3], part["gained"], said, "error of positions (µm)")
+    letter(axes)
+    return figure
+
+
+def _draw_residuals(axes, rows) -> None:
+    for number, (kind, each) in enumerate(rows.groupby("kind")):
+        for model, fill in (("base", {}), ("extended", {"markerfacecolor": "none", "zorder": 4})):
+            some = each[each.model == model]
+            axes.plot(some.imu.astype(str), some.rms, **look(number, "linestyle"), linestyle="",
+                      label=f"{kind}s" if model == "base" else None, **fill)  # fmt: skip
+    axes.set(xlabel="IMU", ylabel="residual / noise", ylim=(0, 1.4 * rows.rms.max()))
+    axes.legend(fontsize=6)
+
+
+def _draw_seen(axes, rows) -> None:
+    for number, (kind, each) in enumerate(rows.groupby("series")):
+        axes.errorbar(each.x, each.y, 2 * each.se, **look(number, "linestyle"), linestyle="",
+                      label=kind, markersize=3)  # fmt: skip
+    ends = rows.x.min(), rows.x.max()
+    axes.plot(ends, ends, color=BLACK, linewidth=0.8)
+    axes.set(xlabel="predicted (noise sds)", ylabel="seen (noise sds)", title="Cause: lever arms")
+    axes.legend(fontsize=6)
+
+
+HIDDEN = (
+    Column("recording", "recording", "recording"),
+    Column("hidden", "hidden", "hidden"),
+    Column("sensors", "in IMU", "in IMU"),
+    Column("named", "named", "named"),
+    Column("named_sensors", "in IMU", "in IMU"),
+    Column("size", "size ± sd", r"size $\pm$ sd"),
+    Column("true_size", "true size", "true size"),
+    Column("gain", "gain, held out (nats)", "gain, held out (nats)"),
+    Column("control", "the same without it", "the same without it"),
+)
+
+
+def table_criticism_hidden(diagnoses: list, truths: list, controls: list, names: list):
+    """Hidden effects, and what the diagnosis says of them, a row a recording.
+
+    ``diagnoses``, ``controls`` (diagnosis.json, tables) with the effect and without;
+    ``truths``: what was hidden in the recordings ``names``.
+    """
+    rows = []
+    for name, truth, (document, _), (control, _) in zip(
+        names, truths, diagnoses, controls, strict=True
+    ):
+        hidden, before = truth["effects"][0], classes(control["causes"])
+        new = [cause for cause in document["causes"] if cause["effect"] not in before]
+        mine = [c for c in new if hidden["effect"] in (c["effect"], *c["indistinguishable_from"])]
+        size, true_size = _sizes(mine, hidden)
+        rows.append({
+            "recording": name, "hidden": hidden["effect"], "sensors": " ".join(hidden["sensors"]),
+            "named": ", ".join(cause["effect"] for cause in new) or "nothing",
+            "named_sensors": ", ".join(" ".join(cause["sensors"]) for cause in new),
+            "size": size, "true_size": true_size,
+            "gain": f"{mine[0]['heldout_gain_nats']:.3g}" if mine else "",
+            "control": "nothing" if not before else _there(hidden["effect"], before),
+        })  # fmt: skip
+    note = (
+        "Effect, IMU and size are drawn from the seed by code that shares nothing with the model;"
+        " the diagnosis sees the recording alone. Named: what the recording without the effect is"
+        " not said to have. Lever arms: with the means that no recording shows."
+    )
+    return pd.DataFrame(rows), HIDDEN, "Effects that were hidden, and what was found", [note]
+
+
+def _there(effect: str, named: dict[str, set[str]]) -> str:
+    """Words on what the recording without the effect has of it, beside its own causes."""
+    there = effect in set().union(*named.values())
+    return f"{len(named)} of its own, {'this too' if there else 'not this'}"
+
+
+def _sizes(causes: list, hidden: dict) -> tuple[str, str]:
+    """(found ± its sd, true) along the true parameters; rms of both where these are others."""
+    parameters = [np.ravel(p["value"]) for p in hidden["parameters"].values()]
+    true = max(parameters, key=len).astype(float)
+    unit, size = hidden["amplitude"]["unit"], float(np.linalg.norm(true))
+    if not causes:
+        return "", f"{size:.3g} {unit}"
+    items = [item for item in causes[0]["parameters"].values() if item["sd"]]
+    values, sds = (np.array([item[key] for item in items]) for key in ("value", "sd"))
+    if len(values) != len(true) or hidden["effect"] != causes[0]["effect"] or len(true) > 9:
+        return f"{rms(values):.3g} {unit} rms", f"{rms(true):.3g} {unit} rms"
+    found, sd = values @ true / size, np.linalg.norm(sds * true) / size
+    return f"{found:.4g} ± {sd:.1g} {unit}", f"{size:.4g} {unit}"

@@ -1,0 +1,255 @@
+"""Measured recordings: residuals beside the simulation's, agreement, first order, still noise."""
+
+from functools import partial
+
+import numpy as np
+import pandas as pd
+from scipy.special import ndtr
+
+from imuarray.report.noise_figure import KINDS, deviation_lines
+from imuarray.report.style import (
+    BLACK,
+    BLUE,
+    PAGE,
+    VERMILLION,
+    logarithmic,
+    look,
+    new_figure,
+    styled,
+)
+from imuarray_papers.figures.style import Column, panels, rms
+
+SOURCES = {
+    "measured": {"color": VERMILLION, "marker": "o", "linestyle": "-"},
+    "simulated": {"color": BLUE, "marker": "s", "linestyle": (0, (4, 1.5))},
+}
+QUANTITIES = {"specific_force": "accelerometers", "angular_rate": "gyroscopes"}
+FIRST_ORDER = (
+    Column("recording", "recording", "recording"),
+    Column("triad", "IMU", "IMU"),
+    Column(
+        "residual_rms", "residual in still poses (mm/s²)", r"residual (mm/s$^2$)", "{:.2f}", 1e3
+    ),
+    Column("left_out", "poses left out", "left out"),
+    Column("force_sd", "accelerometer noise (mm/s²)", r"acc. (mm/s$^2$)", "{:.1f}", 1e3),
+    Column("force_ratio", "/ papers' σa", r"/ $\sigma_a$", "{:.2f}"),
+    Column("rate_sd", "gyroscope noise (deg/s)", "gyro. (deg/s)", "{:.3f}", float(np.degrees(1.0))),
+    Column("rate_ratio", "/ papers' σg", r"/ $\sigma_g$", "{:.2f}"),
+    Column("rate_correlation", "gyroscopes, neighbours' correlation", "corr.", "{:+.2f}"),
+)
+
+AGREEMENT = (
+    Column("samples", "T", "$T$"),
+    Column("assumed", "assumed σa", r"assumed $\sigma_a$"),
+    Column("accelerometer_sd", "its value (m/s²)", r"$\sigma_a$ (m/s$^2$)", "{:.2f}"),
+    Column("claimed_m", "claimed sd (µm)", r"claimed ($\mu$m)", "{:.3g}", 1e6),
+    Column("spread_m", "sd between recordings (µm)", r"between ($\mu$m)", "{:.3g}", 1e6),
+    Column("z_rms", "rms z", "rms $z$", "{:.2f}"),
+    Column("coverage_50", "50 % intervals cover (%)", r"50 \%", "{:.0f}", 100.0),
+    Column("coverage_95", "95 % intervals cover (%)", r"95 \%", "{:.0f}", 100.0),
+)
+
+
+def table_measured_first_order(residuals: list, noise: list, names: list[str]):
+    """First-order calibration of a board: residuals and noise of each IMU, a row for each.
+
+    ``residuals``, ``noise`` of the recordings ``names``: `firstorder.report`. The noise of an IMU
+    is the root mean square over its axes, SI units.
+    """
+    rows = []
+    for name, own, noises in zip(names, residuals, noise, strict=True):
+        sizes = {
+            (sensor, str(triad)): part
+            for (sensor, triad), part in noises.groupby(["sensor", "triad"])
+        }
+        for row in own.itertuples():
+            entry = {"recording": name, "triad": str(row.triad)}
+            entry |= {"residual_rms": row.residual_rms, "left_out": row.left_out}
+            for sensor, short in (("specific_force", "force"), ("angular_rate", "rate")):
+                part = sizes.get((sensor, str(row.triad)))
+                if part is None:
+                    continue
+                sd = rms(part.sd)
+                entry |= {f"{short}_sd": sd, f"{short}_ratio": sd / part.declared.iloc[0]}
+                entry[f"{short}_correlation"] = part.correlation.mean()
+            rows.append(entry)
+    table = pd.DataFrame(rows)
+    note = (
+        "Noise: root mean square over the axes, from differences of neighbouring readings in the"
+        " still poses, beside the noise the recording declared (the papers')."
+    )
+    columns = [column for column in FIRST_ORDER if column.name in table]
+    caption = "First-order calibration from still poses: residual and noise of each IMU"
+    return table, columns, caption, [note]
+
+
+def table_measured_agreement(summary: pd.DataFrame):
+    """Coverage and z-scores between recordings of a board; ``summary``: `measured.agreement`."""
+    table = summary.astype({"assumed": str})
+    note = (
+        f"{table.recordings.max()} recordings, differences of all pairs in all coordinates. Pairs"
+        " share recordings and coordinates share a motion, so the shares have no simple error."
+    )
+    caption = "Do recordings of one board agree within their claimed widths?"
+    return table, AGREEMENT, caption, [note]
+
+
+def figure_measured_residuals(
+    summary: pd.DataFrame, histogram: pd.DataFrame, name: str, settings: dict
+):
+    """Errors of the simulation; `measured.residuals.compare` of the recording ``name``."""
+    noise = settings["noise"]
+    footer = [
+        f"Recording {name}, seed {settings['seed']}. Papers' model with"
+        f" σa = {noise['accelerometer_sd']:g} m/s² and σg = {noise['gyroscope_sd_dps']:g} deg/s,"
+        " positions and motion fitted; the simulation has the fitted motion, this noise and the"
+        " same rails, and is fitted likewise."
+    ]
+    return partial(residual_figure, footer=footer), panels(summary=summary, shape=histogram)
+
+
+@styled
+def residual_figure(table: pd.DataFrame, footer=()):
+    """Standardised residuals, accelerometers above gyroscopes: distribution, sensors, motion.
+
+    ``table``: what `measured.residuals.compare` returns, as panels summary and shape.
+    """
+    shape = table[table.panel == "shape"]
+    figure = new_figure(footer, PAGE, 4.3)
+    axes = figure.subplots(2, 4)
+    for row, (quantity, name) in zip(axes, QUANTITIES.items(), strict=True):
+        chosen = table[table.quantity == quantity]
+        _distribution(row[0], shape[shape.quantity == quantity], name)
+        _sensors(row[1], chosen[chosen["by"] == "axis"])
+        _against(row[2], chosen[chosen["by"] == "angular_rate"], np.degrees(1.0), "|ω| (deg/s)")
+        _against(row[3], chosen[chosen["by"] == "angular_acceleration"], 1.0, "|ω'| (rad/s²)")
+        row[1].set_ylabel("rms (assumed σ)")
+    handles = [axes[0, 0].plot([], [], label=source, **style)[0]
+               for source, style in SOURCES.items()]  # fmt: skip
+    figure.legend(handles=handles, loc="outside upper center", ncols=2)
+    return figure
+
+
+def _distribution(axes, shape, name):
+    for source, style in SOURCES.items():
+        part = shape[(shape.source == source) & (shape.density > 0)]
+        centre = (part.low + part.high) / 2
+        axes.plot(centre, part.density, color=style["color"], linestyle=style["linestyle"])
+    grid = np.linspace(-5, 5, 101)
+    axes.plot(grid, np.exp(-0.5 * grid**2) / np.sqrt(2 * np.pi), color=BLACK, linewidth=0.5)
+    axes.set(
+        yscale="log", ylim=(1e-6, 1), xscale="symlog", xlabel="residual (assumed σ)",
+        ylabel=f"{name}: density",
+    )  # fmt: skip
+    axes.set_xticks([-100, -1, 1, 100], ["−100", "−1", "1", "100"])
+
+
+def _sensors(axes, table):
+    labels = list(dict.fromkeys(table.triad.astype(str)))
+    for source, style in SOURCES.items():
+        part = table[table.source == source]
+        for i, axis in enumerate("xyz"):
+            values = part[part.axis == axis].rms.to_numpy()
+            places = np.arange(len(values)) + 0.22 * (i - 1)
+            axes.plot(places, values, linestyle="", marker=style["marker"], markersize=2.5,
+                      color=style["color"])  # fmt: skip
+    axes.axhline(1, color=BLACK, linewidth=0.5)
+    axes.set(yscale="log", xlabel="IMU (x, y, z)")
+    axes.set_xticks(range(len(labels)), labels)
+
+
+def _against(axes, table, factor, label):
+    for source, style in SOURCES.items():
+        bins = table[table.source == source].groupby("bin_low")
+        centre = factor * (bins.bin_low.first() + bins.bin_high.first()) / 2
+        size = bins.rms.apply(rms)
+        axes.plot(centre, size, markersize=3, **style)
+    axes.axhline(1, color=BLACK, linewidth=0.5)
+    axes.set(yscale="log", xlabel=label)
+
+
+def figure_measured_agreement(summary: pd.DataFrame, pairs: pd.DataFrame, group: str):
+    """Distance of one board's recordings, in claimed widths, and the intervals' coverage.
+
+    ``summary``, ``pairs``: `measured.agreement`, one row each per number of samples and assumed
+    sigma_a (and pair); ``group``: the board.
+    """
+    footer = [
+        f"{summary.recordings.max()} recordings of board {group}; differences"
+        " of all pairs in all coordinates, over their claimed sd. Pairs share recordings, and a"
+        " recording's coordinates share its motion."
+    ]
+    own = pairs.samples == summary.samples.max()
+    pairs = pairs.loc[own, ["samples", "assumed", "z"]].round({"z": 2})  # differences, some tiny
+    table = panels(summary=summary, pairs=pairs)
+    return partial(_draw_agreement, footer=footer), table.astype({"assumed": str})
+
+
+@styled
+def _draw_agreement(table, footer):
+    figure = new_figure(footer, PAGE, 2.7)
+    left, middle, right = figure.subplots(1, 3)
+    pairs, summary = table[table.panel == "pairs"], table[table.panel == "summary"]
+    most = summary.samples.max()
+    for index, name in enumerate(dict.fromkeys(summary.assumed)):
+        style = look(index)
+        size = np.sort(pairs[pairs.assumed == name].z.abs())
+        share = (np.arange(size.size) + 0.5) / size.size
+        left.plot(size, share, label=_assumed(name, summary, most), color=style["color"],
+                  linestyle=style["linestyle"])  # fmt: skip
+        rows = summary[summary.assumed == name].sort_values("samples")
+        middle.plot(rows.samples, 1e6 * rows.spread_m, **style, markersize=4)
+        middle.plot(rows.samples, 1e6 * rows.claimed_m, color=style["color"], linewidth=0.7,
+                    linestyle=(0, (1, 1)), marker=style["marker"], markersize=4,
+                    markerfacecolor="none")  # fmt: skip
+        for column, nominal in (("coverage_50", 50), ("coverage_95", 95)):
+            right.plot(rows.samples, 100 * rows[column], **style, markersize=4,
+                       markerfacecolor="none" if nominal == 50 else None)  # fmt: skip
+    grid = np.geomspace(0.03, 100, 200)
+    left.plot(grid, 2 * ndtr(grid) - 1, color=BLACK, linewidth=1, label="if widths were right")
+    left.set(xscale="log", xlabel="|z| between recordings", ylabel="share of differences")
+    left.set_title(f"$T = {most}$, {len(size)} differences")
+    logarithmic(middle, "samples $T$", "sd (µm)")
+    middle.set_title("between recordings (filled)\nand claimed (open, dotted)")
+    for nominal in (50, 95):
+        right.axhline(nominal, color=BLACK, linewidth=0.6)
+    right.set(xscale="log", ylim=(0, 102), xlabel="samples $T$", ylabel="covered (%)")
+    right.set_title("95 % intervals (filled)\nand 50 % intervals (open)")
+    figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=4)
+    return figure
+
+
+def _assumed(name, summary, most):
+    row = summary[(summary.assumed == name) & (summary.samples == most)].iloc[0]
+    if name == "residual":
+        return f"$\\sigma_a$ from the residual ({row.accelerometer_sd:.2f} m/s²)"
+    return f"$\\sigma_a$ = {name} m/s²"
+
+
+def figure_measured_noise(allan: pd.DataFrame, name: str, settings: dict):
+    """Allan deviation of the still poses, every axis of every IMU, and the papers' white noise.
+
+    ``allan``: `firstorder.report.allan_table` of the recording ``name``. The papers' sd of one
+    reading is drawn as tau^(-1/2).
+    """
+    noise = settings["noise"]
+    papers = {
+        "specific_force": noise["accelerometer_sd"],
+        "angular_rate": np.radians(noise["gyroscope_sd_dps"]),
+    }
+    footer = [
+        f"Still poses of recording {name}. Black: the papers' σa ="
+        f" {noise['accelerometer_sd']:g} m/s² and σg = {noise['gyroscope_sd_dps']:g} deg/s."
+    ]
+    return partial(_draw_noise, papers=papers, footer=footer), allan
+
+
+@styled
+def _draw_noise(allan, papers, footer):
+    figure = new_figure(footer, PAGE, 2.8)
+    for axes, sensor in zip(figure.subplots(1, 2), KINDS, strict=True):
+        taus = deviation_lines(axes, allan, sensor)
+        white = KINDS[sensor][0] * papers[sensor] * np.sqrt(taus[0] / taus)
+        axes.plot(taus, white, color=BLACK, linewidth=1.2, label="papers' σ, white")
+        axes.legend()
+    return figure

@@ -1,0 +1,371 @@
+"""Figure 2 of 2017, 1 and 5 of 2021: the array, and where in its package each triad is."""
+
+from functools import partial
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+from scipy.stats import chi2
+
+from imuarray.geometry import UNDERSIDE_ROTATION, Array, array_from_config
+from imuarray.report.style import BLACK, BLUE, GREY, PAGE, SKY, VERMILLION, look, new_figure, styled
+from imuarray_papers.figures.paper2021 import after_burn_in, prior_of
+from imuarray_papers.figures.style import chain_lines, scale_line
+
+# The orientation marker in a topside package, in units of the package's sides. The text does
+# not say in which corner it is; on the axis that the underside is turned around, as here, both
+# sides' markers lie one above the other.
+MARKER = np.array([0.36, -0.36, 0.0])
+OBLIQUE = np.array([[1.0, 0.0], [0.45, -0.4], [0.0, 5.5]])  # where x, y, z go on the paper
+ARROW = {"arrowstyle": "<->", "linewidth": 0.7, "shrinkA": 0, "shrinkB": 0}
+
+
+def below(array: Array) -> np.ndarray:
+    """(A,) bool, the triads on the underside: those below the middle of the board's height."""
+    height = array.positions[:, 2]
+    return height < (height.min() + height.max()) / 2 - 1e-9
+
+
+def layout_table(array: Array) -> pd.DataFrame:
+    """One row per triad: label, side, position, position relative to the first, marker (m)."""
+    under = below(array)
+    turn = np.where(under[:, None, None], UNDERSIDE_ROTATION, np.eye(3))
+    marker = turn @ (MARKER * np.array(array.package))
+    table = pd.DataFrame({"accelerometer": array.labels})
+    table["side"] = np.where(under, "underside", "topside")
+    for name, values in (
+        ("", array.positions), ("relative_", array.relative),
+        ("marker_", array.positions + marker),
+    ):  # fmt: skip
+        for axis, column in zip("xyz", values.T, strict=True):
+            table[f"{name}{axis}_m"] = column
+    for axis, length in zip(("length", "width", "height"), array.package, strict=True):
+        table[f"package_{axis}_m"] = length
+    return table
+
+
+def figure_2021_fig1(settings: dict, draw=None):
+    """Layout and dimensions: top view (y axis downwards) with numbers and pitch, and side view."""
+    array = array_from_config(settings["array"])
+    footer = [scale_line(settings, f"array {array.name}, nominal")]
+    return partial(draw or _draw_fig1, footer=footer), layout_table(array)
+
+
+def figure_2017_fig2(settings: dict):
+    """The array of the simulations, seen obliquely; crosses: where its sensing elements are."""
+    return figure_2021_fig1(settings, _draw_oblique)
+
+
+@styled
+def _draw_oblique(table, footer):
+    figure = new_figure(footer, height=2.9)
+    axes = figure.subplots()
+    mm = table[[c for c in table if c.endswith("_m")]] * 1e3
+    size = mm[["package_length_m", "package_width_m"]].iloc[0].to_numpy()
+    places = mm[["x_m", "y_m", "z_m"]].to_numpy()
+    low, high = places.min(axis=0), places.max(axis=0)
+    square = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)])
+
+    def outline(middle, half, z, **style):
+        flat = np.column_stack([middle + square * half, np.full(len(square), z)])
+        axes.fill(*(flat @ OBLIQUE).T, linewidth=0.6, **style)
+
+    under = (table.side == "underside").to_numpy()
+    for side, z, style in ((under, low[2], ":"), (~under, high[2], "-")):
+        for place in places[side]:
+            outline(place[:2], size / 2, z, facecolor="none", edgecolor=GREY, linestyle=style)
+        if side.any():
+            axes.plot(*(places[side] @ OBLIQUE).T, "x", color=VERMILLION, markersize=4)
+        middle, half = (low + high)[:2] / 2, (high - low)[:2] / 2 + 0.8 * size
+        outline(middle, half, z, facecolor="#BFD8C6", edgecolor="0.4", alpha=0.35)
+    axes.set(aspect="equal", xticks=[], yticks=[])
+    axes.set_title(f"{(~under).sum()} IMUs on the topside (solid), {under.sum()} on the underside;"
+                   f" height × {OBLIQUE[2, 1]:g}", size=7)  # fmt: skip
+    axes.axis("off")
+    return figure
+
+
+@styled
+def _draw_fig1(table, footer):
+    figure = new_figure(footer, height=4.0)
+    top, side = figure.subplots(2, 1, height_ratios=[6.2, 1], sharex=True)
+    _top_view(top, table)
+    _side_view(side, table)
+    return figure
+
+
+def _top_view(axes, table):
+    mm = table[[c for c in table if c.endswith("_m")]] * 1e3
+    length, width = mm.package_length_m.iloc[0], mm.package_width_m.iloc[0]
+    under = (table.side == "underside").to_numpy()
+    for row in mm.itertuples():
+        if not under[row.Index]:
+            draw_package(axes, row.x_m, row.y_m, length, width, facecolor="0.35")
+            axes.plot(row.marker_x_m, row.marker_y_m, "o", color="white", markersize=3.2)
+        shift = 0.62 if under[row.Index] else -0.62
+        axes.text(
+            row.x_m, row.y_m + shift, table.accelerometer[row.Index], ha="center", va="center",
+            color="#9AD0F5" if under[row.Index] else "white", size=8,
+            style="italic" if under[row.Index] else "normal",
+        )  # fmt: skip
+    _dimension(axes, mm.x_m, mm.y_m.max() + 0.75 * width, "x")
+    _dimension(axes, mm.y_m, mm.x_m.min() - 0.75 * length, "y")
+    axes.set(aspect="equal", ylabel="y (mm), downwards")
+    axes.set_ylim(mm.y_m.max() + 1.3 * width, mm.y_m.min() - 0.8 * width)
+    axes.set_xlim(mm.x_m.min() - 2.15 * length, mm.x_m.max() + length)
+    axes.grid(False)
+    axes.set_title("Seen from above: upright topside, italic underside", size=8)
+
+
+def draw_package(axes, x, y, length, width, **options):
+    """The outline of a package centred at x, y; all in mm."""
+    options = {"edgecolor": BLACK, "linewidth": 0.6} | options
+    axes.add_patch(Rectangle((x - length / 2, y - width / 2), length, width, **options))
+
+
+def _dimension(axes, values, place, along):
+    """An arrow between the first two distinct centres, at ``place`` across, and its length."""
+    centres = np.unique(np.round(values, 9))
+    if centres.size < 2:
+        return
+    first, second = (centres[0], centres[1]) if along == "x" else (centres[-1], centres[-2])
+    ends = [(first, place), (second, place)] if along == "x" else [(place, first), (place, second)]
+    axes.annotate("", *ends, arrowprops=ARROW)
+    middle = np.mean(ends, axis=0)
+    axes.annotate(
+        f"{abs(second - first):.1f} mm", middle, ha="center", va="center", size=7.5,
+        rotation=0 if along == "x" else 90, xytext=(0, -7) if along == "x" else (-7, 0),
+        textcoords="offset points",
+    )  # fmt: skip
+
+
+def _side_view(axes, table):
+    mm = table[[c for c in table if c.endswith("_m")]] * 1e3
+    length, height = mm.package_length_m.iloc[0], mm.package_height_m.iloc[0]
+    low, high = mm.z_m.min(), mm.z_m.max()
+    if high - low > height:  # what is between the packages is the circuit board
+        axes.add_patch(
+            Rectangle(
+                (mm.x_m.min() - 0.7 * length, low + height / 2),
+                np.ptp(mm.x_m) + 1.4 * length,
+                high - low - height,
+                facecolor="#BFD8C6",
+                edgecolor="0.4",
+                linewidth=0.5,
+            )  # fmt: skip
+        )
+    for x, z in sorted(set(zip(mm.x_m.round(6), mm.z_m.round(6), strict=True))):
+        draw_package(axes, x, z, length, height, facecolor="0.35")
+        axes.plot(x, z, "+", color="white", markersize=4)
+    if high > low:
+        _height(axes, mm.x_m.min() - 0.8 * length, mm.x_m.min() - length / 2, low, high)
+    axes.set(aspect="equal", xlabel="x (mm)", ylabel="z (mm)", ylim=(low - 1.2, high + 1.2))
+    axes.grid(False)
+    axes.set_title("Side view", size=8)
+
+
+def _height(axes, place, edge, low, high):
+    """The distance between the sides' centres: an arrow at ``place``, lines to ``edge``."""
+    axes.annotate("", (place, low), (place, high), arrowprops=ARROW)
+    for z in (low, high):
+        axes.plot([place, edge], [z, z], color=BLUE, linewidth=0.4)
+    axes.annotate(
+        f"{high - low:.1f} mm", (place, (low + high) / 2), xytext=(-3, 0), size=7.5,
+        textcoords="offset points", va="center", ha="right",
+    )  # fmt: skip
+
+
+def figure_2021_fig5(
+    chains: list, verdicts: list[dict], coordinates: list, recordings: list, settings: dict
+):  # fmt: skip
+    """Ellipses of the posteriors on (a) topside and (b) underside, at their true size.
+
+    Both seen from above with the y axis downwards. ``chains`` as `posterior.chains.read_chains`
+    gives them, ``verdicts`` and ``coordinates`` of `posterior/`, one for each T; the array is
+    the first of those of ``recordings``.
+    """
+    array = recordings[0]
+    draws, verdicts = after_burn_in(chains, verdicts)
+    known = "truth_m" in coordinates[0]
+    truth = coordinates[0].truth_m.to_numpy().reshape(-1, 3) if known else None
+    posteriors = {samples: _moments_of(values) for samples, values in draws.items()}
+    table = ellipse_table(array, posteriors, prior_of(chains), truth)
+    measured = f"recording {settings['experiment']['recording']}"
+    footer = [scale_line(settings, measured), *chain_lines(verdicts)]
+    return _ellipses(table, array, settings, footer, "MEASURED")
+
+
+def figure_experiment(located: xr.Dataset, recordings: list, name: str, settings: dict):
+    """`figure_2021_fig5` once more, under the sensor model.
+
+    ``located``: `analysis.known.located` of the recording ``name``.
+    """
+    array = recordings[0]
+    posteriors = {}
+    for each in located.samples.to_numpy():
+        one = located.sel(samples=each).isel(accelerometer=slice(1, None))
+        wide = one.position_covariance.isel(accelerometer_other=slice(1, None)).to_numpy()
+        own = wide[range(len(wide)), :, range(len(wide))]
+        posteriors[int(each)] = one.position.to_numpy(), own[:, :2, :2]
+    nominal = located.nominal_position.to_numpy().reshape(-1, *array.positions.shape)[0, 1:]
+    sd = np.full(nominal.shape, located.attrs["position_prior_sd"])
+    table = ellipse_table(array, posteriors, (nominal, sd))
+    footer = [
+        f"Recording {name}, measured. Sensor model: maps, delays and lever arms from the board's"
+        " other recordings, biases and clocks from the whole recording, positions from T samples."
+    ]
+    return _ellipses(table, array, settings, footer, "MEASURED, SENSOR MODEL")
+
+
+def _ellipses(table: pd.DataFrame, array: Array, settings: dict, footer: list[str], title: str):
+    level = settings["experiment"]["ellipse_level"]
+    table.attrs["digits"] = {"mean_x_mm": 6, "mean_y_mm": 6}  # far from 0, and narrow
+    return partial(_draw_ellipses, array=array, level=level, footer=footer, title=title), table
+
+
+@styled
+def _draw_ellipses(table: pd.DataFrame, array: Array, level: float, footer: list[str], title: str):
+    """Both sides of the board with the ellipses of `ellipse_table`, and all packages enlarged."""
+    figure = new_figure(footer, PAGE, 6.6)
+    mosaic = figure.subplot_mosaic(
+        [["topside", "underside"], ["top zoom", "under zoom"], ["legend", "legend"]],
+        height_ratios=[3.3, 2.2, 0.2],
+    )  # fmt: skip
+    names = sorted(samples for samples in table.samples.unique() if samples > 0)
+    reference = layout_table(array).iloc[0]
+    for letter, side, zoom in (("a", "topside", "top zoom"), ("b", "underside", "under zoom")):
+        axes, rows = mosaic[side], table[table.side == side]
+        _packages(axes, rows, array, reference if side == reference.side else None)
+        for row in rows.itertuples():
+            style = _style(names, row.samples)
+            axes.plot(*ellipse(row, level).T, linewidth=0.8, **style)
+            if row.samples > 0:
+                axes.plot(row.mean_x_mm, row.mean_y_mm, ".", color=style["color"], markersize=1.5)
+        reach = 1e3 * np.abs(array.positions[:, :2]).max() + 4.4
+        axes.set(
+            aspect="equal", xlabel="x (mm)", ylabel="y (mm), downwards", xlim=(-reach, reach),
+            ylim=(reach, -reach), title=f"({letter}) {side}, seen from above",
+        )  # fmt: skip
+        axes.grid(False)
+        _zoom(mosaic[zoom], rows[rows.samples == names[-1]], level, _style(names, names[-1]))
+        mosaic[zoom].set_title(f"({letter}) all packages laid over each other, $T = {names[-1]}$")
+    mosaic["legend"].axis("off")
+    mosaic["legend"].legend(handles=_handles(names, level, table), loc="center", ncols=7)
+    figure.suptitle(title, size=8, weight="bold")
+    return figure
+
+
+def _moments_of(draws) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (A - 1, 3) and covariance (A - 1, 2, 2) of x and y from (chains, draws, A - 1, 3)."""
+    draws = draws.reshape(-1, *draws.shape[2:])
+    plane = np.moveaxis(draws[..., :2], 1, 0)
+    return draws.mean(axis=0), np.array([np.cov(own.T) for own in plane])
+
+
+def ellipse_table(array: Array, posteriors: dict, prior, truth=None) -> pd.DataFrame:
+    """Means and covariances of x and y, in mm in the array frame, per triad and T.
+
+    ``posteriors[T]``: mean (A - 1, 3) m relative to the first triad and covariance (A - 1, 2, 2)
+    of x and y; ``prior`` mean and sd, each (A - 1, 3) m; ``truth`` (A - 1, 3) m where known. Rows
+    with samples 0 are the prior.
+    """
+    layout = layout_table(array).iloc[1:].reset_index(drop=True)
+    origin = array.positions[0, :2]
+    table = layout[["accelerometer", "side"]]
+    for name in ("", "marker_"):
+        for axis in "xy":
+            table = table.assign(
+                **{f"{name or 'package_'}{axis}_mm": 1e3 * layout[f"{name}{axis}_m"]}
+            )
+    known = np.full((len(table), 2), np.nan) if truth is None else truth[:, :2] + origin
+    table = table.assign(truth_x_mm=1e3 * known[:, 0], truth_y_mm=1e3 * known[:, 1])
+    variances = np.zeros((len(table), 2, 2))
+    variances[:, [0, 1], [0, 1]] = prior[1][:, :2] ** 2
+    parts = [_moments(table, 0, prior[0][:, :2] + origin, variances)]
+    for samples, (mean, covariance) in posteriors.items():
+        parts.append(_moments(table, samples, mean[:, :2] + origin, covariance))
+    return pd.concat(parts, ignore_index=True)
+
+
+def _moments(table, samples, mean, covariance):
+    return table.assign(
+        samples=samples, mean_x_mm=1e3 * mean[:, 0], mean_y_mm=1e3 * mean[:, 1],
+        cov_xx_mm2=1e6 * covariance[:, 0, 0], cov_xy_mm2=1e6 * covariance[:, 0, 1],
+        cov_yy_mm2=1e6 * covariance[:, 1, 1],
+    )  # fmt: skip
+
+
+def ellipse(row, level: float, points: int = 73) -> np.ndarray:
+    """Outline (points, 2) mm of the Gaussian's ellipse that holds the share ``level``."""
+    covariance = [[row.cov_xx_mm2, row.cov_xy_mm2], [row.cov_xy_mm2, row.cov_yy_mm2]]
+    values, vectors = np.linalg.eigh(covariance)
+    angle = np.linspace(0, 2 * np.pi, points)
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    radii = np.sqrt(chi2.ppf(level, 2) * np.maximum(values, 0))
+    return [row.mean_x_mm, row.mean_y_mm] + (circle * radii) @ vectors.T
+
+
+def _zoom(axes, rows, level, style):
+    """Ellipses, means and truths about the packages' centres, as large as the panel allows."""
+    outlines = [np.zeros((1, 2))]
+    for row in rows.itertuples():
+        centre = np.array([row.package_x_mm, row.package_y_mm])
+        outlines.append(ellipse(row, level) - centre)
+        axes.plot(*outlines[-1].T, linewidth=0.7, **style)
+        axes.plot(*(np.array([row.mean_x_mm, row.mean_y_mm]) - centre), ".", color=style["color"])
+        truth = np.array([row.truth_x_mm, row.truth_y_mm]) - centre
+        axes.plot(*truth, "x", color=BLACK, markersize=3, markeredgewidth=0.6)
+        outlines.append(truth[None])
+    for line in (axes.axhline, axes.axvline):
+        line(0, linestyle=(0, (3, 2)), linewidth=0.5, color=GREY)
+    reach = 1.08 * np.nanmax(np.abs(np.concatenate(outlines))) or 1.0
+    axes.set(
+        aspect="equal", xlabel="x from the centre (mm)", ylabel="y from the centre (mm)",
+        xlim=(-reach, reach), ylim=(reach, -reach),
+    )  # fmt: skip
+
+
+def _style(names, samples) -> dict:
+    if samples == 0:
+        return {"color": SKY, "linestyle": (0, (1, 1))}
+    return look(names.index(samples), "marker")
+
+
+def _packages(axes, rows, array, reference):
+    """Dashed outlines and quadrants, orientation markers and numbers; the reference as a star."""
+    length, width = 1e3 * array.package[0], 1e3 * array.package[1]
+    dashes = {"linestyle": (0, (3, 2)), "linewidth": 0.5, "color": GREY}
+    centres = rows.drop_duplicates("accelerometer")
+    places = [(r.accelerometer, r.package_x_mm, r.package_y_mm, r.marker_x_mm, r.marker_y_mm)
+              for r in centres.itertuples()]  # fmt: skip
+    if reference is not None:
+        values = [1e3 * reference[f"{name}_m"] for name in ("x", "y", "marker_x", "marker_y")]
+        places.append((reference.accelerometer, *values))
+        axes.plot(*values[:2], "*", color=BLACK, markersize=6)
+    for label, x, y, marker_x, marker_y in places:
+        draw_package(axes, x, y, length, width, facecolor="none", edgecolor=GREY,
+                     linestyle=(0, (3, 2)), linewidth=0.5)  # fmt: skip
+        axes.plot([x - length / 2, x + length / 2], [y, y], **dashes)
+        axes.plot([x, x], [y - width / 2, y + width / 2], **dashes)
+        axes.plot(marker_x, marker_y, "o", color=BLACK, markersize=2.2)
+        # in the gap above the package: inside, ellipses would cross it
+        axes.text(x - 0.5 * length, y - 0.53 * width, label, size=6.5, va="bottom", ha="left")
+
+
+def _handles(names, level, table):
+    share = f"{100 * level:g} %"
+    handles = [Line2D([], [], label=f"prior, {share}", **_style(names, 0))]
+    for samples in names:
+        handles.append(
+            Line2D([], [], label=f"$T = {samples}$", marker=".", **_style(names, samples))
+        )
+    if table.truth_x_mm.notna().any():
+        handles.append(
+            Line2D([], [], linestyle="", marker="x", color=BLACK, markersize=3, label="truth")
+        )
+    handles.append(Line2D([], [], linestyle="", marker="*", color=BLACK, label="reference"))
+    handles.append(Line2D([], [], linestyle="", marker="o", color=BLACK, markersize=2.2,
+                          label="orientation marker"))  # fmt: skip
+    return handles

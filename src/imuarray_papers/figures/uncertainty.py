@@ -1,0 +1,338 @@
+"""Figures and tables of estimation theory, and of the validation of posteriors by simulation."""
+
+from functools import partial
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from imuarray.report.style import (
+    BLACK,
+    GREY,
+    MARKERS,
+    PAGE,
+    SKY,
+    logarithmic,
+    look,
+    new_figure,
+    styled,
+)
+from imuarray_papers.figures.style import Column, points, scale_line
+
+ESTIMATORS = ("maximum likelihood", "with the prior")
+
+RANKS = (
+    Column("case", "motion and geometry", "motion and geometry"),
+    Column("samples", "samples", "$N$"),
+    Column("unknowns", "unknowns", "unknowns"),
+    Column("rank", "rank of the information", "rank"),
+    Column("condition", "condition of what is seen", "condition", "{:.2g}"),
+)
+BINS = 20
+ACROSS = 4  # panels in a line
+SHARES = (0.5, 0.9, 0.95)
+REFERENCE = "NUTS"  # whose PIT values the others' are compared with, replicate by replicate
+MIXED = 50  # independent draws of a posterior, of 199: fewer are a slow chain
+WHOLE = ("size", "misfit")  # quantities that hang on all coordinates
+
+COVERAGE = (
+    Column("setting", "setting", "setting"),
+    Column("method", "method", "method"),
+    Column("samples", "T", "$T$"),
+    Column("replicates", "replicates", "replicates"),
+    Column("covered_50", "50 % intervals cover (%)", r"50 \%", "{:.1f}", 100.0),
+    Column("se_50", "±", r"$\pm$", "{:.1f}", 100.0),
+    Column("covered_90", "90 % (%)", r"90 \%", "{:.1f}", 100.0),
+    Column("se_90", "± ", r"$\pm$ ", "{:.1f}", 100.0),
+    Column("covered_95", "95 % (%)", r"95 \%", "{:.1f}", 100.0),
+    Column("se_95", "±  ", r"$\pm$  ", "{:.1f}", 100.0),
+    Column("shift_z", "z of the mean score", r"$z$, shift", "{:+.1f}"),
+    Column("width_z", "z of the mean squared score", r"$z$, width", "{:+.1f}"),
+    Column("size_z", "z, the array's size", r"$z$, size", "{:+.1f}"),
+    Column("misfit_z", "z, misfit of the data", r"$z$, misfit", "{:+.1f}"),
+    Column("p", "p of uniform ranks", "$p$", "{:.2g}"),
+    Column("none", "truths without intervals", "none"),
+    Column("slow", "slow chains", "slow"),
+    Column("apart", "farthest from NUTS", "from NUTS", "{:.2f}"),
+)
+COVERAGE_NOTE = (
+    "Truths drawn from the prior, motion from its own, which the samplers know, but 'sample', which"
+    " is the command as it is: to it the noise and the motion's size are unknown (the paper's limit"
+    " of a flat motion prior cannot be simulated; docs/findings.md says what it does to the array's"
+    " size). ±: standard errors over replicates."
+    " Scores: normal quantiles of the truth's PIT value; a mean square above 1 (z > 0) means widths"
+    " too small."
+    " p: Kolmogorov and Smirnov's, the smallest of all quantities times their number."
+    " Slow: fewer than 50 of 199 kept draws are worth an independent one. Farthest from NUTS: the"
+    " largest rms difference between both methods' PIT values of one truth; 0.05 is chance."
+)
+JOINT = (
+    Column("sampler", "sampler", "sampler"),
+    Column("rounds", "rounds", "rounds"),
+    Column("parameters", "unknowns", "unknowns"),
+    Column("ess_min", "smallest effective size", "ESS", "{:.0f}"),
+    Column("mean_z", "largest |z| of means", r"$|z|$, means", "{:.2f}"),
+    Column("square_z", "largest |z| of squares", r"$|z|$, squares", "{:.2f}"),
+    Column("misfit_z", "|z| of the misfit", r"$|z|$, misfit", "{:.2f}"),
+    Column("p", "p", "$p$", "{:.2g}"),
+)
+JOINT_NOTE = (
+    "Measurements are drawn given the positions, then the positions moved by the sampler given the"
+    " measurements, over and over: right samplers leave the positions' prior as it is, and the"
+    " misfit between both as in independent draws. z: means of the coordinates and their squares"
+    " against the prior's, of the misfit against the independent ones', in Monte Carlo standard"
+    " errors; p: of the largest, times the number of comparisons."
+)
+
+
+def table_theory_ranks(rows: pd.DataFrame, settings: dict):
+    """Rank of the information over N, motion and geometry; ``rows``: `studies.bound.ranks`."""
+    note = (
+        "Fisher information of the positions r_2 ... r_A with the motion unknown, scaled to a unit"
+        " diagonal. A rank below the number of unknowns: the positions cannot be identified."
+    )
+    caption = "Which motion and geometry tell the positions."
+    return rows, RANKS, caption, [note, scale_line(settings)]
+
+
+def figure_theory_efficiency(rows: pd.DataFrame, settings: dict):
+    """RMSE over N beside the bound, their ratio, and that over the noise.
+
+    ``rows``: `studies.bound.efficiency` for the model's noise, then for others at one N.
+    """
+    footer = [scale_line(settings, f"{rows.realisations.max()} realisations per point")]
+    return partial(_draw_efficiency, footer=footer), rows
+
+
+@styled
+def _draw_efficiency(table, footer):
+    figure = new_figure(footer, height=5.4)
+    top, below, louder = figure.subplots(3, 1, height_ratios=[2, 1, 1])
+    others = table[table.noise != 1.0]
+    for index, name in enumerate(ESTIMATORS):
+        rows = table[(table.estimator == name) & (table.noise == 1.0)]
+        points(top, rows.samples, rows.rmse_m, rows.rmse_se_m, index, linestyle="none",
+               label=f"RMSE, {name}")  # fmt: skip
+        top.plot(
+            rows.samples, rows.bound_m, **look(index, "marker"),
+            label="bound" if index == 0 else "linearised posterior",
+        )  # fmt: skip
+        places = rows.samples * 1.04**index
+        points(below, places, rows.ratio, rows.ratio_se, index, linestyle="none")
+        rows = table[(table.estimator == name) & table.samples.isin(others.samples)]
+        points(louder, rows.noise * 1.04**index, rows.ratio, rows.ratio_se, index)
+    for panel in (below, louder):
+        panel.axhline(1.0, color=BLACK, linewidth=0.8)
+        panel.set(ylabel="error / bound")
+    top.set(xscale="log", yscale="log", ylabel="RMSE of the positions (m)")
+    below.set(xscale="log", xlabel="Time samples $N$ (count)")
+    counts = ", ".join(map(str, others.samples.unique()))
+    louder.set(xscale="log", xlabel=f"Noise, times the sensors' own ($N$ = {counts})")
+    top.legend(loc="upper right")
+    return figure
+
+
+def figure_theory_convergence(rows: pd.DataFrame, settings: dict):
+    """Iterations to 1.01 times the bound over the motion, and ML-BCD's rate, predicted and seen.
+
+    ``rows``: `studies.bound.convergence` of the array, then of others. Motions that determine the
+    positions hardly better than they are known nominally are left out above; filled triangles at
+    the top are medians beyond the limit of iterations.
+    """
+    footer = [scale_line(settings, f"N = {rows.samples.max()}")]
+    given = {"nominal_sd": settings["paper2017"]["position_sd"], "footer": footer}
+    return partial(_draw_convergence, **given), rows
+
+
+@styled
+def _draw_convergence(table, nominal_sd, footer):
+    figure = new_figure(footer, height=5.4)
+    top, below = figure.subplots(2, 1)
+    own = table[table.array == table.array.iloc[0]]
+    for index, (acceleration, rows) in enumerate(own.groupby("angular_acceleration_dps2")):
+        # medians: a run that did not come to an end counts as longer than any other
+        known = rows[rows.groupby("angular_rate_dps").bound_m.transform("median") < nominal_sd / 3]
+        counts = known[["angular_rate_dps", "bcd_iterations", "newton_iterations"]].fillna(np.inf)
+        medians = counts.groupby("angular_rate_dps").median()
+        never = medians.index[np.isinf(medians.bcd_iterations)]
+        medians = medians.replace(np.inf, np.nan)
+        style = look(index)
+        top.plot(
+            never, np.full(len(never), 1.3 * rows.limit.max()), linestyle="none", marker="^",
+            color=style["color"], markersize=7 - index,
+        )  # fmt: skip
+        top.plot(
+            medians.index, medians.bcd_iterations, markerfacecolor="none",
+            label=rf"$\|\dot\omega\|$ = {acceleration:g} deg/s²", **style,
+        )  # fmt: skip
+        top.plot(medians.index, medians.newton_iterations, color=GREY, marker=style["marker"],
+                 markerfacecolor="none", linestyle=":")  # fmt: skip
+        below.plot(
+            1 - rows.contraction, 1 - rows.observed, markerfacecolor="none",
+            **{**style, "linestyle": "none"},
+        )  # fmt: skip
+    for index, (name, rows) in enumerate(table[table.array != own.array.iloc[0]].groupby("array")):
+        below.plot(
+            1 - rows.contraction, 1 - rows.observed, color=BLACK, linestyle="none",
+            marker=MARKERS[-1 - index], markerfacecolor="none", label=name,
+        )  # fmt: skip
+    top.plot([], [], color=GREY, linestyle=":", label="Gauss-Newton, each")
+    logarithmic(top, r"Angular rate $\|\omega\|$ (deg/s)", "iterations to 1.01 × bound")
+    top.legend(loc="lower center", bbox_to_anchor=(0.5, 0.12), ncols=2, columnspacing=1.0)
+    drawn = 1 - table.contraction[table.observed.notna()]
+    ends = np.array([drawn.min() / 2, min(drawn.max() * 2, 1.0)])
+    below.plot(ends, ends, color=BLACK, linewidth=0.8)
+    logarithmic(below, "share of the error lost in an iteration, foreseen", "seen")
+    below.legend(loc="upper left", title="other arrays", title_fontsize=7)
+    return figure
+
+
+def figure_theory_size(rows: pd.DataFrame, settings: dict):
+    """The bound over the array's size, absolute and relative to it; `studies.bound.against_size`.
+
+    Both on one axis of lengths would hide that the one falls: two panels.
+    """
+    footer = [scale_line(settings, f"N = {settings['theory']['convergence_samples']}")]
+    return partial(_draw_size, footer=footer), rows
+
+
+@styled
+def _draw_size(table, footer):
+    figure = new_figure(footer, height=4.0)
+    top, below = figure.subplots(2, 1, sharex=True)
+    top.plot(1e3 * table.extent_m, 1e6 * table.bound_m, markerfacecolor="none", **look(0))
+    below.plot(1e3 * table.extent_m, 1e6 * table.relative, markerfacecolor="none", **look(2))
+    # both panels over as many decades, so that what does not change looks so
+    decades = np.log10(table.relative.max() / table.relative.min()) * 0.6
+    middle = 1e6 * np.median(table.bound_m)
+    span = (middle * 10**-decades, middle * 10**decades)
+    logarithmic(top, None, "bound (µm)", ylim=span)
+    logarithmic(below, "size of the array, corner to corner (mm)", "bound / size (ppm)")
+    return figure
+
+
+def coverage(table: pd.DataFrame) -> pd.DataFrame:
+    """Share of central intervals that hold the truth, and uniformity of PIT values.
+
+    A row for each setting, method and T: ``covered_50`` and so on of the coordinates with standard
+    errors over replicates (coordinates of one replicate are not independent); ``shift_z`` and
+    ``width_z``, the mean normal score and the mean squared one less 1 over all coordinates of a
+    replicate, ``size_z`` and ``misfit_z``, the mean scores of those, in standard errors; and
+    ``none``, replicates without intervals; ``slow``, chains with few independent draws; ``apart``,
+    how far from NUTS' a replicate's PIT values are at most (rms; 0.05 is their own noise); and
+    ``p``, the smallest Kolmogorov-Smirnov p-value of a quantity times their number.
+    """
+    rows = []
+    keys = ["setting", "method", "samples"]
+    for key, part in table.groupby(keys, sort=False):
+        grid = part.pivot(index="replicate", columns="quantity", values="pit")
+        grid = grid.dropna(axis="columns", how="all").dropna()
+        own = grid.drop(columns=[name for name in WHOLE if name in grid]).to_numpy()
+        mixed = part.groupby("replicate").independent.first()
+        row = dict(zip(keys, key, strict=True)) | {
+            "replicates": len(grid), "none": part.replicate.nunique() - len(grid),
+            "slow": int(np.sum(mixed < MIXED)), "apart": _apart(table, key),
+        }  # fmt: skip
+        for share in SHARES:
+            inside = (np.abs(own - 0.5) < share / 2).mean(axis=1)
+            row[f"covered_{100 * share:.0f}"] = inside.mean()
+            row[f"se_{100 * share:.0f}"] = inside.std(ddof=1) / np.sqrt(len(grid))
+        scores = stats.norm.ppf(own)
+        row |= {"shift_z": _mean_z(scores.mean(axis=1)),
+                "width_z": _mean_z(np.mean(scores**2, axis=1) - 1)}  # fmt: skip
+        for name in WHOLE:
+            row[f"{name}_z"] = _mean_z(stats.norm.ppf(grid[name])) if name in grid else np.nan
+        smallest = min(stats.kstest(grid[name], "uniform").pvalue for name in grid)
+        rows.append({**row, "p": min(1.0, smallest * grid.shape[1])})
+    return pd.DataFrame(rows)
+
+
+def _apart(table: pd.DataFrame, key) -> float:
+    """Largest rms difference of a replicate's coordinates' PIT values from `REFERENCE`'s."""
+    setting, method, samples = key
+    same = table[(table.setting == setting) & (table.samples == samples)]
+    same = same[~same.quantity.isin(WHOLE)]
+    places = ["replicate", "quantity"]
+    own, other = (same[same.method == name].set_index(places).pit for name in (method, REFERENCE))
+    square = ((own - other) ** 2).dropna().groupby("replicate").mean()
+    return float(np.sqrt(square.max())) if method != REFERENCE and len(square) else np.nan
+
+
+def _mean_z(scores) -> float:
+    """Mean of one score a replicate (R,) over its standard error."""
+    return float(np.mean(scores) / (np.std(scores, ddof=1) / np.sqrt(len(scores))))
+
+
+def table_validation_coverage(pit_values: list[pd.DataFrame], settings: dict):
+    """Share of intervals that hold the truth, by method and T; ``pit_values``: `studies.sbc`."""
+    table = coverage(pd.concat(pit_values))
+    notes = [COVERAGE_NOTE, scale_line(settings)]
+    return table, COVERAGE, "How often intervals hold the truth.", notes
+
+
+def table_validation_joint(rows: pd.DataFrame, settings: dict):
+    """The joint test of samplers and simulation; ``rows``: `studies.joint`."""
+    caption = "Samplers and simulation by turns: do the positions keep their prior?"
+    return rows, JOINT, caption, [JOINT_NOTE, scale_line(settings)]
+
+
+def histogram(values: pd.DataFrame) -> pd.DataFrame:
+    """Density of the truths' PIT values, uniform if right: a row for each bin.
+
+    ``se``: from the spread between replicates, whose parameters are not independent.
+    """
+    frames = []
+    edges = np.linspace(0, 1, BINS + 1)
+    own = values[~values.quantity.isin(WHOLE)].dropna(subset="pit")
+    for (setting, method, samples), part in own.groupby(
+        ["setting", "method", "samples"], sort=False
+    ):
+        place = np.clip((part.pit * BINS).astype(int), 0, BINS - 1)
+        shares = BINS * pd.crosstab(part.replicate, place, normalize="index")
+        shares = shares.reindex(columns=range(BINS), fill_value=0.0)
+        frames.append(
+            pd.DataFrame(
+                {"setting": setting, "method": method, "samples": samples,
+                 "low": edges[:-1], "high": edges[1:],
+                 "density": shares.mean().to_numpy(),
+                 "se": (shares.std(ddof=1) / np.sqrt(len(shares))).to_numpy(),
+                 "replicates": len(shares)}
+            )
+        )  # fmt: skip
+    return pd.concat(frames, ignore_index=True)
+
+
+def figure_validation_ranks(pit_values: list[pd.DataFrame], settings: dict):
+    """A histogram for each setting, T and method; band: all 20 bins of a panel, 95 %.
+
+    ``pit_values``: `studies.sbc`, of each setting.
+    """
+    table = histogram(pd.concat(pit_values))
+    footer = [
+        scale_line(settings, "n: truths from the prior, those without intervals left out"),
+        "Histograms of all positions' coordinates; band: 95 % for all bins of a panel together.",
+    ]
+    return partial(_draw_ranks, footer=footer), table
+
+
+@styled
+def _draw_ranks(table, footer):
+    groups = list(table.groupby(["setting", "samples", "method"], sort=False))
+    lines = -(-len(groups) // ACROSS)
+    figure = new_figure(footer, PAGE, 0.5 + 1.35 * lines)
+    panels = figure.subplots(lines, ACROSS, sharex=True, sharey=True, squeeze=False)
+    for ((setting, samples, method), rows), axes in zip(groups, panels.flat, strict=False):
+        width = stats.norm.isf(0.025 / BINS) * rows.se.mean()
+        axes.axhspan(1 - width, 1 + width, color=SKY, alpha=0.4, linewidth=0)
+        axes.axhline(1.0, color=BLACK, linewidth=0.6)
+        axes.stairs(rows.density, [*rows.low, 1.0], color=look(2)["color"], linewidth=1.2)
+        count = rows.replicates.max()
+        axes.set_title(f"{setting}, T = {samples}\n{method}, n = {count}", size=7)
+    for axes in panels.flat[len(groups) :]:
+        axes.set_visible(False)
+    for axes in panels[:, 0]:
+        axes.set_ylabel("density")
+    for axes in panels[-1]:
+        axes.set_xlabel("posterior below the truth")
+    panels[0, 0].set(xlim=(0, 1), ylim=(0, None))
+    return figure

@@ -1,0 +1,173 @@
+"""Compiled likelihood estimate (26a) and pseudo-marginal Metropolis-Hastings transitions."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from imuarray.compiled import njit
+from imuarray.estimation import kernels
+from imuarray.estimation.collapsed import Tables
+from imuarray_papers.posterior import draws
+
+
+class LikelihoodData(NamedTuple):
+    """A recording as the compiled likelihood wants it; time is the last axis."""
+
+    weighted: np.ndarray  # (A, 3, T) Lambda y
+    energy: np.ndarray  # (T,) y' Lambda y
+    base: np.ndarray  # (3, T) sum_k (Lambda y)_k
+    mean: np.ndarray  # (3, T) mean of the density omega_t is drawn from, p(omega_t | y_g)
+    factor: np.ndarray  # (6, T) its covariance's Cholesky factor: xx, yx, yy, zx, zy, zz
+    log_weight: np.ndarray  # (10, T) log p - log of that density: 1, x, y, z, the six products
+    weights: np.ndarray  # (A,) 1 / sigma_k^2, empty for a general covariance
+    precision: np.ndarray  # (3A, 3A) Lambda, empty for isotropic triads
+    tensor: np.ndarray  # (4, 3, 12)
+    tables: Tables
+    ridge: np.ndarray  # (3,) prior precision of omega_dot (s^4/rad^2), zero where flat
+
+
+class Workspace(NamedTuple):
+    """Scratch memory of one chain."""
+
+    reduced: kernels.Reduced
+    tile: draws.Tile
+
+
+@njit
+def workspace(samples, count, rng):
+    """Allocate a `Workspace` for T samples and N = ``count`` draws, seeded by ``rng``."""
+    return Workspace(kernels.reduced(samples), draws.tile(count, rng))
+
+
+@njit
+def collapse(positions, data, out):
+    """Everything that depends on theta but not on omega; returns log |H' Lambda H|."""
+    if data.weights.size:
+        kernels.information(positions, data.weights, data.tables.pairs, data.tables.products, out.K)
+    else:
+        kernels.information_general(positions, data.precision, data.tensor, out.K)
+    for i in range(3):
+        out.K[6 + i, 6 + i] += data.ridge[i]
+    known = data.tables
+    return kernels.reduce(
+        positions, data.weighted, data.base, data.energy, known.rows, known.values, out
+    )
+
+
+@njit(inline="always")
+def _log_mean_exp(exponent):
+    """log of the mean of exp(exponent), safe from over- and underflow (Appendix A)."""
+    top = exponent[0]
+    for n in range(1, exponent.size):
+        top = max(top, exponent[n])
+    if exponent.size == 1 or not top > -math.inf:
+        return top
+    total = 0.0
+    for n in range(exponent.size):
+        total += math.exp(exponent[n] - top)
+    return top + math.log(total / exponent.size)
+
+
+@njit
+def _assemble(total, const, logdet, determinant_power):
+    return total - 0.5 * const.sum() - determinant_power * const.size * logdet
+
+
+@njit
+def fixed_draws(positions, data, rates, power):
+    """log p-hat (26a) on given draws ``rates`` (T, N, 3) rad/s."""
+    found = kernels.reduced(rates.shape[0])
+    logdet = collapse(positions, data, found)
+    total, weighted = 0.0, data.log_weight.shape[1] > 0
+    exponent = np.empty(rates.shape[1])
+    for t in range(rates.shape[0]):
+        b = found.b[:, t]
+        for n in range(rates.shape[1]):
+            x, y, z = rates[t, n]
+            exponent[n] = -0.5 * kernels.quadratic(
+                x, y, z, found.C, b[0], b[1], b[2], b[3], b[4], b[5]
+            )
+            if weighted:
+                exponent[n] += draws.log_weight(data.log_weight, t, x, y, z)
+        total += _log_mean_exp(exponent)
+    return _assemble(total, found.const, logdet, power)
+
+
+@njit
+def fresh_draws(positions, data, work, power):
+    """log p-hat (26a) with omega drawn anew from p(omega | y_g)."""
+    found = work.reduced
+    logdet = collapse(positions, data, found)
+    total, tile = 0.0, work.tile
+    draws.folded(found.C, tile.quartic)
+    for start in range(0, data.energy.size, draws.TILE):
+        size = min(draws.TILE, data.energy.size - start)
+        numbers = draws.drawn(size, tile)
+        draws.exponents(start, size, data, tile.quartic, found.b, numbers, tile.exponent)
+        total += draws.log_means(size, tile)
+    return _assemble(total, found.const, logdet, power)
+
+
+@njit
+def repeated(positions, data, rng, count, power, out):
+    """Independent realisations of log p-hat at one theta, filling ``out``."""
+    for i in range(out.size):
+        work = workspace(data.energy.size, count, rng)
+        out[i] = fresh_draws(positions, data, work, power)
+
+
+@njit
+def transitions(theta, log_target, prior, centre, factor, step, draws, power, data, rng, count):
+    """``count`` transitions of Algorithm 1 (2021) from ``theta`` (3 (A - 1),), in place.
+
+    ``prior`` (2, 3 (A - 1)) holds means and precisions. The accepted noisy estimate is kept, never
+    redrawn. Proposals are the walk (27) of sd ``step`` where ``centre`` and ``factor`` are empty,
+    else preconditioned Crank-Nicolson: reversible for a normal density of mean ``centre``
+    (3 (A - 1),) and covariance factor factor', ``factor`` lower. In its own coordinates a proposal
+    is sqrt(1 - step^2) z + step n, and only what the target departs from it can be refused.
+    Returns (accepted, log_target).
+    """
+    work = workspace(data.energy.size, draws, rng)
+    size, shaped = theta.size, centre.size > 0
+    positions = np.zeros((size // 3 + 1, 3))
+    flat = positions.ravel()[3:]
+    z, new = theta.copy(), np.empty(size)
+    keep = math.sqrt(1.0 - step**2) if shaped else 1.0
+    square, accepted = _whiten(theta, centre, factor, z) if shaped else 0.0, 0
+    for _ in range(count):
+        proposed, moved = 0.0, 0.0
+        for i in range(size):
+            new[i] = keep * z[i] + step * rng.standard_normal()
+            moved += new[i] ** 2
+        for i in range(size):
+            value = new[i]
+            if shaped:
+                value = centre[i]
+                for j in range(i + 1):
+                    value += factor[i, j] * new[j]
+            flat[i] = value
+            proposed -= 0.5 * prior[1, i] * (value - prior[0, i]) ** 2
+        proposed += fresh_draws(positions, data, work, power)
+        ratio = proposed - log_target
+        if shaped:
+            ratio += 0.5 * (moved - square)
+        if math.log(rng.random()) < ratio:
+            theta[:] = flat
+            z[:] = new
+            log_target, square = proposed, moved
+            accepted += 1
+    return accepted, log_target
+
+
+@njit
+def _whiten(theta, centre, factor, z):
+    """Fills z with theta = centre + factor z, ``factor`` lower; returns its square."""
+    square = 0.0
+    for i in range(theta.size):
+        value = theta[i] - centre[i]
+        for j in range(i):
+            value -= factor[i, j] * z[j]
+        z[i] = value / factor[i, i]
+        square += z[i] ** 2
+    return square

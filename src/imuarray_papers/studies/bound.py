@@ -1,0 +1,298 @@
+"""The Cramer-Rao bound of the positions: who reaches it, how fast, and what it depends on."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from imuarray.estimation.collapsed import Collapsed
+from imuarray.estimation.information import arms, information_at
+from imuarray.estimation.newton import fisher_scoring
+from imuarray.geometry import Array, sub_array
+from imuarray.linear import scaled_eigh
+from imuarray.model import ArrayModel
+from imuarray.model.structure import products
+from imuarray.motion import normal_motion, sphere_motion
+from imuarray.streams import stream
+from imuarray_papers.estimation.bcd import calibrate_bcd
+from imuarray_papers.studies.truths import batches, realisations, root_mean_square, run_batches
+
+NEAR = 1.01  # times the bound: as good as efficient
+BCD_LIMIT = 20000  # iterations after which ML-BCD is given up
+PATIENCE = 400  # iterations of Gauss-Newton where noise is large
+SCORING_LIMIT = 10  # and Gauss-Newton
+RANK = 1e-10  # of the largest eigenvalue of the scaled information
+REPEATS = 20  # motions averaged over; the bound varies little between them
+
+
+def block_information(model: ArrayModel, motion) -> np.ndarray:
+    """Information were the motion known: what a step of ML-BCD assumes."""
+    state = np.zeros((12, len(motion.angular_rate)))
+    state[:6], state[6:9] = (
+        products(motion.angular_rate).T,
+        np.asarray(motion.angular_acceleration).T,
+    )
+    stacked = arms(state)[1:].reshape(3, -1)
+    return np.kron(np.diag(model.noise.triad_weights), stacked @ stacked.T)[3:, 3:]
+
+
+def contraction(known, assumed) -> float:
+    """By what factor ML-BCD's slowest error shrinks in an iteration, near the optimum.
+
+    The largest squared canonical correlation of positions and motion: one less the smallest
+    eigenvalue of the information with the motion unknown against that with it known.
+    """
+    values = np.linalg.eigvals(np.linalg.solve(assumed, known)).real
+    return float(1.0 - values.min())
+
+
+def rms_width(known) -> float:
+    """rms over coordinates of the bound's sds, m."""
+    return float(np.sqrt(np.trace(np.linalg.inv(known)) / len(known)))
+
+
+def _draw(model, rng, samples, motion, options):
+    """(motion, truth, forces, rates, saturated) of a realisation."""
+    made = realisations(model, rng, 1, samples, motion, options["position_sd"], options["rail"])
+    return made.motion.select(0), *(part[0] for part in made[1:])
+
+
+def efficiency(
+    model: ArrayModel, seed, sample_counts, motion, options, threads=1, quiet=True, noise=1.0
+) -> pd.DataFrame:
+    """RMSE of the most likely positions, with and without a prior, against the bound; a row per N.
+
+    Noise is ``noise`` times the model's, and estimators know it. ``motion`` and ``options`` as
+    `studies.position_error` has them. ``bound_m`` is the rms of each realisation's own
+    bound (with the prior: of the linearised posterior's sds), and ``ratio`` the root of the mean
+    of e' I e / P over realisations, e the P errors and I the information: 1 for an efficient
+    estimator, in every direction, whatever the motion.
+    """
+    rows, model = [], replace(model, noise=model.noise.times(noise))
+    for samples in sample_counts:
+
+        def job(batch, samples=samples):
+            number, size = batch
+            rng = stream(seed, "bound", samples, str(noise), number)
+            return [_one(model, rng, samples, motion, options) for _ in range(size)]
+
+        parts = run_batches(job, batches(options["realisations"]), threads, quiet, f"N={samples}")
+        found = np.concatenate(parts)  # (realisations, estimators, columns)
+        for place, name in enumerate(("maximum likelihood", "with the prior")):
+            square, bound, quadratic, iterations, converged = found[:, place].T
+            rmse, error = root_mean_square(square)
+            ratio, ratio_se = root_mean_square(quadratic)
+            rows.append(
+                {"samples": samples, "noise": noise, "estimator": name, "rmse_m": rmse,
+                 "rmse_se_m": error, "bound_m": float(np.sqrt(np.mean(bound))), "ratio": ratio,
+                 "ratio_se": ratio_se,
+                 "realisations": len(found), "iterations_max": int(iterations.max()),
+                 "not_converged": int(np.sum(converged == 0))}
+            )  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def _one(model, rng, samples, motion, options):
+    """Squared error and bound (m^2), e' I e / P, iterations, converged: without, with a prior."""
+    moves, truth, force, rate, saturated = _draw(model, rng, samples, motion, options)
+    data = Collapsed.of(model, force, rate, saturated)
+    size = truth[1:].size
+    # errors of r_k - r_1 are correlated: the reference triad's is in all of them
+    spread = options["position_sd"] ** 2 * (np.eye(size) + np.tile(np.eye(3), (size // 3,) * 2))
+    prior = model.array.parameters, np.linalg.inv(spread)
+    known = information_at(model, moves, truth, saturated)
+    out = []
+    for given in (None, prior):
+        found = fisher_scoring(data, model.array.relative, given, limit=PATIENCE, covariance=False)
+        error = (found.positions - truth)[1:].ravel()
+        whole = known if given is None else known + given[1]
+        out.append([
+            np.mean(error**2), np.trace(np.linalg.inv(whole)) / size, error @ whole @ error / size,
+            len(found.cost) - 1, found.converged,
+        ])  # fmt: skip
+    return np.array(out, float)
+
+
+def convergence(
+    model: ArrayModel, seed, samples, motions, options, count=5, threads=1
+) -> pd.DataFrame:
+    """Iterations of ML-BCD and of Gauss-Newton to 1.01 times the bound, for each motion.
+
+    A row for each of ``count`` realisations. ``contraction`` is what the information predicts for
+    ML-BCD, ``observed`` what its steps show; iterations beyond the limits are NaN.
+    """
+
+    def job(which):
+        number, repeat = which
+        rng = stream(seed, "bound", "convergence", number, repeat)
+        return _convergence_row(model, rng, samples, motions[number], options)
+
+    jobs = [(number, repeat) for number in range(len(motions)) for repeat in range(count)]
+    return pd.DataFrame(run_batches(job, jobs, threads, True, "convergence"))
+
+
+class Paths(NamedTuple):
+    """Paths of ML-BCD and Gauss-Newton to the same optimum from the nominal positions.
+
+    Without marks and iterations where there is no optimum that is found.
+    """
+
+    bound: float  # m, rms
+    marks: np.ndarray  # iterations of ML-BCD
+    away: np.ndarray  # m, rms distance from the optimum there
+    bcd: float  # iterations to 1.01 times the bound, NaN if never
+    newton: float
+
+    @property
+    def observed(self) -> float:
+        """The factor by which ML-BCD's last steps shrink its error."""
+        if not self.away.size:
+            return np.nan
+        # not so far that rounding is what is left
+        floor = max(1e-3 * self.bound, 10 * self.away.min())
+        late = np.flatnonzero((self.away < 0.3 * self.away[0]) & (self.away > floor))
+        if len(late) < 2:
+            return np.nan
+        first, last = late[len(late) // 2], late[-1]
+        apart = max(self.marks[last] - self.marks[first], 1)
+        return float((self.away[last] / self.away[first]) ** (1 / apart))
+
+
+def paths(model: ArrayModel, force, rate, saturated, limit: int = BCD_LIMIT) -> Paths:
+    """Both methods on the same measurements (T, A, 3) and (T, G, 3)."""
+    data = Collapsed.of(model, force, rate, saturated)
+    best = fisher_scoring(data, model.array.relative)
+    bound = np.sqrt(np.trace(best.covariance) / len(best.covariance))
+    if not best.converged:  # data that determine too little: there is no way to go
+        return Paths(bound, np.empty(0, int), np.empty(0), np.nan, np.nan)
+    enough = bound * np.sqrt(NEAR**2 - 1)  # distance from the optimum, errors adding in squares
+    marks = np.unique(np.geomspace(1, limit, 1000).astype(int))
+    slow = calibrate_bcd(
+        model, force, rate, saturated=saturated, tolerance=0.0, limit=limit, marks=marks
+    )
+    away = np.sqrt(np.mean((slow.snapshots - best.positions)[:, 1:] ** 2, axis=(1, 2)))
+    near = np.flatnonzero(away <= enough)
+    newton = np.nan
+    for iteration in range(1, SCORING_LIMIT + 1):
+        tried = fisher_scoring(data, model.array.relative, limit=iteration, covariance=False)
+        if np.sqrt(np.mean((tried.positions - best.positions)[1:] ** 2)) <= enough:
+            newton = iteration
+            break
+    return Paths(bound, marks, away, marks[near[0]] if len(near) else np.nan, newton)
+
+
+def _convergence_row(model, rng, samples, motion, options):
+    moves, truth, force, rate, saturated = _draw(model, rng, samples, motion, options)
+    made = paths(model, force, rate, saturated, options["limit"])
+    known = information_at(model, moves, truth, saturated)
+    return {
+        "array": model.array.name,
+        "angular_rate_dps": np.degrees(motion[0]),
+        "angular_acceleration_dps2": np.degrees(motion[1]),
+        "samples": samples,
+        "bound_m": made.bound,
+        "bcd_iterations": made.bcd,
+        "newton_iterations": made.newton,
+        "contraction": contraction(known, block_information(model, moves)),
+        "limit": options["limit"],
+        "observed": made.observed,
+    }
+
+
+def against_size(model: ArrayModel, seed, samples, motion, factors, count=20) -> pd.DataFrame:
+    """The bound for arrays of the same shape, ``factors`` times as large; a row for each."""
+    rows = []
+    for factor in factors:
+        array = model.array
+        scaled = Array(factor * array.positions, array.labels, array.gyroscopes, array.name)
+        larger = ArrayModel(scaled, model.noise)
+        widths = []
+        for repeat in range(count):
+            rng = stream(seed, "bound", "size", repeat)
+            moves = sphere_motion(rng, (samples,), *motion)
+            widths.append(rms_width(information_at(larger, moves, scaled.relative)))
+        extent = float(np.linalg.norm(np.ptp(scaled.relative, axis=0)))
+        bound = float(np.sqrt(np.mean(np.square(widths))))
+        rows.append(
+            {"factor": factor, "extent_m": extent, "bound_m": bound, "relative": bound / extent}
+        )
+    return pd.DataFrame(rows)
+
+
+def ranks(cases) -> pd.DataFrame:
+    """Rank and conditioning of the information; ``cases`` of (name, model, motion)."""
+    rows = []
+    for name, model, motion in cases:
+        known = information_at(model, motion, model.array.relative)
+        # a coordinate of which nothing is known must not be scaled up to something
+        scale = np.sqrt(np.maximum(np.diag(known), RANK * np.diag(known).max()))
+        values = scaled_eigh(known, scale).values
+        seen = values > RANK * values[-1]
+        rows.append(
+            {"case": name, "samples": len(motion.angular_rate), "unknowns": len(known),
+             "rank": int(seen.sum()), "condition": float(values[-1] / values[seen][0])}
+        )  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def geometries(model: ArrayModel) -> dict[str, ArrayModel]:
+    """Other arrays with the noise of ``model``: fewer triads, all in one plane, half the size."""
+    array, arrays = model.array, {}
+    for count in (3, 4, 8):
+        if count < array.accelerometers:
+            name = f"{count} triads"
+            arrays[name] = replace(sub_array(array, count), name=name)
+    for name, factor in (("all triads in one plane", [1.0, 1.0, 0.0]), ("half the size", 0.5)):
+        arrays[name] = Array(array.positions * factor, array.labels, array.gyroscopes, name)
+    noise = model.noise.accelerometer[0, 0] ** 0.5, model.noise.gyroscope[0, 0] ** 0.5
+    return {name: ArrayModel.isotropic(other, *noise) for name, other in arrays.items()}
+
+
+def rank_cases(model: ArrayModel, seed, sphere, normal) -> list[tuple]:
+    """(name, model, motion) of what may and may not determine the positions.
+
+    ``sphere``: magnitudes as in paper 2017; ``normal``: sds as in paper 2021.
+    """
+    rng = stream(seed, "bound", "ranks")
+    many = normal_motion(rng, (50,), *normal)
+    axis, still = np.array([0.0, 0.6, 0.8]), np.zeros((50, 3))
+    along = {
+        name: getattr(many, name)[:, 2:] * axis for name in ("angular_rate", "angular_acceleration")
+    }
+    cases = [
+        (f"general motion, N = {n}", model, normal_motion(rng, (n,), *normal)) for n in (1, 2, 3, 5)
+    ]
+    cases += [
+        ("the papers' magnitudes", model, sphere_motion(rng, (50,), *sphere)),
+        ("omega_dot = 0", model, many._replace(angular_acceleration=still)),
+        ("omega = 0", model, many._replace(angular_rate=still)),
+        ("turned about one axis", model, many._replace(**along)),
+        ("about one axis, omega_dot free", model,
+         many._replace(angular_rate=along["angular_rate"])),
+    ]  # fmt: skip
+    cases += [(name, other, many) for name, other in geometries(model).items()]
+    return cases
+
+
+def bound_table(model, seed, cases) -> pd.DataFrame:
+    """RMSE bound for each (samples, |omega|, |omega_dot|, |s|) in ``cases`` (SI units)."""
+    rows = []
+    for number, (samples, *sizes) in enumerate(cases):
+        rng = stream(seed, "position bound", number)
+        squares = []  # mean variance over coordinates for each of the motions
+        for _ in range(REPEATS):
+            motion = sphere_motion(rng, (samples,), *sizes)
+            values = np.linalg.eigvalsh(information_at(model, motion, model.array.relative))
+            squares.append(np.mean(1.0 / np.maximum(values, 1e-14 * values[-1])))
+        bound, error = root_mean_square(squares)
+        rows.append(
+            {
+                "samples": samples,
+                "angular_rate_dps": np.degrees(sizes[0]),
+                "angular_acceleration_dps2": np.degrees(sizes[1]),
+                "bound_m": bound,
+                "bound_se_m": error,
+            }  # fmt: skip
+        )
+    return pd.DataFrame(rows)

@@ -1,0 +1,142 @@
+"""The positions' posterior linearised at the truth, and what the printed determinant does to it.
+
+One Gauss-Newton step from the truth with prior: Gaussian, no chains. Good where the posterior
+is narrow; it is what the claims fall back on where the chains are too short to have converged.
+"""
+
+import numpy as np
+import pandas as pd
+
+from imuarray.geometry import positions_of
+from imuarray.model.structure import design
+from imuarray.motion import Motion
+from imuarray_papers.posterior.likelihood import Likelihood
+from imuarray_papers.studies.checks.identifiability import lever_matrices, motion_jacobian
+
+
+def position_information(positions, motion: Motion, force_sd, rate_information, residual, offset):
+    """Information on theta with the motion eliminated, and the score, by Schur complements.
+
+    ``positions`` (A, 3) m relative to the reference; ``force_sd`` m/s^2 and the gyroscopes'
+    ``rate_information`` on omega (s^2/rad^2); ``residual`` (T, A, 3) m/s^2 measured minus
+    predicted and ``offset`` (T, 3) rad/s, gyroscopes' mean minus omega. Returns
+    (3 (A - 1), 3 (A - 1)) and (3 (A - 1),).
+    """
+    rates = np.asarray(motion.angular_rate)
+    samples, count = len(rates), len(positions)
+    levers = lever_matrices(motion)
+    force = motion_jacobian(positions, rates)
+    weight = force_sd**-2.0
+    own = weight * np.swapaxes(force, 1, 2) @ force
+    own[:, :3, :3] += rate_information * np.eye(3)
+    split = force.reshape(samples, count, 3, 9)[:, 1:]
+    cross = weight * np.einsum("tci,tkcx->tkix", levers, split).reshape(samples, -1, 9)
+    gain = np.linalg.solve(own, np.swapaxes(cross, 1, 2))
+    shared = weight * np.einsum("tci,tcj->ij", levers, levers)
+    information = np.kron(np.eye(count - 1), shared) - np.einsum("tpx,txq->pq", cross, gain)
+    pull = weight * np.einsum("tnx,tn->tx", force, residual.reshape(samples, -1))
+    pull[:, :3] += rate_information * offset
+    direct = weight * np.einsum("tci,tkc->ki", levers, residual[:, 1:]).ravel()
+    return information, direct - np.einsum("txp,tx->p", gain, pull)
+
+
+def linearise(recording, truth, model, accelerometer_sd, gyroscopes: int):
+    """Mean error (3 (A - 1),) m and covariance of the posterior linearised at the truth.
+
+    ``accelerometer_sd`` is what the analysis assumes, ``gyroscopes`` the number whose average
+    p(omega | y_g) stands for: (30b) is the covariance of one.
+    """
+    motion = Motion.of(*(truth[name].to_numpy() for name in Motion._fields[:3]))
+    positions = truth["position"].to_numpy()
+    noise = accelerometer_sd, gyroscopes / model.noise.gyroscope[0, 0]
+    residual = recording.specific_force - model.predict_many(motion, positions).specific_force
+    offset = recording.angular_rate.mean(axis=1) - motion.angular_rate
+    information, score = position_information(positions, motion, *noise, residual, offset)
+    weight = recording.position_prior_sd**-2.0
+    pull = weight * (recording.relative_positions() - positions)[1:].ravel()
+    covariance = np.linalg.inv(information + weight * np.eye(len(information)))
+    return covariance @ (score + pull), covariance
+
+
+def coordinates(recording, truth, model, accelerometer_sd, gyroscopes, name) -> pd.DataFrame:
+    """Per coordinate: truth, mean and sd (m) of the linearised posterior called ``name``."""
+    error, covariance = linearise(recording, truth, model, accelerometer_sd, gyroscopes)
+    labels = recording.accelerometer_labels[1:]
+    table = pd.DataFrame([(name, label, axis) for label in labels for axis in "xyz"],
+                         columns=["name", "accelerometer", "axis"])  # fmt: skip
+    table["truth_m"] = truth["position"].to_numpy()[1:].ravel()
+    table["mean_m"], table["sd_m"] = table.truth_m + error, np.sqrt(np.diag(covariance))
+    return table
+
+
+def log_gram_gradient(theta, precision) -> np.ndarray:
+    """Derivative of log |H' Lambda H| in theta (3 (A - 1),)."""
+    positions = positions_of(theta)
+    H = design(positions)[:, 6:]
+    back = precision @ H @ np.linalg.inv(H.T @ precision @ H)  # (3A, 6)
+    slopes = design(np.eye(3))[:, 6:].reshape(3, 3, 6) - design(np.zeros((1, 3)))[:, 6:]
+    return 2 * np.einsum("icx,kcx->ki", slopes, back.reshape(-1, 3, 6))[1:].ravel()
+
+
+def log_gram_hessian(theta, precision, step=1e-6) -> np.ndarray:
+    """Second derivative of log |H' Lambda H|, by central differences of the gradient."""
+    rows = []
+    for i in range(theta.size):
+        shift = np.zeros(theta.size)
+        shift[i] = step
+        up, down = (log_gram_gradient(theta + s * shift, precision) for s in (1, -1))
+        rows.append((up - down) / (2 * step))
+    return 0.5 * (np.array(rows) + np.array(rows).T)
+
+
+def determinant_effect(covariance, theta, samples: int, precision) -> dict:
+    """Change of a posterior when |H' Lambda H| stands without its root, as (25) prints it."""
+    information = np.linalg.inv(covariance)
+    gradient = -0.5 * samples * log_gram_gradient(theta, precision)
+    changed = information + 0.5 * samples * log_gram_hessian(theta, precision)
+    proper = bool(np.linalg.eigvalsh(changed)[0] > 0)
+    shift = np.linalg.solve(changed, gradient)
+    sd = np.sqrt(np.diag(covariance))
+    widths = np.sqrt(np.abs(np.diag(np.linalg.inv(changed)))) / sd
+    along = gradient / np.sqrt(gradient @ covariance @ gradient)
+    return {
+        "shift_max_sd": float(np.abs(shift / sd).max()),
+        "shift_rms_sd": float(np.sqrt(np.mean((shift / sd) ** 2))),
+        "shift_along_sd": float(along @ shift),
+        "width_ratio_min": float(widths.min()), "width_ratio_max": float(widths.max()),
+        "proper": proper,
+    }  # fmt: skip
+
+
+def determinant_by_sampling(recording, truth, model, rng, count=4000, draws=64) -> dict:
+    """The determinant's effect by importance sampling of the exact posterior, for a small array."""
+    gyroscopes, sd = model.array.gyroscopes, np.sqrt(model.noise.accelerometer[0, 0])
+    error, covariance = linearise(recording, truth, model, sd, gyroscopes)
+    positions = truth["position"].to_numpy()
+    centre, factor = positions[1:].ravel() + error, 1.3 * np.linalg.cholesky(covariance)
+    prior = recording.relative_positions()[1:].ravel()
+    normals = rng.standard_normal((count, centre.size))
+    thetas = centre + normals @ factor.T
+    likelihoods = [Likelihood.of(model, recording.specific_force, recording.angular_rate,
+                                 determinant=name) for name in ("derived", "printed")]  # fmt: skip
+    logs = np.empty((2, count))
+    seeds = rng.integers(0, 2**63, count)
+    for row, likelihood in enumerate(likelihoods):
+        for i, theta in enumerate(thetas):
+            places = positions_of(theta)
+            # the same draws for both, so that only the determinant differs
+            logs[row, i] = likelihood.estimate(places, draws, np.random.default_rng(seeds[i]))
+    logs += 0.5 * np.sum(normals**2, axis=1)
+    logs -= 0.5 * np.sum((thetas - prior) ** 2, axis=1) / recording.position_prior_sd**2
+    weights = np.exp(logs - logs.max(axis=1, keepdims=True))
+    weights /= weights.sum(axis=1, keepdims=True)
+    means = weights @ thetas
+    sds = np.sqrt(weights @ thetas**2 - means**2)
+    shift = (means[1] - means[0]) / sds[0]
+    return {
+        "shift_max_sd": float(np.abs(shift).max()),
+        "shift_rms_sd": float(np.sqrt(np.mean(shift**2))),
+        "width_ratio_min": float((sds[1] / sds[0]).min()),
+        "width_ratio_max": float((sds[1] / sds[0]).max()),
+        "effective": float(1 / np.sum(weights[0] ** 2)), "draws": count,
+    }  # fmt: skip

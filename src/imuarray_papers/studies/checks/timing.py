@@ -1,0 +1,97 @@
+"""Processor time, and what a noisy estimate costs in acceptance.
+
+Times are by the clock: not reproducible to the byte, for rough comparisons only.
+"""
+
+import time
+from functools import partial
+
+import numpy as np
+import pandas as pd
+
+from imuarray.geometry import positions_of
+from imuarray.motion import sphere_motion
+from imuarray.simulation.recordings import measure
+from imuarray_papers.estimation.bcd import calibrate_bcd
+
+
+def _fastest(function, repeats: int) -> tuple[float, float]:
+    """Shortest of ``repeats`` runs after one to warm up, and their sd, in seconds.
+
+    The thread's own time, so that a busy machine matters less.
+    """
+    function()
+    spans = []
+    for _ in range(repeats):
+        start = time.thread_time()
+        function()
+        spans.append(time.thread_time() - start)
+    return min(spans), float(np.std(spans, ddof=1))
+
+
+def _row(what, samples, seconds, spread, count) -> dict:
+    return {
+        "what": what, "samples": samples, "seconds": seconds / count, "spread_s": spread / count,
+    }  # fmt: skip
+
+
+def iteration_costs(rng, model, motion_sizes, samples, iterations=10, repeats=7) -> pd.DataFrame:
+    """Seconds an iteration of Algorithm 1 (2017) takes, over N."""
+    rows = []
+    for number in samples:
+        motion = sphere_motion(rng, (number,), *motion_sizes)
+        force, rate, _ = measure(model, motion, model.array.relative, rng)
+
+        def run(limit, force=force, rate=rate):
+            calibrate_bcd(model, force, rate, tolerance=0.0, limit=limit)
+
+        # the difference leaves out arranging the data, which is done once
+        long, short = (
+            _fastest(partial(run, limit), repeats) for limit in (2 * iterations, iterations)
+        )
+        rows.append(_row("iteration", number, long[0] - short[0], long[1] + short[1], iterations))
+    return pd.DataFrame(rows)
+
+
+def transition_costs(targets, thetas, step, rng, count=50, repeats=3) -> pd.DataFrame:
+    """Seconds a transition of Algorithm 1 (2021) takes for each T: target in ``targets``."""
+    rows = []
+    for samples, target in targets.items():
+        theta = np.array(thetas[samples])
+        value = target.log_target(theta, rng)
+
+        def run(target=target, theta=theta, value=value):
+            target.transitions(theta.copy(), value, step, count, rng)
+
+        rows.append(_row("transition", samples, *_fastest(run, repeats), count))
+    return pd.DataFrame(rows)
+
+
+def acceptance_against_variance(targets, theta, step, count, rng) -> list[dict]:
+    """Acceptance at one step length for each target, with its variance of log p-hat at ``theta``.
+
+    ``targets`` maps a label to a `CompiledTarget`. The error allows for accepted proposals
+    coming in clusters: it is taken from 20 blocks of the run.
+    """
+    rows, blocks = [], 20
+    for label, target in targets.items():
+        state = np.array(theta)
+        positions = positions_of(state)
+        logs = target.likelihood.realisations(positions, target.draws, 200, rng)
+        value = target.log_target(state, rng)
+        _, value = target.transitions(state, value, step, count // 2, rng)
+        shares = np.empty(blocks)
+        for block in range(blocks):
+            accepted, value = target.transitions(state, value, step, count // blocks, rng)
+            shares[block] = accepted / (count // blocks)
+        rows.append(
+            {
+                "target": label,
+                "draws": target.draws,
+                "log_variance": logs.var(ddof=1),
+                "acceptance": shares.mean(),
+                "transitions": blocks * (count // blocks),
+                "acceptance_se": shares.std(ddof=1) / np.sqrt(blocks),
+            }  # fmt: skip
+        )
+    return rows

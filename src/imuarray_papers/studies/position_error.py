@@ -1,0 +1,165 @@
+"""RMSE of the calibrated positions, and its settings: paper 2017, figures 4 and 5."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from imuarray.estimation.collapsed import Collapsed
+from imuarray.model import ArrayModel
+from imuarray.streams import stream
+from imuarray_papers.estimation.bcd import block_descent
+from imuarray_papers.studies.truths import (
+    batches,
+    realisations,
+    root_mean_square,
+    run_batches,
+    share,
+)
+
+
+def calibrate_batch(model, rng, count, case, options):
+    """ML-BCD on ``count`` realisations of a `Case`; ``options`` as for `realise`.
+
+    Returns mean squared position errors (count, marks) in m^2, iterations (count,) and the
+    kernel's status (count,): 1 converged, 0 limit, negative not identifiable (NaN errors).
+    """
+    given = options["position_sd"], options["rail"]
+    made = realisations(model, rng, count, case.samples, case.motion, *given)
+    marks = np.asarray(options["marks"], np.int64)
+    squares = np.full((count, len(marks)), np.nan)
+    iterations, status = np.zeros(count, int), np.zeros(count, int)
+    for i in range(count):
+        data = Collapsed.of(model, made.force[i], made.rate[i], made.saturated[i])
+        positions = model.array.relative.copy()
+        status[i], cost, _, snapshots = block_descent(
+            data.arrays, positions, options["tolerance"], 0.0, max(options["marks"]), marks
+        )
+        iterations[i] = len(cost)
+        if status[i] >= 0:
+            squares[i] = np.mean((snapshots - made.truth[i])[:, 1:] ** 2, axis=(1, 2))
+    return squares, iterations, status
+
+
+class Case(NamedTuple):
+    """A setting whose RMSE is wanted: a point of figure 4 or 5."""
+
+    names: tuple  # of its random stream
+    samples: int
+    motion: tuple[float, float, float]  # |omega| rad/s, |omega_dot| rad/s^2, |s| m/s^2
+
+
+class Errors(NamedTuple):
+    """Realisations (R) of some cases (C), with errors after M numbers of iterations."""
+
+    squares: np.ndarray  # (C, R, M) mean squared position errors, m^2, NaN: not identifiable
+    iterations: np.ndarray  # (C, R)
+    status: np.ndarray  # (C, R), the kernel's: 1 converged, 0 limit, negative not identifiable
+
+
+def realise(
+    model: ArrayModel, seed, cases, options, threads=1, quiet=True, part=0, parts=1
+) -> Errors:
+    """One of ``parts`` shares of all cases' realisations; a realisation does not depend on them.
+
+    ``options``: realisations, marks (iterations), position_sd (m), rail (rad/s), tolerance (m).
+    """
+
+    def of(case):
+        def job(batch):
+            number, size = batch
+            return calibrate_batch(model, stream(seed, *case.names, number), size, case, options)
+
+        mine = share(batches(options["realisations"]), part, parts)
+        label = "/".join(map(str, case.names))
+        made = run_batches(job, mine, threads, quiet, label)
+        empty = [(np.empty((0, len(options["marks"]))), np.empty(0, int), np.empty(0, int))]
+        return [np.concatenate(one) for one in zip(*(made or empty), strict=True)]
+
+    return Errors(*map(np.stack, zip(*map(of, cases), strict=True)))
+
+
+def joined(shares) -> Errors:
+    """All shares of `realise` in their order."""
+    return Errors(*(np.concatenate(one, axis=1) for one in zip(*shares, strict=True)))
+
+
+def _table(cases, errors: Errors, marks) -> pd.DataFrame:
+    """A row for each case and number of iterations."""
+    rows = []
+    for case, squares, iterations, status in zip(cases, *errors, strict=True):
+        good = status >= 0
+        for column, mark in enumerate(marks):
+            rmse, error = root_mean_square(squares[good, column])
+            rows.append({
+                "angular_rate_dps": np.degrees(case.motion[0]),
+                "angular_acceleration_dps2": np.degrees(case.motion[1]),
+                "specific_force_mps2": case.motion[2], "samples": case.samples,
+                "iterations": mark, "rmse_m": rmse, "rmse_se_m": error,
+                "realisations": int(good.sum()), "not_identifiable": int((~good).sum()),
+                "converged_share": float(np.mean(status == 1)),
+                "median_iterations": float(np.median(iterations[good])),
+            })  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def against_samples(cases, errors: Errors, marks) -> pd.DataFrame:
+    """Figure 4: RMSE over N and iterations; one row for each pair."""
+    return _table(cases, errors, marks).loc[:, "samples":]
+
+
+def against_motion(cases, errors: Errors, marks) -> pd.DataFrame:
+    """Figure 5: RMSE for each case's |omega|, |omega_dot| and |s|."""
+    last = Errors(errors.squares[..., -1:], errors.iterations, errors.status)
+    return _table(cases, last, marks[-1:]).drop(columns=["not_identifiable", "median_iterations"])
+
+
+FORCES = (0.0, 1.0, 10.0, 100.0)  # m/s^2; section IV: |s| does not matter
+TABLES = {
+    "samples": against_samples,
+    "motion": against_motion,
+    "force": against_motion,
+}
+
+
+def magnitudes(paper: dict) -> tuple[float, float, float]:
+    """|omega| rad/s, |omega_dot| rad/s^2, |s| m/s^2 of figure 4."""
+    rate = np.radians(paper["angular_rate_dps"])
+    return rate, np.radians(paper["angular_acceleration_dps2"]), paper["specific_force"]
+
+
+def study(settings: dict, name: str) -> tuple[list[Case], dict]:
+    """Cases and options of the study: samples, motion or force.
+
+    Figure 4, figure 5, and figure 5's remark that the specific force does not matter.
+    """
+    paper = settings["paper2017"]
+    own = magnitudes(paper)
+    if name == "samples":
+        cases = [Case(("position", name, n), n, own) for n in paper["fig4_samples"]]
+        return cases, _options(settings, paper["fig4_iterations"])
+    if name == "motion":
+        marks = [paper["fig5_iterations"]]
+        motions = [
+            (np.radians(rate), np.radians(acceleration), own[2])
+            for acceleration in paper["fig5_accelerations_dps2"]
+            for rate in paper["fig5_rates_dps"]
+        ]
+    else:
+        marks, motions = [max(paper["fig4_iterations"])], [(*own[:2], force) for force in FORCES]
+    cases = [
+        Case(("position", name, number), paper["fig5_samples"], motion)
+        for number, motion in enumerate(motions)
+    ]
+    return cases, _options(settings, marks)
+
+
+def _options(settings: dict, marks) -> dict:
+    paper = settings["paper2017"]
+    return {
+        "realisations": settings["scale"]["realisations"],
+        "marks": sorted(marks),
+        "position_sd": paper["position_sd"],
+        "rail": np.radians(paper["gyroscope_range_dps"]),
+        "tolerance": paper["tolerance"],
+    }

@@ -1,0 +1,305 @@
+"""Simulation-based calibration: is the truth where the posterior says, as often as it says?
+
+Positions are drawn from their prior and motion from its own, measurements from both; a sampler
+that is right puts the truth at a uniform quantile of its posterior, its PIT value. `imuarray
+sample` with nothing asked of it (`pit_values_by_default`) is handed the recording alone: it knows
+neither the noise nor the size of the motion.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from imuarray.geometry import positions_of
+from imuarray.motion import normal_motion
+from imuarray.posterior.chains import chains_of
+from imuarray.posterior.diagnostics import ess
+from imuarray.recording import Recording
+from imuarray.simulation.recordings import simulate_samples
+from imuarray.streams import stream
+from imuarray_papers.posterior import tuning
+from imuarray_papers.posterior.target import CompiledTarget
+from imuarray_papers.studies.truths import SPARE, Replicate, Setting, misfit, replicate, run_batches
+
+DRAWS = 199  # kept of each posterior, nearly independent
+APART = 2.0  # posterior sds by which chains start off the mode
+WARMUP, SPACING = 200, 4  # NUTS: transitions of warm-up, transitions between kept draws
+PILOT, PILOT_ESS = 20000, 200  # transitions of PmMH at a time, until so many are effective
+BLOCKS = (1, 2, 5, 10, 20, 50, 100, 200, 500)  # of them, after which that is looked at
+ROUNDS, LEARNT = 6, 100  # of a burn-in, draws in each
+FIRST = 100  # transitions between them at least
+TINY = 1e-12
+Found = tuple[np.ndarray, np.ndarray]  # PIT values (R, P + 2), how many draws are independent (R,)
+WIDER = 1.05  # than the mode's curvature, for preconditioned Crank-Nicolson proposals
+SHORTER = 4.0  # every other stretch of transitions of preconditioned Crank-Nicolson proposals
+ML_MORE = 25  # times as many truths as for samplers, as they cost so little
+METHOD = "sample"  # the command's name in tables
+RATE = 1e9  # samples a second: instants tell the model nothing
+BEYOND = 1e6  # m/s^2, rad/s: a rail that nothing reaches
+
+
+def names_of(setting: Setting) -> list[str]:
+    """The quantities that have PIT values: coordinates, then what hangs on all of them."""
+    labels = setting.model.array.labels[1:]
+    return [f"{label}_{axis}" for label in labels for axis in "xyz"] + ["size", "misfit"]
+
+
+def _size(setting: Setting, thetas) -> np.ndarray:
+    """The array's size along its nominal shape, (...)."""
+    nominal = setting.prior.mean
+    return np.asarray(thetas) @ nominal / np.linalg.norm(nominal)
+
+
+def of_draws(setting: Setting, made, draws, name: str) -> np.ndarray:
+    """PIT values (R, P + 2) of the truths among draws (R, L, P), uniform between two draws."""
+    out = []
+    for one, thetas in zip(made, draws, strict=True):
+        both = np.vstack([one.truth, thetas])
+        misfits = [misfit(one.likelihood, theta) for theta in both]
+        values = np.column_stack([both, _size(setting, both), misfits])
+        rank = np.sum(values[1:] < values[0], axis=0)
+        rng = stream(setting.seed, "calibrated", name, setting.name, setting.samples, one.number)
+        out.append((rank + rng.random(rank.size)) / (len(thetas) + 1))
+    return np.array(out)
+
+
+def independent(draws) -> np.ndarray:
+    """Effective size of the kept draws (R, L, P), of the worst parameter: (R,)."""
+    return np.array([ess(one[None]).min() for one in draws])
+
+
+def ml(setting: Setting, made, threads: int = 1) -> Found:
+    """Under a normal density around the ML estimate; NaN of the misfit, and where there is none."""
+    size = setting.prior.mean / np.linalg.norm(setting.prior.mean)
+    out = []
+    for one in made:
+        away, sd = one.truth - one.ml, np.sqrt(np.diag(one.ml_covariance))
+        along = size @ away / np.sqrt(size @ one.ml_covariance @ size)
+        # 0 and 1 themselves have no normal score
+        found = [*np.clip(stats.norm.cdf([*away / sd, along]), TINY, 1 - TINY), np.nan]
+        out.append(found if one.ml_converged else [np.nan] * len(found))
+    return np.array(out), np.full(len(out), np.nan)
+
+
+def _start(setting: Setting, one: Replicate, name: str) -> np.ndarray:
+    where = setting.name, setting.samples, one.number
+    rng = stream(setting.seed, "calibrated", name, "start", *where)
+    return rng.multivariate_normal(one.mode, APART**2 * one.covariance)
+
+
+def nuts(setting: Setting, made, threads: int = 1) -> Found:
+    """By NUTS on the exact marginal likelihood."""
+    from imuarray.posterior.marginal import log_posterior
+    from imuarray.posterior.nuts import run_nuts
+
+    prior, name = setting.prior, "nuts"
+    where = setting.seed, "calibrated", name, setting.name, setting.samples
+
+    def chain(one):
+        found = one.likelihood.marginal(positions_of(one.mode), count)
+        start = _start(setting, one, name)[None]
+        return run_nuts(
+            log_posterior, one.mode, one.covariance, start, WARMUP, DRAWS * SPACING, setting.seed,
+            (*where[1:], one.number), WARMUP + DRAWS * SPACING, True,
+            (found.data, found.nodes, found.log_weights, None, prior.mean, prior.sd), 1,
+        ).draws[0]  # fmt: skip
+
+    pilot = replicate(setting, SPARE)
+    first = pilot.likelihood.marginal(positions_of(pilot.mode))
+    count = round(len(first.nodes) ** (1 / 3))
+    draws = np.array(run_batches(chain, made, threads, True, name))
+    kept = draws[:, SPACING - 1 :: SPACING]
+    return of_draws(setting, made, kept, name), independent(kept)
+
+
+def _walk(setting: Setting, pilot: Replicate, rng):
+    """The paper's: (target of a replicate, step), N and sigma_q chosen as in section III-C.
+
+    But N at the mode: here the prior's mean is as far off as the prior says, not a thirtieth of it.
+    """
+    steps = np.sqrt(np.diag(pilot.covariance)).mean() * np.geomspace(1e-3, 3.0, 12)
+    found = tuning.tune(
+        pilot.likelihood, setting.prior, positions_of(pilot.mode), lambda _: pilot.mode,
+        tuning.Sweeps(steps), lambda _: rng, may_centre=False,
+    )  # fmt: skip
+
+    def target(one):
+        return CompiledTarget(one.likelihood, setting.prior, found.target.draws)
+
+    return target, (found.step,)
+
+
+def _preconditioned(setting: Setting, pilot: Replicate, rng):
+    """The likelihood with proposals of the posterior's shape.
+
+    Omega is drawn as the paper has it: draws around the integrand's mode at one theta are too
+    narrow for others as far off as these posteriors are wide, and chains stick.
+    """
+
+    def shape(one):
+        return one.mode, WIDER * np.linalg.cholesky(one.covariance)
+
+    lengths = np.geomspace(0.05, 0.99, 10)
+    tuned, best = tuning.tune_preconditioned(
+        pilot.likelihood, setting.prior, *shape(pilot), lengths, rng
+    )
+
+    def target(one):
+        return CompiledTarget(one.likelihood, setting.prior, tuned.draws, *shape(one))
+
+    # the tails are not the normal density's: where long steps are refused, short ones are not
+    return target, (best, best / SHORTER)
+
+
+def _pmmh(kernel: Callable, name: str):
+    """PIT values by PmMH; step and thinning from a pilot data set of its own."""
+
+    def pit_values(setting: Setting, made, threads: int = 1) -> Found:
+        rng = stream(setting.seed, "calibrated", name, "pilot", setting.name, setting.samples)
+        pilot = replicate(setting, SPARE)
+        make, lengths = kernel(setting, pilot, rng)
+        theta = pilot.mode.copy()
+        target, _ = _learnt(make(pilot), theta, lengths, FIRST, rng)
+        thin = _thinning(target, theta, lengths, rng)
+
+        def chain(one):
+            where = setting.name, setting.samples, one.number
+            own = stream(setting.seed, "calibrated", name, "chain", *where)
+            theta = _start(setting, one, name)
+            target, value = _learnt(make(one), theta, lengths, max(FIRST, thin // 4), own)
+            return _kept(DRAWS, target, theta, value, lengths, thin, own)[0]
+
+        draws = run_batches(chain, made, threads, True, name)
+        return of_draws(setting, made, draws, name), independent(draws)
+
+    return pit_values
+
+
+def _learnt(target, theta, lengths, spacing: int, rng):
+    """(target, log target) after a burn-in that moves ``theta`` in place.
+
+    Preconditioned Crank-Nicolson proposals learn centre and shape in it, and keep them from then
+    on: where data determine little the posterior's mass is some sds from its mode.
+    """
+    value = target.log_target(theta, rng)
+    for _ in range(ROUNDS):
+        kept, value = _kept(LEARNT, target, theta, value, lengths, spacing, rng)
+        if target.centre is not None:
+            target = _reshaped(target, kept[LEARNT // 4 :])
+    return target, value
+
+
+def _reshaped(target: CompiledTarget, kept) -> CompiledTarget:
+    """Around what was seen; the shape's prior weighs as much as a draw for each coordinate."""
+    centre, (count, size) = kept.mean(axis=0), kept.shape
+    seen, before = np.cov(kept.T), target.factor @ target.factor.T / WIDER**2
+    factor = WIDER * np.linalg.cholesky((count * seen + size * before) / (count + size))
+    return replace(target, centre=centre, factor=factor)
+
+
+def _kept(number, target, theta, value, lengths, count, rng):
+    """``number`` draws, and log target at the last: ``theta`` is moved in place.
+
+    At least ``count`` transitions for each draw, steps of each length by turns.
+    """
+    kept = np.empty((number, theta.size))
+    for row in kept:
+        for length in lengths:
+            _, value = target.transitions(theta, value, length, -(-count // len(lengths)), rng)
+        row[:] = theta
+    return kept, value
+
+
+def _thinning(target, start, lengths, rng) -> int:
+    """Transitions after which a chain has nearly forgotten, for the slowest parameter."""
+    theta = start.copy()
+    value = target.log_target(theta, rng)
+    blocks, effective = [], 0.0
+    while effective < PILOT_ESS and len(blocks) < BLOCKS[-1]:
+        kept, value = _kept(PILOT // 20, target, theta, value, lengths, 20, rng)
+        blocks.append(kept)
+        if len(blocks) in BLOCKS:
+            effective = ess(np.concatenate(blocks)[None]).min()
+    return max(1, int(np.ceil(2 * PILOT * len(blocks) / effective)))
+
+
+METHODS: dict[str, Callable] = {
+    "ML": ml,
+    "PmMH": _pmmh(_walk, "walk"),
+    "PmMH, pCN": _pmmh(_preconditioned, "autoregressive"),  # the random stream's name
+    "NUTS": nuts,
+}
+
+
+def pit_values(
+    setting: Setting, replicates, threads: int = 1, methods=tuple(METHODS)
+) -> pd.DataFrame:
+    """A row for each method, replicate and quantity; ``pit`` is uniform if all is right.
+
+    ``replicates``: their numbers; what one gives does not depend on the others.
+    """
+    made = run_batches(
+        lambda number: replicate(setting, number), replicates, threads, True, "replicates"
+    )
+    names, numbers, frames = np.array(names_of(setting)), np.array(replicates), []
+    for method in methods:
+        found, independent = METHODS[method](setting, made, threads)
+        rows, columns = np.indices(found.shape)
+        frames.append(
+            pd.DataFrame(
+                {"setting": setting.name, "method": method, "samples": setting.samples,
+                 "replicate": numbers[rows.ravel()], "quantity": names[columns.ravel()],
+                 "pit": found.ravel(), "independent": independent[rows.ravel()]}
+            )
+        )  # fmt: skip
+    return pd.concat(frames, ignore_index=True)
+
+
+def drawn(setting: Setting, number: int) -> tuple[np.ndarray, Recording]:
+    """Truth (P,) ``number``: positions and effects from their priors; what was measured of it."""
+    rng = stream(setting.seed, "calibrated", METHOD, setting.name, setting.samples, number)
+    model, prior = setting.model, setting.prior
+    positions = prior.mean + prior.sd * rng.standard_normal(prior.mean.size)
+    effects = model.effect_prior_sd * rng.standard_normal(model.effect_size)
+    motion = normal_motion(rng, (setting.samples,), *setting.motion_sd)
+    time = np.arange(setting.samples) / RATE
+    recording, _ = simulate_samples(
+        model, motion, positions_of(positions), model.array.positions, rng, time, effects,
+        BEYOND, BEYOND, setting.prior_sd,
+    )  # fmt: skip
+    recording = replace(recording, gyroscope_labels=model.array.labels)
+    return np.concatenate([positions, effects]), recording
+
+
+def pit_values_by_default(
+    setting: Setting, replicates: Sequence[int], sample: Callable, threads: int = 1
+) -> pd.DataFrame:
+    """`pit_values` of the command as it is; ``sample`` is `imuarray.sample`.
+
+    Coordinates, the effects' parameters, and the array's size along its nominal shape.
+    """
+    size = setting.prior.mean / np.linalg.norm(setting.prior.mean)
+    names = [f"{label}_{axis}" for label in setting.model.array.labels[1:] for axis in "xyz"]
+    names += [f"effect_{place}" for place in range(setting.model.effect_size)]
+
+    def one(number: int) -> pd.DataFrame:
+        truth, recording = drawn(setting, number)
+        tree = sample(recording, seed=number, effects=setting.model.effects)
+        draws = chains_of(tree).draws[..., : len(names)]
+        both = np.vstack([truth, draws.reshape(-1, len(names))])
+        both = np.column_stack([both, both[:, : size.size] @ size])
+        rank = np.sum(both[1:] < both[0], axis=0)
+        where = setting.name, setting.samples, number
+        rng = stream(setting.seed, "calibrated", METHOD, "rank", *where)
+        pit = (rank + rng.random(rank.size)) / len(both)
+        return pd.DataFrame(
+            {"setting": setting.name, "method": METHOD, "samples": setting.samples,
+             "replicate": number, "quantity": [*names, "size"], "pit": pit,
+             "independent": ess(draws).min()}
+        )  # fmt: skip
+
+    frames = run_batches(one, list(replicates), threads, True, METHOD)
+    return pd.concat(frames, ignore_index=True)
