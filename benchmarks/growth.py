@@ -21,8 +21,8 @@ from matplotlib.ticker import FixedLocator, LogLocator, NullFormatter, StrMethod
 from benchmarks.board import GRAVITY, Options, draw_board
 from benchmarks.cost import cost
 from benchmarks.written import publish
+from imuarray.pictures.style import BLACK, GREY, LOOKS, PAGE, new_figure, styled
 from imuarray.provenance import atomic_write
-from imuarray.report.style import BLACK, GREY, LOOKS, PAGE, new_figure, styled
 
 LENGTHS, IMUS = (1, 2, 4), (4, 8, 16)  # times a minute and a half; 4 IMUs grow longer
 DRAWN = 100  # samples that are sampled from, times length: more need another sampler

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from imuarray.pictures.style import BLACK, PAGE, look, new_figure, styled
 from imuarray.provenance import atomic_write
-from imuarray.report.style import BLACK, PAGE, look, new_figure, styled
 
 CONVERGED = 1.05  # R-hat, as paper 2021 has it
 SHORT = {  # how a method's name begins: what the figure calls it

@@ -34,8 +34,8 @@ from imuarray.engine.parameters import POSITION, columns_of
 from imuarray.engine.readings import arrange
 from imuarray.engine.widths import corrected
 from imuarray.errors import InputError
+from imuarray.pictures.board import missing
 from imuarray.report.board import advice, facts, html, noises, turned, verdict, write_board
-from imuarray.report.pictures import missing
 from tests.browser import in_browser, needs_browser
 
 matplotlib.use("agg")

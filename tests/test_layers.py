@@ -17,8 +17,8 @@ LAYERS = {
         ("errors", "caches", "linear", "tails", "walk"), ("compiled",),
         ("streams", "provenance", "geometry"), ("motion",), ("model",),
         ("recording",), ("simulation", "firstorder", "estimation"), ("alignment", "engine"),
-        ("posterior",), ("diagnosis",), ("report",), ("analysis",), ("plots",), ("commands",),
-        ("cli",), ("__main__",),
+        ("posterior",), ("diagnosis",), ("pictures",), ("report", "plots"), ("analysis",),
+        ("commands",), ("cli",), ("__main__",),
     ),
     PAPERS: (
         ("config", "reference", "estimation", "blind"), ("posterior",), ("measured",),

@@ -133,7 +133,7 @@ def test_a_changed_source_reruns_what_rests_on_it(quick, tmp_path):
         (("imuarray_papers/studies/rate_error.py",), {"rate_error", "claims_accelerometers_only",
                                       "figure_2017_fig3", "claims", "quick"}),
         (("imuarray_papers/studies/checks/timing.py",), {"claims_timing", "claims", "quick"}),
-        (("imuarray/report/imuarray.mplstyle",), {*DRAWN, "quick"}),
+        (("imuarray/pictures/imuarray.mplstyle",), {*DRAWN, "quick"}),
     ):  # fmt: skip
         texts = {tmp_path / "src" / name: "" for name in names}
         for path in texts:

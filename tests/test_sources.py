@@ -66,7 +66,7 @@ def test_what_one_stage_needs_is_that_stages_alone(sources, name, scripts):
     assert not any(name.startswith(("figure_2", "table_2", "simulate_")) for name in found)
 
 
-@pytest.mark.parametrize("name", ["report/style.py", "report/imuarray.mplstyle"])
+@pytest.mark.parametrize("name", ["pictures/style.py", "pictures/imuarray.mplstyle"])
 def test_drawings_rest_on_their_style(sources, name):
     drawn = {one for one in [*SCRIPTS, *DRAWN] if one.startswith("figure_")}
     assert len(drawn) > 15 and drawn <= resting_on(sources, name)

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.errors import require_one_of
-from imuarray.report.pictures import (
+from imuarray.pictures.board import (
     board,
     given_or_new,
     length,
@@ -17,7 +17,7 @@ from imuarray.report.pictures import (
     sphere,
     timeline,
 )
-from imuarray.report.style import GREY, look
+from imuarray.pictures.style import GREY, look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -104,6 +104,6 @@ def motion(dataset: xr.Dataset, quantity: str = "angular_rate", axes: Axes | Non
 
 def allan(noise: StillNoise) -> list[Axes]:
     """Allan deviations and spectra of all axes, and the terms found; of `imuarray.allan`."""
-    from imuarray.report.noise_figure import noise_figure
+    from imuarray.pictures.noise import noise_figure
 
     return noise_figure(noise).axes

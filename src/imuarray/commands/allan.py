@@ -4,10 +4,10 @@ import numpy as np
 
 from imuarray.commands.output import Output
 from imuarray.firstorder.noise import StillNoise, allan
+from imuarray.pictures.noise import noise_figure
+from imuarray.pictures.style import saved
 from imuarray.provenance import write_bytes, write_csv
 from imuarray.recording import read_recording
-from imuarray.report.noise_figure import noise_figure
-from imuarray.report.style import saved
 
 SHOWN = {"specific_force": ("accelerometer", 1e3, "mm/s^2"),
          "angular_rate": ("gyroscope", np.degrees(1.0), "deg/s")}  # fmt: skip

@@ -7,8 +7,8 @@ import pandas as pd
 from imuarray.diagnosis.plain import number, power_of_ten
 from imuarray.diagnosis.words import words
 from imuarray.model.effects import KINDS
-from imuarray.report.pictures import plain
-from imuarray.report.style import BLACK, BLUE, GREY, ORANGE, PAGE, VERMILLION, new_figure, styled
+from imuarray.pictures.board import plain
+from imuarray.pictures.style import BLACK, BLUE, GREY, ORANGE, PAGE, VERMILLION, new_figure, styled
 
 MODELS = {
     "base": {"color": VERMILLION, "marker": "o"},

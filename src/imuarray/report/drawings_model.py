@@ -5,8 +5,8 @@ import pandas as pd
 
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.words import words
+from imuarray.pictures.style import BLACK, BLUE, LOOKS, PAGE, VERMILLION, new_figure, shade, styled
 from imuarray.report.drawings import MODELS, NAMES, imu_ticks, legend_above, plain
-from imuarray.report.style import BLACK, BLUE, LOOKS, PAGE, VERMILLION, new_figure, shade, styled
 
 ALIKE = SETTINGS.alike  # squared correlation from which two effects are one class
 DARK = 0.75  # from which numbers are white

@@ -23,9 +23,9 @@ from imuarray.diagnosis.plain import (
 )
 from imuarray.diagnosis.words import part_in_words, split_name, whose, words
 from imuarray.model.effects import KINDS
+from imuarray.pictures import board as pictures
+from imuarray.pictures.style import PAGE, new_figure, saved, styled
 from imuarray.recording import Recording
-from imuarray.report import pictures
-from imuarray.report.style import PAGE, new_figure, saved, styled
 
 # What the templates' tables call.
 IN_TABLES = (fixed, number, part_in_words, plus_minus, probability, quantity, split_name, symbols,

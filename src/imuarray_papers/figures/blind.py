@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.ticker import NullFormatter
 
-from imuarray.report.style import BLACK, BLUE, PAGE, SKY, VERMILLION, new_figure, shade, styled
+from imuarray.pictures.style import BLACK, BLUE, PAGE, SKY, VERMILLION, new_figure, shade, styled
 from imuarray_papers.blind import summary
 from imuarray_papers.blind.criteria import criteria
 from imuarray_papers.blind.inject import CATALOGUE

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from imuarray.report.style import PAGE, logarithmic, look, new_figure, styled
+from imuarray.pictures.style import PAGE, logarithmic, look, new_figure, styled
 from imuarray_papers.figures.style import Column
 from imuarray_papers.measured.positions import agreement, pairwise
 

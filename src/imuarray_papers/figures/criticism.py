@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from imuarray.geometry import Array
-from imuarray.report.style import BLACK, GREY, PAGE, logarithmic, look, new_figure, styled
+from imuarray.pictures.style import BLACK, GREY, PAGE, logarithmic, look, new_figure, styled
 from imuarray_papers.figures.measured import QUANTITIES
 from imuarray_papers.figures.style import Column, panels, rms
 

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from imuarray.geometry import Array
-from imuarray.report.style import BLACK, PAGE, look, new_figure, styled
+from imuarray.pictures.style import BLACK, PAGE, look, new_figure, styled
 from imuarray_papers.blind.study import accuracy, classes
 from imuarray_papers.figures.criticism import draw_gained, letter, three_digits
 from imuarray_papers.figures.style import Column, panels, rms

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 from scipy.special import ndtr
 
-from imuarray.report.noise_figure import KINDS, deviation_lines
-from imuarray.report.style import (
+from imuarray.pictures.noise import KINDS, deviation_lines
+from imuarray.pictures.style import (
     BLACK,
     BLUE,
     PAGE,

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from imuarray.geometry import array_from_config
-from imuarray.report.style import BLACK, GREY, MARKERS, logarithmic, new_figure, styled
+from imuarray.pictures.style import BLACK, GREY, MARKERS, logarithmic, new_figure, styled
 from imuarray_papers.figures.style import legend_items, level, points, scale_line
 
 MICROMETRE = 1e-6  # m, the level that the paper's conclusions speak of

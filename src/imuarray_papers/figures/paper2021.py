@@ -8,7 +8,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter
 from scipy.stats import gaussian_kde, norm
 
-from imuarray.report.style import BLACK, GREY, PAGE, SKY, logarithmic, look, new_figure, styled
+from imuarray.pictures.style import BLACK, GREY, PAGE, SKY, logarithmic, look, new_figure, styled
 from imuarray_papers.figures.style import (
     chain_lines,
     legend_items,

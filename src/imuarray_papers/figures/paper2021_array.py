@@ -10,7 +10,17 @@ from matplotlib.patches import Rectangle
 from scipy.stats import chi2
 
 from imuarray.geometry import UNDERSIDE_ROTATION, Array, array_from_config
-from imuarray.report.style import BLACK, BLUE, GREY, PAGE, SKY, VERMILLION, look, new_figure, styled
+from imuarray.pictures.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    PAGE,
+    SKY,
+    VERMILLION,
+    look,
+    new_figure,
+    styled,
+)
 from imuarray_papers.figures.paper2021 import after_burn_in, prior_of
 from imuarray_papers.figures.style import chain_lines, scale_line
 

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from imuarray.pictures.style import look, saved
 from imuarray.provenance import write_bytes, write_csv
-from imuarray.report.style import look, saved
 
 DIGITS, ERROR_DIGITS = 5, 3  # significant, of a published number and of its standard error
 

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from imuarray.report.style import (
+from imuarray.pictures.style import (
     BLACK,
     GREY,
     MARKERS,

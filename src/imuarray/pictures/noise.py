@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from imuarray.firstorder.noise import StillNoise
-from imuarray.report.style import BLACK, GREY, PAGE, logarithmic, look, new_figure, styled
+from imuarray.pictures.style import BLACK, GREY, PAGE, logarithmic, look, new_figure, styled
 
 KINDS = {
     "specific_force": (1e3, "accelerometers (mm/s²{})"),

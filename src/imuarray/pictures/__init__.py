@@ -1,0 +1,1 @@
+"""Pictures of recordings and answers, each drawn into axes, and their style."""
