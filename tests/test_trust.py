@@ -1,6 +1,7 @@
 """Mistakes that leave no residual, and those that do: status 3 or 2, and the suspect by name."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -504,6 +505,16 @@ def test_a_map_that_does_not_hold_while_twisting_is_named(sound):
     force[:, 2] = force[:, 2] @ turn
     said = trust._moved_maps(imuarray.calibrate(replace(sound, specific_force=force)))
     assert len(said) == 1 and f"accelerometer {sound.accelerometer_labels[2]} does not" in said[0]
+
+
+def test_an_array_that_shrinks_while_it_moves_is_told(sound):
+    """The scale of all gyroscopes rises by 0.5 %, and with its square the centrifugal force."""
+    assert trust._grows(imuarray.calibrate(sound)) == []
+    rise = np.linspace(1.0, 1.005, len(sound.time))[:, None, None]
+    (said,) = trust._grows(
+        imuarray.calibrate(replace(sound, angular_rate=rise * sound.angular_rate))
+    )
+    assert "scales rise" in said and 0.9 < float(re.search(r"by (\S+) %", said)[1]) < 1.1
 
 
 def test_an_odd_scale_of_all_gyroscopes_is_the_time_base_or_theirs():

@@ -133,7 +133,8 @@ def calibrate(
         ``converged`` (0 or 1), ``residual_ratio`` (rms residual over the declared noise),
         ``model``, ``parts`` (json), ``accelerometer_maps_hold`` (chance that the maps of first
         order are those of this motion) and ``accelerometer_maps_farthest`` (the IMUs that are
-        least so), the same of gyroscopes, and the origin (config, seed, versions).
+        least so), the same of gyroscopes, ``size_growth`` and ``size_growth_sd`` (relative, of the
+        array from the beginning of the motion to its end), and the origin (config, seed, versions).
 
     Raises
     ------

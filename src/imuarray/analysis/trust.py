@@ -30,6 +30,7 @@ POSES = 3.0  # times the noise of a pose's mean; real boards have up to 1.9
 BENT = 0.01  # m/s^2, a residual that matters: 0.1 % of gravity
 SCALED = 0.03  # of all gyroscopes' common scale: three of its prior's sds
 SEEN, ODD = 5e-3, 1e-4  # the same, where the axes' own scales scatter by less than their mean
+GROWN = 6.0  # sds of the growth; clean and real boards' is within one
 HOLD = 1e-6  # chance of maps that still poses gave; 0.97 and more of real and clean boards
 TRIAD = 10.0  # the same of one triad where the noise of each is estimated
 DRIFT = 3.0  # sds of the mean of all samples; offsets that differ by more bias positions
@@ -141,7 +142,7 @@ def reasons_of_calibration(
         reason if len(whose) == len(several) else f"recording {', '.join(whose)}: {reason}"
         for reason, whose in found.items()
     ]
-    judged += _moved_maps(calibration)
+    judged += _moved_maps(calibration) + _grows(calibration)
     if not judged:
         corrected = all(one.correction is not None for one in several)
         judged = unsteady(calibration, corrected, len(several))
@@ -157,6 +158,18 @@ def _moved_maps(calibration: xr.Dataset) -> list[str]:
         " scale change with the rate, the force or the warmth? Record again, poses before and after"
         for kind in KINDS if calibration.attrs.get(f"{kind}_maps_hold", 1.0) < HOLD
     ]  # fmt: skip
+
+
+def _grows(calibration: xr.Dataset) -> list[str]:
+    """Words on an array that does not keep its size: its accelerometers do not move."""
+    growth, sd = (calibration.attrs.get(f"size_growth{name}", 0.0) for name in ("", "_sd"))
+    if not abs(growth) > GROWN * sd:
+        return []
+    grows, change = ("grows", "fall") if growth > 0 else ("shrinks", "rise")
+    return [
+        f"the array {grows} by {100 * abs(growth):.2g} % while it moves: do the gyroscopes' scales"
+        f" {change} with the warmth? Let the board warm up and record again"
+    ]
 
 
 def _drifts(recording: Recording) -> list[str]:

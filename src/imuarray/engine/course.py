@@ -9,6 +9,7 @@ from imuarray.engine.linearise import linearise
 from imuarray.engine.parameters import POSITION, Columns
 from imuarray.engine.robust import by_triad, distances
 from imuarray.engine.widths import growing
+from imuarray.linear import scaled_inverse
 from imuarray.model.effects import KINDS
 
 STRETCHES = 60  # of time, at most, in which residuals are averaged
@@ -61,6 +62,28 @@ def position_sds(found: Estimate) -> np.ndarray:
     whole = np.zeros((len(sds), *found.active.shape))
     whole[:, found.active] = sds[:, found.places[0]]
     return whole[:, :count, found.columns.of(POSITION)]
+
+
+def size_growth(found: Estimate) -> tuple[float, float]:
+    """(relative growth of the array from the beginning of the motion to its end, its sd).
+
+    By a score test, all parameters refitted: an array that keeps its shape grows where the
+    gyroscopes' common scale changes.
+    """
+    size = np.zeros(len(found.information))
+    placed = np.zeros_like(found.active)
+    placed[:, found.columns.of(POSITION)] = True
+    size[found.places[0][placed[found.active]]] = found.positions[1:].ravel()
+    share, along, all_of_it = 0.0, np.zeros(len(size)), 0.0
+    for seen, place in zip(found.passes, found.places, strict=True):
+        own = size[place]
+        middle = (np.arange(len(seen.score)) + 0.5) / len(seen.score) - 0.5
+        for when, inner, slope in zip(middle, seen.information, seen.score, strict=True):
+            share += when * (own @ slope)
+            along[place] += when * (inner @ own)
+            all_of_it += when**2 * (own @ inner @ own)
+    left = all_of_it - along @ scaled_inverse(found.information + found.precision) @ along
+    return float(share / left), float(left**-0.5)
 
 
 def block_scores(found: Estimate) -> Scores:
