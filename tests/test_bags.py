@@ -8,11 +8,13 @@ import pytest
 import yaml
 
 import imuarray
+from imuarray.analysis.logs import open_logs
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.recording.bags import read_bags
 from imuarray.recording.record import MATRICES, NUMBERS, QUANTITIES
 from imuarray.recording.table import read_csv
+from imuarray.recording.units import GRAVITY
 from tests.bag_writer import KINDS, write
 from tests.doc_pages import ROOT, blocks
 
@@ -97,6 +99,19 @@ def test_the_documented_bag(tmp_path):
     (tmp_path / "bag.yaml").write_text(page["bag.yaml"])
     logs = read_bags([write(tmp_path / "run", "mcap", topics)], tmp_path / "bag.yaml").logs
     assert [log.label for log in logs] == ["/imu0", "/imu1", "/imu2", "camera"]
+
+
+def test_units_that_the_standard_does_not_have(tmp_path):
+    topics = readings()
+    bag = write(tmp_path / "run", "mcap", topics)
+    said = {"unit": "g", "noise": 0.002, "range": 16.0}
+    log, *_ = read_bags([bag], put(tmp_path, rig(accelerometers=said))).logs
+    np.testing.assert_array_equal(log.specific_force, GRAVITY * topics[TOPICS[0]][1])
+    assert log.accelerometer_range == 16 * GRAVITY
+    still = {name: (part[0], part[1] / 14.0, part[2]) for name, part in topics.items()}
+    bag = write(tmp_path / "still", "mcap", still)
+    with pytest.raises(InputError, match="'/imu0': expected some 9.8 m/s.2 of gravity.* in g"):
+        open_logs(bag, put(tmp_path, rig()))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -228,7 +243,7 @@ def test_what_is_no_bag(tmp_path, capsys, name, words):
         ("time", {"rate": 1}, "unknown key 'time'"),
         ("imus", {}, "imus: expected IMUs by label"),
         ("imus", {"/imu0": {}}, "imus '/imu0': .* no 'position'"),
-        ("gyroscopes", {"noise": 1, "range": 1, "unit": "deg/s"}, "unknown key 'unit'"),
+        ("gyroscopes", {"noise": 1, "range": 1, "unit": "rpm"}, "gyroscopes: unit: expected"),
         ("position_unit", "cm", "position_unit: expected a unit"),
         ("imus", {"/imu0": {"position": [0, 0, 0], "axes": "x"}}, "'/imu0': expected axes"),
     ],

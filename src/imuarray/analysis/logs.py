@@ -15,11 +15,13 @@ from imuarray.recording import Recording, read_recording
 from imuarray.recording.channels import repeated
 from imuarray.recording.layout import read_layout, rotation
 from imuarray.recording.rig import Log, Rig, recording_of
+from imuarray.recording.units import GRAVITY
 
 RECORDINGS = (".nc", ".nc4", ".h5")
 PACKETS = (".bin", ".bin.xz")
 RAIL = 1 - 1e-6  # of the range
 READ = {"accelerometer": "specific_force", "gyroscope": "angular_rate"}
+GRAVITY_WITHIN = 0.1  # of 1 (g) or of 1000 (mg), by which most readings' size is told
 SURE = 0.8  # of the rates' roughness is left at even instants; a motion too slow shows nothing
 RARE = 0.05  # of the rows: more are no garbage
 SPIKE = 60.0  # times what a triad usually departs from its neighbours in time, or its noise
@@ -112,6 +114,8 @@ def _together(found: Recording | Rig) -> Opened:
     """Samples as they are, or brought to common instants and axes, which is kept."""
     if isinstance(found, Recording):
         return _sampled(found, [])
+    for log in found.logs:
+        _require_gravity(log)
     recording = recording_of(found)
     if recording is not None:
         return _sampled(_with_rails(recording), found.lines)
@@ -212,6 +216,18 @@ def _require_own(log: Log) -> None:
         said = repeated(alone)
         if said:
             raise InputError(f"{log.label}: expected each reading once, found: {said[0]}")
+
+
+def _require_gravity(log: Log) -> None:
+    """InputError for forces in g or mg that are declared m/s^2: most logs lie still for a while."""
+    usual = np.median(np.linalg.norm(log.specific_force, axis=1))
+    for unit, gravity in (("g", 1.0), ("mg", 1000.0)):
+        if abs(usual / gravity - 1) < GRAVITY_WITHIN:
+            raise InputError(
+                f"accelerometer {log.label!r}: expected some {GRAVITY:.2g} m/s^2 of gravity, found"
+                f" {usual:.3g}: are they in {unit}, and the rates in deg/s? State each unit in the"
+                " YAML"
+            )
 
 
 def _railed(log: Log) -> tuple[Log, list[str]]:

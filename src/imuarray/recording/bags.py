@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from imuarray.errors import InputError
-from imuarray.recording.layout import read_layout
+from imuarray.recording.layout import QUANTITIES, read_layout, si_units
 from imuarray.recording.rig import Readings, Rig, pair, to_rig
 
 ENDINGS = (".bag", ".mcap", ".db3")
@@ -44,7 +44,10 @@ def read_bags(
         for topic, part in _read(path).items():
             parts.setdefault(topic, []).append(part)
     read = {
-        label: [_readings(parts, topic, kind, where) for kind, topic in enumerate(of)]
+        label: [
+            _readings(parts, topic, kind, layout["imus"][label], where)
+            for kind, topic in enumerate(of)
+        ]
         for label, of in imus.items()
     }
     unused = sorted(set(parts).difference(*imus.values()))
@@ -69,7 +72,7 @@ def _chosen(imus: dict[str, dict], topics: Sequence[str], where: str) -> dict[st
     return found
 
 
-def _readings(parts: dict[str, list], topic: str, kind: int, where: str) -> Readings:
+def _readings(parts: dict[str, list], topic: str, kind: int, imu, where: str) -> Readings:
     """One kind of a topic from all bags; each kind is three columns of what `_read` gives."""
     if topic not in parts:
         raise InputError(
@@ -83,7 +86,9 @@ def _readings(parts: dict[str, list], topic: str, kind: int, where: str) -> Read
             f"{topic}: expected stamps in the messages' headers, found none (0) in"
             f" {np.sum(stamps == 0)} of {len(stamps)}"
         )
-    return Readings(stamps, 1e-9, values[:, 3 * kind : 3 * kind + 3], topic)
+    name, quantity = list(QUANTITIES.items())[kind]
+    unit = si_units(imu[name], quantity, f"{where}: {name}")
+    return Readings(stamps, 1e-9, unit * values[:, 3 * kind : 3 * kind + 3], topic)
 
 
 def _read(path: Path) -> dict[str, tuple[np.ndarray, np.ndarray]]:

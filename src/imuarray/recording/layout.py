@@ -30,7 +30,7 @@ RIG = {**_TABLE, "time": False, "columns": False, **_PLACES, **_SENSORS, "imus":
 _OWN = {"position": True, "axes": False, "accelerometers": False, "gyroscopes": False}
 IMU = {"log": False, "columns": False, "time": False, **_OWN}
 BAG = {**_PLACES, **_SENSORS, "imus": True}
-BAG_SENSOR = {"noise": True, "range": True}  # in the units of sensor_msgs/Imu
+BAG_SENSOR = {"unit": False, "noise": True, "range": True}  # those of sensor_msgs/Imu
 BAG_IMU = {"topic": False, **_OWN}
 _NAMES = "column", "columns", "log", "topic"
 
@@ -140,18 +140,18 @@ def numbers(layout, where: str) -> dict[str, float]:
     out = {}
     for kind, quantity in QUANTITIES.items():
         section, name = layout[kind], kind.removesuffix("s")
-        # a bag's are in SI units
-        unit = (
-            factor(quantity, section["unit"], f"{where}: {kind}: unit")
-            if "unit" in section
-            else 1.0
-        )
+        unit = si_units(section, quantity, f"{where}: {kind}")
         for key, attribute in (("noise", "noise_sd"), ("range", "range")):
             value = positive(section[key], f"{where}: {kind}: {key}")
             out[f"{name}_{attribute}"] = unit * value
     length = factor("length", layout.get("position_unit", "m"), f"{where}: position_unit")
     prior = positive(layout.get("position_prior", PRIOR / length), f"{where}: position_prior")
     return out | {"position_prior_sd": length * prior}
+
+
+def si_units(section, quantity: str, where: str) -> float:
+    """How large a section's unit is in SI units; a bag's are SI units where it names none."""
+    return factor(quantity, section["unit"], f"{where}: unit") if "unit" in section else 1.0
 
 
 def positions(sections: dict[str, dict], layout, where: str) -> np.ndarray:
