@@ -62,7 +62,7 @@ def set_key(layout, path, value):
         ("accelerometers/noise", True, "positive number, found True"),
         ("accelerometers/triads", [], "triads by label"),
         ("accelerometers/triads/2/columns", ["ax2"], "three columns"),
-        ("accelerometers/triads/2/position", None, "no 'position'"),
+        ("accelerometers/triads/2/position", None, "of each or of none, found none of '2'"),
         ("accelerometers/triads/2/position", [1, "a", 2], "three numbers"),
         ("accelerometers/triads/2/axes", ["x", "x", "z"], "no rotation"),
         ("accelerometers/triads/2/axes", ["x", "q", "z"], "expected axes such as"),

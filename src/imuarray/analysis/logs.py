@@ -15,6 +15,7 @@ from imuarray.recording import Recording, read_recording
 from imuarray.recording.channels import repeated
 from imuarray.recording.layout import read_layout, rotation
 from imuarray.recording.rig import Log, Rig, recording_of
+from imuarray.recording.undrawn import rough_positions
 from imuarray.recording.units import GRAVITY
 
 RECORDINGS = (".nc", ".nc4", ".h5")
@@ -49,7 +50,21 @@ def open_logs(
     """
     found = _opened(paths, columns, topics)
     _require_paired(found.recording)
-    return found
+    return _placed(found)
+
+
+def _placed(opened: Opened) -> Opened:
+    """With positions to begin with, where no drawing gave any."""
+    found = opened.recording
+    if not np.isnan(found.accelerometer_position).any():
+        return opened
+    places, sd = rough_positions(found.time, found.specific_force, found.angular_rate)
+    line = (
+        f"no positions given: they begin from the motion, to {1e3 * sd:.2g} mm; no drawing was"
+        " compared with the answer"
+    )
+    found = replace(found, accelerometer_position=places, position_prior_sd=sd)
+    return Opened(found, [*opened.lines, line])
 
 
 def _with_rails(recording: Recording, layout=None) -> Recording:

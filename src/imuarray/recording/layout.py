@@ -27,7 +27,7 @@ BOARD = {
 SENSOR = {"unit": True, "scale": False, "noise": True, "range": True}
 BOARD_SENSOR = SENSOR | {"triads": True}
 RIG = {**_TABLE, "time": False, "columns": False, **_PLACES, **_SENSORS, "imus": True}
-_OWN = {"position": True, "axes": False, "accelerometers": False, "gyroscopes": False}
+_OWN = {"position": False, "axes": False, "accelerometers": False, "gyroscopes": False}
 IMU = {"log": False, "columns": False, "time": False, **_OWN}
 BAG = {**_PLACES, **_SENSORS, "imus": True}
 BAG_SENSOR = {"unit": False, "noise": True, "range": True}  # those of sensor_msgs/Imu
@@ -76,7 +76,8 @@ def read_layout(path: str | PathLike, bag: bool = False) -> dict[str, Any]:
         where = f"{path}: {kind}"
         _require_keys(layout[kind], keys, where)
         if not rig:
-            triad = {"columns": True, "position": kind == "accelerometers", "axes": False}
+            triad = {"columns": True, "axes": False}
+            triad |= {"position": False} if kind == "accelerometers" else {}
             _require_sections(layout[kind]["triads"], where, "triads", triad)
     if rig:
         _require_sections(layout["imus"], f"{path}: imus", "IMUs", BAG_IMU if bag else IMU)
@@ -155,7 +156,14 @@ def si_units(section, quantity: str, where: str) -> float:
 
 
 def positions(sections: dict[str, dict], layout, where: str) -> np.ndarray:
-    """Nominal positions (A, 3) m of triads or IMUs."""
+    """Nominal positions (A, 3) m of triads or IMUs; NaN where the layout has none at all."""
+    without = [label for label, section in sections.items() if "position" not in section]
+    if len(without) == len(sections):
+        return np.full((len(sections), 3), np.nan)
+    if without:
+        raise InputError(
+            f"{where}: expected the position of each or of none, found none of {without[0]!r}"
+        )
     length = factor("length", layout.get("position_unit", "m"), f"{where}: position_unit")
     places = [
         _three(section["position"], f"{where} {label!r}: position")
