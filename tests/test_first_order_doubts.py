@@ -7,12 +7,13 @@ import pytest
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
+from imuarray.analysis.trust import of_first_order, reasons_of_poses
 from imuarray.errors import InputError
 from imuarray.firstorder.correct import calibrate_first_order
 from imuarray.firstorder.outliers import fit_triads
 from imuarray.firstorder.pose_noise import walked_mean
 from imuarray.firstorder.report import summary_lines
-from imuarray.firstorder.still import averaged_sd, reading_sd, still_poses
+from imuarray.firstorder.still import averaged_sd, reading_sd, smoothing, still_poses
 from tests.test_first_order import GRAVITY, RATE, board, directions, triads
 
 WALKS = [[0.0, 1e-2, 0.0, 0.0], [2e-2] * 4]  # one triad's; strong beside the noise
@@ -176,3 +177,20 @@ def test_orientations_that_repeat_are_few():
         angular_rate=other.angular_rate[both] + noise,
     )  # fmt: skip
     assert calibrate_first_order(whole, gyroscopes="offset", others=[again]).spare == (1,)
+
+
+def test_averaged_and_interpolated_readings_are_told_and_drifts_and_steps_are_not():
+    rng = np.random.default_rng(8)
+    white = rng.standard_normal((4000, 3, 3))
+    slow = white + 0.05 * np.cumsum(rng.standard_normal(white.shape), axis=0)
+    assert np.abs(smoothing([white, slow])).max() < 0.1
+    assert np.abs(smoothing([lfilter([1], [1, -0.6], white, axis=0)]) - 0.6).max() < 0.1
+    assert np.abs(smoothing([lfilter(np.ones(5) / 5, 1, white, axis=0)]) - 1.0).max() < 0.1
+    recording = board(rng)[0]
+    found = calibrate_first_order(recording, GRAVITY)
+    assert of_first_order(found).smoothed == ()
+    force = (recording.specific_force[1:] + recording.specific_force[:-1]) / 2
+    mean = replace(recording.select(slice(1, None)), specific_force=force)
+    smoothed = of_first_order(calibrate_first_order(mean, GRAVITY))
+    assert smoothed.smoothed == ("accelerometer",)
+    assert "averaged, filtered or interpolated" in reasons_of_poses(smoothed)[-1]

@@ -30,6 +30,7 @@ POSES = 3.0  # times the noise of a pose's mean; real boards have up to 1.9
 BENT = 0.01  # m/s^2, a residual that matters: 0.1 % of gravity
 SCALED = 0.03  # of all gyroscopes' common scale: three of its prior's sds
 SEEN, ODD = 5e-3, 1e-4  # the same, where the axes' own scales scatter by less than their mean
+SMOOTHED = 0.5  # correlation of neighbours; a low pass at a fifth of the sampling rate makes 0.3
 GROWN = 6.0  # sds of the growth; clean and real boards' is within one
 HOLD = 1e-6  # chance of maps that still poses gave; 0.97 and more of real and clean boards
 TRIAD = 10.0  # the same of one triad where the noise of each is estimated
@@ -52,6 +53,7 @@ class Poses(NamedTuple):
     residual: float = np.nan  # m/s^2, rms of the worst triad
     scale: float = np.nan  # of the map that all gyroscopes share
     chance: float = 1.0  # of such a mean of all axes' scales, by their own spread
+    smoothed: tuple[str, ...] = ()  # kinds whose still readings follow their neighbours
 
 
 def of_first_order(found: FirstOrder) -> Poses:
@@ -60,7 +62,11 @@ def of_first_order(found: FirstOrder) -> Poses:
     scale = np.nan if common is None or isinstance(common, str) else common.scale
     fit = found.triads
     chance = _chance(found.gyroscope_matrix) if scale == scale else 1.0
-    return Poses(fit.residual_ratio, _worst(fit.residual, fit.relied), scale, chance)
+    smoothed = tuple(
+        kind for kind in KINDS
+        if np.nanmedian(getattr(found, f"{kind}_smoothing")) > SMOOTHED
+    )  # fmt: skip
+    return Poses(fit.residual_ratio, _worst(fit.residual, fit.relied), scale, chance, smoothed)
 
 
 def of_file(path) -> Poses:
@@ -100,6 +106,14 @@ def reasons_of_poses(*several: Poses) -> list[str]:
             " the board bent or was not still, an offset jumped, a response is curved (imuarray"
             " diagnose tells), or recordings are of other boards; sds do not cover that: record"
             " again"
+        )
+    smoothed = sorted({kind for one in several for kind in one.smoothed})
+    if smoothed:
+        found.append(
+            f"readings of {' and '.join(f'{kind}s' for kind in smoothed)} follow their neighbours"
+            " while the board is still: they are averaged, filtered or interpolated from another"
+            " rate, which makes fast motion smaller and later; log raw readings, each sensor at its"
+            " own rate"
         )
     worst = max(several, key=lambda x: abs(x.scale - 1) if x.scale == x.scale else 0.0)
     scale, odd = worst.scale, worst.chance < ODD

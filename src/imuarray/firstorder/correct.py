@@ -17,6 +17,7 @@ from imuarray.firstorder.still import (
     averaged_sd,
     lag_correlation,
     reading_sd,
+    smoothing,
     steps_sd,
     still_poses,
     usual_step,
@@ -50,6 +51,7 @@ class FirstOrder:
         Noise of one reading within a second.
     accelerometer_correlation, gyroscope_correlation : (A, 3), (G, 3)
         Correlation of neighbouring readings.
+    accelerometer_smoothing, gyroscope_smoothing : (A, 3), (G, 3), the same of their fastest noise
     gravity : float, m/s^2, the assumed magnitude
     gyroscopes : Gyroscopes, their maps; None where only their offsets were asked for
     spare : numbers, from 1, of the other recordings left out: poses in two orientations at most
@@ -64,6 +66,8 @@ class FirstOrder:
     gyroscope_noise: np.ndarray
     accelerometer_correlation: np.ndarray
     gyroscope_correlation: np.ndarray
+    accelerometer_smoothing: np.ndarray
+    gyroscope_smoothing: np.ndarray
     gravity: float
     gyroscopes: Gyroscopes | None = None
     spare: tuple[int, ...] = ()
@@ -230,7 +234,7 @@ def _of_poses(still: Still, triads: TriadFit, gravity: float) -> FirstOrder:
     return FirstOrder(
         still.poses, triads, *_gyroscope_offsets(still),
         np.maximum(reading_sd(force, step), 1e-6 * GRAVITY), reading_sd(rate, step),
-        lag_correlation(force), lag_correlation(rate), gravity,
+        lag_correlation(force), lag_correlation(rate), smoothing(force), smoothing(rate), gravity,
     )  # fmt: skip
 
 

@@ -97,6 +97,17 @@ def lag_correlation(pieces, lag: int = 1) -> np.ndarray:
     return products.mean(axis=0) / squares.mean(axis=0)
 
 
+def smoothing(pieces) -> np.ndarray:
+    """Correlation of neighbouring readings in the fastest noise, (...): 0 white, 1 averaged.
+
+    Of their differences, which no drift moves: -1/2 for white noise, -(1 - r) / 2 for noise of
+    correlation r, 0 for a moving average.
+    """
+    steps = [np.diff(piece, axis=0) for piece in pieces]
+    products = np.concatenate([x[1:] * x[:-1] for x in steps]).mean(axis=0)
+    return 1 + 2 * products / np.concatenate([x**2 for x in steps]).mean(axis=0)
+
+
 def window_spread(readings: np.ndarray, window: int) -> np.ndarray:
     """Root mean variance over axes of readings (T, 3) in a centred window of samples, (T,)."""
     # cumulative sums of centred values keep the rounding far below the noise
