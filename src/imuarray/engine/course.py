@@ -75,13 +75,12 @@ def size_growth(found: Estimate) -> tuple[float, float]:
     placed[:, found.columns.of(POSITION)] = True
     size[found.places[0][placed[found.active]]] = found.positions[1:].ravel()
     share, along, all_of_it = 0.0, np.zeros(len(size)), 0.0
-    for seen, place in zip(found.passes, found.places, strict=True):
-        own = size[place]
-        middle = (np.arange(len(seen.score)) + 0.5) / len(seen.score) - 0.5
-        for when, inner, slope in zip(middle, seen.information, seen.score, strict=True):
-            share += when * (own @ slope)
-            along[place] += when * (inner @ own)
-            all_of_it += when**2 * (own @ inner @ own)
+    counts = [len(seen.score) for seen in found.passes]
+    middle = np.concatenate([(np.arange(count) + 0.5) / count - 0.5 for count in counts])
+    for when, (inner, slope) in zip(middle, found.blocks, strict=True):
+        share += when * (size @ slope)
+        along += when * (inner @ size)
+        all_of_it += when**2 * (size @ inner @ size)
     left = all_of_it - along @ scaled_inverse(found.information + found.precision) @ along
     return float(share / left), float(left**-0.5)
 
