@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from imuarray.diagnosis.plain import Sizes, first_up, number, plainly, plus_minus, quantity
-from imuarray.diagnosis.words import split_name
+from imuarray.diagnosis.plain import DEGREE, first_up, number, plus_minus, quantity
+from imuarray.diagnosis.words import meaning, plain
 from imuarray.estimation.selection import position_sds, weakest_of
 from imuarray.firstorder.correct import FirstOrder
 from imuarray.firstorder.report import parameter_table, turned_lines, write_corrected
@@ -172,11 +172,12 @@ def causes(calibration: xr.Dataset) -> list[str]:
         )
         for name, value, sd in zip(*columns, strict=True):
             effect, part, _ = str(name).split(" ", 2)
-            found.setdefault(effect, {})[split_name(part, labels)] = value, sd
-    said = [
-        line for effect, part in found.items() for line in plainly(effect, Sizes.of(part, labels))
+            found.setdefault(effect, {})[part] = value, sd
+    return [
+        f"{first_up(line)}."
+        for effect, values in found.items()
+        for line in plain(effect, values, labels) or meaning(effect)
     ]
-    return [f"{first_up(line)}." for line in said]
 
 
 def before(board: Board) -> list[str]:
@@ -250,8 +251,8 @@ def html(board: Board) -> str:
     return rendered(
         "board.html.j2", board=board, verdict=verdict(board), facts=facts(board),
         advice=advice(board), causes=causes(board.calibration),
-        turned=turn_table(board), positions=position_table(board.calibration), sure=SURE,
-        prior=board.corrected.position_prior_sd, noise=noises(board),
+        positions=position_table(board.calibration), noise=noises(board), sure=SURE,
+        degree=DEGREE,
         figures=pictured(board.corrected, board.calibration, PICTURES, suffixes=["png"]),
         weakest=weakest(board.calibration), frame=frame(board.calibration),
         before=before(board), account=account(board),
@@ -271,20 +272,6 @@ def position_table(calibration: xr.Dataset) -> pd.DataFrame:
         for name, values in parts.items() for number, axis in enumerate("xyz")
     }  # fmt: skip
     return pd.DataFrame({"imu": calibration["accelerometer"].to_numpy()} | columns)
-
-
-def turn_table(board: Board) -> pd.DataFrame | None:
-    """Turns of the triads against the frame, deg: sensor, imu, x, y, z, sd_x, sd_y, sd_z."""
-    if isinstance(board.first_order, str):
-        return None
-    table = parameter_table(board.first_order, board.recording)
-    table = table[table.parameter == "orientation"]
-    wide = table.pivot(index=["sensor", "triad"], columns="component", values=["value", "sd"])
-    wide = np.degrees(wide.astype(float)).reindex(
-        table[["sensor", "triad"]].drop_duplicates().itertuples(index=False, name=None)
-    )
-    wide.columns = [axis if kind == "value" else f"sd_{axis}" for kind, axis in wide.columns]
-    return wide.rename_axis(["sensor", "imu"]).reset_index()
 
 
 def noises(board: Board) -> pd.DataFrame:

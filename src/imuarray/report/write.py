@@ -10,14 +10,13 @@ import xarray as xr
 
 from imuarray.diagnosis.words import sensors_of, whose, words
 from imuarray.engine.dataset import diagnosed
-from imuarray.model import EFFECTS
 from imuarray.provenance import atomic_folder, write_bytes, write_netcdf
 from imuarray.report import drawings as drawn
 from imuarray.report import numbers
 from imuarray.report.answers import USUAL, alarming, answers, verdict
 from imuarray.report.drawings_model import ALIKE, cause_figure, position_figure, separability_figure
 from imuarray.report.page import SUFFIXES, Drawing, files, pictured, rendered
-from imuarray.report.panels import cause_table
+from imuarray.report.panels import cause_table, panels_of
 
 if TYPE_CHECKING:
     from imuarray.diagnosis.document import Diagnosis
@@ -67,14 +66,6 @@ CAUSE_CAPTION = (
     " means of bins with two standard errors), and what the cause predicts (lines); where points"
     " leave the lines, the cause does not fit. Left: all readings that it touches. Right: {}."
 )
-PARAMETERS = "the most certain parameters, against what each multiplies"
-BESIDE = {  # by what it is drawn against
-    "age": "the age of the readings from each sample alone, against the time within a turn"
-    " of the sawtooth, drawn twice",
-    "place": "the triad's position in blocks of time",
-    "time": "the axes that it changes most, against time",
-    "angular acceleration": "the gyroscope along dω/dt against its size; the slope is the delay",
-}
 
 
 def write_report(diagnosis: Diagnosis, folder: str | Path) -> None:
@@ -116,7 +107,7 @@ def draw(diagnosis: Diagnosis, calibration: xr.Dataset) -> list[Drawing]:
         found.append(Drawing(
             f"cause_{place + 1:02d}_{cause.effect}",
             f"Cause: {words(cause.effect)}, {whose(sensors)}",
-            CAUSE_CAPTION.format(BESIDE.get(EFFECTS[cause.effect].against, PARAMETERS)),
+            CAUSE_CAPTION.format(panels_of(cause.effect)[1]),
             files(cause_figure(table, said), table),
         ))  # fmt: skip
     found += [
