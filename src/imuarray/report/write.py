@@ -103,7 +103,7 @@ def draw(diagnosis: Diagnosis, calibration: xr.Dataset) -> list[Drawing]:
         found.append(_drawing("gain", diagnosis, said))
     for place, cause in enumerate(diagnosis.found.search.causes):
         table = cause_table(diagnosis, cause)
-        sensors = sensors_of(numbers.imu_labels(diagnosis), cause.imus)
+        sensors = sensors_of(diagnosis.found.search.readings.labels, cause.imus)
         found.append(Drawing(
             f"cause_{place + 1:02d}_{cause.effect}",
             f"Cause: {words(cause.effect)}, {whose(sensors)}",
@@ -154,7 +154,7 @@ def html(diagnosis: Diagnosis, drawings: list[Drawing]) -> str:
         checks=diagnosis.base.discrepancies,
         after={item.check: item for item in diagnosis.extended.discrepancies},
         causes=document["causes"],
-        labels=numbers.imu_labels(diagnosis),
+        labels=diagnosis.found.search.readings.labels,
         positions=numbers.position_table(diagnosis),
         noise=numbers.noise_table(diagnosis),
         scores=numbers.score_table(diagnosis),
