@@ -16,7 +16,7 @@ from imuarray.estimation.selection import position_sds, weakest_of
 from imuarray.firstorder.correct import FirstOrder
 from imuarray.firstorder.report import parameter_table, turned_lines, write_corrected
 from imuarray.model.effects import KINDS
-from imuarray.pictures.board import levelled, missing
+from imuarray.pictures.board import SURE, levelled, missing
 from imuarray.provenance import atomic_folder, trust, write_bytes, write_csv, write_netcdf
 from imuarray.recording import Recording, write_recording
 from imuarray.report.page import PICTURES, pictured, rendered
@@ -25,7 +25,6 @@ SLOW = np.radians(300.0)  # rad/s rms, of motion that says little of positions
 MISFIT = 1.5  # times the noise: a residual that is looked into
 SHAKEN = 1.2  # times the smooth samples' residual: that of all is clearly above
 NOTHING = " Nothing speaks against them."
-SURE = 1.96  # sds: 95 %
 
 
 def verdict(board: Board) -> str:

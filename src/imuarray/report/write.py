@@ -144,7 +144,6 @@ def html(diagnosis: Diagnosis, drawings: list[Drawing]) -> str:
     return rendered(
         "report.html.j2",
         document=document,
-        recording=str(document["recording"]) or "a recording",
         facts=facts(diagnosis),
         verdict=verdict(diagnosis),
         alarming=alarming(document),
@@ -153,7 +152,6 @@ def html(diagnosis: Diagnosis, drawings: list[Drawing]) -> str:
         usual=USUAL,
         checks=diagnosis.base.discrepancies,
         after={item.check: item for item in diagnosis.extended.discrepancies},
-        causes=document["causes"],
         labels=diagnosis.found.search.readings.labels,
         positions=numbers.position_table(diagnosis),
         noise=numbers.noise_table(diagnosis),
