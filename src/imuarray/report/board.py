@@ -69,13 +69,19 @@ def facts(board: Board) -> str:
     time, calibration = board.recording.time, board.calibration
     rate, count = 1 / np.median(np.diff(time)), len(board.recording.accelerometer_labels)
     found = board.first_order
-    still, noise = "", "declared noise"
+    still, noise, where = "", "declared noise", ""
     if not isinstance(found, str):  # whose noise the corrected recording declares
         still, noise = f" {len(found.poses)} still poses;", "noise of the still poses"
+    size, whole = misfit(calibration), float(calibration.attrs["residual_ratio"])
+    if whole >= SHAKEN * size:
+        where = (
+            f" where the motion is smooth ({number(whole)} times over all: shocks are faster than"
+            " the samples)"
+        )
     return (
         f"{len(time)} samples of {count} IMUs at {rate:.4g} Hz, {time[-1] - time[0]:.1f} s;"
         f"{still} positions from {calibration.attrs['samples']} moving samples, whose"
-        f" residual is {misfit(calibration):.2f} times the {noise}{_shaken(calibration)}."
+        f" residual is {size:.2f} times the {noise}{where}."
     )
 
 
@@ -84,16 +90,6 @@ def misfit(calibration: xr.Dataset) -> float:
     if "gyroscope_smooth_residual" not in calibration:
         return float(calibration.attrs["residual_ratio"])
     return max(float(np.median(calibration[f"{kind}_smooth_residual"])) for kind in KINDS)
-
-
-def _shaken(calibration: xr.Dataset) -> str:
-    whole = float(calibration.attrs["residual_ratio"])
-    if "gyroscope_smooth_residual" not in calibration or whole < SHAKEN * misfit(calibration):
-        return ""
-    return (
-        f" where the motion is smooth ({number(whole)} times over all: shocks are faster than the"
-        " samples)"
-    )
 
 
 def advice(board: Board, folder: Path = Path()) -> list[str]:
