@@ -87,7 +87,7 @@ def equation(effect: str) -> str:
 
 def cause_in_words(cause: dict, labels, says: str = "") -> str:
     """A cause of `diagnosis.json` with its size, or what was read (``says``), test and class."""
-    text = f"{words(cause['effect'])}, {whose(cause['sensors'])}: {in_short(cause, labels, says)}"
+    text = in_short(cause, labels, says)
     if stretches := cause.get("stretches_s"):
         first = [f"{a:.4g} to {b:.4g}" for a, b in stretches[:STATED]]
         text += f"; longest at {', '.join(first)} s"
@@ -107,12 +107,13 @@ def cause_in_words(cause: dict, labels, says: str = "") -> str:
 
 
 def in_short(cause: dict, labels, says: str = "") -> str:
-    """Kind and size of a cause, in the words of one who holds the board."""
+    """Name of a cause, its kind and size in the words of one who holds the board."""
     effect, rows = cause["effect"], cause["parameters"]
     values = {name: (item["value"], item["sd"]) for name, item in rows.items()}
     found = plain(effect, values, labels)
     told = says if says or found else sizes(cause, labels)
-    return "; ".join(filter(None, [*(found or meaning(effect)), told]))
+    said = "; ".join(filter(None, [*(found or meaning(effect)), told]))
+    return f"{words(effect)}, {whose(cause['sensors'])}: {said}"
 
 
 def sizes(cause: dict, labels) -> str:

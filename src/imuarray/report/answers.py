@@ -54,8 +54,7 @@ def verdict(diagnosis: Diagnosis) -> str:
                 "Unexplained: the plain model differs from the recording, and no known cause does."
             )
         return "Nothing: the plain model simulates this recording as far as it can show."
-    said = [f"{words(c['effect'])}, {whose(c['sensors'])}: {in_short(c, labels)}" for c in causes]
-    parts = [f"{first_up(text)}." for text in said[:FEW]]
+    parts = [f"{first_up(in_short(cause, labels))}." for cause in causes[:FEW]]
     if len(causes) > FEW:
         others = joined(words(cause["effect"]) for cause in causes[FEW:])
         parts.append(f"And {others}.")
