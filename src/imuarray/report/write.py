@@ -61,6 +61,7 @@ FIGURES = {  # by name: table, drawing, title, caption
         " intervals as each model claims them.",
     ),
 }  # fmt: skip
+LONGEST = 70  # characters of a path
 CAUSE_CAPTION = (
     "What would be back in the residual without this cause, motion and all else refitted (points:"
     " means of bins with two standard errors), and what the cause predicts (lines); where points"
@@ -118,9 +119,11 @@ def draw(diagnosis: Diagnosis, calibration: xr.Dataset) -> list[Drawing]:
 
 
 def footer(document: dict) -> list[str]:
-    """The small print under a diagnosis' figures."""
+    """The small print under a diagnosis' figures; of a long path its end."""
+    path = " ".join(document["recording"].split()) or "a recording"
+    path = path if len(path) <= LONGEST else f"…{path[1 - LONGEST :]}"
     return [
-        f"{drawn.plain(shortened(document['recording']))}; {document['samples']} samples,"
+        f"{drawn.plain(path)}; {document['samples']} samples,"
         f" seed {document['seed']}, imuarray {document['version']}"
     ]
 
@@ -130,12 +133,6 @@ def _drawing(name: str, diagnosis: Diagnosis, footer) -> Drawing:
     make_table, make_figure, *texts = FIGURES[name]
     table = make_table(diagnosis)
     return Drawing(name, *texts, files(make_figure(table, footer), table))
-
-
-def shortened(path: str, most: int = 70) -> str:
-    """A path's end, on one line."""
-    text = " ".join(str(path).split()) or "a recording"
-    return text if len(text) <= most else f"…{text[1 - most :]}"
 
 
 def html(diagnosis: Diagnosis, drawings: list[Drawing]) -> str:
