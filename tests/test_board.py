@@ -27,7 +27,7 @@ from imuarray.analysis.trust import (
 from imuarray.cli import main
 from imuarray.commands.board import answer
 from imuarray.commands.calibrate import position_lines
-from imuarray.diagnosis.plain import Sizes, plain
+from imuarray.diagnosis.words import plain
 from imuarray.engine.estimate import Recorded, estimate
 from imuarray.engine.forward import EFFECT_GROUPS, GYROSCOPES, gains, mask_of
 from imuarray.engine.parameters import POSITION, columns_of
@@ -353,32 +353,33 @@ def test_what_has_not_been_excited_is_named(found):
 
 
 def sizes(rows, components=("value",), sd=1e-6):
-    """Parameters of IMUs 1, 2, ..., a row each, of one sd."""
-    return Sizes.of({
-        (name, str(k)): (value, sd)
+    """Parameters of IMUs 1, 2, ..., a row each, of one sd, and the IMUs' labels."""
+    found = {
+        f"{name}_{k}": (value, sd)
         for k, row in enumerate(rows, 1) for name, value in zip(components, row, strict=True)
-    }, [str(k + 1) for k in range(len(rows))])  # fmt: skip
+    }  # fmt: skip
+    return found, [str(k + 1) for k in range(len(rows))]
 
 
 def test_a_lag_within_two_sds_is_none():
-    (none,) = plain("gyroscope_delay", sizes([[1.4e-5]] * 3, sd=1.7e-5))
+    (none,) = plain("gyroscope_delay", *sizes([[1.4e-5]] * 3, sd=1.7e-5))
     assert none.startswith("no lag seen") and "0.017 ms" in none
-    (some,) = plain("gyroscope_delay", sizes([[1.4e-5]] * 3, sd=1e-6))
+    (some,) = plain("gyroscope_delay", *sizes([[1.4e-5]] * 3, sd=1e-6))
     assert "run ahead of" in some
 
 
 def test_plain_words_hold_one_against_the_others():
-    said = plain("sensor_delay", sizes([[0.5e-3], [0.5e-3], [-1.0e-3]]))
+    said = plain("sensor_delay", *sizes([[0.5e-3], [0.5e-3], [-1.0e-3]]))
     assert len(said) == 1 and re.match(r"IMU 3 is read 1.5000\s±\s0.0015 ms late", said[0])
-    assert "IMU 2 is read" in plain("sensor_delay", sizes([[1e-3], [-1e-3]]))[0]
-    many = plain("sensor_delay", sizes([[-2e-4], [1e-4], [3e-4], [-1e-4], [-1e-4]]))
+    assert "IMU 2 is read" in plain("sensor_delay", *sizes([[1e-3], [-1e-3]]))[0]
+    many = plain("sensor_delay", *sizes([[-2e-4], [1e-4], [3e-4], [-1e-4], [-1e-4]]))
     assert many == [
         "the IMUs are read at instants of their own, from 0.2 ms late to 0.3 ms early against"
         " their mean"
     ]
     names = ("period", "frequency", "phase", "offset", "drift")
     clocks = [[0, 0, 0, 0, 0], [0, 0, 0, 0, 0], [0, 0, 0, 2e-3, 0], [1e-3, 1.5, 0.2, 0, 0]]
-    said = plain("sensor_clock", sizes(clocks, names))
+    said = plain("sensor_clock", *sizes(clocks, names))
     assert re.match(r"IMU 4 samples on a clock of its own: a reading is up to 1\sms old", said[0])
     assert re.match(r"IMU 3 is read 2.0000\s±\s0.0010 ms late", said[1]) and len(said) == 2
     # reading = (1 + M) rate: a turn about z by 0.6 degrees
@@ -386,7 +387,7 @@ def test_plain_words_hold_one_against_the_others():
     rows = np.zeros((4, 6))
     rows[2, [0, 2]] = -turn, turn
     names = ("xy", "xz", "yx", "yz", "zx", "zy")
-    said = plain("gyroscope_misalignment", sizes(rows, names, 1e-5))
+    said = plain("gyroscope_misalignment", *sizes(rows, names, 1e-5))
     assert re.match(r"gyroscope 3 is turned by 0.600\d*\s±\s0.000\d+ degrees", said[0])
-    said = plain("gyroscope_scale", sizes([[0, 0, 0], [0, 0, 0], [0.01] * 3], "xyz", 1e-5))
+    said = plain("gyroscope_scale", *sizes([[0, 0, 0], [0, 0, 0], [0.01] * 3], "xyz", 1e-5))
     assert said[0].startswith("gyroscope 3 shows 1.000") and len(said) == 1

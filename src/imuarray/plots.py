@@ -9,6 +9,7 @@ import xarray as xr
 
 from imuarray.errors import require_one_of
 from imuarray.pictures.board import (
+    SURE,
     board,
     given_or_new,
     length,
@@ -95,7 +96,7 @@ def motion(dataset: xr.Dataset, quantity: str = "angular_rate", axes: Axes | Non
     for number, name in enumerate("xyz"):
         style, centre = look(number, "marker"), values[:, number]
         axes.plot(time, centre, linewidth=0.8, label=name, **style)
-        half = 1.96 * sds[:, number]
+        half = SURE * sds[:, number]
         axes.fill_between(time, centre - half, centre + half, color=style["color"], alpha=0.25)
     axes.set(xlabel="time (s)", ylabel=label)
     axes.legend(ncols=3)

@@ -1,16 +1,20 @@
 """Causes in words: what they are, how large, how sure, what cannot be distinguished from them.
 
-The sentences of `diagnosis.json` and of its page alike.
+The sentences of `diagnosis.json` and of both pages. A delay or a turn common to all IMUs is
+nobody's: where one IMU stands out, the others are what it is held against.
 """
+
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from imuarray.diagnosis.plain import (
+    DEGREE,
     NARROW,
-    Sizes,
     first_up,
     joined,
-    plain,
+    number,
     plus_minus,
     probability,
     quantity,
@@ -24,7 +28,14 @@ from imuarray.engine.fit import flat_parameters
 from imuarray.model.array_model import component, unit_of
 from imuarray.model.effects import known_effect
 
-FEW = 3  # parameters that are stated one by one
+STATED = 3  # parameters that are stated one by one
+OUT = 5.0  # sds, and times the usual distance from the median, from which one stands out
+SURE = 3.0  # sds of a single turn that is spoken of
+SEEN = 2.0  # sds of a lag
+FEW = 4  # IMUs that are spoken of one by one
+# Entries beside a matrix' diagonal (xy, xz, yx, yz, zx, zy) whose difference is a turn about x, y
+# and z, and whose sum is a skew.
+BELOW, ABOVE = [5, 1, 2], [3, 4, 0]
 
 
 def parameters_of(search: Search, cause: Cause, sds) -> dict:
@@ -65,11 +76,20 @@ def words(effect: str) -> str:
     return effect.replace("_", " ")
 
 
+def equation(effect: str) -> str:
+    """Change that an effect makes in a reading, in the model's own words."""
+    item = known_effect(effect)
+    if item.apply is None:
+        return item.remedy or words(effect)
+    text = symbols((item.apply.__doc__ or "").strip().split("\n")[0].rstrip("."))
+    return text[:1].lower() + text[1:] if text[1:2].islower() else text
+
+
 def cause_in_words(cause: dict, labels, says: str = "") -> str:
     """A cause of `diagnosis.json` with its size, or what was read (``says``), test and class."""
-    text = f"{words(cause['effect'])}, {whose(cause['sensors'])}: {in_short(cause, labels, says)}"
+    text = in_short(cause, labels, says)
     if stretches := cause.get("stretches_s"):
-        first = [f"{a:.4g} to {b:.4g}" for a, b in stretches[:FEW]]
+        first = [f"{a:.4g} to {b:.4g}" for a, b in stretches[:STATED]]
         text += f"; longest at {', '.join(first)} s"
     gain = plus_minus(cause["heldout_gain_nats"], cause["heldout_gain_se"])
     p_value = probability(cause["log10_p_value"])
@@ -87,38 +107,24 @@ def cause_in_words(cause: dict, labels, says: str = "") -> str:
 
 
 def in_short(cause: dict, labels, says: str = "") -> str:
-    """Kind and size of a cause, in the words of one who holds the board."""
-    effect = cause["effect"]
-    found = plain(effect, _sizes_of(cause, labels)) if cause["parameters"] else []
-    told = [says or sizes(cause, labels)] if says or not found else []
-    parts = found or [known_effect(effect).meaning or words(effect)]
-    return "; ".join(filter(None, parts + told))
-
-
-def _sizes_of(cause: dict, labels) -> Sizes:
-    rows = cause["parameters"].items()
-    return Sizes.of(
-        {split_name(name, labels): (item["value"], item["sd"]) for name, item in rows}, labels
-    )
-
-
-def split_name(name: str, labels) -> tuple[str, str]:
-    """(component, IMU) of a parameter's name; IMU is "" where the name has none."""
-    for label in sorted(labels, key=len, reverse=True):
-        if name.endswith(f"_{label}"):
-            return name[: -len(label) - 1], label
-    return name, ""
+    """Name of a cause, its kind and size in the words of one who holds the board."""
+    effect, rows = cause["effect"], cause["parameters"]
+    values = {name: (item["value"], item["sd"]) for name, item in rows.items()}
+    found = plain(effect, values, labels)
+    told = says if says or found else sizes(cause, labels)
+    said = "; ".join(filter(None, [*(found or meaning(effect)), told]))
+    return f"{words(effect)}, {whose(cause['sensors'])}: {said}"
 
 
 def sizes(cause: dict, labels) -> str:
     """A cause's parameters: each of a few, else their rms and the largest."""
     groups: dict[tuple[str, str], list] = {}
+    effect = known_effect(cause["effect"])
     for name, item in cause["parameters"].items():
         part, label = split_name(name, labels)
         if part == "phase":
             continue
         unit = unit_shown(cause["effect"], name, item["unit"])
-        effect = known_effect(cause["effect"])
         kind = part.split("_")[0] if effect.scanned and unit != "m" else ""
         if effect.kind != "mean":
             kind = "correlation time" if part.startswith("correlation_time") else part.split("_")[0]
@@ -131,7 +137,7 @@ def _group(kind, unit, items) -> str:
     # the sign of a clock's frequency says which way its sawtooth runs
     values = np.abs(values) if kind == "frequency" else values
     several = len({label for _, label, _ in items}) > 1
-    if len(items) <= FEW:
+    if len(items) <= STATED:
         size = np.max(np.abs(values))
         return ", ".join(
             f"{part_in_words(part)}{f' of IMU {label}' if several and label else ''} ".replace(
@@ -152,15 +158,194 @@ def _group(kind, unit, items) -> str:
     return text
 
 
+def split_name(name: str, labels) -> tuple[str, str]:
+    """(component, IMU) of a parameter's name; IMU is "" where the name has none."""
+    for label in sorted(labels, key=len, reverse=True):
+        if name.endswith(f"_{label}"):
+            return name[: -len(label) - 1], label
+    return name, ""
+
+
 def part_in_words(part: str) -> str:
     """'accelerometer z, degree 1' of 'accelerometer_z_degree1'."""
     return part.replace("_degree", ", degree ").replace("_", " ")
 
 
-def equation(effect: str) -> str:
-    """Change that an effect makes in a reading, in the model's own words."""
-    item = known_effect(effect)
-    if item.apply is None:
-        return item.remedy or words(effect)
-    text = symbols((item.apply.__doc__ or "").strip().split("\n")[0].rstrip("."))
-    return text[:1].lower() + text[1:] if text[1:2].islower() else text
+def meaning(effect: str) -> list[str]:
+    """What an effect is, where nothing is known of its size."""
+    return [known_effect(effect).meaning or words(effect)]
+
+
+def plain(effect: str, found: dict[str, tuple[float, float | None]], labels) -> list[str]:
+    """Sentences on an effect without its name; none where there are no plainer words than it.
+
+    ``found``: {parameter: (value, sd)} in SI units, of the IMUs named ``labels``.
+    """
+    return WORDS[effect](Sizes.of(found, labels)) if found and effect in WORDS else []
+
+
+class Sizes(NamedTuple):
+    """An effect's parameters (K, m): of which IMUs, named how, values in SI units, sds."""
+
+    labels: list[str]
+    components: list[str]
+    values: np.ndarray
+    sds: np.ndarray
+
+    @classmethod
+    def of(cls, found: dict[str, tuple[float, float | None]], labels) -> "Sizes":
+        """From {name: (value, sd)}; zero where an IMU has none, NaN without an sd."""
+        rows = {split_name(name, labels): row for name, row in found.items()}
+        parts, labels = list(dict.fromkeys(part for part, _ in rows)), list(labels)
+        table = [[rows.get((part, label), (0.0, 0.0)) for part in parts] for label in labels]
+        values, sds = np.moveaxis(np.array(table, float), -1, 0)
+        return cls(labels, parts, values, sds)
+
+
+def standing_out(values, sds) -> tuple[np.ndarray, float]:
+    """(K,) bool, the values that stand out of (K,), and the mean of the others.
+
+    Of two the second is held against the first.
+    """
+    if len(values) == 2:
+        return np.array([False, True]), float(values[0])
+    off = np.abs(values - np.median(values))
+    out = off > OUT * np.maximum(1.48 * np.median(off), np.nan_to_num(sds))
+    return out, float(np.mean(values[~out]))
+
+
+def _late(sizes: Sizes) -> list[str]:
+    values, sds = sizes.values[:, 0], sizes.sds[:, 0]
+    # where the mean of all is zero, a delay against the others' mean is larger, its sd as well
+    larger = len(values) / max(len(values) - 1, 1) if np.all(sds > 0) else 1.0
+    return _read(sizes.labels, -values, larger * sds)
+
+
+def _read(labels, ages, sds) -> list[str]:
+    """Words on IMUs that are read late, by their ages (K,) s at the stamps."""
+    if len(ages) < 2:
+        return []
+    out, usual = standing_out(ages, sds)
+    said = []
+    for k in np.flatnonzero(out):
+        way, side = ("late", "before") if ages[k] > usual else ("early", "after")
+        said.append(
+            f"IMU {labels[k]} is read {plus_minus(1e3 * abs(ages[k] - usual), 1e3 * sds[k])} ms"
+            f" {way}: it shows the motion that long {side} its stamp"
+        )
+    rest = ages[~out] - usual
+    if len(rest) < 2 or np.abs(rest).max() < OUT * np.nanmax(sds):
+        return said
+    return said + [
+        f"{'the others' if said else 'the IMUs'} are read at instants of their own, from"
+        f" {number(1e3 * rest.max(), 2)} ms late to {number(-1e3 * rest.min(), 2)} ms early against"
+        " their mean"
+    ]
+
+
+def _lag(sizes: Sizes) -> list[str]:
+    values, sds = sizes.values[:, 0], sizes.sds[:, 0]
+    out = standing_out(values, sds)[0] if len(values) > 2 else np.zeros(len(values), bool)
+    usual, error = float(np.mean(values[~out])), float(np.sqrt(np.mean(sds[~out] ** 2)))
+    size = f"{plus_minus(1e3 * abs(usual), 1e3 * error)} ms"
+    side = "run ahead of" if usual > 0 else "lag behind"
+    said = [f"the gyroscopes {side} the accelerometers by {size}"]
+    if abs(usual) < SEEN * error:
+        said = [f"no lag seen between gyroscopes and accelerometers ({size})"]
+    for k in np.flatnonzero(out):
+        own = plus_minus(1e3 * abs(values[k]), 1e3 * sds[k])
+        side = "ahead of" if values[k] > 0 else "behind"
+        said.append(f"gyroscope {sizes.labels[k]} is {own} ms {side} its accelerometer")
+    return said
+
+
+def _clocks(sizes: Sizes) -> list[str]:
+    period, age = (sizes.components.index(name) for name in ("period", "offset"))
+    periods = np.abs(sizes.values[:, period])
+    sure = periods > SURE * np.nan_to_num(sizes.sds[:, period])
+    said = []
+    if sure.any():
+        whose = "the IMUs" if sure.all() else f"IMUs {joined(np.array(sizes.labels)[sure])}"
+        verb = f"{whose} sample on clocks of their own"
+        if sure.sum() == 1:
+            verb = f"IMU {sizes.labels[int(np.argmax(sure))]} samples on a clock of its own"
+        size = quantity(float(np.median(periods[sure])), None, "s")
+        said.append(f"{verb}: a reading is up to {size} old, in a sawtooth")
+    return said + _read(sizes.labels, sizes.values[:, age], sizes.sds[:, age])
+
+
+def _turned(kind: str, sizes: Sizes) -> list[str]:
+    if sizes.values.shape[1] != len(BELOW) + len(ABOVE):
+        return []
+    below, above = (np.nan_to_num(sizes.values)[:, half] for half in (BELOW, ABOVE))
+    turns, skew = (below - above) / 2, np.abs(below + above).max(axis=1) / 2
+    errors = np.hypot(*(np.nan_to_num(sizes.sds)[:, half] for half in (BELOW, ABOVE))) / 2
+    angles = np.linalg.norm(turns, axis=1)
+    sds = np.sqrt(np.sum((turns * errors) ** 2, axis=1)) / np.maximum(angles, 1e-12)
+    worst = int(np.argmax(skew))
+    return [
+        *_angles(kind, sizes.labels, angles, sds),
+        f"axes of the {kind}s are skewed by up to {number(DEGREE * skew[worst], 2)} degrees"
+        f" ({kind} {sizes.labels[worst]})",
+    ]
+
+
+def _angles(kind: str, labels, angles, sds) -> list[str]:
+    """One by one those few that are surely not zero; else how large all are."""
+    sure = angles > SURE * sds
+    out = sure & standing_out(angles, sds)[0] if len(angles) > 2 else sure
+    out = out if out.any() else sure
+    if out.sum() > FEW:
+        low, high = (number(DEGREE * end, 2) for end in (angles.min(), angles.max()))
+        return [f"the {kind}s are turned by {low} to {high} degrees"]
+    return [
+        f"{kind} {labels[k]} is turned by {plus_minus(DEGREE * angles[k], DEGREE * sds[k])} degrees"
+        for k in np.flatnonzero(out)
+    ]
+
+
+def _scaled(kind: str, sizes: Sizes) -> list[str]:
+    means = np.nanmean(sizes.values, axis=1)
+    sds = np.sqrt(np.nanmean(sizes.sds**2, axis=1) / sizes.values.shape[1])
+    out, usual = standing_out(means, sds) if len(means) > 2 else (np.ones(len(means), bool), 0)
+    said = []
+    for k in np.flatnonzero(out):
+        off, mean = sizes.values[k] - usual, means[k] - usual
+        rows = zip(sizes.components, off, sizes.sds[k], strict=True)
+        size = float(np.nanmax(np.abs(off)))
+        axes = joined(f"{name} {quantity(v, sd, '%', size)}" for name, v, sd in rows)
+        if np.ptp(off) < abs(mean):
+            more = "too much" if mean > 0 else "too little"
+            shown = quantity(abs(mean), sds[k], "%")
+            said.append(f"{kind} {sizes.labels[k]} shows {shown} {more} ({axes})")
+        else:
+            said.append(f"the axes of {kind} {sizes.labels[k]} are scaled by {axes}")
+    rest = sizes.values[~out]
+    if len(rest) and np.nanmax(np.abs(rest)) > OUT * np.nanmax(sizes.sds):
+        size = quantity(float(np.nanmax(np.abs(rest))), None, "%")
+        among = "the others'" if said else f"the {kind}s'"
+        said.append(f"{among} axes are scaled by up to {size}")
+    return said
+
+
+def _offset(kind: str, unit: str, sizes: Sizes) -> list[str]:
+    ratio = np.abs(sizes.values) / np.where(sizes.sds > 0, sizes.sds, np.inf)
+    k, i = np.unravel_index(np.argmax(ratio), ratio.shape)
+    if ratio[k, i] < SURE:
+        return [f"offsets of the {kind}s are allowed for, and none is surely there"]
+    size = quantity(abs(sizes.values[k, i]), sizes.sds[k, i], unit)
+    where = f"{kind} {sizes.labels[k]}, {sizes.components[i]}"
+    return [f"the {kind}s have offsets, the surest {size} ({where})"]
+
+
+def _places(sizes: Sizes) -> list[str]:
+    size = quantity(float(np.sqrt(np.nanmean(sizes.values**2))), None, "m")
+    return [f"the three axes of an accelerometer sit at places of their own, {size} apart (rms)"]
+
+
+WORDS = {"sensor_delay": _late, "gyroscope_delay": _lag, "sensor_clock": _clocks}
+WORDS["size_effect"] = _places
+for _kind, _unit in (("accelerometer", "m s-2"), ("gyroscope", "rad s-1")):
+    WORDS[f"{_kind}_misalignment"] = partial(_turned, _kind)
+    WORDS[f"{_kind}_scale"] = partial(_scaled, _kind)
+    WORDS[f"{_kind}_bias"] = partial(_offset, _kind, _unit)

@@ -65,9 +65,8 @@ def spiral(count: int) -> np.ndarray:
     """Directions spread evenly over the sphere, (count, 3)."""
     z = 1 - (2 * np.arange(count) + 1) / count
     angle = np.pi * (3 - np.sqrt(5)) * np.arange(count)
-    return np.stack([np.cos(angle), np.sin(angle), 0 * z], axis=1) * np.sqrt(1 - z**2)[:, None] + (
-        z[:, None] * np.array([0, 0, 1])
-    )
+    radius = np.sqrt(1 - z**2)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
 
 
 def turning_of(calibration: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
@@ -190,13 +189,11 @@ def _together(places, close: float) -> list[list[int]]:
 
 def _no_strip(axes: Axes) -> None:
     """No side shorter than FLAT of the other."""
-    spans = [np.subtract(*limits[::-1]) for limits in (axes.get_xlim(), axes.get_ylim())]
-    for span, other, get, put in (
-        (*spans, axes.get_xlim, axes.set_xlim),
-        (*spans[::-1], axes.get_ylim, axes.set_ylim),
-    ):
-        more = max(FLAT * other - span, 0.0) / 2
-        put(get()[0] - more, get()[1] + more)
+    limits = np.array([axes.get_xlim(), axes.get_ylim()])
+    spans = np.ptp(limits, axis=1)
+    more = np.maximum(FLAT * spans[::-1] - spans, 0.0) / 2
+    x_limits, y_limits = limits + more[:, None] * [-1, 1]
+    axes.set(xlim=x_limits, ylim=y_limits)
 
 
 def round_factor(value: float) -> float:
@@ -251,12 +248,11 @@ def _rows(recording: Recording, calibration: xr.Dataset) -> list[tuple[str, str,
     used, shaken = (np.zeros(count, bool) for _ in range(2))
     used[np.clip(places, 0, count - 1)] = True
     shaken[np.clip(places, 0, count - 1)] = calibration["shaken"].to_numpy() > 0
-    rails = recording.at_rail("accelerometer")
-    rails = rails | recording.at_rail("gyroscope")
+    rails = [recording.at_rail(kind) for kind in KINDS]
     return [
         ("still poses", SKY, still),
         ("used for positions", GREEN, used),
-        ("at a rail", ORANGE, rails),
+        ("at a rail", ORANGE, np.any(rails, axis=0)),
         ("shocks", VERMILLION, shaken),
     ]
 
@@ -287,8 +283,7 @@ def sphere(recording: Recording, calibration: xr.Dataset, axes: Axes | None = No
             if vector[2] * side >= 0:
                 place = np.array(_disc(vector[None], side, centre))[:, 0]
                 out = place + (0.12 * (place - np.array([centre, 0])) if vector[2] == 0 else 0.1)
-                name = f"{'−' if vector.min() < 0 else '+'}{'xyz'[int(np.argmax(np.abs(vector)))]}"
-                axes.text(*out, name, ha="center", va="center", size=9, weight="bold")
+                axes.text(*out, direction(vector), ha="center", va="center", size=9, weight="bold")
     axes.plot([], [], "o", color=VERMILLION, markersize=6, label="up in a still pose")
     axes.plot(
         [], [], "o", color=BLUE, alpha=0.5, markersize=3, label="axis of rotation (larger: faster)"

@@ -19,7 +19,7 @@ from imuarray.diagnosis.plain import (
 )
 from imuarray.diagnosis.words import equation, in_short, whose, words
 from imuarray.model.effects import DATA_EFFECTS, EFFECTS, KINDS
-from imuarray.report.numbers import in_noise_sds, position_table
+from imuarray.report.numbers import in_noise_sds, noise_table, position_table
 
 if TYPE_CHECKING:
     from imuarray.diagnosis.document import Diagnosis
@@ -54,8 +54,7 @@ def verdict(diagnosis: Diagnosis) -> str:
                 "Unexplained: the plain model differs from the recording, and no known cause does."
             )
         return "Nothing: the plain model simulates this recording as far as it can show."
-    said = [f"{words(c['effect'])}, {whose(c['sensors'])}: {in_short(c, labels)}" for c in causes]
-    parts = [f"{first_up(text)}." for text in said[:FEW]]
+    parts = [f"{first_up(in_short(cause, labels))}." for cause in causes[:FEW]]
     if len(causes) > FEW:
         others = joined(words(cause["effect"]) for cause in causes[FEW:])
         parts.append(f"And {others}.")
@@ -193,17 +192,10 @@ def extended(diagnosis: Diagnosis) -> Answer:
 
 def noise_in_words(diagnosis: Diagnosis) -> str:
     """The extended model's noise, by kind, beside the declared one."""
-    readings, parts = diagnosis.found.search.readings, []
-    for kind, name in enumerate(KINDS):
-        there = readings.exists[:, kind]
-        if not there.any():
-            continue
-        unit = ("m s-2", "rad s-1")[kind]
-        size, declared = (
-            span(float(sd[there, kind].min()), float(sd[there, kind].max()), unit)
-            for sd in (readings.sd, readings.declared)
-        )
-        parts.append(f"{name}s {size}, declared {declared}")
+    parts = []
+    for (kind, unit), rows in noise_table(diagnosis).groupby(["kind", "unit"], sort=False):
+        size, declared = (span(sd.min(), sd.max(), unit) for sd in (rows.sd, rows.declared))
+        parts.append(f"{kind}s {size}, declared {declared}")
     return f"noise sd of the triads, as the residual shows it: {'; '.join(parts)}"
 
 

@@ -10,13 +10,13 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from imuarray.diagnosis.plain import Sizes, first_up, number, plainly, plus_minus, quantity
-from imuarray.diagnosis.words import split_name
+from imuarray.diagnosis.plain import DEGREE, first_up, number, plus_minus, quantity
+from imuarray.diagnosis.words import meaning, plain
 from imuarray.estimation.selection import position_sds, weakest_of
 from imuarray.firstorder.correct import FirstOrder
 from imuarray.firstorder.report import parameter_table, turned_lines, write_corrected
 from imuarray.model.effects import KINDS
-from imuarray.pictures.board import levelled, missing
+from imuarray.pictures.board import SURE, levelled, missing
 from imuarray.provenance import atomic_folder, trust, write_bytes, write_csv, write_netcdf
 from imuarray.recording import Recording, write_recording
 from imuarray.report.page import PICTURES, pictured, rendered
@@ -25,7 +25,6 @@ SLOW = np.radians(300.0)  # rad/s rms, of motion that says little of positions
 MISFIT = 1.5  # times the noise: a residual that is looked into
 SHAKEN = 1.2  # times the smooth samples' residual: that of all is clearly above
 NOTHING = " Nothing speaks against them."
-SURE = 1.96  # sds: 95 %
 
 
 def verdict(board: Board) -> str:
@@ -70,13 +69,19 @@ def facts(board: Board) -> str:
     time, calibration = board.recording.time, board.calibration
     rate, count = 1 / np.median(np.diff(time)), len(board.recording.accelerometer_labels)
     found = board.first_order
-    still, noise = "", "declared noise"
+    still, noise, where = "", "declared noise", ""
     if not isinstance(found, str):  # whose noise the corrected recording declares
         still, noise = f" {len(found.poses)} still poses;", "noise of the still poses"
+    size, whole = misfit(calibration), float(calibration.attrs["residual_ratio"])
+    if whole >= SHAKEN * size:
+        where = (
+            f" where the motion is smooth ({number(whole)} times over all: shocks are faster than"
+            " the samples)"
+        )
     return (
         f"{len(time)} samples of {count} IMUs at {rate:.4g} Hz, {time[-1] - time[0]:.1f} s;"
         f"{still} positions from {calibration.attrs['samples']} moving samples, whose"
-        f" residual is {misfit(calibration):.2f} times the {noise}{_shaken(calibration)}."
+        f" residual is {size:.2f} times the {noise}{where}."
     )
 
 
@@ -85,16 +90,6 @@ def misfit(calibration: xr.Dataset) -> float:
     if "gyroscope_smooth_residual" not in calibration:
         return float(calibration.attrs["residual_ratio"])
     return max(float(np.median(calibration[f"{kind}_smooth_residual"])) for kind in KINDS)
-
-
-def _shaken(calibration: xr.Dataset) -> str:
-    whole = float(calibration.attrs["residual_ratio"])
-    if "gyroscope_smooth_residual" not in calibration or whole < SHAKEN * misfit(calibration):
-        return ""
-    return (
-        f" where the motion is smooth ({number(whole)} times over all: shocks are faster than the"
-        " samples)"
-    )
 
 
 def advice(board: Board, folder: Path = Path()) -> list[str]:
@@ -172,11 +167,12 @@ def causes(calibration: xr.Dataset) -> list[str]:
         )
         for name, value, sd in zip(*columns, strict=True):
             effect, part, _ = str(name).split(" ", 2)
-            found.setdefault(effect, {})[split_name(part, labels)] = value, sd
-    said = [
-        line for effect, part in found.items() for line in plainly(effect, Sizes.of(part, labels))
+            found.setdefault(effect, {})[part] = value, sd
+    return [
+        f"{first_up(line)}."
+        for effect, values in found.items()
+        for line in plain(effect, values, labels) or meaning(effect)
     ]
-    return [f"{first_up(line)}." for line in said]
 
 
 def before(board: Board) -> list[str]:
@@ -250,8 +246,8 @@ def html(board: Board) -> str:
     return rendered(
         "board.html.j2", board=board, verdict=verdict(board), facts=facts(board),
         advice=advice(board), causes=causes(board.calibration),
-        turned=turn_table(board), positions=position_table(board.calibration), sure=SURE,
-        prior=board.corrected.position_prior_sd, noise=noises(board),
+        positions=position_table(board.calibration), noise=noises(board), sure=SURE,
+        degree=DEGREE,
         figures=pictured(board.corrected, board.calibration, PICTURES, suffixes=["png"]),
         weakest=weakest(board.calibration), frame=frame(board.calibration),
         before=before(board), account=account(board),
@@ -271,20 +267,6 @@ def position_table(calibration: xr.Dataset) -> pd.DataFrame:
         for name, values in parts.items() for number, axis in enumerate("xyz")
     }  # fmt: skip
     return pd.DataFrame({"imu": calibration["accelerometer"].to_numpy()} | columns)
-
-
-def turn_table(board: Board) -> pd.DataFrame | None:
-    """Turns of the triads against the frame, deg: sensor, imu, x, y, z, sd_x, sd_y, sd_z."""
-    if isinstance(board.first_order, str):
-        return None
-    table = parameter_table(board.first_order, board.recording)
-    table = table[table.parameter == "orientation"]
-    wide = table.pivot(index=["sensor", "triad"], columns="component", values=["value", "sd"])
-    wide = np.degrees(wide.astype(float)).reindex(
-        table[["sensor", "triad"]].drop_duplicates().itertuples(index=False, name=None)
-    )
-    wide.columns = [axis if kind == "value" else f"sd_{axis}" for kind, axis in wide.columns]
-    return wide.rename_axis(["sensor", "imu"]).reset_index()
 
 
 def noises(board: Board) -> pd.DataFrame:

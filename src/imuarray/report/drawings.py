@@ -33,6 +33,15 @@ def legend_above(figure, handles) -> None:
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
 
 
+def by_kind(figure, table, **options) -> list:
+    """(axes, rows) of each kind of sensor that a table has, side by side."""
+    kinds = [kind for kind in KINDS if kind in set(table.kind)]
+    panels = figure.subplots(1, len(kinds), squeeze=False, **options)[0]
+    for axes, kind in zip(panels, kinds, strict=True):
+        axes.set_title(f"{kind}s")
+    return [(axes, table[table.kind == kind]) for axes, kind in zip(panels, kinds, strict=True)]
+
+
 @styled
 def discrepancy_figure(table: pd.DataFrame, footer=()):
     """Every check as a dot beside the band of simulations, in sds of that band; both models.
@@ -40,34 +49,27 @@ def discrepancy_figure(table: pd.DataFrame, footer=()):
     ``table``: `imuarray.report.numbers.discrepancy_table`.
     """
     names = list(dict.fromkeys(table.label))
-    kinds = [kind for kind in KINDS if kind in set(table.kind)]
     figure = new_figure(footer, PAGE, 0.75 + 0.23 * len(names))
-    panels = figure.subplots(1, len(kinds), sharey=True, squeeze=False)[0]
-    for axes, kind in zip(panels, kinds, strict=True):
-        part = table[table.kind == kind]
-        _bands(axes, part[part.model == "base"], names)
+    for axes, part in by_kind(figure, table, sharey=True):
+        axes.axvline(0, color=BLACK, linewidth=0.5)
         for model, shift in (("base", -0.16), ("extended", 0.16)):
-            _dots(axes, part[part.model == model], names, shift, MODELS[model])
+            for row in part[part.model == model].itertuples():
+                _check(axes, row, names.index(row.label), shift)
         axes.set(xlabel="sds of the simulated band", ylim=(len(names) - 0.4, -0.6))
-        axes.set_title(f"{kind}s")
         _wide_scale(axes, part.standardised)
-    panels[0].set_yticks(range(len(names)), names)
-    _discrepancy_legend(figure, panels[0])
+    figure.axes[0].set_yticks(range(len(names)), names)
+    _discrepancy_legend(figure, figure.axes[0])
     return figure
 
 
-def _bands(axes, table, names):
-    for row in table.itertuples():
-        place = names.index(row.label)
+def _check(axes, row, place, shift):
+    """A model's dot; and the band, that of the plain model."""
+    if row.model == "base":
         axes.fill_between([-row.limit, row.limit], place - 0.36, place + 0.36, color="0.87", lw=0)
-    axes.axvline(0, color=BLACK, linewidth=0.5)
-
-
-def _dots(axes, table, names, shift, style):
-    for row in table.itertuples():
-        face = style["color"] if row.p_value <= PLAIN else "white"
-        axes.plot(row.standardised, names.index(row.label) + shift, linestyle="", markersize=4.5,
-                  markerfacecolor=face, **style)  # fmt: skip
+    style = MODELS[row.model]
+    face = style["color"] if row.p_value <= PLAIN else "white"
+    axes.plot(row.standardised, place + shift, linestyle="", markersize=4.5,
+              markerfacecolor=face, **style)  # fmt: skip
 
 
 def _wide_scale(axes, values):
@@ -79,21 +81,21 @@ def _wide_scale(axes, values):
         axes.set_xlim(low, edge if values.max() > 3.6 else 4.5)
         return
     axes.set_xscale("symlog", linthresh=5, linscale=1.2)
-    low, powers = _signed_powers(values, 1, 3, 3)
-    axes.set_xticks([*low, 0, *powers[powers <= 3 * far]])
-    axes.xaxis.set_major_formatter(ticks.FuncFormatter(lambda x, _: f"{x:,.0f}".replace("-", "−")))
+    _ticks_at_powers(axes, values, 1, 3, 3, lambda x, _: f"{x:,.0f}".replace("-", "−"))
     axes.xaxis.set_minor_locator(ticks.NullLocator())
     axes.set_xlim(min(-5, 2 * values.min()), max(5, 2 * values.max()))
 
 
-def _signed_powers(values, first: int, most: int, room: float):
-    """Ticks of a symlog axis: (negative, positive) powers of ten, every other one beyond ``most``.
+def _ticks_at_powers(axes, values, first: int, most: int, room: float, text):
+    """Ticks of a symlog axis at 0 and at powers of ten, every other one beyond ``most``.
 
     From 10^first to the largest size; negative ones down to ``room`` times the least value.
     """
     powers = 10.0 ** np.arange(first, np.ceil(np.log10(np.abs(values).max())) + 1)
     powers = powers[:: 1 + (len(powers) > most)]
-    return -powers[powers <= room * abs(min(values.min(), 0))][::-1], powers
+    low = -powers[powers <= room * abs(min(values.min(), 0))][::-1]
+    axes.set_xticks([*low, 0, *powers])
+    axes.xaxis.set_major_formatter(ticks.FuncFormatter(text))
 
 
 def _discrepancy_legend(figure, axes):
@@ -119,14 +121,10 @@ def residual_figure(table: pd.DataFrame, footer=()):
     ``table``: `imuarray.report.numbers.residual_table`.
     """
     figure = new_figure(footer, PAGE, 2.7)
-    kinds = [kind for kind in KINDS if kind in set(table.kind)]
-    panels = figure.subplots(1, len(kinds), squeeze=False)[0]
-    for axes, kind in zip(panels, kinds, strict=True):
-        part = table[table.kind == kind]
+    for axes, part in by_kind(figure, table):
         _residuals(axes, part)
-        axes.set_title(f"{kind}s")
-    panels[0].set_ylabel("rms residual / declared noise")
-    axes = panels[0]
+    axes = figure.axes[0]
+    axes.set_ylabel("rms residual / declared noise")
     handles = _model_handles(axes, 5)
     handles += axes.plot([], [], "_", color=GREY, markersize=5, label="single axes")
     handles += axes.plot([], [], "-", color=BLACK, linewidth=1.5, label="noise, extended model")
@@ -211,9 +209,7 @@ def _gain_scale(axes, table):
         axes.margins(x=0.06)
         return
     axes.set_xscale("symlog", linthresh=100, linscale=0.7)
-    low, powers = _signed_powers(ends, 2, 5, 1.5)
-    axes.set_xticks([*low, 0, *powers])
-    axes.xaxis.set_major_formatter(ticks.FuncFormatter(_power))
+    _ticks_at_powers(axes, ends, 2, 5, 1.5, _power)
     axes.set_xlim(min(2 * ends.min(), -30), 2 * ends.max())
 
 

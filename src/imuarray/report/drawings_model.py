@@ -5,6 +5,7 @@ import pandas as pd
 
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.words import words
+from imuarray.pictures.board import SURE
 from imuarray.pictures.style import BLACK, BLUE, LOOKS, PAGE, VERMILLION, new_figure, shade, styled
 from imuarray.report.drawings import MODELS, NAMES, imu_ticks, legend_above, plain
 
@@ -30,7 +31,7 @@ def position_figure(table: pd.DataFrame, footer=()):
             ("base", -0.15, 0 * part.change),
             ("extended", 0.15, part.change),
         ):
-            axes.errorbar(places + shift, factor * centre, factor * 1.96 * part[f"{model}_sd"],
+            axes.errorbar(places + shift, factor * centre, factor * SURE * part[f"{model}_sd"],
                           linestyle="", markersize=0.8 * size, elinewidth=0.9, label=NAMES[model],
                           **MODELS[model])  # fmt: skip
         axes.axhline(0, color=BLACK, linewidth=0.5)

@@ -16,13 +16,24 @@ from imuarray.model.effects import KINDS
 
 if TYPE_CHECKING:
     from imuarray.diagnosis.document import Diagnosis, Fitted
+    from imuarray.engine.fit import Fit
 
 BAND = ndtri(0.975)  # sds of a 95 % band
 
 
-def imu_labels(diagnosis: Diagnosis) -> tuple[str, ...]:
-    """Labels of the N IMUs."""
-    return diagnosis.found.search.readings.labels
+def in_declared_sds(made: Fit) -> np.ndarray:
+    """Residuals (T, N, 6) over the declared noise, corrected for what the motion takes up."""
+    readings = made.readings
+    return standardised(made) * np.repeat(readings.sd / readings.declared, 3, axis=1)
+
+
+def in_noise_sds(fitted: Fitted) -> dict[str, float]:
+    """rms of the residual over the declared noise, by kind: 1 where the noise is as declared."""
+    unit, exists = in_declared_sds(fitted.fit), fitted.fit.readings.exists
+    return {
+        name: float(np.sqrt(np.nanmean(unit[:, :, 3 * kind : 3 * kind + 3] ** 2)))
+        for kind, name in enumerate(KINDS) if exists[:, kind].any()
+    }  # fmt: skip
 
 
 def discrepancy_table(diagnosis: Diagnosis) -> pd.DataFrame:
@@ -46,11 +57,7 @@ def discrepancy_table(diagnosis: Diagnosis) -> pd.DataFrame:
                 "standardised": BAND * far / max(edge, 1e-300),
                 "limit": -ndtri((1 - 0.95 ** (1 / number)) / 2), "p_value": item.p_value,
             })  # fmt: skip
-    table = pd.DataFrame(rows)
-    order = {name: place for place, name in enumerate(TESTS)}
-    return table.sort_values(
-        "check", key=lambda names: names.map(order), kind="stable", ignore_index=True
-    )
+    return pd.DataFrame(sorted(rows, key=lambda row: list(TESTS).index(row["check"])))
 
 
 def detectable_table(diagnosis: Diagnosis) -> pd.DataFrame:
@@ -88,8 +95,7 @@ def residual_table(diagnosis: Diagnosis) -> pd.DataFrame:
     rows = []
     for model in ("base", "extended"):
         made = getattr(diagnosis, model).fit
-        readings = made.readings
-        unit = standardised(made) * np.repeat(readings.sd / readings.declared, 3, axis=1)
+        readings, unit = made.readings, in_declared_sds(made)
         for imu, kind in np.argwhere(readings.exists):
             triad = unit[:, imu, 3 * kind : 3 * kind + 3]
             count = max(int(np.isfinite(triad).sum()), 1)
@@ -157,7 +163,7 @@ def gain_table(diagnosis: Diagnosis) -> pd.DataFrame:
 def position_table(diagnosis: Diagnosis) -> pd.DataFrame:
     """One row for each triad but the reference: positions and sds of both models, m."""
     document = diagnosis.document
-    names = imu_labels(diagnosis)[: len(document["base"]["positions_m"])]
+    names = diagnosis.found.search.readings.labels[: len(document["base"]["positions_m"])]
     pairs = [(label, axis) for label in names for axis in "xyz"]
     table = pd.DataFrame(pairs, columns=["imu", "axis"])
     for model in ("base", "extended"):
@@ -173,12 +179,9 @@ def separability_table(diagnosis: Diagnosis) -> pd.DataFrame:
     """One row for each pair of effects: the largest and the mean squared canonical correlation."""
     search = diagnosis.found.search
     found = separability(search.given, search.fit, [(c.effect, c.imus) for c in search.causes])
-    pairs = [(i, j) for i in range(len(found.effects)) for j in range(len(found.effects))]
-    return pd.DataFrame({
-        "effect": [found.effects[i] for i, _ in pairs],
-        "other": [found.effects[j] for _, j in pairs],
-        "largest": found.largest.ravel(), "mean": found.mean.ravel(),
-    })  # fmt: skip
+    pairs = pd.MultiIndex.from_product([found.effects] * 2, names=["effect", "other"])
+    columns = {"largest": found.largest.ravel(), "mean": found.mean.ravel()}
+    return pd.DataFrame(columns, pairs).reset_index()
 
 
 def score_table(diagnosis: Diagnosis) -> pd.DataFrame:
@@ -202,13 +205,3 @@ def score_table(diagnosis: Diagnosis) -> pd.DataFrame:
         }
         for effect, score in best.items()
     ])  # fmt: skip
-
-
-def in_noise_sds(fitted: Fitted) -> dict[str, float]:
-    """rms of the residual over the declared noise, by kind: 1 where the noise is as declared."""
-    readings = fitted.fit.readings
-    unit = standardised(fitted.fit) * np.repeat(readings.sd / readings.declared, 3, axis=1)
-    return {
-        name: float(np.sqrt(np.nanmean(unit[:, :, 3 * kind : 3 * kind + 3] ** 2)))
-        for kind, name in enumerate(KINDS) if readings.exists[:, kind].any()
-    }  # fmt: skip

@@ -12,24 +12,12 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 import imuarray
-from imuarray.diagnosis.plain import (
-    fixed,
-    number,
-    plus_minus,
-    probability,
-    quantity,
-    symbols,
-    unit_shown,
-)
-from imuarray.diagnosis.words import part_in_words, split_name, whose, words
+from imuarray.diagnosis import plain, words
 from imuarray.model.effects import KINDS
 from imuarray.pictures import board as pictures
 from imuarray.pictures.style import PAGE, new_figure, saved, styled
 from imuarray.recording import Recording
 
-# What the templates' tables call.
-IN_TABLES = (fixed, number, part_in_words, plus_minus, probability, quantity, split_name, symbols,
-             unit_shown, whose, words)  # fmt: skip
 # Pictures of a calibration: height, one drawing each panel, the variables shown, title, caption.
 PICTURES = {
     "board": (
@@ -84,6 +72,7 @@ class Drawing(NamedTuple):
         return base64.b64encode(self.files["png"]).decode("ascii")
 
 
+@styled
 def pictured(
     recording: Recording, calibration: xr.Dataset, names, footer=(), suffixes=SUFFIXES
 ) -> list[Drawing]:
@@ -94,21 +83,14 @@ def pictured(
         given = (recording, calibration) if name in OF_RECORDING else (calibration,)
         if name == "sphere":
             caption = f"{caption} {pictures.shown(recording, calibration)}"
-        figure = beside(height, [partial(part, *given) for part in parts], footer)
+        figure = new_figure(footer, PAGE, height)
+        panels = figure.subplots(1, len(parts), squeeze=False)[0]
+        for part, axes in zip(parts, panels, strict=True):
+            part(*given, axes=axes)
         table = pd.concat([calibration[each].to_dataframe() for each in shown], axis=1)
         drawn = files(figure, table.reset_index(), suffixes)
         found.append(Drawing(name, title, caption, drawn))
     return found
-
-
-@styled
-def beside(height: float, drawings, footer=()) -> Figure:
-    """Pictures beside each other, each a function of its ``axes``."""
-    figure = new_figure(footer, PAGE, height)
-    panels = figure.subplots(1, len(drawings), squeeze=False)[0]
-    for drawing, axes in zip(drawings, panels, strict=True):
-        drawing(axes=axes)
-    return figure
 
 
 def files(figure: Figure, table: pd.DataFrame, suffixes=SUFFIXES) -> dict[str, bytes]:
@@ -122,5 +104,5 @@ def rendered(template: str, **given) -> str:
     environment = Environment(
         loader=PackageLoader("imuarray.report", "."), undefined=StrictUndefined, autoescape=True
     )
-    environment.globals |= {function.__name__: function for function in IN_TABLES}
+    environment.globals |= vars(plain) | vars(words)  # which the tables call
     return environment.get_template(template).render(version=imuarray.__version__, **given)

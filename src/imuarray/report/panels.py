@@ -35,8 +35,7 @@ class Signal(NamedTuple):
     effect: str
     imus: tuple[int, ...]
     mask: np.ndarray  # (N, m) bool, its free parameters
-    flat: np.ndarray  # (N, m) values of all parameters
-    sds: np.ndarray  # (N, m)
+    sure: np.ndarray  # (N, m) sds by which these are off zero, 0 of others
     explained: np.ndarray  # what it explains that nothing else could
     total: np.ndarray  # the same and the residual, NaN where readings are left out
     width: np.ndarray  # (N, 6) sd of a residual
@@ -44,11 +43,12 @@ class Signal(NamedTuple):
 
 def signal_of(diagnosis: Diagnosis, cause) -> Signal:
     """The `Signal` of an adopted cause (effect, imus) in the extended model."""
-    made = diagnosis.extended.fit
+    made, sds = diagnosis.extended.fit, diagnosis.extended.sds
     columns, flat = made.columns, flat_parameters(made.columns, made.state)
     mask = np.zeros_like(made.active)
     mask[np.ix_(list(cause.imus), columns.of(cause.effect))] = True
     mask &= made.active
+    sure = np.where(mask, np.abs(flat) / np.where(sds > 0, sds, np.inf), 0.0)
     left = made.less_motion(made.along(np.where(mask, flat, 0.0)))
     others = made.active & ~mask
     information, _ = made.normal(others)
@@ -64,13 +64,10 @@ def signal_of(diagnosis: Diagnosis, cause) -> Signal:
     rho = np.clip(diagnosis.found.search.noise.correlation, 0.0, 0.99)
     inflated = np.repeat(np.sqrt((1 + rho) / (1 - rho)), 3, axis=1)
     width = np.sqrt(np.maximum(1.0 - made.leverage, 1e-6)).mean(axis=0) * inflated
-    return Signal(
-        made, cause.effect, tuple(cause.imus), mask, flat, diagnosis.extended.sds, explained,
-        total, width,
-    )  # fmt: skip
+    return Signal(made, cause.effect, tuple(cause.imus), mask, sure, explained, total, width)
 
 
-def binned(x, total, explained, width, bins=BINS) -> pd.DataFrame:
+def binned(x, total, explained, width) -> pd.DataFrame:
     """Means over bins of x: x, y, se, model; NaN in total left out.
 
     Bins share the sum of the distances from the median, and so reach where a slope is determined.
@@ -79,11 +76,11 @@ def binned(x, total, explained, width, bins=BINS) -> pd.DataFrame:
     x, total, explained = x[kept], total[kept], explained[kept]
     width = np.broadcast_to(width, kept.shape)[kept]
     if not len(x) or np.ptp(x) == 0:
-        return pd.DataFrame()
+        return pd.DataFrame(columns=["x", "y", "se", "model"], dtype=float)
     order = np.argsort(x)
     far = np.abs(x[order] - np.median(x))
     shares = np.cumsum(far + far.mean())
-    edges = x[order][np.searchsorted(shares, shares[-1] * np.linspace(0, 1, bins + 1)[1:-1])]
+    edges = x[order][np.searchsorted(shares, shares[-1] * np.linspace(0, 1, BINS + 1)[1:-1])]
     edges = np.unique([x[order[0]], *edges, x[order[-1]]])
     place = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
     counts = np.bincount(place, minlength=len(edges) - 1)
@@ -97,15 +94,13 @@ def binned(x, total, explained, width, bins=BINS) -> pd.DataFrame:
     )
 
 
-if TYPE_CHECKING:
-    from imuarray.diagnosis.document import Diagnosis
-
 PANELS = 3  # special drawings of a cause
 VAGUE = 12.0  # times the best block's sd, from which a block determines no position
 BLOCKS = 12  # of time, in which a position is estimated again
 # From SI to what the figures show, and its unit; the smaller unit for small signals.
 FORCE = ((1.0, "m/s²"), (1e3, "mm/s²"))
 RATE = ((np.degrees(1.0), "deg/s"), (1e3 * np.degrees(1.0), "10⁻³ deg/s"))
+LENGTH = ((1e3, "mm"), (1e6, "µm"))
 
 
 def cause_table(diagnosis: Diagnosis, cause) -> pd.DataFrame:
@@ -115,8 +110,7 @@ def cause_table(diagnosis: Diagnosis, cause) -> pd.DataFrame:
     touches), the others show the cause beside what it depends on.
     """
     signal = signal_of(diagnosis, cause)
-    frames = [added_variable(signal)]
-    frames += PANELS_AGAINST.get(EFFECTS[cause.effect].against, parameter_panels)(signal)
+    frames = [added_variable(signal), *panels_of(cause.effect)[0](signal)]
     frames = [frame for frame in frames if len(frame)]
     for number, frame in enumerate(frames):
         frame.insert(0, "panel", number)
@@ -136,37 +130,40 @@ def added_variable(signal: Signal) -> pd.DataFrame:
         frames.append(
             binned(*(v.ravel() for v in (explained, total, explained, width))).assign(series=name)
         )
-    return labelled(
-        pd.concat(frames, ignore_index=True), "all readings it touches",
-        "predicted (noise sds)", "seen without it (noise sds)",
+    return pd.concat(frames, ignore_index=True).assign(
+        title="all readings it touches", x_label="predicted (noise sds)",
+        y_label="seen without it (noise sds)",
     )  # fmt: skip
 
 
-def labelled(frame, title, x_label, y_label) -> pd.DataFrame:
-    """The frame with its panel's texts."""
-    return frame.assign(title=title, x_label=x_label, y_label=y_label)
+def panel(frame, title, x_label, y_label, units, scale=1.0, least=0.1) -> pd.DataFrame:
+    """The marks x, y, se, model of one panel, all but x in a legible unit, with its texts.
+
+    ``scale`` makes them SI; the second of ``units`` is for those all below ``least`` of the first.
+    """
+    size = np.max(np.abs(scale * frame[["y", "model"]].to_numpy()), initial=0.0)
+    factor, unit = units[0] if size * units[0][0] >= least else units[1]
+    frame = frame.assign(series="", title=title, x_label=x_label, y_label=f"{y_label} ({unit})")
+    frame[["y", "se", "model"]] *= factor * scale
+    return frame
 
 
-def unit_of_axis(values, axis: int) -> tuple[float, str]:
-    """(factor, unit) in which an SI signal (its bins' values) of axis 0 ... 5 is legible."""
-    units = RATE if axis >= 3 else FORCE
-    large = np.max(np.abs(values), initial=0.0) * units[0][0]
-    return units[0] if large >= 0.1 else units[1]
-
-
-def axis_panel(signal: Signal, imu, axis, x, title, x_label, series="") -> pd.DataFrame:
+def axis_panel(signal: Signal, imu, axis, x, title, x_label) -> pd.DataFrame:
     """One reading axis of an IMU, in physical units, binned over x (T,)."""
-    sd = signal.made.readings.sd[imu, axis // 3]
-    found = binned(
-        x, signal.total[:, imu, axis], signal.explained[:, imu, axis], signal.width[imu, axis]
-    )
-    if not len(found):
-        return found
-    factor, unit = unit_of_axis(sd * found[["y", "model"]].to_numpy(), axis)
-    found[["y", "se", "model"]] *= factor * sd
-    kind = "gyroscope" if axis >= 3 else "accelerometer"
-    whose = f"{kind} {signal.made.readings.labels[imu]}, {AXES[axis % 3]}"
-    return labelled(found.assign(series=series), f"{whose}{title}", x_label, f"deviation ({unit})")
+    part, readings = (slice(None), imu, axis), signal.made.readings
+    found = binned(x, signal.total[part], signal.explained[part], signal.width[imu, axis])
+    kind, units = ("gyroscope", RATE) if axis >= 3 else ("accelerometer", FORCE)
+    title = f"{kind} {readings.labels[imu]}, {AXES[axis % 3]}{title}"
+    return panel(found, title, x_label, "deviation", units, readings.sd[imu, axis // 3])
+
+
+def largest(values) -> list[tuple[int, int]]:
+    """(row, column) of the few largest of a matrix's values above zero, in the matrix's order."""
+    best = np.sort(np.argsort(values, axis=None)[::-1][:PANELS])
+    return [
+        tuple(map(int, np.unravel_index(place, values.shape)))
+        for place in best if values.ravel()[place] > 0
+    ]  # fmt: skip
 
 
 def time_panels(signal: Signal) -> list[pd.DataFrame]:
@@ -177,27 +174,14 @@ def time_panels(signal: Signal) -> list[pd.DataFrame]:
     if EFFECTS[signal.effect].sensors in KINDS:
         kind = KINDS.index(EFFECTS[signal.effect].sensors)
         power[:, 3 - 3 * kind : 6 - 3 * kind] = 0.0
-    best = np.sort(np.argsort(power, axis=None)[::-1][:PANELS])
-    return [
-        axis_panel(signal, *np.unravel_index(place, power.shape), signal.made.readings.time,
-                   "", "time (s)")
-        for place in best if power.ravel()[place] > 0
-    ]  # fmt: skip
-
-
-def strongest(signal: Signal) -> list[tuple[int, int]]:
-    """(imu, column) of the free parameters that are most sds from zero."""
-    ratio = np.abs(signal.flat) / np.where(signal.sds > 0, signal.sds, np.inf)
-    ratio = np.where(signal.mask, ratio, 0.0)
-    best = np.sort(np.argsort(ratio, axis=None)[::-1][:PANELS])
-    return [tuple(map(int, np.unravel_index(place, ratio.shape))) for place in best
-            if ratio.ravel()[place] > 0]  # fmt: skip
+    time = signal.made.readings.time
+    return [axis_panel(signal, *place, time, "", "time (s)") for place in largest(power)]
 
 
 def parameter_panels(signal: Signal) -> list[pd.DataFrame]:
     """The most certain parameters, each axis's deviation against what the parameter multiplies."""
     made, panels = signal.made, []
-    for imu, column in strongest(signal):
+    for imu, column in largest(signal.sure):
         derivative = made.whitened[:, imu, :, column]
         axis = int(np.argmax(np.sum(derivative**2, axis=0)))
         x = derivative[:, axis] * made.readings.sd[imu, axis // 3]
@@ -229,23 +213,18 @@ def abscissa(effect: str, name: str) -> tuple[float, str, bool]:
 
 def delay_panels(signal: Signal) -> list[pd.DataFrame]:
     """Delays: the gyroscope's deviation along domega/dt against its size."""
-    made = signal.made
-    turn = made.state.motion[:, 3:6]
+    readings, turn = signal.made.readings, signal.made.state.motion[:, 3:6]
     size = np.linalg.norm(turn, axis=1)
     way = turn / np.maximum(size, 1e-12)[:, None]
     panels = []
-    for imu, _ in strongest(signal):
-        if not made.readings.exists[imu, 1]:
-            continue
-        sd = made.readings.sd[imu, 1]
-        parts = (np.sum(v[:, imu, 3:] * way, axis=1) for v in (signal.total, signal.explained))
-        found = binned(size, *parts, signal.width[imu, 3:].mean())
-        factor, unit = unit_of_axis(sd * found[["y", "model"]].to_numpy(), 3)
-        found[["y", "se", "model"]] *= factor * sd
-        panels.append(labelled(
-            found.assign(series=""), f"gyroscope {made.readings.labels[imu]}, along dω/dt",
-            "|dω/dt| (rad/s²)", f"deviation ({unit})",
-        ))  # fmt: skip
+    for imu, _ in largest(signal.sure):
+        if readings.exists[imu, 1]:
+            parts = (np.sum(v[:, imu, 3:] * way, axis=1) for v in (signal.total, signal.explained))
+            found = binned(size, *parts, signal.width[imu, 3:].mean())
+            title = f"gyroscope {readings.labels[imu]}, along dω/dt"
+            panels.append(
+                panel(found, title, "|dω/dt| (rad/s²)", "deviation", RATE, readings.sd[imu, 1])
+            )
     return panels
 
 
@@ -257,7 +236,8 @@ def clock_panels(signal: Signal) -> list[pd.DataFrame]:
     for imu in sorted(signal.imus, key=lambda k: -abs(clocks[k][0]))[:PANELS]:
         frequency = float(clocks[imu][1])
         turns = clock_turns(clocks[imu], made.readings.time, made.readings.span)
-        part = (turns - np.floor(turns)) if frequency > 0 else 1 - (turns - np.floor(turns))
+        part = turns - np.floor(turns)
+        part = part if frequency > 0 else 1 - part
         age = age_of(clocks[imu], turns)
         place = np.clip((part * 2 * BINS).astype(int), 0, 2 * BINS - 1)
         weight = np.bincount(place, information[:, imu], 2 * BINS)
@@ -269,12 +249,10 @@ def clock_panels(signal: Signal) -> list[pd.DataFrame]:
         frame = pd.DataFrame({
             "x": 1e3 * means[0] / abs(frequency), "y": 1e3 * means[1],
             "se": 1e3 / np.sqrt(weight[some]), "model": 1e3 * means[2], "series": "",
+            "title": f"IMU {made.readings.labels[imu]}, {abs(frequency):.4g} Hz",
+            "x_label": "time mod 1/f, twice (ms)", "y_label": "age of a reading (ms)",
         })  # fmt: skip
-        frame = pd.concat([frame, frame.assign(x=frame.x + 1e3 / abs(frequency))])
-        panels.append(labelled(
-            frame, f"IMU {made.readings.labels[imu]}, {abs(frequency):.4g} Hz",
-            "time mod 1/f, twice (ms)", "age of a reading (ms)",
-        ))  # fmt: skip
+        panels.append(pd.concat([frame, frame.assign(x=frame.x + 1e3 / abs(frequency))]))
     return panels
 
 
@@ -289,13 +267,10 @@ def shift_panels(signal: Signal) -> list[pd.DataFrame]:
             frame = pd.DataFrame(
                 [(t, *(value[axis] for value in values)) for t, *values in found],
                 columns=["x", "y", "se", "model"],
-            ).assign(series="")
+            )
             frame = frame[frame.se < VAGUE * frame.se.min()]
-            large = frame[["y", "model"]].abs().to_numpy().max() >= 1e-3
-            factor, unit = (1e3, "mm") if large else (1e6, "µm")
-            frame[["y", "se", "model"]] *= factor
             title = f"IMU {made.readings.labels[imu]}, position {AXES[axis]}"
-            panels.append(labelled(frame, title, "time (s)", f"from the mean ({unit})"))
+            panels.append(panel(frame, title, "time (s)", "from the mean", LENGTH, least=1.0))
     return panels
 
 
@@ -312,7 +287,22 @@ def position_of_block(signal: Signal, imu, chosen, part):
     return float(made.readings.time[part].mean()), seen, np.sqrt(np.diag(inverse)), step
 
 
-PANELS_AGAINST = {
-    "age": clock_panels, "place": shift_panels, "time": time_panels,
-    "angular acceleration": delay_panels,
-}  # fmt: skip
+AGAINST = {  # by what an effect is drawn against: its panels, and what they show
+    "age": (
+        clock_panels,
+        "the age of the readings from each sample alone, against the time within a turn of the"
+        " sawtooth, drawn twice",
+    ),
+    "place": (shift_panels, "the triad's position in blocks of time"),
+    "time": (time_panels, "the axes that it changes most, against time"),
+    "angular acceleration": (
+        delay_panels,
+        "the gyroscope along dω/dt against its size; the slope is the delay",
+    ),
+}
+PARAMETERS = parameter_panels, "the most certain parameters, against what each multiplies"
+
+
+def panels_of(effect: str):
+    """(function of a `Signal`, caption) of the panels of an effect's own physics."""
+    return AGAINST.get(EFFECTS[effect].against, PARAMETERS)

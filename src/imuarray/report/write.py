@@ -10,14 +10,13 @@ import xarray as xr
 
 from imuarray.diagnosis.words import sensors_of, whose, words
 from imuarray.engine.dataset import diagnosed
-from imuarray.model import EFFECTS
 from imuarray.provenance import atomic_folder, write_bytes, write_netcdf
 from imuarray.report import drawings as drawn
 from imuarray.report import numbers
 from imuarray.report.answers import USUAL, alarming, answers, verdict
 from imuarray.report.drawings_model import ALIKE, cause_figure, position_figure, separability_figure
 from imuarray.report.page import SUFFIXES, Drawing, files, pictured, rendered
-from imuarray.report.panels import cause_table
+from imuarray.report.panels import cause_table, panels_of
 
 if TYPE_CHECKING:
     from imuarray.diagnosis.document import Diagnosis
@@ -62,19 +61,12 @@ FIGURES = {  # by name: table, drawing, title, caption
         " intervals as each model claims them.",
     ),
 }  # fmt: skip
+LONGEST = 70  # characters of a path
 CAUSE_CAPTION = (
     "What would be back in the residual without this cause, motion and all else refitted (points:"
     " means of bins with two standard errors), and what the cause predicts (lines); where points"
     " leave the lines, the cause does not fit. Left: all readings that it touches. Right: {}."
 )
-PARAMETERS = "the most certain parameters, against what each multiplies"
-BESIDE = {  # by what it is drawn against
-    "age": "the age of the readings from each sample alone, against the time within a turn"
-    " of the sawtooth, drawn twice",
-    "place": "the triad's position in blocks of time",
-    "time": "the axes that it changes most, against time",
-    "angular acceleration": "the gyroscope along dω/dt against its size; the slope is the delay",
-}
 
 
 def write_report(diagnosis: Diagnosis, folder: str | Path) -> None:
@@ -112,11 +104,11 @@ def draw(diagnosis: Diagnosis, calibration: xr.Dataset) -> list[Drawing]:
         found.append(_drawing("gain", diagnosis, said))
     for place, cause in enumerate(diagnosis.found.search.causes):
         table = cause_table(diagnosis, cause)
-        sensors = sensors_of(numbers.imu_labels(diagnosis), cause.imus)
+        sensors = sensors_of(diagnosis.found.search.readings.labels, cause.imus)
         found.append(Drawing(
             f"cause_{place + 1:02d}_{cause.effect}",
             f"Cause: {words(cause.effect)}, {whose(sensors)}",
-            CAUSE_CAPTION.format(BESIDE.get(EFFECTS[cause.effect].against, PARAMETERS)),
+            CAUSE_CAPTION.format(panels_of(cause.effect)[1]),
             files(cause_figure(table, said), table),
         ))  # fmt: skip
     found += [
@@ -127,9 +119,11 @@ def draw(diagnosis: Diagnosis, calibration: xr.Dataset) -> list[Drawing]:
 
 
 def footer(document: dict) -> list[str]:
-    """The small print under a diagnosis' figures."""
+    """The small print under a diagnosis' figures; of a long path its end."""
+    path = " ".join(document["recording"].split()) or "a recording"
+    path = path if len(path) <= LONGEST else f"…{path[1 - LONGEST :]}"
     return [
-        f"{drawn.plain(shortened(document['recording']))}; {document['samples']} samples,"
+        f"{drawn.plain(path)}; {document['samples']} samples,"
         f" seed {document['seed']}, imuarray {document['version']}"
     ]
 
@@ -141,19 +135,12 @@ def _drawing(name: str, diagnosis: Diagnosis, footer) -> Drawing:
     return Drawing(name, *texts, files(make_figure(table, footer), table))
 
 
-def shortened(path: str, most: int = 70) -> str:
-    """A path's end, on one line."""
-    text = " ".join(str(path).split()) or "a recording"
-    return text if len(text) <= most else f"…{text[1 - most :]}"
-
-
 def html(diagnosis: Diagnosis, drawings: list[Drawing]) -> str:
     """report.html, every text escaped."""
     document = diagnosis.document
     return rendered(
         "report.html.j2",
         document=document,
-        recording=str(document["recording"]) or "a recording",
         facts=facts(diagnosis),
         verdict=verdict(diagnosis),
         alarming=alarming(document),
@@ -162,8 +149,7 @@ def html(diagnosis: Diagnosis, drawings: list[Drawing]) -> str:
         usual=USUAL,
         checks=diagnosis.base.discrepancies,
         after={item.check: item for item in diagnosis.extended.discrepancies},
-        causes=document["causes"],
-        labels=numbers.imu_labels(diagnosis),
+        labels=diagnosis.found.search.readings.labels,
         positions=numbers.position_table(diagnosis),
         noise=numbers.noise_table(diagnosis),
         scores=numbers.score_table(diagnosis),
