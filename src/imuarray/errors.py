@@ -37,6 +37,12 @@ class IdentifiabilityError(InputError):
     """The input is well formed, but does not determine the quantities asked for."""
 
 
+def require(holds: object, where: str, expected: str, found: object) -> None:
+    """InputError unless something ``holds``: "where: expected ..., found ..."."""
+    if not holds:
+        raise InputError(f"{where}: expected {expected}, found {found}")
+
+
 def require_integer(name: str, value: object, least: int = 1) -> None:
     """InputError unless ``value`` is an integer of at least ``least``; a bool is none."""
     integral = isinstance(value, Integral) and not isinstance(value, bool)

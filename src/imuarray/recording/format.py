@@ -51,8 +51,8 @@ def from_dataset(dataset: xr.Dataset, where: str = "recording", stored: bool = F
     }  # fmt: skip
     recording = Recording(
         **arrays,
-        accelerometer_labels=_labels(dataset["accelerometer"]),
-        gyroscope_labels=_labels(dataset["gyroscope"]),
+        accelerometer_labels=validate.labels_of(dataset["accelerometer"]),
+        gyroscope_labels=validate.labels_of(dataset["gyroscope"]),
         **flags,
         **matrices,
         correction=dataset[list(CORRECTION)] if set(CORRECTION) & set(dataset) else None,
@@ -70,12 +70,6 @@ def _in_si_units(variable: xr.DataArray, where: str, stored: bool) -> np.ndarray
     if stored:
         return Stored(variable.variable, scale)
     return scale * np.asarray(variable.values, dtype=float)
-
-
-def _labels(coordinate: xr.DataArray) -> tuple[str, ...]:
-    """Labels as text; NetCDF's character arrays arrive as bytes."""
-    values = coordinate.values.tolist()
-    return tuple(v.decode(errors="replace") if isinstance(v, bytes) else v for v in values)
 
 
 def read_recording(path: str | Path, stored: bool = False) -> Recording:

@@ -31,6 +31,16 @@ FIRST_ORDER = "first_order"
 # Group with how the logs of loose IMUs were brought together.
 ALIGNMENT = "alignment"
 
+# Optional variables, all or none: how the readings were corrected, inverse @ (raw - offset).
+CORRECTION = {
+    f"{kind}_{name}": (kind, *dims)
+    for kind in ("accelerometer", "gyroscope")
+    for name, dims in (
+        ("inverse", ("axis", "axis_other")), ("offset", ("axis",)), ("offset_sd", ("axis",)),
+        ("offset_walk", ()),
+    )
+}  # fmt: skip
+
 DIMENSIONS = {
     "time": ("time",),
     "specific_force": ("time", "accelerometer", "axis"),
@@ -41,6 +51,7 @@ DIMENSIONS = {
     "angular_rate_saturated": ("time", "gyroscope", "axis"),
     "map_covariance": ("map_entry", "map_entry_other"),
     "accelerometer_axes": ("accelerometer", "axis", "axis_other"),
+    **CORRECTION,
 }
 
 # Optional variables that are true or false.
@@ -72,16 +83,6 @@ OPTIONAL_NUMBERS = {"output_period": "s"}
 
 # Optional variables without a unit.
 MATRICES = ("map_covariance", "accelerometer_axes")
-
-# Optional variables, all or none: how the readings were corrected, inverse @ (raw - offset).
-CORRECTION = {
-    f"{kind}_{name}": (kind, *dims)
-    for kind in ("accelerometer", "gyroscope")
-    for name, dims in (
-        ("inverse", ("axis", "axis_other")), ("offset", ("axis",)), ("offset_sd", ("axis",)),
-        ("offset_walk", ()),
-    )
-}  # fmt: skip
 
 # Of `Recording.alignment`: a log's stamp t is t - offset - drift (t - middle) of the first's clock.
 CLOCKS = ("clock_offset", "clock_offset_sd", "clock_drift", "clock_drift_sd", "clock_middle")
