@@ -12,7 +12,7 @@ from scipy.interpolate import make_interp_spline, make_lsq_spline
 from imuarray.alignment.clocks import Clock, compare, itself
 from imuarray.alignment.found import KINDS, Alignment, Carried
 from imuarray.alignment.resample import WIDEST, Sensor, Splines
-from imuarray.errors import InputError
+from imuarray.errors import InputError, require
 from imuarray.firstorder.correct import rails_shown
 from imuarray.firstorder.turns import angle_of
 from imuarray.recording import Recording
@@ -137,8 +137,7 @@ def align(
 
 def _sensors(logs: Sequence[Log]) -> tuple[list[tuple[Sensor, Sensor]], list[float]]:
     """Accelerometer and gyroscope of each log, their stamps from the log's own zero, and that."""
-    if len(logs) < 2:
-        raise InputError(f"logs: expected two IMUs at least, found {len(logs)}")
+    require(len(logs) >= 2, "logs", "two IMUs at least", len(logs))
     out, origins = [], []
     for log in logs:
         parts = (
@@ -147,17 +146,13 @@ def _sensors(logs: Sequence[Log]) -> tuple[list[tuple[Sensor, Sensor]], list[flo
             (log.gyroscope_time, log.angular_rate, log.gyroscope_range, log.gyroscope_noise_sd),
         )  # fmt: skip
         for kind, (time, *_) in zip(KINDS, parts, strict=True):
-            if len(time) < SHORTEST:
-                raise InputError(
-                    f"{kind} {log.label!r}: expected {SHORTEST} readings at least, found"
-                    f" {len(time)}"
-                )
+            name, count = f"{kind} {log.label!r}", len(time)
+            require(count >= SHORTEST, name, f"{SHORTEST} readings at least", count)
             step, lasts = np.quantile(np.diff(time), 0.99), time[-1] - time[0]
-            if step > 0 and lasts > PAUSED * len(time) * step:
-                raise InputError(
-                    f"{kind} {log.label!r}: expected stamps of one recording, found {len(time)}"
-                    f" readings {step:.3g} s apart or less within {lasts / 86400:.3g} days"
-                )
+            paused = step > 0 and lasts > PAUSED * count * step
+            days = f"within {lasts / 86400:.3g} days"
+            found = f"{count} readings {step:.3g} s apart or less {days}"
+            require(not paused, name, "stamps of one recording", found)
         origins.append(float(min(part[0][0] for part in parts)))
         out.append(tuple(
             Sensor(f"{kind} {log.label!r}", *steadied(time - origins[-1], values), values,
@@ -203,11 +198,8 @@ def _grid(sensors: Sequence[Sensor]) -> tuple[np.ndarray, float]:
 
 
 def _require_common(count: int) -> None:
-    if count < SHORTEST:
-        raise InputError(
-            f"logs: expected {SHORTEST} instants at least that all sensors have readings around,"
-            f" found {count}"
-        )
+    expected = f"{SHORTEST} instants at least that all sensors have readings around"
+    require(count >= SHORTEST, "logs", expected, count)
 
 
 def _knots(sensor: Sensor, grid, step: float) -> np.ndarray | None:
@@ -243,11 +235,8 @@ def _require_slow(sensors: Sequence[Sensor]) -> None:
     """
     for sensor in sensors:
         run = max(len(sensor.time[part]) for part in sensor.runs(WIDEST + 0.5))
-        if run < UNBROKEN:
-            raise InputError(
-                f"{sensor.name}: expected stretches of {UNBROKEN} readings with at most"
-                f" {WIDEST - 1} missing in a row, found {run} at most"
-            )
+        expected = f"stretches of {UNBROKEN} readings with at most {WIDEST - 1} missing in a row"
+        require(run >= UNBROKEN, sensor.name, expected, f"{run} at most")
     worst = max(sensors, key=lambda sensor: sensor.error(sensor.step) / sensor.noise_sd)
     missed = worst.error(worst.step)
     if missed > worst.noise_sd:

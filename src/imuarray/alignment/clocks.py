@@ -8,7 +8,7 @@ import numpy as np
 from scipy.signal import correlate
 
 from imuarray.alignment.resample import Sensor, Splines
-from imuarray.errors import InputError
+from imuarray.errors import InputError, require
 from imuarray.firstorder.gyroscopes import FEWEST, FLATTEST, SLOWEST
 from imuarray.firstorder.turns import nearest_orthogonal, procrustes
 from imuarray.linear import scaled_inverse
@@ -91,11 +91,8 @@ def compare(first: Sensor, other: Sensor, ahead: float = 0.0) -> Clock:
     base = splines(at)
     used = ~(first.near_rail(at).any(axis=1) | other.railed.any(axis=1))
     used &= np.linalg.norm(np.nan_to_num(base), axis=1) > SLOWEST
-    if used.sum() < FEWEST:
-        raise InputError(
-            f"{other.name}: expected {FEWEST} readings in turning motion off the rails to find"
-            f" rotation and clock from, found {used.sum()}"
-        )
+    expected = f"{FEWEST} readings in turning motion off the rails to find rotation and clock from"
+    require(used.sum() >= FEWEST, other.name, expected, used.sum())
     turn = procrustes(other.values[used], base[used])
     _require_turning(base[used], turn, other.name)
     found = _fit(splines, other, clock._replace(map=turn), used)
@@ -110,17 +107,14 @@ def compare(first: Sensor, other: Sensor, ahead: float = 0.0) -> Clock:
 
 def _require_turning(rate, turn, name: str) -> None:
     """InputError for a mirror image, and for motion about one axis."""
-    if np.linalg.det(turn) < 0:
-        raise InputError(
-            f"{name}: expected right-handed axes, found those of a mirror image of the first's; is"
-            " the sign of one of its axes wrong, or of the first's?"
-        )
+    hint = "is the sign of one of its axes wrong, or of the first's?"
+    found = f"those of a mirror image of the first's; {hint}"
+    require(np.linalg.det(turn) >= 0, name, "right-handed axes", found)
     values = np.linalg.eigvalsh(rate.T @ rate)
-    if values[1] < FLATTEST * values[2]:
-        raise InputError(
-            f"{name}: expected motion about two axes at least, found one axis only: the rotation of"
-            " this IMU about it is not determined; turn the rig about other axes, too"
-        )
+    hint = "turn the rig about other axes, too"
+    found = f"one axis only: the rotation of this IMU about it is not determined; {hint}"
+    several = values[1] >= FLATTEST * values[2]
+    require(several, name, "motion about two axes at least", found)
 
 
 def _fit(splines: Splines, other: Sensor, clock: Clock, used) -> Clock:

@@ -7,7 +7,7 @@ from functools import cache, cached_property, partial
 
 import numpy as np
 
-from imuarray.errors import InputError
+from imuarray.errors import require
 from imuarray.geometry import Array
 from imuarray.model import kinematics
 from imuarray.model.effects import EFFECTS, Effect, Instant, Prediction, find_effects, known_effect
@@ -117,10 +117,7 @@ class ArrayModel:
     def join(self, values: dict) -> np.ndarray:
         """Flat effect parameters from a dict; absent ones are zero, scalars are spread."""
         unknown = set(values) - set(self.effects)
-        if unknown:
-            raise InputError(
-                f"effects: expected values for {self.effects}, found {sorted(unknown)}"
-            )
+        require(not unknown, "effects", f"values for {self.effects}", sorted(unknown))
         parts = [
             np.broadcast_to(np.asarray(values.get(item.id, 0.0), float), shape).ravel()
             for item, shape in zip(self.chain, self.shapes, strict=True)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from imuarray.errors import InputError
+from imuarray.errors import InputError, require
 from imuarray.provenance import seal_of
 from imuarray.recording.record import AXES, Recording
 
@@ -56,8 +56,7 @@ def require_once(recording: Recording) -> None:
 
 def require_apart(recordings: Sequence[Recording]) -> None:
     """InputError for no recording, and for turning samples that two of them share."""
-    if not recordings:
-        raise InputError("recordings: expected at least one, found none")
+    require(recordings, "recordings", "at least one", "none")
     if len(recordings) == 1:
         return
     before: list[np.ndarray] = []
@@ -66,11 +65,8 @@ def require_apart(recordings: Sequence[Recording]) -> None:
         marks = np.unique(np.concatenate([_marks(_rows(part)) for part in turning.parts()]))
         for other, known in enumerate(before, 1):
             shared = len(np.intersect1d(marks, known, assume_unique=True))
-            if shared >= LEAST:
-                raise InputError(
-                    f"recordings: expected different ones, found {shared} samples of number {other}"
-                    f" in number {number}, too"
-                )
+            found = f"{shared} samples of number {other} in number {number}, too"
+            require(shared < LEAST, "recordings", "different ones", found)
         before.append(marks)
 
 
@@ -289,5 +285,4 @@ def require_readable(path: Path, patience: float = PATIENCE) -> None:
             f"{path}: expected a NetCDF-4 file, found one that HDF5 is not through with after"
             f" {limit:.0f} s: damaged?"
         ) from None
-    if status < 0:
-        raise InputError(f"{path}: expected a NetCDF-4 file, found one that HDF5 crashes at")
+    require(status >= 0, str(path), "a NetCDF-4 file", "one that HDF5 crashes at")

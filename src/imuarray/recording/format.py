@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 import xarray as xr
 
-from imuarray.errors import InputError
+from imuarray.errors import InputError, require
 from imuarray.provenance import is_damaged, write_netcdf_parts
 from imuarray.recording import record as parts_of
 from imuarray.recording import validate
@@ -103,10 +103,8 @@ def _has_group(path: Path, name: str) -> bool:
 
 def read_truth(path: str | Path) -> xr.Dataset:
     """Read what a simulated recording was made from; InputError if the file has no truth."""
-    if not has_truth(path):
-        raise InputError(
-            f"{path}: expected a group '{TRUTH}' (simulated recordings have one), found none"
-        )
+    expected = f"a group '{TRUTH}' (simulated recordings have one)"
+    require(has_truth(path), str(path), expected, "none")
     return _load(Path(path), group=TRUTH)
 
 
@@ -144,9 +142,8 @@ def load_dataset(path: str | Path, group: str | None = None) -> xr.Dataset:
 
 def _existing(path: str | Path) -> Path:
     path = Path(path)
-    if not path.is_file():
-        found = "a folder" if path.is_dir() else "nothing"
-        raise InputError(f"{path}: expected a recording (a NetCDF-4 file), found {found} there")
+    found = "a folder there" if path.is_dir() else "nothing there"
+    require(path.is_file(), str(path), "a recording (a NetCDF-4 file)", found)
     return path
 
 
@@ -164,8 +161,8 @@ def _load(path: Path, group: str | None, stored: bool = False) -> xr.Dataset:
     With ``stored`` its variables are read when they are asked for.
     """
     with _readable(path):
-        if is_damaged(path):
-            raise InputError(f"{path}: expected a file as it was written, found it damaged")
+        whole = not is_damaged(path)
+        require(whole, str(path), "a file as it was written", "it damaged")
         with _hdf5(path) as file:
             validate.check_sizes(file, str(path), not stored)
         # "s" is a number of seconds here, not a date or a time span

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from imuarray.errors import InputError
+from imuarray.errors import InputError, require
 
 START, ACKNOWLEDGEMENT = 0xAA, 0xA0
 XZ = b"\xfd7zXZ\0"  # how a compressed file begins
@@ -109,16 +109,13 @@ def read_mimu(path: str | Path) -> MimuStream:
     packets with several wrong bytes, as those that sum up to the same are not rare.
     """
     path = Path(path)
-    if not path.is_file():
-        raise InputError(f"{path}: expected a file of MIMU packets, found none")
+    require(path.is_file(), str(path), "a file of MIMU packets", "none")
     data = np.frombuffer(_content(path), np.uint8)
     starts, size = _sound_packets(data, str(path))
     accepted, number, ticks, strangers = _in_sequence(data, starts, str(path))
-    if len(accepted) == 1 and data.size > MOST_AROUND_ONE * size:
-        raise InputError(
-            f"{path}: expected MIMU packets that follow each other, found one alone, at byte"
-            f" {accepted[0]} of {data.size}"
-        )
+    several = len(accepted) > 1 or data.size <= MOST_AROUND_ONE * size
+    found = f"one alone, at byte {accepted[0]} of {data.size}"
+    require(several, str(path), "MIMU packets that follow each other", found)
     account = _account(data, accepted, size, strangers, number)
     packets = data[accepted[:, None] + np.arange(8, size - 2)]
     counts = packets.view(">i2").astype(np.int16).reshape(len(accepted), -1, 6)
@@ -154,11 +151,8 @@ def _sound_packets(data, where) -> tuple[np.ndarray, int]:
     stored = _big_endian(data, at + length + 4, 2)
     good = (sums[at + length + 4] - sums[at]) % NUMBERS == stored
     at, length = at[good], length[good]
-    if not at.size:
-        raise InputError(
-            f"{where}: expected MIMU packets (AA, number, length, ..., checksum), found none in"
-            f" {data.size} bytes"
-        )
+    expected = "MIMU packets (AA, number, length, ..., checksum)"
+    require(at.size, where, expected, f"none in {data.size} bytes")
     sizes, counts = np.unique(length, return_counts=True)
     usual = int(sizes[counts.argmax()])
     at = at[length == usual]

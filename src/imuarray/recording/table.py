@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from imuarray.errors import InputError
+from imuarray.errors import InputError, require
 from imuarray.recording.layout import (
     KINDS,
     QUANTITIES,
@@ -43,19 +43,8 @@ HALF = 0.5  # of the rows share their stamps: one row for each sensor, perhaps
 LONG = 400  # rows, in which missed readings are bridged; blanks in fewer are a damaged table
 
 
-def read_csv(path: str | PathLike, columns: str | PathLike) -> Recording:
-    """A table; the YAML file ``columns`` names its columns and units (docs/convert.md).
-
-    InputError, with the row or the key, for anything that does not fit.
-    """
-    layout = read_layout(columns)
-    return recording_of(load(path, layout, columns)[0], layout, path, columns)[0]
-
-
 def recording_of(table: pd.DataFrame, layout, path, columns) -> tuple[Recording, list[str]]:
-    """A board's table as samples, and what was done to its rows; InputError as `read_csv`."""
-    if "imus" in layout:
-        raise InputError(f"{columns}: expected triads, found IMUs, each with its own stamps")
+    """A board's table as samples, and what was done to its rows; InputError as `read_tables`."""
     where, name = str(path), str(columns)
     table, account = _whole(table, layout, name)
     time, rows, lines = _time(table, layout["time"], where, name)
@@ -83,8 +72,8 @@ def load(path, layout, columns) -> tuple[pd.DataFrame, list[str]]:
     for key, value, usual in given:
         value = usual if value is None and key not in layout else value
         runs = key == "delimiter" and value == WHITESPACE
-        if not isinstance(value, str) or (len(value) != 1 and not runs):
-            raise InputError(f"{columns}: {key}: expected one character, found {value!r}")
+        one = isinstance(value, str) and (len(value) == 1 or runs)
+        require(one, f"{columns}: {key}", "one character", repr(value))
     try:
         options, lines = form_of(Path(path), _named(layout), options)
         # Two rows: a first data row longer than the header is an error here, while with a header
@@ -121,8 +110,7 @@ def _whole(table, layout, columns: str) -> tuple[pd.DataFrame, str]:
     if "incomplete_rows" not in layout:
         return table, ""
     rule = layout["incomplete_rows"]
-    if rule != LEAVE_OUT:
-        raise InputError(f"{columns}: incomplete_rows: expected '{LEAVE_OUT}', found {rule!r}")
+    require(rule == LEAVE_OUT, f"{columns}: incomplete_rows", f"'{LEAVE_OUT}'", repr(rule))
     stamp = layout["time"].get("column") if isinstance(layout["time"], dict) else None
     needed = [used(table, layout), table.loc[:, table.columns == str(stamp)]]
     whole = pd.concat(needed, axis=1).notna().all(axis=1)
@@ -140,10 +128,9 @@ def _alike(name: str, table) -> str:
 
 def column(table, name, where, blank: bool = False) -> np.ndarray:
     """A column's numbers, integers where all are; InputError unless finite, or ``blank`` (NaN)."""
-    if name not in table.columns:
-        raise InputError(f"{where}: expected a column {name!r}, found {_alike(name, table)}")
-    if list(table.columns).count(name) > 1:
-        raise InputError(f"{where}: expected one column {name!r}, found several of that name")
+    require(name in table.columns, where, f"a column {name!r}", _alike(name, table))
+    once = list(table.columns).count(name) == 1
+    require(once, where, f"one column {name!r}", "several of that name")
     values = pd.to_numeric(table[name], errors="coerce").to_numpy()
     values = values if values.dtype.kind == "i" else values.astype(float)
     bad = ~np.isfinite(values) & ~(table[name].isna().to_numpy() & blank)
@@ -186,17 +173,15 @@ def stamps_of(table, section, where, layout_name, blank: bool = False) -> tuple[
     if isinstance(section, dict) and set(section) == {"rate"}:
         rate = positive(section["rate"], f"{layout_name}: time: rate")
         return table.index.to_numpy() / rate, 1.0
-    if not isinstance(section, dict) or set(section) != {"column", "unit"}:
-        raise InputError(
-            f"{layout_name}: time: expected 'column' and 'unit', or 'rate' in Hz, found {section!r}"
-        )
-    name, dated = str(section["column"]), None
-    if list(table.columns).count(name) == 1:
-        dated = seconds_of_dates(table[name])
-    unit = 1e-9
-    if dated is None:
+    stamped = isinstance(section, dict) and set(section) == {"column", "unit"}
+    expected = "'column' and 'unit', or 'rate' in Hz"
+    require(stamped, f"{layout_name}: time", expected, repr(section))
+    name = str(section["column"])
+    once = list(table.columns).count(name) == 1
+    stamps, unit = seconds_of_dates(table[name]) if once else None, 1e-9
+    if stamps is None:
         unit = factor("time", section["unit"], f"{layout_name}: time: unit")
-    stamps = column(table, name, where, blank) if dated is None else dated
+        stamps = column(table, name, where, blank)
     known = stamps[np.isfinite(stamps)]
     if len(known) >= FEW:
         place = f"{where}: column {name!r}"
@@ -233,8 +218,8 @@ def read_tables(
     that does not fit.
     """
     layout, files = read_layout(columns), [Path(path) for path in paths]
-    if "imus" not in layout and len(files) > 1:
-        raise InputError(f"{columns}: expected 'imus', one for each log, found triads of one table")
+    several = "imus" in layout or len(files) == 1
+    require(several, str(columns), "'imus', one for each log", "triads of one table")
     loaded, lines = {}, []
     for path in files:
         loaded[path], said = load(path, layout, columns)
@@ -245,10 +230,8 @@ def read_tables(
     blank = used(table, layout).isna().mean()
     slow = (blank > (0.0 if len(table) > LONG else OFTEN)).any()
     if slow and "incomplete_rows" not in layout:
-        if "output_rate" in layout:
-            raise InputError(
-                f"{columns}: output_rate: expected none where cells are blank, found one"
-            )
+        freely = "output_rate" not in layout
+        require(freely, f"{columns}: output_rate", "none where cells are blank", "one")
         return _read(loaded, layout, _imus(layout, str(columns)), str(columns)), lines
     found, said = recording_of(table, layout, files[0], columns)
     return found, lines + said
@@ -263,11 +246,8 @@ def _read(loaded, layout, imus: dict[str, dict], name: str) -> Rig:
         times = pair(imu.get("time", layout.get("time")))
         stamped &= len(loaded) == 1 or not any(isinstance(t, dict) and "rate" in t for t in times)
         six = imu.get("columns", layout.get("columns"))
-        if not isinstance(six, list) or len(six) != 6:
-            raise InputError(
-                f"{where}: expected six columns, three of the accelerometer and three of the"
-                f" gyroscope, found {six!r}"
-            )
+        expected = "six columns, three of the accelerometer and three of the gyroscope"
+        require(isinstance(six, list) and len(six) == 6, where, expected, repr(six))
         unused = [path for path in unused if path not in paths]
         read[label] = [
             _readings(loaded[path], str(path), names, time, unit, where)
@@ -286,12 +266,8 @@ def _file(log: Any, label: str, files: list[Path], where: str) -> Path:
     want = PurePath(label if log is None else str(log)).parts
     n = len(want)
     found = [p for p in files if n and want in (p.parts[-n:], p.with_suffix("").parts[-n:])]
-    if len(found) != 1:
-        names = ", ".join(map(str, files))
-        raise InputError(
-            f"{where}: expected one of {names} to be {'/'.join(want)}, found {len(found)}:"
-            " 'log' names it"
-        )
+    expected = f"one of {', '.join(map(str, files))} to be {'/'.join(want)}"
+    require(len(found) == 1, where, expected, f"{len(found)}: 'log' names it")
     return found[0]
 
 
