@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import correlate
+from scipy.signal import argrelextrema, correlate
 
 from imuarray.alignment.resample import Sensor, Splines
 from imuarray.errors import InputError, require
@@ -244,15 +244,10 @@ def _placed(base, speed, length: int, zero: float, name: str) -> tuple[int, int]
         score = _match(base, part)
         best = max(best, score.max())
         if best > ALIKE:
-            lags = _peaks(score, best - NEARLY) - begin
+            peaks = argrelextrema(score, np.greater_equal)[0]
+            lags = peaks[score[peaks] > best - NEARLY] - begin
             return int(begin), int(lags[np.argmin(np.abs(COARSE * lags + zero))])
     raise InputError(
         f"{name}: expected the turning motion that the first log shows, too, found none alike"
         f" (correlation {best:.2f}); are both on one rigid body, and do the logs overlap?"
     )
-
-
-def _peaks(score, least: float) -> np.ndarray:
-    """Where a sequence is at its highest nearby, and above ``least``."""
-    beside = np.concatenate([[-np.inf], score, [-np.inf]])
-    return np.flatnonzero((score >= beside[:-2]) & (score >= beside[2:]) & (score > least))

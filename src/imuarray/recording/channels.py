@@ -121,20 +121,15 @@ def _different(parts) -> np.ndarray:
     """(K, 3) how many different values each axis has, at most one more than `COARSE`."""
     known: list[np.ndarray] = []
     for values in parts:
-        left = np.ones(values.shape, bool)
-        for one in known:
-            left &= values != one
-        while True:
-            count = np.sum([~np.isnan(one) for one in known], axis=0) + np.zeros(values.shape[1:])
-            fresh = left.any(axis=0) & (count <= COARSE)
-            if not fresh.any():
-                break
-            first = np.take_along_axis(values, left.argmax(axis=0)[None], axis=0)[0]
-            known.append(np.where(fresh, first, np.nan))
-            left &= values != first
-        if (count > COARSE).all():
+        columns = values.reshape(len(values), -1).T
+        known = known or [np.empty(0)] * len(columns)
+        known = [
+            before if len(before) > COARSE else np.union1d(before, column)
+            for before, column in zip(known, columns, strict=True)
+        ]
+        if min(map(len, known)) > COARSE:
             break
-    return count.astype(int)
+    return np.minimum([len(one) for one in known], COARSE + 1).reshape(-1, 3)
 
 
 def _copied(recording: Recording, kind: str) -> list[str]:
@@ -168,8 +163,7 @@ def _sums(recording: Recording, kind: str):
             middle, sign = columns.mean(axis=0), np.where(columns[0] < 0, -1.0, 1.0)
         off = columns - middle
         total, square = total + off.sum(axis=0), square + off.T @ off
-        odd = rng.integers(1, 2**63, (len(values), 1), dtype=np.uint64) * 2 + 1
-        mark = mark + np.sum((columns * sign + 0.0).view(np.uint64) * odd, axis=0)
+        mark = mark + _marks((columns * sign + 0.0).T, rng)
         free = free + (~railed).sum(axis=0).ravel()
         low, high = np.minimum(low, columns.min(axis=0)), np.maximum(high, columns.max(axis=0))
     mean = total / len(recording.time)
@@ -262,9 +256,10 @@ def runs(mask) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def _marks(rows) -> np.ndarray:
+def _marks(rows, rng=None) -> np.ndarray:
     """64 bits of each row of ``rows`` (N, M): equal for equal rows, else not (to 2**-64)."""
-    odd = np.random.default_rng(0).integers(1, 2**63, rows.shape[1], dtype=np.uint64) * 2 + 1
+    rng = rng or np.random.default_rng(0)
+    odd = rng.integers(1, 2**63, rows.shape[1], dtype=np.uint64) * 2 + 1
     return np.sum(np.ascontiguousarray(rows, float).view(np.uint64) * odd, axis=1)
 
 

@@ -65,16 +65,14 @@ class Account:
 
     def lines(self) -> list[str]:
         """A summary for people; damage with its place."""
-        counts = self.attributes()
+        strangers = self.out_of_sequence
         out = [
-            f"lost {counts['packets_lost']}, bad {counts['packets_bad']}, out of sequence"
-            f" {counts['packets_out_of_sequence']}, garbage {counts['garbage_bytes']} bytes"
+            f"lost {self.lost_packets}, bad {len(self.bad)}, out of sequence {len(strangers)},"
+            f" garbage {self.garbage_bytes} bytes"
         ]
         out += _listed([f"{count} packet(s) missing before sample {i}" for i, count in self.lost])
         out += _listed([f"{length} bytes dropped at byte {i}" for i, length in self.garbage])
-        return out + _listed(
-            [f"packet out of sequence dropped at byte {offset}" for offset in self.out_of_sequence]
-        )
+        return out + _listed([f"packet out of sequence dropped at byte {i}" for i in strangers])
 
 
 def _listed(places: list[str]) -> list[str]:
@@ -188,7 +186,7 @@ def _in_sequence(data, starts, where):
         # in step with the longest run is not yet in step with the neighbours
         steps, passed = np.diff(number[kept]) % NUMBERS, np.diff(stamp[kept]) % WRAP
         linked = _agree(steps, passed, period)
-        kept = kept[_longest(number[kept], stamp[kept], period, linked)]
+        kept = kept[_joined(number[kept], stamp[kept], period, linked)]
     out = np.setdiff1d(np.arange(len(starts)), kept)
     if len(out) > max(MOST_OUT_OF_SEQUENCE * len(starts), 3):
         raise InputError(
@@ -232,14 +230,19 @@ def _agree(steps, passed, period) -> np.ndarray:
     return (steps > 0) & (steps < NUMBERS // 2) & (np.abs(off) < allowed)
 
 
+def _longest_run(linked) -> tuple[int, int]:
+    """First and past-the-last index of the most packets in a row that are linked to the next."""
+    edges = np.concatenate([[0], np.flatnonzero(~linked) + 1, [len(linked) + 1]])
+    best = int(np.diff(edges).argmax())
+    return int(edges[best]), int(edges[best + 1])
+
+
 def _advancing(number, stamp, period, linked) -> np.ndarray:
     """Indices of the most packets that advance, of those in step with the longest run's middle.
 
     The most, so that a repeated packet before a gap does not cost the sound ones before it.
     """
-    edges = np.concatenate([[0], np.flatnonzero(~linked) + 1, [len(number)]])
-    best = int(np.diff(edges).argmax())
-    anchor = int(edges[best] + edges[best + 1]) // 2
+    anchor = sum(_longest_run(linked)) // 2
     steps = (np.diff(number) + NUMBERS // 2) % NUMBERS - NUMBERS // 2
     place = np.concatenate([[0], np.cumsum(steps)])
     away = place - place[anchor]
@@ -264,21 +267,20 @@ def _increasing(values: list[int]) -> list[int]:
     return chain[::-1]
 
 
-def _longest(number, stamp, period, linked) -> np.ndarray:
+def _joined(number, stamp, period, linked) -> np.ndarray:
     """Indices of the longest run of linked packets, with all that fit before and after it."""
-    edges = np.concatenate([[0], np.flatnonzero(~linked) + 1, [len(number)]])
-    best = int(np.diff(edges).argmax())
+    first, end = _longest_run(linked)
 
     def fits(one, other):
         step, ticks = (number[other] - number[one]) % NUMBERS, (stamp[other] - stamp[one]) % WRAP
         return bool(_agree(step, ticks, period))
 
-    kept = list(range(edges[best], edges[best + 1]))
-    for i in range(edges[best + 1], len(number)):
+    kept = list(range(first, end))
+    for i in range(end, len(number)):
         if fits(kept[-1], i):
             kept.append(i)
     before = []
-    for i in range(edges[best] - 1, -1, -1):
+    for i in range(first - 1, -1, -1):
         if fits(i, before[-1] if before else kept[0]):
             before.append(i)
     return np.array(before[::-1] + kept)
@@ -303,8 +305,7 @@ def _account(data, accepted, size, strangers, number) -> Account:
     for offset, length in garbage:
         bad += _bad_packets(data[offset : offset + length], offset, size, dropped)
     steps = np.diff(number)
-    gaps = np.flatnonzero(steps > 1)
-    lost = [(int(i) + 1, int(steps[i]) - 1) for i in gaps]
+    lost = [(int(i) + 1, int(steps[i]) - 1) for i in np.flatnonzero(steps > 1)]
     return Account(
         data.size, len(accepted) * size, acknowledged, garbage, bad, strangers.tolist(), lost
     )
@@ -313,18 +314,13 @@ def _account(data, accepted, size, strangers, number) -> Account:
 def _acknowledgements(data) -> np.ndarray:
     """Offsets of A0, a byte and their 16-bit sum."""
     at = np.flatnonzero(data[: max(data.size - 3, 0)] == ACKNOWLEDGEMENT)
-    return at[
-        _big_endian(data, at, 1) + _big_endian(data, at + 1, 1) == _big_endian(data, at + 2, 2)
-    ]
+    sums = _big_endian(data, at, 1) + _big_endian(data, at + 1, 1)
+    return at[sums == _big_endian(data, at + 2, 2)]
 
 
 def _bad_packets(piece, offset, size, strangers) -> list[int]:
     """Whole packets in a piece of garbage that are not those out of sequence."""
     begin = piece[: max(len(piece) - size + 1, 0)]
     starts = np.flatnonzero((begin == START) & (piece[3 : 3 + len(begin)] == size - 6))
-    found, end = [], 0
-    for at in starts.tolist():
-        if at >= end:
-            end = at + size
-            found.append(offset + at)
-    return [at for at in found if at not in strangers]
+    found = offset + _apart(starts, size)
+    return [at for at in found.tolist() if at not in strangers]
