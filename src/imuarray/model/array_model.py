@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, cached_property, partial
 
 import numpy as np
@@ -42,7 +42,9 @@ class ArrayModel:
         needs them; the defaults are the papers' motion at 5 Hz.
     motion_sd : (float, float, float)
         Prior sd of omega (rad/s), omega_dot (rad/s^2) and s (m/s^2), infinite as in paper 2021.
-        With effects that have a gauge the flat prior is no posterior at all: see `with_motion`.
+        With effects that have a gauge the flat prior is no posterior at all: each sample of the
+        likelihood carries a power of the array's size and of a common gyroscope scale, which the
+        data do not push back; a prior of the motion's own size does (docs/findings.md).
     clock : (float, float) or None
         Where time begins (s) and its span (s), which drifts, shifts and clocks look at; by
         default those of the times given, which a part of a recording does not share with it.
@@ -168,16 +170,6 @@ class ArrayModel:
         if self.clock is None:
             return clock(time)
         return np.asarray(time, float) - self.clock[0], self.clock[1]
-
-    def with_motion(self, motion: Motion) -> ArrayModel:
-        """The model with the motion prior of a recording: zero mean, its own size.
-
-        Under a flat prior each sample of the likelihood carries a power of the array's
-        size and of a common gyroscope scale, which the data do not push back; a prior of
-        the motion's own size does (docs/findings.md).
-        """
-        sds = [float(np.sqrt(np.mean(np.square(field)))) for field in motion[:3]]
-        return replace(self, motion_sd=tuple(sds))
 
     @property
     def _function(self) -> tuple:

@@ -37,11 +37,10 @@ with h5py.File(sys.argv[1], "r") as file:
 """
 
 
-def require_live(recording: Recording, where: str = "recording") -> None:
+def require_live(recording: Recording) -> None:
     """InputError for channels that leave nothing to compute: constant, or another's copy."""
-    found = dead(recording)
-    if found:
-        raise InputError(f"{where}: expected readings of live sensors; {'; '.join(found[:3])}")
+    if found := dead(recording):
+        raise InputError(f"recording: expected readings of live sensors; {'; '.join(found[:3])}")
 
 
 def require_once(recording: Recording) -> None:
@@ -49,8 +48,7 @@ def require_once(recording: Recording) -> None:
 
     Afterwards few copies may be left to see, and all would count twice.
     """
-    found = _twice(recording, _turning(recording))
-    if found:
+    if found := _twice(recording, _turning(recording)):
         raise InputError(f"recording: expected each sample once; {found[0]}: leave it out")
 
 

@@ -241,12 +241,10 @@ class Recording:
             name: (DIMENSIONS[name], np.asarray(getattr(self, name), float), {"units": unit})
             for name, unit in SI.items()
         }
-        for name in FLAGS:
-            if getattr(self, name) is not None:
-                variables[name] = (DIMENSIONS[name], np.asarray(getattr(self, name), bool))
-        for name in MATRICES:
-            if getattr(self, name) is not None:
-                variables[name] = DIMENSIONS[name], getattr(self, name), {"units": "1"}
+        given = {n: x for n in (*FLAGS, *MATRICES) if (x := getattr(self, n)) is not None}
+        for name, values in given.items():
+            own = np.asarray(values, bool if name in FLAGS else None)
+            variables[name] = DIMENSIONS[name], own, {} if name in FLAGS else {"units": "1"}
         if self.correction is not None:
             variables |= {name: self.correction[name].variable for name in CORRECTION}
         coordinates = {

@@ -100,9 +100,7 @@ def _named(section) -> set[str]:
 
 def used(table: pd.DataFrame, layout) -> pd.DataFrame:
     """The columns that a board's triads name."""
-    triads = [triad for kind in KINDS for triad in layout[kind]["triads"].values()]
-    named = [triad["columns"] for triad in triads if isinstance(triad["columns"], list)]
-    return table.loc[:, table.columns.isin([str(name) for names in named for name in names])]
+    return table.loc[:, table.columns.isin(_named([layout[kind] for kind in KINDS]))]
 
 
 def _whole(table, layout, columns: str) -> tuple[pd.DataFrame, str]:
@@ -111,9 +109,7 @@ def _whole(table, layout, columns: str) -> tuple[pd.DataFrame, str]:
         return table, ""
     rule = layout["incomplete_rows"]
     require(rule == LEAVE_OUT, f"{columns}: incomplete_rows", f"'{LEAVE_OUT}'", repr(rule))
-    stamp = layout["time"].get("column") if isinstance(layout["time"], dict) else None
-    needed = [used(table, layout), table.loc[:, table.columns == str(stamp)]]
-    whole = pd.concat(needed, axis=1).notna().all(axis=1)
+    whole = table.loc[:, table.columns.isin(_named(layout))].notna().all(axis=1)
     if whole.all():
         return table, ""
     return table[whole], f"{whole.sum()} of {len(table)} samples"
