@@ -16,6 +16,7 @@ from imuarray.errors import InputError, require
 from imuarray.firstorder.correct import rails_shown
 from imuarray.firstorder.turns import angle_of
 from imuarray.recording import Recording
+from imuarray.recording.record import pieces
 from imuarray.recording.rig import Log
 
 PACES = 1e9, 60.0, 20.0, 5.0  # s between knots of a pace that changes slowly
@@ -39,10 +40,8 @@ def steadied(time, values, enough: float = 1.0) -> tuple[np.ndarray, float]:
     ``enough`` times what they are in the stamps: those that a logger rounds or writes late are
     smoother. Else the stamps.
     """
-    step = np.median(np.diff(time))
-    cuts = np.flatnonzero(np.diff(time) > RUN * step) + 1
-    pieces = [_paced(part) for part in np.split(time, cuts)]
-    even = np.concatenate(pieces)
+    steps = np.diff(time)
+    even = np.concatenate([_paced(time[part]) for part in pieces(steps > RUN * np.median(steps))])
     off = float(np.sqrt(np.mean((even - time) ** 2)))
     if (np.diff(even) <= 0).any() or _roughness(even, values) > enough * _roughness(time, values):
         return time, 0.0

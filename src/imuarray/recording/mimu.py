@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from imuarray.errors import InputError, require
+from imuarray.recording.record import pieces
 
 START, ACKNOWLEDGEMENT = 0xAA, 0xA0
 XZ = b"\xfd7zXZ\0"  # how a compressed file begins
@@ -230,11 +231,9 @@ def _agree(steps, passed, period) -> np.ndarray:
     return (steps > 0) & (steps < NUMBERS // 2) & (np.abs(off) < allowed)
 
 
-def _longest_run(linked) -> tuple[int, int]:
-    """First and past-the-last index of the most packets in a row that are linked to the next."""
-    edges = np.concatenate([[0], np.flatnonzero(~linked) + 1, [len(linked) + 1]])
-    best = int(np.diff(edges).argmax())
-    return int(edges[best]), int(edges[best + 1])
+def _most(linked) -> slice:
+    """The most packets in a row that are ``linked`` (N - 1,), each to the next."""
+    return max(pieces(~linked), key=lambda piece: piece.stop - piece.start)
 
 
 def _advancing(number, stamp, period, linked) -> np.ndarray:
@@ -242,7 +241,8 @@ def _advancing(number, stamp, period, linked) -> np.ndarray:
 
     The most, so that a repeated packet before a gap does not cost the sound ones before it.
     """
-    anchor = sum(_longest_run(linked)) // 2
+    best = _most(linked)
+    anchor = (best.start + best.stop) // 2
     steps = (np.diff(number) + NUMBERS // 2) % NUMBERS - NUMBERS // 2
     place = np.concatenate([[0], np.cumsum(steps)])
     away = place - place[anchor]
@@ -269,18 +269,18 @@ def _increasing(values: list[int]) -> list[int]:
 
 def _joined(number, stamp, period, linked) -> np.ndarray:
     """Indices of the longest run of linked packets, with all that fit before and after it."""
-    first, end = _longest_run(linked)
+    best = _most(linked)
 
     def fits(one, other):
         step, ticks = (number[other] - number[one]) % NUMBERS, (stamp[other] - stamp[one]) % WRAP
         return bool(_agree(step, ticks, period))
 
-    kept = list(range(first, end))
-    for i in range(end, len(number)):
+    kept = list(range(best.start, best.stop))
+    for i in range(best.stop, len(number)):
         if fits(kept[-1], i):
             kept.append(i)
     before = []
-    for i in range(first - 1, -1, -1):
+    for i in range(best.start - 1, -1, -1):
         if fits(i, before[-1] if before else kept[0]):
             before.append(i)
     return np.array(before[::-1] + kept)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -143,10 +144,10 @@ class Stored:
         if self.index is None:
             return self._stretch(start, stop)
         index = self.index[start:stop]
-        ends = np.flatnonzero(np.diff(index) > NEAR) + 1
+        found = (index[piece] for piece in pieces(np.diff(index) > NEAR))
         parts = [
             self._stretch(int(part[0]), int(part[-1]) + 1)[part - part[0]]
-            for part in np.split(index, ends) if part.size
+            for part in found if part.size
         ]  # fmt: skip
         return np.concatenate([self._stretch(0, 0), *parts])
 
@@ -159,6 +160,12 @@ def blocks(values) -> Iterator[tuple[int, np.ndarray]]:
     """(first index, part) of an array (T, ...), stored or not."""
     for first in range(0, max(len(values), 1), PART):
         yield first, values[first : first + PART]
+
+
+def pieces(breaks) -> list[slice]:
+    """Slices of what is without a gap: ``breaks`` (N - 1,), True where one lies behind sample n."""
+    ends = [0, *(np.flatnonzero(breaks) + 1).tolist(), len(breaks) + 1]
+    return [slice(first, last) for first, last in pairwise(ends)]
 
 
 def few(index: np.ndarray) -> np.ndarray:
