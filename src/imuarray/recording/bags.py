@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from imuarray.errors import InputError, require
+from imuarray.errors import InputError, expecting, require
 from imuarray.recording.layout import read_layout
 from imuarray.recording.rig import Readings, Rig, pair, to_rig
 
@@ -83,7 +83,7 @@ def _read(path: Path) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Stamps in ns (N,), specific force and angular rate (N, 6) of each topic."""
     stamps: dict[str, array] = {}
     values: dict[str, array] = {}
-    try:
+    with expecting(path, "a whole ROS bag"):
         opened, deserialize = _open(path)
         with opened as bag:
             wanted = [c for c in bag.connections if c.msgtype == MESSAGE]
@@ -94,12 +94,6 @@ def _read(path: Path) -> dict[str, tuple[np.ndarray, np.ndarray]]:
                 now = stamps.setdefault(connection.topic, array("q"))
                 now.append(stamp.sec * 10**9 + stamp.nanosec)
                 values.setdefault(connection.topic, array("d")).extend(_six(message))
-    except InputError:
-        raise
-    except Exception as error:
-        # a damaged bag makes the library raise nearly anything
-        what = f"{type(error).__name__}: {error}"
-        raise InputError(f"{path}: expected a whole ROS bag, found {what}") from error
     require(stamps, str(path), f"messages of {MESSAGE}", "none")
     return {t: (np.array(stamps[t]), np.array(values[t]).reshape(-1, 6)) for t in stamps}
 

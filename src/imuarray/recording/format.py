@@ -1,7 +1,6 @@
 """The NetCDF-4 file of a recording, read with validation and written."""
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,7 @@ import h5py
 import numpy as np
 import xarray as xr
 
-from imuarray.errors import InputError, require
+from imuarray.errors import InputError, expecting, require
 from imuarray.provenance import is_damaged, write_netcdf_parts
 from imuarray.recording import record as parts_of
 from imuarray.recording import validate
@@ -82,7 +81,7 @@ def read_recording(path: str | Path, stored: bool = False) -> Recording:
     than three accelerometers or collinear ones. Large gaps in time are a warning.
     """
     path = _existing(path)
-    with _readable(path):
+    with expecting(path, "a readable NetCDF-4 file"):
         recording = from_dataset(_load(path, None, stored), str(path), stored)
     if not _has_group(path, ALIGNMENT):
         return recording
@@ -160,7 +159,7 @@ def _load(path: Path, group: str | None, stored: bool = False) -> xr.Dataset:
 
     With ``stored`` its variables are read when they are asked for.
     """
-    with _readable(path):
+    with expecting(path, "a readable NetCDF-4 file"):
         whole = not is_damaged(path)
         require(whole, str(path), "a file as it was written", "it damaged")
         with _hdf5(path) as file:
@@ -174,15 +173,3 @@ def _load(path: Path, group: str | None, stored: bool = False) -> xr.Dataset:
             return dataset
         with dataset:
             return dataset.load()
-
-
-@contextmanager
-def _readable(path: Path) -> Iterator[None]:
-    """InputError for whatever the libraries below raise of a damaged file: nearly anything."""
-    try:
-        yield
-    except InputError:
-        raise
-    except Exception as error:
-        what = f"{type(error).__name__}: {error}"
-        raise InputError(f"{path}: expected a readable NetCDF-4 file, found {what}") from error

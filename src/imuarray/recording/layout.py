@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from imuarray.errors import LARGEST, SMALLEST, InputError, require
+from imuarray.errors import LARGEST, SMALLEST, expecting, require
 from imuarray.recording.units import factor
 from imuarray.recording.validate import is_rotation
 
@@ -63,11 +63,9 @@ def read_layout(path: str | PathLike, bag: bool = False) -> dict[str, Any]:
     """
     path = Path(path)
     require(path.is_file(), str(path), "a YAML file that describes the log", "none")
-    try:
+    # ValueError: bytes that are no UTF-8, a date with a 13th month
+    with expecting(path, "YAML", (yaml.YAMLError, ValueError, RecursionError)):
         layout = yaml.load(path.read_text(encoding="utf-8"), _Loader)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        # ValueError: bytes that are no UTF-8, a date with a 13th month
-        raise InputError(f"{path}: expected YAML, found {' '.join(str(error).split())}") from None
     rig = bag or (isinstance(layout, dict) and "imus" in layout)
     _require_keys(layout, BAG if bag else RIG if rig else BOARD, str(path))
     keys = BAG_SENSOR if bag else SENSOR if rig else BOARD_SENSOR

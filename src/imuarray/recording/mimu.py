@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from imuarray.errors import InputError, require
+from imuarray.errors import InputError, expecting, require
 from imuarray.recording.record import pieces
 
 START, ACKNOWLEDGEMENT = 0xAA, 0xA0
@@ -125,10 +125,8 @@ def _content(path: Path) -> bytes:
     content = path.read_bytes()
     if not content.startswith(XZ):
         return content
-    try:
+    with expecting(path, "a whole file compressed by xz", lzma.LZMAError):
         return lzma.decompress(content)
-    except lzma.LZMAError as error:
-        raise InputError(f"{path}: expected a whole file compressed by xz, found {error}") from None
 
 
 def _big_endian(data, at, count) -> np.ndarray:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from imuarray.errors import InputError, require
+from imuarray.errors import expecting, require
 from imuarray.geometry.boards import UNDERSIDE_ROTATION
 from imuarray.recording.mimu import Account, MimuStream, read_mimu
 from imuarray.recording.record import Recording
@@ -25,20 +25,16 @@ def read_positions(path: str | Path) -> tuple[np.ndarray, tuple[str, ...]]:
     """
     where = str(path)
     expected = "a header 'axes, IMU 1, ...' and the rows x, y, z in metres"
-    try:
+    with expecting(where, expected, (OSError, UnicodeDecodeError)):
         text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{where}: expected {expected}, found {error}") from None
     rows = [[cell.strip() for cell in row] for row in csv.reader(text.splitlines()) if row]
     axes = len(rows) == 4 and [row[0] for row in rows[1:]] == ["x", "y", "z"]
     require(axes, where, expected, f"{len(rows)} rows")
     labels = tuple(name.removeprefix("IMU").strip() for name in rows[0][1:])
     even = all(len(row) == len(rows[0]) for row in rows)
     require(even, where, expected, "rows of different lengths")
-    try:
+    with expecting(where, expected, ValueError):
         values = np.array([[float(cell) for cell in row[1:]] for row in rows[1:]]).T
-    except ValueError as error:
-        raise InputError(f"{where}: expected {expected}, found {error}") from None
     require(np.isfinite(values).all(), where, expected, "a value that is not finite")
     return values, labels
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from imuarray.errors import InputError, require
+from imuarray.errors import InputError, expecting, require
 from imuarray.recording.layout import (
     KINDS,
     QUANTITIES,
@@ -74,16 +74,13 @@ def load(path, layout, columns) -> tuple[pd.DataFrame, list[str]]:
         runs = key == "delimiter" and value == WHITESPACE
         one = isinstance(value, str) and (len(value) == 1 or runs)
         require(one, f"{columns}: {key}", "one character", repr(value))
-    try:
+    with expecting(path, "a CSV file with a header", (OSError, ValueError)):
         options, lines = form_of(Path(path), _named(layout), options)
         # Two rows: a first data row longer than the header is an error here, while with a header
         # pandas would take its first cell for an index and move every name by one column.
         head = pd.read_csv(path, skipinitialspace=True, header=None, nrows=2, dtype=str, **options)
         table = pd.read_csv(path, skipinitialspace=True, **options)
         table.columns = head.iloc[0].fillna("").str.strip()
-    except (OSError, ValueError, UnicodeDecodeError) as error:
-        message = " ".join(str(error).split())
-        raise InputError(f"{path}: expected a CSV file with a header, found {message}") from None
     return table, lines
 
 
