@@ -88,9 +88,6 @@ MATRICES = ("map_covariance", "accelerometer_axes")
 # Of `Recording.alignment`: a log's stamp t is t - offset - drift (t - middle) of the first's clock.
 CLOCKS = ("clock_offset", "clock_offset_sd", "clock_drift", "clock_drift_sd", "clock_middle")
 
-# A simulated sensor need not have a rail.
-MAY_BE_INFINITE = ("accelerometer_range", "gyroscope_range")
-
 # Optional attributes that are text.
 TEXTS = ("title", "source", "license", "selected")
 

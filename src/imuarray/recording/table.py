@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from imuarray.errors import InputError, expecting, require
+from imuarray.recording import written
 from imuarray.recording.layout import (
     KINDS,
     QUANTITIES,
@@ -26,13 +27,6 @@ from imuarray.recording.layout import (
 from imuarray.recording.record import Recording
 from imuarray.recording.rig import Readings, Rig, pair, to_rig
 from imuarray.recording.units import factor, require_plausible_rate
-from imuarray.recording.written import (
-    form_of,
-    in_order,
-    numbering,
-    seconds_of_dates,
-    shared_words,
-)
 
 LEAVE_OUT = "leave out"  # what `incomplete_rows` may be
 FEW = 20  # stamps, of which a rate is worth looking at
@@ -75,7 +69,7 @@ def load(path, layout, columns) -> tuple[pd.DataFrame, list[str]]:
         one = isinstance(value, str) and (len(value) == 1 or runs)
         require(one, f"{columns}: {key}", "one character", repr(value))
     with expecting(path, "a CSV file with a header", (OSError, ValueError)):
-        options, lines = form_of(Path(path), _named(layout), options)
+        options, lines = written.form_of(Path(path), _named(layout), options)
         # Two rows: a first data row longer than the header is an error here, while with a header
         # pandas would take its first cell for an index and move every name by one column.
         head = pd.read_csv(path, skipinitialspace=True, header=None, nrows=2, dtype=str, **options)
@@ -171,7 +165,7 @@ def stamps_of(table, section, where, layout_name, blank: bool = False) -> tuple[
     require(stamped, f"{layout_name}: time", expected, repr(section))
     name = str(section["column"])
     once = list(table.columns).count(name) == 1
-    stamps, unit = seconds_of_dates(table[name]) if once else None, 1e-9
+    stamps, unit = written.seconds_of_dates(table[name]) if once else None, 1e-9
     if stamps is None:
         unit = factor("time", section["unit"], f"{layout_name}: time: unit")
         stamps = column(table, name, where, blank)
@@ -188,7 +182,7 @@ def _time(table, section, where, layout_name) -> tuple[np.ndarray, np.ndarray, l
     rows, lines = np.arange(len(values)), []
     if "rate" in section:
         return values, rows, lines
-    values, rows, lines = in_order(values, table, f"{where}: column {section['column']!r}")
+    values, rows, lines = written.in_order(values, table, f"{where}: column {section['column']!r}")
     table = table.iloc[rows]
     back = np.flatnonzero(np.diff(values) <= 0)
     if back.size:
@@ -269,8 +263,8 @@ def _readings(table, path: str, names, time, unit: float, where: str) -> Reading
     values = [column(table, name, path, blank=True).astype(float) for name in names]
     stamps, second = stamps_of(table, time, path, where, blank=True)
     steps = np.diff(stamps[np.isfinite(stamps)])
-    if len(steps) and np.mean(steps == 0) > HALF and numbering(table):
-        raise InputError(f"{path}: {shared_words(steps, table)}")
+    if len(steps) and np.mean(steps == 0) > HALF and written.numbering(table):
+        raise InputError(f"{path}: {written.shared_words(steps, table)}")
     return Readings(stamps, second, unit * np.stack(values, axis=1), f"{path}: {', '.join(names)}")
 
 

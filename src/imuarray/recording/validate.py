@@ -14,23 +14,8 @@ import xarray as xr
 
 from imuarray.errors import LARGEST, SMALLEST, IdentifiabilityError, InputError, require
 from imuarray.geometry.array import require_apart, require_count
-from imuarray.recording.record import (
-    AXES,
-    CLOCKS,
-    CORRECTION,
-    DIMENSIONS,
-    FLAGS,
-    LABELS,
-    MAX_VALUES,
-    MAY_BE_INFINITE,
-    NUMBERS,
-    OPTIONAL_NUMBERS,
-    QUANTITIES,
-    SAMPLED,
-    SI,
-    Recording,
-    blocks,
-)
+from imuarray.recording import record
+from imuarray.recording.record import Recording, blocks
 
 # A file of a few bytes can declare far more than any memory or disk holds; deflate makes 1032 of 1.
 INFLATED = 1032
@@ -53,37 +38,37 @@ def check_sizes(file: h5py.File, where: str, whole: bool = True) -> None:
     def visit(name: str, item: Any) -> None:
         # Python's integers: the declared sizes may overflow 64 bits
         shape = tuple(int(n) for n in getattr(item, "shape", None) or ())
-        stays = not whole and name in SAMPLED and len(shape) > 1
+        stays = not whole and name in record.SAMPLED and len(shape) > 1
         room = INFLATED * item.id.get_storage_size() if stays else 0
-        if math.prod(shape) > MAX_VALUES and not math.prod(shape) <= room:
+        if math.prod(shape) > record.MAX_VALUES and not math.prod(shape) <= room:
             found.append((name, shape))
 
     file.visititems(visit)
     if found:
         name, shape = found[0]
         raise InputError(
-            f"{where}: {name}: expected at most {MAX_VALUES} values, found shape {shape}"
+            f"{where}: {name}: expected at most {record.MAX_VALUES} values, found shape {shape}"
         )
 
 
 def check_structure(dataset: xr.Dataset, where: str) -> None:
     """Variables, dimensions, labels' type and attributes; units and values are for later."""
-    for name in (*QUANTITIES, *LABELS, "axis"):
+    for name in (*record.QUANTITIES, *record.LABELS, "axis"):
         _check_present(dataset, name, where)
-    for name in QUANTITIES:
+    for name in record.QUANTITIES:
         kind = dataset[name].dtype
         require(kind.kind in "fiu", f"{where}: {name}", "real numbers", f"type {kind}")
-    for name in LABELS:
+    for name in record.LABELS:
         text = all(isinstance(label, str | bytes) for label in dataset[name].values.tolist())
         found = f"type {dataset[name].dtype}"
         require(text, f"{where}: {name}", "text as labels", found)
     axes = list(labels_of(dataset["axis"]))
     found = axes if len(axes) <= 6 else f"{len(axes)} of them"
-    require(axes == list(AXES), f"{where}: axis", f"the labels {list(AXES)}", found)
-    for name, unit in (NUMBERS | OPTIONAL_NUMBERS).items():
-        if name in NUMBERS or name in dataset.attrs:
+    require(axes == list(record.AXES), f"{where}: axis", f"the labels {list(record.AXES)}", found)
+    for name, unit in (record.NUMBERS | record.OPTIONAL_NUMBERS).items():
+        if name in record.NUMBERS or name in dataset.attrs:
             _check_number(dataset.attrs, name, unit, where)
-    corrected = CORRECTION if set(CORRECTION) & set(dataset) else ()  # all or none
+    corrected = record.CORRECTION if set(record.CORRECTION) & set(dataset) else ()  # all or none
     for name, check in _CHECKS.items():
         if name in dataset or name in corrected:
             _check_present(dataset, name, where)
@@ -99,7 +84,7 @@ def labels_of(coordinate: xr.DataArray) -> tuple[str, ...]:
 def check_alignment(dataset: xr.Dataset, recording: Recording, where: str) -> None:
     """Clocks and rates of the recording's IMUs."""
     count = len(recording.accelerometer_labels)
-    for name, shape in {**dict.fromkeys(CLOCKS, (count,)), "rate": (count, 2)}.items():
+    for name, shape in {**dict.fromkeys(record.CLOCKS, (count,)), "rate": (count, 2)}.items():
         there = name in dataset and dataset[name].shape == shape
         require(there, where, f"{name} of each of {count} IMUs", "none")
         place = f"{where}: {name}"
@@ -112,16 +97,16 @@ def check_values(recording: Recording, where: str) -> None:
     require(len(recording.time), f"{where}: time", "at least 1 sample", 0)
     if not recording.gyroscope_labels:
         raise IdentifiabilityError(f"{where}: expected at least 1 gyroscope triad, found 0")
-    for kind in LABELS:
+    for kind in record.LABELS:
         require_count(len(getattr(recording, f"{kind}_labels")), where, kind)
-    for kind in LABELS:
+    for kind in record.LABELS:
         for label, times in Counter(getattr(recording, f"{kind}_labels")).items():
             found = f"{label!r} {times} times"
             require(times == 1, f"{where}: {kind}", "labels that are all different", found)
     limits = {
         "specific_force": recording.accelerometer_range, "angular_rate": recording.gyroscope_range
     }  # fmt: skip
-    for name in QUANTITIES:
+    for name in record.QUANTITIES:
         _check_finite(recording, name, limits.get(name, np.inf), where)
     _check_time(recording.time, where, declared=bool(recording.selected))
     require_apart(recording.accelerometer_position, f"{where}: accelerometer_position")
@@ -131,7 +116,7 @@ def _check_present(dataset: xr.Dataset, name: str, where: str) -> None:
     # a dimension without a coordinate would be given numbers as labels by xarray
     have = ", ".join(sorted(map(str, dataset.variables))) or "none"
     require(name in dataset.variables, where, f"a variable '{name}'", have)
-    expected, found = DIMENSIONS.get(name, (name,)), dataset[name].dims
+    expected, found = record.DIMENSIONS.get(name, (name,)), dataset[name].dims
     right = f"dimensions {_listed(expected)}"
     require(found == expected, f"{where}: {name}", right, _listed(found))
 
@@ -154,8 +139,8 @@ def _check_number(attributes: dict, name: str, unit: str, where: str) -> None:
     single = value.dtype.kind in "fiu" and value.size == 1
     require(single, where, expected, repr(attributes[name]))
     number = float(value.item())
-    # written so that NaN fails
-    right = SMALLEST <= number <= LARGEST or (number == np.inf and name in MAY_BE_INFINITE)
+    # a simulated sensor need not have a rail; NaN is not right
+    right = SMALLEST <= number <= LARGEST or (number == np.inf and name.endswith("_range"))
     require(right, where, expected, number)
 
 
@@ -175,7 +160,7 @@ def _check_boolean(dataset: xr.Dataset, name: str, where: str) -> None:
 
 def _check_covariance(dataset: xr.Dataset, name: str, where: str) -> None:
     values = _numbers(dataset[name], where)
-    first, second = (9 * dataset.sizes[kind] for kind in LABELS)
+    first, second = (9 * dataset.sizes[kind] for kind in record.LABELS)
     square = values.shape in ((first, first), (first + second, first + second))
     finite = square and (np.abs(values) <= LARGEST).all()
     found = f"{' x '.join(map(str, values.shape))}, or others"
@@ -201,8 +186,8 @@ def _check_correction(dataset: xr.Dataset, name: str, where: str) -> None:
 
 # Of variables that need not be there.
 _CHECKS = {
-    **dict.fromkeys(FLAGS, _check_boolean), "map_covariance": _check_covariance,
-    **dict.fromkeys(CORRECTION, _check_correction), "accelerometer_axes": _check_rotations,
+    **dict.fromkeys(record.FLAGS, _check_boolean), "map_covariance": _check_covariance,
+    **dict.fromkeys(record.CORRECTION, _check_correction), "accelerometer_axes": _check_rotations,
 }  # fmt: skip
 
 
@@ -224,18 +209,18 @@ def _check_finite(recording: Recording, name: str, limit: float, where: str) -> 
         )
     raise InputError(
         f"{where}: {name}: expected values within the declared range of {limit:g} "
-        f"{SI[name]}, found {part[index]:g} at {place}; is the units attribute right?"
+        f"{record.SI[name]}, found {part[index]:g} at {place}; is the units attribute right?"
     )
 
 
 def _place(recording: Recording, name: str, index: tuple[int, ...]) -> str:
     """Where an index of a variable is, in the words of the file."""
     words = []
-    for dimension, i in zip(DIMENSIONS[name], index, strict=True):
+    for dimension, i in zip(record.DIMENSIONS[name], index, strict=True):
         if dimension == "time":
             words.append(f"time index {i}")
         elif dimension == "axis":
-            words.append(f"axis {AXES[i]}")
+            words.append(f"axis {record.AXES[i]}")
         else:
             words.append(f"{dimension} {getattr(recording, dimension + '_labels')[i]!r}")
     return ", ".join(words)
