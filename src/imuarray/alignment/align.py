@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.interpolate import make_interp_spline, make_lsq_spline
 
-from imuarray.alignment.clocks import Clock, compare, itself
+from imuarray.alignment.clocks import Clock, compare
 from imuarray.alignment.found import KINDS, Alignment, Carried
 from imuarray.alignment.resample import WIDEST, Sensor, Splines
 from imuarray.errors import InputError, require
@@ -107,7 +107,7 @@ def align(
     _require_slow([sensor for pair in pairs for sensor in pair])
     gyroscopes = [pair[1] for pair in pairs]
     ahead = _ahead(logs, gyroscopes, origins)
-    clocks = [itself(gyroscopes[0].time)]
+    clocks = [Clock(0.0, 0.0, float(np.mean(gyroscopes[0].time[[0, -1]])))]
     clocks += map(compare, gyroscopes[:1] * len(ahead), gyroscopes[1:], ahead)
     frame = np.eye(3) if logs[0].axes is None else logs[0].axes
     rotation = np.array([frame @ clock.rotation.T for clock in clocks])

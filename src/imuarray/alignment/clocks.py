@@ -37,10 +37,10 @@ class Clock(NamedTuple):
     offset: float
     drift: float
     middle: float
-    map: np.ndarray
-    covariance: np.ndarray
-    residual: float
-    stray: float
+    map: np.ndarray = np.eye(3)
+    covariance: np.ndarray = np.zeros((14, 14))
+    residual: float = 0.0
+    stray: float = 0.0
 
     def instants(self, stamps) -> np.ndarray:
         """On the first log's clock, s."""
@@ -73,11 +73,6 @@ class Clock(NamedTuple):
         return back @ self.covariance[2:11, 2:11] @ back.T
 
 
-def itself(stamps) -> Clock:
-    """The first log's clock."""
-    return Clock(0.0, 0.0, float(np.mean(stamps[[0, -1]])), np.eye(3), np.zeros((14, 14)), 0.0, 0.0)
-
-
 def compare(first: Sensor, other: Sensor, ahead: float = 0.0) -> Clock:
     """Clock and map of a gyroscope against another by robust least squares.
 
@@ -86,7 +81,7 @@ def compare(first: Sensor, other: Sensor, ahead: float = 0.0) -> Clock:
     """
     splines = Splines(first)
     middle, offset, drift = _coarse(first, other, ahead)
-    clock = Clock(offset, drift, middle, np.eye(3), np.zeros((14, 14)), 0.0, 0.0)
+    clock = Clock(offset, drift, middle)
     at = clock.instants(other.time)
     base = splines(at)
     used = ~(first.near_rail(at).any(axis=1) | other.railed.any(axis=1))

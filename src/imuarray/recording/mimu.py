@@ -130,10 +130,7 @@ def _content(path: Path) -> bytes:
 
 
 def _big_endian(data, at, count) -> np.ndarray:
-    value = np.zeros(len(at), np.int64)
-    for i in range(count):
-        value = value * 256 + data[at + i]
-    return value
+    return data[at[:, None] + np.arange(count)] @ 256 ** np.arange(count)[::-1]
 
 
 def _sound_packets(data, where) -> tuple[np.ndarray, int]:

@@ -273,19 +273,16 @@ def _imus(layout, where: str) -> dict[str, dict]:
     force, rate = (layout[kind]["triads"] for kind in KINDS)
     found = {}
     for label, triad in force.items():
-        other = rate.get(label)
-        axes = [t.get("axes", list("xyz")) for t in (triad, other or {})]
-        if other is None or len(rate) != len(force) or axes[0] != axes[1]:
+        both = triad, rate.get(label, {})
+        axes = [one.get("axes", list("xyz")) for one in both]
+        if not both[1] or len(rate) != len(force) or axes[0] != axes[1]:
             raise InputError(
                 f"{where}: {label!r}: expected, as some cells are blank, an accelerometer and a"
                 f" gyroscope of each label with the same axes, found others{BLANK}"
             )
-        columns = [
-            name
-            for t in (triad, other)
-            for name in three_columns(t["columns"], f"{where}: {label!r}")
-        ]
-        found[label] = {"columns": columns, "position": triad["position"], "axes": axes[0]} | {
-            kind: layout[kind] for kind in KINDS
-        }
+        columns = [three_columns(one["columns"], f"{where}: {label!r}") for one in both]
+        found[label] = {
+            "columns": sum(columns, []), "position": triad["position"], "axes": axes[0],
+            **{kind: layout[kind] for kind in KINDS},
+        }  # fmt: skip
     return found
