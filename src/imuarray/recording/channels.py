@@ -101,14 +101,14 @@ def _parts(recording: Recording, kind: str):
 def _constant(recording: Recording, kind: str) -> list[str]:
     labels = getattr(recording, f"{kind}_labels")
     count = _different(values for values, _ in _parts(recording, kind))
-    first = next(recording.parts(1))
+    first = next(_parts(recording, kind))[0][0]
     least = np.where(len(recording.time) < MANY, 1, COARSE)
     few = count <= least
     if few.any():
         few &= ~np.all([rail.all(axis=0) for _, rail in _parts(recording, kind)], axis=0)
     return [
         f"{kind} {labels[k]!r}, axis {AXES[axis]}: "
-        + (f"{getattr(first, _KINDS[kind])[0, k, axis]:g}" if count[k, axis] == 1
+        + (f"{first[k, axis]:g}" if count[k, axis] == 1
            else f"{count[k, axis]} values")
         + " in all samples"
         for k, axis in np.argwhere(few)

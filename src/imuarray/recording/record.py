@@ -257,10 +257,8 @@ class Recording:
             "gyroscope": ("gyroscope", np.array(self.gyroscope_labels, object)),
             "axis": ("axis", np.array(AXES, object)),
         }
-        attributes = {name: float(getattr(self, name)) for name in NUMBERS}
-        for name in OPTIONAL_NUMBERS:
-            if not np.isnan(getattr(self, name)):
-                attributes[name] = float(getattr(self, name))
+        declared = [name for name in OPTIONAL_NUMBERS if not np.isnan(getattr(self, name))]
+        attributes = {name: float(getattr(self, name)) for name in (*NUMBERS, *declared)}
         attributes |= {name: getattr(self, name) for name in TEXTS if getattr(self, name)}
         try:
             return xr.Dataset(variables, coordinates, attributes)
@@ -311,11 +309,10 @@ class Recording:
         whole = self.selected.partition(" of ")[2] or f"{len(self.time)} samples"
         return replace(left, selected=f"{len(left.time)} of {whole}")
 
-    def parts(self, size: int | None = None) -> Iterator[Recording]:
-        """The samples in turn, `PART` or ``size`` at a time, in memory."""
-        size = size or PART
-        for first in range(0, max(len(self.time), 1), size):
-            yield self._at(slice(first, first + size))
+    def parts(self) -> Iterator[Recording]:
+        """The samples in turn, `PART` at a time, in memory."""
+        for first in range(0, max(len(self.time), 1), PART):
+            yield self._at(slice(first, first + PART))
 
     def in_memory(self) -> Recording:
         """The recording with its readings read; InputError where they are too many."""

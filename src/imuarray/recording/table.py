@@ -62,9 +62,8 @@ def recording_of(table: pd.DataFrame, layout, path, columns) -> tuple[Recording,
 def load(path, layout, columns) -> tuple[pd.DataFrame, list[str]]:
     """The table, and how it is written; columns as its header has them: twins are seen."""
     options = {"sep": layout.get("delimiter"), "comment": layout.get("comment")}
-    given = (("delimiter", options["sep"], ","), ("comment", options["comment"], "#"))
-    for key, value, usual in given:
-        value = usual if value is None and key not in layout else value
+    for key, usual in (("delimiter", ","), ("comment", "#")):
+        value = layout.get(key, usual)
         runs = key == "delimiter" and value == WHITESPACE
         one = isinstance(value, str) and (len(value) == 1 or runs)
         require(one, f"{columns}: {key}", "one character", repr(value))
