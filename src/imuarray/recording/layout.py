@@ -95,7 +95,7 @@ def _require_sections(sections: Any, where: str, what: str, keys: dict[str, bool
 def _require_keys(section: Any, keys: dict[str, bool], where: str) -> None:
     require(isinstance(section, dict), where, _listed(keys), repr(section))
     for key in section:
-        near = get_close_matches(str(key), keys, 1)
+        near = [] if key in keys else get_close_matches(str(key), keys, 1)
         hint = f"; did you mean {near[0]}?" if near else ""
         require(key in keys, where, _listed(keys), f"an unknown key {key!r}{hint}")
     for key, needed in keys.items():

@@ -114,7 +114,8 @@ def _alike(name: str, table) -> str:
 
 def column(table, name, where, blank: bool = False) -> np.ndarray:
     """A column's numbers, integers where all are; InputError unless finite, or ``blank`` (NaN)."""
-    require(name in table.columns, where, f"a column {name!r}", _alike(name, table))
+    if name not in table.columns:
+        raise InputError(f"{where}: expected a column {name!r}, found {_alike(name, table)}")
     once = list(table.columns).count(name) == 1
     require(once, where, f"one column {name!r}", "several of that name")
     values = pd.to_numeric(table[name], errors="coerce").to_numpy()
