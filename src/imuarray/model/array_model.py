@@ -231,24 +231,15 @@ def unit_of(effect: str, place: tuple[int, ...]) -> str:
     return unit.split(",")[place[-1]].strip() if "," in unit else unit
 
 
-def parameter_ids(model: ArrayModel, labels=None) -> list[tuple[str, str]]:
-    """(effect, component_IMU) of each flat effect parameter, (P,).
+def parameter_names(model: ArrayModel, labels=None) -> list[str]:
+    """'effect component_IMU unit' of each flat effect parameter, (P,).
 
     ``labels``: of the accelerometers and of the gyroscopes; by default the array's, or numbers.
     """
-    return [(effect, name) for effect, name, _ in _parameters(model, labels)]
-
-
-def parameter_names(model: ArrayModel, labels=None) -> list[str]:
-    """'effect component_IMU unit' of each flat effect parameter, (P,); see `parameter_ids`."""
-    return [" ".join(parts) for parts in _parameters(model, labels)]
-
-
-def _parameters(model: ArrayModel, labels) -> list[tuple[str, str, str]]:
     counts = (str(k + 1) for k in range(model.array.gyroscopes))
     whole = max(labels or (model.array.labels, tuple(counts)), key=len)
     return [
-        (item.id, f"{component(item.id, i[1:])}_{whole[i[0]]}", unit_of(item.id, i[1:]))
+        f"{item.id} {component(item.id, i[1:])}_{whole[i[0]]} {unit_of(item.id, i[1:])}"
         for item, shape in zip(model.chain, model.shapes, strict=True)
         for i in np.ndindex(*shape)
     ]
