@@ -9,7 +9,7 @@ import numpy as np
 import yaml
 
 from imuarray.errors import LARGEST, SMALLEST, expecting, require
-from imuarray.recording.units import factor
+from imuarray.recording.units import UNITS, factor
 from imuarray.recording.validate import is_rotation
 
 WIDEST = 2.0  # m; beyond this, positions without a declared unit are taken to be in another
@@ -133,10 +133,8 @@ def numbers(layout, where: str) -> dict[str, float]:
     out = {}
     for kind, quantity in QUANTITIES.items():
         section, name = layout[kind], kind.removesuffix("s")
-        # a bag's are in SI units
-        place, unit = f"{where}: {kind}", 1.0
-        if "unit" in section:
-            unit = factor(quantity, section["unit"], f"{place}: unit")
+        place, si = f"{where}: {kind}", next(iter(UNITS[quantity]))  # a bag's are in SI units
+        unit = factor(quantity, section.get("unit", si), f"{place}: unit")
         for key, attribute in (("noise", "noise_sd"), ("range", "range")):
             value = positive(section[key], f"{place}: {key}")
             out[f"{name}_{attribute}"] = unit * value
