@@ -106,12 +106,8 @@ def write_recording(
     `attrs` (such as `provenance.stamp` gives) join the recording's own attributes, which win. The
     file reads back, or it is not written: InputError as in `read_recording`.
     """
-    whole = next(recording.parts()).to_dataset()
-    if whole.sizes["time"] == len(recording.time):
-        from_dataset(whole, str(path))
-    else:
-        validate.check_structure(whole, str(path))
-        validate.check_values(recording, str(path))
+    validate.check_structure(next(recording.parts()).to_dataset(), str(path))
+    validate.check_values(recording, str(path))
     datasets = (part.to_dataset() for part in recording.parts())
     parts = (one.assign_attrs({**(attrs or {}), **one.attrs}) for one in datasets)
     known = {record.TRUTH: truth, record.ALIGNMENT: recording.alignment, **(groups or {})}
