@@ -16,7 +16,7 @@ from imuarray.errors import InputError, require
 from imuarray.firstorder.correct import rails_shown
 from imuarray.firstorder.turns import angle_of
 from imuarray.recording import Recording
-from imuarray.recording.record import pieces
+from imuarray.recording.record import RAIL, pieces
 from imuarray.recording.rig import Log
 
 PACES = 1e9, 60.0, 20.0, 5.0  # s between knots of a pace that changes slowly
@@ -29,7 +29,6 @@ LITTLE = 0.3  # of the noise that is left, what averaging may miss
 SHORTEST = 100  # readings of a sensor, and common instants
 UNBROKEN = 32  # readings of a sensor, but for a few missing ones
 PAUSED = 100  # times as long as its readings take, which a log may last
-RAIL = 1 - 1e-6  # of the range
 UNEVEN = 2.0  # s, by which logs may begin and end apart without a line
 
 

@@ -94,8 +94,8 @@ TEXTS = ("title", "source", "license", "selected")
 # Variables with a value for each sample.
 SAMPLED = ("time", "specific_force", "angular_rate", *FLAGS)
 
-# A rail is a count; turning counts into SI units and back may cost the last digits.
-_RAIL_TOLERANCE = 1e-6
+# Of a range: a rail is a count; turning counts into SI units and back may cost the last digits.
+RAIL = 1 - 1e-6
 
 
 class Stored:
@@ -288,13 +288,13 @@ class Recording:
         """Rates at the gyroscopes' rail, (T, G, 3) bool."""
         if self.angular_rate_saturated is not None:
             return self.angular_rate_saturated
-        return np.abs(self.angular_rate) >= self.gyroscope_range * (1 - _RAIL_TOLERANCE)
+        return np.abs(self.angular_rate) >= self.gyroscope_range * RAIL
 
     def saturated_accelerometers(self) -> np.ndarray:
         """Specific forces at the accelerometers' rail, (T, A, 3) bool."""
         if self.specific_force_saturated is not None:
             return self.specific_force_saturated
-        return np.abs(self.specific_force) >= self.accelerometer_range * (1 - _RAIL_TOLERANCE)
+        return np.abs(self.specific_force) >= self.accelerometer_range * RAIL
 
     def at_rail(self, kind: str) -> np.ndarray:
         """Samples (T,) with a reading at its rail of a ``kind``, accelerometer or gyroscope."""
