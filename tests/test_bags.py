@@ -13,10 +13,10 @@ from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.recording.bags import read_bags
 from imuarray.recording.record import MATRICES, NUMBERS, QUANTITIES
-from imuarray.recording.table import read_csv
 from imuarray.recording.units import GRAVITY
 from tests.bag_writer import KINDS, write
 from tests.doc_pages import ROOT, blocks
+from tests.test_convert_csv import read_csv
 
 TOPICS = "/imu0", "/imu1", "/imu2", "/imu3"
 PLACES = [[0, 0, 0], [100, 0, 0], [0, 80, 0], [0, 0, 55.5]]

@@ -10,7 +10,7 @@ import yaml
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.recording import read_recording
-from imuarray.recording.table import read_csv
+from tests.test_convert_csv import read_csv
 
 ROOT = Path(__file__).parents[1]
 

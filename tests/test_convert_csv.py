@@ -5,7 +5,8 @@ import pytest
 import yaml
 
 from imuarray.errors import InputError
-from imuarray.recording.table import read_csv
+from imuarray.recording.layout import read_layout
+from imuarray.recording.table import load, recording_of
 
 HEADER = ["t", *(f"{kind}{axis}{i}" for i in (1, 2, 3) for kind in "ag" for axis in "xyz")]
 
@@ -30,6 +31,12 @@ def table(rows=4) -> list[list[str]]:
     """Header and rows of cells; each cell of a row differs."""
     cells = [[str(10 * i), *(f"{0.1 * j + 0.01 * i:.2f}" for j in range(18))] for i in range(rows)]
     return [HEADER, *cells]
+
+
+def read_csv(path, columns):
+    """A board's table as it is, without a look at blank cells."""
+    layout = read_layout(columns)
+    return recording_of(load(path, layout, columns)[0], layout, path, columns)[0]
 
 
 def read(folder, rows, columns=None, delimiter=","):

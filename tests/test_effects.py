@@ -1,5 +1,7 @@
 """The seam for effects: one small function reaches simulation, ML and the likelihood."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -86,8 +88,9 @@ def test_no_reward_along_a_gauge_with_a_proper_motion_prior():
         ("gyroscope_scale",), lambda rng: {}, samples=60
     )
     normals = np.random.default_rng(2).standard_normal((60, 4, 3))
-    change = {}
-    for name, used in (("flat", model), ("proper", model.with_motion(motion))):
+    change, sds = {}, [float(np.sqrt(np.mean(np.square(field)))) for field in motion[:3]]
+    proper = replace(model, motion_sd=tuple(sds))
+    for name, used in (("flat", model), ("proper", proper)):
         likelihood = GenericLikelihood(
             used, measured(used, force, rate), packed(model, motion), steps=6
         )

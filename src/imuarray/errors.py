@@ -1,6 +1,7 @@
 """Errors because of the input, as opposed to because of a defect."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from numbers import Integral
 
 # Sizes that a quantity in SI units may have: what is squared and summed stays a number, and
@@ -35,6 +36,27 @@ class InputError(ValueError):
 
 class IdentifiabilityError(InputError):
     """The input is well formed, but does not determine the quantities asked for."""
+
+
+def require(holds: object, where: str, expected: str, found: object) -> None:
+    """InputError unless something ``holds``: "where: expected ..., found ..."."""
+    if not holds:
+        raise InputError(f"{where}: expected {expected}, found {found}")
+
+
+@contextmanager
+def expecting(where: object, expected: str, errors=Exception) -> Iterator[None]:
+    """InputError, "where: expected ..., found ...", for ``errors`` that are raised within.
+
+    By default for all, with their names: of a damaged file libraries raise nearly anything.
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except errors as error:
+        found = f"{type(error).__name__}: {error}" if errors is Exception else str(error)
+        raise InputError(f"{where}: expected {expected}, found {found}") from error
 
 
 def require_integer(name: str, value: object, least: int = 1) -> None:

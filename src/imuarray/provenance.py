@@ -255,7 +255,8 @@ def write_netcdf_parts(
     encoded = {n: xr.conventions.encode_cf_variable(first.variables[n], name=n) for n in along}
     room = sum(one.nbytes for one in encoded.values()) * length // first.sizes["time"]
     with atomic_write(path) as temporary:
-        _require_room(temporary.parent, room)
+        if shutil.disk_usage(temporary.parent).free < room:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         first.drop_vars(along).to_netcdf(temporary, engine="h5netcdf")
         for name, dataset in (groups or {}).items():
             dataset.to_netcdf(temporary, mode="a", group=name, engine="h5netcdf")
@@ -274,11 +275,6 @@ def write_netcdf_parts(
                     file[name][start:stop] = part[name].to_numpy()
                 start = stop
         _seal(temporary)
-
-
-def _require_room(folder: Path, size: int) -> None:
-    if shutil.disk_usage(folder).free < size:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 def _seal(path: Path) -> None:

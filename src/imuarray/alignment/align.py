@@ -9,13 +9,14 @@ from dataclasses import replace
 import numpy as np
 from scipy.interpolate import make_interp_spline, make_lsq_spline
 
-from imuarray.alignment.clocks import Clock, compare, itself
+from imuarray.alignment.clocks import Clock, compare
 from imuarray.alignment.found import KINDS, Alignment, Carried
 from imuarray.alignment.resample import WIDEST, Sensor, Splines
-from imuarray.errors import InputError
+from imuarray.errors import InputError, require
 from imuarray.firstorder.correct import rails_shown
 from imuarray.firstorder.turns import angle_of
 from imuarray.recording import Recording
+from imuarray.recording.record import RAIL, pieces
 from imuarray.recording.rig import Log
 
 PACES = 1e9, 60.0, 20.0, 5.0  # s between knots of a pace that changes slowly
@@ -28,7 +29,6 @@ LITTLE = 0.3  # of the noise that is left, what averaging may miss
 SHORTEST = 100  # readings of a sensor, and common instants
 UNBROKEN = 32  # readings of a sensor, but for a few missing ones
 PAUSED = 100  # times as long as its readings take, which a log may last
-RAIL = 1 - 1e-6  # of the range
 UNEVEN = 2.0  # s, by which logs may begin and end apart without a line
 
 
@@ -39,10 +39,8 @@ def steadied(time, values, enough: float = 1.0) -> tuple[np.ndarray, float]:
     ``enough`` times what they are in the stamps: those that a logger rounds or writes late are
     smoother. Else the stamps.
     """
-    step = np.median(np.diff(time))
-    cuts = np.flatnonzero(np.diff(time) > RUN * step) + 1
-    pieces = [_paced(part) for part in np.split(time, cuts)]
-    even = np.concatenate(pieces)
+    steps = np.diff(time)
+    even = np.concatenate([_paced(time[part]) for part in pieces(steps > RUN * np.median(steps))])
     off = float(np.sqrt(np.mean((even - time) ** 2)))
     if (np.diff(even) <= 0).any() or _roughness(even, values) > enough * _roughness(time, values):
         return time, 0.0
@@ -108,7 +106,7 @@ def align(
     _require_slow([sensor for pair in pairs for sensor in pair])
     gyroscopes = [pair[1] for pair in pairs]
     ahead = _ahead(logs, gyroscopes, origins)
-    clocks = [itself(gyroscopes[0].time)]
+    clocks = [Clock(0.0, 0.0, float(np.mean(gyroscopes[0].time[[0, -1]])))]
     clocks += map(compare, gyroscopes[:1] * len(ahead), gyroscopes[1:], ahead)
     frame = np.eye(3) if logs[0].axes is None else logs[0].axes
     rotation = np.array([frame @ clock.rotation.T for clock in clocks])
@@ -137,8 +135,7 @@ def align(
 
 def _sensors(logs: Sequence[Log]) -> tuple[list[tuple[Sensor, Sensor]], list[float]]:
     """Accelerometer and gyroscope of each log, their stamps from the log's own zero, and that."""
-    if len(logs) < 2:
-        raise InputError(f"logs: expected two IMUs at least, found {len(logs)}")
+    require(len(logs) >= 2, "logs", "two IMUs at least", len(logs))
     out, origins = [], []
     for log in logs:
         parts = (
@@ -147,17 +144,13 @@ def _sensors(logs: Sequence[Log]) -> tuple[list[tuple[Sensor, Sensor]], list[flo
             (log.gyroscope_time, log.angular_rate, log.gyroscope_range, log.gyroscope_noise_sd),
         )  # fmt: skip
         for kind, (time, *_) in zip(KINDS, parts, strict=True):
-            if len(time) < SHORTEST:
-                raise InputError(
-                    f"{kind} {log.label!r}: expected {SHORTEST} readings at least, found"
-                    f" {len(time)}"
-                )
+            name, count = f"{kind} {log.label!r}", len(time)
+            require(count >= SHORTEST, name, f"{SHORTEST} readings at least", count)
             step, lasts = np.quantile(np.diff(time), 0.99), time[-1] - time[0]
-            if step > 0 and lasts > PAUSED * len(time) * step:
-                raise InputError(
-                    f"{kind} {log.label!r}: expected stamps of one recording, found {len(time)}"
-                    f" readings {step:.3g} s apart or less within {lasts / 86400:.3g} days"
-                )
+            paused = step > 0 and lasts > PAUSED * count * step
+            days = f"within {lasts / 86400:.3g} days"
+            found = f"{count} readings {step:.3g} s apart or less {days}"
+            require(not paused, name, "stamps of one recording", found)
         origins.append(float(min(part[0][0] for part in parts)))
         out.append(tuple(
             Sensor(f"{kind} {log.label!r}", *steadied(time - origins[-1], values), values,
@@ -203,11 +196,8 @@ def _grid(sensors: Sequence[Sensor]) -> tuple[np.ndarray, float]:
 
 
 def _require_common(count: int) -> None:
-    if count < SHORTEST:
-        raise InputError(
-            f"logs: expected {SHORTEST} instants at least that all sensors have readings around,"
-            f" found {count}"
-        )
+    expected = f"{SHORTEST} instants at least that all sensors have readings around"
+    require(count >= SHORTEST, "logs", expected, count)
 
 
 def _knots(sensor: Sensor, grid, step: float) -> np.ndarray | None:
@@ -243,11 +233,8 @@ def _require_slow(sensors: Sequence[Sensor]) -> None:
     """
     for sensor in sensors:
         run = max(len(sensor.time[part]) for part in sensor.runs(WIDEST + 0.5))
-        if run < UNBROKEN:
-            raise InputError(
-                f"{sensor.name}: expected stretches of {UNBROKEN} readings with at most"
-                f" {WIDEST - 1} missing in a row, found {run} at most"
-            )
+        expected = f"stretches of {UNBROKEN} readings with at most {WIDEST - 1} missing in a row"
+        require(run >= UNBROKEN, sensor.name, expected, f"{run} at most")
     worst = max(sensors, key=lambda sensor: sensor.error(sensor.step) / sensor.noise_sd)
     missed = worst.error(worst.step)
     if missed > worst.noise_sd:

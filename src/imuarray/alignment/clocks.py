@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import correlate
+from scipy.signal import argrelextrema, correlate
 
 from imuarray.alignment.resample import Sensor, Splines
-from imuarray.errors import InputError
+from imuarray.errors import InputError, require
 from imuarray.firstorder.gyroscopes import FEWEST, FLATTEST, SLOWEST
 from imuarray.firstorder.turns import nearest_orthogonal, procrustes
 from imuarray.linear import scaled_inverse
@@ -37,10 +37,10 @@ class Clock(NamedTuple):
     offset: float
     drift: float
     middle: float
-    map: np.ndarray
-    covariance: np.ndarray
-    residual: float
-    stray: float
+    map: np.ndarray = np.eye(3)
+    covariance: np.ndarray = np.zeros((14, 14))
+    residual: float = 0.0
+    stray: float = 0.0
 
     def instants(self, stamps) -> np.ndarray:
         """On the first log's clock, s."""
@@ -73,11 +73,6 @@ class Clock(NamedTuple):
         return back @ self.covariance[2:11, 2:11] @ back.T
 
 
-def itself(stamps) -> Clock:
-    """The first log's clock."""
-    return Clock(0.0, 0.0, float(np.mean(stamps[[0, -1]])), np.eye(3), np.zeros((14, 14)), 0.0, 0.0)
-
-
 def compare(first: Sensor, other: Sensor, ahead: float = 0.0) -> Clock:
     """Clock and map of a gyroscope against another by robust least squares.
 
@@ -86,16 +81,13 @@ def compare(first: Sensor, other: Sensor, ahead: float = 0.0) -> Clock:
     """
     splines = Splines(first)
     middle, offset, drift = _coarse(first, other, ahead)
-    clock = Clock(offset, drift, middle, np.eye(3), np.zeros((14, 14)), 0.0, 0.0)
+    clock = Clock(offset, drift, middle)
     at = clock.instants(other.time)
     base = splines(at)
     used = ~(first.near_rail(at).any(axis=1) | other.railed.any(axis=1))
     used &= np.linalg.norm(np.nan_to_num(base), axis=1) > SLOWEST
-    if used.sum() < FEWEST:
-        raise InputError(
-            f"{other.name}: expected {FEWEST} readings in turning motion off the rails to find"
-            f" rotation and clock from, found {used.sum()}"
-        )
+    expected = f"{FEWEST} readings in turning motion off the rails to find rotation and clock from"
+    require(used.sum() >= FEWEST, other.name, expected, used.sum())
     turn = procrustes(other.values[used], base[used])
     _require_turning(base[used], turn, other.name)
     found = _fit(splines, other, clock._replace(map=turn), used)
@@ -110,17 +102,14 @@ def compare(first: Sensor, other: Sensor, ahead: float = 0.0) -> Clock:
 
 def _require_turning(rate, turn, name: str) -> None:
     """InputError for a mirror image, and for motion about one axis."""
-    if np.linalg.det(turn) < 0:
-        raise InputError(
-            f"{name}: expected right-handed axes, found those of a mirror image of the first's; is"
-            " the sign of one of its axes wrong, or of the first's?"
-        )
+    hint = "is the sign of one of its axes wrong, or of the first's?"
+    found = f"those of a mirror image of the first's; {hint}"
+    require(np.linalg.det(turn) >= 0, name, "right-handed axes", found)
     values = np.linalg.eigvalsh(rate.T @ rate)
-    if values[1] < FLATTEST * values[2]:
-        raise InputError(
-            f"{name}: expected motion about two axes at least, found one axis only: the rotation of"
-            " this IMU about it is not determined; turn the rig about other axes, too"
-        )
+    hint = "turn the rig about other axes, too"
+    found = f"one axis only: the rotation of this IMU about it is not determined; {hint}"
+    several = values[1] >= FLATTEST * values[2]
+    require(several, name, "motion about two axes at least", found)
 
 
 def _fit(splines: Splines, other: Sensor, clock: Clock, used) -> Clock:
@@ -250,15 +239,10 @@ def _placed(base, speed, length: int, zero: float, name: str) -> tuple[int, int]
         score = _match(base, part)
         best = max(best, score.max())
         if best > ALIKE:
-            lags = _peaks(score, best - NEARLY) - begin
+            peaks = argrelextrema(score, np.greater_equal)[0]
+            lags = peaks[score[peaks] > best - NEARLY] - begin
             return int(begin), int(lags[np.argmin(np.abs(COARSE * lags + zero))])
     raise InputError(
         f"{name}: expected the turning motion that the first log shows, too, found none alike"
         f" (correlation {best:.2f}); are both on one rigid body, and do the logs overlap?"
     )
-
-
-def _peaks(score, least: float) -> np.ndarray:
-    """Where a sequence is at its highest nearby, and above ``least``."""
-    beside = np.concatenate([[-np.inf], score, [-np.inf]])
-    return np.flatnonzero((score >= beside[:-2]) & (score >= beside[2:]) & (score > least))

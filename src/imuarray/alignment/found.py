@@ -110,33 +110,31 @@ class Alignment:
 
     def dataset(self) -> xr.Dataset:
         """Dataset of the alignment for the recording's file: dimensions imu, axis, kind."""
-        sds = np.sqrt([np.diag(clock.covariance)[:2] for clock in self.clocks])
-        clocks = {"offset": "s", "drift": "1", "middle": "s"}
-        begun = {"offset": self.epochs - self.epochs[0], "drift": 0.0, "middle": self.epochs}
-        facts = {
-            f"clock_{name}": (
-                np.array([getattr(clock, name) for clock in self.clocks]) + begun[name], unit
-            )
-            for name, unit in clocks.items()
-        }  # fmt: skip
-        facts |= {"clock_offset_sd": (sds[:, 0], "s"), "clock_drift_sd": (sds[:, 1], "1")}
-        facts |= {"angle_sd": (self.angle_sd, "rad"), "agreement": (self.agreement, "1")}
-        made = {name: ("imu", values, {"units": unit}) for name, (values, unit) in facts.items()}
-        both = "m s-2 and rad s-1"
-        units = {
-            "rate": "Hz", "jitter": "s", "interpolation_error": both, "interpolated_noise": both
-        }  # fmt: skip
-        for name, values in zip(units, np.moveaxis(self.carried, -1, 0), strict=True):
-            made[name] = ("imu", "kind"), values, {"units": units[name]}
-        made["rotation"] = ("imu", "axis", "axis_other"), self.rotation, {"units": "1"}
+        offset, drift, middle = np.array([clock[:3] for clock in self.clocks]).T
+        sds = np.sqrt([np.diag(clock.covariance)[:2] for clock in self.clocks]).T
+        rate, jitter, error, noise = np.moveaxis(self.carried, -1, 0)
+        own, kinds, both = ("imu",), ("imu", "kind"), "m s-2 and rad s-1"
+        found = {
+            "clock_offset": (own, offset + (self.epochs - self.epochs[0]), "s"),
+            "clock_drift": (own, drift, "1"),
+            "clock_middle": (own, middle + self.epochs, "s"),
+            "clock_offset_sd": (own, sds[0], "s"),
+            "clock_drift_sd": (own, sds[1], "1"),
+            "angle_sd": (own, self.angle_sd, "rad"),
+            "agreement": (own, self.agreement, "1"),
+            "rate": (kinds, rate, "Hz"),
+            "jitter": (kinds, jitter, "s"),
+            "interpolation_error": (kinds, error, both),
+            "interpolated_noise": (kinds, noise, both),
+            "rotation": (("imu", "axis", "axis_other"), self.rotation, "1"),
+        }
         named = {"imu": self.labels, "kind": KINDS, "axis": AXES}
+        origin = self.origin + self.epochs[0]
         return xr.Dataset(
-            made, {name: np.array(list(labels), object) for name, labels in named.items()},
-            {
-                "step": self.step, "origin": self.origin + self.epochs[0],
-                "left_out": self.left_out,
-            },
-        )  # fmt: skip
+            {name: (dims, values, {"units": unit}) for name, (dims, values, unit) in found.items()},
+            {name: np.array(list(labels), object) for name, labels in named.items()},
+            {"step": self.step, "origin": origin, "left_out": self.left_out},
+        )
 
 
 def _with(value: float, sd: float) -> str:

@@ -5,12 +5,14 @@ Readings are carried over by splines of fifth degree (Unser, Sampling - 50 years
 """
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.interpolate import BSpline, make_interp_spline, make_lsq_spline
+
+from imuarray.recording.record import pieces
 
 DEGREE = 5
 REACH = 8  # readings, or knots, beside a rail that show in the spline: 0.43^8 is 0.1 %
@@ -34,6 +36,7 @@ class Sensor:
     values: np.ndarray
     railed: np.ndarray
     noise_sd: float
+    spectra: dict = field(default_factory=dict, init=False)  # by segment, as far as asked for
 
     @cached_property
     def step(self) -> float:
@@ -54,11 +57,6 @@ class Sensor:
                 values, railed = make_interp_spline(time, values, DEGREE)(at), railed[nearest]
             found.append((values, railed))
         return found
-
-    @cached_property
-    def spectra(self) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-        """`spectrum` by its segment, as far as asked for."""
-        return {}
 
     def spectrum(self, segment: int) -> tuple[np.ndarray, np.ndarray]:
         """Frequencies (F,) in cycles a reading, and the power of motion (S, F) in moving pieces.
@@ -86,9 +84,7 @@ class Sensor:
 
     def runs(self, longest: float) -> list[slice]:
         """Slices of readings no further apart than ``longest`` usual steps."""
-        cuts = np.flatnonzero(np.diff(self.time) > longest * self.step) + 1
-        ends = [0, *cuts, len(self.time)]
-        return [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        return pieces(np.diff(self.time) > longest * self.step)
 
     def error(self, spacing: float) -> float:
         """Rms of what a spline of knots ``spacing`` seconds apart misses, one axis, in motion."""

@@ -11,7 +11,7 @@ from imuarray.engine.estimate import Estimate
 from imuarray.engine.parameters import POSITION, model_of
 from imuarray.engine.widths import widths
 from imuarray.model import ArrayModel, Noise
-from imuarray.model.array_model import parameter_ids, parameter_names
+from imuarray.model.array_model import parameter_names
 from imuarray.model.effects import DATA_EFFECTS, EFFECTS, KINDS
 from imuarray.motion.state import UNITS
 from imuarray.provenance import digest, stamp
@@ -149,8 +149,8 @@ def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
             # of r_2 ... r_A, then the effects' parameters
             "whole_covariance": (("unknown", "unknown_other"), whole),
         }
-        scope = [EFFECTS[effect].scope for effect, _ in parameter_ids(model, labels)]
         coords["parameter"] = names = parameter_names(model, labels)
+        scope = [EFFECTS[name.split()[0]].scope for name in names]
         coords["scope"] = "parameter", scope
         theirs = np.flatnonzero(np.array(scope) == "recording")
         if len(recordings) > 1 and len(theirs):

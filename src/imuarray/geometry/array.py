@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from imuarray.errors import IdentifiabilityError, InputError
+from imuarray.errors import IdentifiabilityError, require
 
 
 @dataclass(frozen=True)
@@ -72,8 +72,7 @@ MAX_TRIADS = 256  # of a kind; the slowest estimator takes half a minute and 5 G
 
 def require_count(count: int, where: str, kind: str) -> None:
     """InputError for more triads than `MAX_TRIADS`."""
-    if count > MAX_TRIADS:
-        raise InputError(f"{where}: expected at most {MAX_TRIADS} {kind} triads, found {count}")
+    require(count <= MAX_TRIADS, where, f"at most {MAX_TRIADS} {kind} triads", count)
 
 
 def require_apart(positions: np.ndarray, where: str) -> None:

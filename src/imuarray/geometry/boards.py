@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from imuarray.errors import IdentifiabilityError, InputError
+from imuarray.errors import IdentifiabilityError, InputError, require
 from imuarray.geometry.array import Array, require_count, require_planar_extent
 
 PITCH = 6.3e-3  # m, between package centres in the plane
@@ -55,8 +55,8 @@ def array_from_csv(path: str, gyroscopes: int | None = None) -> Array:
             rows = [[cell.strip() for cell in row] for row in csv.reader(handle) if row]
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: expected a readable CSV file of positions: {error}") from None
-    if not rows or [cell.lower() for cell in rows[0]] != ["label", "x", "y", "z"]:
-        raise InputError(f"{path}: expected the header label,x,y,z, found {rows[:1]}")
+    head = [cell.lower() for cell in rows[0]] if rows else []
+    require(head == ["label", "x", "y", "z"], path, "the header label,x,y,z", rows[:1])
     labels, values = [], []
     for number, row in enumerate(rows[1:], start=2):
         try:
@@ -89,25 +89,20 @@ def array_from_config(section: dict) -> Array:
         return _checked(values, section.get("labels", labels), count, "array.positions")
     if "file" in section:
         return array_from_csv(section["file"], count)
-    if section.get("board") not in BOARDS:
-        raise InputError(
-            f"array: expected board ({', '.join(BOARDS)}), file or positions, found {section}"
-        )
+    known = section.get("board") in BOARDS
+    require(known, "array", f"board ({', '.join(BOARDS)}), file or positions", section)
     board = BOARDS[section["board"]]()
     checked = _checked(board.positions, board.labels, count, board.name)
     return replace(board, gyroscopes=checked.gyroscopes)
 
 
 def _checked(values, labels, gyroscopes, where) -> Array:
-    if values.ndim != 2 or values.shape[1] != 3:
-        raise InputError(f"{where}: expected rows of x, y, z, found shape {values.shape}")
-    if not np.all(np.isfinite(values)):
-        row = int(np.argwhere(~np.isfinite(values))[0, 0]) + 1
-        raise InputError(
-            f"{where}: expected finite positions, found {values[row - 1]} in row {row}"
-        )
-    if len(set(labels)) != len(values):
-        raise InputError(f"{where}: expected {len(values)} different labels, found {list(labels)}")
+    threes = values.ndim == 2 and values.shape[1] == 3
+    require(threes, where, "rows of x, y, z", f"shape {values.shape}")
+    for number, row in enumerate(values, 1):
+        require(np.isfinite(row).all(), where, "finite positions", f"{row} in row {number}")
+    different = len(set(labels)) == len(values)
+    require(different, where, f"{len(values)} different labels", list(labels))
     require_planar_extent(values, where)
     count = len(values) if gyroscopes is None else int(gyroscopes)
     require_count(len(values), where, "accelerometer")

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, cached_property, partial
 
 import numpy as np
 
-from imuarray.errors import InputError
+from imuarray.errors import require
 from imuarray.geometry import Array
 from imuarray.model import kinematics
 from imuarray.model.effects import EFFECTS, Effect, Instant, Prediction, find_effects, known_effect
@@ -42,7 +42,9 @@ class ArrayModel:
         needs them; the defaults are the papers' motion at 5 Hz.
     motion_sd : (float, float, float)
         Prior sd of omega (rad/s), omega_dot (rad/s^2) and s (m/s^2), infinite as in paper 2021.
-        With effects that have a gauge the flat prior is no posterior at all: see `with_motion`.
+        With effects that have a gauge the flat prior is no posterior at all: each sample of the
+        likelihood carries a power of the array's size and of a common gyroscope scale, which the
+        data do not push back; a prior of the motion's own size does (docs/findings.md).
     clock : (float, float) or None
         Where time begins (s) and its span (s), which drifts, shifts and clocks look at; by
         default those of the times given, which a part of a recording does not share with it.
@@ -117,10 +119,7 @@ class ArrayModel:
     def join(self, values: dict) -> np.ndarray:
         """Flat effect parameters from a dict; absent ones are zero, scalars are spread."""
         unknown = set(values) - set(self.effects)
-        if unknown:
-            raise InputError(
-                f"effects: expected values for {self.effects}, found {sorted(unknown)}"
-            )
+        require(not unknown, "effects", f"values for {self.effects}", sorted(unknown))
         parts = [
             np.broadcast_to(np.asarray(values.get(item.id, 0.0), float), shape).ravel()
             for item, shape in zip(self.chain, self.shapes, strict=True)
@@ -171,16 +170,6 @@ class ArrayModel:
         if self.clock is None:
             return clock(time)
         return np.asarray(time, float) - self.clock[0], self.clock[1]
-
-    def with_motion(self, motion: Motion) -> ArrayModel:
-        """The model with the motion prior of a recording: zero mean, its own size.
-
-        Under a flat prior each sample of the likelihood carries a power of the array's
-        size and of a common gyroscope scale, which the data do not push back; a prior of
-        the motion's own size does (docs/findings.md).
-        """
-        sds = [float(np.sqrt(np.mean(np.square(field)))) for field in motion[:3]]
-        return replace(self, motion_sd=tuple(sds))
 
     @property
     def _function(self) -> tuple:
@@ -242,24 +231,15 @@ def unit_of(effect: str, place: tuple[int, ...]) -> str:
     return unit.split(",")[place[-1]].strip() if "," in unit else unit
 
 
-def parameter_ids(model: ArrayModel, labels=None) -> list[tuple[str, str]]:
-    """(effect, component_IMU) of each flat effect parameter, (P,).
+def parameter_names(model: ArrayModel, labels=None) -> list[str]:
+    """'effect component_IMU unit' of each flat effect parameter, (P,).
 
     ``labels``: of the accelerometers and of the gyroscopes; by default the array's, or numbers.
     """
-    return [(effect, name) for effect, name, _ in _parameters(model, labels)]
-
-
-def parameter_names(model: ArrayModel, labels=None) -> list[str]:
-    """'effect component_IMU unit' of each flat effect parameter, (P,); see `parameter_ids`."""
-    return [" ".join(parts) for parts in _parameters(model, labels)]
-
-
-def _parameters(model: ArrayModel, labels) -> list[tuple[str, str, str]]:
     counts = (str(k + 1) for k in range(model.array.gyroscopes))
     whole = max(labels or (model.array.labels, tuple(counts)), key=len)
     return [
-        (item.id, f"{component(item.id, i[1:])}_{whole[i[0]]}", unit_of(item.id, i[1:]))
+        f"{item.id} {component(item.id, i[1:])}_{whole[i[0]]} {unit_of(item.id, i[1:])}"
         for item, shape in zip(model.chain, model.shapes, strict=True)
         for i in np.ndindex(*shape)
     ]

@@ -76,10 +76,9 @@ def _axes_places(shape, axes):
     if np.abs(along - axes).max() < OBLIQUE:
         for axis, coordinate in np.ndindex(3, 3):
             masks.append(along[:, axis, :, None] ** 2 * along[:, coordinate, None, :])
-    for triad in range(shape[0]):
-        for coordinate in range(3):
-            masks.append(np.zeros(shape, bool))
-            masks[-1][triad, :, coordinate] = True
+    for triad, coordinate in np.ndindex(shape[0], 3):
+        masks.append(np.zeros(shape, bool))
+        masks[-1][triad, :, coordinate] = True
     return masks
 
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.errors import InputError
+from imuarray.errors import InputError, require
 from imuarray.motion.state import Motion
 from imuarray.provenance import add_code, code_version, digest
 
@@ -217,8 +217,7 @@ def _again(old, new) -> bool:
 def find_effects(ids) -> tuple[Effect, ...]:
     """Effects by id; InputError names the unknown one and what is known."""
     for name in ids:
-        if name not in EFFECTS:
-            raise InputError(f"effects: expected any of {', '.join(sorted(EFFECTS))}, found {name}")
+        require(name in EFFECTS, "effects", f"any of {', '.join(sorted(EFFECTS))}", name)
     return tuple(EFFECTS[name] for name in ids)
 
 
@@ -257,10 +256,7 @@ def read_effects(path: str | Path) -> tuple[str, ...]:
         code = compile(text, str(path), "exec", dont_inherit=True)
         exec(code, {"__name__": path.stem, "__file__": str(path)})  # noqa: S102
         new = tuple(name for name in EFFECTS if name not in kept)
-        if not new:
-            raise InputError(
-                f"{path}: expected effects (@effect(...) of docs/effects.md), found none"
-            )
+        require(new, str(path), "effects (@effect(...) of docs/effects.md)", "none")
     except BaseException as error:
         EFFECTS.clear()
         EFFECTS.update(before)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from imuarray.errors import InputError
 
@@ -25,9 +26,7 @@ def _covariance(blocks, count, what) -> np.ndarray:
     if given.ndim == 0 or given.shape == (count,):
         full = np.diag(np.repeat(np.broadcast_to(given, count) ** 2, 3))
     elif given.shape == (count, 3, 3):
-        full = np.zeros((size, size))
-        for k, block in enumerate(given):
-            full[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = block
+        full = block_diag(*given)
     elif given.shape == (size, size):
         full = given
     else:

@@ -3,7 +3,7 @@
 For each sample the motion's mode and curvature are found by Gauss-Newton: omega, omega_dot, s and,
 where effects need them, omega double dot and s dot. It is exact where residuals are linear in the
 motion; for the papers' model with its flat motion prior it is near (26a), up to a constant. Effects
-that have a gauge need a proper motion prior (`ArrayModel.with_motion`): flat, each sample would
+that have a gauge need a proper motion prior (`ArrayModel.motion_sd`): flat, each sample would
 carry a power of the gauge's scale.
 
 Parameters may end in logs of factors on the sds of the noise and of the motion's prior, as

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from imuarray.errors import InputError
+from imuarray.errors import InputError, expecting, require
 from imuarray.recording.layout import QUANTITIES, read_layout, si_units
 from imuarray.recording.rig import Readings, Rig, pair, to_rig
 
@@ -66,26 +66,19 @@ def _chosen(imus: dict[str, dict], topics: Sequence[str], where: str) -> dict[st
     found = {}
     for topic in topics:
         labels = [label for label, of in named.items() if topic in of]
-        if not labels:
-            raise InputError(f"{where}: expected an IMU of the topic {topic}, found none")
+        require(labels, where, f"an IMU of the topic {topic}", "none")
         found |= {label: named[label] for label in labels}
     return found
 
 
 def _readings(parts: dict[str, list], topic: str, kind: int, imu, where: str) -> Readings:
     """One kind of a topic from all bags; each kind is three columns of what `_read` gives."""
-    if topic not in parts:
-        raise InputError(
-            f"{where}: expected a topic of {MESSAGE} among {', '.join(sorted(parts))}, found"
-            f" {topic!r}"
-        )
+    expected = f"a topic of {MESSAGE} among {', '.join(sorted(parts))}"
+    require(topic in parts, where, expected, repr(topic))
     joined = sorted(parts[topic], key=lambda part: part[0][0])
     stamps, values = (np.concatenate(part) for part in zip(*joined, strict=True))
-    if not stamps.all():
-        raise InputError(
-            f"{topic}: expected stamps in the messages' headers, found none (0) in"
-            f" {np.sum(stamps == 0)} of {len(stamps)}"
-        )
+    found = f"none (0) in {np.sum(stamps == 0)} of {len(stamps)}"
+    require(stamps.all(), topic, "stamps in the messages' headers", found)
     name, quantity = list(QUANTITIES.items())[kind]
     unit = si_units(imu[name], quantity, f"{where}: {name}")
     return Readings(stamps, 1e-9, unit * values[:, 3 * kind : 3 * kind + 3], topic)
@@ -95,7 +88,7 @@ def _read(path: Path) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Stamps in ns (N,), specific force and angular rate (N, 6) of each topic."""
     stamps: dict[str, array] = {}
     values: dict[str, array] = {}
-    try:
+    with expecting(path, "a whole ROS bag"):
         opened, deserialize = _open(path)
         with opened as bag:
             wanted = [c for c in bag.connections if c.msgtype == MESSAGE]
@@ -106,14 +99,7 @@ def _read(path: Path) -> dict[str, tuple[np.ndarray, np.ndarray]]:
                 now = stamps.setdefault(connection.topic, array("q"))
                 now.append(stamp.sec * 10**9 + stamp.nanosec)
                 values.setdefault(connection.topic, array("d")).extend(_six(message))
-    except InputError:
-        raise
-    except Exception as error:
-        # a damaged bag makes the library raise nearly anything
-        what = f"{type(error).__name__}: {error}"
-        raise InputError(f"{path}: expected a whole ROS bag, found {what}") from error
-    if not stamps:
-        raise InputError(f"{path}: expected messages of {MESSAGE}, found none")
+    require(stamps, str(path), f"messages of {MESSAGE}", "none")
     return {t: (np.array(stamps[t]), np.array(values[t]).reshape(-1, 6)) for t in stamps}
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from imuarray.errors import InputError
+from imuarray.errors import InputError, require
 from imuarray.provenance import seal_of
 from imuarray.recording.record import AXES, Recording
 
@@ -37,11 +37,10 @@ with h5py.File(sys.argv[1], "r") as file:
 """
 
 
-def require_live(recording: Recording, where: str = "recording") -> None:
+def require_live(recording: Recording) -> None:
     """InputError for channels that leave nothing to compute: constant, or another's copy."""
-    found = dead(recording)
-    if found:
-        raise InputError(f"{where}: expected readings of live sensors; {'; '.join(found[:3])}")
+    if found := dead(recording):
+        raise InputError(f"recording: expected readings of live sensors; {'; '.join(found[:3])}")
 
 
 def require_once(recording: Recording) -> None:
@@ -49,15 +48,13 @@ def require_once(recording: Recording) -> None:
 
     Afterwards few copies may be left to see, and all would count twice.
     """
-    found = _twice(recording, _turning(recording))
-    if found:
+    if found := _twice(recording, _turning(recording)):
         raise InputError(f"recording: expected each sample once; {found[0]}: leave it out")
 
 
 def require_apart(recordings: Sequence[Recording]) -> None:
     """InputError for no recording, and for turning samples that two of them share."""
-    if not recordings:
-        raise InputError("recordings: expected at least one, found none")
+    require(recordings, "recordings", "at least one", "none")
     if len(recordings) == 1:
         return
     before: list[np.ndarray] = []
@@ -66,11 +63,8 @@ def require_apart(recordings: Sequence[Recording]) -> None:
         marks = np.unique(np.concatenate([_marks(_rows(part)) for part in turning.parts()]))
         for other, known in enumerate(before, 1):
             shared = len(np.intersect1d(marks, known, assume_unique=True))
-            if shared >= LEAST:
-                raise InputError(
-                    f"recordings: expected different ones, found {shared} samples of number {other}"
-                    f" in number {number}, too"
-                )
+            found = f"{shared} samples of number {other} in number {number}, too"
+            require(shared < LEAST, "recordings", "different ones", found)
         before.append(marks)
 
 
@@ -107,14 +101,14 @@ def _parts(recording: Recording, kind: str):
 def _constant(recording: Recording, kind: str) -> list[str]:
     labels = getattr(recording, f"{kind}_labels")
     count = _different(values for values, _ in _parts(recording, kind))
-    first = next(recording.parts(1))
+    first = next(_parts(recording, kind))[0][0]
     least = np.where(len(recording.time) < MANY, 1, COARSE)
     few = count <= least
     if few.any():
         few &= ~np.all([rail.all(axis=0) for _, rail in _parts(recording, kind)], axis=0)
     return [
         f"{kind} {labels[k]!r}, axis {AXES[axis]}: "
-        + (f"{getattr(first, _KINDS[kind])[0, k, axis]:g}" if count[k, axis] == 1
+        + (f"{first[k, axis]:g}" if count[k, axis] == 1
            else f"{count[k, axis]} values")
         + " in all samples"
         for k, axis in np.argwhere(few)
@@ -125,20 +119,15 @@ def _different(parts) -> np.ndarray:
     """(K, 3) how many different values each axis has, at most one more than `COARSE`."""
     known: list[np.ndarray] = []
     for values in parts:
-        left = np.ones(values.shape, bool)
-        for one in known:
-            left &= values != one
-        while True:
-            count = np.sum([~np.isnan(one) for one in known], axis=0) + np.zeros(values.shape[1:])
-            fresh = left.any(axis=0) & (count <= COARSE)
-            if not fresh.any():
-                break
-            first = np.take_along_axis(values, left.argmax(axis=0)[None], axis=0)[0]
-            known.append(np.where(fresh, first, np.nan))
-            left &= values != first
-        if (count > COARSE).all():
+        columns = values.reshape(len(values), -1).T
+        known = known or [np.empty(0)] * len(columns)
+        known = [
+            before if len(before) > COARSE else np.union1d(before, column)
+            for before, column in zip(known, columns, strict=True)
+        ]
+        if min(map(len, known)) > COARSE:
             break
-    return count.astype(int)
+    return np.minimum([len(one) for one in known], COARSE + 1).reshape(-1, 3)
 
 
 def _copied(recording: Recording, kind: str) -> list[str]:
@@ -172,8 +161,7 @@ def _sums(recording: Recording, kind: str):
             middle, sign = columns.mean(axis=0), np.where(columns[0] < 0, -1.0, 1.0)
         off = columns - middle
         total, square = total + off.sum(axis=0), square + off.T @ off
-        odd = rng.integers(1, 2**63, (len(values), 1), dtype=np.uint64) * 2 + 1
-        mark = mark + np.sum((columns * sign + 0.0).view(np.uint64) * odd, axis=0)
+        mark = mark + _marks((columns * sign + 0.0).T, rng)
         free = free + (~railed).sum(axis=0).ravel()
         low, high = np.minimum(low, columns.min(axis=0)), np.maximum(high, columns.max(axis=0))
     mean = total / len(recording.time)
@@ -266,9 +254,10 @@ def runs(mask) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def _marks(rows) -> np.ndarray:
+def _marks(rows, rng=None) -> np.ndarray:
     """64 bits of each row of ``rows`` (N, M): equal for equal rows, else not (to 2**-64)."""
-    odd = np.random.default_rng(0).integers(1, 2**63, rows.shape[1], dtype=np.uint64) * 2 + 1
+    rng = rng or np.random.default_rng(0)
+    odd = rng.integers(1, 2**63, rows.shape[1], dtype=np.uint64) * 2 + 1
     return np.sum(np.ascontiguousarray(rows, float).view(np.uint64) * odd, axis=1)
 
 
@@ -289,5 +278,4 @@ def require_readable(path: Path, patience: float = PATIENCE) -> None:
             f"{path}: expected a NetCDF-4 file, found one that HDF5 is not through with after"
             f" {limit:.0f} s: damaged?"
         ) from None
-    if status < 0:
-        raise InputError(f"{path}: expected a NetCDF-4 file, found one that HDF5 crashes at")
+    require(status >= 0, str(path), "a NetCDF-4 file", "one that HDF5 crashes at")

@@ -1,7 +1,6 @@
 """The NetCDF-4 file of a recording, read with validation and written."""
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,24 +9,10 @@ import h5py
 import numpy as np
 import xarray as xr
 
-from imuarray.errors import InputError
+from imuarray.errors import InputError, expecting, require
 from imuarray.provenance import is_damaged, write_netcdf_parts
-from imuarray.recording import record as parts_of
-from imuarray.recording import validate
-from imuarray.recording.record import (
-    ALIGNMENT,
-    CORRECTION,
-    FLAGS,
-    MATRICES,
-    NUMBERS,
-    OPTIONAL_NUMBERS,
-    QUANTITIES,
-    SAMPLED,
-    TEXTS,
-    TRUTH,
-    Recording,
-    Stored,
-)
+from imuarray.recording import record, validate
+from imuarray.recording.record import Recording, Stored
 from imuarray.recording.units import factor
 
 
@@ -37,27 +22,28 @@ def from_dataset(dataset: xr.Dataset, where: str = "recording", stored: bool = F
     With ``stored`` readings of more than a part stay in the file.
     """
     validate.check_structure(dataset, where)
-    stored = stored and dataset.sizes["time"] > parts_of.PART
+    stored = stored and dataset.sizes["time"] > record.PART
     arrays = {
-        name: _in_si_units(dataset[name], where, stored and name in SAMPLED[1:])
-        for name in QUANTITIES
+        name: _in_si_units(dataset[name], where, stored and name in record.SAMPLED[1:])
+        for name in record.QUANTITIES
     }
-    matrices = {name: dataset[name].values.astype(float) for name in MATRICES if name in dataset}
-    numbers = [*NUMBERS, *(name for name in OPTIONAL_NUMBERS if name in dataset.attrs)]
+    matrices = [name for name in record.MATRICES if name in dataset]
+    corrected = [name for name in record.CORRECTION if name in dataset]
+    numbers = [n for n in record.NUMBERS | record.OPTIONAL_NUMBERS if n in dataset.attrs]
     flags = {
         name: Stored(dataset[name].variable) if stored and dataset[name].ndim > 1
         else dataset[name].values.astype(bool)
-        for name in FLAGS if name in dataset
+        for name in record.FLAGS if name in dataset
     }  # fmt: skip
     recording = Recording(
         **arrays,
-        accelerometer_labels=_labels(dataset["accelerometer"]),
-        gyroscope_labels=_labels(dataset["gyroscope"]),
+        accelerometer_labels=validate.labels_of(dataset["accelerometer"]),
+        gyroscope_labels=validate.labels_of(dataset["gyroscope"]),
         **flags,
-        **matrices,
-        correction=dataset[list(CORRECTION)] if set(CORRECTION) & set(dataset) else None,
+        **{name: dataset[name].values.astype(float) for name in matrices},
+        correction=dataset[corrected] if corrected else None,
         **{name: float(np.asarray(dataset.attrs[name]).item()) for name in numbers},
-        **{name: str(dataset.attrs.get(name, "")) for name in TEXTS},
+        **{name: str(dataset.attrs.get(name, "")) for name in record.TEXTS},
     )
     validate.check_values(recording, where)
     return recording
@@ -66,16 +52,10 @@ def from_dataset(dataset: xr.Dataset, where: str = "recording", stored: bool = F
 def _in_si_units(variable: xr.DataArray, where: str, stored: bool) -> np.ndarray | Stored:
     """Values as float64, or left in the file, by the attribute `units`; InputError if unknown."""
     place = f"{where}: {variable.name}: units"
-    scale = factor(QUANTITIES[str(variable.name)], variable.attrs.get("units"), place)
+    scale = factor(record.QUANTITIES[str(variable.name)], variable.attrs.get("units"), place)
     if stored:
         return Stored(variable.variable, scale)
     return scale * np.asarray(variable.values, dtype=float)
-
-
-def _labels(coordinate: xr.DataArray) -> tuple[str, ...]:
-    """Labels as text; NetCDF's character arrays arrive as bytes."""
-    values = coordinate.values.tolist()
-    return tuple(v.decode(errors="replace") if isinstance(v, bytes) else v for v in values)
 
 
 def read_recording(path: str | Path, stored: bool = False) -> Recording:
@@ -87,33 +67,31 @@ def read_recording(path: str | Path, stored: bool = False) -> Recording:
     file is missing, is not NetCDF-4 or is not a recording; raises IdentifiabilityError for fewer
     than three accelerometers or collinear ones. Large gaps in time are a warning.
     """
-    path = _existing(path)
-    with _readable(path):
-        recording = from_dataset(_load(path, None, stored), str(path), stored)
-    if not _has_group(path, ALIGNMENT):
+    path = Path(path)
+    with expecting(path, "a readable NetCDF-4 file"):
+        recording = from_dataset(load_dataset(path, None, stored), str(path), stored)
+    if not _has_group(path, record.ALIGNMENT):
         return recording
-    alignment = _load(path, ALIGNMENT)
-    validate.check_alignment(alignment, recording, f"{path}: {ALIGNMENT}")
+    alignment = load_dataset(path, record.ALIGNMENT)
+    validate.check_alignment(alignment, recording, f"{path}: {record.ALIGNMENT}")
     return replace(recording, alignment=alignment)
 
 
 def has_truth(path: str | Path) -> bool:
     """True where a recording is simulated and says from what; InputError if it can not be read."""
-    return _has_group(_existing(path), TRUTH)
+    return _has_group(path, record.TRUTH)
 
 
-def _has_group(path: Path, name: str) -> bool:
-    with _hdf5(path) as file:
+def _has_group(path: str | Path, name: str) -> bool:
+    with _hdf5(_existing(path)) as file:
         return isinstance(file.get(name), h5py.Group)
 
 
 def read_truth(path: str | Path) -> xr.Dataset:
     """Read what a simulated recording was made from; InputError if the file has no truth."""
-    if not has_truth(path):
-        raise InputError(
-            f"{path}: expected a group '{TRUTH}' (simulated recordings have one), found none"
-        )
-    return _load(Path(path), group=TRUTH)
+    expected = f"a group '{record.TRUTH}' (simulated recordings have one)"
+    require(has_truth(path), str(path), expected, "none")
+    return load_dataset(path, record.TRUTH)
 
 
 def write_recording(
@@ -128,31 +106,21 @@ def write_recording(
     `attrs` (such as `provenance.stamp` gives) join the recording's own attributes, which win. The
     file reads back, or it is not written: InputError as in `read_recording`.
     """
-    whole = next(recording.parts()).to_dataset()
-    if whole.sizes["time"] == len(recording.time):
-        from_dataset(whole, str(path))
-    else:
-        validate.check_structure(whole, str(path))
-        validate.check_values(recording, str(path))
+    validate.check_structure(next(recording.parts()).to_dataset(), str(path))
+    validate.check_values(recording, str(path))
     datasets = (part.to_dataset() for part in recording.parts())
     parts = (one.assign_attrs({**(attrs or {}), **one.attrs}) for one in datasets)
-    known = {TRUTH: truth, ALIGNMENT: recording.alignment, **(groups or {})}
+    known = {record.TRUTH: truth, record.ALIGNMENT: recording.alignment, **(groups or {})}
     write_netcdf_parts(
         parts, len(recording.time), path,
         {name: part for name, part in known.items() if part is not None},
     )  # fmt: skip
 
 
-def load_dataset(path: str | Path, group: str | None = None) -> xr.Dataset:
-    """One group of a NetCDF-4 file in memory; InputError where it cannot be read."""
-    return _load(_existing(path), group)
-
-
 def _existing(path: str | Path) -> Path:
     path = Path(path)
-    if not path.is_file():
-        found = "a folder" if path.is_dir() else "nothing"
-        raise InputError(f"{path}: expected a recording (a NetCDF-4 file), found {found} there")
+    found = "a folder there" if path.is_dir() else "nothing there"
+    require(path.is_file(), str(path), "a recording (a NetCDF-4 file)", found)
     return path
 
 
@@ -164,14 +132,16 @@ def _hdf5(path: Path) -> h5py.File:
         raise InputError(f"{path}: expected a NetCDF-4 file, found another: {error}") from None
 
 
-def _load(path: Path, group: str | None, stored: bool = False) -> xr.Dataset:
-    """Read one group into memory, after looking at what sizes it declares.
+def load_dataset(path: str | Path, group: str | None = None, stored: bool = False) -> xr.Dataset:
+    """One group of a NetCDF-4 file in memory; InputError where it cannot be read.
 
-    With ``stored`` its variables are read when they are asked for.
+    Not before the sizes that it declares have been looked at. With ``stored`` the variables of a
+    long one are read when they are asked for.
     """
-    with _readable(path):
-        if is_damaged(path):
-            raise InputError(f"{path}: expected a file as it was written, found it damaged")
+    path = _existing(path)
+    with expecting(path, "a readable NetCDF-4 file"):
+        whole = not is_damaged(path)
+        require(whole, str(path), "a file as it was written", "it damaged")
         with _hdf5(path) as file:
             validate.check_sizes(file, str(path), not stored)
         # "s" is a number of seconds here, not a date or a time span
@@ -179,19 +149,7 @@ def _load(path: Path, group: str | None, stored: bool = False) -> xr.Dataset:
         # HDF5 without named dimensions is for `validate` to refuse, not for the library to warn of
         options["phony_dims"] = "access"
         dataset = xr.open_dataset(path, group=group, cache=False, **options)
-        if stored and dataset.sizes.get("time", 0) > parts_of.PART:
+        if stored and dataset.sizes.get("time", 0) > record.PART:
             return dataset
         with dataset:
             return dataset.load()
-
-
-@contextmanager
-def _readable(path: Path) -> Iterator[None]:
-    """InputError for whatever the libraries below raise of a damaged file: nearly anything."""
-    try:
-        yield
-    except InputError:
-        raise
-    except Exception as error:
-        what = f"{type(error).__name__}: {error}"
-        raise InputError(f"{path}: expected a readable NetCDF-4 file, found {what}") from error

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from imuarray.errors import LARGEST, SMALLEST, InputError
+from imuarray.errors import LARGEST, SMALLEST, expecting, require
 from imuarray.recording.units import factor
 from imuarray.recording.validate import is_rotation
 
@@ -62,13 +62,10 @@ def read_layout(path: str | PathLike, bag: bool = False) -> dict[str, Any]:
     Each of a rig's IMUs has both kinds' sections whole, its own keys in place of the common ones.
     """
     path = Path(path)
-    if not path.is_file():
-        raise InputError(f"{path}: expected a YAML file that describes the log, found none")
-    try:
+    require(path.is_file(), str(path), "a YAML file that describes the log", "none")
+    # ValueError: bytes that are no UTF-8, a date with a 13th month
+    with expecting(path, "YAML", (yaml.YAMLError, ValueError, RecursionError)):
         layout = yaml.load(path.read_text(encoding="utf-8"), _Loader)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        # ValueError: bytes that are no UTF-8, a date with a 13th month
-        raise InputError(f"{path}: expected YAML, found {' '.join(str(error).split())}") from None
     rig = bag or (isinstance(layout, dict) and "imus" in layout)
     _require_keys(layout, BAG if bag else RIG if rig else BOARD, str(path))
     keys = BAG_SENSOR if bag else SENSOR if rig else BOARD_SENSOR
@@ -90,22 +87,20 @@ def read_layout(path: str | PathLike, bag: bool = False) -> dict[str, Any]:
 
 
 def _require_sections(sections: Any, where: str, what: str, keys: dict[str, bool]) -> None:
-    if not isinstance(sections, dict) or not sections:
-        raise InputError(f"{where}: expected {what} by label, found {sections!r}")
+    named = isinstance(sections, dict) and sections
+    require(named, where, f"{what} by label", repr(sections))
     for label, section in sections.items():
         _require_keys(section, keys, f"{where} {label!r}")
 
 
 def _require_keys(section: Any, keys: dict[str, bool], where: str) -> None:
-    if not isinstance(section, dict):
-        raise InputError(f"{where}: expected {_listed(keys)}, found {section!r}")
-    unknown = [key for key in section if key not in keys]
-    missing = [key for key, needed in keys.items() if needed and key not in section]
-    if unknown or missing:
-        found = f"an unknown key {unknown[0]!r}" if unknown else f"no {missing[0]!r}"
-        near = get_close_matches(str(unknown[0]), keys, 1) if unknown else []
+    require(isinstance(section, dict), where, _listed(keys), repr(section))
+    for key in section:
+        near = [] if key in keys else get_close_matches(str(key), keys, 1)
         hint = f"; did you mean {near[0]}?" if near else ""
-        raise InputError(f"{where}: expected {_listed(keys)}, found {found}{hint}")
+        require(key in keys, where, _listed(keys), f"an unknown key {key!r}{hint}")
+    for key, needed in keys.items():
+        require(key in section or not needed, where, _listed(keys), f"no {key!r}")
 
 
 def _listed(keys: dict[str, bool]) -> str:
@@ -124,15 +119,13 @@ def _is_number(value) -> bool:
 
 def positive(value, where: str) -> float:
     """A number above 0, or InputError."""
-    if not _is_number(value) or value < SMALLEST:
-        raise InputError(f"{where}: expected a positive number, found {value!r}")
+    require(_is_number(value) and value >= SMALLEST, where, "a positive number", repr(value))
     return float(value)
 
 
 def _three(value, where: str) -> list[float]:
-    numbers = isinstance(value, list) and len(value) == 3
-    if not numbers or not all(map(_is_number, value)):
-        raise InputError(f"{where}: expected three numbers, found {value!r}")
+    numbers = isinstance(value, list) and len(value) == 3 and all(map(_is_number, value))
+    require(numbers, where, "three numbers", repr(value))
     return [float(x) for x in value]
 
 
@@ -141,9 +134,10 @@ def numbers(layout, where: str) -> dict[str, float]:
     out = {}
     for kind, quantity in QUANTITIES.items():
         section, name = layout[kind], kind.removesuffix("s")
-        unit = si_units(section, quantity, f"{where}: {kind}")
+        place = f"{where}: {kind}"
+        unit = si_units(section, quantity, place)
         for key, attribute in (("noise", "noise_sd"), ("range", "range")):
-            value = positive(section[key], f"{where}: {kind}: {key}")
+            value = positive(section[key], f"{place}: {key}")
             out[f"{name}_{attribute}"] = unit * value
     length = factor("length", layout.get("position_unit", "m"), f"{where}: position_unit")
     prior = positive(layout.get("position_prior", PRIOR / length), f"{where}: position_prior")
@@ -170,11 +164,9 @@ def positions(sections: dict[str, dict], layout, where: str) -> np.ndarray:
         for label, section in sections.items()
     ]
     size = float(np.ptp(places, axis=0).max())
-    if "position_unit" not in layout and size > WIDEST:
-        raise InputError(
-            f"{where}: expected positions within {WIDEST:g} m of each other, found {size:g}:"
-            " name the position_unit, mm or m"
-        )
+    near, found = size <= WIDEST, f"{size:g}: name the position_unit, mm or m"
+    expected = f"positions within {WIDEST:g} m of each other"
+    require(near or "position_unit" in layout, where, expected, found)
     return length * np.array(places)
 
 
@@ -183,25 +175,22 @@ def rotation(axes, where: str) -> np.ndarray:
 
     The shorthand lists, for the array's x, y and z, the sensor's axis that points along it.
     """
-    expected = "expected axes such as [-y, -x, -z] or a 3 x 3 rotation matrix"
-    if not isinstance(axes, list) or len(axes) != 3:
-        raise InputError(f"{where}: {expected}, found {axes!r}")
+    expected = "axes such as [-y, -x, -z] or a 3 x 3 rotation matrix"
+    require(isinstance(axes, list) and len(axes) == 3, where, expected, repr(axes))
     if all(isinstance(row, str) for row in axes):
         matrix = np.zeros((3, 3))
         for row, name in enumerate(axes):
             letter = name.lstrip("+-")
-            if letter not in ("x", "y", "z"):
-                raise InputError(f"{where}: {expected}, found {axes!r}")
+            require(letter in ("x", "y", "z"), where, expected, repr(axes))
             matrix[row, "xyz".index(letter)] = -1.0 if name.startswith("-") else 1.0
     else:
         matrix = np.array([_three(row, where) for row in axes])
-    if not is_rotation(matrix):
-        raise InputError(f"{where}: {expected}, found {axes!r}, which is no rotation")
+    require(is_rotation(matrix), where, expected, f"{axes!r}, which is no rotation")
     return matrix
 
 
 def three_columns(names, where: str) -> list[str]:
     """Three different names, or InputError."""
-    if not isinstance(names, list) or len(set(map(str, names))) != 3 or len(names) != 3:
-        raise InputError(f"{where}: expected three columns, found {names!r}")
+    three = isinstance(names, list) and len(set(map(str, names))) == len(names) == 3
+    require(three, where, "three columns", repr(names))
     return [str(name) for name in names]

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from imuarray.errors import InputError
+from imuarray.errors import InputError, expecting, require
+from imuarray.recording.record import pieces
 
 START, ACKNOWLEDGEMENT = 0xAA, 0xA0
 XZ = b"\xfd7zXZ\0"  # how a compressed file begins
@@ -65,16 +66,14 @@ class Account:
 
     def lines(self) -> list[str]:
         """A summary for people; damage with its place."""
-        counts = self.attributes()
+        strangers = self.out_of_sequence
         out = [
-            f"lost {counts['packets_lost']}, bad {counts['packets_bad']}, out of sequence"
-            f" {counts['packets_out_of_sequence']}, garbage {counts['garbage_bytes']} bytes"
+            f"lost {self.lost_packets}, bad {len(self.bad)}, out of sequence {len(strangers)},"
+            f" garbage {self.garbage_bytes} bytes"
         ]
         out += _listed([f"{count} packet(s) missing before sample {i}" for i, count in self.lost])
         out += _listed([f"{length} bytes dropped at byte {i}" for i, length in self.garbage])
-        return out + _listed(
-            [f"packet out of sequence dropped at byte {offset}" for offset in self.out_of_sequence]
-        )
+        return out + _listed([f"packet out of sequence dropped at byte {i}" for i in strangers])
 
 
 def _listed(places: list[str]) -> list[str]:
@@ -109,16 +108,13 @@ def read_mimu(path: str | Path) -> MimuStream:
     packets with several wrong bytes, as those that sum up to the same are not rare.
     """
     path = Path(path)
-    if not path.is_file():
-        raise InputError(f"{path}: expected a file of MIMU packets, found none")
+    require(path.is_file(), str(path), "a file of MIMU packets", "none")
     data = np.frombuffer(_content(path), np.uint8)
     starts, size = _sound_packets(data, str(path))
     accepted, number, ticks, strangers = _in_sequence(data, starts, str(path))
-    if len(accepted) == 1 and data.size > MOST_AROUND_ONE * size:
-        raise InputError(
-            f"{path}: expected MIMU packets that follow each other, found one alone, at byte"
-            f" {accepted[0]} of {data.size}"
-        )
+    several = len(accepted) > 1 or data.size <= MOST_AROUND_ONE * size
+    found = f"one alone, at byte {accepted[0]} of {data.size}"
+    require(several, str(path), "MIMU packets that follow each other", found)
     account = _account(data, accepted, size, strangers, number)
     packets = data[accepted[:, None] + np.arange(8, size - 2)]
     counts = packets.view(">i2").astype(np.int16).reshape(len(accepted), -1, 6)
@@ -129,17 +125,12 @@ def _content(path: Path) -> bytes:
     content = path.read_bytes()
     if not content.startswith(XZ):
         return content
-    try:
+    with expecting(path, "a whole file compressed by xz", lzma.LZMAError):
         return lzma.decompress(content)
-    except lzma.LZMAError as error:
-        raise InputError(f"{path}: expected a whole file compressed by xz, found {error}") from None
 
 
 def _big_endian(data, at, count) -> np.ndarray:
-    value = np.zeros(len(at), np.int64)
-    for i in range(count):
-        value = value * 256 + data[at + i]
-    return value
+    return data[at[:, None] + np.arange(count)] @ 256 ** np.arange(count)[::-1]
 
 
 def _sound_packets(data, where) -> tuple[np.ndarray, int]:
@@ -154,11 +145,8 @@ def _sound_packets(data, where) -> tuple[np.ndarray, int]:
     stored = _big_endian(data, at + length + 4, 2)
     good = (sums[at + length + 4] - sums[at]) % NUMBERS == stored
     at, length = at[good], length[good]
-    if not at.size:
-        raise InputError(
-            f"{where}: expected MIMU packets (AA, number, length, ..., checksum), found none in"
-            f" {data.size} bytes"
-        )
+    expected = "MIMU packets (AA, number, length, ..., checksum)"
+    require(at.size, where, expected, f"none in {data.size} bytes")
     sizes, counts = np.unique(length, return_counts=True)
     usual = int(sizes[counts.argmax()])
     at = at[length == usual]
@@ -194,7 +182,7 @@ def _in_sequence(data, starts, where):
         # in step with the longest run is not yet in step with the neighbours
         steps, passed = np.diff(number[kept]) % NUMBERS, np.diff(stamp[kept]) % WRAP
         linked = _agree(steps, passed, period)
-        kept = kept[_longest(number[kept], stamp[kept], period, linked)]
+        kept = kept[_joined(number[kept], stamp[kept], period, linked)]
     out = np.setdiff1d(np.arange(len(starts)), kept)
     if len(out) > max(MOST_OUT_OF_SEQUENCE * len(starts), 3):
         raise InputError(
@@ -238,14 +226,18 @@ def _agree(steps, passed, period) -> np.ndarray:
     return (steps > 0) & (steps < NUMBERS // 2) & (np.abs(off) < allowed)
 
 
+def _most(linked) -> slice:
+    """The most packets in a row that are ``linked`` (N - 1,), each to the next."""
+    return max(pieces(~linked), key=lambda piece: piece.stop - piece.start)
+
+
 def _advancing(number, stamp, period, linked) -> np.ndarray:
     """Indices of the most packets that advance, of those in step with the longest run's middle.
 
     The most, so that a repeated packet before a gap does not cost the sound ones before it.
     """
-    edges = np.concatenate([[0], np.flatnonzero(~linked) + 1, [len(number)]])
-    best = int(np.diff(edges).argmax())
-    anchor = int(edges[best] + edges[best + 1]) // 2
+    best = _most(linked)
+    anchor = (best.start + best.stop) // 2
     steps = (np.diff(number) + NUMBERS // 2) % NUMBERS - NUMBERS // 2
     place = np.concatenate([[0], np.cumsum(steps)])
     away = place - place[anchor]
@@ -270,21 +262,20 @@ def _increasing(values: list[int]) -> list[int]:
     return chain[::-1]
 
 
-def _longest(number, stamp, period, linked) -> np.ndarray:
+def _joined(number, stamp, period, linked) -> np.ndarray:
     """Indices of the longest run of linked packets, with all that fit before and after it."""
-    edges = np.concatenate([[0], np.flatnonzero(~linked) + 1, [len(number)]])
-    best = int(np.diff(edges).argmax())
+    best = _most(linked)
 
     def fits(one, other):
         step, ticks = (number[other] - number[one]) % NUMBERS, (stamp[other] - stamp[one]) % WRAP
         return bool(_agree(step, ticks, period))
 
-    kept = list(range(edges[best], edges[best + 1]))
-    for i in range(edges[best + 1], len(number)):
+    kept = list(range(best.start, best.stop))
+    for i in range(best.stop, len(number)):
         if fits(kept[-1], i):
             kept.append(i)
     before = []
-    for i in range(edges[best] - 1, -1, -1):
+    for i in range(best.start - 1, -1, -1):
         if fits(i, before[-1] if before else kept[0]):
             before.append(i)
     return np.array(before[::-1] + kept)
@@ -309,8 +300,7 @@ def _account(data, accepted, size, strangers, number) -> Account:
     for offset, length in garbage:
         bad += _bad_packets(data[offset : offset + length], offset, size, dropped)
     steps = np.diff(number)
-    gaps = np.flatnonzero(steps > 1)
-    lost = [(int(i) + 1, int(steps[i]) - 1) for i in gaps]
+    lost = [(int(i) + 1, int(steps[i]) - 1) for i in np.flatnonzero(steps > 1)]
     return Account(
         data.size, len(accepted) * size, acknowledged, garbage, bad, strangers.tolist(), lost
     )
@@ -319,18 +309,13 @@ def _account(data, accepted, size, strangers, number) -> Account:
 def _acknowledgements(data) -> np.ndarray:
     """Offsets of A0, a byte and their 16-bit sum."""
     at = np.flatnonzero(data[: max(data.size - 3, 0)] == ACKNOWLEDGEMENT)
-    return at[
-        _big_endian(data, at, 1) + _big_endian(data, at + 1, 1) == _big_endian(data, at + 2, 2)
-    ]
+    sums = _big_endian(data, at, 1) + _big_endian(data, at + 1, 1)
+    return at[sums == _big_endian(data, at + 2, 2)]
 
 
 def _bad_packets(piece, offset, size, strangers) -> list[int]:
     """Whole packets in a piece of garbage that are not those out of sequence."""
     begin = piece[: max(len(piece) - size + 1, 0)]
     starts = np.flatnonzero((begin == START) & (piece[3 : 3 + len(begin)] == size - 6))
-    found, end = [], 0
-    for at in starts.tolist():
-        if at >= end:
-            end = at + size
-            found.append(offset + at)
-    return [at for at in found if at not in strangers]
+    found = offset + _apart(starts, size)
+    return [at for at in found.tolist() if at not in strangers]

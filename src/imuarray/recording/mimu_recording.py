@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from imuarray.errors import InputError
+from imuarray.errors import expecting, require
 from imuarray.geometry.boards import UNDERSIDE_ROTATION
 from imuarray.recording.mimu import Account, MimuStream, read_mimu
 from imuarray.recording.record import Recording
@@ -24,23 +24,18 @@ def read_positions(path: str | Path) -> tuple[np.ndarray, tuple[str, ...]]:
     for anything else.
     """
     where = str(path)
-    expected = "expected a header 'axes, IMU 1, ...' and the rows x, y, z in metres"
-    try:
+    expected = "a header 'axes, IMU 1, ...' and the rows x, y, z in metres"
+    with expecting(where, expected, (OSError, UnicodeDecodeError)):
         text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{where}: {expected}, found {error}") from None
     rows = [[cell.strip() for cell in row] for row in csv.reader(text.splitlines()) if row]
-    if len(rows) != 4 or [row[0] for row in rows[1:]] != ["x", "y", "z"]:
-        raise InputError(f"{where}: {expected}, found {len(rows)} rows")
+    axes = len(rows) == 4 and [row[0] for row in rows[1:]] == ["x", "y", "z"]
+    require(axes, where, expected, f"{len(rows)} rows")
     labels = tuple(name.removeprefix("IMU").strip() for name in rows[0][1:])
-    if any(len(row) != len(rows[0]) for row in rows):
-        raise InputError(f"{where}: {expected}, found rows of different lengths")
-    try:
+    even = all(len(row) == len(rows[0]) for row in rows)
+    require(even, where, expected, "rows of different lengths")
+    with expecting(where, expected, ValueError):
         values = np.array([[float(cell) for cell in row[1:]] for row in rows[1:]]).T
-    except ValueError as error:
-        raise InputError(f"{where}: {expected}, found {error}") from None
-    if not np.isfinite(values).all():
-        raise InputError(f"{where}: {expected}, found a value that is not finite")
+    require(np.isfinite(values).all(), where, expected, "a value that is not finite")
     return values, labels
 
 
@@ -49,9 +44,8 @@ def turned_labels(labels, text: str | None) -> tuple[str, ...]:
     if text is None:
         return tuple(label for label in labels if label.isdigit() and int(label) % 2 == 0)
     turned = tuple(part.strip() for part in text.split(",") if part.strip())
-    unknown = [label for label in turned if label not in labels]
-    if unknown:
-        raise InputError(f"--underside: expected labels of {', '.join(labels)}, found {unknown[0]}")
+    for label in turned:
+        require(label in labels, "--underside", f"labels of {', '.join(labels)}", label)
     return turned
 
 
@@ -74,25 +68,20 @@ def to_recording(
     stream: MimuStream,
     positions,
     labels,
-    underside=None,
+    turned,
     accelerometer_noise_sd: float = 0.04,
     gyroscope_noise_sd: float = float(np.radians(0.06)),
     position_prior_sd: float = 3e-3,
     output_rate: float = OUTPUT_RATE,
-    title: str = "",
     source: str = "",
 ) -> Recording:
     """Counts to SI units, the underside's axes turned into the array frame.
 
-    ``positions`` (A, 3) m; ``underside`` labels turned by `UNDERSIDE_ROTATION`, None for the
-    even-numbered ones. InputError where the IMUs are not as many as the positions.
+    ``positions`` (A, 3) m; ``turned`` are the labels of those that `UNDERSIDE_ROTATION` turns.
+    InputError where the IMUs are not as many as the positions.
     """
     count = stream.counts.shape[1]
-    if count != len(labels):
-        raise InputError(
-            f"positions: expected {count} IMUs, as the packets hold, found {len(labels)}"
-        )
-    turned = turned_labels(labels, None) if underside is None else tuple(underside)
+    require(count == len(labels), "positions", f"{count} IMUs, as the packets hold", len(labels))
     force = stream.counts[..., :3] * (GRAVITY / COUNTS_PER_G)
     rate = stream.counts[..., 3:] * np.radians(1 / COUNTS_PER_DPS)
     under = np.array([label in turned for label in labels])
@@ -105,6 +94,6 @@ def to_recording(
         gyroscope_labels=tuple(labels), accelerometer_noise_sd=accelerometer_noise_sd,
         gyroscope_noise_sd=gyroscope_noise_sd, position_prior_sd=position_prior_sd,
         accelerometer_range=RAIL / COUNTS_PER_G * GRAVITY,
-        gyroscope_range=float(np.radians(RAIL / COUNTS_PER_DPS)), title=title, source=source,
+        gyroscope_range=float(np.radians(RAIL / COUNTS_PER_DPS)), source=source,
         accelerometer_axes=axes, output_period=1 / output_rate,
     )  # fmt: skip

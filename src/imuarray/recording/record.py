@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,16 @@ FIRST_ORDER = "first_order"
 # Group with how the logs of loose IMUs were brought together.
 ALIGNMENT = "alignment"
 
+# Optional variables, all or none: how the readings were corrected, inverse @ (raw - offset).
+CORRECTION = {
+    f"{kind}_{name}": (kind, *dims)
+    for kind in ("accelerometer", "gyroscope")
+    for name, dims in (
+        ("inverse", ("axis", "axis_other")), ("offset", ("axis",)), ("offset_sd", ("axis",)),
+        ("offset_walk", ()),
+    )
+}  # fmt: skip
+
 DIMENSIONS = {
     "time": ("time",),
     "specific_force": ("time", "accelerometer", "axis"),
@@ -41,6 +52,7 @@ DIMENSIONS = {
     "angular_rate_saturated": ("time", "gyroscope", "axis"),
     "map_covariance": ("map_entry", "map_entry_other"),
     "accelerometer_axes": ("accelerometer", "axis", "axis_other"),
+    **CORRECTION,
 }
 
 # Optional variables that are true or false.
@@ -73,21 +85,8 @@ OPTIONAL_NUMBERS = {"output_period": "s"}
 # Optional variables without a unit.
 MATRICES = ("map_covariance", "accelerometer_axes")
 
-# Optional variables, all or none: how the readings were corrected, inverse @ (raw - offset).
-CORRECTION = {
-    f"{kind}_{name}": (kind, *dims)
-    for kind in ("accelerometer", "gyroscope")
-    for name, dims in (
-        ("inverse", ("axis", "axis_other")), ("offset", ("axis",)), ("offset_sd", ("axis",)),
-        ("offset_walk", ()),
-    )
-}  # fmt: skip
-
 # Of `Recording.alignment`: a log's stamp t is t - offset - drift (t - middle) of the first's clock.
 CLOCKS = ("clock_offset", "clock_offset_sd", "clock_drift", "clock_drift_sd", "clock_middle")
-
-# A simulated sensor need not have a rail.
-MAY_BE_INFINITE = ("accelerometer_range", "gyroscope_range")
 
 # Optional attributes that are text.
 TEXTS = ("title", "source", "license", "selected")
@@ -95,8 +94,8 @@ TEXTS = ("title", "source", "license", "selected")
 # Variables with a value for each sample.
 SAMPLED = ("time", "specific_force", "angular_rate", *FLAGS)
 
-# A rail is a count; turning counts into SI units and back may cost the last digits.
-_RAIL_TOLERANCE = 1e-6
+# Of a range: a rail is a count; turning counts into SI units and back may cost the last digits.
+RAIL = 1 - 1e-6
 
 
 class Stored:
@@ -142,10 +141,10 @@ class Stored:
         if self.index is None:
             return self._stretch(start, stop)
         index = self.index[start:stop]
-        ends = np.flatnonzero(np.diff(index) > NEAR) + 1
+        found = (index[piece] for piece in pieces(np.diff(index) > NEAR))
         parts = [
             self._stretch(int(part[0]), int(part[-1]) + 1)[part - part[0]]
-            for part in np.split(index, ends) if part.size
+            for part in found if part.size
         ]  # fmt: skip
         return np.concatenate([self._stretch(0, 0), *parts])
 
@@ -158,6 +157,12 @@ def blocks(values) -> Iterator[tuple[int, np.ndarray]]:
     """(first index, part) of an array (T, ...), stored or not."""
     for first in range(0, max(len(values), 1), PART):
         yield first, values[first : first + PART]
+
+
+def pieces(breaks) -> list[slice]:
+    """Slices of what is without a gap: ``breaks`` (N - 1,), True where one lies behind sample n."""
+    ends = [0, *(np.flatnonzero(breaks) + 1).tolist(), len(breaks) + 1]
+    return [slice(first, last) for first, last in pairwise(ends)]
 
 
 def few(index: np.ndarray) -> np.ndarray:
@@ -240,12 +245,10 @@ class Recording:
             name: (DIMENSIONS[name], np.asarray(getattr(self, name), float), {"units": unit})
             for name, unit in SI.items()
         }
-        for name in FLAGS:
-            if getattr(self, name) is not None:
-                variables[name] = (DIMENSIONS[name], np.asarray(getattr(self, name), bool))
-        for name in MATRICES:
-            if getattr(self, name) is not None:
-                variables[name] = DIMENSIONS[name], getattr(self, name), {"units": "1"}
+        given = {n: x for n in (*FLAGS, *MATRICES) if (x := getattr(self, n)) is not None}
+        for name, values in given.items():
+            own = np.asarray(values, bool if name in FLAGS else None)
+            variables[name] = DIMENSIONS[name], own, {} if name in FLAGS else {"units": "1"}
         if self.correction is not None:
             variables |= {name: self.correction[name].variable for name in CORRECTION}
         coordinates = {
@@ -254,10 +257,8 @@ class Recording:
             "gyroscope": ("gyroscope", np.array(self.gyroscope_labels, object)),
             "axis": ("axis", np.array(AXES, object)),
         }
-        attributes = {name: float(getattr(self, name)) for name in NUMBERS}
-        for name in OPTIONAL_NUMBERS:
-            if not np.isnan(getattr(self, name)):
-                attributes[name] = float(getattr(self, name))
+        declared = [name for name in OPTIONAL_NUMBERS if not np.isnan(getattr(self, name))]
+        attributes = {name: float(getattr(self, name)) for name in (*NUMBERS, *declared)}
         attributes |= {name: getattr(self, name) for name in TEXTS if getattr(self, name)}
         try:
             return xr.Dataset(variables, coordinates, attributes)
@@ -287,13 +288,13 @@ class Recording:
         """Rates at the gyroscopes' rail, (T, G, 3) bool."""
         if self.angular_rate_saturated is not None:
             return self.angular_rate_saturated
-        return np.abs(self.angular_rate) >= self.gyroscope_range * (1 - _RAIL_TOLERANCE)
+        return np.abs(self.angular_rate) >= self.gyroscope_range * RAIL
 
     def saturated_accelerometers(self) -> np.ndarray:
         """Specific forces at the accelerometers' rail, (T, A, 3) bool."""
         if self.specific_force_saturated is not None:
             return self.specific_force_saturated
-        return np.abs(self.specific_force) >= self.accelerometer_range * (1 - _RAIL_TOLERANCE)
+        return np.abs(self.specific_force) >= self.accelerometer_range * RAIL
 
     def at_rail(self, kind: str) -> np.ndarray:
         """Samples (T,) with a reading at its rail of a ``kind``, accelerometer or gyroscope."""
@@ -308,11 +309,10 @@ class Recording:
         whole = self.selected.partition(" of ")[2] or f"{len(self.time)} samples"
         return replace(left, selected=f"{len(left.time)} of {whole}")
 
-    def parts(self, size: int | None = None) -> Iterator[Recording]:
-        """The samples in turn, `PART` or ``size`` at a time, in memory."""
-        size = size or PART
-        for first in range(0, max(len(self.time), 1), size):
-            yield self._at(slice(first, first + size))
+    def parts(self) -> Iterator[Recording]:
+        """The samples in turn, `PART` at a time, in memory."""
+        for first in range(0, max(len(self.time), 1), PART):
+            yield self._at(slice(first, first + PART))
 
     def in_memory(self) -> Recording:
         """The recording with its readings read; InputError where they are too many."""

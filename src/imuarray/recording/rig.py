@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from imuarray.errors import LARGEST, InputError
+from imuarray.errors import LARGEST, InputError, require
 from imuarray.recording.layout import numbers, positions, rotation
 from imuarray.recording.record import Recording
 
@@ -135,15 +135,11 @@ def _in_order(readings: Readings) -> tuple[Readings, list[str]]:
     """Stamps that increase, and what was left out: blank readings, and those logged twice."""
     stamps, values, where = readings.stamps, readings.values, readings.where
     there = ~np.isnan(stamps) & ~np.isnan(values).any(axis=1)
-    if not there.any():
-        raise InputError(f"{where}: expected readings, found none")
+    require(there.any(), where, "readings", "none")
     rows = np.flatnonzero(there)
     wild = np.abs(values[rows]).max(axis=1) > LARGEST
-    if wild.any():
-        at = rows[np.argmax(wild)]
-        raise InputError(
-            f"{where}: expected finite numbers, found {values[at]} in reading {at + 1}"
-        )
+    at = rows[np.argmax(wild)]
+    require(not wild.any(), where, "finite numbers", f"{values[at]} in reading {at + 1}")
     steps = np.diff(stamps[rows])
     # a logger that runs faster than a sensor writes its last reading again
     again = (steps == 0) & (values[rows[1:]] == values[rows[:-1]]).all(axis=1)

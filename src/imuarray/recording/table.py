@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from imuarray.errors import InputError
+from imuarray.errors import InputError, expecting, require
+from imuarray.recording import written
 from imuarray.recording.layout import (
     KINDS,
     QUANTITIES,
@@ -26,13 +27,6 @@ from imuarray.recording.layout import (
 from imuarray.recording.record import Recording
 from imuarray.recording.rig import Readings, Rig, pair, to_rig
 from imuarray.recording.units import factor, require_plausible_rate
-from imuarray.recording.written import (
-    form_of,
-    in_order,
-    numbering,
-    seconds_of_dates,
-    shared_words,
-)
 
 LEAVE_OUT = "leave out"  # what `incomplete_rows` may be
 FEW = 20  # stamps, of which a rate is worth looking at
@@ -43,19 +37,8 @@ HALF = 0.5  # of the rows share their stamps: one row for each sensor, perhaps
 LONG = 400  # rows, in which missed readings are bridged; blanks in fewer are a damaged table
 
 
-def read_csv(path: str | PathLike, columns: str | PathLike) -> Recording:
-    """A table; the YAML file ``columns`` names its columns and units (docs/convert.md).
-
-    InputError, with the row or the key, for anything that does not fit.
-    """
-    layout = read_layout(columns)
-    return recording_of(load(path, layout, columns)[0], layout, path, columns)[0]
-
-
 def recording_of(table: pd.DataFrame, layout, path, columns) -> tuple[Recording, list[str]]:
-    """A board's table as samples, and what was done to its rows; InputError as `read_csv`."""
-    if "imus" in layout:
-        raise InputError(f"{columns}: expected triads, found IMUs, each with its own stamps")
+    """A board's table as samples, and what was done to its rows; InputError as `read_tables`."""
     where, name = str(path), str(columns)
     table, account = _whole(table, layout, name)
     time, rows, lines = _time(table, layout["time"], where, name)
@@ -79,22 +62,18 @@ def recording_of(table: pd.DataFrame, layout, path, columns) -> tuple[Recording,
 def load(path, layout, columns) -> tuple[pd.DataFrame, list[str]]:
     """The table, and how it is written; columns as its header has them: twins are seen."""
     options = {"sep": layout.get("delimiter"), "comment": layout.get("comment")}
-    given = (("delimiter", options["sep"], ","), ("comment", options["comment"], "#"))
-    for key, value, usual in given:
-        value = usual if value is None and key not in layout else value
+    for key, usual in (("delimiter", ","), ("comment", "#")):
+        value = layout.get(key, usual)
         runs = key == "delimiter" and value == WHITESPACE
-        if not isinstance(value, str) or (len(value) != 1 and not runs):
-            raise InputError(f"{columns}: {key}: expected one character, found {value!r}")
-    try:
-        options, lines = form_of(Path(path), _named(layout), options)
+        one = isinstance(value, str) and (len(value) == 1 or runs)
+        require(one, f"{columns}: {key}", "one character", repr(value))
+    with expecting(path, "a CSV file with a header", (OSError, ValueError)):
+        options, lines = written.form_of(Path(path), _named(layout), options)
         # Two rows: a first data row longer than the header is an error here, while with a header
         # pandas would take its first cell for an index and move every name by one column.
         head = pd.read_csv(path, skipinitialspace=True, header=None, nrows=2, dtype=str, **options)
         table = pd.read_csv(path, skipinitialspace=True, **options)
         table.columns = head.iloc[0].fillna("").str.strip()
-    except (OSError, ValueError, UnicodeDecodeError) as error:
-        message = " ".join(str(error).split())
-        raise InputError(f"{path}: expected a CSV file with a header, found {message}") from None
     return table, lines
 
 
@@ -111,9 +90,7 @@ def _named(section) -> set[str]:
 
 def used(table: pd.DataFrame, layout) -> pd.DataFrame:
     """The columns that a board's triads name."""
-    triads = [triad for kind in KINDS for triad in layout[kind]["triads"].values()]
-    named = [triad["columns"] for triad in triads if isinstance(triad["columns"], list)]
-    return table.loc[:, table.columns.isin([str(name) for names in named for name in names])]
+    return table.loc[:, table.columns.isin(_named([layout[kind] for kind in KINDS]))]
 
 
 def _whole(table, layout, columns: str) -> tuple[pd.DataFrame, str]:
@@ -121,11 +98,8 @@ def _whole(table, layout, columns: str) -> tuple[pd.DataFrame, str]:
     if "incomplete_rows" not in layout:
         return table, ""
     rule = layout["incomplete_rows"]
-    if rule != LEAVE_OUT:
-        raise InputError(f"{columns}: incomplete_rows: expected '{LEAVE_OUT}', found {rule!r}")
-    stamp = layout["time"].get("column") if isinstance(layout["time"], dict) else None
-    needed = [used(table, layout), table.loc[:, table.columns == str(stamp)]]
-    whole = pd.concat(needed, axis=1).notna().all(axis=1)
+    require(rule == LEAVE_OUT, f"{columns}: incomplete_rows", f"'{LEAVE_OUT}'", repr(rule))
+    whole = table.loc[:, table.columns.isin(_named(layout))].notna().all(axis=1)
     if whole.all():
         return table, ""
     return table[whole], f"{whole.sum()} of {len(table)} samples"
@@ -142,8 +116,8 @@ def column(table, name, where, blank: bool = False) -> np.ndarray:
     """A column's numbers, integers where all are; InputError unless finite, or ``blank`` (NaN)."""
     if name not in table.columns:
         raise InputError(f"{where}: expected a column {name!r}, found {_alike(name, table)}")
-    if list(table.columns).count(name) > 1:
-        raise InputError(f"{where}: expected one column {name!r}, found several of that name")
+    once = list(table.columns).count(name) == 1
+    require(once, where, f"one column {name!r}", "several of that name")
     values = pd.to_numeric(table[name], errors="coerce").to_numpy()
     values = values if values.dtype.kind == "i" else values.astype(float)
     bad = ~np.isfinite(values) & ~(table[name].isna().to_numpy() & blank)
@@ -186,17 +160,15 @@ def stamps_of(table, section, where, layout_name, blank: bool = False) -> tuple[
     if isinstance(section, dict) and set(section) == {"rate"}:
         rate = positive(section["rate"], f"{layout_name}: time: rate")
         return table.index.to_numpy() / rate, 1.0
-    if not isinstance(section, dict) or set(section) != {"column", "unit"}:
-        raise InputError(
-            f"{layout_name}: time: expected 'column' and 'unit', or 'rate' in Hz, found {section!r}"
-        )
-    name, dated = str(section["column"]), None
-    if list(table.columns).count(name) == 1:
-        dated = seconds_of_dates(table[name])
-    unit = 1e-9
-    if dated is None:
+    stamped = isinstance(section, dict) and set(section) == {"column", "unit"}
+    expected = "'column' and 'unit', or 'rate' in Hz"
+    require(stamped, f"{layout_name}: time", expected, repr(section))
+    name = str(section["column"])
+    once = list(table.columns).count(name) == 1
+    stamps, unit = written.seconds_of_dates(table[name]) if once else None, 1e-9
+    if stamps is None:
         unit = factor("time", section["unit"], f"{layout_name}: time: unit")
-    stamps = column(table, name, where, blank) if dated is None else dated
+        stamps = column(table, name, where, blank)
     known = stamps[np.isfinite(stamps)]
     if len(known) >= FEW:
         place = f"{where}: column {name!r}"
@@ -210,7 +182,7 @@ def _time(table, section, where, layout_name) -> tuple[np.ndarray, np.ndarray, l
     rows, lines = np.arange(len(values)), []
     if "rate" in section:
         return values, rows, lines
-    values, rows, lines = in_order(values, table, f"{where}: column {section['column']!r}")
+    values, rows, lines = written.in_order(values, table, f"{where}: column {section['column']!r}")
     table = table.iloc[rows]
     back = np.flatnonzero(np.diff(values) <= 0)
     if back.size:
@@ -233,8 +205,8 @@ def read_tables(
     that does not fit.
     """
     layout, files = read_layout(columns), [Path(path) for path in paths]
-    if "imus" not in layout and len(files) > 1:
-        raise InputError(f"{columns}: expected 'imus', one for each log, found triads of one table")
+    several = "imus" in layout or len(files) == 1
+    require(several, str(columns), "'imus', one for each log", "triads of one table")
     loaded, lines = {}, []
     for path in files:
         loaded[path], said = load(path, layout, columns)
@@ -245,10 +217,8 @@ def read_tables(
     blank = used(table, layout).isna().mean()
     slow = (blank > (0.0 if len(table) > LONG else OFTEN)).any()
     if slow and "incomplete_rows" not in layout:
-        if "output_rate" in layout:
-            raise InputError(
-                f"{columns}: output_rate: expected none where cells are blank, found one"
-            )
+        freely = "output_rate" not in layout
+        require(freely, f"{columns}: output_rate", "none where cells are blank", "one")
         return _read(loaded, layout, _imus(layout, str(columns)), str(columns)), lines
     found, said = recording_of(table, layout, files[0], columns)
     return found, lines + said
@@ -263,11 +233,8 @@ def _read(loaded, layout, imus: dict[str, dict], name: str) -> Rig:
         times = pair(imu.get("time", layout.get("time")))
         stamped &= len(loaded) == 1 or not any(isinstance(t, dict) and "rate" in t for t in times)
         six = imu.get("columns", layout.get("columns"))
-        if not isinstance(six, list) or len(six) != 6:
-            raise InputError(
-                f"{where}: expected six columns, three of the accelerometer and three of the"
-                f" gyroscope, found {six!r}"
-            )
+        expected = "six columns, three of the accelerometer and three of the gyroscope"
+        require(isinstance(six, list) and len(six) == 6, where, expected, repr(six))
         unused = [path for path in unused if path not in paths]
         read[label] = [
             _readings(loaded[path], str(path), names, time, unit, where)
@@ -286,12 +253,8 @@ def _file(log: Any, label: str, files: list[Path], where: str) -> Path:
     want = PurePath(label if log is None else str(log)).parts
     n = len(want)
     found = [p for p in files if n and want in (p.parts[-n:], p.with_suffix("").parts[-n:])]
-    if len(found) != 1:
-        names = ", ".join(map(str, files))
-        raise InputError(
-            f"{where}: expected one of {names} to be {'/'.join(want)}, found {len(found)}:"
-            " 'log' names it"
-        )
+    expected = f"one of {', '.join(map(str, files))} to be {'/'.join(want)}"
+    require(len(found) == 1, where, expected, f"{len(found)}: 'log' names it")
     return found[0]
 
 
@@ -300,8 +263,8 @@ def _readings(table, path: str, names, time, unit: float, where: str) -> Reading
     values = [column(table, name, path, blank=True).astype(float) for name in names]
     stamps, second = stamps_of(table, time, path, where, blank=True)
     steps = np.diff(stamps[np.isfinite(stamps)])
-    if len(steps) and np.mean(steps == 0) > HALF and numbering(table):
-        raise InputError(f"{path}: {shared_words(steps, table)}")
+    if len(steps) and np.mean(steps == 0) > HALF and written.numbering(table):
+        raise InputError(f"{path}: {written.shared_words(steps, table)}")
     return Readings(stamps, second, unit * np.stack(values, axis=1), f"{path}: {', '.join(names)}")
 
 
@@ -310,19 +273,16 @@ def _imus(layout, where: str) -> dict[str, dict]:
     force, rate = (layout[kind]["triads"] for kind in KINDS)
     found = {}
     for label, triad in force.items():
-        other = rate.get(label)
-        axes = [t.get("axes", list("xyz")) for t in (triad, other or {})]
-        if other is None or len(rate) != len(force) or axes[0] != axes[1]:
+        both = triad, rate.get(label, {})
+        axes = [one.get("axes", list("xyz")) for one in both]
+        if not both[1] or len(rate) != len(force) or axes[0] != axes[1]:
             raise InputError(
                 f"{where}: {label!r}: expected, as some cells are blank, an accelerometer and a"
                 f" gyroscope of each label with the same axes, found others{BLANK}"
             )
-        columns = [
-            name
-            for t in (triad, other)
-            for name in three_columns(t["columns"], f"{where}: {label!r}")
-        ]
-        found[label] = {"columns": columns, "position": triad["position"], "axes": axes[0]} | {
-            kind: layout[kind] for kind in KINDS
-        }
+        columns = [three_columns(one["columns"], f"{where}: {label!r}") for one in both]
+        found[label] = {
+            "columns": sum(columns, []), "position": triad["position"], "axes": axes[0],
+            **{kind: layout[kind] for kind in KINDS},
+        }  # fmt: skip
     return found

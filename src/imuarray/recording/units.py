@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from imuarray.errors import InputError
+from imuarray.errors import InputError, require
 
 GRAVITY = 9.80665  # m/s^2, the unit g of data sheets
 _DEGREE = math.pi / 180
@@ -52,7 +52,7 @@ def _long(seconds: float) -> str:
 def factor(quantity: str, unit: object, where: str) -> float:
     """One ``unit`` of a ``quantity`` of `UNITS` in SI units; InputError if unknown."""
     known = UNITS[quantity]
-    if not isinstance(unit, str) or unit not in known:
-        found = "none" if unit is None else repr(unit)
-        raise InputError(f"{where}: expected a unit of {', '.join(known)}, found {found}")
+    found = "none" if unit is None else repr(unit)
+    right = isinstance(unit, str) and unit in known
+    require(right, where, f"a unit of {', '.join(known)}", found)
     return known[unit]

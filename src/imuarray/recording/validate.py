@@ -12,25 +12,10 @@ import h5py
 import numpy as np
 import xarray as xr
 
-from imuarray.errors import LARGEST, SMALLEST, IdentifiabilityError, InputError
+from imuarray.errors import LARGEST, SMALLEST, IdentifiabilityError, InputError, require
 from imuarray.geometry.array import require_apart, require_count
-from imuarray.recording.record import (
-    AXES,
-    CLOCKS,
-    CORRECTION,
-    DIMENSIONS,
-    FLAGS,
-    LABELS,
-    MAX_VALUES,
-    MAY_BE_INFINITE,
-    NUMBERS,
-    OPTIONAL_NUMBERS,
-    QUANTITIES,
-    SAMPLED,
-    SI,
-    Recording,
-    blocks,
-)
+from imuarray.recording import record
+from imuarray.recording.record import Recording, blocks
 
 # A file of a few bytes can declare far more than any memory or disk holds; deflate makes 1032 of 1.
 INFLATED = 1032
@@ -48,70 +33,78 @@ def check_sizes(file: h5py.File, where: str, whole: bool = True) -> None:
 
     Unless it is read as a ``whole``, readings may be as many as the file has room for.
     """
-    found: list[tuple[str, tuple[int, ...]]] = []
 
-    def visit(name: str, item: Any) -> None:
+    def visit(name: str, item: Any) -> tuple[str, tuple[int, ...]] | None:
         # Python's integers: the declared sizes may overflow 64 bits
         shape = tuple(int(n) for n in getattr(item, "shape", None) or ())
-        stays = not whole and name in SAMPLED and len(shape) > 1
+        stays = not whole and name in record.SAMPLED and len(shape) > 1
         room = INFLATED * item.id.get_storage_size() if stays else 0
-        if math.prod(shape) > MAX_VALUES and not math.prod(shape) <= room:
-            found.append((name, shape))
+        large = math.prod(shape) > max(record.MAX_VALUES, room)
+        return (name, shape) if large else None
 
-    file.visititems(visit)
-    if found:
-        name, shape = found[0]
+    if found := file.visititems(visit):
+        name, shape = found
         raise InputError(
-            f"{where}: {name}: expected at most {MAX_VALUES} values, found shape {shape}"
+            f"{where}: {name}: expected at most {record.MAX_VALUES} values, found shape {shape}"
         )
 
 
 def check_structure(dataset: xr.Dataset, where: str) -> None:
     """Variables, dimensions, labels' type and attributes; units and values are for later."""
-    for name in (*QUANTITIES, *LABELS, "axis"):
+    for name in (*record.QUANTITIES, *record.LABELS, "axis"):
         _check_present(dataset, name, where)
-    for name in QUANTITIES:
-        _check_numeric(dataset[name], where)
-    for name in LABELS:
-        _check_text(dataset[name], where)
-    _check_axis(dataset["axis"], where)
-    for name in FLAGS:
-        if name in dataset:
-            _check_present(dataset, name, where)
-            _check_boolean(dataset[name], where)
-    for name, unit in NUMBERS.items():
-        _check_number(dataset.attrs, name, unit, where)
-    for name, unit in OPTIONAL_NUMBERS.items():
-        if name in dataset.attrs:
+    for name in record.QUANTITIES:
+        kind = dataset[name].dtype
+        require(kind.kind in "fiu", f"{where}: {name}", "real numbers", f"type {kind}")
+    for name in record.LABELS:
+        text = all(isinstance(label, str | bytes) for label in dataset[name].values.tolist())
+        found = f"type {dataset[name].dtype}"
+        require(text, f"{where}: {name}", "text as labels", found)
+    axes = list(labels_of(dataset["axis"]))
+    found = axes if len(axes) <= 6 else f"{len(axes)} of them"
+    require(axes == list(record.AXES), f"{where}: axis", f"the labels {list(record.AXES)}", found)
+    for name, unit in (record.NUMBERS | record.OPTIONAL_NUMBERS).items():
+        if name in record.NUMBERS or name in dataset.attrs:
             _check_number(dataset.attrs, name, unit, where)
-    if "map_covariance" in dataset:
-        _check_covariance(dataset, "map_covariance", where)
-    for name in CORRECTION if set(CORRECTION) & set(dataset) else ():
-        _check_correction(dataset, name, where)
-    if "accelerometer_axes" in dataset:
-        _check_rotations(dataset, "accelerometer_axes", where)
+    corrected = record.CORRECTION if set(record.CORRECTION) & set(dataset) else ()  # all or none
+    for name, check in _CHECKS.items():
+        if name in dataset or name in corrected:
+            _check_present(dataset, name, where)
+            check(dataset, name, f"{where}: {name}")
+
+
+def labels_of(coordinate: xr.DataArray) -> tuple[str, ...]:
+    """Labels as text; NetCDF's character arrays arrive as bytes."""
+    values = coordinate.values.tolist()
+    return tuple(v.decode(errors="replace") if isinstance(v, bytes) else v for v in values)
 
 
 def check_alignment(dataset: xr.Dataset, recording: Recording, where: str) -> None:
     """Clocks and rates of the recording's IMUs."""
     count = len(recording.accelerometer_labels)
-    for name, shape in {**dict.fromkeys(CLOCKS, (count,)), "rate": (count, 2)}.items():
-        if name not in dataset or dataset[name].shape != shape:
-            raise InputError(f"{where}: expected {name} of each of {count} IMUs, found none")
-        _check_numeric(dataset[name], where)
-        if not (np.abs(dataset[name].values) <= LARGEST).all():
-            raise InputError(f"{where}: {name}: expected finite numbers, found others")
+    for name, shape in {**dict.fromkeys(record.CLOCKS, (count,)), "rate": (count, 2)}.items():
+        there = name in dataset and dataset[name].shape == shape
+        require(there, where, f"{name} of each of {count} IMUs", "none")
+        place = f"{where}: {name}"
+        finite = (np.abs(_numbers(dataset[name], place)) <= LARGEST).all()
+        require(finite, place, "finite numbers", "others")
 
 
 def check_values(recording: Recording, where: str) -> None:
     """Numbers, order in time, labels and geometry of a well-formed recording."""
-    _check_counts(recording, where)
-    _check_labels("accelerometer", recording.accelerometer_labels, where)
-    _check_labels("gyroscope", recording.gyroscope_labels, where)
+    require(len(recording.time), f"{where}: time", "at least 1 sample", 0)
+    if not recording.gyroscope_labels:
+        raise IdentifiabilityError(f"{where}: expected at least 1 gyroscope triad, found 0")
+    for kind in record.LABELS:
+        require_count(len(getattr(recording, f"{kind}_labels")), where, kind)
+    for kind in record.LABELS:
+        for label, times in Counter(getattr(recording, f"{kind}_labels")).items():
+            found = f"{label!r} {times} times"
+            require(times == 1, f"{where}: {kind}", "labels that are all different", found)
     limits = {
         "specific_force": recording.accelerometer_range, "angular_rate": recording.gyroscope_range
     }  # fmt: skip
-    for name in QUANTITIES:
+    for name in record.QUANTITIES:
         _check_finite(recording, name, limits.get(name, np.inf), where)
     _check_time(recording.time, where, declared=bool(recording.selected))
     require_apart(recording.accelerometer_position, f"{where}: accelerometer_position")
@@ -119,102 +112,34 @@ def check_values(recording: Recording, where: str) -> None:
 
 def _check_present(dataset: xr.Dataset, name: str, where: str) -> None:
     # a dimension without a coordinate would be given numbers as labels by xarray
-    if name not in dataset.variables:
-        have = ", ".join(sorted(map(str, dataset.variables))) or "none"
-        raise InputError(f"{where}: expected a variable '{name}', found {have}")
-    expected = DIMENSIONS.get(name) or CORRECTION.get(name, (name,))
-    if dataset[name].dims != expected:
-        raise InputError(
-            f"{where}: {name}: expected dimensions {_listed(expected)}, "
-            f"found {_listed(dataset[name].dims)}"
-        )
+    have = ", ".join(sorted(map(str, dataset.variables))) or "none"
+    require(name in dataset.variables, where, f"a variable '{name}'", have)
+    expected, found = record.DIMENSIONS.get(name, (name,)), dataset[name].dims
+    right = f"dimensions {_listed(expected)}"
+    require(found == expected, f"{where}: {name}", right, _listed(found))
 
 
 def _listed(names: tuple) -> str:
     return f"({', '.join(map(str, names))})"
 
 
-def _check_numeric(variable: xr.DataArray, where: str) -> None:
-    if variable.dtype.kind not in "fiu":
-        raise InputError(
-            f"{where}: {variable.name}: expected real numbers, found type {variable.dtype}"
-        )
-
-
-def _check_text(coordinate: xr.DataArray, where: str) -> None:
-    if not all(isinstance(label, str | bytes) for label in coordinate.values.tolist()):
-        raise InputError(
-            f"{where}: {coordinate.name}: expected text as labels, found type {coordinate.dtype}"
-        )
-
-
-def _check_axis(coordinate: xr.DataArray, where: str) -> None:
-    values = coordinate.values.tolist()
-    found = [v.decode(errors="replace") if isinstance(v, bytes) else v for v in values]
-    if found != list(AXES):
-        shown = found if len(found) <= 6 else f"{len(found)} of them"
-        raise InputError(f"{where}: axis: expected the labels {list(AXES)}, found {shown}")
-
-
-def _check_boolean(variable: xr.DataArray, where: str) -> None:
-    parts = (part.values for _, part in blocks(variable))
-    if variable.dtype.kind not in "biu" or not all(np.isin(part, (0, 1)).all() for part in parts):
-        raise InputError(
-            f"{where}: {variable.name}: expected true or false (1 or 0), "
-            f"found type {variable.dtype} with other values"
-        )
+def _numbers(variable: xr.DataArray, where: str) -> np.ndarray:
+    """Values as float64; InputError where they are not real numbers."""
+    require(variable.dtype.kind in "fiu", where, "real numbers", f"type {variable.dtype}")
+    return variable.values.astype(float)
 
 
 def _check_number(attributes: dict, name: str, unit: str, where: str) -> None:
     bounds = f"between {SMALLEST:g} and {LARGEST:g}"
-    expected = f"expected the attribute '{name}' to be a number {bounds} in {unit}"
-    if name not in attributes:
-        raise InputError(f"{where}: {expected}, found none")
+    expected = f"the attribute '{name}' to be a number {bounds} in {unit}"
+    require(name in attributes, where, expected, "none")
     value = np.asarray(attributes[name])
-    if value.dtype.kind not in "fiu" or value.size != 1:
-        raise InputError(f"{where}: {expected}, found {attributes[name]!r}")
+    single = value.dtype.kind in "fiu" and value.size == 1
+    require(single, where, expected, repr(attributes[name]))
     number = float(value.item())
-    if np.isinf(number) and number > 0 and name in MAY_BE_INFINITE:
-        return
-    # written so that NaN fails
-    if not SMALLEST <= number <= LARGEST:
-        raise InputError(f"{where}: {expected}, found {number}")
-
-
-def _check_covariance(dataset: xr.Dataset, name: str, where: str) -> None:
-    _check_present(dataset, name, where)
-    _check_numeric(dataset[name], where)
-    values = dataset[name].values.astype(float)
-    first, second = (9 * dataset.sizes[kind] for kind in LABELS)
-    square = values.shape in ((first, first), (first + second, first + second))
-    if not square or not (np.abs(values) <= LARGEST).all():
-        raise InputError(
-            f"{where}: {name}: expected {first} or {first + second} squared finite numbers, found"
-            f" {' x '.join(map(str, values.shape))}, or others"
-        )
-    least, *_, most = np.linalg.eigvalsh((values + values.T) / 2)
-    even = np.allclose(values, values.T, rtol=0, atol=1e-9 * most)
-    if not (even and least >= -1e-9 * most):
-        raise InputError(f"{where}: {name}: expected a covariance, found none")
-
-
-def _check_rotations(dataset: xr.Dataset, name: str, where: str) -> None:
-    _check_present(dataset, name, where)
-    _check_numeric(dataset[name], where)
-    values = dataset[name].values.astype(float)
-    square = values.shape[1:] == (3, 3) and (np.abs(values) <= 2).all()
-    if not square or not is_rotation(values).all():
-        raise InputError(f"{where}: {name}: expected rotations, 3 x 3 each, found others")
-
-
-def _check_correction(dataset: xr.Dataset, name: str, where: str) -> None:
-    _check_present(dataset, name, where)
-    _check_numeric(dataset[name], where)
-    values = dataset[name].values.astype(float)
-    unknown = np.isnan(values) & name.endswith("_sd")  # of a single pose
-    axes = values.ndim == 1 or values.shape[-1] == 3
-    if not axes or not (unknown | (np.abs(values) <= LARGEST)).all():
-        raise InputError(f"{where}: {name}: expected finite numbers for each axis, found others")
+    # a simulated sensor need not have a rail; NaN is not right
+    right = SMALLEST <= number <= LARGEST or (number == np.inf and name.endswith("_range"))
+    require(right, where, expected, number)
 
 
 def is_rotation(matrices) -> np.ndarray:
@@ -223,40 +148,58 @@ def is_rotation(matrices) -> np.ndarray:
     return unit & (np.linalg.det(matrices) > 0)
 
 
-def _check_counts(recording: Recording, where: str) -> None:
-    if len(recording.time) == 0:
-        raise InputError(f"{where}: time: expected at least 1 sample, found 0")
-    if len(recording.gyroscope_labels) == 0:
-        raise IdentifiabilityError(f"{where}: expected at least 1 gyroscope triad, found 0")
-    require_count(len(recording.accelerometer_labels), where, "accelerometer")
-    require_count(len(recording.gyroscope_labels), where, "gyroscope")
+def _check_boolean(dataset: xr.Dataset, name: str, where: str) -> None:
+    variable = dataset[name]
+    parts = (part.values for _, part in blocks(variable))
+    right = variable.dtype.kind in "biu" and all(np.isin(part, (0, 1)).all() for part in parts)
+    found = f"type {variable.dtype} with other values"
+    require(right, where, "true or false (1 or 0)", found)
 
 
-def _check_labels(kind: str, labels: tuple[str, ...], where: str) -> None:
-    repeated = [label for label, count in Counter(labels).items() if count > 1]
-    if repeated:
-        raise InputError(
-            f"{where}: {kind}: expected labels that are all different, "
-            f"found {repeated[0]!r} {labels.count(repeated[0])} times"
-        )
+def _check_covariance(dataset: xr.Dataset, name: str, where: str) -> None:
+    values = _numbers(dataset[name], where)
+    first, second = (9 * dataset.sizes[kind] for kind in record.LABELS)
+    square = values.shape in ((first, first), (first + second, first + second))
+    finite = square and (np.abs(values) <= LARGEST).all()
+    found = f"{' x '.join(map(str, values.shape))}, or others"
+    require(finite, where, f"{first} or {first + second} squared finite numbers", found)
+    least, *_, most = np.linalg.eigvalsh((values + values.T) / 2)
+    even = np.allclose(values, values.T, rtol=0, atol=1e-9 * most)
+    require(even and least >= -1e-9 * most, where, "a covariance", "none")
+
+
+def _check_rotations(dataset: xr.Dataset, name: str, where: str) -> None:
+    values = _numbers(dataset[name], where)
+    square = values.shape[1:] == (3, 3) and (np.abs(values) <= 2).all()
+    require(square and is_rotation(values).all(), where, "rotations, 3 x 3 each", "others")
+
+
+def _check_correction(dataset: xr.Dataset, name: str, where: str) -> None:
+    values = _numbers(dataset[name], where)
+    unknown = np.isnan(values) & name.endswith("_sd")  # of a single pose
+    axes = values.ndim == 1 or values.shape[-1] == 3
+    right = axes and (unknown | (np.abs(values) <= LARGEST)).all()
+    require(right, where, "finite numbers for each axis", "others")
+
+
+# Of variables that need not be there.
+_CHECKS = {
+    **dict.fromkeys(record.FLAGS, _check_boolean), "map_covariance": _check_covariance,
+    **dict.fromkeys(record.CORRECTION, _check_correction), "accelerometer_axes": _check_rotations,
+}  # fmt: skip
 
 
 def _check_finite(recording: Recording, name: str, limit: float, where: str) -> None:
     """Finite numbers; and within a declared range."""
-    values = getattr(recording, name)
-    sizes = ((first, np.abs(part)) for first, part in blocks(values))
-    marks = [
-        (first, int(np.sum(~(size <= LARGEST))), int(np.sum(size > BEYOND_RANGE * limit)))
-        for first, size in sizes
-    ]  # NaN is not finite, too
-    strange, beyond = sum(mark[1] for mark in marks), sum(mark[2] for mark in marks)
-    if not strange and not beyond:
+    values, most = getattr(recording, name), min(LARGEST, BEYOND_RANGE * limit)
+    if all((np.abs(part) <= most).all() for _, part in blocks(values)):  # NaN is not
         return
-    start = next(mark[0] for mark in marks if mark[1 if strange else 2])
-    part = next(part for first, part in blocks(values) if first == start)
-    size = np.abs(part)
-    index = _first(~(size <= LARGEST) if strange else size > BEYOND_RANGE * limit)
-    place = _place(recording, name, (start + index[0], *index[1:]))
+    strange = sum(int(np.sum(~(np.abs(part) <= LARGEST))) for _, part in blocks(values))
+    most = LARGEST if strange else most
+    marks = ((first, part, ~(np.abs(part) <= most)) for first, part in blocks(values))
+    first, part, wrong = next(mark for mark in marks if mark[2].any())
+    index = tuple(np.argwhere(wrong)[0].tolist())
+    place = _place(recording, name, (first + index[0], *index[1:]))
     if strange:
         raise InputError(
             f"{where}: {name}: expected finite numbers, at most {LARGEST:g}, found {part[index]}"
@@ -264,22 +207,18 @@ def _check_finite(recording: Recording, name: str, limit: float, where: str) -> 
         )
     raise InputError(
         f"{where}: {name}: expected values within the declared range of {limit:g} "
-        f"{SI[name]}, found {part[index]:g} at {place}; is the units attribute right?"
+        f"{record.SI[name]}, found {part[index]:g} at {place}; is the units attribute right?"
     )
-
-
-def _first(mask: np.ndarray) -> tuple[int, ...]:
-    return tuple(int(i) for i in np.unravel_index(int(np.argmax(mask)), mask.shape))
 
 
 def _place(recording: Recording, name: str, index: tuple[int, ...]) -> str:
     """Where an index of a variable is, in the words of the file."""
     words = []
-    for dimension, i in zip(DIMENSIONS[name], index, strict=True):
+    for dimension, i in zip(record.DIMENSIONS[name], index, strict=True):
         if dimension == "time":
             words.append(f"time index {i}")
         elif dimension == "axis":
-            words.append(f"axis {AXES[i]}")
+            words.append(f"axis {record.AXES[i]}")
         else:
             words.append(f"{dimension} {getattr(recording, dimension + '_labels')[i]!r}")
     return ", ".join(words)

@@ -3,7 +3,6 @@
 import re
 from itertools import islice
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -20,15 +19,10 @@ FEW = 20  # rows, of which nothing is sure
 SENSORS = 64  # distinct values of a column that may number the sensors
 
 
-class Form(NamedTuple):
-    """Options of `pandas.read_csv`, and lines that say what was found."""
+def form_of(path: Path, named: set[str], given: dict) -> tuple[dict, list[str]]:
+    """Options of `pandas.read_csv` for a table, and lines that say what was found.
 
-    options: dict
-    lines: list[str]
-
-
-def form_of(path: Path, named: set[str], given: dict) -> Form:
-    """Form of a table; ``named``: columns that it must have, ``given``: the YAML's own options.
+    ``named``: columns that it must have, ``given``: the YAML's own options.
 
     The header is the first line that has the most of the columns, as its delimiter parts them.
     """
@@ -52,7 +46,7 @@ def form_of(path: Path, named: set[str], given: dict) -> Form:
     options = given | {
         "sep": sep, "skiprows": skip, "encoding": encoding, "decimal": "," if comma else ".",
     }  # fmt: skip
-    return Form(options, [f"{path.name}: {', '.join(said)}"] if said else [])
+    return options, [f"{path.name}: {', '.join(said)}"] if said else []
 
 
 def _cells(line: str, delimiter: str) -> list[str]:

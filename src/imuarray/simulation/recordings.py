@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from imuarray.errors import InputError
+from imuarray.errors import require
 from imuarray.model import ArrayModel
 from imuarray.model.array_model import parameter_names
 from imuarray.motion import Motion
@@ -100,11 +100,9 @@ def simulate_recording(
     sensors = max(model.array.accelerometers, model.array.gyroscopes)
     most = MAX_VALUES // (3 * sensors)
     samples = sampling_rate * duration
-    if not 0.5 < samples <= most:
-        raise InputError(
-            f"simulate: expected 1 to {most} samples of {sensors} triads, found {duration:g} s at"
-            f" {sampling_rate:g} Hz"
-        )
+    found = f"{duration:g} s at {sampling_rate:g} Hz"
+    possible = 0.5 < samples <= most
+    require(possible, "simulate", f"1 to {most} samples of {sensors} triads", found)
     time = np.arange(int(round(samples))) / sampling_rate
     begin = 0.0 if model.clock is None else model.clock[0]
     return simulate_samples(
