@@ -154,10 +154,8 @@ def positions(sections: dict[str, dict], layout, where: str) -> np.ndarray:
     without = [label for label, section in sections.items() if "position" not in section]
     if len(without) == len(sections):
         return np.full((len(sections), 3), np.nan)
-    if without:
-        raise InputError(
-            f"{where}: expected the position of each or of none, found none of {without[0]!r}"
-        )
+    found = f"none of {without[0]!r}" if without else ""
+    require(not without, where, "the position of each or of none", found)
     length = factor("length", layout.get("position_unit", "m"), f"{where}: position_unit")
     places = [
         _three(section["position"], f"{where} {label!r}: position")
