@@ -143,27 +143,23 @@ def _draw_effect(scene: Scene, case: Case, effect: str, sensors, rng) -> Change:
 
 
 def _truth(scene: Scene, case: Case, seed: int, changes, recording: Recording) -> dict:
-    gone = recording.at_rail("accelerometer")
-    gone |= recording.at_rail("gyroscope")
+    """What `make` says of a recording."""
+    effects = []
+    for change in changes:
+        labels = [scene.array.labels[k] for k in change.sensors]
+        effects.append({
+            "effect": change.effect,
+            "sensors": ["all"] if len(labels) == scene.accelerometers else labels,
+            **change.described(), "sigma": size_of(scene, change),
+            "sigma_exact": size_of(scene, change, EXACT_STEPS),
+        })  # fmt: skip
+    at_rail = recording.at_rail("accelerometer") | recording.at_rail("gyroscope")
     return {
-        "case": asdict(case), "seed": int(seed),
-        "effects": [_described(scene, change) for change in changes],
+        "case": asdict(case), "seed": int(seed), "effects": effects,
         "sigma": size_of(scene, changes), "sigma_exact": size_of(scene, changes, EXACT_STEPS),
         "struck": list(case.struck), "positions_m": scene.positions.tolist(),
-        "at_rail": float(gone.mean()),
+        "at_rail": float(at_rail.mean()),
     }  # fmt: skip
-
-
-def _described(scene: Scene, change: Change) -> dict:
-    """An effect as `make` gives it."""
-    labels = [scene.array.labels[k] for k in change.sensors]
-    return {
-        "effect": change.effect,
-        "sensors": ["all"] if len(labels) == scene.accelerometers else labels,
-        **change.described(),
-        "sigma": size_of(scene, change),
-        "sigma_exact": size_of(scene, change, EXACT_STEPS),
-    }
 
 
 def matrix(scale: str = "default") -> list[Case]:
