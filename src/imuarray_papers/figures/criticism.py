@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 
 from imuarray.geometry import Array
-from imuarray.pictures.style import BLACK, GREY, PAGE, logarithmic, look, new_figure, styled
+from imuarray.pictures.style import BLACK, GREY, PAGE, logarithmic, new_figure, styled
 from imuarray_papers.figures.measured import QUANTITIES
-from imuarray_papers.figures.style import Column, panels, rms
+from imuarray_papers.figures.style import Column, marks, panels, rms
 
 STEPS = {  # of `measured.causes.STEPS`
     "normal": "papers'", "clocks": "+ clocks", "no arms": "+ lag, maps",
@@ -86,21 +86,27 @@ def _causes(document: dict) -> pd.DataFrame:
             "effect": cause["effect"], "sensors": " ".join(cause["sensors"]),
             "nats": cause["heldout_gain_nats"], "nats_error": cause["heldout_gain_se"],
         }  # fmt: skip
-        items = [item for item in cause["parameters"].values() if item["sd"]]
-        if len({item["unit"] for item in items}) == 1:
-            values, sds = (np.array([item[key] for item in items]) for key in ("value", "sd"))
+        values, sds, units = estimated(cause)
+        if len(units) == 1:
             alike = abs(values.mean()) > 0.5 * rms(values)
-            row |= {"unit": items[0]["unit"], "mean": values.mean() if alike else np.nan,
+            row |= {"unit": units.pop(), "mean": values.mean() if alike else np.nan,
                     "rms": rms(values), "sd": np.median(sds)}  # fmt: skip
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def estimated(cause: dict) -> tuple[np.ndarray, np.ndarray, set[str]]:
+    """Values and sds of the parameters of a cause that have an sd, and their units."""
+    items = [item for item in cause["parameters"].values() if item["sd"]]
+    values, sds = (np.array([item[key] for item in items]) for key in ("value", "sd"))
+    return values, sds, {item["unit"] for item in items}
 
 
 @styled
 def _draw(table, footer):
     figure = new_figure(footer, PAGE, 2.5)
     axes = figure.subplots(1, 4, width_ratios=(1.1, 1.1, 1, 1))
-    part = {name: rows for name, rows in table.groupby("panel")}
+    part = dict(list(table.groupby("panel")))
     _draw_wrong(axes[0], part["wrong"])
     _draw_clock(axes[1], part["cause"], part["causes"])
     _draw_extended(axes[2], part["extended"])
@@ -123,8 +129,7 @@ def _draw_wrong(axes, rows) -> None:
             some = rows[(rows.quantity == quantity) & (rows.source == source)]
             bars = some.y - some.low, some.high - some.y
             axes.errorbar(some.x, some.y, bars, label=label if source == "measured" else None,
-                          **look(number, "linestyle"), linestyle="", markersize=4,
-                          elinewidth=0.7, **fill)  # fmt: skip
+                          elinewidth=0.7, **marks(number, markersize=4), **fill)  # fmt: skip
     axes.plot([], [], "o", color=GREY, markerfacecolor="none", label="the model's simulation")
     axes.axhline(1, color=BLACK, linewidth=0.6)
     logarithmic(axes, "angular acceleration (10³ deg/s²)", "residual / noise")
@@ -136,7 +141,7 @@ def _draw_wrong(axes, rows) -> None:
 
 
 def _draw_clock(axes, rows, causes) -> None:
-    axes.errorbar(rows.x, rows.y, rows.se, linestyle="", **look(0, "linestyle"), markersize=3)
+    axes.errorbar(rows.x, rows.y, rows.se, **marks(0, markersize=3))
     for turn in (0, 1):  # the sawtooth falls between them
         some = rows[(rows.x >= turn) & (rows.x < turn + 1)]
         axes.plot(some.x, some.predicted, color=BLACK, linewidth=0.8)
@@ -159,7 +164,7 @@ def name_models(axes, names) -> None:
 
 
 def _draw_extended(axes, rows) -> None:
-    style = look(2, "linestyle") | {"linestyle": "", "markersize": 5}
+    style = marks(2, markersize=5)
     axes.plot(range(len(rows)), rows.smooth, **style, label="smooth")
     axes.plot(range(len(rows)), rows["all"], **style, markerfacecolor="none", label="all")
     axes.axhline(1, color=BLACK, linewidth=0.6)
@@ -172,8 +177,7 @@ def _draw_extended(axes, rows) -> None:
 
 def draw_gained(axes, rows, said: str, ylabel: str) -> None:
     """rms (µm) and cover of the 95 % intervals, model after model."""
-    style = look(3, "linestyle") | {"linestyle": "", "markersize": 5}
-    axes.plot(range(len(rows)), 1e6 * rows.rms_m, **style)
+    axes.plot(range(len(rows)), 1e6 * rows.rms_m, **marks(3, markersize=5))
     for place, row in enumerate(rows.itertuples()):
         axes.annotate(f"{100 * row.covered:.0f} %", (place, 1e6 * row.rms_m), (0, 5), size=6,
                       ha="center", textcoords="offset points")  # fmt: skip
@@ -190,8 +194,8 @@ def _draw_between(axes, rows, left_out) -> None:
     """Differences between recordings, at one size too, and the size's error that all share."""
     gain, error = left_out.loc["board", ["over_inflated", "over_inflated_error"]]
     said = f"left out: +{gain:.0f} ± {error:.0f} nats"
-    style = look(3, "linestyle") | {"linestyle": "", "markersize": 5}
-    axes.plot(range(len(rows)), 1e6 * rows.same_size_rms_m, **style, markerfacecolor="none")
+    hollow = marks(3, markersize=5, markerfacecolor="none")
+    axes.plot(range(len(rows)), 1e6 * rows.same_size_rms_m, **hollow)
     common = 1e6 * rows.common_size_m.iloc[-1]
     axes.axhline(common, color=GREY, linestyle=(0, (4, 2)), linewidth=0.8)
     axes.annotate("size, shared", (0.03, common), (0, -8), xycoords=("axes fraction", "data"),
