@@ -133,16 +133,13 @@ class Scene:
         """Motion at the host's instants, (T, 1, 3)."""
         return States(*(x[:, None] for x in self._states_at(self.time)))
 
-    def states(self, times: np.ndarray | None = None) -> States:
-        """Exact motion at each sensor's own instants ``times`` (T, K); None for the host's."""
-        if times is None:
-            return self.nominal
-        late = [bool((column != self.time).any()) for column in times.T]
-        if not any(late):
+    def states(self, ages: np.ndarray | None) -> States:
+        """Exact motion ``ages`` (T, K) seconds after the host's instants; None: at these."""
+        if ages is None or not ages.any():
             return self.nominal
         columns = [
-            self._states_at(column) if moved else [x[:, 0] for x in self.nominal]
-            for moved, column in zip(late, times.T, strict=True)
+            self._states_at(self.time + age) if age.any() else [x[:, 0] for x in self.nominal]
+            for age in ages.T
         ]
         return States(*(np.stack(x, axis=1) for x in zip(*columns, strict=True)))
 
@@ -161,19 +158,18 @@ class Field:
 
     def __init__(self, scene: Scene, ages: Pair):
         """``ages`` in seconds, added to the host's instants: (T, A) and (T, G), or None."""
-        self.scene = scene
-        self._times = [None if age is None else scene.time[:, None] + age for age in ages]
+        self.scene, self.ages = scene, ages
         self._same = ages.force is ages.rate or np.array_equal(ages.force, ages.rate)
 
     @cached_property
     def states(self) -> States:
         """Motion at the accelerometers' instants, (T, A or 1, 3)."""
-        return self.scene.states(self._times[0])
+        return self.scene.states(self.ages.force)
 
     @cached_property
     def turning(self) -> States:
         """Motion at the gyroscopes' instants, (T, G or 1, 3)."""
-        return self.states if self._same else self.scene.states(self._times[1])
+        return self.states if self._same else self.scene.states(self.ages.rate)
 
     @cached_property
     def force(self) -> np.ndarray:

@@ -79,11 +79,10 @@ def effects(rows: list[dict]) -> pd.DataFrame:
     lines = []
     for row in rows:
         for effect in row["truth"]:
-            whole = effect["sensors"] == ["all"]
-            line = {name: row[name] for name in ("case", "kind", "rails")}
-            line |= {**effect, "wrong": bool(row["wrong_names"])}
-            many = "two" if len(effect["sensors"]) > 1 else "one"
-            lines.append(line | {"sensors": "all" if whole else many})
+            line = {name: row[name] for name in ("case", "kind", "rails")} | effect
+            few = "two" if len(effect["sensors"]) > 1 else "one"
+            many = "all" if effect["sensors"] == ["all"] else few
+            lines.append(line | {"sensors": many, "wrong": bool(row["wrong_names"])})
     columns = ["case", "kind", "rails", "effect", "sensors", "sigma", "sigma_exact", "amplitude",
                "unit", "found", "named", "sensors_right", "wrong"]  # fmt: skip
     return pd.DataFrame(lines, columns=columns)
@@ -100,8 +99,7 @@ def detection(table: pd.DataFrame, against: str) -> pd.DataFrame:
     lines = []
     for name, part in groups + ([(ALL, single)] if against == "sigma" and groups else []):
         bins = _sigma_bins(part) if against == "sigma" else _equal_bins(part, against)
-        for members in bins:
-            lines.append(_detected(name, against, members))
+        lines += [_detected(name, against, members) for members in bins]
     return pd.DataFrame(lines)
 
 
