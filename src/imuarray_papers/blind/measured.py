@@ -1,27 +1,19 @@
 """An effect added to a measured recording, from its readings alone, and is it found?"""
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from imuarray.recording import Recording
 from imuarray.streams import stream
-from imuarray_papers.blind.change import Change, Pair, with_errors
+from imuarray_papers.blind.change import Change, with_errors
 from imuarray_papers.blind.inject import EFFECTS
+from imuarray_papers.blind.scene import Field, Pair
 from imuarray_papers.blind.study import classes
 
 NOT_FROM_READINGS = tuple(name for name, entry in EFFECTS.items() if not entry.from_readings)
 SHOWN = 2.0  # times the smallest size that a recording shows
-
-
-class MeasuredField(NamedTuple):
-    """Readings at each sensor's own instants; see `scene.Field`."""
-
-    force: np.ndarray  # (T, A, 3) m/s^2
-    rate: np.ndarray  # (T, G, 3) rad/s
-    force_at_gyroscopes: np.ndarray  # (T, G, 3) m/s^2
 
 
 class MeasuredScene:
@@ -53,14 +45,14 @@ class MeasuredScene:
         """The readings as they are."""
         return self.readings
 
-    def field(self, ages: Pair) -> MeasuredField:
+    def field(self, ages: Pair) -> Field:
         """Readings ``ages`` (T, A) and (T, G) s later, or None, by a cubic spline.
 
         A spline carries noise along: what it gives between samples is a little less noisy.
         """
         force, rate = self.readings
         wanted = (force, ages.force), (rate, ages.rate), (force, ages.rate)
-        return MeasuredField(*(self._at(*each) for each in wanted))
+        return Field(*(self._at(*each) for each in wanted), states=None)
 
     def _at(self, values: np.ndarray, ages: np.ndarray | None) -> np.ndarray:
         if ages is None:
