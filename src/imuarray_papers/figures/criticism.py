@@ -132,12 +132,11 @@ def _draw_wrong(axes, rows) -> None:
                           elinewidth=0.7, **marks(number, markersize=4), **fill)  # fmt: skip
     axes.plot([], [], "o", color=GREY, markerfacecolor="none", label="the model's simulation")
     axes.axhline(1, color=BLACK, linewidth=0.6)
-    logarithmic(axes, "angular acceleration (10³ deg/s²)", "residual / noise")
+    title = f"Wrong: up to {rows[rows.source == 'measured'].y.max():.0f} × noise"
+    logarithmic(axes, "angular acceleration (10³ deg/s²)", "residual / noise", title=title)
     axes.xaxis.set_major_formatter("{x:g}")
     axes.xaxis.set_minor_formatter("")
     axes.legend(fontsize=6, loc="lower center", bbox_to_anchor=(0.5, 0.15))
-    measured = rows[rows.source == "measured"].y
-    axes.set_title(f"Wrong: up to {measured.max():.0f} × noise")
 
 
 def _draw_clock(axes, rows, causes) -> None:
@@ -146,9 +145,11 @@ def _draw_clock(axes, rows, causes) -> None:
         some = rows[(rows.x >= turn) & (rows.x < turn + 1)]
         axes.plot(some.x, some.predicted, color=BLACK, linewidth=0.8)
     imu = rows.title.iloc[0].split(",")[0]
-    axes.set(xlabel=f"turns of {imu}'s clock", ylabel="age of a reading (ms)")
-    axes.set_ylim(1.7 * rows.predicted.min(), 1.15 * rows.predicted.max())
-    axes.set_title("Cause: a clock in each chip")
+    axes.set(
+        xlabel=f"turns of {imu}'s clock", ylabel="age of a reading (ms)",
+        ylim=(1.7 * rows.predicted.min(), 1.15 * rows.predicted.max()),
+        title="Cause: a clock in each chip",
+    )  # fmt: skip
     lag = causes[causes.effect == "gyroscope_delay"]
     if len(lag):
         value, sd = 1e3 * lag["mean"].iloc[0], 1e3 * lag.sd.iloc[0]
@@ -157,8 +158,10 @@ def _draw_clock(axes, rows, causes) -> None:
         axes.text(0.04, 0.03, said, size=6, transform=axes.transAxes)
 
 
-def name_models(axes, names) -> None:
-    """Models along the abscissa."""
+def _over_models(axes, names, ylabel: str, title: str) -> None:
+    """Models along the abscissa; a logarithmic ordinate with its numbers written out."""
+    axes.set(yscale="log", ylabel=ylabel, title=title)
+    axes.yaxis.set_major_formatter("{x:g}")
     axes.set_xticks(range(len(names)), names, rotation=35, ha="right", size=6.5)
     axes.set_xlim(-0.5, len(names) - 0.5)
 
@@ -168,11 +171,9 @@ def _draw_extended(axes, rows) -> None:
     axes.plot(range(len(rows)), rows.smooth, **style, label="smooth")
     axes.plot(range(len(rows)), rows["all"], **style, markerfacecolor="none", label="all")
     axes.axhline(1, color=BLACK, linewidth=0.6)
-    axes.set(yscale="log", ylabel="residual / noise")
-    axes.yaxis.set_major_formatter("{x:g}")
-    name_models(axes, rows.model)
+    title = f"Extended: {rows.smooth.iloc[0]:.0f} to {rows.smooth.iloc[-1]:.2g} × noise"
+    _over_models(axes, rows.model, "residual / noise", title)
     axes.legend(fontsize=6)
-    axes.set_title(f"Extended: {rows.smooth.iloc[0]:.0f} to {rows.smooth.iloc[-1]:.2g} × noise")
 
 
 def draw_gained(axes, rows, said: str, ylabel: str) -> None:
@@ -181,13 +182,10 @@ def draw_gained(axes, rows, said: str, ylabel: str) -> None:
     for place, row in enumerate(rows.itertuples()):
         axes.annotate(f"{100 * row.covered:.0f} %", (place, 1e6 * row.rms_m), (0, 5), size=6,
                       ha="center", textcoords="offset points")  # fmt: skip
-    axes.set(yscale="log", ylabel=ylabel)
-    axes.yaxis.set_major_formatter("{x:g}")
-    axes.margins(y=0.3)
-    name_models(axes, rows.model)
-    axes.text(0.04, 0.04, said, size=6, transform=axes.transAxes)
     first, last = (1e6 * rows.rms_m.iloc[place] for place in (0, -1))
-    axes.set_title(f"Gained: {first:.0f} to {last:.2g} µm")
+    _over_models(axes, rows.model, ylabel, f"Gained: {first:.0f} to {last:.2g} µm")
+    axes.margins(y=0.3)
+    axes.text(0.04, 0.04, said, size=6, transform=axes.transAxes)
 
 
 def _draw_between(axes, rows, left_out) -> None:
