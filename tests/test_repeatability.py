@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from imuarray_papers.figures.repeatability import (
+from imuarray_papers.figures.board import (
     MODELS,
     parameters_agreement,
     positions_agreement,

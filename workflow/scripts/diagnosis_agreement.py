@@ -7,7 +7,7 @@ with job(snakemake):
     from pathlib import Path
 
     from imuarray.provenance import write_csv
-    from imuarray_papers.figures.repeatability import (
+    from imuarray_papers.figures.board import (
         parameters_agreement,
         positions_agreement,
         recordings_table,

@@ -1,6 +1,6 @@
 """Cases by name, those that a scale asks for, and the recording and truth a seed makes of one."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 
 from imuarray.recording import Recording
@@ -143,27 +143,23 @@ def _draw_effect(scene: Scene, case: Case, effect: str, sensors, rng) -> Change:
 
 
 def _truth(scene: Scene, case: Case, seed: int, changes, recording: Recording) -> dict:
-    gone = recording.at_rail("accelerometer")
-    gone |= recording.at_rail("gyroscope")
+    """What `make` says of a recording."""
+    effects = []
+    for change in changes:
+        labels = [scene.array.labels[k] for k in change.sensors]
+        effects.append({
+            "effect": change.effect,
+            "sensors": ["all"] if len(labels) == scene.accelerometers else labels,
+            **change.described(), "sigma": size_of(scene, change),
+            "sigma_exact": size_of(scene, change, EXACT_STEPS),
+        })  # fmt: skip
+    at_rail = recording.at_rail("accelerometer") | recording.at_rail("gyroscope")
     return {
-        "case": asdict(case), "seed": int(seed),
-        "effects": [_described(scene, change) for change in changes],
+        "case": asdict(case), "seed": int(seed), "effects": effects,
         "sigma": size_of(scene, changes), "sigma_exact": size_of(scene, changes, EXACT_STEPS),
         "struck": list(case.struck), "positions_m": scene.positions.tolist(),
-        "at_rail": float(gone.mean()),
+        "at_rail": float(at_rail.mean()),
     }  # fmt: skip
-
-
-def _described(scene: Scene, change: Change) -> dict:
-    """An effect as `make` gives it."""
-    labels = [scene.array.labels[k] for k in change.sensors]
-    return {
-        "effect": change.effect,
-        "sensors": ["all"] if len(labels) == scene.accelerometers else labels,
-        **change.described(),
-        "sigma": size_of(scene, change),
-        "sigma_exact": size_of(scene, change, EXACT_STEPS),
-    }
 
 
 def matrix(scale: str = "default") -> list[Case]:
@@ -175,9 +171,9 @@ def matrix(scale: str = "default") -> list[Case]:
         raise ValueError(f"scale: expected quick, default or paper, found {scale!r}")
     repeats = REPEATS["default" if scale == "quick" else scale]
     found = []
-    for kind, enumerated in _KINDS.items():
+    for kind in KINDS:
         rng = stream(0, "blind", "matrix", kind)
-        plans = list(enumerated(repeats[kind], rng))
+        plans = list(_plans(kind, repeats[kind], rng))
         cases = [_case(kind, number, *plan, rng) for number, plan in enumerate(plans)]
         if scale == "quick":
             count = QUICK[kind]
@@ -205,34 +201,29 @@ def _case(kind: str, number: int, names, wanted, sigma, rng) -> Case:
     return Case(label, effects, sigma, kind=kind, **setting)
 
 
-def _single(names, sizes, without: int, wanted=HOW_MANY) -> Callable:
-    """Each effect alone at each size, on as many IMUs as is ``wanted``, by turns.
+# Of one effect: which, at which sizes (an effect without an amplitude to set comes so many times
+# instead), on how many IMUs.
+SINGLE = {
+    "one": (CATALOGUE, SIZES, 3, HOW_MANY),
+    "gauge": (GAUGE, (), 1, ("all",)),
+    "outside": (OUTSIDE, OUTSIDE_SIZES, 2, HOW_MANY),
+    "struck": (CATALOGUE, (STRUCK_SIZE,), 1, HOW_MANY),
+}
 
-    An effect without an amplitude to set comes ``without`` times instead.
-    """
 
-    def plans(repeats: int, rng) -> Iterator[tuple]:
+def _plans(kind: str, repeats: int, rng) -> Iterator[tuple]:
+    """Effects, on how many IMUs each is, and their size in sigma, of the cases of a kind."""
+    if kind == "clean":
+        yield from [((), (), None)] * repeats
+    elif kind == "pair":
+        names = [name for name in CATALOGUE if EFFECTS[name].scalable]
+        for _ in range(repeats):
+            chosen = tuple(names[k] for k in sorted(rng.permutation(len(names))[:2]))
+            wanted = tuple(rng.choice(["one", "two", "all"], 2, p=[0.55, 0.15, 0.3]).tolist())
+            yield chosen, wanted, PAIR_SIZE
+    else:
+        names, sizes, without, wanted = SINGLE[kind]
         for name in names:
             for sigma in sizes if EFFECTS[name].scalable else (None,) * without:
                 for how in wanted:
-                    yield from (((name,), (how,), sigma) for _ in range(repeats))
-
-    return plans
-
-
-def _pair(repeats: int, rng) -> Iterator[tuple]:
-    names = [name for name in CATALOGUE if EFFECTS[name].scalable]
-    for _ in range(repeats):
-        chosen = tuple(names[k] for k in sorted(rng.permutation(len(names))[:2]))
-        wanted = tuple(rng.choice(["one", "two", "all"], 2, p=[0.55, 0.15, 0.3]).tolist())
-        yield chosen, wanted, PAIR_SIZE
-
-
-_KINDS = {
-    "clean": lambda repeats, rng: [((), (), None)] * repeats,
-    "one": _single(CATALOGUE, SIZES, 3),
-    "pair": _pair,
-    "gauge": _single(GAUGE, (), 1, ("all",)),
-    "outside": _single(OUTSIDE, OUTSIDE_SIZES, 2),
-    "struck": _single(CATALOGUE, (STRUCK_SIZE,), 1),
-}
+                    yield from [((name,), (how,), sigma)] * repeats

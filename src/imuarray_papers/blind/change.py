@@ -71,17 +71,12 @@ class Change:
 
     def described(self) -> dict:
         """Id, amplitude and parameters in plain numbers, texts and lists, with their units."""
-        drawn = {"amplitude": Parameter(self.size, EFFECTS[self.effect].unit)}
+        drawn = {"amplitude": Parameter(self.size, EFFECTS[self.effect].unit), **self.parameters}
         plain = {
-            name: {"value": _plain(value), "unit": unit}
-            for name, (value, unit) in (drawn | self.parameters).items()
+            name: {"value": np.asarray(value).tolist(), "unit": unit}
+            for name, (value, unit) in drawn.items()
         }
         return {"effect": self.effect, "amplitude": plain.pop("amplitude"), "parameters": plain}
-
-
-def _plain(value):
-    """Arrays as lists, numpy's numbers as Python's."""
-    return value if isinstance(value, str | list | bool) else np.asarray(value).tolist()
 
 
 @dataclass(frozen=True)

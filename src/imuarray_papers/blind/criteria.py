@@ -1,7 +1,6 @@
 """The acceptance criteria that the diagnosis is held against, and whether it meets them."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -9,14 +8,13 @@ import pandas as pd
 from imuarray_papers.blind.cases import KINDS, PAIR_SIZE
 from imuarray_papers.blind.summary import LARGE, REACHED, coverage_limits, share_limits
 
-COVERAGE = (0.92, 0.98)  # of 95 % intervals
 LONGEST = 60.0  # s for a recording
 UPPER_LIMIT, UPPER_COUNT = 0.04, 400  # of the false alarms' share, over so many recordings
 PASS, NONE = "pass", "no recordings"
+COVERED = "covered"
 
 
-@dataclass(frozen=True)
-class Criterion:
+class Criterion(NamedTuple):
     """A limit on a share of recordings.
 
     Attributes
@@ -25,12 +23,11 @@ class Criterion:
     kinds : tuple of str
         Kinds of cases that it is about.
     hit : str
-        Column of `imuarray_papers.blind.summary.recordings` that says what is counted.
-    limit : float or None
-        None for what is counted without a limit.
-    least : bool
-        Whether the share must be at least the limit (a crash is then a miss), or at most (a
-        crash is then left out: it has a criterion of its own).
+        Column of `imuarray_papers.blind.summary.recordings` that says what is counted; `COVERED`:
+        the mean share of intervals instead. A crash has a criterion of its own: it is a miss where
+        the share must be large, else left out.
+    aim : tuple of two floats, or None
+        Lowest and highest share that will do; None for what is counted without a limit.
     size : tuple of str and float, or None
         Only recordings with at least so much in a column.
     """
@@ -39,60 +36,69 @@ class Criterion:
     says: str
     kinds: tuple[str, ...]
     hit: str
-    limit: float | None
-    least: bool = False
+    aim: tuple[float, float] | None
     size: tuple[str, float] | None = None
 
-    @property
-    def aim(self) -> tuple[float, float] | None:
-        """Lowest and highest share that will do."""
-        if self.limit is None:
-            return None
-        return (self.limit, 1.0) if self.least else (0.0, self.limit)
-
-    def measure(self, table: pd.DataFrame) -> tuple:
-        """Recordings, how many are hit, their share and its 95 % limits."""
+    def measure(self, table: pd.DataFrame) -> dict:
+        """``recordings``, how many are hit (``count``), their ``share`` and its 95 % limits."""
         part = table[table.kind.isin(self.kinds)]
         if self.size is not None:
             part = part[part[self.size[0]] >= self.size[1]]
-        if not self.least and self.hit != "crash":
+        if self.hit != "crash" and (self.aim is None or self.aim[1] < 1):
             part = part[~part.crash]
-        # a crash leaves None
-        number, count = len(part), int(part[self.hit].eq(True).sum())
-        return number, count, count / number if number else np.nan, *share_limits(count, number)
+        number = len(part)
+        if self.hit == COVERED:
+            count = None
+            limits = coverage_limits(part, "extended") if number else (np.nan,) * 3
+        else:
+            # a crash leaves None
+            count = int(part[self.hit].eq(True).sum())
+            share = count / number if number else np.nan
+            limits = share, *share_limits(count, number)
+        names = ("recordings", "count", "share", "low", "high")
+        return dict(zip(names, (number, count, *limits), strict=True))
 
 
-ONE = {"kinds": ("one",), "size": ("sigma", REACHED * LARGE)}
-FULL_PAIRS = {"kinds": ("pair",), "size": ("least_sigma", REACHED * PAIR_SIZE)}
+LARGE_ONE = ("sigma", REACHED * LARGE)
+FULL_PAIR = ("least_sigma", REACHED * PAIR_SIZE)
 CRITERIA = (
-    Criterion("false_alarms", "clean: any cause named", ("clean",), "named", 0.02),
+    Criterion("false_alarms", "clean: any cause named", ("clean",), "named", (0.0, 0.02)),
     Criterion("clean_unexplained", "clean: unexplained raised", ("clean",), "unexplained", None),
     Criterion(
-        "one_found", "one effect, 8 sigma or more: right class", hit="found", limit=0.97,
-        least=True, **ONE,
+        "one_found", "one effect, 8 sigma or more: right class", ("one",), "found", (0.97, 1.0),
+        LARGE_ONE,
     ),
     Criterion(
-        "one_wrong", "one effect, 8 sigma or more: a wrong name", hit="wrong", limit=0.01, **ONE
+        "one_wrong", "one effect, 8 sigma or more: a wrong name", ("one",), "wrong", (0.0, 0.01),
+        LARGE_ONE,
     ),
     Criterion(
-        "one_sensors", "one effect, 8 sigma or more: right class and right sensors",
-        hit="sensors_right", limit=0.95, least=True, **ONE,
+        "one_sensors", "one effect, 8 sigma or more: right class and right sensors", ("one",),
+        "sensors_right", (0.95, 1.0), LARGE_ONE,
     ),
     Criterion(
-        "pair_set", "two effects, 12 sigma each: exactly the right set", hit="right_set",
-        limit=0.90, least=True, **FULL_PAIRS,
+        "pair_set", "two effects, 12 sigma each: exactly the right set", ("pair",), "right_set",
+        (0.90, 1.0), FULL_PAIR,
     ),
-    Criterion("gauge", "gauges: a single confident name", ("gauge",), "confident", 0.0),
+    Criterion("gauge", "gauges: a single confident name", ("gauge",), "confident", (0.0, 0.0)),
     Criterion(
-        "outside", "outside the catalogue: named, unexplained not raised",
-        ("outside",), "confident", 0.03,
+        "outside", "outside the catalogue: named, unexplained not raised", ("outside",),
+        "confident", (0.0, 0.03),
     ),
     Criterion(
-        "struck", "struck from the catalogue: named, unexplained not raised",
-        ("struck",), "confident", 0.03,
+        "struck", "struck from the catalogue: named, unexplained not raised", ("struck",),
+        "confident", (0.0, 0.03),
     ),
-    Criterion("time", "longer than 60 s", KINDS, "long", 0.0),
-    Criterion("crashes", "no answer at all", KINDS, "crash", 0.0),
+    Criterion("time", "longer than 60 s", KINDS, "long", (0.0, 0.0)),
+    Criterion("crashes", "no answer at all", KINDS, "crash", (0.0, 0.0)),
+    *(
+        Criterion(
+            f"coverage_{name}", f"95 % intervals of the extended model cover: {words}", kinds,
+            COVERED, (0.92, 0.98),
+        )
+        for name, words, kinds in (*((kind, kind, (kind,)) for kind in KINDS),
+                                   ("all", "all sets", KINDS))
+    ),
 )  # fmt: skip
 
 
@@ -105,33 +111,18 @@ def criteria(table: pd.DataFrame) -> pd.DataFrame:
     limit.
     """
     table = table.assign(long=table.least_seconds > LONGEST)
-    lines = [_line(item.id, item.says, item.aim, table, item.measure) for item in CRITERIA]
+    lines = []
+    for item in CRITERIA:
+        line, every = item.measure(table[table.standard]), item.measure(table)
+        number, low, high = line["recordings"], line["low"], line["high"]
+        lines.append({
+            "id": item.id, "bar": item.says, "aim": _aim_text(item.aim), **line,
+            "verdict": verdict(item.aim, number, line["share"]),
+            "sure": is_sure(item.aim, number, low, high),
+            **{f"all_{name}": value for name, value in every.items()},
+        })  # fmt: skip
     lines.insert(1, _upper_line(lines[0]))
-    for kind in (*KINDS, None):
-        words = f"95 % intervals of the extended model cover: {kind or 'all sets'}"
-        part = table if kind is None else table[table.kind == kind]
-        lines.append(_line(f"coverage_{kind or 'all'}", words, COVERAGE, part, _covered))
     return pd.DataFrame(lines)
-
-
-def _line(id, says, aim: tuple | None, table: pd.DataFrame, measure: Callable) -> dict:
-    """A row of the table; ``aim``: lowest and highest share that will do, or None."""
-    names = ("recordings", "count", "share", "low", "high")
-    line = dict(zip(names, measure(table[table.standard]), strict=True))
-    every = dict(zip([f"all_{name}" for name in names], measure(table), strict=True))
-    number, low, high = line["recordings"], line["low"], line["high"]
-    return {
-        "id": id, "bar": says, "aim": _aim_text(aim), **line,
-        "verdict": verdict(aim, number, line["share"]), "sure": is_sure(aim, number, low, high),
-        **every,
-    }  # fmt: skip
-
-
-def _covered(part: pd.DataFrame) -> tuple:
-    part = part[~part.crash]
-    if part.empty:
-        return 0, None, np.nan, np.nan, np.nan
-    return len(part), None, *coverage_limits(part, "extended")
 
 
 def _upper_line(first: dict) -> dict:

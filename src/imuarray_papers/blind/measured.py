@@ -1,17 +1,15 @@
 """An effect added to a measured recording, from its readings alone, and is it found?"""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from imuarray.recording import Recording
 from imuarray.streams import stream
-from imuarray_papers.blind.change import Change, Pair, with_errors
+from imuarray_papers.blind.change import Change, with_errors
 from imuarray_papers.blind.inject import EFFECTS
+from imuarray_papers.blind.scene import Field, Pair
 from imuarray_papers.blind.study import classes
 
 NOT_FROM_READINGS = tuple(name for name, entry in EFFECTS.items() if not entry.from_readings)
@@ -47,40 +45,19 @@ class MeasuredScene:
         """The readings as they are."""
         return self.readings
 
-    def field(self, ages: Pair) -> MeasuredField:
-        """The readings at each sensor's own instants."""
-        return MeasuredField(self, ages)
+    def field(self, ages: Pair) -> Field:
+        """Readings ``ages`` (T, A) and (T, G) s later, or None, by a cubic spline.
 
-
-class MeasuredField:
-    """Readings at the recorded instants plus ages, by a cubic spline; see `scene.Field`.
-
-    A spline carries noise along: what it gives between samples is a little less noisy.
-    """
-
-    def __init__(self, scene: MeasuredScene, ages: Pair):
-        """``ages`` (T, A) and (T, G) seconds, or None."""
-        self.scene, self.ages = scene, ages
-
-    @cached_property
-    def force(self) -> np.ndarray:
-        """(T, A, 3) m/s^2."""
-        return self._at(self.scene.readings.force, self.ages.force)
-
-    @cached_property
-    def rate(self) -> np.ndarray:
-        """(T, G, 3) rad/s."""
-        return self._at(self.scene.readings.rate, self.ages.rate)
-
-    @cached_property
-    def force_at_gyroscopes(self) -> np.ndarray:
-        """Specific force of each IMU at its gyroscope's instants, (T, G, 3) m/s^2."""
-        return self._at(self.scene.readings.force, self.ages.rate)
+        A spline carries noise along: what it gives between samples is a little less noisy.
+        """
+        force, rate = self.readings
+        wanted = (force, ages.force), (rate, ages.rate), (force, ages.rate)
+        return Field(*(self._at(*each) for each in wanted), states=None)
 
     def _at(self, values: np.ndarray, ages: np.ndarray | None) -> np.ndarray:
         if ages is None:
             return values
-        moved, time = np.array(values), self.scene.time
+        moved, time = np.array(values), self.time
         for k in np.flatnonzero(ages.any(axis=0)):
             # beyond the ends a cubic runs away
             instants = np.clip(time + ages[:, k], time[0], time[-1])
@@ -132,7 +109,11 @@ def inject_measured(
     moving = change.after if change.stale else change.relabel
     if moving:
         flags = Pair(*(np.abs(x) > 0.5 for x in moving(Pair(*(f.astype(float) for f in flags)))))
-    return _rebuilt(recording, readings, flags)
+    names = ("specific_force_saturated", "angular_rate_saturated")
+    # flags only where there were some
+    kept = {name: flag for name, flag in zip(names, flags, strict=True)
+            if getattr(recording, name) is not None}  # fmt: skip
+    return replace(recording, specific_force=readings.force, angular_rate=readings.rate, **kept)
 
 
 def _with_noise(scene: MeasuredScene, change: Change, readings: Pair, seed: int) -> Pair:
@@ -152,16 +133,6 @@ def _within_rails(new, old, at_rail, limit) -> tuple[np.ndarray, np.ndarray]:
     moved = ~at_rail & (new != old)
     passing = moved & (np.abs(new) >= limit)
     return np.where(moved, np.clip(new, -limit, limit), old), at_rail | passing
-
-
-def _rebuilt(recording: Recording, readings: Pair, flags: Pair) -> Recording:
-    """The recording with other readings; flags only where it had some."""
-    parts = {"specific_force": readings.force, "angular_rate": readings.rate}
-    names = ("specific_force_saturated", "angular_rate_saturated")
-    for name, flag in zip(names, flags, strict=True):
-        if getattr(recording, name) is not None:
-            parts[name] = flag
-    return replace(recording, **parts)
 
 
 def hide(

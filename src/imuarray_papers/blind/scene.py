@@ -47,6 +47,19 @@ class States(NamedTuple):
         return np.cross(self.rate, inner) + np.cross(self.acceleration, arms)
 
 
+class Field(NamedTuple):
+    """True quantities at each sensor's own instants, for the errors to be computed from."""
+
+    force: np.ndarray  # u_k, (T, A, 3) m/s^2
+    rate: np.ndarray  # w, (T, G, 3) rad/s
+    force_at_gyroscopes: np.ndarray  # u_k of each IMU at its gyroscope's instants, (T, G, 3) m/s^2
+    states: States | None  # at the accelerometers' instants; None of a measured recording
+
+    def lever(self, arms: np.ndarray, sensors) -> np.ndarray:
+        """Specific force that arms (n, 3) or (T, n, 3) add at some triads, (T, n, 3) m/s^2."""
+        return self.states.columns(sensors).lever(arms)
+
+
 def _waves(waves, time: np.ndarray, orders) -> list[np.ndarray]:
     """Derivatives of a sum of sinusoids at ``time`` (T,), each (T, 3).
 
@@ -133,16 +146,13 @@ class Scene:
         """Motion at the host's instants, (T, 1, 3)."""
         return States(*(x[:, None] for x in self._states_at(self.time)))
 
-    def states(self, times: np.ndarray | None = None) -> States:
-        """Exact motion at each sensor's own instants ``times`` (T, K); None for the host's."""
-        if times is None:
-            return self.nominal
-        late = [bool((column != self.time).any()) for column in times.T]
-        if not any(late):
+    def states(self, ages: np.ndarray | None) -> States:
+        """Exact motion ``ages`` (T, K) seconds after the host's instants; None: at these."""
+        if ages is None or not ages.any():
             return self.nominal
         columns = [
-            self._states_at(column) if moved else [x[:, 0] for x in self.nominal]
-            for moved, column in zip(late, times.T, strict=True)
+            self._states_at(self.time + age) if age.any() else [x[:, 0] for x in self.nominal]
+            for age in ages.T
         ]
         return States(*(np.stack(x, axis=1) for x in zip(*columns, strict=True)))
 
@@ -152,48 +162,13 @@ class Scene:
         return Pair(here.force, here.rate)
 
     def field(self, ages: Pair) -> Field:
-        """Specific force and rates at the sensors' own instants, the host's plus ``ages``."""
-        return Field(self, ages)
-
-
-class Field:
-    """True quantities at each sensor's own instants, for the errors to be computed from."""
-
-    def __init__(self, scene: Scene, ages: Pair):
-        """``ages`` in seconds, added to the host's instants: (T, A) and (T, G), or None."""
-        self.scene = scene
-        self._times = [None if age is None else scene.time[:, None] + age for age in ages]
-        self._same = ages.force is ages.rate or np.array_equal(ages.force, ages.rate)
-
-    @cached_property
-    def states(self) -> States:
-        """Motion at the accelerometers' instants, (T, A or 1, 3)."""
-        return self.scene.states(self._times[0])
-
-    @cached_property
-    def turning(self) -> States:
-        """Motion at the gyroscopes' instants, (T, G or 1, 3)."""
-        return self.states if self._same else self.scene.states(self._times[1])
-
-    @cached_property
-    def force(self) -> np.ndarray:
-        """u_k at the accelerometers' instants, (T, A, 3) m/s^2."""
-        return force_at(self.states, self.scene.positions)
-
-    @cached_property
-    def rate(self) -> np.ndarray:
-        """w at the gyroscopes' instants, (T, G, 3) rad/s."""
-        shape = (len(self.scene.time), self.scene.accelerometers, 3)
-        return np.broadcast_to(self.turning.rate, shape)
-
-    @cached_property
-    def force_at_gyroscopes(self) -> np.ndarray:
-        """u_k of each IMU at its gyroscope's instants, (T, G, 3) m/s^2."""
-        return self.force if self._same else force_at(self.turning, self.scene.positions)
-
-    def lever(self, arms: np.ndarray, sensors) -> np.ndarray:
-        """Specific force that arms (n, 3) or (T, n, 3) add at some triads, (T, n, 3) m/s^2."""
-        return self.states.columns(sensors).lever(arms)
+        """True quantities ``ages`` (T, A) and (T, G) s after the host's instants, None: at them."""
+        states = self.states(ages.force)
+        same = ages.force is ages.rate or np.array_equal(ages.force, ages.rate)
+        turning = states if same else self.states(ages.rate)
+        force = force_at(states, self.positions)
+        rate = np.broadcast_to(turning.rate, force.shape)
+        return Field(force, rate, force if same else force_at(turning, self.positions), states)
 
 
 def force_at(states: States, positions: np.ndarray) -> np.ndarray:

@@ -16,10 +16,7 @@ TOLERANCE = 0.01  # of a size that was asked for
 
 def skew(vectors: np.ndarray) -> np.ndarray:
     """[v]x of vectors (..., 3), so that [v]x a = v x a; (..., 3, 3)."""
-    x, y, z = np.moveaxis(np.asarray(vectors), -1, 0)
-    zero = np.zeros_like(x)
-    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    return np.cross(np.eye(3), vectors[..., None, :])  # row i: e_i x v
 
 
 class Projection:

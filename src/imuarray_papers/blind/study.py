@@ -178,62 +178,46 @@ def grade(entry: dict) -> dict:
     row |= {name: case[name] for name in ("kind", "imus", "sampling_rate", "duration", "rails")}
     row |= {"requested_sigma": case["sigma"]}
     row |= {name: truth[name] for name in ("sigma", "sigma_exact", "struck")}
-    row |= _crashed(truth) if answer is None else _answered(truth, answer)
+    row |= _answer_in_row(truth, answer)
     return row | {name: entry[name] for name in ("seconds", "cpu_seconds", "error")}
 
 
-def _described(effect: dict) -> dict:
-    """An effect of the truth in a row."""
-    row = {name: effect[name] for name in ("effect", "sensors", "sigma", "sigma_exact")}
-    return row | {"amplitude": effect["amplitude"]["value"], "unit": effect["amplitude"]["unit"]}
-
-
-def _crashed(truth: dict) -> dict:
-    lost = {"found": False, "named": False, "sensors_right": False}
+def _answer_in_row(truth: dict, answer: dict | None) -> dict:
+    """What the diagnosis said, against the truth; after a crash it has said nothing."""
+    kind, imus = truth["case"]["kind"], truth["case"]["imus"]
+    lost = answer is None
+    causes = [] if lost else answer["causes"]
+    unexplained = None if lost else bool(answer["unexplained"])
+    wanted, named = [effect["effect"] for effect in truth["effects"]], classes(causes)
+    keys = ("effect", "sensors", "indistinguishable_from")
+    gains = {f"{name}{end}": f"{key}{end}" for name, key in GAINS.items() for end in ("", "_se")}
     return {
-        "truth": [_described(effect) | lost for effect in truth["effects"]],
-        "causes": [], "wrong_names": [], "right_set": False, "confident": False,
-        "unexplained": None, "grade": "crash",
-        **{f"{name}{end}": None for name in GAINS for end in ("", "_se")},
-        **dict.fromkeys(MODELS),
+        "truth": [_effect_in_row(effect, causes, imus) for effect in truth["effects"]],
+        "causes": [{key: cause[key] for key in keys} for cause in causes],
+        "wrong_names": wrong_names(wanted, named),
+        "right_set": not lost and right_set(wanted, named),
+        "confident": is_confident(kind, causes, unexplained),
+        "unexplained": unexplained,
+        "grade": "crash" if lost else _grade(kind, wanted, causes, unexplained),
+        **{name: None if lost else answer["gain"][key] for name, key in gains.items()},
+        **{
+            name: None if lost else accuracy(answer[name], truth["positions_m"])
+            for name in MODELS
+        },
     }  # fmt: skip
 
 
-def _answered(truth: dict, answer: dict) -> dict:
-    kind, imus = truth["case"]["kind"], truth["case"]["imus"]
-    causes, unexplained = answer["causes"], bool(answer["unexplained"])
-    named = classes(causes)
-    wanted = [effect["effect"] for effect in truth["effects"]]
-    keys = ("effect", "sensors", "indistinguishable_from")
-    return {
-        "truth": [_described(effect) | _seen(effect, causes, imus) for effect in truth["effects"]],
-        "causes": [{key: cause[key] for key in keys} for cause in causes],
-        "wrong_names": wrong_names(wanted, named),
-        "right_set": right_set(wanted, named),
-        "confident": is_confident(kind, causes, unexplained),
-        "unexplained": unexplained,
-        "grade": _grade(kind, wanted, causes, unexplained),
-        **{
-            f"{name}{end}": answer["gain"][f"{key}{end}"]
-            for name, key in GAINS.items()
-            for end in ("", "_se")
-        },
-        **{name: accuracy(answer[name], truth["positions_m"]) for name in MODELS},
-    }
-
-
-def _seen(effect: dict, causes: list[dict], imus: int) -> dict:
-    """Found, named itself, on the right sensors: True or False for an effect of the truth."""
+def _effect_in_row(effect: dict, causes: list[dict], imus: int) -> dict:
+    """An effect of the truth: what it is; and found, named itself, on the right sensors or not."""
+    row = {name: effect[name] for name in ("effect", "sensors", "sigma", "sigma_exact")}
+    row |= {"amplitude": effect["amplitude"]["value"], "unit": effect["amplitude"]["unit"]}
     name = effect["effect"]
     of_it = [c for c in causes if name in (c["effect"], *c["indistinguishable_from"])]
     itself = [c for c in of_it if c["effect"] == name]
     # named twice, it is on all the sensors named
     named = sensors_of({s for cause in itself or of_it for s in cause["sensors"]}, imus)
-    return {
-        "found": bool(of_it),
-        "named": bool(itself),
-        "sensors_right": bool(of_it) and named == sensors_of(effect["sensors"], imus),
-    }
+    right = bool(of_it) and named == sensors_of(effect["sensors"], imus)
+    return row | {"found": bool(of_it), "named": bool(itself), "sensors_right": right}
 
 
 def accuracy(model: dict, positions) -> dict:

@@ -79,11 +79,10 @@ def effects(rows: list[dict]) -> pd.DataFrame:
     lines = []
     for row in rows:
         for effect in row["truth"]:
-            whole = effect["sensors"] == ["all"]
-            line = {name: row[name] for name in ("case", "kind", "rails")}
-            line |= {**effect, "wrong": bool(row["wrong_names"])}
-            many = "two" if len(effect["sensors"]) > 1 else "one"
-            lines.append(line | {"sensors": "all" if whole else many})
+            line = {name: row[name] for name in ("case", "kind", "rails")} | effect
+            few = "two" if len(effect["sensors"]) > 1 else "one"
+            many = "all" if effect["sensors"] == ["all"] else few
+            lines.append(line | {"sensors": many, "wrong": bool(row["wrong_names"])})
     columns = ["case", "kind", "rails", "effect", "sensors", "sigma", "sigma_exact", "amplitude",
                "unit", "found", "named", "sensors_right", "wrong"]  # fmt: skip
     return pd.DataFrame(lines, columns=columns)
@@ -100,8 +99,7 @@ def detection(table: pd.DataFrame, against: str) -> pd.DataFrame:
     lines = []
     for name, part in groups + ([(ALL, single)] if against == "sigma" and groups else []):
         bins = _sigma_bins(part) if against == "sigma" else _equal_bins(part, against)
-        for members in bins:
-            lines.append(_detected(name, against, members))
+        lines += [_detected(name, against, members) for members in bins]
     return pd.DataFrame(lines)
 
 
@@ -162,7 +160,7 @@ def confusion(rows: list[dict]) -> pd.DataFrame:
         for name, right in _columns(row).items():
             counts[name, right] += 1
     lines = []
-    for (kind, truth), counts in sorted(tally.items(), key=_order):
+    for (kind, truth), counts in sorted(tally.items(), key=lambda item: _order(*item[0])):
         number = counts["recordings"]
         for name in dict.fromkeys(key[0] for key in counts if key != "recordings"):
             right, wrong = counts[name, True], counts[name, False]
@@ -184,11 +182,10 @@ def _columns(row: dict) -> dict[str, bool]:
     return found
 
 
-def _order(item) -> tuple:
-    """Kinds in the matrix' order, effects in the registry's."""
-    (kind, truth), _ = item
-    known = list(EFFECTS)
-    return KINDS.index(kind), known.index(truth) if truth in known else -1
+def _order(kind: str, name: str) -> tuple:
+    """Kinds in the matrix' order; all effects first, then each in the registry's."""
+    known = [ALL, *EFFECTS]
+    return KINDS.index(kind), known.index(name) if name in known else -1
 
 
 def gain_table(table: pd.DataFrame) -> pd.DataFrame:
@@ -203,8 +200,7 @@ def gain_table(table: pd.DataFrame) -> pd.DataFrame:
     for kind, part in there[~there.kind.isin(["clean", "pair"])].groupby("kind"):
         groups += [(kind, effect, few) for effect, few in part.groupby("effects")]
     lines = [{"kind": kind, "effect": name} | _gained(part) for kind, name, part in groups]
-    known = [ALL, *EFFECTS]
-    lines.sort(key=lambda line: (KINDS.index(line["kind"]), known.index(line["effect"])))
+    lines.sort(key=lambda line: _order(line["kind"], line["effect"]))
     return pd.DataFrame(lines)
 
 

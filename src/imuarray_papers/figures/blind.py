@@ -14,6 +14,7 @@ from imuarray_papers.blind.summary import ALL, CRASH, NOTHING, UNEXPLAINED
 from imuarray_papers.figures.style import Column, panels, scale_line
 
 COLUMNS = 6  # panels in a row
+TICKS = 3  # at most, of an axis
 FOUND, WRONG = {"color": BLUE, "marker": "o"}, {"color": VERMILLION, "marker": "s"}
 # Amplitudes without a unit, said instead of "1".
 MEANING = {
@@ -32,7 +33,6 @@ GROUPS = {
 }  # fmt: skip
 STRUCK = "struck effects, all"
 TEXT = 5.0  # pt, in cells
-YES_NO = {True: "yes", False: "no"}
 
 CRITERIA = (
     Column("bar", "set and what is counted", "set and what is counted"),
@@ -135,7 +135,7 @@ def _detection_panel(axes, bins, effects, against, name):
         axes.set_xlabel(MEANING.get(name, UNITS.get(unit, unit)), size=5.5, labelpad=1)
 
 
-def _ticks(axes, most=3) -> None:
+def _ticks(axes) -> None:
     """Few labels, at powers of ten where there are two of them, written out."""
     low, high = axes.get_xlim()
     if high < 3 * low:
@@ -144,7 +144,7 @@ def _ticks(axes, most=3) -> None:
     places = [m * 10.0**e for e in decades for m in (1, 2, 5) if low <= m * 10.0**e <= high]
     tens = [place for place in places if np.isclose(np.log10(place) % 1, [0, 1]).any()]
     places = tens if len(tens) > 1 else places
-    places = places[:: -(-len(places) // most) or 1]
+    places = places[:: -(-len(places) // TICKS) or 1]
     axes.set_xticks(places, [f"{place:g}" for place in places])
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_xlim(low, high)
@@ -159,16 +159,16 @@ def _detection_legend(axes) -> None:
 
 def confusion_rows(table: pd.DataFrame) -> pd.DataFrame:
     """The figure's lines: those of `blind.summary.confusion`, struck effects added up."""
-    struck = table[table.kind == "struck"]
-    rest = table[table.kind != "struck"]
-    if struck.empty:
-        return rest
-    number = struck.drop_duplicates("truth").recordings.sum()
-    added = struck.groupby("named", sort=False)[["right", "wrong"]].sum().reset_index()
-    added = added.assign(kind="struck", truth=STRUCK, recordings=number)
-    for side in ("right", "wrong"):
-        added[f"{side}_share"] = added[side] / number
-    return pd.concat([rest, added], ignore_index=True)
+    struck = table.kind == "struck"
+    if not struck.any():
+        return table
+    number = table[struck].drop_duplicates("truth").recordings.sum()
+    added = table[struck].groupby("named", sort=False)[["right", "wrong"]].sum().reset_index()
+    added = added.assign(
+        kind="struck", truth=STRUCK, recordings=number,
+        right_share=added.right / number, wrong_share=added.wrong / number,
+    )  # fmt: skip
+    return pd.concat([table[~struck], added], ignore_index=True)
 
 
 def names_of(table: pd.DataFrame) -> list[str]:
@@ -231,10 +231,9 @@ def _separate(axes, lines, columns) -> None:
     """Thin lines between cells, thick ones between groups, and the groups' names."""
     axes.grid(False)
     axes.tick_params(length=0)
-    for edge in np.arange(len(lines) + 1) - 0.5:
-        axes.axhline(edge, color="0.9", linewidth=0.3, zorder=3)
-    for edge in np.arange(len(columns) + 1) - 0.5:
-        axes.axvline(edge, color="0.9", linewidth=0.3, zorder=3)
+    for names, line in ((lines, axes.axhline), (columns, axes.axvline)):
+        for edge in np.arange(len(names) + 1) - 0.5:
+            line(edge, color="0.9", linewidth=0.3, zorder=3)
     effects = next(i for i, name in enumerate(columns) if name == NOTHING)
     axes.axvline(effects - 0.5, color=BLACK, linewidth=0.8, zorder=4)
     kinds = [kind for kind, _ in lines]
@@ -251,7 +250,7 @@ def table_blind_bars(rows: dict, settings: dict):
     found = summary.recordings(rows["rows"])
     table = criteria(found)
     # empty where there is no verdict to be sure of
-    table["sure"] = [YES_NO.get(value, "") for value in table.sure]
+    table["sure"] = table.sure.map({True: "yes", False: "no"}).fillna("")
     notes = [
         f"{scale_line(settings)}; {len(found)} recordings, {int(found.crash.sum())} without an"
         " answer. Measured: on 8 IMUs, 125 Hz, 24 s, for which the bars are set; all settings"

@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 
 from imuarray.geometry import Array
-from imuarray.pictures.style import BLACK, GREY, PAGE, logarithmic, look, new_figure, styled
+from imuarray.pictures.style import BLACK, GREY, PAGE, logarithmic, new_figure, styled
 from imuarray_papers.figures.measured import QUANTITIES
-from imuarray_papers.figures.style import Column, panels, rms
+from imuarray_papers.figures.style import Column, marks, panels, rms
 
 STEPS = {  # of `measured.causes.STEPS`
     "normal": "papers'", "clocks": "+ clocks", "no arms": "+ lag, maps",
@@ -86,21 +86,27 @@ def _causes(document: dict) -> pd.DataFrame:
             "effect": cause["effect"], "sensors": " ".join(cause["sensors"]),
             "nats": cause["heldout_gain_nats"], "nats_error": cause["heldout_gain_se"],
         }  # fmt: skip
-        items = [item for item in cause["parameters"].values() if item["sd"]]
-        if len({item["unit"] for item in items}) == 1:
-            values, sds = (np.array([item[key] for item in items]) for key in ("value", "sd"))
+        values, sds, units = estimated(cause)
+        if len(units) == 1:
             alike = abs(values.mean()) > 0.5 * rms(values)
-            row |= {"unit": items[0]["unit"], "mean": values.mean() if alike else np.nan,
+            row |= {"unit": units.pop(), "mean": values.mean() if alike else np.nan,
                     "rms": rms(values), "sd": np.median(sds)}  # fmt: skip
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def estimated(cause: dict) -> tuple[np.ndarray, np.ndarray, set[str]]:
+    """Values and sds of the parameters of a cause that have an sd, and their units."""
+    items = [item for item in cause["parameters"].values() if item["sd"]]
+    values, sds = (np.array([item[key] for item in items]) for key in ("value", "sd"))
+    return values, sds, {item["unit"] for item in items}
 
 
 @styled
 def _draw(table, footer):
     figure = new_figure(footer, PAGE, 2.5)
     axes = figure.subplots(1, 4, width_ratios=(1.1, 1.1, 1, 1))
-    part = {name: rows for name, rows in table.groupby("panel")}
+    part = dict(list(table.groupby("panel")))
     _draw_wrong(axes[0], part["wrong"])
     _draw_clock(axes[1], part["cause"], part["causes"])
     _draw_extended(axes[2], part["extended"])
@@ -123,27 +129,27 @@ def _draw_wrong(axes, rows) -> None:
             some = rows[(rows.quantity == quantity) & (rows.source == source)]
             bars = some.y - some.low, some.high - some.y
             axes.errorbar(some.x, some.y, bars, label=label if source == "measured" else None,
-                          **look(number, "linestyle"), linestyle="", markersize=4,
-                          elinewidth=0.7, **fill)  # fmt: skip
+                          elinewidth=0.7, **marks(number, markersize=4), **fill)  # fmt: skip
     axes.plot([], [], "o", color=GREY, markerfacecolor="none", label="the model's simulation")
     axes.axhline(1, color=BLACK, linewidth=0.6)
-    logarithmic(axes, "angular acceleration (10³ deg/s²)", "residual / noise")
+    title = f"Wrong: up to {rows[rows.source == 'measured'].y.max():.0f} × noise"
+    logarithmic(axes, "angular acceleration (10³ deg/s²)", "residual / noise", title=title)
     axes.xaxis.set_major_formatter("{x:g}")
     axes.xaxis.set_minor_formatter("")
     axes.legend(fontsize=6, loc="lower center", bbox_to_anchor=(0.5, 0.15))
-    measured = rows[rows.source == "measured"].y
-    axes.set_title(f"Wrong: up to {measured.max():.0f} × noise")
 
 
 def _draw_clock(axes, rows, causes) -> None:
-    axes.errorbar(rows.x, rows.y, rows.se, linestyle="", **look(0, "linestyle"), markersize=3)
+    axes.errorbar(rows.x, rows.y, rows.se, **marks(0, markersize=3))
     for turn in (0, 1):  # the sawtooth falls between them
         some = rows[(rows.x >= turn) & (rows.x < turn + 1)]
         axes.plot(some.x, some.predicted, color=BLACK, linewidth=0.8)
     imu = rows.title.iloc[0].split(",")[0]
-    axes.set(xlabel=f"turns of {imu}'s clock", ylabel="age of a reading (ms)")
-    axes.set_ylim(1.7 * rows.predicted.min(), 1.15 * rows.predicted.max())
-    axes.set_title("Cause: a clock in each chip")
+    axes.set(
+        xlabel=f"turns of {imu}'s clock", ylabel="age of a reading (ms)",
+        ylim=(1.7 * rows.predicted.min(), 1.15 * rows.predicted.max()),
+        title="Cause: a clock in each chip",
+    )  # fmt: skip
     lag = causes[causes.effect == "gyroscope_delay"]
     if len(lag):
         value, sd = 1e3 * lag["mean"].iloc[0], 1e3 * lag.sd.iloc[0]
@@ -152,46 +158,42 @@ def _draw_clock(axes, rows, causes) -> None:
         axes.text(0.04, 0.03, said, size=6, transform=axes.transAxes)
 
 
-def name_models(axes, names) -> None:
-    """Models along the abscissa."""
+def _over_models(axes, names, ylabel: str, title: str) -> None:
+    """Models along the abscissa; a logarithmic ordinate with its numbers written out."""
+    axes.set(yscale="log", ylabel=ylabel, title=title)
+    axes.yaxis.set_major_formatter("{x:g}")
     axes.set_xticks(range(len(names)), names, rotation=35, ha="right", size=6.5)
     axes.set_xlim(-0.5, len(names) - 0.5)
 
 
 def _draw_extended(axes, rows) -> None:
-    style = look(2, "linestyle") | {"linestyle": "", "markersize": 5}
+    style = marks(2, markersize=5)
     axes.plot(range(len(rows)), rows.smooth, **style, label="smooth")
     axes.plot(range(len(rows)), rows["all"], **style, markerfacecolor="none", label="all")
     axes.axhline(1, color=BLACK, linewidth=0.6)
-    axes.set(yscale="log", ylabel="residual / noise")
-    axes.yaxis.set_major_formatter("{x:g}")
-    name_models(axes, rows.model)
+    title = f"Extended: {rows.smooth.iloc[0]:.0f} to {rows.smooth.iloc[-1]:.2g} × noise"
+    _over_models(axes, rows.model, "residual / noise", title)
     axes.legend(fontsize=6)
-    axes.set_title(f"Extended: {rows.smooth.iloc[0]:.0f} to {rows.smooth.iloc[-1]:.2g} × noise")
 
 
 def draw_gained(axes, rows, said: str, ylabel: str) -> None:
     """rms (µm) and cover of the 95 % intervals, model after model."""
-    style = look(3, "linestyle") | {"linestyle": "", "markersize": 5}
-    axes.plot(range(len(rows)), 1e6 * rows.rms_m, **style)
+    axes.plot(range(len(rows)), 1e6 * rows.rms_m, **marks(3, markersize=5))
     for place, row in enumerate(rows.itertuples()):
         axes.annotate(f"{100 * row.covered:.0f} %", (place, 1e6 * row.rms_m), (0, 5), size=6,
                       ha="center", textcoords="offset points")  # fmt: skip
-    axes.set(yscale="log", ylabel=ylabel)
-    axes.yaxis.set_major_formatter("{x:g}")
-    axes.margins(y=0.3)
-    name_models(axes, rows.model)
-    axes.text(0.04, 0.04, said, size=6, transform=axes.transAxes)
     first, last = (1e6 * rows.rms_m.iloc[place] for place in (0, -1))
-    axes.set_title(f"Gained: {first:.0f} to {last:.2g} µm")
+    _over_models(axes, rows.model, ylabel, f"Gained: {first:.0f} to {last:.2g} µm")
+    axes.margins(y=0.3)
+    axes.text(0.04, 0.04, said, size=6, transform=axes.transAxes)
 
 
 def _draw_between(axes, rows, left_out) -> None:
     """Differences between recordings, at one size too, and the size's error that all share."""
     gain, error = left_out.loc["board", ["over_inflated", "over_inflated_error"]]
     said = f"left out: +{gain:.0f} ± {error:.0f} nats"
-    style = look(3, "linestyle") | {"linestyle": "", "markersize": 5}
-    axes.plot(range(len(rows)), 1e6 * rows.same_size_rms_m, **style, markerfacecolor="none")
+    hollow = marks(3, markersize=5, markerfacecolor="none")
+    axes.plot(range(len(rows)), 1e6 * rows.same_size_rms_m, **hollow)
     common = 1e6 * rows.common_size_m.iloc[-1]
     axes.axhline(common, color=GREY, linestyle=(0, (4, 2)), linewidth=0.8)
     axes.annotate("size, shared", (0.03, common), (0, -8), xycoords=("axes fraction", "data"),

@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 
 from imuarray.geometry import Array
-from imuarray.pictures.style import BLACK, PAGE, look, new_figure, styled
+from imuarray.pictures.style import BLACK, PAGE, new_figure, styled
 from imuarray_papers.blind.study import accuracy, classes
-from imuarray_papers.figures.criticism import draw_gained, letter, three_digits
-from imuarray_papers.figures.style import Column, panels, rms
+from imuarray_papers.figures.criticism import draw_gained, estimated, letter, three_digits
+from imuarray_papers.figures.style import Column, marks, panels, rms
 
 MODELS = {"base": "papers'", "inflated": "noise inflated", "extended": "extended"}
 
@@ -71,16 +71,16 @@ def _arms(document: dict, truth: dict, turns) -> pd.DataFrame:
 def _draw_hidden(table, footer):
     figure = new_figure(footer, PAGE, 2.5)
     axes = figure.subplots(1, 4)
-    part = {name: rows for name, rows in table.groupby("panel")}
+    part = dict(list(table.groupby("panel")))
     sizes = part["wrong"].groupby("model").rms.max()
     _draw_residuals(axes[0], part["wrong"])
     axes[0].set_title(f"Wrong: {sizes.base:.1f} × the noise")
     _draw_seen(axes[1], part["cause"])
     arms = 1e3 * part["extended"][["true_m", "found_m"]]
-    axes[2].plot(arms.true_m, arms.found_m, **look(2, "linestyle"), linestyle="", markersize=3)
+    axes[2].plot(arms.true_m, arms.found_m, **marks(2, markersize=3))
     axes[2].axline((0, 0), slope=1, color=BLACK, linewidth=0.8)
-    axes[2].set(xlabel="true (mm)", ylabel="found (mm)")
-    axes[2].set_title(f"Extended: {sizes.extended:.1f} × the noise")
+    said = f"Extended: {sizes.extended:.1f} × the noise"
+    axes[2].set(xlabel="true (mm)", ylabel="found (mm)", title=said)
     gain, error = part["left_out"][["over_inflated", "over_inflated_error"]].iloc[0]
     said = f"held out: +{gain:.1f} ± {error:.1f} nats"
     draw_gained(axes[3], part["gained"], said, "error of positions (µm)")
@@ -92,16 +92,15 @@ def _draw_residuals(axes, rows) -> None:
     for number, (kind, each) in enumerate(rows.groupby("kind")):
         for model, fill in (("base", {}), ("extended", {"markerfacecolor": "none", "zorder": 4})):
             some = each[each.model == model]
-            axes.plot(some.imu.astype(str), some.rms, **look(number, "linestyle"), linestyle="",
-                      label=f"{kind}s" if model == "base" else None, **fill)  # fmt: skip
+            label = f"{kind}s" if model == "base" else None
+            axes.plot(some.imu.astype(str), some.rms, label=label, **marks(number), **fill)
     axes.set(xlabel="IMU", ylabel="residual / noise", ylim=(0, 1.4 * rows.rms.max()))
     axes.legend(fontsize=6)
 
 
 def _draw_seen(axes, rows) -> None:
     for number, (kind, each) in enumerate(rows.groupby("series")):
-        axes.errorbar(each.x, each.y, 2 * each.se, **look(number, "linestyle"), linestyle="",
-                      label=kind, markersize=3)  # fmt: skip
+        axes.errorbar(each.x, each.y, 2 * each.se, label=kind, **marks(number, markersize=3))
     ends = rows.x.min(), rows.x.max()
     axes.plot(ends, ends, color=BLACK, linewidth=0.8)
     axes.set(xlabel="predicted (noise sds)", ylabel="seen (noise sds)", title="Cause: lever arms")
@@ -164,8 +163,7 @@ def _sizes(causes: list, hidden: dict) -> tuple[str, str]:
     unit, size = hidden["amplitude"]["unit"], float(np.linalg.norm(true))
     if not causes:
         return "", f"{size:.3g} {unit}"
-    items = [item for item in causes[0]["parameters"].values() if item["sd"]]
-    values, sds = (np.array([item[key] for item in items]) for key in ("value", "sd"))
+    values, sds, _ = estimated(causes[0])
     if len(values) != len(true) or hidden["effect"] != causes[0]["effect"] or len(true) > 9:
         return f"{rms(values):.3g} {unit} rms", f"{rms(true):.3g} {unit} rms"
     found, sd = values @ true / size, np.linalg.norm(sds * true) / size

@@ -58,10 +58,8 @@ def table_measured_first_order(residuals: list, noise: list, names: list[str]):
     """
     rows = []
     for name, own, noises in zip(names, residuals, noise, strict=True):
-        sizes = {
-            (sensor, str(triad)): part
-            for (sensor, triad), part in noises.groupby(["sensor", "triad"])
-        }
+        noises = noises.astype({"triad": str})
+        sizes = dict(list(noises.groupby(["sensor", "triad"])))
         for row in own.itertuples():
             entry = {"recording": name, "triad": str(row.triad)}
             entry |= {"residual_rms": row.residual_rms, "left_out": row.left_out}
@@ -134,13 +132,11 @@ def _distribution(axes, shape, name):
     for source, style in SOURCES.items():
         part = shape[(shape.source == source) & (shape.density > 0)]
         centre = (part.low + part.high) / 2
-        axes.plot(centre, part.density, color=style["color"], linestyle=style["linestyle"])
+        axes.plot(centre, part.density, **style | {"marker": ""})
     grid = np.linspace(-5, 5, 101)
     axes.plot(grid, np.exp(-0.5 * grid**2) / np.sqrt(2 * np.pi), color=BLACK, linewidth=0.5)
-    axes.set(
-        yscale="log", ylim=(1e-6, 1), xscale="symlog", xlabel="residual (assumed σ)",
-        ylabel=f"{name}: density",
-    )  # fmt: skip
+    axes.set(yscale="log", ylim=(1e-6, 1), xscale="symlog")
+    axes.set(xlabel="residual (assumed σ)", ylabel=f"{name}: density")
     axes.set_xticks([-100, -1, 1, 100], ["−100", "−1", "1", "100"])
 
 
@@ -151,8 +147,7 @@ def _sensors(axes, table):
         for i, axis in enumerate("xyz"):
             values = part[part.axis == axis].rms.to_numpy()
             places = np.arange(len(values)) + 0.22 * (i - 1)
-            axes.plot(places, values, linestyle="", marker=style["marker"], markersize=2.5,
-                      color=style["color"])  # fmt: skip
+            axes.plot(places, values, **style | {"linestyle": "", "markersize": 2.5})
     axes.axhline(1, color=BLACK, linewidth=0.5)
     axes.set(yscale="log", xlabel="IMU (x, y, z)")
     axes.set_xticks(range(len(labels)), labels)
@@ -181,8 +176,8 @@ def figure_measured_agreement(summary: pd.DataFrame, pairs: pd.DataFrame, group:
     ]
     own = pairs.samples == summary.samples.max()
     pairs = pairs.loc[own, ["samples", "assumed", "z"]].round({"z": 2})  # differences, some tiny
-    table = panels(summary=summary, pairs=pairs)
-    return partial(_draw_agreement, footer=footer), table.astype({"assumed": str})
+    table = panels(summary=summary, pairs=pairs).astype({"assumed": str})
+    return partial(_draw_agreement, footer=footer), table
 
 
 @styled
@@ -192,29 +187,29 @@ def _draw_agreement(table, footer):
     pairs, summary = table[table.panel == "pairs"], table[table.panel == "summary"]
     most = summary.samples.max()
     for index, name in enumerate(dict.fromkeys(summary.assumed)):
-        style = look(index)
+        style = look(index) | {"markersize": 4}
+        hollow = style | {"markerfacecolor": "none"}
         size = np.sort(pairs[pairs.assumed == name].z.abs())
         share = (np.arange(size.size) + 0.5) / size.size
-        left.plot(size, share, label=_assumed(name, summary, most), color=style["color"],
-                  linestyle=style["linestyle"])  # fmt: skip
+        left.plot(size, share, label=_assumed(name, summary, most), **look(index, "marker"))
         rows = summary[summary.assumed == name].sort_values("samples")
-        middle.plot(rows.samples, 1e6 * rows.spread_m, **style, markersize=4)
-        middle.plot(rows.samples, 1e6 * rows.claimed_m, color=style["color"], linewidth=0.7,
-                    linestyle=(0, (1, 1)), marker=style["marker"], markersize=4,
-                    markerfacecolor="none")  # fmt: skip
-        for column, nominal in (("coverage_50", 50), ("coverage_95", 95)):
-            right.plot(rows.samples, 100 * rows[column], **style, markersize=4,
-                       markerfacecolor="none" if nominal == 50 else None)  # fmt: skip
+        middle.plot(rows.samples, 1e6 * rows.spread_m, **style)
+        dotted = hollow | {"linestyle": (0, (1, 1)), "linewidth": 0.7}
+        middle.plot(rows.samples, 1e6 * rows.claimed_m, **dotted)
+        right.plot(rows.samples, 100 * rows.coverage_50, **hollow)
+        right.plot(rows.samples, 100 * rows.coverage_95, **style)
     grid = np.geomspace(0.03, 100, 200)
     left.plot(grid, 2 * ndtr(grid) - 1, color=BLACK, linewidth=1, label="if widths were right")
-    left.set(xscale="log", xlabel="|z| between recordings", ylabel="share of differences")
-    left.set_title(f"$T = {most}$, {len(size)} differences")
-    logarithmic(middle, "samples $T$", "sd (µm)")
-    middle.set_title("between recordings (filled)\nand claimed (open, dotted)")
+    left.set(
+        xscale="log", xlabel="|z| between recordings", ylabel="share of differences",
+        title=f"$T = {most}$, {len(size)} differences",
+    )  # fmt: skip
+    said = "between recordings (filled)\nand claimed (open, dotted)"
+    logarithmic(middle, "samples $T$", "sd (µm)", title=said)
     for nominal in (50, 95):
         right.axhline(nominal, color=BLACK, linewidth=0.6)
-    right.set(xscale="log", ylim=(0, 102), xlabel="samples $T$", ylabel="covered (%)")
-    right.set_title("95 % intervals (filled)\nand 50 % intervals (open)")
+    right.set(xscale="log", ylim=(0, 102), xlabel="samples $T$", ylabel="covered (%)",
+              title="95 % intervals (filled)\nand 50 % intervals (open)")  # fmt: skip
     figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=4)
     return figure
 

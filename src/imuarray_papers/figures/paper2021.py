@@ -21,6 +21,7 @@ from imuarray_papers.figures.style import (
 TRACE_POINTS = 1000  # drawn per chain; more would not be seen
 BINS = 40
 GRID = 160
+TRUTH = {"color": BLACK, "linewidth": 0.8, "linestyle": (0, (1, 1)), "label": "truth"}
 LINEAR = 5.0  # um, where figure 4's axis turns from linear to logarithmic
 
 
@@ -45,8 +46,8 @@ def _draw_fig2(table, target, footer):
     figure = new_figure(footer, height=2.9)
     axes = figure.subplots()
     for index, (samples, rows) in enumerate(table.groupby("samples")):
-        points(axes, rows.draws, rows.variance, rows.variance_se, index, linestyle="none",
-               label=f"$T = {samples}$")  # fmt: skip
+        alone = {"linestyle": "none", "label": f"$T = {samples}$"}
+        points(axes, rows.draws, rows.variance, rows.variance_se, index, **alone)
         axes.plot(rows.draws, rows.fit, "-", color=look(index)["color"], linewidth=0.9)
     axes.plot([], [], "-", color=GREY, linewidth=0.9, label=r"$\sim 1/N$")
     level(axes, target, f"target {target:g}", color="0.3", linestyle=(0, (5, 2)))
@@ -70,8 +71,8 @@ def figure_2021_fig3(chains: list, verdict: list[dict], coordinates: list, setti
     name = f"x of IMU {first}, $T = {verdict['samples']}$"
     table.attrs["digits"] = {"value": 7, "low_um": 7, "high_um": 7}  # far from 0, and narrow
     footer = [scale_line(settings), *chain_lines({verdict["samples"]: verdict})]
-    given = {"burn_in_steps": verdict["burn_in_steps"], "name": name, "footer": footer}
-    return partial(_draw_fig3, **given), table
+    steps = verdict["burn_in_steps"]
+    return partial(_draw_fig3, burn_in_steps=steps, name=name, footer=footer), table
 
 
 @styled
@@ -113,24 +114,21 @@ def chain_panels(series, burn_in: int, thin: int, truth: float | None = None) ->
     every = max(1, series.shape[1] // TRACE_POINTS)
     edges = np.linspace(left.min(), left.max(), BINS + 1)
     correlation = _autocorrelations(left)
-    rows = []
+    parts = []
     for chain, draws in enumerate(series, start=1):
         kept = np.arange(0, draws.size, every)
-        rows.append(_panel("trace", chain, step=(kept + 1) * thin, value=draws[kept]))
         density = np.histogram(left[chain - 1], edges, density=True)[0]
-        rows.append(_panel("histogram", chain, low_um=edges[:-1], high_um=edges[1:], value=density))
         function = correlation[chain - 1]
-        rows.append(
-            _panel("autocorrelation", chain, step=np.arange(function.size) * thin, value=function)
-        )
+        for name, columns in (
+            ("trace", {"step": (kept + 1) * thin, "value": draws[kept]}),
+            ("histogram", {"low_um": edges[:-1], "high_um": edges[1:], "value": density}),
+            ("autocorrelation", {"step": np.arange(function.size) * thin, "value": function}),
+        ):
+            parts.append(pd.DataFrame({"panel": name, "chain": chain, **columns}))
     if truth is not None:
-        rows.append(_panel("truth", 0, value=[1e6 * truth]))
+        parts.append(pd.DataFrame({"panel": "truth", "chain": 0, "value": [1e6 * truth]}))
     columns = ["panel", "chain", "step", "low_um", "high_um", "value"]
-    return pd.concat(rows, ignore_index=True).reindex(columns=columns)
-
-
-def _panel(name, chain, **columns):
-    return pd.DataFrame({"panel": name, "chain": chain, **columns})
+    return pd.concat(parts, ignore_index=True).reindex(columns=columns)
 
 
 def _autocorrelations(left) -> np.ndarray:
@@ -149,7 +147,7 @@ def _autocorrelations(left) -> np.ndarray:
 def _traces(axes, table, burn_in_steps):
     for chain, rows in table[table.panel == "trace"].groupby("chain"):
         axes.plot(rows.step, rows.value, linewidth=0.6, **_ink(chain), label=f"chain {chain}")
-    _truth(axes.axhline, table)
+    _truth(axes, table)
     axes.axvspan(0, burn_in_steps, color="0.85", zorder=0, label="burn-in")
     axes.set(xlim=(0, table[table.panel == "trace"].step.max()), ylabel="Position (µm)")
 
@@ -158,7 +156,7 @@ def _histograms(axes, table):
     for chain, rows in table[table.panel == "histogram"].groupby("chain"):
         edges = [*rows.low_um, rows.high_um.iloc[-1]]
         axes.stairs(rows.value, edges, orientation="horizontal", linewidth=0.9, **_ink(chain))
-    _truth(axes.axhline, table)
+    _truth(axes, table)
     axes.tick_params(labelleft=False)
     axes.set(xlabel="Density\n(1/µm)", xlim=(0, None))
     peak = table[table.panel == "histogram"].value.max()
@@ -171,8 +169,7 @@ def _correlations(axes, table):
     for chain, rows in table[table.panel == "autocorrelation"].groupby("chain"):
         axes.plot(rows.step, rows.value, **_ink(chain), label=f"chain {chain}")
     axes.axhline(0, color=GREY, linewidth=0.6)
-    axes.set(xlabel="Lag (steps)", ylabel="Autocorrelation (1)")
-    axes.set_xlim(left=0)
+    axes.set(xlabel="Lag (steps)", ylabel="Autocorrelation (1)", xlim=(0, None))
     axes.set_title("(b) after burn-in", size=8)
 
 
@@ -181,9 +178,9 @@ def _ink(chain: int) -> dict:
     return look({1: 2, 2: 0}.get(int(chain), int(chain)), "marker")
 
 
-def _truth(line, table):
+def _truth(axes, table):
     for value in table[table.panel == "truth"].value:
-        line(value, color=BLACK, linewidth=0.8, linestyle=(0, (1, 1)), label="truth")
+        axes.axhline(value, **TRUTH)
 
 
 def after_burn_in(chains: list, verdicts: list[dict]) -> tuple[dict, dict]:
@@ -225,13 +222,13 @@ def _draw_fig4(table, name, footer):
     for letter, row, (axis, rows) in zip("abc", panels, table.groupby("axis"), strict=True):
         for axes in row:
             _posteriors(axes, rows)
-        row[0].set(ylabel="Density / peak (1)", ylim=(0, 1.08))
         truth = f"{1e3 * rows.truth_m.iloc[0]:.4g}".replace("-", "−")
-        row[0].set_title(f"({letter}) {axis} of {name}, true value {truth} mm")
+        title = f"({letter}) {axis} of {name}, true value {truth} mm"
+        row[0].set(ylabel="Density / peak (1)", ylim=(0, 1.08), title=title)
         row[1].set_title(_spreads(rows))
     widest = table[table.samples > 0].deviation_um
-    panels[-1, 0].set(xlabel="Deviation from the true value (µm)")
-    panels[-1, 0].set_xlim(widest.min(), widest.max())
+    near = (widest.min(), widest.max())
+    panels[-1, 0].set(xlabel="Deviation from the true value (µm)", xlim=near)
     panels[-1, 1].set_xlabel("Deviation from the true value (µm), asinh scale")
     panels[-1, 1].set_xscale("asinh", linear_width=LINEAR)
     powers = [10.0**k for k in (1, 2, 3, 4)]
@@ -254,29 +251,23 @@ def densities(posteriors: dict[int, np.ndarray], prior, truth) -> pd.DataFrame:
     ``truth`` (3,) m. Columns: distribution (prior, posterior), samples (0: prior), axis, chain
     (0: prior), deviation_um, density_per_um, sd_um (of all chains together), truth_m.
     """
-    rows = []
+    parts = []
     for number, axis in enumerate("xyz"):
         centre, spread = (1e6 * (prior[0][number] - truth[number]), 1e6 * prior[1][number])
         grid = centre + spread * np.linspace(-4, 4, GRID)
-        common = {"axis": axis, "truth_m": truth[number]}
-        rows.append(
-            pd.DataFrame(
-                {"distribution": "prior", "samples": 0, "chain": 0, "deviation_um": grid,
-                 "density_per_um": norm.pdf(grid, centre, spread), "sd_um": spread, **common}
-            )
-        )  # fmt: skip
+        made = [("prior", 0, 0, grid, norm.pdf(grid, centre, spread), spread)]
         for samples, draws in posteriors.items():
             values = 1e6 * (draws[..., number] - truth[number])
             for chain, one in enumerate(values, start=1):
                 grid = one.mean() + one.std(ddof=1) * np.linspace(-4, 4, GRID)
-                rows.append(
-                    pd.DataFrame(
-                        {"distribution": "posterior", "samples": samples, "chain": chain,
-                         "deviation_um": grid, "density_per_um": gaussian_kde(one)(grid),
-                         "sd_um": values.std(ddof=1), **common}
-                    )
-                )  # fmt: skip
-    return pd.concat(rows, ignore_index=True)
+                density = gaussian_kde(one)(grid)
+                made.append(("posterior", samples, chain, grid, density, values.std(ddof=1)))
+        for name, samples, chain, grid, density, sd in made:
+            parts.append(pd.DataFrame({
+                "distribution": name, "samples": samples, "chain": chain, "deviation_um": grid,
+                "density_per_um": density, "sd_um": sd, "axis": axis, "truth_m": truth[number],
+            }))  # fmt: skip
+    return pd.concat(parts, ignore_index=True)
 
 
 def _posteriors(axes, rows):
@@ -285,7 +276,7 @@ def _posteriors(axes, rows):
     _density(axes, rows[rows.samples == 0], {"color": SKY, "linestyle": ":"}, "prior")
     for index, samples in enumerate(names):
         _density(axes, rows[rows.samples == samples], look(index, "linestyle"), f"$T = {samples}$")
-    axes.axvline(0, color=BLACK, linewidth=0.8, linestyle=(0, (1, 1)), label="truth")
+    axes.axvline(0, **TRUTH)
 
 
 def _density(axes, rows, style, label):

@@ -29,18 +29,15 @@ from imuarray_papers.figures.style import chain_lines, scale_line
 # sides' markers lie one above the other.
 MARKER = np.array([0.36, -0.36, 0.0])
 OBLIQUE = np.array([[1.0, 0.0], [0.45, -0.4], [0.0, 5.5]])  # where x, y, z go on the paper
+UNDERSIDE = {"color": "#9AD0F5", "style": "italic"}  # of a number
 ARROW = {"arrowstyle": "<->", "linewidth": 0.7, "shrinkA": 0, "shrinkB": 0}
-
-
-def below(array: Array) -> np.ndarray:
-    """(A,) bool, the triads on the underside: those below the middle of the board's height."""
-    height = array.positions[:, 2]
-    return height < (height.min() + height.max()) / 2 - 1e-9
 
 
 def layout_table(array: Array) -> pd.DataFrame:
     """One row per triad: label, side, position, position relative to the first, marker (m)."""
-    under = below(array)
+    height = array.positions[:, 2]
+    # below the middle of the board's height
+    under = height < (height.min() + height.max()) / 2 - 1e-9
     turn = np.where(under[:, None, None], UNDERSIDE_ROTATION, np.eye(3))
     marker = turn @ (MARKER * np.array(array.package))
     table = pd.DataFrame({"accelerometer": array.labels})
@@ -72,7 +69,7 @@ def figure_2017_fig2(settings: dict):
 def _draw_oblique(table, footer):
     figure = new_figure(footer, height=2.9)
     axes = figure.subplots()
-    mm = table[[c for c in table if c.endswith("_m")]] * 1e3
+    mm = 1e3 * table.filter(regex="_m$")
     size = mm[["package_length_m", "package_width_m"]].iloc[0].to_numpy()
     places = mm[["x_m", "y_m", "z_m"]].to_numpy()
     low, high = places.min(axis=0), places.max(axis=0)
@@ -107,21 +104,18 @@ def _draw_fig1(table, footer):
 
 
 def _top_view(axes, table):
-    mm = table[[c for c in table if c.endswith("_m")]] * 1e3
+    mm = 1e3 * table.filter(regex="_m$")
     length, width = mm.package_length_m.iloc[0], mm.package_width_m.iloc[0]
     under = (table.side == "underside").to_numpy()
     for row in mm.itertuples():
         if not under[row.Index]:
-            draw_package(axes, row.x_m, row.y_m, length, width, facecolor="0.35")
+            _rectangle(axes, row.x_m, row.y_m, length, width, facecolor="0.35")
             axes.plot(row.marker_x_m, row.marker_y_m, "o", color="white", markersize=3.2)
-        shift = 0.62 if under[row.Index] else -0.62
-        axes.text(
-            row.x_m, row.y_m + shift, table.accelerometer[row.Index], ha="center", va="center",
-            color="#9AD0F5" if under[row.Index] else "white", size=8,
-            style="italic" if under[row.Index] else "normal",
-        )  # fmt: skip
-    _dimension(axes, mm.x_m, mm.y_m.max() + 0.75 * width, "x")
-    _dimension(axes, mm.y_m, mm.x_m.min() - 0.75 * length, "y")
+        label, y = table.accelerometer[row.Index], row.y_m + (0.62 if under[row.Index] else -0.62)
+        looks = UNDERSIDE if under[row.Index] else {"color": "white"}
+        axes.text(row.x_m, y, label, ha="center", va="center", size=8, **looks)
+    _pitch(axes, mm.x_m, mm.y_m.max() + 0.75 * width, "x")
+    _pitch(axes, mm.y_m, mm.x_m.min() - 0.75 * length, "y")
     axes.set(aspect="equal", ylabel="y (mm), downwards")
     axes.set_ylim(mm.y_m.max() + 1.3 * width, mm.y_m.min() - 0.8 * width)
     axes.set_xlim(mm.x_m.min() - 2.15 * length, mm.x_m.max() + length)
@@ -129,62 +123,51 @@ def _top_view(axes, table):
     axes.set_title("Seen from above: upright topside, italic underside", size=8)
 
 
-def draw_package(axes, x, y, length, width, **options):
-    """The outline of a package centred at x, y; all in mm."""
+def _rectangle(axes, x, y, length, width, **options):
+    """The outline of a package or the board, centred at x, y; all in mm."""
     options = {"edgecolor": BLACK, "linewidth": 0.6} | options
     axes.add_patch(Rectangle((x - length / 2, y - width / 2), length, width, **options))
 
 
-def _dimension(axes, values, place, along):
-    """An arrow between the first two distinct centres, at ``place`` across, and its length."""
+def _pitch(axes, values, place, along):
+    """The distance between the first two distinct centres, drawn at ``place`` across."""
     centres = np.unique(np.round(values, 9))
     if centres.size < 2:
         return
-    first, second = (centres[0], centres[1]) if along == "x" else (centres[-1], centres[-2])
-    ends = [(first, place), (second, place)] if along == "x" else [(place, first), (place, second)]
-    axes.annotate("", *ends, arrowprops=ARROW)
-    middle = np.mean(ends, axis=0)
+    if along == "x":
+        _distance(axes, (centres[0], place), (centres[1], place), ha="center", xytext=(0, -7))
+    else:
+        ends = (place, centres[-1]), (place, centres[-2])
+        _distance(axes, *ends, ha="center", xytext=(-7, 0), rotation=90)
+
+
+def _distance(axes, start, end, **options):
+    """A double arrow between two points (mm), and its length beside the middle."""
+    axes.annotate("", start, end, arrowprops=ARROW)
     axes.annotate(
-        f"{abs(second - first):.1f} mm", middle, ha="center", va="center", size=7.5,
-        rotation=0 if along == "x" else 90, xytext=(0, -7) if along == "x" else (-7, 0),
-        textcoords="offset points",
+        f"{np.linalg.norm(np.subtract(end, start)):.1f} mm", np.mean([start, end], axis=0),
+        va="center", size=7.5, textcoords="offset points", **options,
     )  # fmt: skip
 
 
 def _side_view(axes, table):
-    mm = table[[c for c in table if c.endswith("_m")]] * 1e3
+    mm = 1e3 * table.filter(regex="_m$")
     length, height = mm.package_length_m.iloc[0], mm.package_height_m.iloc[0]
     low, high = mm.z_m.min(), mm.z_m.max()
     if high - low > height:  # what is between the packages is the circuit board
-        axes.add_patch(
-            Rectangle(
-                (mm.x_m.min() - 0.7 * length, low + height / 2),
-                np.ptp(mm.x_m) + 1.4 * length,
-                high - low - height,
-                facecolor="#BFD8C6",
-                edgecolor="0.4",
-                linewidth=0.5,
-            )  # fmt: skip
-        )
+        size = np.ptp(mm.x_m) + 1.4 * length, high - low - height
+        board = {"facecolor": "#BFD8C6", "edgecolor": "0.4", "linewidth": 0.5}
+        _rectangle(axes, (mm.x_m.min() + mm.x_m.max()) / 2, (low + high) / 2, *size, **board)
     for x, z in sorted(set(zip(mm.x_m.round(6), mm.z_m.round(6), strict=True))):
-        draw_package(axes, x, z, length, height, facecolor="0.35")
+        _rectangle(axes, x, z, length, height, facecolor="0.35")
         axes.plot(x, z, "+", color="white", markersize=4)
     if high > low:
-        _height(axes, mm.x_m.min() - 0.8 * length, mm.x_m.min() - length / 2, low, high)
+        place, edge = mm.x_m.min() - 0.8 * length, mm.x_m.min() - length / 2
+        _distance(axes, (place, low), (place, high), ha="right", xytext=(-3, 0))
+        axes.plot([place, edge], [[low, high]] * 2, color=BLUE, linewidth=0.4)
     axes.set(aspect="equal", xlabel="x (mm)", ylabel="z (mm)", ylim=(low - 1.2, high + 1.2))
     axes.grid(False)
     axes.set_title("Side view", size=8)
-
-
-def _height(axes, place, edge, low, high):
-    """The distance between the sides' centres: an arrow at ``place``, lines to ``edge``."""
-    axes.annotate("", (place, low), (place, high), arrowprops=ARROW)
-    for z in (low, high):
-        axes.plot([place, edge], [z, z], color=BLUE, linewidth=0.4)
-    axes.annotate(
-        f"{high - low:.1f} mm", (place, (low + high) / 2), xytext=(-3, 0), size=7.5,
-        textcoords="offset points", va="center", ha="right",
-    )  # fmt: skip
 
 
 def figure_2021_fig5(
@@ -201,9 +184,9 @@ def figure_2021_fig5(
     known = "truth_m" in coordinates[0]
     truth = coordinates[0].truth_m.to_numpy().reshape(-1, 3) if known else None
     posteriors = {samples: _moments_of(values) for samples, values in draws.items()}
-    table = ellipse_table(array, posteriors, prior_of(chains), truth)
     measured = f"recording {settings['experiment']['recording']}"
     footer = [scale_line(settings, measured), *chain_lines(verdicts)]
+    table = ellipse_table(array, posteriors, prior_of(chains), truth)
     return _ellipses(table, array, settings, footer, "MEASURED")
 
 
@@ -281,30 +264,23 @@ def ellipse_table(array: Array, posteriors: dict, prior, truth=None) -> pd.DataF
     of x and y; ``prior`` mean and sd, each (A - 1, 3) m; ``truth`` (A - 1, 3) m where known. Rows
     with samples 0 are the prior.
     """
+    names = {"x_m": "package_x_mm", "y_m": "package_y_mm",
+             "marker_x_m": "marker_x_mm", "marker_y_m": "marker_y_mm"}  # fmt: skip
     layout = layout_table(array).iloc[1:].reset_index(drop=True)
+    table = layout[["accelerometer", "side"]].join(1e3 * layout[[*names]].rename(columns=names))
     origin = array.positions[0, :2]
-    table = layout[["accelerometer", "side"]]
-    for name in ("", "marker_"):
-        for axis in "xy":
-            table = table.assign(
-                **{f"{name or 'package_'}{axis}_mm": 1e3 * layout[f"{name}{axis}_m"]}
-            )
     known = np.full((len(table), 2), np.nan) if truth is None else truth[:, :2] + origin
     table = table.assign(truth_x_mm=1e3 * known[:, 0], truth_y_mm=1e3 * known[:, 1])
-    variances = np.zeros((len(table), 2, 2))
-    variances[:, [0, 1], [0, 1]] = prior[1][:, :2] ** 2
-    parts = [_moments(table, 0, prior[0][:, :2] + origin, variances)]
-    for samples, (mean, covariance) in posteriors.items():
-        parts.append(_moments(table, samples, mean[:, :2] + origin, covariance))
+    parts = []
+    prior = prior[0], prior[1][:, :2, None] ** 2 * np.eye(2)
+    for samples, (mean, covariance) in ({0: prior} | posteriors).items():
+        centre, covariance = 1e3 * (mean[:, :2] + origin), 1e6 * covariance
+        parts.append(table.assign(
+            samples=samples, mean_x_mm=centre[:, 0], mean_y_mm=centre[:, 1],
+            cov_xx_mm2=covariance[:, 0, 0], cov_xy_mm2=covariance[:, 0, 1],
+            cov_yy_mm2=covariance[:, 1, 1],
+        ))  # fmt: skip
     return pd.concat(parts, ignore_index=True)
-
-
-def _moments(table, samples, mean, covariance):
-    return table.assign(
-        samples=samples, mean_x_mm=1e3 * mean[:, 0], mean_y_mm=1e3 * mean[:, 1],
-        cov_xx_mm2=1e6 * covariance[:, 0, 0], cov_xy_mm2=1e6 * covariance[:, 0, 1],
-        cov_yy_mm2=1e6 * covariance[:, 1, 1],
-    )  # fmt: skip
 
 
 def ellipse(row, level: float, points: int = 73) -> np.ndarray:
@@ -346,7 +322,7 @@ def _style(names, samples) -> dict:
 def _packages(axes, rows, array, reference):
     """Dashed outlines and quadrants, orientation markers and numbers; the reference as a star."""
     length, width = 1e3 * array.package[0], 1e3 * array.package[1]
-    dashes = {"linestyle": (0, (3, 2)), "linewidth": 0.5, "color": GREY}
+    dashes = {"linestyle": (0, (3, 2)), "linewidth": 0.5}
     centres = rows.drop_duplicates("accelerometer")
     places = [(r.accelerometer, r.package_x_mm, r.package_y_mm, r.marker_x_mm, r.marker_y_mm)
               for r in centres.itertuples()]  # fmt: skip
@@ -355,27 +331,22 @@ def _packages(axes, rows, array, reference):
         places.append((reference.accelerometer, *values))
         axes.plot(*values[:2], "*", color=BLACK, markersize=6)
     for label, x, y, marker_x, marker_y in places:
-        draw_package(axes, x, y, length, width, facecolor="none", edgecolor=GREY,
-                     linestyle=(0, (3, 2)), linewidth=0.5)  # fmt: skip
-        axes.plot([x - length / 2, x + length / 2], [y, y], **dashes)
-        axes.plot([x, x], [y - width / 2, y + width / 2], **dashes)
+        _rectangle(axes, x, y, length, width, facecolor="none", edgecolor=GREY, **dashes)
+        axes.plot([x - length / 2, x + length / 2], [y, y], color=GREY, **dashes)
+        axes.plot([x, x], [y - width / 2, y + width / 2], color=GREY, **dashes)
         axes.plot(marker_x, marker_y, "o", color=BLACK, markersize=2.2)
         # in the gap above the package: inside, ellipses would cross it
         axes.text(x - 0.5 * length, y - 0.53 * width, label, size=6.5, va="bottom", ha="left")
 
 
 def _handles(names, level, table):
-    share = f"{100 * level:g} %"
-    handles = [Line2D([], [], label=f"prior, {share}", **_style(names, 0))]
+    handles = [Line2D([], [], label=f"prior, {100 * level:g} %", **_style(names, 0))]
     for samples in names:
+        style = _style(names, samples)
+        handles.append(Line2D([], [], label=f"$T = {samples}$", marker=".", **style))
+    signs = [("truth", "x", 3)] if table.truth_x_mm.notna().any() else []
+    for label, marker, size in (*signs, ("reference", "*", None), ("orientation marker", "o", 2.2)):
         handles.append(
-            Line2D([], [], label=f"$T = {samples}$", marker=".", **_style(names, samples))
+            Line2D([], [], linestyle="", marker=marker, color=BLACK, markersize=size, label=label)
         )
-    if table.truth_x_mm.notna().any():
-        handles.append(
-            Line2D([], [], linestyle="", marker="x", color=BLACK, markersize=3, label="truth")
-        )
-    handles.append(Line2D([], [], linestyle="", marker="*", color=BLACK, label="reference"))
-    handles.append(Line2D([], [], linestyle="", marker="o", color=BLACK, markersize=2.2,
-                          label="orientation marker"))  # fmt: skip
     return handles

@@ -24,9 +24,14 @@ def legend_items(axes, last=()):
     return [handles[i] for i in order], [labels[i] for i in order]
 
 
-def points(axes, x, y, error, index: int, without=(), **options) -> None:
+def points(axes, x, y, error, index: int, **options) -> None:
     """Hollow markers with error bars, in the look of series ``index``."""
-    axes.errorbar(x, y, error, markerfacecolor="none", **(look(index, *without) | options))
+    axes.errorbar(x, y, error, markerfacecolor="none", **(look(index) | options))
+
+
+def marks(index: int, **options) -> dict:
+    """The look of series ``index`` without a line."""
+    return look(index, "linestyle") | {"linestyle": "", **options}
 
 
 def level(axes, value: float, text: str, **options) -> None:
@@ -88,34 +93,28 @@ def scale_line(settings: dict, *more: str) -> str:
     return "; ".join([f"Scale {settings['scale']['name']}, seed {settings['seed']}", *more])
 
 
-def chain_line(samples: int, verdict: dict) -> str:
-    """Course and end of the chains of one T, from `posterior/*.json`.
-
-    R-hat and ESS are the largest and the smallest over all coordinates.
-    """
-    acceptance = "/".join(f"{share:.2f}" for share in verdict["acceptance"])
-    return (
-        f"T={samples}: N={verdict['draws_per_sample']}, "
-        f"σq={1e6 * verdict['step_length_m']:.3g} µm, {verdict['steps']} steps, "
-        f"acc. {acceptance}, R-hat {verdict['rhat_max']:.3f}, "
-        f"ESS {verdict['ess_min']:.0f}"
-    )
-
-
 def chain_lines(verdicts: dict[int, dict]) -> list[str]:
-    """One line per T; the last says what R-hat is and which chains pass its criterion.
+    """Course and end of the chains of each T; last what R-hat is and which pass its criterion.
 
-    Only a verdict that says so is called converged.
+    ``verdicts``: `posterior/*.json`. R-hat and ESS are the largest and the smallest over all
+    coordinates. Only a verdict that says so is called converged.
     """
-    lines = [chain_line(samples, verdict) for samples, verdict in verdicts.items()]
-    good = [str(samples) for samples, verdict in verdicts.items() if verdict["converged"]]
-    bad = [str(samples) for samples, verdict in verdicts.items() if not verdict["converged"]]
+    lines, passed = [], {True: [], False: []}
+    for samples, verdict in verdicts.items():
+        acceptance = "/".join(f"{share:.2f}" for share in verdict["acceptance"])
+        lines.append(
+            f"T={samples}: N={verdict['draws_per_sample']}, "
+            f"σq={1e6 * verdict['step_length_m']:.3g} µm, {verdict['steps']} steps, "
+            f"acc. {acceptance}, R-hat {verdict['rhat_max']:.3f}, "
+            f"ESS {verdict['ess_min']:.0f}"
+        )
+        passed[verdict["converged"]].append(str(samples))
     threshold = max(verdict["rhat_threshold"] for verdict in verdicts.values())
     last = "R-hat: the largest, ESS: the smallest over all coordinates."
-    if good:
-        last += f" R-hat < {threshold:g}, converged: T = {', '.join(good)}."
-    if bad:
-        last += f" R-hat not below {threshold:g}, preliminary: T = {', '.join(bad)}."
+    if passed[True]:
+        last += f" R-hat < {threshold:g}, converged: T = {', '.join(passed[True])}."
+    if passed[False]:
+        last += f" R-hat not below {threshold:g}, preliminary: T = {', '.join(passed[False])}."
     return [*lines, last]
 
 

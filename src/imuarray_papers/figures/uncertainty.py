@@ -17,7 +17,7 @@ from imuarray.pictures.style import (
     new_figure,
     styled,
 )
-from imuarray_papers.figures.style import Column, points, scale_line
+from imuarray_papers.figures.style import Column, marks, points, scale_line
 
 ESTIMATORS = ("maximum likelihood", "with the prior")
 
@@ -33,6 +33,7 @@ ACROSS = 4  # panels in a line
 SHARES = (0.5, 0.9, 0.95)
 REFERENCE = "NUTS"  # whose PIT values the others' are compared with, replicate by replicate
 MIXED = 50  # independent draws of a posterior, of 199: fewer are a slow chain
+KEYS = ["setting", "method", "samples"]  # of a histogram, and a row
 WHOLE = ("size", "misfit")  # quantities that hang on all coordinates
 
 COVERAGE = (
@@ -111,12 +112,10 @@ def _draw_efficiency(table, footer):
     others = table[table.noise != 1.0]
     for index, name in enumerate(ESTIMATORS):
         rows = table[(table.estimator == name) & (table.noise == 1.0)]
-        points(top, rows.samples, rows.rmse_m, rows.rmse_se_m, index, linestyle="none",
-               label=f"RMSE, {name}")  # fmt: skip
-        top.plot(
-            rows.samples, rows.bound_m, **look(index, "marker"),
-            label="bound" if index == 0 else "linearised posterior",
-        )  # fmt: skip
+        alone = {"linestyle": "none", "label": f"RMSE, {name}"}
+        points(top, rows.samples, rows.rmse_m, rows.rmse_se_m, index, **alone)
+        label = "bound" if index == 0 else "linearised posterior"
+        top.plot(rows.samples, rows.bound_m, label=label, **look(index, "marker"))
         places = rows.samples * 1.04**index
         points(below, places, rows.ratio, rows.ratio_se, index, linestyle="none")
         rows = table[(table.estimator == name) & table.samples.isin(others.samples)]
@@ -124,7 +123,7 @@ def _draw_efficiency(table, footer):
     for panel in (below, louder):
         panel.axhline(1.0, color=BLACK, linewidth=0.8)
         panel.set(ylabel="error / bound")
-    top.set(xscale="log", yscale="log", ylabel="RMSE of the positions (m)")
+    logarithmic(top, None, "RMSE of the positions (m)")
     below.set(xscale="log", xlabel="Time samples $N$ (count)")
     counts = ", ".join(map(str, others.samples.unique()))
     louder.set(xscale="log", xlabel=f"Noise, times the sensors' own ($N$ = {counts})")
@@ -140,8 +139,8 @@ def figure_theory_convergence(rows: pd.DataFrame, settings: dict):
     the top are medians beyond the limit of iterations.
     """
     footer = [scale_line(settings, f"N = {rows.samples.max()}")]
-    given = {"nominal_sd": settings["paper2017"]["position_sd"], "footer": footer}
-    return partial(_draw_convergence, **given), rows
+    nominal = settings["paper2017"]["position_sd"]
+    return partial(_draw_convergence, nominal_sd=nominal, footer=footer), rows
 
 
 @styled
@@ -156,21 +155,14 @@ def _draw_convergence(table, nominal_sd, footer):
         medians = counts.groupby("angular_rate_dps").median()
         never = medians.index[np.isinf(medians.bcd_iterations)]
         medians = medians.replace(np.inf, np.nan)
-        style = look(index)
-        top.plot(
-            never, np.full(len(never), 1.3 * rows.limit.max()), linestyle="none", marker="^",
-            color=style["color"], markersize=7 - index,
-        )  # fmt: skip
-        top.plot(
-            medians.index, medians.bcd_iterations, markerfacecolor="none",
-            label=rf"$\|\dot\omega\|$ = {acceleration:g} deg/s²", **style,
-        )  # fmt: skip
-        top.plot(medians.index, medians.newton_iterations, color=GREY, marker=style["marker"],
-                 markerfacecolor="none", linestyle=":")  # fmt: skip
-        below.plot(
-            1 - rows.contraction, 1 - rows.observed, markerfacecolor="none",
-            **{**style, "linestyle": "none"},
-        )  # fmt: skip
+        hollow = look(index) | {"markerfacecolor": "none"}
+        height = np.full(len(never), 1.3 * rows.limit.max())
+        top.plot(never, height, **marks(index, marker="^", markersize=7 - index))
+        label = rf"$\|\dot\omega\|$ = {acceleration:g} deg/s²"
+        top.plot(medians.index, medians.bcd_iterations, label=label, **hollow)
+        newton = hollow | {"color": GREY, "linestyle": ":"}
+        top.plot(medians.index, medians.newton_iterations, **newton)
+        below.plot(1 - rows.contraction, 1 - rows.observed, **hollow | {"linestyle": ""})
     for index, (name, rows) in enumerate(table[table.array != own.array.iloc[0]].groupby("array")):
         below.plot(
             1 - rows.contraction, 1 - rows.observed, color=BLACK, linestyle="none",
@@ -223,13 +215,12 @@ def coverage(table: pd.DataFrame) -> pd.DataFrame:
     ``p``, the smallest Kolmogorov-Smirnov p-value of a quantity times their number.
     """
     rows = []
-    keys = ["setting", "method", "samples"]
-    for key, part in table.groupby(keys, sort=False):
+    for key, part in table.groupby(KEYS, sort=False):
         grid = part.pivot(index="replicate", columns="quantity", values="pit")
         grid = grid.dropna(axis="columns", how="all").dropna()
         own = grid.drop(columns=[name for name in WHOLE if name in grid]).to_numpy()
         mixed = part.groupby("replicate").independent.first()
-        row = dict(zip(keys, key, strict=True)) | {
+        row = dict(zip(KEYS, key, strict=True)) | {
             "replicates": len(grid), "none": part.replicate.nunique() - len(grid),
             "slow": int(np.sum(mixed < MIXED)), "apart": _apart(table, key),
         }  # fmt: skip
@@ -284,21 +275,15 @@ def histogram(values: pd.DataFrame) -> pd.DataFrame:
     frames = []
     edges = np.linspace(0, 1, BINS + 1)
     own = values[~values.quantity.isin(WHOLE)].dropna(subset="pit")
-    for (setting, method, samples), part in own.groupby(
-        ["setting", "method", "samples"], sort=False
-    ):
+    for key, part in own.groupby(KEYS, sort=False):
         place = np.clip((part.pit * BINS).astype(int), 0, BINS - 1)
         shares = BINS * pd.crosstab(part.replicate, place, normalize="index")
         shares = shares.reindex(columns=range(BINS), fill_value=0.0)
-        frames.append(
-            pd.DataFrame(
-                {"setting": setting, "method": method, "samples": samples,
-                 "low": edges[:-1], "high": edges[1:],
-                 "density": shares.mean().to_numpy(),
-                 "se": (shares.std(ddof=1) / np.sqrt(len(shares))).to_numpy(),
-                 "replicates": len(shares)}
-            )
-        )  # fmt: skip
+        error = shares.std(ddof=1) / np.sqrt(len(shares))
+        frames.append(pd.DataFrame(dict(zip(KEYS, key, strict=True)) | {
+            "low": edges[:-1], "high": edges[1:], "density": shares.mean().to_numpy(),
+            "se": error.to_numpy(), "replicates": len(shares),
+        }))  # fmt: skip
     return pd.concat(frames, ignore_index=True)
 
 
