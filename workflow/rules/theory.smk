@@ -13,7 +13,7 @@ rule bound_efficiency:
         mem_mb=3000,
         runtime=60,
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017", "theory"),
+        settings=sections("paper2017", "theory"),
         code=code("bound_efficiency"),
     message:
         "theory: efficiency ({wildcards.scale})"
@@ -33,7 +33,7 @@ rule bound_convergence:
         mem_mb=3000,
         runtime=60,
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017", "theory"),
+        settings=sections("paper2017", "theory"),
         code=code("bound_convergence"),
     message:
         "theory: convergence ({wildcards.scale})"
@@ -52,7 +52,7 @@ rule bound_size:
         mem_mb=3000,
         runtime=60,
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017", "theory"),
+        settings=sections("paper2017", "theory"),
         code=code("bound_size"),
     message:
         "theory: size of the array ({wildcards.scale})"
@@ -71,7 +71,7 @@ rule bound_ranks:
         mem_mb=3000,
         runtime=60,
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017", "paper2021", "theory"),
+        settings=sections("paper2017", "paper2021", "theory"),
         code=code("bound_ranks"),
     message:
         "theory: ranks ({wildcards.scale})"
@@ -79,81 +79,30 @@ rule bound_ranks:
         "../scripts/bound_ranks.py"
 
 
-rule figure_theory_efficiency:
-    input:
-        rows="results/{scale}/theory/efficiency.csv",
-    output:
-        **figure("theory_efficiency", "Estimation theory"),
-    log:
-        "results/{scale}/logs/figures/theory_efficiency.log",
-    benchmark:
-        "results/{scale}/benchmarks/figures/theory_efficiency.tsv"
-    resources:
-        mem_mb=3000,
-    params:
-        **by("figures.uncertainty.figure_theory_efficiency"),
-        settings=lambda wc: effective(config, wc.scale, "paper2017", "theory"),
-    message:
-        "figure: theory, efficiency ({wildcards.scale})"
-    script:
-        "../scripts/publish.py"
-
-
-rule figure_theory_convergence:
-    input:
-        rows="results/{scale}/theory/convergence.csv",
-    output:
-        **figure("theory_convergence", "Estimation theory"),
-    log:
-        "results/{scale}/logs/figures/theory_convergence.log",
-    benchmark:
-        "results/{scale}/benchmarks/figures/theory_convergence.tsv"
-    resources:
-        mem_mb=3000,
-    params:
-        **by("figures.uncertainty.figure_theory_convergence"),
-        settings=lambda wc: effective(config, wc.scale, "paper2017", "theory"),
-    message:
-        "figure: theory, convergence ({wildcards.scale})"
-    script:
-        "../scripts/publish.py"
-
-
-rule figure_theory_size:
-    input:
-        rows="results/{scale}/theory/size.csv",
-    output:
-        **figure("theory_size", "Estimation theory"),
-    log:
-        "results/{scale}/logs/figures/theory_size.log",
-    benchmark:
-        "results/{scale}/benchmarks/figures/theory_size.tsv"
-    resources:
-        mem_mb=3000,
-    params:
-        **by("figures.uncertainty.figure_theory_size"),
-        settings=lambda wc: effective(config, wc.scale, "paper2017", "theory"),
-    message:
-        "figure: theory, size of the array ({wildcards.scale})"
-    script:
-        "../scripts/publish.py"
-
-
-rule table_theory_ranks:
-    input:
-        rows="results/{scale}/theory/ranks.csv",
-    output:
-        **table("theory_ranks"),
-    log:
-        "results/{scale}/logs/tables/theory_ranks.log",
-    benchmark:
-        "results/{scale}/benchmarks/tables/theory_ranks.tsv"
-    resources:
-        mem_mb=3000,
-    params:
-        **by("figures.uncertainty.table_theory_ranks"),
-        settings=lambda wc: effective(config, wc.scale, "paper2017", "theory"),
-    message:
-        "table: theory, ranks ({wildcards.scale})"
-    script:
-        "../scripts/publish.py"
+draw(
+    "uncertainty.figure_theory_efficiency",
+    "figure: theory, efficiency ({wildcards.scale})",
+    {"rows": "results/{scale}/theory/efficiency.csv"},
+    category="Estimation theory",
+    settings=sections("paper2017", "theory"),
+)
+draw(
+    "uncertainty.figure_theory_convergence",
+    "figure: theory, convergence ({wildcards.scale})",
+    {"rows": "results/{scale}/theory/convergence.csv"},
+    category="Estimation theory",
+    settings=sections("paper2017", "theory"),
+)
+draw(
+    "uncertainty.figure_theory_size",
+    "figure: theory, size of the array ({wildcards.scale})",
+    {"rows": "results/{scale}/theory/size.csv"},
+    category="Estimation theory",
+    settings=sections("paper2017", "theory"),
+)
+draw(
+    "uncertainty.table_theory_ranks",
+    "table: theory, ranks ({wildcards.scale})",
+    {"rows": "results/{scale}/theory/ranks.csv"},
+    settings=sections("paper2017", "theory"),
+)
