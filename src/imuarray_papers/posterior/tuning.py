@@ -9,7 +9,7 @@ import numpy as np
 from imuarray.geometry import positions_of
 from imuarray.posterior.prior import GaussianPrior
 from imuarray_papers.posterior.likelihood import Likelihood
-from imuarray_papers.posterior.target import CompiledTarget, Target
+from imuarray_papers.posterior.target import CompiledTarget
 
 
 class Sweeps(NamedTuple):
@@ -79,7 +79,9 @@ def _tuned_draws(likelihood, positions, mode, sweeps, rng, threads, may_centre):
     return likelihood, choose_draws(sweeps.draws, found, sweeps.variance), start, first, centred
 
 
-def tune_step(target: Target, start, steps, transitions: int, rng, aim=0.18, threads=1) -> float:
+def tune_step(
+    target: CompiledTarget, start, steps, transitions: int, rng, aim=0.18, threads=1
+) -> float:
     """The step length at which the acceptance crosses ``aim``, from ``start`` (P,)."""
     rates = acceptance_sweep(target, start, steps, transitions, rng, threads)
     return choose_step(steps, rates, aim)
@@ -135,7 +137,7 @@ def choose_draws(draws, variances, target: float = 0.1) -> int:
     return max(1, int(np.ceil(scale / target)))
 
 
-def acceptance(target: Target, start, step: float, count: int, rng) -> float:
+def acceptance(target: CompiledTarget, start, step: float, count: int, rng) -> float:
     """Share of accepted proposals over ``count`` transitions, after as many of burn-in."""
     theta = np.array(start, float)
     value = target.log_target(theta, rng)
@@ -144,7 +146,9 @@ def acceptance(target: Target, start, step: float, count: int, rng) -> float:
     return accepted / count
 
 
-def acceptance_sweep(target: Target, start, steps, count: int, rng, threads: int = 1) -> np.ndarray:
+def acceptance_sweep(
+    target: CompiledTarget, start, steps, count: int, rng, threads: int = 1
+) -> np.ndarray:
     """`acceptance` for each sigma_q in ``steps`` (metres), (len(steps),); streams as above."""
 
     def one(job):
