@@ -118,10 +118,10 @@ def test_a_digest_follows_what_the_code_does(sources, monkeypatch, tmp_path):
 
 
 def test_rules_take_the_digest_of_the_script_they_run():
-    for rule in re.split(r"(?m)^(?:rule|checkpoint) ", RULES)[1:]:
-        name, script = rule.partition(":")[0], re.search(r"scripts/(\w+)\.py", rule)
-        if script:
-            assert f'code("{script[1]}"' in rule, name
+    for rule in re.split(r"(?m)^ *(?:rule|checkpoint)\b", RULES)[1:]:
+        script = re.search(r"scripts/(\w+)\.py", rule)
+        if script and script[1] != "publish":  # that of `draw`
+            assert f'code("{script[1]}"' in rule, rule
 
 
 def test_what_is_drawn_is_a_function_of_the_package():
