@@ -43,10 +43,9 @@ def draw(
     source, _, function = by.rpartition(".")
     kind, _, own = function.partition("_")
     place = f"{kind}s/{output or own}"
-    outputs = {"figure": figure, "table": table}[kind]
     DRAWINGS[function] = {
         "input": input,
-        "output": outputs(output or own, category, caption or own, folder),
+        "output": drawn(kind, output or own, category, caption or own, folder),
         "log": f"{folder}/logs/{place}.log",
         "benchmark": f"{folder}/benchmarks/{place}.tsv",
         "params": {

@@ -1,22 +1,22 @@
 # A rule for each figure and table that `draw` was told of.
-for function, drawn in DRAWINGS.items():
+for function, drawing in DRAWINGS.items():
 
     rule:
         name:
             function
         input:
-            **drawn["input"],
+            **drawing["input"],
         output:
-            **drawn["output"],
+            **drawing["output"],
         log:
-            drawn["log"],
+            drawing["log"],
         benchmark:
-            drawn["benchmark"]
+            drawing["benchmark"]
         resources:
             mem_mb=3000,
         params:
-            **drawn["params"],
+            **drawing["params"],
         message:
-            drawn["message"]
+            drawing["message"]
         script:
             "../scripts/publish.py"
