@@ -15,7 +15,7 @@ from imuarray_papers.pipeline.sources import Sources
 
 WORKFLOW = Path(__file__).parents[1] / "workflow"
 SCRIPTS = {path.stem: path.read_text("utf-8") for path in (WORKFLOW / "scripts").glob("*.py")}
-SAMPLING = {"sample_posterior", "sample_experiment", "sample_measured"}
+SAMPLING = {"sample_posterior", "sample_experiment"}
 RULES = "".join(path.read_text(encoding="utf-8") for path in (WORKFLOW / "rules").iterdir())
 # functions that make a figure or a table, by their names, which are those of the rules, too
 DRAWN = {

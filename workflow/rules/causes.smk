@@ -181,9 +181,7 @@ rule figure_past_rail:
         recording="results/measured/left_out/{name}.nc",
         calibration="results/measured/left_out/{name}_others.nc",
     output:
-        **drawn(
-            "figure", "past_rail_{name}", "Diagnosis", "past_rail", folder="results/measured"
-        ),
+        **drawn("figure", "past_rail_{name}", "Diagnosis", "past_rail", folder="results/measured"),
     log:
         "results/measured/logs/past_rail_{name}.log",
     benchmark:

@@ -14,6 +14,7 @@ rule sample_experiment:
         runtime=60,
     params:
         settings=sections("paper2017", "paper2021", "experiment"),
+        lengths="experiment_transitions",
         code=code("sample_experiment"),
     message:
         "chains of the experiment: {wildcards.kind} ({wildcards.scale})"

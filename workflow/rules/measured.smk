@@ -148,29 +148,18 @@ rule residuals:
         "../scripts/residuals.py"
 
 
-rule sample_measured:
+use rule sample_experiment as sample_measured with:
     input:
-        recordings=expand("results/measured/subsets/{{kind}}_T{samples}.nc", samples=SAMPLES),
-    output:
-        of_samples("chains/{kind}_T{samples}.nc"),
-    log:
-        "results/{scale}/logs/chains/{kind}.log",
-    benchmark:
-        "results/{scale}/benchmarks/chains/{kind}.tsv"
+        subsets=expand("results/measured/subsets/{{kind}}_T{samples}.nc", samples=SAMPLES),
     wildcard_constraints:
         kind=MEASURED_KINDS,
     priority: 9
-    threads: lambda wc: CORES.threads(wc.scale)
-    resources:
-        mem_mb=4000,
-        runtime=60,
     params:
         settings=sections("paper2017", "paper2021", "experiment"),
-        code=code("sample_measured"),
+        lengths="measured_transitions",
+        code=code("sample_experiment"),
     message:
         "chains of {wildcards.kind} ({wildcards.scale})"
-    script:
-        "../scripts/sample_measured.py"
 
 
 use rule judge_experiment as judge_measured with:
