@@ -1,16 +1,16 @@
 # Only `snakemake theory` asks for these: the Cramer-Rao bound and what follows from it.
 
 
-for name, about in {
-    "efficiency": "efficiency",
-    "convergence": "convergence",
-    "size": "size of the array",
-    "ranks": "ranks",
-}.items():
+for each, name, about in (
+    ("bound_efficiency", "efficiency", "efficiency"),
+    ("bound_convergence", "convergence", "convergence"),
+    ("bound_size", "size", "size of the array"),
+    ("bound_ranks", "ranks", "ranks"),
+):
 
     rule:
         name:
-            f"bound_{name}"
+            each
         output:
             f"results/{{scale}}/theory/{name}.csv",
         log:
