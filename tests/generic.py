@@ -11,7 +11,6 @@ from imuarray.model.jax64 import cholesky, jax, jnp, log_determinant, solve_lowe
 from imuarray.posterior import generic
 from imuarray.posterior.generic import Unknown
 from imuarray.posterior.prior import GaussianPrior
-from imuarray_papers.posterior.target import Target
 
 
 def _log_weight(flat, x, scale, draw):
@@ -72,8 +71,8 @@ class GenericLikelihood:
 
 
 @dataclass(frozen=True)
-class GenericTarget(Target):
-    """Any ``estimate(theta, rng)`` of log p-hat, walked one Python step at a time.
+class GenericTarget:
+    """As `CompiledTarget`, of any ``estimate(theta, rng)`` of log p-hat, a Python step at a time.
 
     ``scale``, (size,) or a lower factor (size, size): a step per parameter.
     """
@@ -82,8 +81,17 @@ class GenericTarget(Target):
     prior: GaussianPrior
     scale: np.ndarray
 
+    @property
+    def size(self) -> int:
+        """Number of parameters."""
+        return self.prior.mean.size
+
+    def log_target(self, theta, rng) -> float:
+        """log prior + log p-hat."""
+        return self.prior.log_density(theta) + self.estimate(theta, rng)
+
     def transitions(self, theta, log_target, step, count, rng) -> tuple[int, float]:
-        """`Target.transitions` in plain Python."""
+        """`CompiledTarget.transitions` in plain Python."""
         accepted, shaped = 0, np.matmul if self.scale.ndim == 2 else np.multiply
         for _ in range(count):
             proposal = theta + step * shaped(self.scale, rng.standard_normal(self.size))

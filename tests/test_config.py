@@ -41,6 +41,7 @@ def test_schema_knows_every_board():
 def test_cluster_groups_are_of_rules():
     rules = "".join(path.read_text() for path in (ROOT / "workflow/rules").glob("*.smk"))
     known = set(re.findall(r"(?m)^(?:rule|checkpoint|use rule \w+ as) (\w+)", rules))
+    known |= set(re.findall(r'(?:draw\(\n +"\w+\.|^ +\(")(\w+)"', rules, re.MULTILINE))
     profile = yaml.safe_load((ROOT / "profiles/slurm/config.yaml").read_text())
     assert {group.partition("=")[0] for group in profile["groups"]} <= known
 

@@ -115,7 +115,7 @@ def test_interrupted_run_continues_from_its_last_block(target, starts, tmp_path)
     path = tmp_path / "state.npz"
 
     class Dying:
-        size, calls = target.size, itertools.count()
+        calls = itertools.count()
         log_target = staticmethod(target.log_target)
 
         def transitions(self, *args):
@@ -140,7 +140,7 @@ def test_finished_run_is_read_back(target, starts, tmp_path):
         raise AssertionError("nothing is left to sample")
 
     class Done:
-        size, log_target, transitions = target.size, never, never
+        log_target = transitions = never
 
     same(run_chains(Done(), starts, STEP, 10, 5, **options), whole)
 

@@ -42,81 +42,34 @@ rule blind_grade:
         "../scripts/blind_grade.py"
 
 
-rule figure_blind_detection:
-    input:
-        rows="results/blind/{scale}/graded.json",
-    output:
-        **figure(
-            "blind_detection_{against}",
-            "Blind study",
-            caption="blind_detection",
-            folder="results/blind/{scale}",
-        ),
-    log:
-        "results/blind/{scale}/logs/figures/blind_detection_{against}.log",
-    benchmark:
-        "results/blind/{scale}/benchmarks/figures/blind_detection_{against}.tsv"
-    wildcard_constraints:
-        against="sigma|amplitude",
-    params:
-        **by("figures.blind.figure_blind_detection"),
-        settings=lambda wc: blind_settings(config, wc.scale),
-        against=lambda wc: wc.against,
-    message:
-        "figure: blind study, detection over {wildcards.against} ({wildcards.scale})"
-    script:
-        "../scripts/publish.py"
-
-
-rule figure_blind_confusion:
-    input:
-        rows="results/blind/{scale}/graded.json",
-    output:
-        **figure("blind_confusion", "Blind study", folder="results/blind/{scale}"),
-    log:
-        "results/blind/{scale}/logs/figures/blind_confusion.log",
-    benchmark:
-        "results/blind/{scale}/benchmarks/figures/blind_confusion.tsv"
-    params:
-        **by("figures.blind.figure_blind_confusion"),
-        settings=lambda wc: blind_settings(config, wc.scale),
-    message:
-        "figure: blind study, confusion ({wildcards.scale})"
-    script:
-        "../scripts/publish.py"
-
-
-rule table_blind_bars:
-    input:
-        rows="results/blind/{scale}/graded.json",
-    output:
-        **table("blind_bars", "Blind study", folder="results/blind/{scale}"),
-    log:
-        "results/blind/{scale}/logs/tables/blind_bars.log",
-    benchmark:
-        "results/blind/{scale}/benchmarks/tables/blind_bars.tsv"
-    params:
-        **by("figures.blind.table_blind_bars"),
-        settings=lambda wc: blind_settings(config, wc.scale),
-    message:
-        "table: blind study, acceptance criteria ({wildcards.scale})"
-    script:
-        "../scripts/publish.py"
-
-
-rule table_blind_gain:
-    input:
-        rows="results/blind/{scale}/graded.json",
-    output:
-        **table("blind_gain", "Blind study", folder="results/blind/{scale}"),
-    log:
-        "results/blind/{scale}/logs/tables/blind_gain.log",
-    benchmark:
-        "results/blind/{scale}/benchmarks/tables/blind_gain.tsv"
-    params:
-        **by("figures.blind.table_blind_gain"),
-        settings=lambda wc: blind_settings(config, wc.scale),
-    message:
-        "table: blind study, gain ({wildcards.scale})"
-    script:
-        "../scripts/publish.py"
+GRADED = {"rows": "results/blind/{scale}/graded.json"}
+BLIND = {
+    "folder": "results/blind/{scale}",
+    "category": "Blind study",
+    "settings": lambda wc: blind_settings(config, wc.scale),
+}
+draw(
+    "blind.figure_blind_detection",
+    "figure: blind study, detection over {wildcards.against} ({wildcards.scale})",
+    GRADED,
+    output="blind_detection_{against}",
+    **BLIND,
+)
+draw(
+    "blind.figure_blind_confusion",
+    "figure: blind study, confusion ({wildcards.scale})",
+    GRADED,
+    **BLIND,
+)
+draw(
+    "blind.table_blind_bars",
+    "table: blind study, acceptance criteria ({wildcards.scale})",
+    GRADED,
+    **BLIND,
+)
+draw(
+    "blind.table_blind_gain",
+    "table: blind study, gain ({wildcards.scale})",
+    GRADED,
+    **BLIND,
+)

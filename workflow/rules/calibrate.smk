@@ -55,7 +55,7 @@ rule rate_error:
     resources:
         runtime=90,
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017.fig3"),
+        settings=sections("paper2017.fig3"),
         code=code("rate_error"),
     message:
         "angular rate error of 2017 ({wildcards.scale})"

@@ -4,7 +4,7 @@
 
 rule correct_together:
     input:
-        lambda wc: expand("results/measured/recordings/{name}.nc", name=MEASURED.board(wc.group)),
+        of_board("results/measured/recordings/{name}.nc"),
     output:
         directory("results/measured/together/{group}"),
     log:
@@ -44,7 +44,7 @@ rule fit_stepwise:
 
 rule repeat_causes:
     input:
-        lambda wc: expand("results/measured/causes/{name}.csv", name=MEASURED.board(wc.group)),
+        of_board("results/measured/causes/{name}.csv"),
     output:
         "results/measured/causes_{group}.csv",
     log:
@@ -60,21 +60,13 @@ rule repeat_causes:
         "../scripts/repeat_causes.py"
 
 
-rule table_causes:
-    input:
-        summary="results/measured/causes_{group}.csv",
-    output:
-        **table("causes_table_{group}", folder="results/measured"),
-    log:
-        "results/measured/logs/tables/causes_{group}.log",
-    benchmark:
-        "results/measured/benchmarks/tables/causes_{group}.tsv"
-    params:
-        **by("figures.board.table_causes"),
-    message:
-        "table: what each cause gains on {wildcards.group}"
-    script:
-        "../scripts/publish.py"
+draw(
+    "board.table_causes",
+    "table: what each cause gains on {wildcards.group}",
+    {"summary": "results/measured/causes_{group}.csv"},
+    folder="results/measured",
+    output="causes_table_{group}",
+)
 
 
 # Leave one recording out: what the others say of the board, and of this one.
@@ -126,24 +118,14 @@ rule predict_left_out:
         "../scripts/predict_left_out.py"
 
 
-rule table_left_out:
-    input:
-        tables=lambda wc: expand(
-            "results/measured/predicted/{name}.csv", name=MEASURED.board(wc.group)
-        ),
-    output:
-        **table("left_out_{group}", folder="results/measured"),
-    log:
-        "results/measured/logs/tables/left_out_{group}.log",
-    benchmark:
-        "results/measured/benchmarks/tables/left_out_{group}.tsv"
-    params:
-        **by("figures.board.table_left_out"),
-        names=lambda wc: MEASURED.board(wc.group),
-    message:
-        "table: recordings of {wildcards.group} predicted by the others"
-    script:
-        "../scripts/publish.py"
+draw(
+    "board.table_left_out",
+    "table: recordings of {wildcards.group} predicted by the others",
+    {"tables": of_board("results/measured/predicted/{name}.csv")},
+    folder="results/measured",
+    output="left_out_{group}",
+    names=lambda wc: MEASURED.board(wc.group),
+)
 
 
 # Paper 2021's experiment once more, with the sensors as the other recordings show them.
@@ -169,44 +151,29 @@ rule locate_experiment:
         "../scripts/locate_experiment.py"
 
 
-rule figure_experiment:
-    input:
-        located="results/measured/located/{name}.nc",
-        recordings=["results/measured/left_out/{name}.nc"],
-    output:
-        **figure("experiment_{name}", "Measured", caption="experiment", folder="results/measured"),
-    log:
-        "results/measured/logs/figures/experiment_{name}.log",
-    benchmark:
-        "results/measured/benchmarks/figures/experiment_{name}.tsv"
-    params:
-        **by("figures.paper2021_array.figure_experiment"),
-        settings=effective(config, config["scale"], "paper2021", "experiment"),
-    message:
-        "figure 5 of 2021 once more, from {wildcards.name} with sensors known"
-    script:
-        "../scripts/publish.py"
-
-
-rule table_experiment:
-    input:
-        located=lambda wc: expand(
-            "results/measured/located/{name}.nc", name=MEASURED.board(wc.group)
-        ),
-        summary="results/measured/agreement/{group}.csv",
-    output:
-        **table("experiment_table_{group}", folder="results/measured"),
-    log:
-        "results/measured/logs/tables/experiment_{group}.log",
-    benchmark:
-        "results/measured/benchmarks/tables/experiment_{group}.tsv"
-    params:
-        **by("figures.board.table_experiment"),
-        names=lambda wc: MEASURED.board(wc.group),
-    message:
-        "table II of 2021 once more, {wildcards.group}"
-    script:
-        "../scripts/publish.py"
+draw(
+    "paper2021_array.figure_experiment",
+    "figure 5 of 2021 once more, from {wildcards.name} with sensors known",
+    {
+        "located": "results/measured/located/{name}.nc",
+        "recordings": ["results/measured/left_out/{name}.nc"],
+    },
+    folder="results/measured",
+    output="experiment_{name}",
+    category="Measured",
+    settings=effective(config, config["scale"], "paper2021", "experiment"),
+)
+draw(
+    "board.table_experiment",
+    "table II of 2021 once more, {wildcards.group}",
+    {
+        "located": of_board("results/measured/located/{name}.nc"),
+        "summary": "results/measured/agreement/{group}.csv",
+    },
+    folder="results/measured",
+    output="experiment_table_{group}",
+    names=lambda wc: MEASURED.board(wc.group),
+)
 
 
 rule figure_past_rail:
@@ -214,7 +181,7 @@ rule figure_past_rail:
         recording="results/measured/left_out/{name}.nc",
         calibration="results/measured/left_out/{name}_others.nc",
     output:
-        **figure("past_rail_{name}", "Diagnosis", caption="past_rail", folder="results/measured"),
+        **drawn("figure", "past_rail_{name}", "Diagnosis", "past_rail", folder="results/measured"),
     log:
         "results/measured/logs/past_rail_{name}.log",
     benchmark:
@@ -229,21 +196,11 @@ rule figure_past_rail:
         "../scripts/figure_past_rail.py"
 
 
-rule table_past_rail:
-    input:
-        tables=lambda wc: expand(
-            "results/measured/figures/past_rail_{name}.csv", name=MEASURED.board(wc.group)
-        ),
-    output:
-        **table("past_rail_table_{group}", folder="results/measured"),
-    log:
-        "results/measured/logs/tables/past_rail_{group}.log",
-    benchmark:
-        "results/measured/benchmarks/tables/past_rail_{group}.tsv"
-    params:
-        **by("figures.board.table_past_rail"),
-        names=lambda wc: MEASURED.board(wc.group),
-    message:
-        "table: recordings of {wildcards.group} past the rail"
-    script:
-        "../scripts/publish.py"
+draw(
+    "board.table_past_rail",
+    "table: recordings of {wildcards.group} past the rail",
+    {"tables": of_board("results/measured/figures/past_rail_{name}.csv")},
+    folder="results/measured",
+    output="past_rail_table_{group}",
+    names=lambda wc: MEASURED.board(wc.group),
+)

@@ -15,7 +15,7 @@ rule claims_identifiability:
     benchmark:
         "results/{scale}/benchmarks/claims/identifiability.tsv"
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017"),
+        settings=sections("paper2017"),
         code=code("claims_identifiability"),
     message:
         "claims: identifiability ({wildcards.scale})"
@@ -31,7 +31,7 @@ rule claims_position_bound:
     benchmark:
         "results/{scale}/benchmarks/claims/position_bound.tsv"
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017"),
+        settings=sections("paper2017"),
         code=code("claims_position_bound"),
     message:
         "claims: bound of the positions ({wildcards.scale})"
@@ -47,7 +47,7 @@ rule claims_accelerometers_only:
     benchmark:
         "results/{scale}/benchmarks/claims/accelerometers_only.tsv"
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017"),
+        settings=sections("paper2017"),
         code=code("claims_accelerometers_only"),
     message:
         "claims: accelerometers only ({wildcards.scale})"
@@ -65,7 +65,7 @@ rule claims_marginalisation:
     benchmark:
         "results/{scale}/benchmarks/claims/marginalisation.tsv"
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2021"),
+        settings=sections("paper2021"),
         code=code("claims_marginalisation"),
     message:
         "claims: marginalisation ({wildcards.scale})"
@@ -84,7 +84,7 @@ rule claims_linearised:
     benchmark:
         "results/{scale}/benchmarks/claims/linearised.tsv"
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2021", "experiment"),
+        settings=sections("paper2021", "experiment"),
         names=SIMULATED,
         kinds=KINDS,
         code=code("claims_linearised"),
@@ -96,8 +96,8 @@ rule claims_linearised:
 
 rule claims_timing:
     input:
-        recordings=expand("results/{{scale}}/recordings/T{samples}.nc", samples=SAMPLES),
-        tuning=expand("results/{{scale}}/tuning/T{samples}.json", samples=SAMPLES),
+        recordings=of_samples("recordings/T{samples}.nc"),
+        tuning=of_samples("tuning/T{samples}.json"),
     output:
         timing="results/{scale}/claims/timing.csv",
         acceptance="results/{scale}/claims/acceptance_variance.csv",
@@ -106,7 +106,7 @@ rule claims_timing:
     benchmark:
         "results/{scale}/benchmarks/claims/timing.tsv"
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017", "paper2021"),
+        settings=sections("paper2017", "paper2021"),
         code=code("claims_timing"),
     message:
         "claims: timing ({wildcards.scale})"
@@ -130,12 +130,12 @@ rule claims:
             name=["variance", "acceptance"],
             samples=SAMPLES,
         ),
-        tuned=expand("results/{{scale}}/tuning/T{samples}.json", samples=SAMPLES),
+        tuned=of_samples("tuning/T{samples}.json"),
         posterior=expand(
             "results/{{scale}}/posterior/{name}.{kind}", name=POSTERIORS, kind=["csv", "json"]
         ),
         chains=expand("results/{{scale}}/chains/{name}.nc", name=POSTERIORS),
-        burn_in=expand("results/{{scale}}/posterior/burn_in_T{samples}.csv", samples=SAMPLES),
+        burn_in=of_samples("posterior/burn_in_T{samples}.csv"),
         identifiability="results/{scale}/claims/identifiability.json",
         ranks="results/{scale}/claims/ranks.csv",
         work="results/{scale}/claims/inner_steps.csv",
@@ -161,9 +161,7 @@ rule claims:
     resources:
         mem_mb=4000,
     params:
-        settings=lambda wc: effective(
-            config, wc.scale, "paper2017", "paper2021", "experiment", "recordings"
-        ),
+        settings=sections("paper2017", "paper2021", "experiment", "recordings"),
         code=code("claims"),
     message:
         "claims: verdicts ({wildcards.scale})"

@@ -2,47 +2,33 @@
 # in recordings, simulated and real, and must be found.
 
 
-rule figure_criticism:
-    input:
-        summary=f"results/measured/residuals/{SHOWN}.csv",
-        noise=f"results/measured/first_order/{SHOWN}_noise.csv",
-        diagnosis=f"results/measured/diagnosis/{SHOWN}/diagnosis.json",
-        causes=f"results/measured/causes_{MEASURED.group(SHOWN)}.csv",
-        predicted=f"results/measured/predicted/{SHOWN}.csv",
-    output:
-        **figure("criticism", "Criticism", folder="results/measured"),
-    log:
-        "results/measured/logs/figures/criticism.log",
-    benchmark:
-        "results/measured/benchmarks/figures/criticism.tsv"
-    params:
-        **by("figures.criticism.figure_criticism"),
-        name=SHOWN,
-        group=MEASURED.group(SHOWN),
-    message:
-        "figure: what is wrong, why, and what the cause gains"
-    script:
-        "../scripts/publish.py"
-
-
-rule table_criticism:
-    input:
-        **{key: path for key, path in rules.figure_criticism.input.items()},
-        recordings=MEASURED.recording(SHOWN),
-    output:
-        **table("criticism_table", "Criticism", folder="results/measured"),
-    log:
-        "results/measured/logs/tables/criticism_table.log",
-    benchmark:
-        "results/measured/benchmarks/tables/criticism_table.tsv"
-    params:
-        **by("figures.criticism.table_criticism"),
-        name=SHOWN,
-        group=MEASURED.group(SHOWN),
-    message:
-        "table: what is wrong, why, and what the cause gains"
-    script:
-        "../scripts/publish.py"
+CRITICISED = {
+    "summary": f"results/measured/residuals/{SHOWN}.csv",
+    "noise": f"results/measured/first_order/{SHOWN}_noise.csv",
+    "diagnosis": f"results/measured/diagnosis/{SHOWN}/diagnosis.json",
+    "causes": f"results/measured/causes_{MEASURED.group(SHOWN)}.csv",
+    "predicted": f"results/measured/predicted/{SHOWN}.csv",
+}
+draw(
+    "criticism.figure_criticism",
+    "figure: what is wrong, why, and what the cause gains",
+    CRITICISED,
+    folder="results/measured",
+    category="Criticism",
+    name=SHOWN,
+    group=MEASURED.group(SHOWN),
+)
+draw(
+    "criticism.table_criticism",
+    "table: what is wrong, why, and what the cause gains",
+    CRITICISED | {"recordings": MEASURED.recording(SHOWN)},
+    folder="results/measured",
+    output="criticism_table",
+    category="Criticism",
+    caption="criticism_table",
+    name=SHOWN,
+    group=MEASURED.group(SHOWN),
+)
 
 
 rule hide:
@@ -91,45 +77,33 @@ use rule diagnose_recording as diagnose_hidden with:
         "diagnosis, hidden: {wildcards.hidden}"
 
 
-rule figure_criticism_hidden:
-    input:
-        diagnosis="results/measured/hidden/lever_arms/diagnosis.json",
-        truth="results/measured/hidden/lever_arms.json",
-        recordings="results/measured/hidden/lever_arms.nc",
-    output:
-        **figure("criticism_hidden", "Criticism", folder="results/measured"),
-    log:
-        "results/measured/logs/figures/criticism_hidden.log",
-    benchmark:
-        "results/measured/benchmarks/figures/criticism_hidden.tsv"
-    params:
-        **by("figures.hidden.figure_criticism_hidden"),
-    message:
-        "figure: an effect that was hidden, and found"
-    script:
-        "../scripts/publish.py"
-
-
-rule table_criticism_hidden:
-    input:
-        diagnoses=expand(
+draw(
+    "hidden.figure_criticism_hidden",
+    "figure: an effect that was hidden, and found",
+    {
+        "diagnosis": "results/measured/hidden/lever_arms/diagnosis.json",
+        "truth": "results/measured/hidden/lever_arms.json",
+        "recordings": "results/measured/hidden/lever_arms.nc",
+    },
+    folder="results/measured",
+    category="Criticism",
+)
+draw(
+    "hidden.table_criticism_hidden",
+    "table: effects that were hidden, and what was found",
+    {
+        "diagnoses": expand(
             "results/measured/hidden/{hidden}/diagnosis.json", hidden=MEASURED.hidden()
         ),
-        truths=expand("results/measured/hidden/{hidden}.json", hidden=MEASURED.hidden()),
-        controls=[
+        "truths": expand("results/measured/hidden/{hidden}.json", hidden=MEASURED.hidden()),
+        "controls": [
             f"results/measured/{MEASURED.control(hidden)}/diagnosis.json"
             for hidden in MEASURED.hidden()
         ],
-    output:
-        **table("criticism_hidden_table", "Criticism", folder="results/measured"),
-    log:
-        "results/measured/logs/tables/criticism_hidden_table.log",
-    benchmark:
-        "results/measured/benchmarks/tables/criticism_hidden_table.tsv"
-    params:
-        **by("figures.hidden.table_criticism_hidden"),
-        names=["simulated", "simulated", SHOWN][: len(MEASURED.hidden())],
-    message:
-        "table: effects that were hidden, and what was found"
-    script:
-        "../scripts/publish.py"
+    },
+    folder="results/measured",
+    output="criticism_hidden_table",
+    category="Criticism",
+    caption="criticism_hidden_table",
+    names=["simulated", "simulated", SHOWN][: len(MEASURED.hidden())],
+)

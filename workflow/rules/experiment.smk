@@ -2,7 +2,7 @@ rule sample_experiment:
     input:
         recording="results/{scale}/recordings/{kind}.nc",
     output:
-        expand("results/{{scale}}/chains/{{kind}}_T{samples}.nc", samples=SAMPLES),
+        of_samples("chains/{kind}_T{samples}.nc"),
     log:
         "results/{scale}/logs/chains/{kind}.log",
     benchmark:
@@ -13,7 +13,8 @@ rule sample_experiment:
         mem_mb=4000,
         runtime=60,
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017", "paper2021", "experiment"),
+        settings=sections("paper2017", "paper2021", "experiment"),
+        lengths="experiment_transitions",
         code=code("sample_experiment"),
     message:
         "chains of the experiment: {wildcards.kind} ({wildcards.scale})"
@@ -24,13 +25,11 @@ rule sample_experiment:
 rule judge_experiment:
     input:
         recordings="results/{scale}/recordings/{kind}.nc",
-        chains=expand("results/{{scale}}/chains/{{kind}}_T{samples}.nc", samples=SAMPLES),
+        chains=of_samples("chains/{kind}_T{samples}.nc"),
     output:
-        verdicts=expand("results/{{scale}}/posterior/{{kind}}_T{samples}.json", samples=SAMPLES),
-        coordinates=expand("results/{{scale}}/posterior/{{kind}}_T{samples}.csv", samples=SAMPLES),
-        burn_ins=expand(
-            "results/{{scale}}/posterior/burn_in_{{kind}}_T{samples}.csv", samples=SAMPLES
-        ),
+        verdicts=of_samples("posterior/{kind}_T{samples}.json"),
+        coordinates=of_samples("posterior/{kind}_T{samples}.csv"),
+        burn_ins=of_samples("posterior/burn_in_{kind}_T{samples}.csv"),
     log:
         "results/{scale}/logs/posterior/{kind}.log",
     benchmark:
@@ -38,7 +37,7 @@ rule judge_experiment:
     resources:
         mem_mb=4000,
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017", "paper2021", "experiment"),
+        settings=sections("paper2017", "paper2021", "experiment"),
         code=code("judge_chains"),
     message:
         "chains of {wildcards.kind}: burn-in, R-hat, effective sample size ({wildcards.scale})"

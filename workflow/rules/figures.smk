@@ -4,212 +4,101 @@ SHOWN_CAPTIONS = [
 ]
 
 
-rule figure_2017_fig2:
-    output:
-        **figure("2017_fig2", "Paper 2017"),
-    log:
-        "results/{scale}/logs/figures/2017_fig2.log",
-    benchmark:
-        "results/{scale}/benchmarks/figures/2017_fig2.tsv"
-    params:
-        **by("figures.paper2021_array.figure_2017_fig2"),
-        settings=lambda wc: effective(config, wc.scale),
-    message:
-        "figure 2 of 2017 ({wildcards.scale})"
-    script:
-        "../scripts/publish.py"
-
-
-rule figure_2017_fig3:
-    input:
-        rates="results/{scale}/calibration/rate_error.csv",
-    output:
-        **figure("2017_fig3", "Paper 2017"),
-    log:
-        "results/{scale}/logs/figures/2017_fig3.log",
-    benchmark:
-        "results/{scale}/benchmarks/figures/2017_fig3.tsv"
-    params:
-        **by("figures.paper2017.figure_2017_fig3"),
-        settings=lambda wc: effective(config, wc.scale, "paper2017.fig3"),
-    message:
-        "figure 3 of 2017 ({wildcards.scale})"
-    script:
-        "../scripts/publish.py"
-
-
-rule figure_2017_fig4:
-    input:
-        errors="results/{scale}/calibration/position_error_samples.csv",
-    output:
-        **figure("2017_fig4", "Paper 2017"),
-    log:
-        "results/{scale}/logs/figures/2017_fig4.log",
-    benchmark:
-        "results/{scale}/benchmarks/figures/2017_fig4.tsv"
-    params:
-        **by("figures.paper2017.figure_2017_fig4"),
-        settings=lambda wc: effective(config, wc.scale, "paper2017.fig4"),
-    message:
-        "figure 4 of 2017 ({wildcards.scale})"
-    script:
-        "../scripts/publish.py"
-
-
-rule figure_2017_fig5:
-    input:
-        errors="results/{scale}/calibration/position_error_motion.csv",
-    output:
-        **figure("2017_fig5", "Paper 2017"),
-    log:
-        "results/{scale}/logs/figures/2017_fig5.log",
-    benchmark:
-        "results/{scale}/benchmarks/figures/2017_fig5.tsv"
-    params:
-        **by("figures.paper2017.figure_2017_fig5"),
-        settings=lambda wc: effective(config, wc.scale, "paper2017.fig5"),
-    message:
-        "figure 5 of 2017 ({wildcards.scale})"
-    script:
-        "../scripts/publish.py"
-
-
-rule figure_2021_fig1:
-    output:
-        **figure("2021_fig1", "Paper 2021"),
-    log:
-        "results/{scale}/logs/figures/2021_fig1.log",
-    benchmark:
-        "results/{scale}/benchmarks/figures/2021_fig1.tsv"
-    params:
-        **by("figures.paper2021_array.figure_2021_fig1"),
-        settings=lambda wc: effective(config, wc.scale),
-    message:
-        "figure 1 of 2021 ({wildcards.scale})"
-    script:
-        "../scripts/publish.py"
-
-
-rule figure_2021_fig2:
-    input:
-        variances=expand("results/{{scale}}/tuning/variance_T{samples}.csv", samples=SAMPLES),
-    output:
-        **figure("2021_fig2", "Paper 2021"),
-    log:
-        "results/{scale}/logs/figures/2021_fig2.log",
-    benchmark:
-        "results/{scale}/benchmarks/figures/2021_fig2.tsv"
-    params:
-        **by("figures.paper2021.figure_2021_fig2"),
-        settings=lambda wc: effective(config, wc.scale, "paper2021"),
-    message:
-        "figure 2 of 2021 ({wildcards.scale})"
-    script:
-        "../scripts/publish.py"
-
-
-rule figure_2021_fig3:
-    input:
-        chains=expand("results/{{scale}}/chains/T{samples}.nc", samples=max(SAMPLES)),
-        verdict=expand("results/{{scale}}/posterior/T{samples}.json", samples=max(SAMPLES)),
-        coordinates=expand("results/{{scale}}/posterior/T{samples}.csv", samples=max(SAMPLES)),
-    output:
-        **figure("2021_fig3", "Paper 2021"),
-    log:
-        "results/{scale}/logs/figures/2021_fig3.log",
-    benchmark:
-        "results/{scale}/benchmarks/figures/2021_fig3.tsv"
-    params:
-        **by("figures.paper2021.figure_2021_fig3"),
-        settings=lambda wc: effective(config, wc.scale, "paper2021"),
-    message:
-        "figure 3 of 2021 ({wildcards.scale})"
-    script:
-        "../scripts/publish.py"
-
-
-rule figure_2021_fig4:
-    input:
-        chains=expand("results/{{scale}}/chains/T{samples}.nc", samples=SAMPLES),
-        verdicts=expand("results/{{scale}}/posterior/T{samples}.json", samples=SAMPLES),
-        coordinates=expand("results/{{scale}}/posterior/T{samples}.csv", samples=SAMPLES),
-    output:
-        **figure("2021_fig4", "Paper 2021"),
-    log:
-        "results/{scale}/logs/figures/2021_fig4.log",
-    benchmark:
-        "results/{scale}/benchmarks/figures/2021_fig4.tsv"
-    params:
-        **by("figures.paper2021.figure_2021_fig4"),
-        settings=lambda wc: effective(config, wc.scale, "paper2021"),
-    message:
-        "figure 4 of 2021 ({wildcards.scale})"
-    script:
-        "../scripts/publish.py"
-
-
-rule figure_2021_fig5:
-    input:
-        chains=lambda wc: MEASURED.posterior(wc.scale, SHOWN, "chains", ["nc"]),
-        verdicts=lambda wc: MEASURED.posterior(wc.scale, SHOWN, "posterior", ["json"]),
-        coordinates=lambda wc: MEASURED.posterior(wc.scale, SHOWN, "posterior", ["csv"]),
-        recordings=MEASURED.subsets(),
-    output:
-        **figure("2021_fig5", "Paper 2021"),
-    log:
-        "results/{scale}/logs/figures/2021_fig5.log",
-    benchmark:
-        "results/{scale}/benchmarks/figures/2021_fig5.tsv"
-    params:
-        **by("figures.paper2021_array.figure_2021_fig5"),
-        settings=lambda wc: effective(config, wc.scale, "paper2021", "experiment"),
-    message:
-        "figure 5 of 2021 ({wildcards.scale})"
-    script:
-        "../scripts/publish.py"
-
-
-rule table_2021_table1:
-    input:
-        tunings=expand("results/{{scale}}/tuning/T{samples}.json", samples=SAMPLES),
-        verdicts=expand("results/{{scale}}/posterior/T{samples}.json", samples=SAMPLES),
-    output:
-        **table("2021_table1", "Paper 2021"),
-    log:
-        "results/{scale}/logs/tables/2021_table1.log",
-    benchmark:
-        "results/{scale}/benchmarks/tables/2021_table1.tsv"
-    params:
-        **by("figures.paper2021_tables.table_2021_table1"),
-        settings=lambda wc: effective(config, wc.scale, "paper2021"),
-    message:
-        "table I of 2021 ({wildcards.scale})"
-    script:
-        "../scripts/publish.py"
-
-
-rule table_2021_table2:
-    input:
-        experiment=lambda wc: MEASURED.posterior(wc.scale, SHOWN, "posterior", ["csv", "json"]),
-        simulation=lambda wc: MEASURED.posterior(
-            wc.scale, f"simulated_{SHOWN}", "posterior", ["csv", "json"]
-        ),
-        ideal=expand(
-            "results/{{scale}}/posterior/T{samples}.{form}", samples=SAMPLES, form=["csv", "json"]
-        ),
-    output:
-        **table("2021_table2", "Paper 2021"),
-    log:
-        "results/{scale}/logs/tables/2021_table2.log",
-    benchmark:
-        "results/{scale}/benchmarks/tables/2021_table2.tsv"
-    params:
-        **by("figures.paper2021_tables.table_2021_table2"),
-        settings=lambda wc: effective(config, wc.scale, "paper2021", "experiment"),
-    message:
-        "table II of 2021 ({wildcards.scale})"
-    script:
-        "../scripts/publish.py"
+draw(
+    "paper2021_array.figure_2017_fig2",
+    "figure 2 of 2017 ({wildcards.scale})",
+    category="Paper 2017",
+    settings=sections(),
+)
+draw(
+    "paper2017.figure_2017_fig3",
+    "figure 3 of 2017 ({wildcards.scale})",
+    {"rates": "results/{scale}/calibration/rate_error.csv"},
+    category="Paper 2017",
+    settings=sections("paper2017.fig3"),
+)
+draw(
+    "paper2017.figure_2017_fig4",
+    "figure 4 of 2017 ({wildcards.scale})",
+    {"errors": "results/{scale}/calibration/position_error_samples.csv"},
+    category="Paper 2017",
+    settings=sections("paper2017.fig4"),
+)
+draw(
+    "paper2017.figure_2017_fig5",
+    "figure 5 of 2017 ({wildcards.scale})",
+    {"errors": "results/{scale}/calibration/position_error_motion.csv"},
+    category="Paper 2017",
+    settings=sections("paper2017.fig5"),
+)
+draw(
+    "paper2021_array.figure_2021_fig1",
+    "figure 1 of 2021 ({wildcards.scale})",
+    category="Paper 2021",
+    settings=sections(),
+)
+draw(
+    "paper2021.figure_2021_fig2",
+    "figure 2 of 2021 ({wildcards.scale})",
+    {"variances": of_samples("tuning/variance_T{samples}.csv")},
+    category="Paper 2021",
+    settings=sections("paper2021"),
+)
+draw(
+    "paper2021.figure_2021_fig3",
+    "figure 3 of 2021 ({wildcards.scale})",
+    {
+        "chains": of_samples("chains/T{samples}.nc", max(SAMPLES)),
+        "verdict": of_samples("posterior/T{samples}.json", max(SAMPLES)),
+        "coordinates": of_samples("posterior/T{samples}.csv", max(SAMPLES)),
+    },
+    category="Paper 2021",
+    settings=sections("paper2021"),
+)
+draw(
+    "paper2021.figure_2021_fig4",
+    "figure 4 of 2021 ({wildcards.scale})",
+    {
+        "chains": of_samples("chains/T{samples}.nc"),
+        "verdicts": of_samples("posterior/T{samples}.json"),
+        "coordinates": of_samples("posterior/T{samples}.csv"),
+    },
+    category="Paper 2021",
+    settings=sections("paper2021"),
+)
+draw(
+    "paper2021_array.figure_2021_fig5",
+    "figure 5 of 2021 ({wildcards.scale})",
+    {
+        "chains": lambda wc: MEASURED.posterior(wc.scale, SHOWN, "chains", ["nc"]),
+        "verdicts": lambda wc: MEASURED.posterior(wc.scale, SHOWN, "posterior", ["json"]),
+        "coordinates": lambda wc: MEASURED.posterior(wc.scale, SHOWN, "posterior", ["csv"]),
+        "recordings": MEASURED.subsets(),
+    },
+    category="Paper 2021",
+    settings=sections("paper2021", "experiment"),
+)
+draw(
+    "paper2021_tables.table_2021_table1",
+    "table I of 2021 ({wildcards.scale})",
+    {
+        "tunings": of_samples("tuning/T{samples}.json"),
+        "verdicts": of_samples("posterior/T{samples}.json"),
+    },
+    category="Paper 2021",
+    settings=sections("paper2021"),
+)
+draw(
+    "paper2021_tables.table_2021_table2",
+    "table II of 2021 ({wildcards.scale})",
+    {
+        name: lambda wc, kind=kind: MEASURED.posterior(wc.scale, kind, "posterior", ["csv", "json"])
+        for name, kind in (("experiment", SHOWN), ("simulation", f"simulated_{SHOWN}"))
+    }
+    | {"ideal": of_samples("posterior/T{samples}.{form}", form=["csv", "json"])},
+    category="Paper 2021",
+    settings=sections("paper2021", "experiment"),
+)
 
 
 rule gallery:

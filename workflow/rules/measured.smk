@@ -148,147 +148,80 @@ rule residuals:
         "../scripts/residuals.py"
 
 
-rule sample_measured:
+use rule sample_experiment as sample_measured with:
     input:
-        recordings=expand("results/measured/subsets/{{kind}}_T{samples}.nc", samples=SAMPLES),
-    output:
-        expand("results/{{scale}}/chains/{{kind}}_T{samples}.nc", samples=SAMPLES),
-    log:
-        "results/{scale}/logs/chains/{kind}.log",
-    benchmark:
-        "results/{scale}/benchmarks/chains/{kind}.tsv"
+        subsets=expand("results/measured/subsets/{{kind}}_T{samples}.nc", samples=SAMPLES),
     wildcard_constraints:
         kind=MEASURED_KINDS,
     priority: 9
-    threads: lambda wc: CORES.threads(wc.scale)
-    resources:
-        mem_mb=4000,
-        runtime=60,
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017", "paper2021", "experiment"),
-        code=code("sample_measured"),
+        settings=sections("paper2017", "paper2021", "experiment"),
+        lengths="measured_transitions",
+        code=code("sample_experiment"),
     message:
         "chains of {wildcards.kind} ({wildcards.scale})"
-    script:
-        "../scripts/sample_measured.py"
 
 
 use rule judge_experiment as judge_measured with:
     input:
         recordings=expand("results/measured/subsets/{{kind}}_T{samples}.nc", samples=SAMPLES),
-        chains=expand("results/{{scale}}/chains/{{kind}}_T{samples}.nc", samples=SAMPLES),
+        chains=of_samples("chains/{kind}_T{samples}.nc"),
     wildcard_constraints:
         kind=MEASURED_KINDS,
 
 
-rule figure_measured_residuals:
-    input:
-        summary="results/measured/residuals/{name}.csv",
-        histogram="results/measured/residuals/{name}_histogram.csv",
-    output:
-        **figure(
-            "residuals_{name}", "Measured", caption="measured_residuals", folder="results/measured"
-        ),
-    log:
-        "results/measured/logs/figures/residuals_{name}.log",
-    benchmark:
-        "results/measured/benchmarks/figures/residuals_{name}.tsv"
-    params:
-        **by("figures.measured.figure_measured_residuals"),
-        settings=effective(config, ""),
-    message:
-        "figure: residuals of {wildcards.name}"
-    script:
-        "../scripts/publish.py"
-
-
-rule figure_measured_noise:
-    input:
-        allan="results/measured/first_order/{name}_allan.csv",
-    output:
-        **figure("noise_{name}", "Measured", caption="measured_noise", folder="results/measured"),
-    log:
-        "results/measured/logs/figures/noise_{name}.log",
-    benchmark:
-        "results/measured/benchmarks/figures/noise_{name}.tsv"
-    params:
-        **by("figures.measured.figure_measured_noise"),
-        settings=effective(config, ""),
-    message:
-        "figure: noise of {wildcards.name}"
-    script:
-        "../scripts/publish.py"
-
-
-rule figure_measured_agreement:
-    input:
-        summary="results/measured/agreement/{group}.csv",
-        pairs="results/measured/agreement/{group}_pairs.csv",
-    output:
-        **figure(
-            "agreement_{group}",
-            "Measured",
-            caption="measured_agreement",
-            folder="results/measured",
-        ),
-    log:
-        "results/measured/logs/figures/agreement_{group}.log",
-    benchmark:
-        "results/measured/benchmarks/figures/agreement_{group}.tsv"
-    params:
-        **by("figures.measured.figure_measured_agreement"),
-        settings=effective(config, ""),
-    message:
-        "figure: agreement within {wildcards.group}"
-    script:
-        "../scripts/publish.py"
-
-
-rule table_measured_first_order:
-    input:
-        residuals=lambda wc: expand(
-            "results/measured/first_order/{name}_residuals.csv", name=MEASURED.board(wc.group)
-        ),
-        noise=lambda wc: expand(
-            "results/measured/first_order/{name}_noise.csv", name=MEASURED.board(wc.group)
-        ),
-    output:
-        **table(
-            "first_order_{group}",
-            "Measured",
-            caption="measured_first_order_table",
-            folder="results/measured",
-        ),
-    log:
-        "results/measured/logs/tables/first_order_{group}.log",
-    benchmark:
-        "results/measured/benchmarks/tables/first_order_{group}.tsv"
-    params:
-        **by("figures.measured.table_measured_first_order"),
-        names=lambda wc: MEASURED.board(wc.group),
-    message:
-        "table: first-order calibration of {wildcards.group}"
-    script:
-        "../scripts/publish.py"
-
-
-rule table_measured_agreement:
-    input:
-        summary="results/measured/agreement/{group}.csv",
-    output:
-        **table(
-            "agreement_{group}",
-            "Measured",
-            caption="measured_agreement_table",
-            folder="results/measured",
-        ),
-    log:
-        "results/measured/logs/tables/agreement_{group}.log",
-    benchmark:
-        "results/measured/benchmarks/tables/agreement_{group}.tsv"
-    params:
-        **by("figures.measured.table_measured_agreement"),
-    message:
-        "table: agreement within {wildcards.group}"
-    script:
-        "../scripts/publish.py"
+draw(
+    "measured.figure_measured_residuals",
+    "figure: residuals of {wildcards.name}",
+    {
+        "summary": "results/measured/residuals/{name}.csv",
+        "histogram": "results/measured/residuals/{name}_histogram.csv",
+    },
+    folder="results/measured",
+    output="residuals_{name}",
+    category="Measured",
+    settings=effective(config, ""),
+)
+draw(
+    "measured.figure_measured_noise",
+    "figure: noise of {wildcards.name}",
+    {"allan": "results/measured/first_order/{name}_allan.csv"},
+    folder="results/measured",
+    output="noise_{name}",
+    category="Measured",
+    settings=effective(config, ""),
+)
+draw(
+    "measured.figure_measured_agreement",
+    "figure: agreement within {wildcards.group}",
+    {
+        "summary": "results/measured/agreement/{group}.csv",
+        "pairs": "results/measured/agreement/{group}_pairs.csv",
+    },
+    folder="results/measured",
+    output="agreement_{group}",
+    category="Measured",
+    settings=effective(config, ""),
+)
+draw(
+    "measured.table_measured_first_order",
+    "table: first-order calibration of {wildcards.group}",
+    {
+        part: of_board(f"results/measured/first_order/{{name}}_{part}.csv")
+        for part in ("residuals", "noise")
+    },
+    folder="results/measured",
+    output="first_order_{group}",
+    category="Measured",
+    caption="measured_first_order_table",
+    names=lambda wc: MEASURED.board(wc.group),
+)
+draw(
+    "measured.table_measured_agreement",
+    "table: agreement within {wildcards.group}",
+    {"summary": "results/measured/agreement/{group}.csv"},
+    folder="results/measured",
+    output="agreement_{group}",
+    category="Measured",
+    caption="measured_agreement_table",
+)

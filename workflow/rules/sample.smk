@@ -14,7 +14,7 @@ rule sample_posterior:
         mem_mb=4000,
         runtime=90,
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2021"),
+        settings=sections("paper2021"),
         code=code("sample_posterior"),
     message:
         "chains, T = {wildcards.samples} ({wildcards.scale})"
@@ -24,12 +24,12 @@ rule sample_posterior:
 
 rule judge_chains:
     input:
-        recordings=expand("results/{{scale}}/recordings/T{samples}.nc", samples=SAMPLES),
-        chains=expand("results/{{scale}}/chains/T{samples}.nc", samples=SAMPLES),
+        recordings=of_samples("recordings/T{samples}.nc"),
+        chains=of_samples("chains/T{samples}.nc"),
     output:
-        verdicts=expand("results/{{scale}}/posterior/T{samples}.json", samples=SAMPLES),
-        coordinates=expand("results/{{scale}}/posterior/T{samples}.csv", samples=SAMPLES),
-        burn_ins=expand("results/{{scale}}/posterior/burn_in_T{samples}.csv", samples=SAMPLES),
+        verdicts=of_samples("posterior/T{samples}.json"),
+        coordinates=of_samples("posterior/T{samples}.csv"),
+        burn_ins=of_samples("posterior/burn_in_T{samples}.csv"),
     log:
         "results/{scale}/logs/posterior/samples.log",
     benchmark:
@@ -37,7 +37,7 @@ rule judge_chains:
     resources:
         mem_mb=4000,
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2021"),
+        settings=sections("paper2021"),
         code=code("judge_chains"),
     message:
         "chains of the simulation: burn-in, R-hat, effective sample size ({wildcards.scale})"

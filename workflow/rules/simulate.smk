@@ -1,13 +1,13 @@
 rule simulate_samples:
     output:
-        expand("results/{{scale}}/recordings/T{samples}.nc", samples=SAMPLES),
+        of_samples("recordings/T{samples}.nc"),
     log:
         "results/{scale}/logs/recordings/samples.log",
     benchmark:
         "results/{scale}/benchmarks/recordings/samples.tsv"
     priority: 10
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2021"),
+        settings=sections("paper2021"),
         code=code("simulate_samples"),
     message:
         "simulated recordings of 2021 ({wildcards.scale})"
@@ -23,7 +23,7 @@ rule simulate_experiment:
     benchmark:
         "results/{scale}/benchmarks/recordings/{kind}.tsv"
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2017", "paper2021", "experiment"),
+        settings=sections("paper2017", "paper2021", "experiment"),
         code=code("simulate_experiment"),
     message:
         "simulated experiment of 2021: {wildcards.kind} ({wildcards.scale})"

@@ -1,8 +1,8 @@
 rule sweep_variance:
     input:
-        recordings=expand("results/{{scale}}/recordings/T{samples}.nc", samples=SAMPLES),
+        recordings=of_samples("recordings/T{samples}.nc"),
     output:
-        expand("results/{{scale}}/tuning/variance_T{samples}.csv", samples=SAMPLES),
+        of_samples("tuning/variance_T{samples}.csv"),
     log:
         "results/{scale}/logs/tuning/variance.log",
     benchmark:
@@ -10,7 +10,7 @@ rule sweep_variance:
     priority: 10
     threads: lambda wc: CORES.threads(wc.scale)
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2021"),
+        settings=sections("paper2021"),
         code=code("sweep_variance"),
     message:
         "variance of the log-likelihood estimate over N ({wildcards.scale})"
@@ -20,10 +20,10 @@ rule sweep_variance:
 
 rule sweep_acceptance:
     input:
-        recordings=expand("results/{{scale}}/recordings/T{samples}.nc", samples=SAMPLES),
-        variances=expand("results/{{scale}}/tuning/variance_T{samples}.csv", samples=SAMPLES),
+        recordings=of_samples("recordings/T{samples}.nc"),
+        variances=of_samples("tuning/variance_T{samples}.csv"),
     output:
-        expand("results/{{scale}}/tuning/acceptance_T{samples}.csv", samples=SAMPLES),
+        of_samples("tuning/acceptance_T{samples}.csv"),
     log:
         "results/{scale}/logs/tuning/acceptance.log",
     benchmark:
@@ -31,7 +31,7 @@ rule sweep_acceptance:
     priority: 10
     threads: lambda wc: CORES.threads(wc.scale)
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2021"),
+        settings=sections("paper2021"),
         code=code("sweep_acceptance"),
     message:
         "acceptance over the step length ({wildcards.scale})"
@@ -41,16 +41,16 @@ rule sweep_acceptance:
 
 rule tune:
     input:
-        acceptances=expand("results/{{scale}}/tuning/acceptance_T{samples}.csv", samples=SAMPLES),
+        acceptances=of_samples("tuning/acceptance_T{samples}.csv"),
     output:
-        expand("results/{{scale}}/tuning/T{samples}.json", samples=SAMPLES),
+        of_samples("tuning/T{samples}.json"),
     log:
         "results/{scale}/logs/tuning/tune.log",
     benchmark:
         "results/{scale}/benchmarks/tuning/tune.tsv"
     priority: 10
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2021"),
+        settings=sections("paper2021"),
         code=code("tune"),
     message:
         "tuning: N and the step length ({wildcards.scale})"

@@ -18,7 +18,7 @@ rule pit_values:
         mem_mb=3000,
         runtime=240,
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2021", "validation"),
+        settings=sections("paper2021", "validation"),
         parts=lambda wc: CORES.parts(wc.scale),
         code=code("pit_values"),
     message:
@@ -38,7 +38,7 @@ rule joint_test:
         mem_mb=3000,
         runtime=120,
     params:
-        settings=lambda wc: effective(config, wc.scale, "paper2021", "validation"),
+        settings=sections("paper2021", "validation"),
         code=code("joint_test"),
     message:
         "validation: joint distribution test ({wildcards.scale})"
@@ -46,61 +46,25 @@ rule joint_test:
         "../scripts/joint_test.py"
 
 
-rule figure_validation_ranks:
-    input:
-        pit_values=lambda wc: expand(PIT_VALUES, scale=wc.scale, part=range(CORES.parts(wc.scale))),
-    output:
-        **figure("validation_ranks", "Validation"),
-    log:
-        "results/{scale}/logs/figures/validation_ranks.log",
-    benchmark:
-        "results/{scale}/benchmarks/figures/validation_ranks.tsv"
-    resources:
-        mem_mb=3000,
-    params:
-        **by("figures.uncertainty.figure_validation_ranks"),
-        settings=lambda wc: effective(config, wc.scale, "paper2021", "validation"),
-    message:
-        "figure: validation, ranks ({wildcards.scale})"
-    script:
-        "../scripts/publish.py"
-
-
-rule table_validation_coverage:
-    input:
-        pit_values=lambda wc: expand(PIT_VALUES, scale=wc.scale, part=range(CORES.parts(wc.scale))),
-    output:
-        **table("validation_coverage"),
-    log:
-        "results/{scale}/logs/tables/validation_coverage.log",
-    benchmark:
-        "results/{scale}/benchmarks/tables/validation_coverage.tsv"
-    resources:
-        mem_mb=3000,
-    params:
-        **by("figures.uncertainty.table_validation_coverage"),
-        settings=lambda wc: effective(config, wc.scale, "paper2021", "validation"),
-    message:
-        "table: validation, coverage ({wildcards.scale})"
-    script:
-        "../scripts/publish.py"
-
-
-rule table_validation_joint:
-    input:
-        rows="results/{scale}/validation/joint.csv",
-    output:
-        **table("validation_joint"),
-    log:
-        "results/{scale}/logs/tables/validation_joint.log",
-    benchmark:
-        "results/{scale}/benchmarks/tables/validation_joint.tsv"
-    resources:
-        mem_mb=3000,
-    params:
-        **by("figures.uncertainty.table_validation_joint"),
-        settings=lambda wc: effective(config, wc.scale, "paper2021", "validation"),
-    message:
-        "table: validation, joint distribution test ({wildcards.scale})"
-    script:
-        "../scripts/publish.py"
+ALL_PIT_VALUES = {
+    "pit_values": lambda wc: expand(PIT_VALUES, scale=wc.scale, part=range(CORES.parts(wc.scale)))
+}
+draw(
+    "uncertainty.figure_validation_ranks",
+    "figure: validation, ranks ({wildcards.scale})",
+    ALL_PIT_VALUES,
+    category="Validation",
+    settings=sections("paper2021", "validation"),
+)
+draw(
+    "uncertainty.table_validation_coverage",
+    "table: validation, coverage ({wildcards.scale})",
+    ALL_PIT_VALUES,
+    settings=sections("paper2021", "validation"),
+)
+draw(
+    "uncertainty.table_validation_joint",
+    "table: validation, joint distribution test ({wildcards.scale})",
+    {"rows": "results/{scale}/validation/joint.csv"},
+    settings=sections("paper2021", "validation"),
+)

@@ -1,5 +1,6 @@
-"""Chains for figure 5 and table II: T disjoint samples of a recording, sigma_a enlarged.
+"""Chains for figure 5 and table II: T samples of a recording, sigma_a enlarged.
 
+Of a simulated recording they are chosen here; measured ones come chosen, from a board of their own.
 N and sigma_q are tuned here, on the subset itself, as in section III-C.
 """
 
@@ -9,15 +10,22 @@ with job(snakemake) as settings:
     from imuarray.recording import read_recording
     from imuarray_papers.studies.bayes import sample_paired, select_disjoint, tuned_experiment
 
-    kind, lengths = snakemake.wildcards.kind, settings["scale"]["experiment_transitions"]
-    whole = read_recording(snakemake.input.recording)
-    subsets = select_disjoint(whole, settings["paper2021"]["samples"])
-    for samples, path in zip(settings["paper2021"]["samples"], snakemake.output, strict=True):
-        names = ("experiment", kind, samples)
-        recording = whole.select(subsets[samples])
-        target, step, record = tuned_experiment(settings, recording, names, snakemake.threads)
+    kind, counts = snakemake.wildcards.kind, settings["paper2021"]["samples"]
+    lengths, threads = settings["scale"][snakemake.params.lengths], snakemake.threads
+    measured = "subsets" in snakemake.input.keys()
+    if measured:
+        recordings = [read_recording(path) for path in snakemake.input.subsets]
+    else:
+        whole = read_recording(snakemake.input.recording)
+        chosen = select_disjoint(whole, counts)
+        recordings = [whole.select(chosen[samples]) for samples in counts]
+    for samples, recording, path in zip(counts, recordings, snakemake.output, strict=True):
+        given, names = settings, ("experiment", kind, samples)
+        if measured:
+            board = {"positions": recording.accelerometer_position.tolist(),
+                     "labels": list(recording.accelerometer_labels)}  # fmt: skip
+            given = {**settings, "array": board}
+        target, step, record = tuned_experiment(given, recording, names, threads)
         attrs = {"samples": samples, "draws_per_sample": target.draws, **record}
         steps = lengths[f"T{samples}"]
-        sample_paired(
-            settings, recording, target, step, steps, names, path, attrs, snakemake.threads
-        )
+        sample_paired(given, recording, target, step, steps, names, path, attrs, threads)

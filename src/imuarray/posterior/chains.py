@@ -5,8 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from imuarray.provenance import write_netcdf
-
 
 @dataclass(frozen=True)
 class Chains:
@@ -28,11 +26,6 @@ class Chains:
     def steps(self) -> int:
         """Transitions made by each chain."""
         return self.draws.shape[1] * self.thin
-
-
-def write_chains(path, chains: Chains, labels, prior, attrs: dict) -> None:
-    """Write what `chain_tree` makes of the chains."""
-    write_netcdf(chain_tree(chains, labels, prior, attrs), path)
 
 
 def chain_tree(chains: Chains, labels, prior, attrs: dict, effects=(), sds=None) -> xr.DataTree:
@@ -74,7 +67,7 @@ def chain_tree(chains: Chains, labels, prior, attrs: dict, effects=(), sds=None)
 
 
 def read_chains(path) -> tuple[Chains, xr.DataTree]:
-    """The chains and the whole tree of a file that `write_chains` made."""
+    """The chains and the whole tree in a file of what `chain_tree` made."""
     with xr.open_datatree(path, engine="h5netcdf") as opened:
         tree = opened.load()
     return chains_of(tree), tree

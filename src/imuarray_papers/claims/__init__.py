@@ -8,7 +8,6 @@ from imuarray_papers.claims import (
     error2017,
     estimator2021,
     experiment2021,
-    measured2021,
     posterior2021,
     rate2017,
     theory2017,

@@ -45,7 +45,7 @@ def _position_block(force, state, rows, values, A, positions):
 
 
 @njit
-def block_descent(data, positions, tolerance, cost_tolerance, limit, marks):
+def block_descent(data, positions, tolerance, limit, marks):
     """Algorithm 1 on a recording's `Arrays`; ``positions`` (A, 3) is start and result.
 
     Returns (status, cost (n,), step (n,), snapshots (S, A, 3)) as `Calibration` has them after n
@@ -69,7 +69,7 @@ def block_descent(data, positions, tolerance, cost_tolerance, limit, marks):
         cost[done] = work.cost.sum() + work.reduced.const.sum()
         moved[done] = step
         fallen = cost[max(done - 1, 0)] - cost[done]
-        flat = done > 0 and fallen <= cost_tolerance * abs(cost[done])
+        flat = done > 0 and fallen <= 0.0
         done += 1
         while mark < len(marks) and marks[mark] == done:
             snapshots[mark] = positions
@@ -87,7 +87,6 @@ def calibrate_bcd(
     start=None,
     saturated=None,
     tolerance: float = 1e-10,
-    cost_tolerance: float = 0.0,
     limit: int = 5000,
     marks=(),
 ) -> Calibration:
@@ -97,9 +96,7 @@ def calibrate_bcd(
     ----------
     start : (A, 3) m or None for the nominal positions
     tolerance : float, m
-        Stop when no position moved by more in one iteration.
-    cost_tolerance : float
-        ... or when the cost fell by less than this, relatively.
+        Stop when no position moved by more in one iteration, or when the cost no longer fell.
     limit : int
         Largest number of iterations; ``converged`` says whether it was hit.
     marks : sequence of int
@@ -116,9 +113,7 @@ def calibrate_bcd(
     """
     data, positions = arranged(model, specific_force, angular_rate, start, saturated)
     marks = np.asarray(sorted(marks), np.int64)
-    status, *path = block_descent(
-        data.arrays, positions, float(tolerance), float(cost_tolerance), limit, marks
-    )
+    status, *path = block_descent(data.arrays, positions, float(tolerance), limit, marks)
     explain(status)
     require_rotation([data], positions)  # again: the start's errors no longer blur the motion
     motion = motion_from(data, positions)

@@ -122,13 +122,12 @@ def bcd_positions(recording: Recording, accelerometer_sd: float) -> Positions:
 
 
 def position_table(found: Positions, labels, /, **columns) -> pd.DataFrame:
-    """One row a coordinate: accelerometer, axis, mean_m, sd_m and ``columns`` in front."""
-    rows = [(label, axis) for label in labels[1:] for axis in "xyz"]
-    table = pd.DataFrame(rows, columns=["accelerometer", "axis"])
-    table["mean_m"], table["sd_m"] = found.mean[1:].ravel(), found.sd.ravel()
-    for place, (name, value) in enumerate(columns.items()):
-        table.insert(place, name, value)
-    return table
+    """One row a coordinate: ``columns``, then accelerometer, axis, mean_m, sd_m."""
+    others = labels[1:]
+    return pd.DataFrame({
+        **columns, "accelerometer": np.repeat(others, 3), "axis": list("xyz") * len(others),
+        "mean_m": found.mean[1:].ravel(), "sd_m": found.sd.ravel(),
+    })  # fmt: skip
 
 
 def pairwise(table: pd.DataFrame) -> pd.DataFrame:

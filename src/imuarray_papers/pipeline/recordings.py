@@ -1,7 +1,7 @@
 """Names and paths of the measured part: what the configured recordings ask for."""
 
-FIGURE = ("pdf", "png", "csv")  # endings of what a drawing rule writes
-TABLE = ("csv", "tex", "md")
+from imuarray_papers.pipeline.rules import FIGURE, TABLE
+
 DIAGNOSED = ("positions", "parameters", "recordings")  # tables of a board's diagnoses
 
 

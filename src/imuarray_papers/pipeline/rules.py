@@ -4,6 +4,8 @@ import hashlib
 import re
 from pathlib import Path
 
+FIGURE = ("pdf", "png", "csv")  # endings of what a drawing rule writes
+TABLE = ("csv", "tex", "md")
 SIZES = {  # the sizes of a scale that a section of the configuration goes with
     "paper2017": ("realisations", "rate_points"),
     "paper2021": ("variance_realisations", "acceptance_steps", "draws", "transitions"),
@@ -23,7 +25,9 @@ def effective(config: dict, scale: str, *sections: str) -> dict:
     """
     found = {name: config[name] for name in ALWAYS}
     if "file" in config["array"]:  # results rest on what is in it
-        found["array_contents"] = contents(config["array"]["file"])
+        file = Path(config["array"]["file"])
+        digest = hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else ""
+        found["array_contents"] = [digest]
     sizes = {}
     for section in sections:
         name, _, figure = section.partition(".")
@@ -39,27 +43,21 @@ def blind_settings(config: dict, scale: str) -> dict:
     return {"seed": config["seed"], "scale": {"name": scale, "cases": cases}}
 
 
-def figure(name: str, category: str, caption: str = "", folder: str = "results/{scale}") -> dict:
-    """Outputs of a rule that draws: PDF, PNG for the report, and the numbers drawn."""
-    from snakemake.io import report
-
-    path = f"{folder}/figures/{name}"
-    caption = f"../report/{caption or name}.rst"
-    png = report(f"{path}.png", caption=caption, category=category)
-    return {"pdf": f"{path}.pdf", "png": png, "csv": f"{path}.csv"}
-
-
-def table(
-    name: str, category: str = "", caption: str = "", folder: str = "results/{scale}"
+def drawn(
+    kind: str, name: str, category: str = "", caption: str = "", folder: str = "results/{scale}"
 ) -> dict:
-    """Outputs of a rule that writes a table: CSV (in a report's category), LaTeX, Markdown."""
+    """Outputs, by ending, of a rule that makes a "figure" or a "table".
+
+    A figure's PNG or a table's CSV is in the report, if that has a ``category`` for it.
+    """
     from snakemake.io import report
 
-    path = f"{folder}/tables/{name}"
-    csv = f"{path}.csv"
+    endings, shown = {"figure": (FIGURE, "png"), "table": (TABLE, "csv")}[kind]
+    files = {ending: f"{folder}/{kind}s/{name}.{ending}" for ending in endings}
     if category:
-        csv = report(csv, caption=f"../report/{caption or name}.rst", category=category)
-    return {"csv": csv, "tex": f"{path}.tex", "md": f"{path}.md"}
+        caption = f"../report/{caption or name}.rst"
+        files[shown] = report(files[shown], caption=caption, category=category)
+    return files
 
 
 class CoreBudget:
@@ -76,12 +74,6 @@ class CoreBudget:
     def parts(self, scale: str, study: str = "samples") -> int:
         """Jobs that the realisations of a study are dealt to; those but "samples" are small."""
         return self.scales[scale]["parts"] if study == "samples" else 1
-
-
-def contents(*paths: str) -> list[str]:
-    """SHA-256 of files outside the pipeline: a parameter that changes when one does."""
-    files = [Path(path) for path in paths]
-    return [hashlib.sha256(f.read_bytes()).hexdigest() if f.is_file() else "" for f in files]
 
 
 def read_by(page: str) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,32 +14,9 @@ from imuarray_papers.posterior.likelihood import Likelihood
 WALK = np.empty(0), np.empty((0, 0))  # no centre, no factor: the walk (27)
 
 
-class Target:
-    """A posterior density estimated with fresh randomness at each evaluation.
-
-    ``estimate(theta, rng)`` gives log p-hat at theta (size,), positions first.
-    """
-
-    prior: GaussianPrior
-    estimate: Callable
-
-    @property
-    def size(self) -> int:
-        """Number of parameters."""
-        return self.prior.mean.size
-
-    def log_target(self, theta, rng) -> float:
-        """log prior + log p-hat with fresh draws."""
-        return self.prior.log_density(theta) + self.estimate(theta, rng)
-
-    def transitions(self, theta, log_target, step, count, rng) -> tuple[int, float]:
-        """Advance ``theta`` in place by ``count`` steps; (accepted, the last log target)."""
-        raise NotImplementedError
-
-
 @dataclass(frozen=True)
-class CompiledTarget(Target):
-    """The papers' model: theta are the positions r_2 ... r_A, everything compiled.
+class CompiledTarget:
+    """The posterior of theta, the positions r_2 ... r_A, with draws of omega anew at each estimate.
 
     With a ``centre`` (size,) and a ``factor`` (lower (size, size)) proposals are preconditioned
     Crank-Nicolson: they leave the normal density of that mean and covariance factor factor' as it
@@ -56,12 +32,16 @@ class CompiledTarget(Target):
     centre: np.ndarray | None = None
     factor: np.ndarray | None = None
 
-    def estimate(self, theta, rng) -> float:
-        """log p-hat."""
-        return self.likelihood.estimate(positions_of(theta), self.draws, rng)
+    def log_target(self, theta, rng) -> float:
+        """log prior + log p-hat with fresh draws."""
+        estimate = self.likelihood.estimate(positions_of(theta), self.draws, rng)
+        return self.prior.log_density(theta) + estimate
 
     def transitions(self, theta, log_target, step, count, rng) -> tuple[int, float]:
-        """`Target.transitions`, compiled; releases the interpreter for other chains."""
+        """Advance ``theta`` in place by ``count`` steps; (accepted, the last log target).
+
+        Compiled; releases the interpreter for other chains.
+        """
         prior = np.stack([self.prior.mean, self.prior.sd**-2.0])
         shape = WALK if self.centre is None else (self.centre, self.factor)
         return kernels.transitions(

@@ -9,7 +9,7 @@ import numpy as np
 from imuarray.geometry import positions_of
 from imuarray.posterior.prior import GaussianPrior
 from imuarray_papers.posterior.likelihood import Likelihood
-from imuarray_papers.posterior.target import CompiledTarget, Target
+from imuarray_papers.posterior.target import CompiledTarget
 
 
 class Sweeps(NamedTuple):
@@ -27,7 +27,6 @@ class Tuned(NamedTuple):
     """The walk (27) ready to run."""
 
     target: CompiledTarget
-    start: np.ndarray  # (P,) m, near the posterior's mode
     step: float  # m, sigma_q
     variances: np.ndarray  # of log p-hat with omega from p(omega | y_g), for each N tried
     centred: bool  # whether omega is drawn around the integrand's mode instead
@@ -51,19 +50,6 @@ def tune(
     may_centre : bool
         False: omega from p(omega | y_g), however large the variance.
     """
-    likelihood, draws, start, variances, centred = _tuned_draws(
-        likelihood, positions, mode, sweeps, rng, threads, may_centre
-    )
-    target = CompiledTarget(likelihood, prior, draws)
-    step = tune_step(
-        target, start, sweeps.steps, sweeps.transitions, rng("acceptance"), sweeps.acceptance,
-        threads,
-    )  # fmt: skip
-    return Tuned(target, start, step, variances, centred)
-
-
-def _tuned_draws(likelihood, positions, mode, sweeps, rng, threads, may_centre):
-    """(likelihood, N, start (P,), variances at first, whether omega is now drawn elsewhere)."""
 
     def variances(likelihood, positions):
         return variance_sweep(
@@ -76,13 +62,12 @@ def _tuned_draws(likelihood, positions, mode, sweeps, rng, threads, may_centre):
     if centred:
         likelihood = likelihood.centred(positions_of(start))
         found = variances(likelihood, positions_of(start))
-    return likelihood, choose_draws(sweeps.draws, found, sweeps.variance), start, first, centred
-
-
-def tune_step(target: Target, start, steps, transitions: int, rng, aim=0.18, threads=1) -> float:
-    """The step length at which the acceptance crosses ``aim``, from ``start`` (P,)."""
-    rates = acceptance_sweep(target, start, steps, transitions, rng, threads)
-    return choose_step(steps, rates, aim)
+    draws = choose_draws(sweeps.draws, found, sweeps.variance)
+    target = CompiledTarget(likelihood, prior, draws)
+    rates = acceptance_sweep(
+        target, start, sweeps.steps, sweeps.transitions, rng("acceptance"), threads
+    )
+    return Tuned(target, choose_step(sweeps.steps, rates, sweeps.acceptance), first, centred)
 
 
 def tune_preconditioned(
@@ -94,33 +79,31 @@ def tune_preconditioned(
     with the largest expected squared jump.
     """
     tried = Sweeps(lengths)
-    likelihood, draws, *_ = _tuned_draws(
-        likelihood, positions_of(centre), lambda _: centre, tried, lambda _: rng, 1, False
-    )
+    found = variance_sweep(likelihood, positions_of(centre), tried.draws, tried.realisations, rng)
+    draws = choose_draws(tried.draws, found, tried.variance)
     target = CompiledTarget(likelihood, prior, draws, centre, factor)
     rates = acceptance_sweep(target, centre, lengths, tried.transitions, rng)
     return target, float(lengths[np.argmax(rates * np.square(lengths))])
 
 
-def _each(function, jobs, threads: int) -> np.ndarray:
-    """``function`` of every job on ``threads`` threads; the kernels release the interpreter."""
+def _each(function, values, rng, threads: int) -> np.ndarray:
+    """``function`` of each value and a stream of its own, which ``rng`` spawns.
+
+    So the threads do not matter; the kernels release the interpreter.
+    """
     with ThreadPoolExecutor(threads) as pool:
-        return np.array(list(pool.map(function, jobs)))
+        return np.array(list(pool.map(function, values, rng.spawn(len(values)))))
 
 
 def variance_sweep(
     likelihood: Likelihood, positions, draws, count: int, rng, threads: int = 1
 ) -> np.ndarray:
-    """Variance of log p-hat at ``positions`` for each N in ``draws`` (figure 2), (len(draws),).
+    """Variance of log p-hat at ``positions`` for each N in ``draws`` (figure 2), (len(draws),)."""
 
-    Each N has a stream spawned from ``rng``, so the threads do not matter.
-    """
-
-    def one(job):
-        number, own = job
+    def one(number, own):
         return likelihood.realisations(positions, number, count, own).var(ddof=1)
 
-    return _each(one, list(zip(draws, rng.spawn(len(draws)), strict=True)), threads)
+    return _each(one, draws, rng, threads)
 
 
 def choose_draws(draws, variances, target: float = 0.1) -> int:
@@ -135,7 +118,7 @@ def choose_draws(draws, variances, target: float = 0.1) -> int:
     return max(1, int(np.ceil(scale / target)))
 
 
-def acceptance(target: Target, start, step: float, count: int, rng) -> float:
+def acceptance(target: CompiledTarget, start, step: float, count: int, rng) -> float:
     """Share of accepted proposals over ``count`` transitions, after as many of burn-in."""
     theta = np.array(start, float)
     value = target.log_target(theta, rng)
@@ -144,14 +127,15 @@ def acceptance(target: Target, start, step: float, count: int, rng) -> float:
     return accepted / count
 
 
-def acceptance_sweep(target: Target, start, steps, count: int, rng, threads: int = 1) -> np.ndarray:
-    """`acceptance` for each sigma_q in ``steps`` (metres), (len(steps),); streams as above."""
+def acceptance_sweep(
+    target: CompiledTarget, start, steps, count: int, rng, threads: int = 1
+) -> np.ndarray:
+    """`acceptance` for each sigma_q in ``steps`` (metres), (len(steps),)."""
 
-    def one(job):
-        step, own = job
+    def one(step, own):
         return acceptance(target, start, step, count, own)
 
-    return _each(one, list(zip(steps, rng.spawn(len(steps)), strict=True)), threads)
+    return _each(one, steps, rng, threads)
 
 
 def choose_step(steps, rates, target: float = 0.18) -> float:

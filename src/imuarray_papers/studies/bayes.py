@@ -5,9 +5,9 @@ import numpy as np
 from imuarray.estimation.selection import disjoint, neighbours
 from imuarray.geometry import Array
 from imuarray.motion import hand_twisting, normal_motion
-from imuarray.posterior.chains import write_chains
+from imuarray.posterior.chains import chain_tree
 from imuarray.posterior.prior import GaussianPrior
-from imuarray.provenance import code_digest, digest, stamp
+from imuarray.provenance import code_digest, digest, stamp, write_netcdf
 from imuarray.recording import Recording
 from imuarray.simulation.recordings import simulate_recording, simulate_samples
 from imuarray.streams import stream
@@ -164,5 +164,5 @@ def sample_paired(settings, recording, target, step, transitions, names, path, a
         checkpoint=checkpoint, key=key, threads=threads,
     )  # fmt: skip
     labels = recording.accelerometer_labels[1:]
-    write_chains(path, chains, labels, target.prior, {**stamp(settings, seed), **attrs})
+    write_netcdf(chain_tree(chains, labels, target.prior, stamp(settings, seed) | attrs), path)
     checkpoint.unlink(missing_ok=True)

@@ -33,7 +33,7 @@ def calibrate_batch(model, rng, count, case, options):
         data = Collapsed.of(model, made.force[i], made.rate[i], made.saturated[i])
         positions = model.array.relative.copy()
         status[i], cost, _, snapshots = block_descent(
-            data.arrays, positions, options["tolerance"], 0.0, max(options["marks"]), marks
+            data.arrays, positions, options["tolerance"], max(options["marks"]), marks
         )
         iterations[i] = len(cost)
         if status[i] >= 0:

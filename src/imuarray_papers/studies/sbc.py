@@ -60,10 +60,15 @@ def of_draws(setting: Setting, made, draws, name: str) -> np.ndarray:
         both = np.vstack([one.truth, thetas])
         misfits = [misfit(one.likelihood, theta) for theta in both]
         values = np.column_stack([both, _size(setting, both), misfits])
-        rank = np.sum(values[1:] < values[0], axis=0)
         rng = stream(setting.seed, "calibrated", name, setting.name, setting.samples, one.number)
-        out.append((rank + rng.random(rank.size)) / (len(thetas) + 1))
+        out.append(_pit(values, rng))
     return np.array(out)
+
+
+def _pit(values, rng) -> np.ndarray:
+    """Where the first of ``values`` (L + 1, Q) lies among the others, (Q,) in (0, 1)."""
+    rank = np.sum(values[1:] < values[0], axis=0)
+    return (rank + rng.random(rank.size)) / len(values)
 
 
 def independent(draws) -> np.ndarray:
@@ -282,7 +287,7 @@ def pit_values_by_default(
     Coordinates, the effects' parameters, and the array's size along its nominal shape.
     """
     size = setting.prior.mean / np.linalg.norm(setting.prior.mean)
-    names = [f"{label}_{axis}" for label in setting.model.array.labels[1:] for axis in "xyz"]
+    names = names_of(setting)[: size.size]
     names += [f"effect_{place}" for place in range(setting.model.effect_size)]
 
     def one(number: int) -> pd.DataFrame:
@@ -291,10 +296,8 @@ def pit_values_by_default(
         draws = chains_of(tree).draws[..., : len(names)]
         both = np.vstack([truth, draws.reshape(-1, len(names))])
         both = np.column_stack([both, both[:, : size.size] @ size])
-        rank = np.sum(both[1:] < both[0], axis=0)
         where = setting.name, setting.samples, number
-        rng = stream(setting.seed, "calibrated", METHOD, "rank", *where)
-        pit = (rank + rng.random(rank.size)) / len(both)
+        pit = _pit(both, stream(setting.seed, "calibrated", METHOD, "rank", *where))
         return pd.DataFrame(
             {"setting": setting.name, "method": METHOD, "samples": setting.samples,
              "replicate": number, "quantity": [*names, "size"], "pit": pit,
