@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import imuarray
-from imuarray.analysis.beyond import posterior_beyond
 from imuarray.analysis.calibration import fitted_beyond
-from imuarray.analysis.density import traced
+from imuarray.analysis.density import posterior_beyond, traced
 from imuarray.analysis.known import _choose, _hidden, fused, past_rail
 from imuarray.cli import main
 from imuarray.errors import InputError

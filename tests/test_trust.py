@@ -13,7 +13,7 @@ from imuarray.analysis import trust
 from imuarray.analysis.drawing import Places, departures
 from imuarray.analysis.misfit import residuals, unsteady
 from imuarray.analysis.rigid import slope, turning
-from imuarray.analysis.suspects import clipped, suspects, told, wrapped
+from imuarray.analysis.suspects import clipped, suspects, wrapped
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.firstorder.correct import corrected
@@ -266,13 +266,13 @@ def test_the_motion_of_a_rigid_array():
 
 def test_two_suspects_are_both_named(sound):
     recording = one(turned(20)(sound), 5, late)
-    assert told(suspects(recording)) == ["IMU 3 is turned by 20 degrees", "IMU 6 is 1 sample late"]
+    assert suspects(recording) == ["IMU 3 is turned by 20 degrees", "IMU 6 is 1 sample late"]
 
 
 def test_a_delay_among_samples_that_are_no_course(sound):
     few = one(sound, 2, late, GYROSCOPE).select(slice(0, None, 7))
     shaken = np.sort(np.random.default_rng(0).uniform(0, 8, len(few.time)))
-    assert told(suspects(replace(few, time=shaken))) == ["gyroscope 3 is 8 ms late"]
+    assert suspects(replace(few, time=shaken)) == ["gyroscope 3 is 8 ms late"]
 
 
 def test_samples_too_far_apart_for_an_integral_give_none(sound):

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 import numpy as np
 import xarray as xr
 
-from imuarray.errors import LARGEST, SMALLEST, InputError
+from imuarray.errors import LARGEST, SMALLEST, InputError, one_line
 from imuarray.model.effects import DATA_EFFECTS, EFFECTS, KINDS, own_version
 from imuarray.recording import Recording
 from imuarray.recording.record import CLOCKS, CORRECTION, DIMENSIONS, MATRICES
@@ -81,6 +81,16 @@ def is_of(recording: Recording, calibration: xr.Dataset) -> bool:
     rate, there = np.median(recording.angular_rate, axis=1), calibration["angular_rate"].to_numpy()
     here = np.stack([np.interp(time[inside], recording.time, axis) for axis in rate.T], axis=1)
     return bool(np.median(np.abs(here - there[inside])) < SAME * np.median(np.abs(there[inside])))
+
+
+def reasons_of(calibration: xr.Dataset) -> list[str]:
+    """Why a calibration is not to be trusted, as its file says; none for one that is."""
+    try:
+        return [one_line(str(reason)) for reason in json.loads(calibration.attrs["reasons"])]
+    except KeyError:
+        return []
+    except (ValueError, TypeError):
+        raise InputError("expected the attribute reasons as a JSON list, found another") from None
 
 
 def _require_numbers(variable: xr.DataArray, dimensions: tuple[str, ...]) -> None:

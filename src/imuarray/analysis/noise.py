@@ -8,13 +8,7 @@ import numpy as np
 from imuarray.analysis.model import Say, silent
 from imuarray.engine.derivatives import no_derivatives
 from imuarray.engine.fit import pick
-from imuarray.engine.linearise import (
-    CHUNK,
-    Eliminated,
-    State,
-    chunk_at,
-    directions_of,
-)
+from imuarray.engine.linearise import CHUNK, Eliminated, State, chunk_at, directions_of
 from imuarray.engine.parameters import Columns, columns_of
 from imuarray.engine.readings import Readings, measured
 from imuarray.estimation.identifiability import Calibration
@@ -99,6 +93,12 @@ def _factors(squares, freedom, apart: int) -> np.ndarray:
     return np.sqrt(np.maximum(squares / freedom, 1e-12))
 
 
+def noise_of(readings: Readings) -> Noise:
+    """The readings' sds (N, 2), as a model has them."""
+    counts = readings.exists.sum(axis=0)
+    return Noise.of(*counts, *(readings.sd[:n, kind] for kind, n in enumerate(counts)))
+
+
 def estimated_noise(
     recording: Recording, model: ArrayModel, fit, known=(False, False), say: Say = silent
 ) -> Fitted:
@@ -114,17 +114,15 @@ def estimated_noise(
     known : (bool, bool)
         Whether the accelerometers' noise, the gyroscopes', is the model's own.
     """
-    counts, columns = (
-        (model.array.accelerometers, model.array.gyroscopes),
-        columns_of(model.array, (), recording.position_prior_sd),
-    )
+    columns = columns_of(model.array, (), recording.position_prior_sd)
     readings = measured(
         model, recording.specific_force, recording.angular_rate, recording.saturated_gyroscopes()
     )
     for number in range(ROUNDS + 1):
         found = fit(model)
         motion = np.hstack(found.motion.motion[:3])
-        state = State(motion, found.positions, np.empty(0), no_derivatives(len(motion), counts[0]))
+        rest = no_derivatives(len(motion), len(found.positions))
+        state = State(motion, found.positions, np.empty(0), rest)
         seen = shown(readings, columns, state, columns.owner, found.covariance)
         wrong = factors(seen, readings.exists, known)
         if np.abs(np.log(wrong)).max() < ENOUGH:
@@ -133,6 +131,5 @@ def estimated_noise(
             say("the estimates of noise and positions did not settle; the last ones are taken")
             break
         readings = readings.with_sd(readings.sd * wrong)
-        sds = (readings.sd[:n, kind] for kind, n in enumerate(counts))
-        model = replace(model, noise=Noise.of(*counts, *sds))
+        model = replace(model, noise=noise_of(readings))
     return Fitted(model, found, seen.motion_sd, seen.freedom.sum(axis=0))

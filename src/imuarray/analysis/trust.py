@@ -5,7 +5,6 @@ leave no residual. What is known besides is the drawing, that rates and forces a
 and that still poses show gravity.
 """
 
-import json
 import re
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -15,10 +14,10 @@ import numpy as np
 import xarray as xr
 from scipy.special import stdtr
 
-from imuarray.analysis.checked import FEW, is_of
+from imuarray.analysis.checked import FEW, is_of, reasons_of
 from imuarray.analysis.drawing import FAR, Places, another_size, departures, size_of
 from imuarray.analysis.misfit import RESIDUAL, is_papers, residuals, rigid, unfitting, unsteady
-from imuarray.analysis.rigid import SLOPE, Slope, elsewhere, kept, slope, turning
+from imuarray.analysis.rigid import COHERENT, SLOPE, Slope, elsewhere, kept, slope, turning
 from imuarray.analysis.suspects import MIRRORED, clipped, common, gravity, wrapped
 from imuarray.firstorder.correct import FirstOrder
 from imuarray.model.effects import EFFECTS, KINDS, Effect
@@ -58,8 +57,7 @@ def of_first_order(found: FirstOrder) -> Poses:
     common = None if found.gyroscopes is None else found.gyroscopes.common
     scale = np.nan if common is None or isinstance(common, str) else common.scale
     fit = found.triads
-    chance = _chance(found.gyroscope_matrix) if scale == scale else 1.0
-    return Poses(fit.residual_ratio, _worst(fit.residual, fit.relied), scale, chance)
+    return _poses(fit.residual_ratio, fit.residual, fit.relied, scale, found.gyroscope_matrix)
 
 
 def of_file(path) -> Poses:
@@ -69,11 +67,17 @@ def of_file(path) -> Poses:
             return Poses()
         stored = file[FIRST_ORDER]
         ratio = float(np.ravel(stored.attrs.get("residual_ratio", 1.0))[0])
-        residual = _worst(stored["residual"][:], stored["used"][:] != 0)
         common = stored["gyroscope_common"][:] if "gyroscope_common" in stored else [[np.nan]]
-        scale = float(np.trace(common) / 3)
-        chance = _chance(stored["gyroscope_matrix"][:]) if scale == scale else 1.0
-    return Poses(ratio, residual, scale, chance)
+        maps = stored["gyroscope_matrix"][:] if "gyroscope_matrix" in stored else None
+        residual, used = stored["residual"][:], stored["used"][:] != 0
+    return _poses(ratio, residual, used, float(np.trace(common) / 3), maps)
+
+
+def _poses(ratio: float, residual, used, scale: float, maps) -> Poses:
+    """With residuals (P, A, 3) where they are ``used`` (P, A), gyroscopes' ``maps`` (G, 3, 3)."""
+    squares = np.where(used[..., None], residual**2, np.nan)
+    worst = np.sqrt(np.nanmax(np.nanmean(np.ascontiguousarray(squares), axis=(0, 2))))
+    return Poses(ratio, float(worst), scale, _chance(maps) if scale == scale else 1.0)
 
 
 def _chance(matrices) -> float:
@@ -81,12 +85,6 @@ def _chance(matrices) -> float:
     scales = np.linalg.norm(matrices, axis=1).ravel() - 1
     sd = scales.std(ddof=1) / np.sqrt(scales.size)
     return float(2 * stdtr(scales.size - 1, -abs(scales.mean()) / max(sd, 1e-300)))
-
-
-def _worst(residual, used) -> float:
-    """Rms of the worst triad, of residuals (P, A, 3) where they are ``used`` (P, A)."""
-    squares = np.where(used[..., None], residual**2, np.nan)
-    return float(np.sqrt(np.nanmax(np.nanmean(np.ascontiguousarray(squares), axis=(0, 2)))))
 
 
 def reasons_of_poses(*several: Poses) -> list[str]:
@@ -128,7 +126,7 @@ def reasons_of_calibration(
     little: list[str] = []
     limit = RESIDUAL if is_papers(calibration) else TRIAD
     for number, recording in enumerate(several, 1):
-        places = _places(recording, calibration["position"].to_numpy(), _covariance(calibration))
+        places = _places_of(recording, calibration)
         residual = residuals(recording, calibration, places)
         if len(several) == 1:
             little = _little(recording, places)
@@ -183,10 +181,10 @@ def reasons_of_posterior(
 
     ``spread``: whether the gyroscopes' disagreement is allowed for.
     """
-    draws = posterior["posterior"]["position"].to_numpy().reshape(-1, _size(recording))
-    covariance = np.zeros((_size(recording) + 3,) * 2)
-    covariance[3:, 3:] = np.cov(draws, rowvar=False)
-    places = _places(recording, np.vstack([np.zeros(3), draws.mean(0).reshape(-1, 3)]), covariance)
+    draws = np.concatenate(posterior["posterior"]["position"].to_numpy())  # of r_2 ... r_A
+    draws = np.insert(draws, 0, 0.0, axis=1)
+    covariance = np.cov(draws.reshape(len(draws), -1), rowvar=False)
+    places = _places(recording, draws.mean(axis=0), covariance)
     plain = "effect_parameter" not in posterior["posterior"]
     residual = rigid(recording, places, spread) if plain else {}
     found = _little(recording, places) + _judged(recording, places, residual) + _drifts(recording)
@@ -202,8 +200,7 @@ def reasons_of_motion(
     ``own_clocks``: whether `imuarray.apply` has found the recording's own; ``as_read``: whether it
     had to correct the readings as the calibration's were.
     """
-    said = json.loads(calibration.attrs.get("reasons", "[]"))
-    places = _places(recording, calibration["position"].to_numpy(), _covariance(calibration))
+    said, places = reasons_of(calibration), _places_of(recording, calibration)
     residual = rigid(recording, places) if is_papers(calibration) else {}
     found = _judged(recording, places, residual) + _elsewhere(kept(recording), places)
     found += _of_another_time(recording, calibration, own_clocks)
@@ -223,13 +220,9 @@ def reasons_of_diagnosis(recording: Recording, document: dict) -> list[str]:
     return _little(recording, places) + _judged(recording, places, {})
 
 
-def _size(recording: Recording) -> int:
-    return 3 * (len(recording.accelerometer_labels) - 1)
-
-
-def _covariance(calibration: xr.Dataset) -> np.ndarray:
-    size = 3 * calibration.sizes["accelerometer"]
-    return calibration["position_covariance"].to_numpy().reshape(size, size)
+def _places_of(recording: Recording, calibration: xr.Dataset) -> Places:
+    found, whole = (calibration[f"position{part}"].to_numpy() for part in ("", "_covariance"))
+    return _places(recording, found, whole.reshape((found.size,) * 2))
 
 
 def _places(recording: Recording, found, covariance) -> Places:
@@ -253,10 +246,9 @@ def _judged(
     if len(moving.time) < FEW:
         return found + _drawn(places, None)
     found += clipped(moving) + wrapped(moving)
-    size = another_size(places)
-    alike = [size] if size else [f"{said}?" for said in common(moving)]
+    alike = another_size(places) or common(moving)
     if alike:
-        return found + alike
+        return [*found, alike]
     bad, named = unfitting(residual, moving, limit)
     if named:
         return found + bad
@@ -267,12 +259,13 @@ def _judged(
 
 def _drawn(places: Places, course: Slope | None) -> list[str]:
     """Positions against the drawing, rates against accelerometers."""
-    hand = 0 if course is None or abs(course.correlation) < 0.9 else np.sign(course.correlation)
-    off = departures(places._replace(hand=int(hand)))
-    found = [off] if off else []
-    if course is not None and course.off:
-        found.append(_turning_words(course, places))
-    return found
+    if course is None:
+        said = [departures(places)]
+    else:
+        hand = 0 if abs(course.correlation) < COHERENT else int(np.sign(course.correlation))
+        turning = _turning_words(course, places) if course.off else None
+        said = [departures(places._replace(hand=hand)), turning]
+    return [sentence for sentence in said if sentence]
 
 
 def _little(recording: Recording, places: Places) -> list[str]:
@@ -288,17 +281,13 @@ def _little(recording: Recording, places: Places) -> list[str]:
     rms = max(np.sqrt(np.trace(places.covariance) / size), bound)
     if rms < LEARNT * prior:
         return []
+    seconds, more = float(np.ptp(recording.time)), "turn the array faster, and about all axes"
+    if seconds < SHORT:
+        more = f"{seconds:.2g} s are too short: record a dozen still poses and a minute of twisting"
     return [
         f"the recording says little of the positions: they are known to {1e3 * rms:.2g} mm by it,"
-        f" to {1e3 * prior:.2g} mm by the drawing; {_more(recording)}"
+        f" to {1e3 * prior:.2g} mm by the drawing; {more}"
     ]
-
-
-def _more(recording: Recording) -> str:
-    seconds = float(np.ptp(recording.time))
-    if seconds < SHORT:
-        return f"{seconds:.2g} s are too short: record a dozen still poses and a minute of twisting"
-    return "turn the array faster, and about all axes"
 
 
 def _elsewhere(moving: Recording, places: Places) -> list[str]:

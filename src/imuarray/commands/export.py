@@ -1,6 +1,7 @@
 """The work behind `imuarray export`."""
 
-from imuarray.analysis.export import export, reasons_of
+from imuarray.analysis.checked import reasons_of
+from imuarray.analysis.export import export
 from imuarray.commands.output import Output
 from imuarray.errors import InputError
 from imuarray.firstorder.noise import allan
