@@ -38,12 +38,10 @@ def fitted(
             except InputError as error:
                 raise InputError(f"--model {model}: {error}") from None
     readings = _arranged(recordings, say)
+    if not effects:
+        return _selected(readings, True, say)
     with _near_the_model():
-        if effects:
-            return with_effects(readings, effects), []
-        found, groups = select_forward(readings)
-    _tell(groups, say)
-    return found, groups
+        return with_effects(readings, effects), []
 
 
 @contextmanager
@@ -68,9 +66,7 @@ def fitted_beyond(
     readings = _arranged([recording], say)
     if not groups_of(readings):
         return None
-    with _near_the_model():
-        found, groups = select_forward(readings, bare=False)
-    _tell(groups, say)
+    found, groups = _selected(readings, False, say)
     return found if any(group.kept for group in groups) else None
 
 
@@ -87,10 +83,14 @@ def _arranged(recordings, say: Say) -> list[Readings]:
     return found
 
 
-def _tell(groups: Sequence[EffectGroup], say: Say) -> None:
+def _selected(readings, bare: bool, say: Say) -> tuple[Estimate, list[EffectGroup]]:
+    """`select_forward`, each group's verdict told."""
+    with _near_the_model():
+        found, groups = select_forward(readings, bare=bare)
     for group in groups:
         verdict = "kept" if group.kept else "left out"
         say(f"{group.name}: {verdict}, {group.gain:.3g} ({group.error:.2g}) nats on held-out time")
+    return found, groups
 
 
 def calibrate(
@@ -146,12 +146,13 @@ def calibrate(
         require_live(one)
     require_apart(recordings)
     require_together(model, recordings, effects, accelerometer_noise)
-    if effects and methods.is_file(model):
-        raise InputError("--effects: expected none with the model of a calibration, found some")
     if model == "papers":
         return calibrate_papers(recordings[0], accelerometer_noise, say)
     whole = [less_leak_by_others(one) for one in recordings]
-    return _finished(_engine(whole, str(model), tuple(effects), say), recordings, str(model))
+    found, groups = fitted(whole, str(model), tuple(effects), say)
+    dataset = engine_dataset(whole, found)
+    dataset.attrs["parts"] = json.dumps([group._asdict() for group in groups])
+    return _finished(dataset, recordings, str(model))
 
 
 def _finished(dataset: xr.Dataset, recordings, model: str) -> xr.Dataset:
@@ -180,11 +181,3 @@ def calibrate_papers(
         model, whole.specific_force, whole.angular_rate, saturated=whole.saturated_gyroscopes()
     )
     return _finished(papers_dataset(recording, model, found), [given], "papers")
-
-
-def _engine(recordings, model: str, effects, say: Say) -> xr.Dataset:
-    """Robust least squares: forward selection, given effects, or those of a calibration."""
-    found, groups = fitted(recordings, model, effects, say)
-    dataset = engine_dataset(recordings, found)
-    dataset.attrs["parts"] = json.dumps([group._asdict() for group in groups])
-    return dataset

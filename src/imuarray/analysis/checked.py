@@ -83,6 +83,28 @@ def is_of(recording: Recording, calibration: xr.Dataset) -> bool:
     return bool(np.median(np.abs(here - there[inside])) < SAME * np.median(np.abs(there[inside])))
 
 
+def effect_names(calibration: xr.Dataset) -> list[str]:
+    """The effects that a calibration has in its model; none of the papers' model."""
+    return [name for name in str(calibration.attrs.get("effects", "")).split(",") if name]
+
+
+def parameters_of(calibration: xr.Dataset) -> dict[str, dict[str, float]]:
+    """Value and sd of each of the effects' parameters, by its name; none without effects."""
+    if "effect_parameter" not in calibration:
+        return {}
+    names = "parameter", "effect_parameter", "effect_sd"
+    rows = zip(*(calibration[name].to_numpy() for name in names), strict=True)
+    return {str(name): {"value": value, "sd": sd} for name, value, sd in rows}
+
+
+def values_of(calibration: xr.Dataset, start: str) -> list[float]:
+    """Values of the effects' parameters whose names ``start`` so."""
+    if "effect_parameter" not in calibration:
+        return []
+    names, values = (calibration[name].to_numpy() for name in ("parameter", "effect_parameter"))
+    return [value for name, value in zip(names, values, strict=True) if name.startswith(start)]
+
+
 def reasons_of(calibration: xr.Dataset) -> list[str]:
     """Why a calibration is not to be trusted, as its file says; none for one that is."""
     try:

@@ -131,18 +131,26 @@ def another_size(places: Places) -> str | None:
 
 def size_words(size: float) -> str:
     """How far off a size is, and the scales, or the mistake, that would make it so."""
+    off = factor_words(size)
     if SIZES[0] < size < SIZES[1]:
-        off, rate = 100 * abs(size - 1), 100 * abs(size**-0.5 - 1)
-        grown, shrunk = ("large", "small") if size > 1 else ("small", "large")
         return (
-            f"the array comes out {off:.2g} % too {grown}: gyroscopes {rate:.2g} % too {shrunk}, or"
-            f" accelerometers {off:.2g} % too {grown}?"
+            f"the array comes out {off}: gyroscopes {factor_words(size**-0.5)}, or accelerometers"
+            f" {off}?"
         )
-    times, word = (1 / size, "small") if size < 1 else (size, "large")
-    said = f"the array comes out {times:.4g} times too {word}"
     if found := _mistake(size):
-        return f"{said} ({found[2]}): {found[1]}"
-    return f"{said}: a unit of the rates, of the specific force or of the nominal positions?"
+        return f"the array comes out {off} ({found[2]}): {found[1]}"
+    return (
+        f"the array comes out {off}: a unit of the rates, of the specific force or of the nominal"
+        " positions?"
+    )
+
+
+def factor_words(factor: float) -> str:
+    """By how much something is too large, or too small, as a user thinks of it."""
+    word = "large" if factor > 1 else "small"
+    if SIZES[0] < factor < SIZES[1]:
+        return f"{100 * abs(factor - 1):.2g} % too {word}"
+    return f"{max(factor, 1 / factor):.4g} times too {word}"
 
 
 def _mistake(size: float) -> tuple[float, str, str] | None:

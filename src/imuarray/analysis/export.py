@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis import methods
-from imuarray.analysis.checked import reasons_of, require_fit
+from imuarray.analysis.checked import effect_names, parameters_of, reasons_of, require_fit
 from imuarray.analysis.formats import frames_of, left_of
 from imuarray.analysis.plain import finite
 from imuarray.errors import InputError, require_one_of
@@ -67,7 +67,7 @@ def describe(calibration: xr.Dataset, noise: StillNoise | None = None) -> dict[s
     if len(labels["gyroscope"]) > len(labels["accelerometer"]):
         raise InputError("export: expected no more gyroscopes than accelerometers, found more")
     attrs, positions = calibration.attrs, calibration["position"].to_numpy()
-    effects = [name for name in str(attrs.get("effects", "")).split(",") if name]
+    effects = effect_names(calibration)
     array = Array(positions, tuple(labels["accelerometer"]), len(labels["gyroscope"]), "export")
     model = ArrayModel.isotropic(array, 1.0, 1.0, effects)
     _require_whole(calibration, model)
@@ -116,15 +116,6 @@ def _require_whole(calibration: xr.Dataset, model: ArrayModel) -> None:
     ):
         if not right:
             raise InputError(f"expected a calibration with {what}, found others, or none")
-
-
-def parameters_of(calibration: xr.Dataset) -> dict[str, dict[str, float]]:
-    """Value and sd of each of the effects' parameters, by its name; none without effects."""
-    if "effect_parameter" not in calibration:
-        return {}
-    names = ("parameter", "effect_parameter", "effect_sd")
-    rows = zip(*(calibration[name].to_numpy() for name in names), strict=True)
-    return {str(name): {"value": value, "sd": sd} for name, value, sd in rows}
 
 
 def _values(calibration: xr.Dataset, model: ArrayModel) -> dict:

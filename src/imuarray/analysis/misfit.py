@@ -7,6 +7,7 @@ from imuarray.analysis.checked import FEW
 from imuarray.analysis.drawing import Places
 from imuarray.analysis.rigid import kept, turning
 from imuarray.analysis.suspects import suspects
+from imuarray.diagnosis.plain import joined
 from imuarray.model.effects import KINDS
 from imuarray.recording import Recording
 
@@ -76,8 +77,7 @@ def unsteady(calibration: xr.Dataset, corrected: bool, recordings: int = 1) -> l
         found = labels[:1] if len(ratio) > 1 else labels
     if not len(found):
         return []
-    named = " and ".join(found) if len(found) < 3 else f"{', '.join(found[:-1])} and {found[-1]}"
-    by = f"disagree on the place of IMU {named}, by {ratio.max():.2g} times what noise explains: "
+    by = f"disagree on the place of IMU {joined(found)}, by {ratio.max():.2g} times what noise explains: "
     if recordings > 1:
         return [
             f"the recordings {by}was it glued anew, or is one recording of another board? Calibrate"

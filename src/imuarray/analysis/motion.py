@@ -7,7 +7,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from imuarray.analysis.checked import require_fit, require_labels
+from imuarray.analysis.checked import (
+    effect_names,
+    require_fit,
+    require_labels,
+    values_of,
+)
 from imuarray.analysis.model import assumed
 from imuarray.analysis.prepare import less_leak
 from imuarray.engine.parameters import model_of
@@ -65,8 +70,8 @@ def motion_parts(
     require_fit(calibration, recording)
     used = [calibration[name].to_numpy() for name in sorted(map(str, calibration.data_vars))]
     data = digest(recording.specific_force, recording.angular_rate, *used)
-    origin, effects = recording.time[0], str(calibration.attrs.get("effects")).split(",")
-    together = len(recording.accelerometer_labels) < 3 or CLOCK in effects
+    origin, clocks = recording.time[0], CLOCK in effect_names(calibration)
+    together = len(recording.accelerometer_labels) < 3 or clocks
     for part in [recording.in_memory()] if together else recording.parts():
         dataset = _motion_of(calibration, part, accelerometer_noise, origin)
         dataset.attrs |= stamp({"recording and calibration": data}, 0)
@@ -134,14 +139,9 @@ def _late(calibration: xr.Dataset) -> float:
     What is common to the delays of all IMUs is nowhere seen: their mean is taken for zero. With
     clocks of their own, the delays are the offsets of these.
     """
-    if "effect_parameter" not in calibration:
-        return 0.0
-    names = [str(name) for name in calibration["parameter"].to_numpy()]
-    delay = [name.startswith("sensor_delay ") for name in names]
-    clock = [name.startswith("sensor_clock offset") for name in names]
-    values = calibration["effect_parameter"].to_numpy()
-    delays = values[delay] if any(delay) else -values[clock]
-    return float(np.median(delays)) if len(delays) else 0.0
+    clocks = values_of(calibration, "sensor_clock offset")
+    delays = values_of(calibration, "sensor_delay ") or [-offset for offset in clocks]
+    return float(np.median(delays)) if delays else 0.0
 
 
 def _with_common_map(found, calibration: xr.Dataset, recording: Recording):
@@ -151,8 +151,7 @@ def _with_common_map(found, calibration: xr.Dataset, recording: Recording):
     maps, their common scale alone is left.
     """
     rate = np.asarray(found.estimate.motion.angular_rate)
-    names = calibration.attrs.get("effects", "")
-    effects = find_effects(names.split(",") if names else ())
+    effects = find_effects(effect_names(calibration))
     if any(item.resizes and item.kinds == [1] for item in effects):
         scale_sd = np.nan_to_num(calibration.attrs.get("gyroscope_common_scale_sd", np.nan))
         own = scale_sd**2 * rate[:, :, None] * rate[:, None]
@@ -192,7 +191,7 @@ def motion_under(
     block = calibration["position_covariance"].to_numpy()[1:, :, 1:, :]
     covariance: np.ndarray | None = block.reshape((parameters.size,) * 2)
     extended = "effect_parameter" in calibration
-    model = model_of(recording, attrs["effects"].split(",") if extended else ())
+    model = model_of(recording, effect_names(calibration))
     if extended:
         _require_parameters(calibration, recording, model)
         parameters = np.append(parameters, calibration["effect_parameter"].to_numpy())
@@ -212,7 +211,7 @@ def _with_own_clocks(found, calibration: xr.Dataset, recording: Recording, covar
     from imuarray.analysis.known import fused
     from imuarray.engine.clocks import CLOCK
 
-    if CLOCK not in str(calibration.attrs.get("effects")).split(",") or covariance is None:
+    if CLOCK not in effect_names(calibration) or covariance is None:
         return found, False
     still = recording.stationary
     moving = np.ones(len(recording.time), bool) if still is None else ~still

@@ -76,21 +76,19 @@ def _size(estimates, covariances) -> float:
 
 
 def factors(seen: Shown, exists, known=(False, False)) -> np.ndarray:
-    """By what the triads' sds are wrong (N, 2); 1 where they are ``known`` or do not exist."""
+    """By what the triads' sds are wrong (N, 2); 1 where they are ``known`` or do not exist.
+
+    Of few triads, or with few degrees of freedom, all of a kind share one.
+    """
     out = np.ones(exists.shape)
     for kind in np.flatnonzero(~np.array(known)):
         own = exists[:, kind]
-        out[own, kind] = _factors(seen.squares[own, kind], seen.freedom[own, kind], APART[kind])
+        squares, freedom = seen.squares[own, kind], seen.freedom[own, kind]
+        if len(squares) < APART[kind] or freedom.min() < FREEDOM:
+            squares, freedom = squares.sum(), freedom.sum()
+        if np.all(freedom >= 1):
+            out[own, kind] = np.sqrt(np.maximum(squares / freedom, 1e-12))
     return out
-
-
-def _factors(squares, freedom, apart: int) -> np.ndarray:
-    """Factors (n,) of one kind of sensor: each its own, or one for all."""
-    if len(squares) < apart or freedom.min() < FREEDOM:
-        squares, freedom = np.full(len(squares), squares.sum()), freedom.sum()
-        if np.all(freedom < 1):
-            return np.ones(len(squares))
-    return np.sqrt(np.maximum(squares / freedom, 1e-12))
 
 
 def noise_of(readings: Readings) -> Noise:

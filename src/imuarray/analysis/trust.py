@@ -14,8 +14,15 @@ import numpy as np
 import xarray as xr
 from scipy.special import stdtr
 
-from imuarray.analysis.checked import FEW, is_of, reasons_of
-from imuarray.analysis.drawing import FAR, Places, another_size, departures, size_of
+from imuarray.analysis.checked import FEW, effect_names, is_of, reasons_of
+from imuarray.analysis.drawing import (
+    FAR,
+    Places,
+    another_size,
+    departures,
+    factor_words,
+    size_of,
+)
 from imuarray.analysis.misfit import RESIDUAL, is_papers, residuals, rigid, unfitting, unsteady
 from imuarray.analysis.rigid import COHERENT, SLOPE, Slope, elsewhere, kept, slope, turning
 from imuarray.analysis.suspects import MIRRORED, clipped, common, gravity, wrapped
@@ -305,8 +312,8 @@ def _elsewhere(moving: Recording, places: Places) -> list[str]:
 
 def _of_another_time(recording: Recording, calibration: xr.Dataset, own_clocks: bool) -> list[str]:
     """One sentence where clocks and drifts of the calibration are those of another recording."""
-    names = calibration.attrs.get("effects", "").split(",")
-    effects = [name for name in names if name in EFFECTS and _looks_at_time(EFFECTS[name])]
+    known = [name for name in effect_names(calibration) if name in EFFECTS]
+    effects = [name for name in known if _looks_at_time(EFFECTS[name])]
     if own_clocks:
         effects = [n for n in effects if not (EFFECTS[n].scanned and EFFECTS[n].shifts_time)]
     if not effects or is_of(recording, calibration):
@@ -330,20 +337,12 @@ def _turning_words(course: Slope, places: Places) -> str:
     size, sd = size_of(places)
     causes = []
     if abs(size - value**2) < FAR * sd:
-        causes.append(f"gyroscopes {_times(1 / value)}")
+        causes.append(f"gyroscopes {factor_words(1 / value)}")
     if abs(1000 * value - 1) < FAR * SLOPE:
         causes.append("time in ms declared s")
     elif abs(size - 1) < FAR * sd or not causes:
-        causes.append(f"steps of time {_times(1 / value)}")
+        causes.append(f"steps of time {factor_words(1 / value)}")
     return (
         f"the rates change {value:.4g} times as fast as the accelerometers' angular acceleration"
         f" says: {' or '.join(causes)}?"
     )
-
-
-def _times(factor: float) -> str:
-    """A factor as a user thinks of it."""
-    word = "large" if factor > 1 else "small"
-    if 0.5 < factor < 2:
-        return f"{100 * abs(factor - 1):.2g} % too {word}"
-    return f"{max(factor, 1 / factor):.4g} times too {word}"

@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis.calibration import calibrate as calibrated
-from imuarray.analysis.export import parameters_of
+from imuarray.analysis.checked import parameters_of
 from imuarray.analysis.model import assumed
 from imuarray.analysis.trust import of_file, reasons_of_calibration, reasons_of_poses
 from imuarray.commands.output import Output
