@@ -77,7 +77,8 @@ def unsteady(calibration: xr.Dataset, corrected: bool, recordings: int = 1) -> l
         found = labels[:1] if len(ratio) > 1 else labels
     if not len(found):
         return []
-    by = f"disagree on the place of IMU {joined(found)}, by {ratio.max():.2g} times what noise explains: "
+    times = f"{ratio.max():.2g} times what noise explains"
+    by = f"disagree on the place of IMU {joined(found)}, by {times}: "
     if recordings > 1:
         return [
             f"the recordings {by}was it glued anew, or is one recording of another board? Calibrate"
