@@ -6,7 +6,6 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis import methods
-from imuarray.analysis.checked import effect_names, parameters_of, reasons_of, require_fit
 from imuarray.analysis.formats import frames_of, left_of
 from imuarray.analysis.plain import finite
 from imuarray.errors import InputError, require_one_of
@@ -16,6 +15,7 @@ from imuarray.model import ArrayModel
 from imuarray.model.effects import KINDS, Prediction
 from imuarray.recording.record import CORRECTION, NUMBERS
 from imuarray.recording.validate import is_rotation
+from imuarray.trust import effect_names, parameters_of, reasons_in, require_fit
 
 BIASES = "accelerometer_bias", "gyroscope_bias"
 MATRICES = ("accelerometer_scale", "accelerometer_misalignment", "gyroscope_scale",
@@ -94,7 +94,7 @@ def describe(calibration: xr.Dataset, noise: StillNoise | None = None) -> dict[s
     return finite({
         "created_by": str(attrs.get("created_by", "")),
         "trusted": bool(attrs["trusted"]) if "trusted" in attrs else None,
-        "reasons": reasons_of(calibration), "formulas": FORMULAS, "rate_hz": rate, "imus": imus,
+        "reasons": reasons_in(calibration), "formulas": FORMULAS, "rate_hz": rate, "imus": imus,
         "position_covariance_m2": calibration["position_covariance"].to_numpy(),
         "parameters": parameters_of(calibration),
         "not_in_matrices": [name for name in effects if name not in (*MATRICES, *BIASES, *TIMES)],

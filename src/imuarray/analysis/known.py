@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from imuarray.analysis.checked import effect_names, require_fit
 from imuarray.analysis.model import Say, silent
 from imuarray.engine.clocks import CLOCK, refined, shown_clocks, timed, with_clocks
 from imuarray.engine.estimate import Estimate, Recorded, estimate
@@ -20,6 +19,7 @@ from imuarray.engine.start import start
 from imuarray.errors import InputError
 from imuarray.model.effects import EFFECTS
 from imuarray.recording import Recording
+from imuarray.trust import effect_names, require_fit
 
 
 def with_own(readings: Readings, effects, positions, values: dict) -> Estimate:

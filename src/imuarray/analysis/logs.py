@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from imuarray.analysis.suspects import ends
 from imuarray.errors import InputError
 from imuarray.firstorder.correct import rails_shown
 from imuarray.recording import Recording, read_recording
 from imuarray.recording.channels import repeated
 from imuarray.recording.layout import read_layout, rotation
 from imuarray.recording.rig import Log, Rig, recording_of
+from imuarray.trust import ends
 
 RECORDINGS = (".nc", ".nc4", ".h5")
 PACKETS = (".bin", ".bin.xz")

@@ -7,12 +7,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from imuarray.analysis.checked import (
-    effect_names,
-    require_fit,
-    require_labels,
-    values_of,
-)
 from imuarray.analysis.model import assumed
 from imuarray.analysis.prepare import less_leak
 from imuarray.engine.parameters import model_of
@@ -28,6 +22,12 @@ from imuarray.motion.state import UNITS
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording
 from imuarray.recording.record import CORRECTION
+from imuarray.trust import (
+    effect_names,
+    require_fit,
+    require_labels,
+    values_of,
+)
 
 
 def apply(

@@ -8,12 +8,12 @@ import xarray as xr
 
 from imuarray.analysis.model import assumed
 from imuarray.analysis.motion import as_calibrated, motion_parts
-from imuarray.analysis.trust import reasons_of_motion
 from imuarray.commands.output import Output
 from imuarray.errors import InputError
 from imuarray.motion.state import UNITS
 from imuarray.provenance import trust, write_netcdf_parts
 from imuarray.recording import load_dataset, read_recording
+from imuarray.trust import reasons_of_motion
 
 LATE = 1e-4  # s, worth a line
 

@@ -4,15 +4,14 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis.calibration import calibrate as calibrated
-from imuarray.analysis.checked import parameters_of
 from imuarray.analysis.model import assumed
-from imuarray.analysis.trust import of_file, reasons_of_calibration, reasons_of_poses
 from imuarray.commands.output import Output
 from imuarray.diagnosis.plain import number
 from imuarray.estimation.selection import position_sds, weakest_of
 from imuarray.model.effects import KINDS
 from imuarray.provenance import trust, write_netcdf
 from imuarray.recording import read_recording
+from imuarray.trust import of_file, parameters_of, reasons_of_calibration, reasons_of_poses
 
 MISFIT = 1.5  # residual over declared noise from which it is spoken of
 

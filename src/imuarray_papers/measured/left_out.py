@@ -11,7 +11,6 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from imuarray.analysis.checked import effect_names, values_of
 from imuarray.analysis.known import fused, used, with_board
 from imuarray.engine.course import block_scores
 from imuarray.engine.dataset import engine_dataset, places_among, positions_dataset
@@ -35,6 +34,7 @@ from imuarray.firstorder.correct import (
 from imuarray.model import ArrayModel
 from imuarray.model.effects import EFFECTS
 from imuarray.recording import Recording, array_of
+from imuarray.trust import effect_names, values_of
 
 STEPS = 20  # of Gauss-Newton, at most
 SETTLED = 1e-3  # of a position's sd

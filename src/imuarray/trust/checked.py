@@ -30,8 +30,6 @@ _PERHAPS = {
     **dict.fromkeys((*CLOCKS, "log_rate"), ("accelerometer",)),
     **{name: ("recording", *dims) for name, dims in CORRECTION.items() if name[-3:] != "_sd"},
 }  # fmt: skip
-FEW = 20  # samples
-SAME = 0.1  # relative difference of rates, up to which they are those of one recording
 SAME_BOARD = 5.0  # prior sds by which two drawings of one board may differ
 INDEFINITE = 1e-3  # of a correlation matrix' least eigenvalue; rounding leaves less
 
@@ -70,19 +68,6 @@ def _require_right_axes(mended: Iterable[str]) -> None:
             )
 
 
-def is_of(recording: Recording, calibration: xr.Dataset) -> bool:
-    """True where the calibration is of this recording, or of one that this is a part of."""
-    if "angular_rate" not in calibration:
-        return False
-    time = calibration["time"].to_numpy()
-    inside = (time >= recording.time[0]) & (time <= recording.time[-1])
-    if inside.sum() < min(FEW, len(recording.time)):
-        return False
-    rate, there = np.median(recording.angular_rate, axis=1), calibration["angular_rate"].to_numpy()
-    here = np.stack([np.interp(time[inside], recording.time, axis) for axis in rate.T], axis=1)
-    return bool(np.median(np.abs(here - there[inside])) < SAME * np.median(np.abs(there[inside])))
-
-
 def effect_names(calibration: xr.Dataset) -> list[str]:
     """The effects that a calibration has in its model; none of the papers' model."""
     return [name for name in str(calibration.attrs.get("effects", "")).split(",") if name]
@@ -105,7 +90,7 @@ def values_of(calibration: xr.Dataset, start: str) -> list[float]:
     return [value for name, value in zip(names, values, strict=True) if name.startswith(start)]
 
 
-def reasons_of(calibration: xr.Dataset) -> list[str]:
+def reasons_in(calibration: xr.Dataset) -> list[str]:
     """Why a calibration is not to be trusted, as its file says; none for one that is."""
     try:
         return [one_line(str(reason)) for reason in json.loads(calibration.attrs["reasons"])]

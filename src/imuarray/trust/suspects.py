@@ -11,11 +11,11 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
-from imuarray.analysis.drawing import DEGREE, angle_words
-from imuarray.analysis.rigid import COHERENT, FEWEST, runs, slope, turning
 from imuarray.recording import Recording
 from imuarray.recording.record import few
 from imuarray.recording.units import GRAVITY
+from imuarray.trust.drawing import DEGREE, angle_words
+from imuarray.trust.rigid import COHERENT, FEWEST, runs, slope, turning
 
 FAR = 4.0  # times the median triad's error, and the declared noise
 TAKEN = 0.35  # of the error must be left at most

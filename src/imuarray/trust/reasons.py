@@ -7,15 +7,15 @@ and that still poses show gravity.
 
 import re
 from collections.abc import Sequence
-from typing import NamedTuple
 
-import h5py
 import numpy as np
 import xarray as xr
-from scipy.special import stdtr
 
-from imuarray.analysis.checked import FEW, effect_names, is_of, reasons_of
-from imuarray.analysis.drawing import (
+from imuarray.model.effects import EFFECTS, KINDS, Effect
+from imuarray.recording import Recording
+from imuarray.recording.channels import repeated
+from imuarray.trust.checked import effect_names, reasons_in
+from imuarray.trust.drawing import (
     FAR,
     Places,
     another_size,
@@ -23,24 +23,16 @@ from imuarray.analysis.drawing import (
     factor_words,
     size_of,
 )
-from imuarray.analysis.misfit import RESIDUAL, is_papers, residuals, rigid, unfitting, unsteady
-from imuarray.analysis.rigid import COHERENT, SLOPE, Slope, elsewhere, kept, slope, turning
-from imuarray.analysis.suspects import MIRRORED, clipped, common, gravity, wrapped
-from imuarray.firstorder.correct import FirstOrder
-from imuarray.model.effects import EFFECTS, KINDS, Effect
-from imuarray.recording import Recording
-from imuarray.recording.channels import repeated
-from imuarray.recording.record import FIRST_ORDER
+from imuarray.trust.misfit import RESIDUAL, is_papers, residuals, rigid, unfitting, unsteady
+from imuarray.trust.rigid import COHERENT, FEW, SLOPE, Slope, elsewhere, kept, slope, turning
+from imuarray.trust.suspects import MIRRORED, clipped, common, gravity, wrapped
 
-POSES = 3.0  # times the noise of a pose's mean; real boards have up to 1.9
-BENT = 0.01  # m/s^2, a residual that matters: 0.1 % of gravity
-SCALED = 0.03  # of all gyroscopes' common scale: three of its prior's sds
-SEEN, ODD = 5e-3, 1e-4  # the same, where the axes' own scales scatter by less than their mean
 HOLD = 1e-6  # chance of maps that still poses gave; 0.97 and more of real and clean boards
 TRIAD = 10.0  # the same of one triad where the noise of each is estimated
 DRIFT = 3.0  # sds of the mean of all samples; offsets that differ by more bias positions
 LEARNT = 0.5  # of the drawing's sd: positions known worse are hardly known from the recording
 OTHER = 1.2  # times less residual elsewhere; 1.003 at most for the right board, 2 for another
+SAME = 0.1  # relative difference of rates, up to which they are those of one recording
 UNIT = re.compile(r"\bin \S+ declared ")  # in a reason that names a unit
 SHORT = 60.0  # s
 AS_READ = (
@@ -48,75 +40,6 @@ AS_READ = (
     " changed since are not seen; correct it by three still poses or more of its own (imuarray"
     " first-order new.nc --with old.nc, the calibration's recording as read)"
 )
-
-
-class Poses(NamedTuple):
-    """Results of a first-order calibration: NaN where it has none."""
-
-    ratio: float = 1.0  # residual of the poses over their noise
-    residual: float = np.nan  # m/s^2, rms of the worst triad
-    scale: float = np.nan  # of the map that all gyroscopes share
-    chance: float = 1.0  # of such a mean of all axes' scales, by their own spread
-
-
-def of_first_order(found: FirstOrder) -> Poses:
-    """From the answer."""
-    common = None if found.gyroscopes is None else found.gyroscopes.common
-    scale = np.nan if common is None or isinstance(common, str) else common.scale
-    fit = found.triads
-    return _poses(fit.residual_ratio, fit.residual, fit.relied, scale, found.gyroscope_matrix)
-
-
-def of_file(path) -> Poses:
-    """From a corrected recording's file, or one that was selected from it."""
-    with h5py.File(path, "r") as file:
-        if FIRST_ORDER not in file:
-            return Poses()
-        stored = file[FIRST_ORDER]
-        ratio = float(np.ravel(stored.attrs.get("residual_ratio", 1.0))[0])
-        common = stored["gyroscope_common"][:] if "gyroscope_common" in stored else [[np.nan]]
-        maps = stored["gyroscope_matrix"][:] if "gyroscope_matrix" in stored else None
-        residual, used = stored["residual"][:], stored["used"][:] != 0
-    return _poses(ratio, residual, used, float(np.trace(common) / 3), maps)
-
-
-def _poses(ratio: float, residual, used, scale: float, maps) -> Poses:
-    """With residuals (P, A, 3) where they are ``used`` (P, A), gyroscopes' ``maps`` (G, 3, 3)."""
-    squares = np.where(used[..., None], residual**2, np.nan)
-    worst = np.sqrt(np.nanmax(np.nanmean(np.ascontiguousarray(squares), axis=(0, 2))))
-    return Poses(ratio, float(worst), scale, _chance(maps) if scale == scale else 1.0)
-
-
-def _chance(matrices) -> float:
-    """Chance (t distribution) of such a mean of the scales of axes, of maps (G, 3, 3)."""
-    scales = np.linalg.norm(matrices, axis=1).ravel() - 1
-    sd = scales.std(ddof=1) / np.sqrt(scales.size)
-    return float(2 * stdtr(scales.size - 1, -abs(scales.mean()) / max(sd, 1e-300)))
-
-
-def reasons_of_poses(*several: Poses) -> list[str]:
-    """Why first-order calibrations are not to be trusted: their residual, and the common scale."""
-    found = []
-    ratio = max((x.ratio for x in several if not x.residual <= BENT), default=1.0)
-    if ratio > POSES:
-        found.append(
-            f"the still poses fit {ratio:.2g} times worse than noise and a drift of offsets allow:"
-            " the board bent or was not still, an offset jumped, a response is curved (imuarray"
-            " diagnose tells), or recordings are of other boards; sds do not cover that: record"
-            " again"
-        )
-    worst = max(several, key=lambda x: abs(x.scale - 1) if x.scale == x.scale else 0.0)
-    scale, odd = worst.scale, worst.chance < ODD
-    if abs(scale - 1) > SCALED or (odd and abs(scale - 1) > SEEN):
-        off = 100 * abs(1 / scale - 1)
-        much, large = ("much", "small") if scale < 1 else ("little", "large")
-        found.append(
-            f"all gyroscopes together read {off:.2g} % too {much} by the moves between poses: is"
-            " that their scale, or is it the time base: a clock that runs wrong, a declared rate of"
-            f" the log that is not its own, rows that were lost? If so, the array comes out"
-            f" {2 * off:.2g} % too {large}"
-        )
-    return found
 
 
 def reasons_of_calibration(
@@ -207,7 +130,7 @@ def reasons_of_motion(
     ``own_clocks``: whether `imuarray.apply` has found the recording's own; ``as_read``: whether it
     had to correct the readings as the calibration's were.
     """
-    said, places = reasons_of(calibration), _places_of(recording, calibration)
+    said, places = reasons_in(calibration), _places_of(recording, calibration)
     residual = rigid(recording, places) if is_papers(calibration) else {}
     found = _judged(recording, places, residual) + _elsewhere(kept(recording), places)
     found += _of_another_time(recording, calibration, own_clocks)
@@ -316,12 +239,25 @@ def _of_another_time(recording: Recording, calibration: xr.Dataset, own_clocks: 
     effects = [name for name in known if _looks_at_time(EFFECTS[name])]
     if own_clocks:
         effects = [n for n in effects if not (EFFECTS[n].scanned and EFFECTS[n].shifts_time)]
-    if not effects or is_of(recording, calibration):
+    if not effects or _is_of(recording, calibration):
         return []
     return [
         f"the calibration has {', '.join(effects)}, at the instants of its own (first) recording:"
         " calibrate this one, too, and apply that"
     ]
+
+
+def _is_of(recording: Recording, calibration: xr.Dataset) -> bool:
+    """True where the calibration is of this recording, or of one that this is a part of."""
+    if "angular_rate" not in calibration:
+        return False
+    time = calibration["time"].to_numpy()
+    inside = (time >= recording.time[0]) & (time <= recording.time[-1])
+    if inside.sum() < min(FEW, len(recording.time)):
+        return False
+    rate, there = np.median(recording.angular_rate, axis=1), calibration["angular_rate"].to_numpy()
+    here = np.stack([np.interp(time[inside], recording.time, axis) for axis in rate.T], axis=1)
+    return bool(np.median(np.abs(here - there[inside])) < SAME * np.median(np.abs(there[inside])))
 
 
 def _looks_at_time(effect: Effect) -> bool:
