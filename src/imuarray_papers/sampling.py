@@ -71,7 +71,7 @@ def flat(
         found = locate(recording, recording.accelerometer_noise_sd)
         mode, density = found.mean, sample_covariance(recording.angular_rate)
     else:
-        fitted = estimated_noise(recording, model, mode_search(recording), (known, False), say)
+        fitted = estimated_noise(recording, model, mode_search(recording), known, say)
         model, found = fitted.model, fitted.calibration
         mode = found.positions
     if not found.converged:

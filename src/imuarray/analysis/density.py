@@ -22,6 +22,7 @@ from imuarray.estimation.collapsed import Collapsed
 from imuarray.geometry import positions_of
 from imuarray.linear import scaled_inverse
 from imuarray.model import ArrayModel
+from imuarray.model.effects import KINDS
 from imuarray.posterior.generic import SCALES, log_laplace, unknown
 from imuarray.posterior.marginal import Marginal, log_posterior
 from imuarray.posterior.prior import GaussianPrior, TiedPrior
@@ -56,14 +57,13 @@ class Posterior(NamedTuple):
 
 
 def posterior_of(
-    recording: Recording, model: ArrayModel, known: tuple[bool, bool] = (False, False),
-    say: Say = silent,
-) -> Posterior:  # fmt: skip
+    recording: Recording, model: ArrayModel, known: bool = False, say: Say = silent
+) -> Posterior:
     """The posterior of a recording under the papers' model, around its mode.
 
     omega and omega_dot are normal of the recording's own size; that and the noise are unknown, with
-    log-normal priors a factor of twenty wide. ``known``: whether the accelerometers' noise, the
-    gyroscopes', is the model's own.
+    log-normal priors a factor of twenty wide. ``known``: whether the accelerometers' noise is the
+    model's own.
     """
     fitted = estimated_noise(recording, model, mode_search(recording), known, say)
     found, chosen = fitted.calibration, fitted.model
@@ -71,7 +71,7 @@ def posterior_of(
         say(NOT_CONVERGED)
     # s is flat: differences between triads do not show it
     chosen = replace(chosen, motion_sd=(*fitted.motion_sd[:2], np.inf))
-    free = [*np.logical_not(known), True, True, False]
+    free = [not known, True, True, True, False]
     unknown = unknown_scales(model, chosen, fitted.freedom, np.zeros(3), len(recording.time))
     before, freedom = (part[free] for part in unknown)
     prior = prior_of(recording, chosen)
@@ -171,13 +171,11 @@ def unknown_scales(declared: ArrayModel, chosen: ArrayModel, freedom, own, sampl
 
     ``own`` (3,): where the logs of the motion's size are expected.
     """
-    kinds = "accelerometer", "gyroscope"
-    size, other = (
-        np.array([np.trace(getattr(model.noise, kind)) for kind in kinds])
-        for model in (declared, chosen)
-    )
-    before = 0.5 * np.log(size / other)
-    return np.append(before, own), np.append(freedom, np.full(3, 3.0 * samples))
+    ratios = [
+        np.trace(getattr(declared.noise, kind)) / np.trace(getattr(chosen.noise, kind))
+        for kind in KINDS
+    ]
+    return np.append(0.5 * np.log(ratios), own), np.append(freedom, np.full(3, 3.0 * samples))
 
 
 def prior_of(recording: Recording, model: ArrayModel) -> GaussianPrior:

@@ -127,12 +127,11 @@ def _steps(calibration: xr.Dataset, model: ArrayModel) -> dict[str, list[dict]]:
     """Corrections of each kind in turn, arrays with triads first."""
     out: dict[str, list[dict]] = {kind: [] for kind in KINDS}
     if set(CORRECTION) <= set(calibration):
-        first = calibration[list(CORRECTION)].isel(recording=0)
-        for name, part_values in first.items():
-            kind, _, part = str(name).partition("_")
-            if not out[kind]:
-                out[kind].append({"from": "first-order"})
-            out[kind][0][part] = part_values.to_numpy()
+        for kind in KINDS:
+            out[kind] = [{"from": "first-order"}]
+        for name in CORRECTION:
+            kind, _, part = name.partition("_")
+            out[kind][0][part] = calibration[name].isel(recording=0).to_numpy()
         for kind, left in left_of(calibration).items():
             out[kind][0]["map_sd"] = np.sqrt(np.maximum(np.diag(left), 0)).reshape(-1, 3, 3)
     values = _values(calibration, model)

@@ -84,10 +84,17 @@ def again(recording: Recording, calibration: xr.Dataset, say: Say = silent) -> E
     return resumed(readings, columns, active & columns.owner, state)
 
 
-def used(recording: Recording) -> Readings:
-    """The moving samples that a board is estimated from."""
+def used(recording: Recording, say: Say = silent) -> Readings:
+    """The moving samples that a board is estimated from; InputError where there are none."""
     readings = arrange(recording, sparse=True)
-    return most_informative(readings.select(determined(readings, 1)), lambda text: None)
+    found = most_informative(readings.select(determined(readings, 1)), say)
+    if not len(found.time):
+        rate = 1 / np.median(np.diff(recording.time)) if len(recording.time) > 1 else 0.0
+        raise InputError(
+            f"recording: expected samples that determine the motion, found none, at {rate:.4g}"
+            " samples a second; is the unit of time right?"
+        )
+    return found
 
 
 def with_board(recording: Recording, calibration: xr.Dataset) -> tuple[Readings, Estimate]:

@@ -59,9 +59,7 @@ def _with_rails(recording: Recording, layout=None) -> Recording:
     if layout is not None:
         triads = layout["gyroscopes"]["triads"].values()
         rates = np.array([rotation(one.get("axes", list("xyz")), "gyroscopes") for one in triads])
-    for kind, name, turns in (
-        ("accelerometer", "specific_force", forces), ("gyroscope", "angular_rate", rates)
-    ):  # fmt: skip
+    for (kind, name), turns in zip(READ.items(), (forces, rates), strict=True):
         if (np.isclose(turns, 0) | np.isclose(np.abs(turns), 1)).all():
             continue
         own = np.einsum("kji,tkj->tki", turns, getattr(recording, name))

@@ -75,13 +75,14 @@ def _size(estimates, covariances) -> float:
     return float(np.sqrt(found))
 
 
-def factors(seen: Shown, exists, known=(False, False)) -> np.ndarray:
-    """By what the triads' sds are wrong (N, 2); 1 where they are ``known`` or do not exist.
+def factors(seen: Shown, exists, known: bool = False) -> np.ndarray:
+    """By what the triads' sds are wrong (N, 2); 1 where they do not exist.
 
-    Of few triads, or with few degrees of freedom, all of a kind share one.
+    And of accelerometers where theirs are ``known``. Of few triads, or with few degrees of freedom,
+    all of a kind share one.
     """
     out = np.ones(exists.shape)
-    for kind in np.flatnonzero(~np.array(known)):
+    for kind in (1,) if known else (0, 1):
         own = exists[:, kind]
         squares, freedom = seen.squares[own, kind], seen.freedom[own, kind]
         if len(squares) < APART[kind] or freedom.min() < FREEDOM:
@@ -98,7 +99,7 @@ def noise_of(readings: Readings) -> Noise:
 
 
 def estimated_noise(
-    recording: Recording, model: ArrayModel, fit, known=(False, False), say: Say = silent
+    recording: Recording, model: ArrayModel, fit, known: bool = False, say: Say = silent
 ) -> Fitted:
     """The papers' model's fit of a recording, and the noise of each triad that goes with it.
 
@@ -109,8 +110,8 @@ def estimated_noise(
     Parameters
     ----------
     fit : callable, model -> `Calibration` of ``recording`` with its covariance
-    known : (bool, bool)
-        Whether the accelerometers' noise, the gyroscopes', is the model's own.
+    known
+        Whether the accelerometers' noise is the model's own.
     """
     columns = columns_of(model.array, (), recording.position_prior_sd)
     readings = measured(

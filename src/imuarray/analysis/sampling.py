@@ -96,7 +96,7 @@ def sample(
         posterior = _beyond(recording, str(model), effects, say)
     if posterior is None:
         moving, known = assumed(moving, accelerometer_noise), accelerometer_noise is not None
-        posterior = posterior_of(moving, model_of(moving), (known, False), say)
+        posterior = posterior_of(moving, model_of(moving), known, say)
     return _exact(posterior, method, steps, seed, not progress, say)
 
 
