@@ -5,8 +5,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from imuarray.analysis import methods
-from imuarray.analysis.formats import frames_of, left_of
+from imuarray.analysis import formats, methods
 from imuarray.analysis.plain import finite
 from imuarray.errors import InputError, require_one_of
 from imuarray.firstorder.noise import TERMS, StillNoise
@@ -54,8 +53,6 @@ def export(calibration: xr.Dataset, format: str = "json", noise: StillNoise | No
 
     InputError for another format, a calibration that is not whole, or noise of other IMUs.
     """
-    from imuarray.analysis import formats
-
     require_one_of("format", format, methods.EXPORTS)
     return getattr(formats, format)(describe(calibration, noise))
 
@@ -73,7 +70,7 @@ def describe(calibration: xr.Dataset, noise: StillNoise | None = None) -> dict[s
     _require_whole(calibration, model)
     try:
         steps, times = _steps(calibration, model), _times(calibration, model)
-        frames = frames_of(calibration, steps, positions)
+        frames = formats.frames_of(calibration, steps, positions)
     except np.linalg.LinAlgError:
         raise InputError("expected corrections that can be inverted, found singular ones") from None
     rate = attrs.get("rate", noise.rate_hz if noise else None)
@@ -132,7 +129,7 @@ def _steps(calibration: xr.Dataset, model: ArrayModel) -> dict[str, list[dict]]:
         for name in CORRECTION:
             kind, _, part = name.partition("_")
             out[kind][0][part] = calibration[name].isel(recording=0).to_numpy()
-        for kind, left in left_of(calibration).items():
+        for kind, left in formats.left_of(calibration).items():
             out[kind][0]["map_sd"] = np.sqrt(np.maximum(np.diag(left), 0)).reshape(-1, 3, 3)
     values = _values(calibration, model)
     for number, kind in enumerate(KINDS):

@@ -262,20 +262,18 @@ def clipped(recording: Recording) -> list[str]:
 
 def wrapped(recording: Recording) -> list[str]:
     """A sentence for each gyroscope axis that jumps from one end of its readings to the other."""
-    step, found = np.diff(recording.time), []
+    step, rates = np.diff(recording.time), _as_read(recording, "gyroscope")
     near = step < 1.5 * np.median(step) if len(step) else step > 0
-    rates = _as_read(recording, "gyroscope")
-    for k, axis in np.ndindex(rates.shape[1:]):
-        values = rates[:, k, axis]
-        jump, end = np.abs(np.diff(values)), np.abs(values).max()
-        beside = np.maximum(np.r_[0, jump[:-1]], np.r_[jump[1:], 0])
-        if np.sum(near & (jump > JUMP * end) & (beside < (2 - JUMP) * end)) >= TWICE:
-            label = recording.gyroscope_labels[k]
-            found.append(
-                f"gyroscope {label}, axis {'xyz'[axis]}, jumps from one end of its readings to the"
-                f" other: it wraps at {np.degrees(end):.4g} deg/s, beyond its range"
-            )
-    return found
+    jump, end = np.abs(np.diff(rates, axis=0)), np.abs(rates).max(axis=0)
+    around = np.pad(jump, ((1, 1), (0, 0), (0, 0)))
+    alone = np.maximum(around[:-2], around[2:]) < (2 - JUMP) * end
+    wraps = np.sum(near[:, None, None] & (jump > JUMP * end) & alone, axis=0)
+    return [
+        f"gyroscope {recording.gyroscope_labels[k]}, axis {'xyz'[axis]}, jumps from one end of its"
+        f" readings to the other: it wraps at {np.degrees(end[k, axis]):.4g} deg/s, beyond its"
+        " range"
+        for k, axis in np.argwhere(wraps >= TWICE)
+    ]
 
 
 def _as_read(recording: Recording, kind: str) -> np.ndarray:
