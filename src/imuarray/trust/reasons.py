@@ -193,8 +193,8 @@ def _drawn(places: Places, course: Slope | None) -> list[str]:
         said = [departures(places)]
     else:
         hand = 0 if abs(course.correlation) < COHERENT else int(np.sign(course.correlation))
-        turning = _turning_words(course, places) if course.off else None
-        said = [departures(places._replace(hand=hand)), turning]
+        change = _turning_words(course, places) if course.off else None
+        said = [departures(places._replace(hand=hand)), change]
     return [sentence for sentence in said if sentence]
 
 
