@@ -30,12 +30,7 @@ from imuarray.engine.widths import corrected
 from imuarray.errors import InputError
 from imuarray.pictures.board import missing
 from imuarray.report.board import advice, facts, html, noises, turned, verdict, write_board
-from imuarray.trust import (
-    of_file,
-    of_first_order,
-    reasons_of_calibration,
-    reasons_of_motion,
-)
+from imuarray.trust import of_file, of_first_order, reasons_of_calibration, reasons_of_motion
 from tests.browser import in_browser, needs_browser
 
 matplotlib.use("agg")

@@ -22,12 +22,7 @@ from imuarray.motion.state import UNITS
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording
 from imuarray.recording.record import CORRECTION
-from imuarray.trust import (
-    effect_names,
-    require_fit,
-    require_labels,
-    values_of,
-)
+from imuarray.trust import effect_names, require_fit, require_labels, values_of
 
 
 def apply(
@@ -88,11 +83,10 @@ def as_calibrated(recording: Recording, calibration: xr.Dataset) -> Recording:
     require_fit(calibration)
     require_labels(calibration, recording)
     first, recording = calibration[list(CORRECTION)].isel(recording=0), recording.in_memory()
-    names = "specific_force", "angular_rate"
-    rails = recording.saturated_accelerometers(), recording.saturated_gyroscopes()
     changed: dict[str, Any] = {}
-    for kind, name, railed in zip(KINDS, names, rails, strict=True):
+    for kind, name in zip(KINDS, ("specific_force", "angular_rate"), strict=True):
         inverse, offset = (first[f"{kind}_{part}"].to_numpy() for part in ("inverse", "offset"))
+        railed = getattr(recording, f"saturated_{kind}s")()
         limit = getattr(recording, f"{kind}_range")
         changed |= {
             name: corrected(inverse, offset, getattr(recording, name)),

@@ -15,14 +15,7 @@ from imuarray.model.effects import EFFECTS, KINDS, Effect
 from imuarray.recording import Recording
 from imuarray.recording.channels import repeated
 from imuarray.trust.checked import effect_names, reasons_in
-from imuarray.trust.drawing import (
-    FAR,
-    Places,
-    another_size,
-    departures,
-    factor_words,
-    size_of,
-)
+from imuarray.trust.drawing import FAR, Places, another_size, departures, factor_words, size_of
 from imuarray.trust.misfit import RESIDUAL, is_papers, residuals, rigid, unfitting, unsteady
 from imuarray.trust.rigid import COHERENT, FEW, SLOPE, Slope, elsewhere, kept, slope, turning
 from imuarray.trust.suspects import MIRRORED, clipped, common, gravity, wrapped
