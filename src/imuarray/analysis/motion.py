@@ -185,7 +185,7 @@ def motion_under(
     block = calibration["position_covariance"].to_numpy()[1:, :, 1:, :]
     covariance: np.ndarray | None = block.reshape((parameters.size,) * 2)
     extended = "effect_parameter" in calibration
-    model = model_of(recording, effect_names(calibration))
+    model = model_of(recording, effect_names(calibration) if extended else ())
     if extended:
         _require_parameters(calibration, recording, model)
         parameters = np.append(parameters, calibration["effect_parameter"].to_numpy())
