@@ -18,12 +18,6 @@ import imuarray
 from benchmarks.board import Options, draw_board, write
 from imuarray.analysis.board import board
 from imuarray.analysis.motion import _late, as_calibrated
-from imuarray.analysis.trust import (
-    of_file,
-    of_first_order,
-    reasons_of_calibration,
-    reasons_of_motion,
-)
 from imuarray.cli import main
 from imuarray.commands.board import answer
 from imuarray.commands.calibrate import position_lines
@@ -36,6 +30,7 @@ from imuarray.engine.widths import corrected
 from imuarray.errors import InputError
 from imuarray.pictures.board import missing
 from imuarray.report.board import advice, facts, html, noises, turned, verdict, write_board
+from imuarray.trust import of_file, of_first_order, reasons_of_calibration, reasons_of_motion
 from tests.browser import in_browser, needs_browser
 
 matplotlib.use("agg")

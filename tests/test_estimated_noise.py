@@ -50,7 +50,7 @@ def test_few_samples_share_one_factor_without_bias():
 
 def test_what_is_known_is_kept():
     made = recording(100, triads=4)
-    found = posterior_of(made, model_of(made), known=(True, False))
+    found = posterior_of(made, model_of(made), known=True)
     np.testing.assert_array_equal(found.model.noise.accelerometer, 0.04**2 * np.eye(12))
     assert found.scales == ("gyroscope_noise", "angular_rate", "angular_acceleration")
 

@@ -7,13 +7,13 @@ import pytest
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
-from imuarray.analysis.trust import of_first_order, reasons_of_poses
 from imuarray.errors import InputError
 from imuarray.firstorder.correct import calibrate_first_order
 from imuarray.firstorder.outliers import fit_triads
 from imuarray.firstorder.pose_noise import walked_mean
 from imuarray.firstorder.report import summary_lines
 from imuarray.firstorder.still import averaged_sd, reading_sd, smoothing, still_poses
+from imuarray.trust import of_first_order, reasons_of_poses
 from tests.test_first_order import GRAVITY, RATE, board, directions, triads
 
 WALKS = [[0.0, 1e-2, 0.0, 0.0], [2e-2] * 4]  # one triad's; strong beside the noise

@@ -8,7 +8,6 @@ import pytest
 from scipy.linalg import rq
 
 from benchmarks.board import GRAVITY, Options, draw_board, draw_hand
-from imuarray.analysis.trust import POSES, Poses, of_file, reasons_of_poses
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.firstorder.correct import calibrate_first_order, calibrate_together, correct
@@ -17,6 +16,7 @@ from imuarray.firstorder.report import gyroscope_lines, parameter_table, turned_
 from imuarray.firstorder.still import still_poses
 from imuarray.recording import read_recording, write_recording
 from imuarray.recording.format import load_dataset
+from imuarray.trust.poses import POSES, Poses, of_file, reasons_of_poses
 
 SHORT = Options(sampling_rate=100.0, still=3.2, move=1.5, twisting=4.0)
 

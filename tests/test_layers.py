@@ -17,8 +17,8 @@ LAYERS = {
         ("errors", "caches", "linear", "tails", "walk"), ("compiled",),
         ("streams", "provenance", "geometry"), ("motion",), ("model",),
         ("recording",), ("simulation", "firstorder", "estimation"), ("alignment", "engine"),
-        ("posterior",), ("diagnosis",), ("pictures",), ("report", "plots"), ("analysis",),
-        ("commands",), ("cli",), ("__main__",),
+        ("posterior",), ("diagnosis",), ("pictures",), ("report", "plots"), ("trust",),
+        ("analysis",), ("commands",), ("cli",), ("__main__",),
     ),
     PAPERS: (
         ("config", "reference", "estimation", "blind"), ("posterior",), ("measured",),
@@ -55,6 +55,12 @@ def test_imports_run_one_way(package):
 
 def test_the_tool_knows_nothing_of_the_papers():
     assert not [path for path in TOOL.rglob("*.py") if imported(path, "imuarray_papers")]
+
+
+def test_trust_is_entered_by_its_door():
+    files = [path for package in LAYERS for path in package.rglob("*.py")]
+    outside = [path for path in files if path.parent.name != "trust"]
+    assert not [path for path in outside if "imuarray.trust." in path.read_text(encoding="utf-8")]
 
 
 def test_the_injector_shares_no_code_with_the_model():

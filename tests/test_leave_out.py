@@ -7,13 +7,14 @@ import pandas as pd
 import pytest
 from scipy.stats import multivariate_t
 
-from imuarray.analysis.known import located, predicted, with_board
+from imuarray.analysis.known import with_board
 from imuarray.engine.course import block_scores, log_densities
 from imuarray.engine.dataset import engine_dataset
 from imuarray.engine.fit import at, flat_parameters
 from imuarray.engine.heldout import log_scores
 from imuarray.engine.linearise import linearise
 from imuarray_papers.figures.board import table_experiment, table_left_out
+from imuarray_papers.measured.left_out import located, predicted
 from tests.test_engine import fitted, simulated
 
 

@@ -192,7 +192,8 @@ def test_no_module_beside_the_finders_names_an_effect():
         "known",  # how a recording's own clocks are found beside a known board
     }
     package = Path(imuarray.__file__).parent
-    for folder in ("diagnosis", "report", "analysis", "commands", "estimation", "posterior"):
+    folders = "diagnosis", "report", "trust", "analysis", "commands", "estimation", "posterior"
+    for folder in folders:
         for path in (package / folder).rglob("*.py"):
             text = path.read_text(encoding="utf-8")
             named = [name for name in {**EFFECTS, **DATA_EFFECTS} if f'"{name}"' in text]

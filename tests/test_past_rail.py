@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 import imuarray
-from imuarray.analysis.beyond import posterior_beyond
 from imuarray.analysis.calibration import fitted_beyond
-from imuarray.analysis.density import traced
-from imuarray.analysis.known import _choose, _hidden, fused, past_rail
+from imuarray.analysis.density import posterior_beyond, traced
+from imuarray.analysis.known import fused
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.provenance import write_netcdf
 from imuarray_papers.figures.board import draw_past_rail, table_past_rail
+from imuarray_papers.measured.left_out import _choose, _hidden, past_rail
 from tests.cases import known
 from tests.test_bound import model
 

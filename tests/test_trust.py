@@ -10,16 +10,17 @@ import xarray as xr
 from scipy.spatial.transform import Rotation
 
 import imuarray
-from imuarray.analysis import trust
-from imuarray.analysis.drawing import Places, departures
-from imuarray.analysis.misfit import residuals, unsteady
-from imuarray.analysis.rigid import slope, turning
-from imuarray.analysis.suspects import clipped, suspects, told, wrapped
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.firstorder.correct import corrected
 from imuarray.geometry import mimu4444, mimu4444_corners
 from imuarray.recording.record import CORRECTION
+from imuarray.trust import poses
+from imuarray.trust import reasons as doubts
+from imuarray.trust.drawing import Places, departures
+from imuarray.trust.misfit import residuals, unsteady
+from imuarray.trust.rigid import slope, turning
+from imuarray.trust.suspects import clipped, suspects, wrapped
 from imuarray_papers.blind.cases import Case, make
 
 CASE = Case("trust", duration=8.0)
@@ -220,7 +221,7 @@ def test_a_sound_recording_gives_none(case):
     for seed in range(3):
         recording, _ = make(case, seed)
         found = imuarray.calibrate(recording, "papers")
-        assert trust.reasons_of_calibration(recording, found) == []
+        assert doubts.reasons_of_calibration(recording, found) == []
 
 
 def test_samples_that_are_no_course_give_none():
@@ -229,7 +230,7 @@ def test_samples_that_are_no_course_give_none():
     shuffled = recording.select(np.random.default_rng(0).permutation(len(recording.time)))
     recording = replace(shuffled, time=recording.time)
     found = imuarray.calibrate(recording, "papers")
-    assert trust.reasons_of_calibration(recording, found) == []
+    assert doubts.reasons_of_calibration(recording, found) == []
 
 
 def test_a_drawing_wrong_by_its_declared_amount_gives_none():
@@ -267,13 +268,13 @@ def test_the_motion_of_a_rigid_array():
 
 def test_two_suspects_are_both_named(sound):
     recording = one(turned(20)(sound), 5, late)
-    assert told(suspects(recording)) == ["IMU 3 is turned by 20 degrees", "IMU 6 is 1 sample late"]
+    assert suspects(recording) == ["IMU 3 is turned by 20 degrees", "IMU 6 is 1 sample late"]
 
 
 def test_a_delay_among_samples_that_are_no_course(sound):
     few = one(sound, 2, late, GYROSCOPE).select(slice(0, None, 7))
     shaken = np.sort(np.random.default_rng(0).uniform(0, 8, len(few.time)))
-    assert told(suspects(replace(few, time=shaken))) == ["gyroscope 3 is 8 ms late"]
+    assert suspects(replace(few, time=shaken)) == ["gyroscope 3 is 8 ms late"]
 
 
 def test_samples_too_far_apart_for_an_integral_give_none(sound):
@@ -297,17 +298,17 @@ def posterior_of(found, scale=1.0):
 
 def test_a_posterior(sound):
     found = imuarray.calibrate(sound, "papers")
-    assert trust.reasons_of_posterior(sound, posterior_of(found)) == []
+    assert doubts.reasons_of_posterior(sound, posterior_of(found)) == []
     wrong = times(sound, force=-1.0)
-    (said,) = trust.reasons_of_posterior(wrong, posterior_of(found, -1.0))
+    (said,) = doubts.reasons_of_posterior(wrong, posterior_of(found, -1.0))
     assert "specific force of the wrong sign" in said
     noisy = one(sound, 2, lambda x: x + 0.1 * np.sin(np.arange(len(x)))[:, None], GYROSCOPE)
-    (said,) = trust.reasons_of_posterior(noisy, posterior_of(found))
+    (said,) = doubts.reasons_of_posterior(noisy, posterior_of(found))
     assert "gyroscope 3 does not fit the others" in said
-    assert trust.reasons_of_posterior(noisy, posterior_of(found), spread=True) == []
+    assert doubts.reasons_of_posterior(noisy, posterior_of(found), spread=True) == []
     tree = posterior_of(found)
     tree.attrs["converged"] = 0
-    assert trust.reasons_of_posterior(sound, tree) == [
+    assert doubts.reasons_of_posterior(sound, tree) == [
         "the search or the chains have not converged"
     ]
 
@@ -320,7 +321,7 @@ def test_a_diagnosis(sound):
 
     def reasons(recording, positions):
         section = {"positions_m": positions.tolist(), "positions_sd_m": sds.tolist()}
-        return trust.reasons_of_diagnosis(recording, {"extended": section})
+        return doubts.reasons_of_diagnosis(recording, {"extended": section})
 
     assert reasons(sound, places) == []
     (said,) = reasons(times(sound, force=-1.0), -places)
@@ -331,9 +332,9 @@ def test_a_recording_that_says_little(sound):
     """Whatever sds are claimed of it; slow enough for its motion to be good for an application."""
     found = imuarray.calibrate(sound, "papers")
     slow = replace(times(sound, 1e-4, 1e-2), time=100 * sound.time)
-    (said,) = trust.reasons_of_calibration(slow, found)
+    (said,) = doubts.reasons_of_calibration(slow, found)
     assert "says little of the positions" in said
-    assert trust.reasons_of_motion(slow, found) == []
+    assert doubts.reasons_of_motion(slow, found) == []
 
 
 def test_positions_known_worse_than_drawn(sound):
@@ -345,7 +346,7 @@ def test_positions_known_worse_than_drawn(sound):
     )
     one = np.eye(3 * len(sound.accelerometer_labels)) * sound.position_prior_sd**2
     known, little = (
-        trust.reasons_of_calibration(
+        doubts.reasons_of_calibration(
             drawn, found.assign(position_covariance=(("row", "column"), share * one))
         )
         for share in (0.01, 4.0)
@@ -358,9 +359,9 @@ def test_positions_known_worse_than_drawn(sound):
 
 def test_several_recordings_of_a_board(sound):
     found = imuarray.calibrate(sound, "papers")
-    assert trust.reasons_of_calibration([sound, sound], found) == []
+    assert doubts.reasons_of_calibration([sound, sound], found) == []
     wrong = times(sound, rate=-1.0)
-    (said,) = trust.reasons_of_calibration([sound, wrong], found)
+    (said,) = doubts.reasons_of_calibration([sound, wrong], found)
     assert said.startswith("recording 2: the gyroscopes turn the other way round")
 
 
@@ -392,16 +393,16 @@ def test_what_looks_at_the_time_is_of_its_own_recording(sound, effect):
         {"effects": f"{effect},gyroscope_delay", "model": "diagnosis"},
     )  # fmt: skip
     part = sound.select(slice(100, 400))
-    assert trust._of_another_time(sound, calibration, False) == []
-    assert trust._of_another_time(part, calibration, False) == []
+    assert doubts._of_another_time(sound, calibration, False) == []
+    assert doubts._of_another_time(part, calibration, False) == []
     another = make(CASE, 2)[0]
     later = replace(another, time=another.time + 100.0)
     for one in (another, later):
-        (said,) = trust._of_another_time(one, calibration, False)
+        (said,) = doubts._of_another_time(one, calibration, False)
         assert effect in said
-        assert bool(trust._of_another_time(one, calibration, True)) == (effect != "sensor_clock")
+        assert bool(doubts._of_another_time(one, calibration, True)) == (effect != "sensor_clock")
     without = calibration.assign_attrs(effects="gyroscope_delay")
-    assert trust._of_another_time(another, without, False) == []
+    assert doubts._of_another_time(another, without, False) == []
 
 
 def test_a_rail_within_the_range_shows_under_a_correction(sound):
@@ -447,10 +448,10 @@ def jumped(recording, imu, by=(0.1, 0.1, 0.1)):
 @pytest.mark.parametrize("imu", [0, 2], ids=["the reference", "another"])
 def test_an_offset_that_jumps_is_named(sound, imu, monkeypatch):
     """It leaves hardly a residual: all parts of the recording fit, at other places of the IMU."""
-    monkeypatch.setattr(trust, "unsteady", lambda found, *_: unsteady(found, True))
+    monkeypatch.setattr(doubts, "unsteady", lambda found, *_: unsteady(found, True))
     found = imuarray.calibrate(jumped(sound, imu))
     assert found.attrs["residual_ratio"] < 1.5
-    (reason,) = trust.reasons_of_calibration(jumped(sound, imu), found)
+    (reason,) = doubts.reasons_of_calibration(jumped(sound, imu), found)
     assert f"on the place of IMU {sound.accelerometer_labels[imu]}, by" in reason
 
 
@@ -498,20 +499,20 @@ def test_a_map_that_does_not_hold_while_twisting_is_named(sound):
     count = len(sound.accelerometer_labels)
     sound = replace(sound, map_covariance=1e-8 * np.eye(9 * count))
     found = imuarray.calibrate(sound)
-    assert found.attrs["accelerometer_maps_hold"] > trust.HOLD
-    assert trust._moved_maps(found) == []
+    assert found.attrs["accelerometer_maps_hold"] > doubts.HOLD
+    assert doubts._moved_maps(found) == []
     turn = Rotation.from_rotvec([0, 0, np.radians(1.0)]).as_matrix()
     force = sound.specific_force.copy()
     force[:, 2] = force[:, 2] @ turn
-    said = trust._moved_maps(imuarray.calibrate(replace(sound, specific_force=force)))
+    said = doubts._moved_maps(imuarray.calibrate(replace(sound, specific_force=force)))
     assert len(said) == 1 and f"accelerometer {sound.accelerometer_labels[2]} does not" in said[0]
 
 
 def test_an_array_that_shrinks_while_it_moves_is_told(sound):
     """The scale of all gyroscopes rises by 0.5 %, and with its square the centrifugal force."""
-    assert trust._grows(imuarray.calibrate(sound)) == []
+    assert reasons._grows(imuarray.calibrate(sound)) == []
     rise = np.linspace(1.0, 1.005, len(sound.time))[:, None, None]
-    (said,) = trust._grows(
+    (said,) = reasons._grows(
         imuarray.calibrate(replace(sound, angular_rate=rise * sound.angular_rate))
     )
     assert "scales rise" in said and 0.9 < float(re.search(r"by (\S+) %", said)[1]) < 1.1
@@ -520,12 +521,12 @@ def test_an_array_that_shrinks_while_it_moves_is_told(sound):
 def test_an_odd_scale_of_all_gyroscopes_is_the_time_base_or_theirs():
     rng, maps = np.random.default_rng(3), np.tile(np.eye(3), (6, 1, 1))
     maps += 0.005 * rng.standard_normal((6, 3, 1)) * np.eye(3)
-    chances = [trust._chance(part * maps) for part in (1.0, 1.015)]
-    assert chances[0] > trust.ODD > chances[1]
-    assert trust.reasons_of_poses(trust.Poses(scale=1.0, chance=chances[0])) == []
-    (said,) = trust.reasons_of_poses(trust.Poses(scale=1 / 1.015, chance=chances[1]))
+    chances = [poses._chance(part * maps) for part in (1.0, 1.015)]
+    assert chances[0] > poses.ODD > chances[1]
+    assert poses.reasons_of_poses(poses.Poses(scale=1.0, chance=chances[0])) == []
+    (said,) = poses.reasons_of_poses(poses.Poses(scale=1 / 1.015, chance=chances[1]))
     assert "read 1.5 % too much" in said and "time base" in said
-    assert trust.reasons_of_poses(trust.Poses(scale=1.003, chance=1e-9)) == []
+    assert poses.reasons_of_poses(poses.Poses(scale=1.003, chance=1e-9)) == []
 
 
 def test_gyroscopes_that_wrap_are_named(sound):
@@ -551,4 +552,4 @@ def test_the_noise_of_the_only_gyroscope_stays_as_declared(sound):
     )
     found = imuarray.calibrate(alone)
     np.testing.assert_allclose(found.gyroscope_sd, alone.gyroscope_noise_sd)
-    assert trust.reasons_of_calibration(alone, found) == []
+    assert doubts.reasons_of_calibration(alone, found) == []

@@ -220,17 +220,15 @@ def _require_writable(option: str, path: Path, folder: bool = False) -> None:
 
 
 def _read_effects(arguments: argparse.Namespace) -> None:
-    """The user's own effects into the catalogue; none beside those of a calibration."""
-    model = getattr(arguments, "model", None)
-    if getattr(arguments, "effects", None) and isinstance(model, InputFile):
-        raise InputError("--effects: expected none with the model of a calibration, found some")
+    """The user's own effects into the catalogue."""
     files = getattr(arguments, "effect_file", None)
     if not files:
         return
     from imuarray.model import read_effects
 
     new = [name for path in files for name in read_effects(path)]
-    if hasattr(arguments, "effects") and not arguments.effects and not isinstance(model, InputFile):
+    of_file = isinstance(getattr(arguments, "model", None), InputFile)
+    if hasattr(arguments, "effects") and not arguments.effects and not of_file:
         raise InputError(
             f"--effect-file: expected --effects that names what to use of {', '.join(new)}, found"
             " none"

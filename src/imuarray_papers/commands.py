@@ -4,12 +4,12 @@ from functools import partial
 
 from imuarray.analysis.calibration import calibrate_papers
 from imuarray.analysis.model import assumed
-from imuarray.analysis.trust import of_file, reasons_of_poses, reasons_of_posterior
 from imuarray.commands import calibrate as calibrating
 from imuarray.commands import sample as sampling
 from imuarray.commands.output import Output
 from imuarray.provenance import stamp
 from imuarray.recording import read_recording, write_recording
+from imuarray.trust import of_file, reasons_of_poses, reasons_of_posterior
 from imuarray_papers.config import read_config
 from imuarray_papers.estimation.bcd import calibrate_bcd
 from imuarray_papers.sampling import SHRUNK

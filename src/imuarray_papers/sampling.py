@@ -8,7 +8,7 @@ import xarray as xr
 from imuarray.analysis.density import NOT_CONVERGED, Posterior, mode_search, prior_of
 from imuarray.analysis.model import Say, assumed, silent, usable
 from imuarray.analysis.noise import estimated_noise
-from imuarray.analysis.sampling import NUTS_STEPS, NUTS_WARMUP, SamplerRun, tree_of
+from imuarray.analysis.sampling import NUTS_STEPS, NUTS_WARMUP, tree_of
 from imuarray.engine.parameters import model_of
 from imuarray.errors import InputError, require_one_of
 from imuarray.geometry import positions_of
@@ -71,7 +71,7 @@ def flat(
         found = locate(recording, recording.accelerometer_noise_sd)
         mode, density = found.mean, sample_covariance(recording.angular_rate)
     else:
-        fitted = estimated_noise(recording, model, mode_search(recording), (known, False), say)
+        fitted = estimated_noise(recording, model, mode_search(recording), known, say)
         model, found = fitted.model, fitted.calibration
         mode = found.positions
     if not found.converged:
@@ -111,8 +111,7 @@ def sample(
         recording.time, recording.specific_force, recording.angular_rate, rates, method, steps,
         recording.accelerometer_noise_sd, code_digest(),
     )  # fmt: skip
-    run = SamplerRun(chains, target.posterior, key, {"sampler": method} | attrs)
-    tree = tree_of(run, seed)
+    tree = tree_of(target.posterior, chains, {"sampler": method} | attrs, key, seed)
     fallen = flattest(chains.draws, recording) < FLAT
     tree.attrs |= {"shrunk_by_sds": target.shrinkage, "on_a_line": int(fallen)}
     if fallen:

@@ -5,10 +5,10 @@ from imuarray_papers.pipeline.job import job
 with job(snakemake):
     from functools import partial
 
-    from imuarray.analysis.known import ASSUMED, BINS, past_rail
     from imuarray.recording import load_dataset, read_recording
     from imuarray_papers.figures.board import draw_past_rail
     from imuarray_papers.figures.style import write_figure
+    from imuarray_papers.measured.left_out import ASSUMED, BINS, past_rail
 
     recording = read_recording(snakemake.input.recording)
     table = past_rail(recording, load_dataset(snakemake.input.calibration))

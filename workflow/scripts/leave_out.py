@@ -3,9 +3,9 @@
 from imuarray_papers.pipeline.job import job
 
 with job(snakemake):
-    from imuarray.analysis.known import left_out
     from imuarray.provenance import digest, stamp, write_netcdf
     from imuarray.recording import read_recording, write_recording
+    from imuarray_papers.measured.left_out import left_out
 
     entry, made = snakemake.params.entry, snakemake.output
     recording, *others = [

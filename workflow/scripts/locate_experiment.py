@@ -3,9 +3,9 @@
 from imuarray_papers.pipeline.job import job
 
 with job(snakemake):
-    from imuarray.analysis.known import located
     from imuarray.provenance import write_netcdf
     from imuarray.recording import load_dataset, read_recording
+    from imuarray_papers.measured.left_out import located
 
     recording = read_recording(snakemake.input.recording)
     calibration = load_dataset(snakemake.input.calibration)

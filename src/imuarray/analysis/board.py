@@ -7,7 +7,6 @@ from pathlib import Path
 from imuarray.analysis.calibration import calibrate
 from imuarray.analysis.logs import open_logs
 from imuarray.analysis.model import Say, silent
-from imuarray.analysis.trust import of_first_order, reasons_of_calibration, reasons_of_poses
 from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.firstorder.correct import FirstOrder, calibrate_first_order, correct
 from imuarray.firstorder.still import still_poses
@@ -15,6 +14,7 @@ from imuarray.recording import Recording
 from imuarray.recording.units import GRAVITY
 from imuarray.recording.validate import check_values
 from imuarray.report.board import Board
+from imuarray.trust import of_first_order, reasons_of_calibration, reasons_of_poses
 
 FEWEST = 3  # samples
 

@@ -10,14 +10,13 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis import methods
-from imuarray.analysis.known import again
+from imuarray.analysis.known import again, used
 from imuarray.analysis.model import Say, assumed, require_together, silent, usable
 from imuarray.analysis.prepare import less_leak_by_others
 from imuarray.engine.dataset import engine_dataset, papers_dataset, with_readings
 from imuarray.engine.estimate import Estimate
 from imuarray.engine.forward import EffectGroup, groups_of, select_forward, with_effects
 from imuarray.engine.parameters import model_of
-from imuarray.engine.readings import Readings, arrange, determined, most_informative
 from imuarray.errors import InputError, one_line
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording, load_dataset
@@ -37,13 +36,11 @@ def fitted(
                 return again(recordings[0], load_dataset(Path(model)), say), []
             except InputError as error:
                 raise InputError(f"--model {model}: {error}") from None
-    readings = _arranged(recordings, say)
+    readings = [used(one, say) for one in recordings]
+    if not effects:
+        return _selected(readings, True, say)
     with _near_the_model():
-        if effects:
-            return with_effects(readings, effects), []
-        found, groups = select_forward(readings)
-    _tell(groups, say)
-    return found, groups
+        return with_effects(readings, effects), []
 
 
 @contextmanager
@@ -65,32 +62,21 @@ def fitted_beyond(
     """`fitted` of one recording, None where no more than positions and motion are in the model."""
     if methods.is_file(model) or effects:
         return fitted([recording], model, effects, say)[0]
-    readings = _arranged([recording], say)
+    readings = [used(recording, say)]
     if not groups_of(readings):
         return None
-    with _near_the_model():
-        found, groups = select_forward(readings, bare=False)
-    _tell(groups, say)
+    found, groups = _selected(readings, False, say)
     return found if any(group.kept for group in groups) else None
 
 
-def _arranged(recordings, say: Say) -> list[Readings]:
-    arranged = [arrange(one, sparse=True) for one in recordings]
-    found = [most_informative(one.select(determined(one, 1)), say) for one in arranged]
-    for recording, one in zip(recordings, found, strict=True):
-        if not len(one.time):
-            rate = 1 / np.median(np.diff(recording.time)) if len(recording.time) > 1 else 0.0
-            raise InputError(
-                f"recording: expected samples that determine the motion, found none, at {rate:.4g}"
-                " samples a second; is the unit of time right?"
-            )
-    return found
-
-
-def _tell(groups: Sequence[EffectGroup], say: Say) -> None:
+def _selected(readings, bare: bool, say: Say) -> tuple[Estimate, list[EffectGroup]]:
+    """`select_forward`, each group's verdict told."""
+    with _near_the_model():
+        found, groups = select_forward(readings, bare=bare)
     for group in groups:
         verdict = "kept" if group.kept else "left out"
         say(f"{group.name}: {verdict}, {group.gain:.3g} ({group.error:.2g}) nats on held-out time")
+    return found, groups
 
 
 def calibrate(
@@ -147,12 +133,13 @@ def calibrate(
         require_live(one)
     require_apart(recordings)
     require_together(model, recordings, effects, accelerometer_noise)
-    if effects and methods.is_file(model):
-        raise InputError("--effects: expected none with the model of a calibration, found some")
     if model == "papers":
         return calibrate_papers(recordings[0], accelerometer_noise, say)
     whole = [less_leak_by_others(one) for one in recordings]
-    return _finished(_engine(whole, str(model), tuple(effects), say), recordings, str(model))
+    found, groups = fitted(whole, str(model), tuple(effects), say)
+    dataset = engine_dataset(whole, found)
+    dataset.attrs["parts"] = json.dumps([group._asdict() for group in groups])
+    return _finished(dataset, recordings, str(model))
 
 
 def _finished(dataset: xr.Dataset, recordings, model: str) -> xr.Dataset:
@@ -181,11 +168,3 @@ def calibrate_papers(
         model, whole.specific_force, whole.angular_rate, saturated=whole.saturated_gyroscopes()
     )
     return _finished(papers_dataset(recording, model, found), [given], "papers")
-
-
-def _engine(recordings, model: str, effects, say: Say) -> xr.Dataset:
-    """Robust least squares: forward selection, given effects, or those of a calibration."""
-    found, groups = fitted(recordings, model, effects, say)
-    dataset = engine_dataset(recordings, found)
-    dataset.attrs["parts"] = json.dumps([group._asdict() for group in groups])
-    return dataset

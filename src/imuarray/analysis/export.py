@@ -1,21 +1,20 @@
 """A calibration as other tools want it: one plain document, of which the file formats are made."""
 
-import json
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from imuarray.analysis import methods
-from imuarray.analysis.checked import require_fit
-from imuarray.analysis.formats import frames_of, left_of
-from imuarray.errors import InputError, one_line, require_one_of
+from imuarray.analysis import formats, methods
+from imuarray.analysis.plain import finite
+from imuarray.errors import InputError, require_one_of
 from imuarray.firstorder.noise import TERMS, StillNoise
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.model.effects import KINDS, Prediction
 from imuarray.recording.record import CORRECTION, NUMBERS
 from imuarray.recording.validate import is_rotation
+from imuarray.trust import effect_names, parameters_of, reasons_in, require_fit
 
 BIASES = "accelerometer_bias", "gyroscope_bias"
 MATRICES = ("accelerometer_scale", "accelerometer_misalignment", "gyroscope_scale",
@@ -54,20 +53,8 @@ def export(calibration: xr.Dataset, format: str = "json", noise: StillNoise | No
 
     InputError for another format, a calibration that is not whole, or noise of other IMUs.
     """
-    from imuarray.analysis import formats
-
     require_one_of("format", format, methods.EXPORTS)
     return getattr(formats, format)(describe(calibration, noise))
-
-
-def reasons_of(calibration: xr.Dataset) -> list[str]:
-    """Why a calibration is not to be trusted, as its file says; none for one that is."""
-    try:
-        return [one_line(str(reason)) for reason in json.loads(calibration.attrs["reasons"])]
-    except KeyError:
-        return []
-    except (ValueError, TypeError):
-        raise InputError("expected the attribute reasons as a JSON list, found another") from None
 
 
 def describe(calibration: xr.Dataset, noise: StillNoise | None = None) -> dict[str, Any]:
@@ -77,40 +64,38 @@ def describe(calibration: xr.Dataset, noise: StillNoise | None = None) -> dict[s
     if len(labels["gyroscope"]) > len(labels["accelerometer"]):
         raise InputError("export: expected no more gyroscopes than accelerometers, found more")
     attrs, positions = calibration.attrs, calibration["position"].to_numpy()
-    effects = [name for name in str(attrs.get("effects", "")).split(",") if name]
+    effects = effect_names(calibration)
     array = Array(positions, tuple(labels["accelerometer"]), len(labels["gyroscope"]), "export")
     model = ArrayModel.isotropic(array, 1.0, 1.0, effects)
     _require_whole(calibration, model)
     try:
         steps, times = _steps(calibration, model), _times(calibration, model)
-        frames = frames_of(calibration, steps, positions)
+        frames = formats.frames_of(calibration, steps, positions)
     except np.linalg.LinAlgError:
         raise InputError("expected corrections that can be inverted, found singular ones") from None
     rate = attrs.get("rate", noise.rate_hz if noise else None)
     imus = []
     for k, frame in enumerate(frames):
         imu: dict[str, Any] = {"label": labels["accelerometer"][k], **_clock(calibration, k)}
-        whole = {name: _plain(value) for name, value in frame.items() if name not in KINDS}
-        imu["kalibr"] = {name: whole.pop(name) for name in ("T_i_b", "T_i_b_turn_sd_rad")}
-        imu |= whole
+        imu |= frame
         for kind in KINDS:
             if k < len(labels[kind]):
-                imu[kind] = {"label": labels[kind][k], "unit": NUMBERS[f"{kind}_noise_sd"]}
-                imu[kind]["corrections"] = [_step(step, k) for step in steps[kind]]
-                imu["kalibr"][kind] = {n: _plain(value) for n, value in frame[kind].items()}
-                value, sd = (_plain(part[k]) for part in times[kind])
-                imu[kind] |= {"time_offset_s": value, "time_offset_sd_s": sd}
-                imu[kind]["noise"] = _noise(calibration, noise, kind, k, rate)
+                value, sd = (part[k] for part in times[kind])
+                imu[kind] = {
+                    "label": labels[kind][k], "unit": NUMBERS[f"{kind}_noise_sd"],
+                    "corrections": [_step(step, k) for step in steps[kind]],
+                    "time_offset_s": value, "time_offset_sd_s": sd,
+                    "noise": _noise(calibration, noise, kind, k, rate),
+                }  # fmt: skip
         imus.append(imu | {"kalibr": imu.pop("kalibr")})
-    covariance = calibration["position_covariance"].to_numpy()
-    return {
+    return finite({
         "created_by": str(attrs.get("created_by", "")),
         "trusted": bool(attrs["trusted"]) if "trusted" in attrs else None,
-        "reasons": reasons_of(calibration), "formulas": FORMULAS, "rate_hz": rate, "imus": imus,
-        "position_covariance_m2": _plain(covariance),
-        "parameters": _parameters(calibration),
+        "reasons": reasons_in(calibration), "formulas": FORMULAS, "rate_hz": rate, "imus": imus,
+        "position_covariance_m2": calibration["position_covariance"].to_numpy(),
+        "parameters": parameters_of(calibration),
         "not_in_matrices": [name for name in effects if name not in (*MATRICES, *BIASES, *TIMES)],
-    }  # fmt: skip
+    })  # fmt: skip
 
 
 def _require_whole(calibration: xr.Dataset, model: ArrayModel) -> None:
@@ -130,23 +115,6 @@ def _require_whole(calibration: xr.Dataset, model: ArrayModel) -> None:
             raise InputError(f"expected a calibration with {what}, found others, or none")
 
 
-def _plain(values) -> Any:
-    """Lists and numbers, None for what is not finite."""
-    values = np.asarray(values, float)
-    out = values.astype(object)
-    out[~np.isfinite(values)] = None
-    return out.tolist()
-
-
-def _parameters(calibration: xr.Dataset) -> dict[str, dict]:
-    if "effect_parameter" not in calibration:
-        return {}
-    names = calibration["parameter"].to_numpy()
-    columns = (_plain(calibration[f"effect_{name}"]) for name in ("parameter", "sd"))
-    rows = zip(names, *columns, strict=True)
-    return {str(name): {"value": value, "sd": sd} for name, value, sd in rows}
-
-
 def _values(calibration: xr.Dataset, model: ArrayModel) -> dict:
     found = calibration.get("effect_parameter")
     return model.split(np.empty(0) if found is None else found.to_numpy())
@@ -156,13 +124,12 @@ def _steps(calibration: xr.Dataset, model: ArrayModel) -> dict[str, list[dict]]:
     """Corrections of each kind in turn, arrays with triads first."""
     out: dict[str, list[dict]] = {kind: [] for kind in KINDS}
     if set(CORRECTION) <= set(calibration):
-        first = calibration[list(CORRECTION)].isel(recording=0)
-        for name, part_values in first.items():
-            kind, _, part = str(name).partition("_")
-            if not out[kind]:
-                out[kind].append({"from": "first-order"})
-            out[kind][0][part] = part_values.to_numpy()
-        for kind, left in left_of(calibration).items():
+        for kind in KINDS:
+            out[kind] = [{"from": "first-order"}]
+        for name in CORRECTION:
+            kind, _, part = name.partition("_")
+            out[kind][0][part] = calibration[name].isel(recording=0).to_numpy()
+        for kind, left in formats.left_of(calibration).items():
             out[kind][0]["map_sd"] = np.sqrt(np.maximum(np.diag(left), 0)).reshape(-1, 3, 3)
     values = _values(calibration, model)
     for number, kind in enumerate(KINDS):
@@ -189,7 +156,7 @@ def _linear(model: ArrayModel, values: dict, kind: int) -> tuple[np.ndarray, np.
 
 
 def _step(step: dict, k: int) -> dict[str, Any]:
-    return {name: part if name == "from" else _plain(part[k]) for name, part in step.items()}
+    return {name: part if name == "from" else part[k] for name, part in step.items()}
 
 
 def _times(calibration: xr.Dataset, model: ArrayModel) -> dict[str, tuple]:
@@ -227,9 +194,9 @@ def _times(calibration: xr.Dataset, model: ArrayModel) -> dict[str, tuple]:
 def _clock(calibration: xr.Dataset, k: int) -> dict[str, Any]:
     """An IMU's rate, and what its clock gains, where it logged by itself."""
     if "clock_drift" not in calibration:
-        return {"rate_hz": _plain(calibration.attrs.get("rate", np.nan)), "clock": None}
+        return {"rate_hz": calibration.attrs.get("rate"), "clock": None}
     names = {"drift": "clock_drift", "drift_sd": "clock_drift_sd", "at_s": "clock_middle"}
-    found = {name: _plain(calibration[own].to_numpy()[k]) for name, own in names.items()}
+    found = {name: calibration[own].to_numpy()[k] for name, own in names.items()}
     rate = float(f"{calibration['log_rate'].to_numpy()[k]:.10g}")
     return {"rate_hz": rate, "clock": found if k else None}
 
@@ -239,7 +206,7 @@ def _noise(calibration: xr.Dataset, noise: StillNoise | None, kind: str, k: int,
     if noise is None:
         sds = calibration.get(f"{kind}_sd")
         density = np.nan if sds is None or not rate else sds.to_numpy()[k] / np.sqrt(rate)
-        return {"from": "calibrate", TERMS[0]: {"value": _plain(np.broadcast_to(density, 3))}}
+        return {"from": "calibrate", TERMS[0]: {"value": np.broadcast_to(density, 3)}}
     sensor = "specific_force" if kind == KINDS[0] else "angular_rate"
     label = str(calibration[kind].to_numpy()[k])
     table = noise.terms[(noise.terms.sensor == sensor) & (noise.terms.triad == label)]
@@ -247,6 +214,6 @@ def _noise(calibration: xr.Dataset, noise: StillNoise | None, kind: str, k: int,
         raise InputError(f"noise: expected that of {kind} {label}, found none")
     out: dict[str, Any] = {"from": "allan"}
     for term, part in table.groupby("term", sort=False):
-        out[str(term)] = {name: _plain(part[name]) for name in ("value", "sd", "below")}
+        out[str(term)] = {name: part[name].to_numpy() for name in ("value", "sd", "below")}
         out[str(term)]["unit"] = part.unit.iloc[0]
     return out

@@ -1,13 +1,12 @@
 """Files of other tools, made of the document that `imuarray.analysis.export` describes."""
 
-import csv as tables
-import io
 import re
 from json import dumps
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
@@ -56,15 +55,16 @@ def frames_of(calibration: xr.Dataset, steps: dict, positions) -> list[dict]:
         to = np.eye(4)
         if k:
             to[:3, :3], to[:3, 3] = turn @ lower[0][1].T, turn @ (positions[0] - positions[k])
-        frame: dict[str, Any] = {"position_m": positions[k], "position_sd_m": sds[k]}
-        frame |= {"rotation": turns[k], "rotation_sd_rad": own[k], "axes": axes[k]}
-        frame |= {"T_i_b": to, "T_i_b_turn_sd_rad": others[k]}
-        frame[KINDS[0]] = {"M": scale, "bias": axes[k].T @ sensed[KINDS[0]][1][k]}
+        kalibr: dict[str, Any] = {"T_i_b": to, "T_i_b_turn_sd_rad": others[k]}
+        kalibr[KINDS[0]] = {"M": scale, "bias": axes[k].T @ sensed[KINDS[0]][1][k]}
         if k < calibration.sizes[KINDS[1]]:
             matrix, bias = (part[k] for part in sensed[KINDS[1]])
             scale, whole = lower_times_rotation(axes[k].T @ matrix)
-            frame[KINDS[1]] = {"M": scale, "C_gyro_i": whole @ turn.T, "bias": axes[k].T @ bias}
-        frames.append(frame)
+            kalibr[KINDS[1]] = {"M": scale, "C_gyro_i": whole @ turn.T, "bias": axes[k].T @ bias}
+        frames.append({
+            "position_m": positions[k], "position_sd_m": sds[k], "rotation": turns[k],
+            "rotation_sd_rad": own[k], "axes": axes[k], "kalibr": kalibr,
+        })  # fmt: skip
     return frames
 
 
@@ -89,23 +89,24 @@ def turn_sds(calibration: xr.Dataset, turns, others) -> tuple[np.ndarray, np.nda
     From the maps 1 + d that first order has left: of U R (1 + d) what is beneath the diagonal of
     R d R' turns R, of L R (1 + d) what is above.
     """
-    left, count = left_of(calibration).get("accelerometer"), len(turns)
+    left = left_of(calibration).get("accelerometer")
     if left is None:
-        return (np.full((count, 3), np.nan),) * 2
-    sds, places, signs = [], ([7, 6, 3], [5, 2, 1]), ([1, -1, 1], [-1, 1, -1])
-    for relative, (frames, place, sign) in enumerate(
-        zip((turns, others), places, signs, strict=True)
-    ):
-        slopes = np.zeros((count, 3, count, 9))
-        for k, turn in enumerate(frames):
-            slopes[k, :, k] = np.array(sign)[:, None] * np.kron(turn, turn)[place]
-        if relative:
-            apart = others @ others[0].T
-            slopes = slopes - np.einsum("kij,jlm->kilm", apart, slopes[0])
-        rows = slopes.reshape(3 * count, 9 * count)
-        variances = np.einsum("ri,ij,rj->r", rows, left, rows)
-        sds.append(np.sqrt(np.maximum(variances, 0.0)).reshape(count, 3))
-    return sds[0], sds[1]
+        return (np.full((len(turns), 3), np.nan),) * 2
+    own = _slopes(turns, [7, 6, 3], [1, -1, 1])
+    relative = _slopes(others, [5, 2, 1], [-1, 1, -1])
+    relative -= np.einsum("kij,jlm->kilm", others @ others[0].T, relative[0])
+    rows = (slopes.reshape(-1, len(left)) for slopes in (own, relative))
+    variances = (np.einsum("ri,ij,rj->r", part, left, part).reshape(-1, 3) for part in rows)
+    first, second = (np.sqrt(np.maximum(part, 0.0)) for part in variances)
+    return first, second
+
+
+def _slopes(turns, place, sign) -> np.ndarray:
+    """(A, 3, A, 9) of the ``turns`` to the IMUs' own maps, by entries of R d R' and their signs."""
+    slopes = np.zeros((len(turns), 3, len(turns), 9))
+    for k, turn in enumerate(turns):
+        slopes[k, :, k] = np.array(sign)[:, None] * np.kron(turn, turn)[place]
+    return slopes
 
 
 def json(document: dict[str, Any]) -> str:
@@ -115,7 +116,7 @@ def json(document: dict[str, Any]) -> str:
 
 def csv(document: dict[str, Any]) -> str:
     """A row for each IMU: place, turn (rotation vector, array to IMU) and times, with sds."""
-    out, rows = io.StringIO(), []
+    rows = []
     for imu in document["imus"]:
         row = {"imu": imu["label"]}
         turn = Rotation.from_matrix(imu["rotation"]).as_rotvec().tolist()
@@ -131,10 +132,7 @@ def csv(document: dict[str, Any]) -> str:
         rows.append(
             row | {"trusted": document["trusted"], "reasons": "; ".join(document["reasons"])}
         )
-    writer = tables.DictWriter(out, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return out.getvalue()
+    return pd.DataFrame(rows).to_csv(index=False, lineterminator="\n")
 
 
 def urdf(document: dict[str, Any]) -> str:

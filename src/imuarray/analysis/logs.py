@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from imuarray.analysis.suspects import ends
 from imuarray.errors import InputError
 from imuarray.firstorder.correct import rails_shown
 from imuarray.recording import Recording, read_recording
@@ -17,6 +16,7 @@ from imuarray.recording.layout import read_layout, rotation
 from imuarray.recording.rig import Log, Rig, recording_of
 from imuarray.recording.undrawn import rough_positions
 from imuarray.recording.units import GRAVITY
+from imuarray.trust import ends
 
 RECORDINGS = (".nc", ".nc4", ".h5")
 PACKETS = (".bin", ".bin.xz")
@@ -76,9 +76,7 @@ def _with_rails(recording: Recording, layout=None) -> Recording:
     if layout is not None:
         triads = layout["gyroscopes"]["triads"].values()
         rates = np.array([rotation(one.get("axes", list("xyz")), "gyroscopes") for one in triads])
-    for kind, name, turns in (
-        ("accelerometer", "specific_force", forces), ("gyroscope", "angular_rate", rates)
-    ):  # fmt: skip
+    for (kind, name), turns in zip(READ.items(), (forces, rates), strict=True):
         if (np.isclose(turns, 0) | np.isclose(np.abs(turns), 1)).all():
             continue
         own = np.einsum("kji,tkj->tki", turns, getattr(recording, name))

@@ -62,8 +62,9 @@ def require_together(
     if model not in methods.MODELS and not methods.is_file(model):
         known = ", ".join(methods.MODELS)
         raise InputError(f"model: expected any of {known} or a calibration (.nc), found {model!r}")
-    if model == "papers" and effects:
-        raise InputError("--effects: expected none with --model papers, found some")
+    if effects and model != "sensors":
+        other = "--model papers" if model == "papers" else "the model of a calibration"
+        raise InputError(f"--effects: expected none with {other}, found some")
     if model != "papers" and accelerometer_noise is not None:
         raise InputError(
             "--accelerometer-noise: expected it with --model papers only, found it where the noise"

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from imuarray.analysis.checked import require_fit, require_labels
 from imuarray.analysis.model import assumed
 from imuarray.analysis.prepare import less_leak
 from imuarray.engine.parameters import model_of
@@ -23,6 +22,7 @@ from imuarray.motion.state import UNITS
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording
 from imuarray.recording.record import CORRECTION
+from imuarray.trust import effect_names, require_fit, require_labels, values_of
 
 
 def apply(
@@ -65,8 +65,8 @@ def motion_parts(
     require_fit(calibration, recording)
     used = [calibration[name].to_numpy() for name in sorted(map(str, calibration.data_vars))]
     data = digest(recording.specific_force, recording.angular_rate, *used)
-    origin, effects = recording.time[0], str(calibration.attrs.get("effects")).split(",")
-    together = len(recording.accelerometer_labels) < 3 or CLOCK in effects
+    origin, clocks = recording.time[0], CLOCK in effect_names(calibration)
+    together = len(recording.accelerometer_labels) < 3 or clocks
     for part in [recording.in_memory()] if together else recording.parts():
         dataset = _motion_of(calibration, part, accelerometer_noise, origin)
         dataset.attrs |= stamp({"recording and calibration": data}, 0)
@@ -83,11 +83,10 @@ def as_calibrated(recording: Recording, calibration: xr.Dataset) -> Recording:
     require_fit(calibration)
     require_labels(calibration, recording)
     first, recording = calibration[list(CORRECTION)].isel(recording=0), recording.in_memory()
-    names = "specific_force", "angular_rate"
-    rails = recording.saturated_accelerometers(), recording.saturated_gyroscopes()
     changed: dict[str, Any] = {}
-    for kind, name, railed in zip(KINDS, names, rails, strict=True):
+    for kind, name in zip(KINDS, ("specific_force", "angular_rate"), strict=True):
         inverse, offset = (first[f"{kind}_{part}"].to_numpy() for part in ("inverse", "offset"))
+        railed = getattr(recording, f"saturated_{kind}s")()
         limit = getattr(recording, f"{kind}_range")
         changed |= {
             name: corrected(inverse, offset, getattr(recording, name)),
@@ -134,14 +133,9 @@ def _late(calibration: xr.Dataset) -> float:
     What is common to the delays of all IMUs is nowhere seen: their mean is taken for zero. With
     clocks of their own, the delays are the offsets of these.
     """
-    if "effect_parameter" not in calibration:
-        return 0.0
-    names = [str(name) for name in calibration["parameter"].to_numpy()]
-    delay = [name.startswith("sensor_delay ") for name in names]
-    clock = [name.startswith("sensor_clock offset") for name in names]
-    values = calibration["effect_parameter"].to_numpy()
-    delays = values[delay] if any(delay) else -values[clock]
-    return float(np.median(delays)) if len(delays) else 0.0
+    clocks = values_of(calibration, "sensor_clock offset")
+    delays = values_of(calibration, "sensor_delay ") or [-offset for offset in clocks]
+    return float(np.median(delays)) if delays else 0.0
 
 
 def _with_common_map(found, calibration: xr.Dataset, recording: Recording):
@@ -151,8 +145,7 @@ def _with_common_map(found, calibration: xr.Dataset, recording: Recording):
     maps, their common scale alone is left.
     """
     rate = np.asarray(found.estimate.motion.angular_rate)
-    names = calibration.attrs.get("effects", "")
-    effects = find_effects(names.split(",") if names else ())
+    effects = find_effects(effect_names(calibration))
     if any(item.resizes and item.kinds == [1] for item in effects):
         scale_sd = np.nan_to_num(calibration.attrs.get("gyroscope_common_scale_sd", np.nan))
         own = scale_sd**2 * rate[:, :, None] * rate[:, None]
@@ -192,7 +185,7 @@ def motion_under(
     block = calibration["position_covariance"].to_numpy()[1:, :, 1:, :]
     covariance: np.ndarray | None = block.reshape((parameters.size,) * 2)
     extended = "effect_parameter" in calibration
-    model = model_of(recording, attrs["effects"].split(",") if extended else ())
+    model = model_of(recording, effect_names(calibration) if extended else ())
     if extended:
         _require_parameters(calibration, recording, model)
         parameters = np.append(parameters, calibration["effect_parameter"].to_numpy())
@@ -212,7 +205,7 @@ def _with_own_clocks(found, calibration: xr.Dataset, recording: Recording, covar
     from imuarray.analysis.known import fused
     from imuarray.engine.clocks import CLOCK
 
-    if CLOCK not in str(calibration.attrs.get("effects")).split(",") or covariance is None:
+    if CLOCK not in effect_names(calibration) or covariance is None:
         return found, False
     still = recording.stationary
     moving = np.ones(len(recording.time), bool) if still is None else ~still

@@ -8,13 +8,7 @@ import numpy as np
 from imuarray.analysis.model import Say, silent
 from imuarray.engine.derivatives import no_derivatives
 from imuarray.engine.fit import pick
-from imuarray.engine.linearise import (
-    CHUNK,
-    Eliminated,
-    State,
-    chunk_at,
-    directions_of,
-)
+from imuarray.engine.linearise import CHUNK, Eliminated, State, chunk_at, directions_of
 from imuarray.engine.parameters import Columns, columns_of
 from imuarray.engine.readings import Readings, measured
 from imuarray.estimation.identifiability import Calibration
@@ -81,26 +75,31 @@ def _size(estimates, covariances) -> float:
     return float(np.sqrt(found))
 
 
-def factors(seen: Shown, exists, known=(False, False)) -> np.ndarray:
-    """By what the triads' sds are wrong (N, 2); 1 where they are ``known`` or do not exist."""
+def factors(seen: Shown, exists, known: bool = False) -> np.ndarray:
+    """By what the triads' sds are wrong (N, 2); 1 where they do not exist.
+
+    And of accelerometers where theirs are ``known``. Of few triads, or with few degrees of freedom,
+    all of a kind share one.
+    """
     out = np.ones(exists.shape)
-    for kind in np.flatnonzero(~np.array(known)):
+    for kind in (1,) if known else (0, 1):
         own = exists[:, kind]
-        out[own, kind] = _factors(seen.squares[own, kind], seen.freedom[own, kind], APART[kind])
+        squares, freedom = seen.squares[own, kind], seen.freedom[own, kind]
+        if len(squares) < APART[kind] or freedom.min() < FREEDOM:
+            squares, freedom = squares.sum(), freedom.sum()
+        if np.all(freedom >= 1):
+            out[own, kind] = np.sqrt(np.maximum(squares / freedom, 1e-12))
     return out
 
 
-def _factors(squares, freedom, apart: int) -> np.ndarray:
-    """Factors (n,) of one kind of sensor: each its own, or one for all."""
-    if len(squares) < apart or freedom.min() < FREEDOM:
-        squares, freedom = np.full(len(squares), squares.sum()), freedom.sum()
-        if np.all(freedom < 1):
-            return np.ones(len(squares))
-    return np.sqrt(np.maximum(squares / freedom, 1e-12))
+def noise_of(readings: Readings) -> Noise:
+    """The readings' sds (N, 2), as a model has them."""
+    counts = readings.exists.sum(axis=0)
+    return Noise.of(*counts, *(readings.sd[:n, kind] for kind, n in enumerate(counts)))
 
 
 def estimated_noise(
-    recording: Recording, model: ArrayModel, fit, known=(False, False), say: Say = silent
+    recording: Recording, model: ArrayModel, fit, known: bool = False, say: Say = silent
 ) -> Fitted:
     """The papers' model's fit of a recording, and the noise of each triad that goes with it.
 
@@ -111,20 +110,18 @@ def estimated_noise(
     Parameters
     ----------
     fit : callable, model -> `Calibration` of ``recording`` with its covariance
-    known : (bool, bool)
-        Whether the accelerometers' noise, the gyroscopes', is the model's own.
+    known
+        Whether the accelerometers' noise is the model's own.
     """
-    counts, columns = (
-        (model.array.accelerometers, model.array.gyroscopes),
-        columns_of(model.array, (), recording.position_prior_sd),
-    )
+    columns = columns_of(model.array, (), recording.position_prior_sd)
     readings = measured(
         model, recording.specific_force, recording.angular_rate, recording.saturated_gyroscopes()
     )
     for number in range(ROUNDS + 1):
         found = fit(model)
         motion = np.hstack(found.motion.motion[:3])
-        state = State(motion, found.positions, np.empty(0), no_derivatives(len(motion), counts[0]))
+        rest = no_derivatives(len(motion), len(found.positions))
+        state = State(motion, found.positions, np.empty(0), rest)
         seen = shown(readings, columns, state, columns.owner, found.covariance)
         wrong = factors(seen, readings.exists, known)
         if np.abs(np.log(wrong)).max() < ENOUGH:
@@ -133,6 +130,5 @@ def estimated_noise(
             say("the estimates of noise and positions did not settle; the last ones are taken")
             break
         readings = readings.with_sd(readings.sd * wrong)
-        sds = (readings.sd[:n, kind] for kind, n in enumerate(counts))
-        model = replace(model, noise=Noise.of(*counts, *sds))
+        model = replace(model, noise=noise_of(readings))
     return Fitted(model, found, seen.motion_sd, seen.freedom.sum(axis=0))

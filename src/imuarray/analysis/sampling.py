@@ -2,18 +2,18 @@
 
 from collections.abc import Sequence
 from os import PathLike
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
 from imuarray.analysis import methods
-from imuarray.analysis.beyond import posterior_beyond
 from imuarray.analysis.calibration import fitted_beyond
 from imuarray.analysis.density import (
     NOT_CONVERGED,
     Posterior,
+    posterior_beyond,
     posterior_of,
     traced,
 )
@@ -23,8 +23,12 @@ from imuarray.engine.parameters import model_of
 from imuarray.errors import require_integer, require_one_of
 from imuarray.model import ArrayModel
 from imuarray.model.array_model import parameter_names
-from imuarray.posterior.chains import Chains
+from imuarray.model.effects import KINDS
+from imuarray.posterior.chains import Chains, chain_tree, chains_of
+from imuarray.posterior.diagnostics import ENOUGH, RHAT, ess, rhat, summarise
 from imuarray.posterior.generic import SCALES
+from imuarray.posterior.independent import UNRELIABLE, run_independent
+from imuarray.posterior.nuts import run_nuts
 from imuarray.provenance import code_digest, digest, stamp
 from imuarray.recording import Recording
 from imuarray.streams import stream
@@ -33,26 +37,6 @@ from imuarray.streams import stream
 NUTS_STEPS, NUTS_WARMUP = (1250, 750), 300
 APART = 2.0  # posterior sds by which the starts differ
 FEW = 400  # effective draws; fewer tell neither quantiles nor R-hat (Vehtari and others, 2021)
-
-
-class Asked(NamedTuple):
-    """Options of a sampler."""
-
-    method: str
-    steps: int | None
-    seed: int
-    progress: bool
-    say: Say
-
-
-class SamplerRun(NamedTuple):
-    """Chains, and what made them."""
-
-    chains: Chains
-    posterior: Posterior
-    key: str  # digest of everything that they depend on
-    attrs: dict  # attributes: the sampler, Pareto's k, what else was tried
-    short: str = ""  # why they are not enough, where the sampler itself says so
 
 
 def sample(
@@ -112,8 +96,8 @@ def sample(
         posterior = _beyond(recording, str(model), effects, say)
     if posterior is None:
         moving, known = assumed(moving, accelerometer_noise), accelerometer_noise is not None
-        posterior = posterior_of(moving, model_of(moving), (known, False), say)
-    return tree_of(_exact(posterior, Asked(method, steps, seed, progress, say)), seed)
+        posterior = posterior_of(moving, model_of(moving), known, say)
+    return _exact(posterior, method, steps, seed, not progress, say)
 
 
 def _beyond(recording: Recording, model: str, effects, say: Say) -> Posterior | None:
@@ -126,42 +110,45 @@ def _beyond(recording: Recording, model: str, effects, say: Say) -> Posterior | 
     return posterior_beyond(recording, found)
 
 
-def summary(posterior: xr.DataTree) -> pd.DataFrame:
-    """One row per coordinate of what `sample` gave: mean, sd and quantiles (m), R-hat, ESS."""
-    from imuarray.posterior.chains import chains_of
-    from imuarray.posterior.diagnostics import RHAT, summarise
-
-    labels = [str(label) for label in posterior["posterior"]["accelerometer"].to_numpy()]
-    return summarise(chains_of(posterior), labels, RHAT)[1]
-
-
-def tree_of(run: SamplerRun, seed: int) -> xr.DataTree:
-    """A sampler's chains with their verdict and origin, as `sample` returns them."""
-    from imuarray.posterior.chains import chain_tree
-    from imuarray.posterior.diagnostics import RHAT, summarise
-
-    recording, model = run.posterior.recording, run.posterior.model
-    labels = recording.accelerometer_labels[1:]
-    names = parameter_names(model, (recording.accelerometer_labels, recording.gyroscope_labels))
-    verdict, _, _ = summarise(run.chains, labels, RHAT)
-    attrs: dict[str, Any] = {**stamp({"recording": run.key}, seed)}
-    kept = "burn_in_draws", "burn_in_steps", "steps", "rhat_max", "ess_min"
-    attrs |= {name: verdict[name] for name in kept} | run.attrs
-    sound = verdict["converged"] and verdict["ess_min"] >= FEW and not run.short
-    attrs |= {"converged": int(sound), "divergent": run.chains.divergent, **_noise(model)}
-    unit = dict(zip(SCALES, [*_noise(model).values(), *model.motion_sd], strict=True))
-    sds = {name: unit[name] for name in run.posterior.scales}
-    return chain_tree(run.chains, labels, run.posterior.prior, attrs, names, sds)
-
-
-def _noise(model: ArrayModel) -> dict[str, float]:
-    """Rms noise over the triads of each kind (m/s^2, rad/s)."""
-    kinds = "accelerometer", "gyroscope"
-    variances = [np.diag(getattr(model.noise, kind)).mean() for kind in kinds]
-    return {f"{kind}_noise_sd": float(v**0.5) for kind, v in zip(kinds, variances, strict=True)}
+def _exact(
+    posterior: Posterior, method: str, steps: int | None, seed: int, quiet: bool, say: Say
+) -> xr.DataTree:
+    """On the marginal likelihood: independent proposals, or NUTS where these are not enough."""
+    (log_density, data), mode = traced(posterior, say), posterior.mode
+    attrs: dict[str, Any] = {"sampler": "nuts"}
+    if method != "nuts":
+        names = "sample", "independent"
+        chains, k = run_independent(
+            log_density, mode, posterior.covariance, steps, seed, names, quiet, data
+        )
+        short = _short(chains, k, steps)
+        if method == "independent" or not short:
+            attrs, key = {"sampler": "independent"}, _key(posterior, steps, seed, method)
+            return tree_of(posterior, chains, attrs | {"pareto_k": k}, key, seed, bool(short))
+        attrs |= {"pareto_k": k, "instead_of": short}
+        say(f"{short}: NUTS instead")
+    steps = steps or NUTS_STEPS[bool(posterior.model.effects)]
+    # two starts some posterior sds from the mode: far away there are modes of others' own
+    rng = stream(seed, "sample", "starts")
+    starts = rng.multivariate_normal(mode, APART**2 * posterior.covariance, size=2)
+    chains = run_nuts(
+        log_density, mode, posterior.covariance, starts, NUTS_WARMUP, steps, seed, quiet=quiet,
+        data=data,
+    )  # fmt: skip
+    return tree_of(posterior, chains, attrs, _key(posterior, steps, seed, method), seed)
 
 
-def _key(posterior: Posterior, asked: Asked, *rest) -> str:
+def _short(chains: Chains, k: float, steps: int | None) -> str:
+    """Why independent proposals are not enough; empty where they are."""
+    worst, least = rhat(chains.draws).max(), ess(chains.draws).min()
+    few = steps is None and (worst > RHAT or least < ENOUGH)
+    if k <= UNRELIABLE and not few:
+        return ""
+    return f"independent proposals: Pareto's k {k:.2f}, R-hat {worst:.3f}, ESS {least:.0f}"
+
+
+def _key(posterior: Posterior, steps: int | None, seed: int, method: str) -> str:
+    """Digest of everything that chains depend on."""
     recording, model, prior = posterior.recording, posterior.model, posterior.prior
     used, root = posterior.readings, getattr(prior, "root", None)
     return digest(
@@ -169,51 +156,40 @@ def _key(posterior: Posterior, asked: Asked, *rest) -> str:
         recording.saturated_gyroscopes(), recording.accelerometer_position,
         *(() if used is None else (used.time, used.values, used.weights, root)),
         list(model.clock or ()), model.noise.accelerometer, model.noise.gyroscope,
-        list(model.motion_sd), list(model.derivative_sd), prior.mean, prior.sd, *rest, asked.seed,
-        list(model.effects), asked.method, code_digest(),
+        list(model.motion_sd), list(model.derivative_sd), prior.mean, prior.sd, steps, seed,
+        list(model.effects), method, code_digest(),
     )  # fmt: skip
 
 
-def _apart(posterior: Posterior, rng) -> np.ndarray:
-    """Two starts some posterior sds from the mode: far away there are modes of others' own."""
-    return rng.multivariate_normal(posterior.mode, APART**2 * posterior.covariance, size=2)
+def tree_of(
+    posterior: Posterior, chains: Chains, more: dict, key: str, seed: int, short: bool = False
+) -> xr.DataTree:
+    """Chains with their verdict and origin, as `sample` returns them.
+
+    ``more``: attributes on the sampler; ``key``: digest of what the chains depend on; ``short``:
+    whether the sampler itself says that they are not enough.
+    """
+    recording, model = posterior.recording, posterior.model
+    labels = recording.accelerometer_labels[1:]
+    names = parameter_names(model, (recording.accelerometer_labels, recording.gyroscope_labels))
+    verdict, _, _ = summarise(chains, labels, RHAT)
+    attrs: dict[str, Any] = {**stamp({"recording": key}, seed)}
+    kept = "burn_in_draws", "burn_in_steps", "steps", "rhat_max", "ess_min"
+    attrs |= {name: verdict[name] for name in kept} | more
+    sound = verdict["converged"] and verdict["ess_min"] >= FEW and not short
+    attrs |= {"converged": int(sound), "divergent": chains.divergent, **_noise(model)}
+    unit = dict(zip(SCALES, [*_noise(model).values(), *model.motion_sd], strict=True))
+    sds = {name: unit[name] for name in posterior.scales}
+    return chain_tree(chains, labels, posterior.prior, attrs, names, sds)
 
 
-def _exact(posterior: Posterior, asked: Asked) -> SamplerRun:
-    """On the marginal likelihood: independent proposals, or NUTS where these are not enough."""
-    density, told = traced(posterior, asked.say), {}
-    if asked.method != "nuts":
-        made = _independent(posterior, asked, *density)
-        if asked.method == "independent" or not made.short:
-            return made
-        told = {"pareto_k": made.attrs["pareto_k"], "instead_of": made.short}
-        asked.say(f"{made.short}: NUTS instead")
-    steps = asked.steps or NUTS_STEPS[bool(posterior.model.effects)]
-    chains = _nuts(posterior, asked, steps, *density)
-    return SamplerRun(chains, posterior, _key(posterior, asked, steps), {"sampler": "nuts"} | told)
+def _noise(model: ArrayModel) -> dict[str, float]:
+    """Rms noise over the triads of each kind (m/s^2, rad/s)."""
+    variances = {kind: np.diag(getattr(model.noise, kind)).mean() for kind in KINDS}
+    return {f"{kind}_noise_sd": float(value**0.5) for kind, value in variances.items()}
 
 
-def _independent(posterior: Posterior, asked: Asked, log_density, data) -> SamplerRun:
-    from imuarray.posterior.diagnostics import ENOUGH, RHAT, ess, rhat
-    from imuarray.posterior.independent import UNRELIABLE, run_independent
-
-    chains, k = run_independent(
-        log_density, posterior.mode, posterior.covariance, asked.steps, asked.seed,
-        ("sample", "independent"), not asked.progress, data,
-    )  # fmt: skip
-    told = {"sampler": "independent", "pareto_k": k}
-    worst, least, short = rhat(chains.draws).max(), ess(chains.draws).min(), ""
-    if not k <= UNRELIABLE or (asked.steps is None and (worst > RHAT or least < ENOUGH)):
-        short = f"independent proposals: Pareto's k {k:.2f}, R-hat {worst:.3f}, ESS {least:.0f}"
-    return SamplerRun(chains, posterior, _key(posterior, asked, asked.steps), told, short=short)
-
-
-def _nuts(posterior: Posterior, asked: Asked, steps: int, log_density, data) -> Chains:
-    """NUTS, whitened at the mode."""
-    from imuarray.posterior.nuts import run_nuts
-
-    starts = _apart(posterior, stream(asked.seed, "sample", "starts"))
-    return run_nuts(
-        log_density, posterior.mode, posterior.covariance, starts, NUTS_WARMUP, steps, asked.seed,
-        quiet=not asked.progress, data=data,
-    )  # fmt: skip
+def summary(posterior: xr.DataTree) -> pd.DataFrame:
+    """One row per coordinate of what `sample` gave: mean, sd and quantiles (m), R-hat, ESS."""
+    labels = [str(label) for label in posterior["posterior"]["accelerometer"].to_numpy()]
+    return summarise(chains_of(posterior), labels, RHAT)[1]

@@ -8,12 +8,12 @@ import xarray as xr
 
 from imuarray.analysis.model import assumed
 from imuarray.analysis.motion import as_calibrated, motion_parts
-from imuarray.analysis.trust import reasons_of_motion
 from imuarray.commands.output import Output
 from imuarray.errors import InputError
 from imuarray.motion.state import UNITS
 from imuarray.provenance import trust, write_netcdf_parts
 from imuarray.recording import load_dataset, read_recording
+from imuarray.trust import reasons_of_motion
 
 LATE = 1e-4  # s, worth a line
 
@@ -37,13 +37,12 @@ def apply(arguments) -> None:
     write_netcdf_parts(
         (sums.add(part) for part in chain((first,), parts)), len(recording.time), arguments.out
     )
-    late = first.attrs["late_s"]
     average = recording.gyroscope_noise_sd / np.sqrt(recording.angular_rate.shape[1])
-    found = sums.document()
-    output.say("\n".join([*report(found, average), *late_lines(late)]))
-    found |= {
-        "gyroscopes_averaged_sd_rad_s": average, "late_s": late, "out": str(arguments.out)
+    found = sums.document() | {
+        "gyroscopes_averaged_sd_rad_s": average, "late_s": first.attrs["late_s"],
+        "out": str(arguments.out),
     }  # fmt: skip
+    output.say("\n".join(report(found)))
     output.done(found, reasons)
 
 
@@ -80,26 +79,16 @@ class Sums:
         }
 
 
-def late_lines(late: float) -> list[str]:
-    """Where an IMU is late, the mean of all is not the time of most of them."""
-    if abs(late) < LATE:
-        return []
-    return [
-        f"by the clock of most IMUs the motion is {1e3 * late:.2f} ms late: it is that of"
-        f" time - {late:.3g} s (attribute late_s)"
-    ]
-
-
-def report(found: dict, average: float) -> list[str]:
-    """Lines on the motion for a person; ``average`` (rad/s) is the sd of the gyroscopes' mean."""
+def report(found: dict) -> list[str]:
+    """Lines on the motion for a person."""
     lines = [
         f"{found['samples']} samples: {found['left_out']} left out, at a rail;"
         f" {found['gyroscope_at_rail']} with a gyroscope at its rail"
     ]
     if "off_the_rail" in found:
+        average = np.degrees(found["gyroscopes_averaged_sd_rad_s"])
         lines.append(
-            f"gyroscopes averaged, off the rail: sd {np.degrees(average):.3g} deg/s (angular rate,"
-            " noise alone)"
+            f"gyroscopes averaged, off the rail: sd {average:.3g} deg/s (angular rate, noise alone)"
         )
     for name in ("off_the_rail", "at_the_rail"):
         if name in found:
@@ -115,4 +104,10 @@ def report(found: dict, average: float) -> list[str]:
     )
     if found["not_converged"]:
         lines.append(f"NOT converged at {found['not_converged']} samples")
+    late = found["late_s"]
+    if abs(late) >= LATE:  # where an IMU is late, the mean of all is not the time of most of them
+        lines.append(
+            f"by the clock of most IMUs the motion is {1e3 * late:.2f} ms late: it is that of"
+            f" time - {late:.3g} s (attribute late_s)"
+        )
     return lines

@@ -1,6 +1,7 @@
 """Types of a command line's texts; each refuses a wrong one with what was expected."""
 
 import argparse
+from functools import partial
 from pathlib import Path
 
 from imuarray.analysis import methods
@@ -46,6 +47,7 @@ def model(text: str) -> str | InputFile:
 
 
 def _at_least(least: int, text: str) -> int:
+    """An integer that is not less."""
     try:
         value = int(text)
     except ValueError:
@@ -67,11 +69,5 @@ def positive(text: str) -> float:
     return value
 
 
-def count(text: str) -> int:
-    """An integer of at least 1."""
-    return _at_least(1, text)
-
-
-def seed(text: str) -> int:
-    """An integer of at least 0."""
-    return _at_least(0, text)
+count = partial(_at_least, 1)
+seed = partial(_at_least, 0)

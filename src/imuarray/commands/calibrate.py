@@ -5,13 +5,13 @@ import xarray as xr
 
 from imuarray.analysis.calibration import calibrate as calibrated
 from imuarray.analysis.model import assumed
-from imuarray.analysis.trust import of_file, reasons_of_calibration, reasons_of_poses
 from imuarray.commands.output import Output
 from imuarray.diagnosis.plain import number
 from imuarray.estimation.selection import position_sds, weakest_of
 from imuarray.model.effects import KINDS
 from imuarray.provenance import trust, write_netcdf
 from imuarray.recording import read_recording
+from imuarray.trust import of_file, parameters_of, reasons_of_calibration, reasons_of_poses
 
 MISFIT = 1.5  # residual over declared noise from which it is spoken of
 
@@ -53,9 +53,7 @@ def document(dataset: xr.Dataset) -> dict:
         ],
     }
     if "effect_parameter" in dataset:
-        columns = (dataset[name].to_numpy() for name in ("effect_parameter", "effect_sd"))
-        rows = zip(dataset["parameter"].to_numpy(), *columns, strict=True)
-        found["effects"] = {name: {"value": value, "sd": sd} for name, value, sd in rows}
+        found["effects"] = parameters_of(dataset)
     return found
 
 
@@ -81,13 +79,9 @@ def position_lines(dataset: xr.Dataset) -> list[str]:
 
 def _effects(dataset: xr.Dataset) -> list[str]:
     """The effects' parameters, in their own units (docs/effects.md)."""
-    if "effect_parameter" not in dataset:
-        return []
-    columns = (dataset[name].to_numpy() for name in ("parameter", "effect_parameter", "effect_sd"))
-    rows = zip(*columns, strict=True)
-    return ["effect parameter: value (sd)"] + [
-        f"{name}: {value:.4g} ({sd:.2g})" for name, value, sd in rows
-    ]
+    rows = parameters_of(dataset).items()
+    lines = [f"{name}: {found['value']:.4g} ({found['sd']:.2g})" for name, found in rows]
+    return ["effect parameter: value (sd)", *lines] if lines else []
 
 
 def _informative(dataset: xr.Dataset) -> list[str]:

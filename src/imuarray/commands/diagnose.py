@@ -1,12 +1,12 @@
 """The work behind `imuarray diagnose`."""
 
-from imuarray.analysis.trust import of_file, reasons_of_diagnosis, reasons_of_poses
 from imuarray.commands.output import Output
 from imuarray.diagnosis.document import diagnose as run
 from imuarray.errors import InputError
 from imuarray.model.effects import DATA_EFFECTS, EFFECTS
 from imuarray.recording import read_recording
 from imuarray.report.write import write_report
+from imuarray.trust import of_file, reasons_of_diagnosis, reasons_of_poses
 
 
 def diagnose(arguments) -> None:

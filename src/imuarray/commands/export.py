@@ -1,11 +1,12 @@
 """The work behind `imuarray export`."""
 
-from imuarray.analysis.export import export, reasons_of
+from imuarray.analysis.export import export
 from imuarray.commands.output import Output
 from imuarray.errors import InputError
 from imuarray.firstorder.noise import allan
 from imuarray.provenance import write_bytes
 from imuarray.recording import load_dataset, read_recording
+from imuarray.trust import reasons_in
 
 
 def run(arguments) -> None:
@@ -15,7 +16,7 @@ def run(arguments) -> None:
     noise = None if arguments.noise is None else allan(read_recording(arguments.noise))
     try:
         text = export(calibration, arguments.format, noise)
-        reasons = [f"the calibration is not to be trusted: {x}" for x in reasons_of(calibration)]
+        reasons = [f"the calibration is not to be trusted: {x}" for x in reasons_in(calibration)]
     except InputError as error:
         raise InputError(f"{arguments.calibration}: {error}") from None
     write_bytes(text.encode(), arguments.out)

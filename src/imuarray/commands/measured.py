@@ -9,7 +9,6 @@ from imuarray.recording import read_recording, write_recording
 
 def first_order(arguments) -> None:
     """Calibration of each triad from poses and moves; the corrected recording carries it."""
-    from imuarray.analysis.trust import of_first_order, reasons_of_poses
     from imuarray.firstorder.correct import calibrate_first_order
     from imuarray.firstorder.report import (
         noise_table,
@@ -17,6 +16,7 @@ def first_order(arguments) -> None:
         summary_lines,
         write_corrected,
     )
+    from imuarray.trust import of_first_order, reasons_of_poses
 
     recording, output = read_recording(arguments.recording), Output(arguments)
     found = calibrate_first_order(

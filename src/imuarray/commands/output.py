@@ -1,12 +1,12 @@
 """Output of a command: text for a person, or one JSON object for a program."""
 
 import json
-import math
 import sys
 import time
 from collections.abc import Sequence
 from typing import Any
 
+from imuarray.analysis.plain import finite
 from imuarray.errors import one_line, printable
 
 
@@ -44,16 +44,3 @@ class Output:
             verdict = {"trusted": not said, "reasons": said}
             print(json.dumps(finite(document) | verdict, allow_nan=False), flush=True)
         self._arguments.reasons = said
-
-
-def finite(value: Any) -> Any:
-    """Plain data as JSON knows it: numpy's numbers and arrays as lists, what is not finite null."""
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, dict):
-        return {str(key): finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -20,16 +20,11 @@ from imuarray.commands.argument_types import (
 )
 from imuarray.errors import InputError
 
-
-class Option(NamedTuple):
-    """Arguments of argparse's ``add_argument``."""
-
-    name: str
-    given: dict[str, Any]
+Option = tuple[str, dict[str, Any]]  # arguments of argparse's `add_argument`
 
 
 def option(name: str, help: str, **given: Any) -> Option:
-    return Option(name, {"help": help, **given})
+    return name, {"help": help, **given}
 
 
 def number(name: str, metavar: str, help: str, default: Any = None, type=positive) -> Option:
@@ -301,17 +296,10 @@ def _add_convert(commands):
 
 def _add(commands, name: str, command: Command) -> None:
     """One subcommand, with what all of them have."""
-    parser = commands.add_parser(
-        name, help=command.summary, description=command.summary,
-    )  # fmt: skip
+    parser = commands.add_parser(name, help=command.summary, description=command.summary)
     parser.epilog = f"example: {parser.prog} {command.example}"
-    parser.add_argument(
-        "--out",
-        required=True,
-        type=Path,
-        metavar="FOLDER" if command.folder else "FILE",
-        help=command.out,
-    )
+    kind = "FOLDER" if command.folder else "FILE"
+    parser.add_argument("--out", required=True, type=Path, metavar=kind, help=command.out)
     parser.add_argument("--quiet", action="store_true", help="no progress, no summary")
     parser.add_argument(
         "--json", action="store_true", help="the summary as one JSON object (SI units)"
@@ -319,8 +307,8 @@ def _add(commands, name: str, command: Command) -> None:
     parser.add_argument(
         "--debug", action="store_true", help="the traceback of an error that was not foreseen"
     )
-    for one in command.options:
-        parser.add_argument(one.name, **one.given)
+    for option_name, given in command.options:
+        parser.add_argument(option_name, **given)
     parser.set_defaults(
         run=_later(f"{command.package}.{command.run}"), folder=command.folder, reasons=()
     )

@@ -9,10 +9,10 @@ import xarray as xr
 from imuarray.analysis.model import assumed
 from imuarray.analysis.sampling import sample as sampled
 from imuarray.analysis.sampling import summary
-from imuarray.analysis.trust import of_file, reasons_of_poses, reasons_of_posterior
 from imuarray.commands.output import Output
 from imuarray.provenance import trust, write_netcdf
 from imuarray.recording import read_recording
+from imuarray.trust import of_file, reasons_of_poses, reasons_of_posterior
 
 VERDICT = (
     "sampler", "converged", "rhat_max", "ess_min", "burn_in_steps", "steps", "divergent",

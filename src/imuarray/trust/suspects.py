@@ -6,17 +6,16 @@ takes most of its error away is named.
 """
 
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
-from imuarray.analysis.drawing import DEGREE, angle_words
-from imuarray.analysis.rigid import COHERENT, FEWEST, runs, slope, turning
 from imuarray.recording import Recording
 from imuarray.recording.record import few
 from imuarray.recording.units import GRAVITY
+from imuarray.trust.drawing import DEGREE, angle_words
+from imuarray.trust.rigid import COHERENT, FEWEST, runs, slope, turning
 
 FAR = 4.0  # times the median triad's error, and the declared noise
 TAKEN = 0.35  # of the error must be left at most
@@ -28,34 +27,23 @@ ENDS, NEXT = 10, 5  # readings at a channel's end, and times those at the values
 ALIKE = 9  # decimals to which equal readings are equal again when a correction is undone
 
 
-class Suspect(NamedTuple):
-    """A triad, and what would make it agree with the others (empty if nothing known does)."""
-
-    kind: str
-    label: str
-    words: str
-
-
-def suspects(recording: Recording) -> list[Suspect]:
+def suspects(recording: Recording) -> list[str]:
     """The triads that are off, in words; none where all agree, or where half of them do not.
 
-    ``recording`` without still poses and readings at a rail.
+    A whole IMU where both its triads do the same. ``recording`` without still poses and readings
+    at a rail.
     """
-    return _accelerometers(recording) + _gyroscopes(recording)
-
-
-def told(found: list[Suspect]) -> list[str]:
-    """One phrase for each; a whole IMU where both its triads say the same."""
     words: dict[tuple[str, str], list[str]] = {}
-    for item in found:
-        words.setdefault((item.label, item.words), []).append(item.kind)
+    for kind, find in (("accelerometer", _accelerometers), ("gyroscope", _gyroscopes)):
+        for found in find(recording):
+            words.setdefault(found, []).append(kind)
     return [
         f"{'IMU' if len(kinds) == 2 else kinds[0]} {label} {said or 'does not fit the others'}"
         for (label, said), kinds in words.items()
     ]
 
 
-def _gyroscopes(recording: Recording) -> list[Suspect]:
+def _gyroscopes(recording: Recording) -> list[tuple[str, str]]:
     rates = recording.angular_rate
 
     def others(left):
@@ -65,10 +53,11 @@ def _gyroscopes(recording: Recording) -> list[Suspect]:
 
     places, rate = recording.relative_positions(), np.median(rates, axis=1)
     rise = turning(recording.specific_force, rate, places).acceleration
-    return _search(recording, "gyroscope", rates, others, recording.gyroscope_noise_sd, rise)
+    labels, sd = recording.gyroscope_labels, recording.gyroscope_noise_sd
+    return _search(rates, others, labels, sd, runs(recording.time), rise)
 
 
-def _accelerometers(recording: Recording) -> list[Suspect]:
+def _accelerometers(recording: Recording) -> list[tuple[str, str]]:
     force, places = recording.specific_force, recording.relative_positions()
     rate = np.median(recording.angular_rate, axis=1)
 
@@ -80,17 +69,21 @@ def _accelerometers(recording: Recording) -> list[Suspect]:
             found[:, k] = turning(force[:, part], rate, places[part]).at(places[k : k + 1])[:, 0]
         return found
 
-    return _search(recording, "accelerometer", force, others, recording.accelerometer_noise_sd)
+    labels, sd = recording.accelerometer_labels, recording.accelerometer_noise_sd
+    return _search(force, others, labels, sd, runs(recording.time))
 
 
-def _search(recording, kind, readings, others, sd, rise=None) -> list[Suspect]:
-    """One triad after the other: the worst is named and left out, until the rest agree."""
-    count, labels = readings.shape[1], getattr(recording, f"{kind}_labels")
+def _search(readings, others, labels, sd, chain, rise=None) -> list[tuple[str, str]]:
+    """Labels, and what would make the triads agree with the others (empty if nothing known does).
+
+    One after the other: the worst is named and left out, until the rest agree. ``chain``, ``rise``
+    as of `explain`.
+    """
+    count = readings.shape[1]
     left = np.arange(count)
-    found: list[Suspect] = []
+    found: list[tuple[str, str]] = []
     if count < 3:
         return []
-    chain = runs(recording.time)
     while len(left) > max(2, count / 2):
         expected = others(left)
         error = np.sqrt(np.mean((readings - expected) ** 2, axis=(0, 2)))
@@ -100,7 +93,7 @@ def _search(recording, kind, readings, others, sd, rise=None) -> list[Suspect]:
         if error[worst] < FAR * max(np.median(without), sd):
             return found
         words = explain(readings[:, worst], expected[:, worst], chain, rise)
-        found.append(Suspect(kind, labels[worst], words))
+        found.append((labels[worst], words))
         left = rest
     return [] if len(found) == count - 2 else found
 
@@ -197,8 +190,8 @@ FACTORS = (  # of time, force, rates, positions, to undo a mistake
 SIGNS = [np.array(signs) for signs in product((1, -1), repeat=3)][1:]
 
 
-def common(recording: Recording) -> list[str]:
-    """A mistake in all sensors alike, by the course of the angular acceleration; or nothing.
+def common(recording: Recording) -> str:
+    """A mistake in all sensors alike, by the course of the angular acceleration; or "".
 
     With nominal positions the gyroscopes' and the accelerometers' turning is the same once it is
     undone, and before is not.
@@ -215,24 +208,24 @@ def common(recording: Recording) -> list[str]:
         return max(abs(found.low - 1), abs(found.high - 1)) - found.coarse
 
     if misfit(1, 1, 1, 1) < LIKE:
-        return []
-    tried = [(misfit(*factors), [words]) for factors, words in FACTORS]
+        return ""
+    tried = [(misfit(*factors), words) for factors, words in FACTORS]
     tried += [(misfit(1, 1, signs, 1), _wrong_signs(signs)) for signs in SIGNS]
     least, words = min(tried)
-    return words if least < LIKE else []
+    return f"{words}?" if least < LIKE else ""
 
 
-def _wrong_signs(signs) -> list[str]:
+def _wrong_signs(signs) -> str:
     """Words on all gyroscopes' axes against the accelerometers'."""
     wrong, right = (
         [name for name, s in zip("xyz", signs, strict=True) if s == which] for which in (-1, 1)
     )
     if not right:
-        return [MIRRORED]
+        return MIRRORED
     said = f"all gyroscopes have {_axes_named(wrong)} of the wrong sign"
     if len(wrong) == 2:  # a turn by half apart, the same as
         said += f", or all accelerometers {_axes_named(right)}"
-    return [said]
+    return said
 
 
 def _axes_named(names) -> str:
@@ -269,20 +262,18 @@ def clipped(recording: Recording) -> list[str]:
 
 def wrapped(recording: Recording) -> list[str]:
     """A sentence for each gyroscope axis that jumps from one end of its readings to the other."""
-    step, found = np.diff(recording.time), []
+    step, rates = np.diff(recording.time), _as_read(recording, "gyroscope")
     near = step < 1.5 * np.median(step) if len(step) else step > 0
-    rates = _as_read(recording, "gyroscope")
-    for k, axis in np.ndindex(rates.shape[1:]):
-        values = rates[:, k, axis]
-        jump, end = np.abs(np.diff(values)), np.abs(values).max()
-        beside = np.maximum(np.r_[0, jump[:-1]], np.r_[jump[1:], 0])
-        if np.sum(near & (jump > JUMP * end) & (beside < (2 - JUMP) * end)) >= TWICE:
-            label = recording.gyroscope_labels[k]
-            found.append(
-                f"gyroscope {label}, axis {'xyz'[axis]}, jumps from one end of its readings to the"
-                f" other: it wraps at {np.degrees(end):.4g} deg/s, beyond its range"
-            )
-    return found
+    jump, end = np.abs(np.diff(rates, axis=0)), np.abs(rates).max(axis=0)
+    around = np.pad(jump, ((1, 1), (0, 0), (0, 0)))
+    alone = np.maximum(around[:-2], around[2:]) < (2 - JUMP) * end
+    wraps = np.sum(near[:, None, None] & (jump > JUMP * end) & alone, axis=0)
+    return [
+        f"gyroscope {recording.gyroscope_labels[k]}, axis {'xyz'[axis]}, jumps from one end of its"
+        f" readings to the other: it wraps at {np.degrees(end[k, axis]):.4g} deg/s, beyond its"
+        " range"
+        for k, axis in np.argwhere(wraps >= TWICE)
+    ]
 
 
 def _as_read(recording: Recording, kind: str) -> np.ndarray:

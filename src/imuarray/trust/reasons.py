@@ -5,38 +5,28 @@ leave no residual. What is known besides is the drawing, that rates and forces a
 and that still poses show gravity.
 """
 
-import json
 import re
 from collections.abc import Sequence
-from typing import NamedTuple
 
-import h5py
 import numpy as np
 import xarray as xr
-from scipy.special import stdtr
 
-from imuarray.analysis.checked import FEW, is_of
-from imuarray.analysis.drawing import FAR, Places, another_size, departures, size_of
-from imuarray.analysis.misfit import RESIDUAL, is_papers, residuals, rigid, unfitting, unsteady
-from imuarray.analysis.rigid import SLOPE, Slope, elsewhere, kept, slope, turning
-from imuarray.analysis.suspects import MIRRORED, clipped, common, gravity, wrapped
-from imuarray.firstorder.correct import FirstOrder
 from imuarray.model.effects import EFFECTS, KINDS, Effect
 from imuarray.recording import Recording
 from imuarray.recording.channels import repeated
-from imuarray.recording.record import FIRST_ORDER
+from imuarray.trust.checked import effect_names, reasons_in
+from imuarray.trust.drawing import FAR, Places, another_size, departures, factor_words, size_of
+from imuarray.trust.misfit import RESIDUAL, is_papers, residuals, rigid, unfitting, unsteady
+from imuarray.trust.rigid import COHERENT, FEW, SLOPE, Slope, elsewhere, kept, slope, turning
+from imuarray.trust.suspects import MIRRORED, clipped, common, gravity, wrapped
 
-POSES = 3.0  # times the noise of a pose's mean; real boards have up to 1.9
-BENT = 0.01  # m/s^2, a residual that matters: 0.1 % of gravity
-SCALED = 0.03  # of all gyroscopes' common scale: three of its prior's sds
-SEEN, ODD = 5e-3, 1e-4  # the same, where the axes' own scales scatter by less than their mean
-SMOOTHED = 0.5  # correlation of neighbours; a low pass at a fifth of the sampling rate makes 0.3
 GROWN = 6.0  # sds of the growth; clean and real boards' is within one
 HOLD = 1e-6  # chance of maps that still poses gave; 0.97 and more of real and clean boards
 TRIAD = 10.0  # the same of one triad where the noise of each is estimated
 DRIFT = 3.0  # sds of the mean of all samples; offsets that differ by more bias positions
 LEARNT = 0.5  # of the drawing's sd: positions known worse are hardly known from the recording
 OTHER = 1.2  # times less residual elsewhere; 1.003 at most for the right board, 2 for another
+SAME = 0.1  # relative difference of rates, up to which they are those of one recording
 UNIT = re.compile(r"\bin \S+ declared ")  # in a reason that names a unit
 SHORT = 60.0  # s
 AS_READ = (
@@ -44,89 +34,6 @@ AS_READ = (
     " changed since are not seen; correct it by three still poses or more of its own (imuarray"
     " first-order new.nc --with old.nc, the calibration's recording as read)"
 )
-
-
-class Poses(NamedTuple):
-    """Results of a first-order calibration: NaN where it has none."""
-
-    ratio: float = 1.0  # residual of the poses over their noise
-    residual: float = np.nan  # m/s^2, rms of the worst triad
-    scale: float = np.nan  # of the map that all gyroscopes share
-    chance: float = 1.0  # of such a mean of all axes' scales, by their own spread
-    smoothed: tuple[str, ...] = ()  # kinds whose still readings follow their neighbours
-
-
-def of_first_order(found: FirstOrder) -> Poses:
-    """From the answer."""
-    common = None if found.gyroscopes is None else found.gyroscopes.common
-    scale = np.nan if common is None or isinstance(common, str) else common.scale
-    fit = found.triads
-    chance = _chance(found.gyroscope_matrix) if scale == scale else 1.0
-    smoothed = tuple(
-        kind for kind in KINDS
-        if np.nanmedian(getattr(found, f"{kind}_smoothing")) > SMOOTHED
-    )  # fmt: skip
-    return Poses(fit.residual_ratio, _worst(fit.residual, fit.relied), scale, chance, smoothed)
-
-
-def of_file(path) -> Poses:
-    """From a corrected recording's file, or one that was selected from it."""
-    with h5py.File(path, "r") as file:
-        if FIRST_ORDER not in file:
-            return Poses()
-        stored = file[FIRST_ORDER]
-        ratio = float(np.ravel(stored.attrs.get("residual_ratio", 1.0))[0])
-        residual = _worst(stored["residual"][:], stored["used"][:] != 0)
-        common = stored["gyroscope_common"][:] if "gyroscope_common" in stored else [[np.nan]]
-        scale = float(np.trace(common) / 3)
-        chance = _chance(stored["gyroscope_matrix"][:]) if scale == scale else 1.0
-    return Poses(ratio, residual, scale, chance)
-
-
-def _chance(matrices) -> float:
-    """Chance (t distribution) of such a mean of the scales of axes, of maps (G, 3, 3)."""
-    scales = np.linalg.norm(matrices, axis=1).ravel() - 1
-    sd = scales.std(ddof=1) / np.sqrt(scales.size)
-    return float(2 * stdtr(scales.size - 1, -abs(scales.mean()) / max(sd, 1e-300)))
-
-
-def _worst(residual, used) -> float:
-    """Rms of the worst triad, of residuals (P, A, 3) where they are ``used`` (P, A)."""
-    squares = np.where(used[..., None], residual**2, np.nan)
-    return float(np.sqrt(np.nanmax(np.nanmean(np.ascontiguousarray(squares), axis=(0, 2)))))
-
-
-def reasons_of_poses(*several: Poses) -> list[str]:
-    """Why first-order calibrations are not to be trusted: their residual, and the common scale."""
-    found = []
-    ratio = max((x.ratio for x in several if not x.residual <= BENT), default=1.0)
-    if ratio > POSES:
-        found.append(
-            f"the still poses fit {ratio:.2g} times worse than noise and a drift of offsets allow:"
-            " the board bent or was not still, an offset jumped, a response is curved (imuarray"
-            " diagnose tells), or recordings are of other boards; sds do not cover that: record"
-            " again"
-        )
-    smoothed = sorted({kind for one in several for kind in one.smoothed})
-    if smoothed:
-        found.append(
-            f"readings of {' and '.join(f'{kind}s' for kind in smoothed)} follow their neighbours"
-            " while the board is still: they are averaged, filtered or interpolated from another"
-            " rate, which makes fast motion smaller and later; log raw readings, each sensor at its"
-            " own rate"
-        )
-    worst = max(several, key=lambda x: abs(x.scale - 1) if x.scale == x.scale else 0.0)
-    scale, odd = worst.scale, worst.chance < ODD
-    if abs(scale - 1) > SCALED or (odd and abs(scale - 1) > SEEN):
-        off = 100 * abs(1 / scale - 1)
-        much, large = ("much", "small") if scale < 1 else ("little", "large")
-        found.append(
-            f"all gyroscopes together read {off:.2g} % too {much} by the moves between poses: is"
-            " that their scale, or is it the time base: a clock that runs wrong, a declared rate of"
-            f" the log that is not its own, rows that were lost? If so, the array comes out"
-            f" {2 * off:.2g} % too {large}"
-        )
-    return found
 
 
 def reasons_of_calibration(
@@ -143,7 +50,7 @@ def reasons_of_calibration(
     little: list[str] = []
     limit = RESIDUAL if is_papers(calibration) else TRIAD
     for number, recording in enumerate(several, 1):
-        places = _places(recording, calibration["position"].to_numpy(), _covariance(calibration))
+        places = _places_of(recording, calibration)
         residual = residuals(recording, calibration, places)
         if len(several) == 1:
             little = _little(recording, places)
@@ -210,10 +117,10 @@ def reasons_of_posterior(
 
     ``spread``: whether the gyroscopes' disagreement is allowed for.
     """
-    draws = posterior["posterior"]["position"].to_numpy().reshape(-1, _size(recording))
-    covariance = np.zeros((_size(recording) + 3,) * 2)
-    covariance[3:, 3:] = np.cov(draws, rowvar=False)
-    places = _places(recording, np.vstack([np.zeros(3), draws.mean(0).reshape(-1, 3)]), covariance)
+    draws = np.concatenate(posterior["posterior"]["position"].to_numpy())  # of r_2 ... r_A
+    draws = np.insert(draws, 0, 0.0, axis=1)
+    covariance = np.cov(draws.reshape(len(draws), -1), rowvar=False)
+    places = _places(recording, draws.mean(axis=0), covariance)
     plain = "effect_parameter" not in posterior["posterior"]
     residual = rigid(recording, places, spread) if plain else {}
     found = _little(recording, places) + _judged(recording, places, residual) + _drifts(recording)
@@ -229,8 +136,7 @@ def reasons_of_motion(
     ``own_clocks``: whether `imuarray.apply` has found the recording's own; ``as_read``: whether it
     had to correct the readings as the calibration's were.
     """
-    said = json.loads(calibration.attrs.get("reasons", "[]"))
-    places = _places(recording, calibration["position"].to_numpy(), _covariance(calibration))
+    said, places = reasons_in(calibration), _places_of(recording, calibration)
     residual = rigid(recording, places) if is_papers(calibration) else {}
     found = _judged(recording, places, residual) + _elsewhere(kept(recording), places)
     found += _of_another_time(recording, calibration, own_clocks)
@@ -250,13 +156,9 @@ def reasons_of_diagnosis(recording: Recording, document: dict) -> list[str]:
     return _little(recording, places) + _judged(recording, places, {})
 
 
-def _size(recording: Recording) -> int:
-    return 3 * (len(recording.accelerometer_labels) - 1)
-
-
-def _covariance(calibration: xr.Dataset) -> np.ndarray:
-    size = 3 * calibration.sizes["accelerometer"]
-    return calibration["position_covariance"].to_numpy().reshape(size, size)
+def _places_of(recording: Recording, calibration: xr.Dataset) -> Places:
+    found, whole = (calibration[f"position{part}"].to_numpy() for part in ("", "_covariance"))
+    return _places(recording, found, whole.reshape((found.size,) * 2))
 
 
 def _places(recording: Recording, found, covariance) -> Places:
@@ -280,10 +182,9 @@ def _judged(
     if len(moving.time) < FEW:
         return found + _drawn(places, None)
     found += clipped(moving) + wrapped(moving)
-    size = another_size(places)
-    alike = [size] if size else [f"{said}?" for said in common(moving)]
+    alike = another_size(places) or common(moving)
     if alike:
-        return found + alike
+        return [*found, alike]
     bad, named = unfitting(residual, moving, limit)
     if named:
         return found + bad
@@ -294,12 +195,13 @@ def _judged(
 
 def _drawn(places: Places, course: Slope | None) -> list[str]:
     """Positions against the drawing, rates against accelerometers."""
-    hand = 0 if course is None or abs(course.correlation) < 0.9 else np.sign(course.correlation)
-    off = departures(places._replace(hand=int(hand)))
-    found = [off] if off else []
-    if course is not None and course.off:
-        found.append(_turning_words(course, places))
-    return found
+    if course is None:
+        said = [departures(places)]
+    else:
+        hand = 0 if abs(course.correlation) < COHERENT else int(np.sign(course.correlation))
+        change = _turning_words(course, places) if course.off else None
+        said = [departures(places._replace(hand=hand)), change]
+    return [sentence for sentence in said if sentence]
 
 
 def _little(recording: Recording, places: Places) -> list[str]:
@@ -315,17 +217,13 @@ def _little(recording: Recording, places: Places) -> list[str]:
     rms = max(np.sqrt(np.trace(places.covariance) / size), bound)
     if rms < LEARNT * prior:
         return []
+    seconds, more = float(np.ptp(recording.time)), "turn the array faster, and about all axes"
+    if seconds < SHORT:
+        more = f"{seconds:.2g} s are too short: record a dozen still poses and a minute of twisting"
     return [
         f"the recording says little of the positions: they are known to {1e3 * rms:.2g} mm by it,"
-        f" to {1e3 * prior:.2g} mm by the drawing; {_more(recording)}"
+        f" to {1e3 * prior:.2g} mm by the drawing; {more}"
     ]
-
-
-def _more(recording: Recording) -> str:
-    seconds = float(np.ptp(recording.time))
-    if seconds < SHORT:
-        return f"{seconds:.2g} s are too short: record a dozen still poses and a minute of twisting"
-    return "turn the array faster, and about all axes"
 
 
 def _elsewhere(moving: Recording, places: Places) -> list[str]:
@@ -343,16 +241,29 @@ def _elsewhere(moving: Recording, places: Places) -> list[str]:
 
 def _of_another_time(recording: Recording, calibration: xr.Dataset, own_clocks: bool) -> list[str]:
     """One sentence where clocks and drifts of the calibration are those of another recording."""
-    names = calibration.attrs.get("effects", "").split(",")
-    effects = [name for name in names if name in EFFECTS and _looks_at_time(EFFECTS[name])]
+    known = [name for name in effect_names(calibration) if name in EFFECTS]
+    effects = [name for name in known if _looks_at_time(EFFECTS[name])]
     if own_clocks:
         effects = [n for n in effects if not (EFFECTS[n].scanned and EFFECTS[n].shifts_time)]
-    if not effects or is_of(recording, calibration):
+    if not effects or _is_of(recording, calibration):
         return []
     return [
         f"the calibration has {', '.join(effects)}, at the instants of its own (first) recording:"
         " calibrate this one, too, and apply that"
     ]
+
+
+def _is_of(recording: Recording, calibration: xr.Dataset) -> bool:
+    """True where the calibration is of this recording, or of one that this is a part of."""
+    if "angular_rate" not in calibration:
+        return False
+    time = calibration["time"].to_numpy()
+    inside = (time >= recording.time[0]) & (time <= recording.time[-1])
+    if inside.sum() < min(FEW, len(recording.time)):
+        return False
+    rate, there = np.median(recording.angular_rate, axis=1), calibration["angular_rate"].to_numpy()
+    here = np.stack([np.interp(time[inside], recording.time, axis) for axis in rate.T], axis=1)
+    return bool(np.median(np.abs(here - there[inside])) < SAME * np.median(np.abs(there[inside])))
 
 
 def _looks_at_time(effect: Effect) -> bool:
@@ -368,20 +279,12 @@ def _turning_words(course: Slope, places: Places) -> str:
     size, sd = size_of(places)
     causes = []
     if abs(size - value**2) < FAR * sd:
-        causes.append(f"gyroscopes {_times(1 / value)}")
+        causes.append(f"gyroscopes {factor_words(1 / value)}")
     if abs(1000 * value - 1) < FAR * SLOPE:
         causes.append("time in ms declared s")
     elif abs(size - 1) < FAR * sd or not causes:
-        causes.append(f"steps of time {_times(1 / value)}")
+        causes.append(f"steps of time {factor_words(1 / value)}")
     return (
         f"the rates change {value:.4g} times as fast as the accelerometers' angular acceleration"
         f" says: {' or '.join(causes)}?"
     )
-
-
-def _times(factor: float) -> str:
-    """A factor as a user thinks of it."""
-    word = "large" if factor > 1 else "small"
-    if 0.5 < factor < 2:
-        return f"{100 * abs(factor - 1):.2g} % too {word}"
-    return f"{max(factor, 1 / factor):.4g} times too {word}"

@@ -3,12 +3,12 @@
 import numpy as np
 import xarray as xr
 
-from imuarray.analysis.checked import FEW
-from imuarray.analysis.drawing import Places
-from imuarray.analysis.rigid import Turning, kept, turning
-from imuarray.analysis.suspects import suspects, told
+from imuarray.diagnosis.plain import joined
 from imuarray.model.effects import KINDS
 from imuarray.recording import Recording
+from imuarray.trust.drawing import Places
+from imuarray.trust.rigid import FEW, kept, turning
+from imuarray.trust.suspects import suspects
 
 UNSTEADY = 2.5  # times what noise explains between parts of a recording; 1.3 at most of sound ones
 APART = 1.5  # times that of the other IMUs: what disturbs one disturbs all a little
@@ -32,7 +32,7 @@ def unfitting(
     worst = max(triads, key=triads.__getitem__, default="")
     if not (whole > RESIDUAL or triads.get(worst, 0.0) > limit):
         return [], False
-    named = told(suspects(moving))
+    named = suspects(moving)
     if named:
         cause = f"{', '.join(named)}?"
     elif triads.get(worst, 0.0) > limit:
@@ -44,25 +44,17 @@ def unfitting(
 
 def residuals(recording: Recording, calibration: xr.Dataset, places: Places) -> dict[str, float]:
     """Residual over declared noise, of the whole (the key is empty) and of each triad."""
-    found = {"": float(calibration.attrs["residual_ratio"])}
+    whole = {"": float(calibration.attrs["residual_ratio"])}
     if is_papers(calibration):
-        return rigid(recording, places) | found
+        return rigid(recording, places) | whole
     if "gyroscope_smooth_residual" in calibration:
         # what is faster than the samples is no fault of the calibration, and its sds allow for it
-        smooth = {
-            f"{kind} {label}": float(value)
-            for kind in KINDS
-            for label, value in zip(
-                calibration[kind].values, calibration[f"{kind}_smooth_residual"].values, strict=True
-            )
-        }
+        own = {kind: calibration[f"{kind}_smooth_residual"].to_numpy() for kind in KINDS}
+        smooth = _by_triad(recording, own)
         return smooth | {"": float(np.sqrt(np.mean(np.square(list(smooth.values())))))}
-    kinds = (("accelerometer", recording.accelerometer_noise_sd),
-             ("gyroscope", recording.gyroscope_noise_sd))  # fmt: skip
-    for kind, declared in kinds:
-        for label, sds in zip(calibration[kind].values, calibration[f"{kind}_sd"], strict=True):
-            found[f"{kind} {label}"] = float(np.sqrt(np.mean(sds**2))) / declared
-    return found
+    sds = {k: np.sqrt(np.mean(calibration[f"{k}_sd"].to_numpy() ** 2, axis=1)) for k in KINDS}
+    ratios = {k: sds[k] / getattr(recording, f"{k}_noise_sd") for k in KINDS}
+    return whole | _by_triad(recording, ratios)
 
 
 def unsteady(calibration: xr.Dataset, corrected: bool, recordings: int = 1) -> list[str]:
@@ -84,8 +76,8 @@ def unsteady(calibration: xr.Dataset, corrected: bool, recordings: int = 1) -> l
         found = labels[:1] if len(ratio) > 1 else labels
     if not len(found):
         return []
-    named = " and ".join(found) if len(found) < 3 else f"{', '.join(found[:-1])} and {found[-1]}"
-    by = f"disagree on the place of IMU {named}, by {ratio.max():.2g} times what noise explains: "
+    times = f"{ratio.max():.2g} times what noise explains"
+    by = f"disagree on the place of IMU {joined(found)}, by {times}: "
     if recordings > 1:
         return [
             f"the recordings {by}was it glued anew, or is one recording of another board? Calibrate"
@@ -103,28 +95,27 @@ def rigid(recording: Recording, places: Places, spread: bool = False) -> dict[st
     ``spread``: of the accelerometers alone.
     """
     moving = kept(recording)
-    count, gyroscopes = places.found.shape[0], moving.angular_rate.shape[1]
     if len(moving.time) < FEW:
         return {}
-    rate = moving.angular_rate.mean(axis=1)
-    motion: Turning = turning(moving.specific_force, rate, places.found)
-    off = (moving.specific_force - motion.at(places.found)) / recording.accelerometer_noise_sd
-    squares = dict(zip(_names("accelerometer", recording), _mean_squares(off), strict=True))
-    free = {name: max(3 * count - 6, 1) / (3 * count) for name in squares}
-    if gyroscopes > 1 and not spread:
-        off = (moving.angular_rate - rate[:, None]) / recording.gyroscope_noise_sd
-        own = dict(zip(_names("gyroscope", recording), _mean_squares(off), strict=True))
-        squares |= own
-        free |= dict.fromkeys(own, 1 - 1 / gyroscopes)
-    whole = sum(squares.values()) / sum(free.values())
-    return {"": float(np.sqrt(whole))} | {
-        name: float(np.sqrt(value / free[name])) for name, value in squares.items()
+    force, rates = moving.specific_force, moving.angular_rate
+    rate, counts = rates.mean(axis=1), (force.shape[1], rates.shape[1])
+    off = {KINDS[0]: force - turning(force, rate, places.found).at(places.found)}
+    free = {KINDS[0]: max(3 * counts[0] - 6, 1) / (3 * counts[0])}
+    if counts[1] > 1 and not spread:
+        off[KINDS[1]], free[KINDS[1]] = rates - rate[:, None], 1 - 1 / counts[1]
+    squares = {
+        kind: np.mean((values / getattr(recording, f"{kind}_noise_sd")) ** 2, axis=(0, 2))
+        for kind, values in off.items()
     }
+    whole = sum(map(np.sum, squares.values())) / sum(free[k] * len(squares[k]) for k in free)
+    ratios = {kind: np.sqrt(values / free[kind]) for kind, values in squares.items()}
+    return {"": float(np.sqrt(whole))} | _by_triad(recording, ratios)
 
 
-def _mean_squares(values) -> np.ndarray:
-    return np.mean(values**2, axis=(0, 2))
-
-
-def _names(kind: str, recording: Recording) -> list[str]:
-    return [f"{kind} {label}" for label in getattr(recording, f"{kind}_labels")]
+def _by_triad(recording: Recording, ratios: dict[str, np.ndarray]) -> dict[str, float]:
+    """Ratios (K,) of each kind by the sensors' names."""
+    return {
+        f"{kind} {label}": float(value)
+        for kind, values in ratios.items()
+        for label, value in zip(getattr(recording, f"{kind}_labels"), values, strict=True)
+    }

@@ -14,6 +14,7 @@ from imuarray.recording import Recording
 KNOWN = 0.03  # of the array's largest moment: turning about an axis with less is not seen
 STEP = 0.1  # share of the usual step by which stamps of neighbours may differ from it
 MOVES = 9
+FEW = 20  # samples, that anything is said of
 MOST, STRETCH = 20_000, 500  # samples that are looked at, in a row
 FEWEST = 60  # pairs of neighbouring samples
 COHERENT = 0.9  # correlation below which the samples are no course of one smooth motion

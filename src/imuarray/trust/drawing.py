@@ -60,23 +60,15 @@ class Places(NamedTuple):
         return float(np.linalg.norm(centred(self.found)) / np.linalg.norm(centred(self.nominal)))
 
 
-class Explanation(NamedTuple):
-    """A mistake in words, and the drawing (A, 3) m that it would make; ``unknowns`` fitted."""
-
-    words: str
-    places: np.ndarray
-    unknowns: int
-
-
 def centred(places) -> np.ndarray:
     """Relative to the triads' centre."""
     return places - places.mean(axis=0)
 
 
-def precision(places: Places, prior_sd: float | None = None) -> np.ndarray:
+def precision(places: Places) -> np.ndarray:
     """Precision of found less nominal positions, (3 A, 3 A) 1/m^2, wherever the origin."""
-    sd = places.prior_sd if prior_sd is None else prior_sd
-    inverse = np.linalg.inv(places.covariance + sd**2 * np.eye(len(places.covariance)))
+    drawn = places.prior_sd**2 * np.eye(len(places.covariance))
+    inverse = np.linalg.inv(places.covariance + drawn)
     moved = np.tile(np.eye(3), (len(places.found), 1))
     pull = inverse @ moved
     return inverse - pull @ np.linalg.solve(moved.T @ pull, pull.T)
@@ -131,20 +123,34 @@ def another_size(places: Places) -> str | None:
     """
     size, drawn = places.size(), centred(places.nominal)
     off = np.linalg.norm(centred(places.found) / size - drawn) / np.linalg.norm(drawn)
-    far = abs(size_of(places)[0] - 1) > FAR * size_of(places)[1]
-    if not (far and off < ALIKE) or SIZES[0] < size < SIZES[1]:
+    fitted, sd = size_of(places)
+    if not (abs(fitted - 1) > FAR * sd and off < ALIKE) or SIZES[0] < size < SIZES[1]:
         return None
     return size_words(size) if places.learnt() or _mistake(size) else None
 
 
 def size_words(size: float) -> str:
-    """Words on how far off a size is, and which mistake would make it so."""
-    small = size < 1
-    said = f"the array comes out {(1 / size if small else size):.4g} times too "
-    said += "small" if small else "large"
+    """How far off a size is, and the scales, or the mistake, that would make it so."""
+    off = factor_words(size)
+    if SIZES[0] < size < SIZES[1]:
+        return (
+            f"the array comes out {off}: gyroscopes {factor_words(size**-0.5)}, or accelerometers"
+            f" {off}?"
+        )
     if found := _mistake(size):
-        return f"{said} ({found[2]}): {found[1]}"
-    return f"{said}: a unit of the rates, of the specific force or of the nominal positions?"
+        return f"the array comes out {off} ({found[2]}): {found[1]}"
+    return (
+        f"the array comes out {off}: a unit of the rates, of the specific force or of the nominal"
+        " positions?"
+    )
+
+
+def factor_words(factor: float) -> str:
+    """By how much something is too large, or too small, as a user thinks of it."""
+    word = "large" if factor > 1 else "small"
+    if SIZES[0] < factor < SIZES[1]:
+        return f"{100 * abs(factor - 1):.2g} % too {word}"
+    return f"{max(factor, 1 / factor):.4g} times too {word}"
 
 
 def _mistake(size: float) -> tuple[float, str, str] | None:
@@ -156,50 +162,47 @@ def _explained(places: Places) -> str | None:
     weight = precision(places)
     before = chi_square(weight, places.found - places.nominal)
     freedom = 3 * (len(places.found) - 1)
-    fits = [
-        (chi_square(weight, places.found - item.places) + AS_GOOD * item.unknowns, item)
-        for item in _explanations(places)
-    ]
     # each further unknown has to pay for itself
-    score, best = min(fits, key=lambda fit: fit[0])
-    left = score - AS_GOOD * best.unknowns
+    fits = [
+        (chi_square(weight, places.found - drawn) + AS_GOOD * unknowns, AS_GOOD * unknowns, words)
+        for words, drawn, unknowns in _explanations(places)
+    ]
+    score, paid, best = min(fits, key=lambda fit: fit[0])
+    left = score - paid
     explained = before - left > 0.5 * (before - freedom)
     if not explained or (chdtrc(freedom, left) < ALARM and left > LEFT * before):
         return None
-    words = [item.words for fit, item in fits if item is not best and fit < score + AS_GOOD]
-    return ", or ".join([best.words, *words[:2]])
+    others = [words for fit, _, words in fits if words is not best and fit < score + AS_GOOD]
+    return ", or ".join([best, *others[:2]])
 
 
-def _explanations(places: Places) -> list[Explanation]:
+def _explanations(places: Places) -> list[tuple[str, np.ndarray, int]]:
+    """Mistakes in words, the drawing (A, 3) m that each would make, the number of its unknowns."""
     nominal, labels = places.nominal, places.labels
     size, _ = size_of(places)
     turn, _ = Rotation.align_vectors(centred(places.found), centred(nominal))
     found = [
-        Explanation("the array comes out inverted: specific force of the wrong sign (gravity's"
-                    " instead of minus gravity's)?", -nominal, 1),
-        Explanation(f"the array comes out turned by {angle_words(turn)}:"
-                    " are the sensors in the drawing's frame?", turn.apply(nominal), 3),
+        ("the array comes out inverted: specific force of the wrong sign (gravity's instead of"
+         " minus gravity's)?", -nominal, 1),
+        (f"the array comes out turned by {angle_words(turn)}: are the sensors in the drawing's"
+         " frame?", turn.apply(nominal), 3),
     ]  # fmt: skip
     if size > 0:
-        found.append(Explanation(small_words(size), size * nominal, 1))
-    found += [
-        Explanation(f"the array comes out mirrored in {axis}: {_mirrored_words(places)}?",
-                    nominal * (1 - 2 * np.eye(3)[i]), 1)
-        for i, axis in enumerate("xyz")
-    ]  # fmt: skip
+        found.append((size_words(size), size * nominal, 1))
+    for axis, flip in zip("xyz", 1 - 2 * np.eye(3), strict=True):
+        said = f"the array comes out mirrored in {axis}: {_mirrored_words(places)}?"
+        found.append((said, nominal * flip, 1))
     for i, j in combinations(range(len(nominal)), 2):
         order = np.arange(len(nominal))
         order[[i, j]] = j, i
-        found.append(
-            Explanation(f"IMUs {labels[i]} and {labels[j]} come out at each other's place: were"
-                        " they exchanged?", nominal[order], 1)
-        )  # fmt: skip
+        said = f"IMUs {labels[i]} and {labels[j]} come out at each other's place: were they"
+        found.append((f"{said} exchanged?", nominal[order], 1))
     for k, label in enumerate(labels):
         moved = nominal.copy()
         moved[k] += _apart(places, k)
         distance = 1e3 * np.linalg.norm(moved[k] - nominal[k])
         said = f"IMU {label} comes out {distance:.3g} mm from its place: is it the one drawn there?"
-        found.append(Explanation(said, moved, 3))
+        found.append((said, moved, 3))
     return found
 
 
@@ -222,18 +225,6 @@ def angle_words(rotation: Rotation) -> str:
     """The angle of a rotation for a person."""
     angle = np.degrees(rotation.magnitude())
     return f"{angle:.0f} degrees" if angle >= 10 else f"{angle:.2g} degrees"
-
-
-def small_words(size: float) -> str:
-    """A size that is off by some per cent, and the scales that would make it so."""
-    if not SIZES[0] < size < SIZES[1]:
-        return size_words(size)
-    off, rate = 100 * abs(size - 1), 100 * abs(size**-0.5 - 1)
-    grown, shrunk = ("large", "small") if size > 1 else ("small", "large")
-    return (
-        f"the array comes out {off:.2g} % too {grown}: gyroscopes {rate:.2g} % too {shrunk}, or"
-        f" accelerometers {off:.2g} % too {grown}?"
-    )
 
 
 def _unnamed(places: Places, alone, p: float) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 import numpy as np
 import xarray as xr
 
-from imuarray.errors import LARGEST, SMALLEST, InputError
+from imuarray.errors import LARGEST, SMALLEST, InputError, one_line
 from imuarray.model.effects import DATA_EFFECTS, EFFECTS, KINDS, own_version
 from imuarray.recording import Recording
 from imuarray.recording.record import CLOCKS, CORRECTION, DIMENSIONS, MATRICES
@@ -30,8 +30,6 @@ _PERHAPS = {
     **dict.fromkeys((*CLOCKS, "log_rate"), ("accelerometer",)),
     **{name: ("recording", *dims) for name, dims in CORRECTION.items() if name[-3:] != "_sd"},
 }  # fmt: skip
-FEW = 20  # samples
-SAME = 0.1  # relative difference of rates, up to which they are those of one recording
 SAME_BOARD = 5.0  # prior sds by which two drawings of one board may differ
 INDEFINITE = 1e-3  # of a correlation matrix' least eigenvalue; rounding leaves less
 
@@ -70,17 +68,36 @@ def _require_right_axes(mended: Iterable[str]) -> None:
             )
 
 
-def is_of(recording: Recording, calibration: xr.Dataset) -> bool:
-    """True where the calibration is of this recording, or of one that this is a part of."""
-    if "angular_rate" not in calibration:
-        return False
-    time = calibration["time"].to_numpy()
-    inside = (time >= recording.time[0]) & (time <= recording.time[-1])
-    if inside.sum() < min(FEW, len(recording.time)):
-        return False
-    rate, there = np.median(recording.angular_rate, axis=1), calibration["angular_rate"].to_numpy()
-    here = np.stack([np.interp(time[inside], recording.time, axis) for axis in rate.T], axis=1)
-    return bool(np.median(np.abs(here - there[inside])) < SAME * np.median(np.abs(there[inside])))
+def effect_names(calibration: xr.Dataset) -> list[str]:
+    """The effects that a calibration has in its model; none of the papers' model."""
+    return [name for name in str(calibration.attrs.get("effects", "")).split(",") if name]
+
+
+def parameters_of(calibration: xr.Dataset) -> dict[str, dict[str, float]]:
+    """Value and sd of each of the effects' parameters, by its name; none without effects."""
+    if "effect_parameter" not in calibration:
+        return {}
+    names = "parameter", "effect_parameter", "effect_sd"
+    rows = zip(*(calibration[name].to_numpy() for name in names), strict=True)
+    return {str(name): {"value": value, "sd": sd} for name, value, sd in rows}
+
+
+def values_of(calibration: xr.Dataset, start: str) -> list[float]:
+    """Values of the effects' parameters whose names ``start`` so."""
+    if "effect_parameter" not in calibration:
+        return []
+    names, values = (calibration[name].to_numpy() for name in ("parameter", "effect_parameter"))
+    return [value for name, value in zip(names, values, strict=True) if name.startswith(start)]
+
+
+def reasons_in(calibration: xr.Dataset) -> list[str]:
+    """Why a calibration is not to be trusted, as its file says; none for one that is."""
+    try:
+        return [one_line(str(reason)) for reason in json.loads(calibration.attrs["reasons"])]
+    except KeyError:
+        return []
+    except (ValueError, TypeError):
+        raise InputError("expected the attribute reasons as a JSON list, found another") from None
 
 
 def _require_numbers(variable: xr.DataArray, dimensions: tuple[str, ...]) -> None:

@@ -1,0 +1,97 @@
+"""Why a first-order calibration is not to be trusted: its residual, and the common scale."""
+
+from typing import NamedTuple
+
+import h5py
+import numpy as np
+from scipy.special import stdtr
+
+from imuarray.firstorder.correct import FirstOrder
+from imuarray.model.effects import KINDS
+from imuarray.recording.record import FIRST_ORDER
+
+POSES = 3.0  # times the noise of a pose's mean; real boards have up to 1.9
+BENT = 0.01  # m/s^2, a residual that matters: 0.1 % of gravity
+SMOOTHED = 0.5  # correlation of neighbours; a low pass at a fifth of the sampling rate makes 0.3
+SCALED = 0.03  # of all gyroscopes' common scale: three of its prior's sds
+SEEN, ODD = 5e-3, 1e-4  # the same, where the axes' own scales scatter by less than their mean
+
+
+class Poses(NamedTuple):
+    """Results of a first-order calibration: NaN where it has none."""
+
+    ratio: float = 1.0  # residual of the poses over their noise
+    residual: float = np.nan  # m/s^2, rms of the worst triad
+    scale: float = np.nan  # of the map that all gyroscopes share
+    chance: float = 1.0  # of such a mean of all axes' scales, by their own spread
+    smoothed: tuple[str, ...] = ()  # kinds whose still readings follow their neighbours
+
+
+def of_first_order(found: FirstOrder) -> Poses:
+    """From the answer."""
+    common = None if found.gyroscopes is None else found.gyroscopes.common
+    scale = np.nan if common is None or isinstance(common, str) else common.scale
+    fit = found.triads
+    poses = _poses(fit.residual_ratio, fit.residual, fit.relied, scale, found.gyroscope_matrix)
+    follow = {kind: np.nanmedian(getattr(found, f"{kind}_smoothing")) for kind in KINDS}
+    return poses._replace(smoothed=tuple(kind for kind in KINDS if follow[kind] > SMOOTHED))
+
+
+def of_file(path) -> Poses:
+    """From a corrected recording's file, or one that was selected from it."""
+    with h5py.File(path, "r") as file:
+        if FIRST_ORDER not in file:
+            return Poses()
+        stored = file[FIRST_ORDER]
+        ratio = float(np.ravel(stored.attrs.get("residual_ratio", 1.0))[0])
+        common = stored["gyroscope_common"][:] if "gyroscope_common" in stored else [[np.nan]]
+        maps = stored["gyroscope_matrix"][:] if "gyroscope_matrix" in stored else None
+        residual, used = stored["residual"][:], stored["used"][:] != 0
+    return _poses(ratio, residual, used, float(np.trace(common) / 3), maps)
+
+
+def _poses(ratio: float, residual, used, scale: float, maps) -> Poses:
+    """With residuals (P, A, 3) where they are ``used`` (P, A), gyroscopes' ``maps`` (G, 3, 3)."""
+    squares = np.where(used[..., None], residual**2, np.nan)
+    worst = np.sqrt(np.nanmax(np.nanmean(np.ascontiguousarray(squares), axis=(0, 2))))
+    return Poses(ratio, float(worst), scale, _chance(maps) if scale == scale else 1.0)
+
+
+def _chance(matrices) -> float:
+    """Chance (t distribution) of such a mean of the scales of axes, of maps (G, 3, 3)."""
+    scales = np.linalg.norm(matrices, axis=1).ravel() - 1
+    sd = scales.std(ddof=1) / np.sqrt(scales.size)
+    return float(2 * stdtr(scales.size - 1, -abs(scales.mean()) / max(sd, 1e-300)))
+
+
+def reasons_of_poses(*several: Poses) -> list[str]:
+    """Why first-order calibrations are not to be trusted: their residual, and the common scale."""
+    found = []
+    ratio = max((x.ratio for x in several if not x.residual <= BENT), default=1.0)
+    if ratio > POSES:
+        found.append(
+            f"the still poses fit {ratio:.2g} times worse than noise and a drift of offsets allow:"
+            " the board bent or was not still, an offset jumped, a response is curved (imuarray"
+            " diagnose tells), or recordings are of other boards; sds do not cover that: record"
+            " again"
+        )
+    smoothed = sorted({kind for one in several for kind in one.smoothed})
+    if smoothed:
+        found.append(
+            f"readings of {' and '.join(f'{kind}s' for kind in smoothed)} follow their neighbours"
+            " while the board is still: they are averaged, filtered or interpolated from another"
+            " rate, which makes fast motion smaller and later; log raw readings, each sensor at its"
+            " own rate"
+        )
+    worst = max(several, key=lambda x: abs(x.scale - 1) if x.scale == x.scale else 0.0)
+    scale, odd = worst.scale, worst.chance < ODD
+    if abs(scale - 1) > SCALED or (odd and abs(scale - 1) > SEEN):
+        off = 100 * abs(1 / scale - 1)
+        much, large = ("much", "small") if scale < 1 else ("little", "large")
+        found.append(
+            f"all gyroscopes together read {off:.2g} % too {much} by the moves between poses: is"
+            " that their scale, or is it the time base: a clock that runs wrong, a declared rate of"
+            f" the log that is not its own, rows that were lost? If so, the array comes out"
+            f" {2 * off:.2g} % too {large}"
+        )
+    return found
