@@ -278,6 +278,11 @@ def by_imu(force, rate) -> np.ndarray:
     return out
 
 
+def by_triad(values) -> np.ndarray:
+    """(T, N, 2) sums over the axes of (T, N, 6)."""
+    return values.reshape(*values.shape[:2], 2, 3).sum(axis=-1)
+
+
 def arrange(recording: Recording, sparse: bool = False) -> Readings:
     """`Readings` of the moving samples whose motion is seen; InputError where too few are left.
 

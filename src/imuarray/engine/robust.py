@@ -22,7 +22,7 @@ from imuarray.engine.linearise import (
     motion_step,
 )
 from imuarray.engine.parameters import Columns
-from imuarray.engine.readings import Readings
+from imuarray.engine.readings import Readings, by_triad
 from imuarray.estimation.threads import one_thread
 
 LEAST_FREE = 1e-3  # of a reading's variance that the motion leaves, or its size says nothing
@@ -123,11 +123,6 @@ def _inside(blocks, part: slice) -> list[tuple[int, slice]]:
 def _leverage(basis, count) -> np.ndarray:
     """Share of each reading's variance that the motion takes up, (T, N, 6)."""
     return np.einsum("tij,tij->ti", basis, basis).reshape(len(basis), count, 6)
-
-
-def by_triad(values) -> np.ndarray:
-    """(T, N, 2) sums over the axes of (T, N, 6)."""
-    return values.reshape(*values.shape[:2], 2, 3).sum(axis=-1)
 
 
 def judged(readings: Readings, seen: Pass, owned, former: np.ndarray) -> Readings:

@@ -20,8 +20,8 @@ from imuarray.engine.fusion import covariances, descend, fuse, one_sided
 from imuarray.engine.gyroscope_clocks import with_phases
 from imuarray.engine.linearise import CHUNK, State, chunk_at, predicted
 from imuarray.engine.parameters import Columns
-from imuarray.engine.readings import Readings
-from imuarray.engine.robust import by_triad, distances, normal_pass
+from imuarray.engine.readings import Readings, by_triad
+from imuarray.engine.robust import distances, normal_pass
 from imuarray.engine.settings import SETTINGS
 from imuarray.model import ArrayModel
 from imuarray.model.jax64 import jax
