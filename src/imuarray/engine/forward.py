@@ -11,7 +11,7 @@ from scipy.linalg import block_diag
 from scipy.special import chdtrc
 
 from imuarray.engine.clocks import CLOCK, refined, shown_clocks, timed, with_clocks
-from imuarray.engine.estimate import Estimate, Recorded, estimate, places_of, tested
+from imuarray.engine.estimate import Estimate, Recorded, Tested, estimate, tested
 from imuarray.engine.fit import flat_parameters, from_flat, in_use
 from imuarray.engine.heldout import gain_of
 from imuarray.engine.linearise import State
@@ -94,7 +94,11 @@ def groups_of(readings: Sequence[Readings]) -> list[str]:
     if sum(len(one.time) for one in readings) < 2 * SETTINGS.blocks:
         return []
     smooth = all(one.gapless for one in readings)
-    return [n for n, ids in EFFECT_GROUPS.items() if smooth or not any(map(_needs_neighbours, ids))]
+    return [name for name in EFFECT_GROUPS if smooth or not _needs_neighbours(name)]
+
+
+def _needs_neighbours(group: str) -> bool:
+    return any(EFFECTS[effect].derivatives for effect in EFFECT_GROUPS[group])
 
 
 def select_forward(
@@ -135,7 +139,7 @@ def select_forward(
     if not (now.kept or bare):
         return now.found, clocks + groups
     found = now.fitted().found
-    late = any(_needs_neighbours(effect) for name in now.kept for effect in EFFECT_GROUPS[name])
+    late = any(map(_needs_neighbours, now.kept))
     pair = readings[0].pair
     if all(one.smooth for one in found.recorded) and (pair or not late):
         begun = [
@@ -269,10 +273,6 @@ def _contradicted(parts, ridge, values, freed, spread) -> bool:
     return bool(chdtrc(len(off), off @ np.linalg.solve(spread, off)) < CHANCE)
 
 
-def _needs_neighbours(effect: str) -> bool:
-    return EFFECTS[effect].derivatives
-
-
 def mask_of(columns: Columns, effects) -> np.ndarray:
     """(N, m) bool of the parameters of some effects, or the positions."""
     return np.isin(columns.names, list(effects)) & columns.owner
@@ -289,8 +289,7 @@ def gains(found: Estimate, masks: dict, kept: dict | None = None) -> list[Effect
     left = _left(found)
     every = [*masks.values(), *kept.values(), *(mask for mask, _ in left)]
     active = np.any([found.active, *every], axis=0)
-    places, out = places_of(found.columns, active, len(found.recorded)), []
-    given = _Given(*tested(found, active), active, places)
+    given, out = tested(found, active), []
     beside = np.any([found.active, *kept.values()], axis=0)
     for name, mask in masks.items():
         out.append(_tried(name, given, mask, beside, left))
@@ -298,24 +297,7 @@ def gains(found: Estimate, masks: dict, kept: dict | None = None) -> list[Effect
     return out
 
 
-class _Given(NamedTuple):
-    """Information by block of n parameters, as `tested` gives it, and which they are."""
-
-    blocks: list
-    precision: np.ndarray
-    values: np.ndarray
-    active: np.ndarray
-    places: tuple[np.ndarray, ...]
-
-    def chosen(self, mask) -> np.ndarray:
-        """(n,) bool of (N, m), in all recordings."""
-        found = np.zeros(len(self.values), bool)
-        for place in self.places:
-            found[place] |= mask[self.active]
-        return found
-
-
-def _tried(name: str, given: _Given, own, beside, left) -> EffectGroup:
+def _tried(name: str, given: Tested, own, beside, left) -> EffectGroup:
     """A group's gain, and whether it is kept; ``own`` and ``beside`` (N, m) bool."""
     freed, used, ridge = given.chosen(own), given.chosen(beside | own), given.precision.copy()
     spare, known = np.zeros(len(used), bool), None

@@ -7,15 +7,7 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import chdtrc
 
-from imuarray.engine.estimate import (
-    Estimate,
-    jackknifed,
-    means,
-    pinned,
-    places_of,
-    stepped,
-    tested,
-)
+from imuarray.engine.estimate import Estimate, jackknifed, means, pinned, stepped, tested
 from imuarray.engine.fit import flat_parameters, from_flat, scaled_solve
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import Columns, columns_of, gauge_masks
@@ -57,17 +49,17 @@ def beside_maps(found: Estimate) -> tuple[Estimate, dict[str, float]]:
     wide = _with_maps(found)
     maps = mask_of_left(lefts, wide.columns, wide.active)
     active, count = wide.active | maps, len(found.values)
-    blocks, _, _ = tested(wide, active)
+    given = tested(wide, active)
     names = np.array(wide.columns.names)[np.nonzero(maps)[1]]
     places, spread = _places_left(lefts, [spread_of(left, wide.columns, maps) for left in lefts],
                                   np.isin(names, MAPS), count)  # fmt: skip
     precision = block_diag(found.precision, np.linalg.inv(spread))
     both, mine = [], maps[active]
-    for number, place in enumerate(places_of(wide.columns, active, len(lefts))):
+    for number, place in enumerate(given.places):
         own = np.empty(len(place), int)
         own[~mine], own[mine] = found.places[number], places[number]
         both.append((place, own))
-    blocks = _placed(blocks, both, len(precision))
+    blocks = _placed(given.blocks, both, len(precision))
     information = sum(inner for inner, _ in blocks)
     slope = sum(score for _, score in blocks)
     slope[:count] -= found.precision @ (found.values - means(found))
@@ -157,9 +149,7 @@ def _formal(found: Estimate) -> np.ndarray:
     """Gauges that the array's size takes up not pinned, but as large as they may well be."""
     known, gauges = np.isfinite(found.scale_sd), gauge_masks(found.columns, found.active)
     count, prior = len(found.values), found.precision.copy()
-    prior[:count, :count] = pinned(
-        found.recorded, found.columns, found.active, found.places, resized=known
-    )
+    prior[:count, :count] = pinned(found.columns, found.active, found.places, resized=known)
     sizes = [mask[found.active] for effect, mask in gauges if effect.resizes]
     if not known:
         for mine in sizes:
@@ -234,14 +224,11 @@ def _with_maps(found: Estimate) -> Estimate:
         return found
     readings = found.recorded[0].readings
     columns = columns_of(readings.array, (*old.model.effects, *missing), readings.position_prior_sd)
-    index = [
-        list(zip(columns.names, columns.places, strict=True)).index(one)
-        for one in zip(old.names, old.places, strict=True)
-    ]
+    known = np.isin(columns.names, old.names)
 
     def wider(values) -> np.ndarray:
         out = np.zeros((len(values), columns.size), values.dtype)
-        out[:, index] = values
+        out[:, known] = values
         return out
 
     def moved(state: State) -> State:
