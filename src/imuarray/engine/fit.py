@@ -16,6 +16,7 @@ from imuarray.engine.linearise import (
     RoughPrior,
     State,
     directions_of,
+    leverage_of,
     linearise,
     seen_again,
     through_of,
@@ -66,7 +67,7 @@ class Fit:
     @property
     def leverage(self) -> np.ndarray:
         """Share of each reading's variance that the motion takes up, (T, N, 6)."""
-        return np.einsum("tij,tij->ti", self.basis, self.basis).reshape(self.residual.shape)
+        return leverage_of(self.basis)
 
     def less_motion(self, values) -> np.ndarray:
         """Whitened readings (T, N, 6) without what the motion can explain of them."""

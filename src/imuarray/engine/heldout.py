@@ -69,12 +69,8 @@ def log_densities(readings: Readings, state: State, residual, misfits, log_volum
         squares = squares / readings.trust**2
     nats = np.zeros(len(weighted))
     for kind, nu in enumerate(freedoms):
-        n, d = number[..., kind], squares[..., kind]
-        if np.isfinite(nu):
-            scale = gammaln((nu + n) / 2) - gammaln(nu / 2) - n / 2 * np.log(nu * np.pi)
-            density = scale - (nu + n) / 2 * np.log1p(d / nu)
-        else:
-            density = -n / 2 * np.log(2 * np.pi) - d / 2
+        n = number[..., kind]
+        density = log_t(squares[..., kind], n, nu)
         nats += np.sum(density - n * np.log(readings.sd[:, kind]), axis=1)
     nats += state.motion.shape[1] / 2 * np.log(2 * np.pi) - log_volume / 2
     if state.rough_prior is not None:
@@ -83,6 +79,18 @@ def log_densities(readings: Readings, state: State, residual, misfits, log_volum
     if state.turning is not None:
         nats -= state.turning.log_norm
     return nats - (misfits - weighted) / 2
+
+
+def log_t(squares, number, freedom):
+    """Log density of ``number`` readings together at their sum of ``squares``, in units of the sd.
+
+    Student's t's of a finite ``freedom``, or a normal one's.
+    """
+    if np.isinf(freedom):
+        return -number / 2 * np.log(2 * np.pi) - squares / 2
+    scale = gammaln((freedom + number) / 2) - gammaln(freedom / 2)
+    scale = scale - number / 2 * np.log(freedom * np.pi)
+    return scale - (freedom + number) / 2 * np.log1p(squares / freedom)
 
 
 def trained_elsewhere(parts, ridge) -> np.ndarray:

@@ -241,6 +241,11 @@ def _less_motion(residual, basis, inverse, bare, sd):
     return left.reshape(residual.shape), taken[..., 0], unexpected, misfit
 
 
+def leverage_of(basis) -> np.ndarray:
+    """Share of each reading's variance that the motion takes up, (T, N, 6)."""
+    return np.einsum("tij,tij->ti", basis, basis).reshape(len(basis), -1, 6)
+
+
 def through_of(basis, whitened) -> np.ndarray:
     """(T, N, D, m) coordinates in the motion's basis of each IMU's derivatives (T, N, 6, m)."""
     return np.swapaxes(basis.reshape(*whitened.shape[:3], -1), 2, 3) @ whitened
@@ -263,7 +268,7 @@ def linearise(
     def one(start):
         return chunk_at(readings, columns, state, directions, start)
 
-    return _joined(one, len(readings.values), spare)
+    return Eliminated(*_joined(one, len(readings.values), spare))
 
 
 def seen_again(readings: Readings, columns: Columns, state: State, seen: Eliminated) -> Eliminated:
@@ -274,20 +279,17 @@ def seen_again(readings: Readings, columns: Columns, state: State, seen: Elimina
     count, first = readings.values.shape[1], seen.unexpected.shape[1]
 
     def one(start):
-        index, x, extra, (mean, sd) = _chunk_of(readings, state, start)
+        index = padded(start, len(readings.values))
+        x, extra, (mean, sd) = _rows_of(readings, state, index)
         values = np.asarray(_predicted(
             columns.model, count, False, x, extra, readings.time[index], readings.span,
             state.positions, state.parameters,
         ))  # fmt: skip
         residual = readings.weights_of(index) * (readings.values[index] - values)
         bare = (mean - x[:, x.shape[1] - sd.shape[1] :]) / sd
-        basis, inverse = (part[start : start + CHUNK] for part in (seen.basis, seen.inverse))
-        used = len(basis)  # less than a chunk, at last
-        return _less_motion(residual[:used], basis, inverse, bare[:used], sd[:used])
+        return _less_motion(residual, seen.basis[index], seen.inverse[index], bare, sd)
 
-    with ThreadPoolExecutor(THREADS) as pool:
-        parts = zip(*pool.map(one, range(0, len(seen.residual), CHUNK)), strict=True)
-        left, taken, unexpected, misfit = (np.concatenate(part) for part in parts)
+    left, taken, unexpected, misfit = _joined(one, len(readings.values))
     return seen._replace(
         residual=left, taken=taken, unexpected=unexpected[:, :first], misfit=misfit
     )
@@ -300,7 +302,8 @@ def directions_of(columns: Columns, wanted=None) -> np.ndarray:
 
 def chunk_at(readings: Readings, columns: Columns, state: State, directions, start) -> Eliminated:
     """The `CHUNK` samples from ``start`` on, the last one repeated where there are fewer."""
-    index, x, extra, (mean, sd) = _chunk_of(readings, state, start)
+    index = padded(start, len(readings.values))
+    x, extra, (mean, sd) = _rows_of(readings, state, index)
     placed = bool(np.all(directions < columns.of(POSITION).size)) or not columns.model.chain
     residual, motion, whitened, gram = _chunk(
         columns.model, readings.values.shape[1], placed, x, extra, readings.time[index],
@@ -318,15 +321,13 @@ def chunk_at(readings: Readings, columns: Columns, state: State, directions, sta
     )
 
 
-def _chunk_of(readings: Readings, state: State, start):
-    """(indices (CHUNK,), motion, derivatives, the motion's prior) of a chunk."""
-    return _rows_of(
-        readings, state, np.minimum(np.arange(start, start + CHUNK), len(readings.values) - 1)
-    )
+def padded(start: int, samples: int) -> np.ndarray:
+    """Indices (CHUNK,) of a chunk's samples, the last one repeated where there are fewer."""
+    return np.minimum(np.arange(start, start + CHUNK), samples - 1)
 
 
 def _rows_of(readings: Readings, state: State, index):
-    """`_chunk_of` for any samples."""
+    """(motion, derivatives, the motion's prior) of the samples ``index``."""
     extra = jax.tree.map(lambda field: field[index], (*state.derivatives, readings.wandered))
     nothing = np.zeros((len(index), 0))
     prior = (nothing, nothing)
@@ -336,7 +337,7 @@ def _rows_of(readings: Readings, state: State, index):
         free = np.zeros((len(index), 3)), np.full((len(index), 3), np.inf)  # of s
         parts = zip((part[index] for part in state.turning[:2]), free, prior, strict=True)
         prior = tuple(np.hstack(part) for part in parts)
-    return index, state.motion[index], extra, prior
+    return state.motion[index], extra, prior
 
 
 def motion_step(readings: Readings, columns: Columns, state: State, start) -> np.ndarray:
@@ -344,7 +345,7 @@ def motion_step(readings: Readings, columns: Columns, state: State, start) -> np
 
     LinAlgError where the readings do not determine it.
     """
-    index, *_ = _chunk_of(readings, state, start)
+    index = padded(start, len(readings.values))
     gram, slope, _ = motion_equations(readings, columns.model, state, index)
     return np.linalg.solve(gram, slope[..., None])[..., 0]
 
@@ -355,7 +356,7 @@ def motion_equations(readings: Readings, model: ArrayModel, state: State, index,
     Information, score and squared residuals, the prior's included. ``rails`` (T, N, 6): weights of
     readings that count as far as the prediction falls short of them.
     """
-    index, x, extra, (mean, sd) = _rows_of(readings, state, index)
+    x, extra, (mean, sd) = _rows_of(readings, state, index)
     one_sided = None if rails is None else rails[index]
     gram, slope, cost = map(np.array, _motion(
         model, readings.values.shape[1], x, extra, readings.time[index], readings.span,
@@ -387,12 +388,12 @@ def _motion(model, count, x, extra, time, span, positions, parameters, data):
     return jnp.einsum("tri,trj->tij", motion, motion), slope, jnp.sum(residual**2, axis=1)
 
 
-def _joined(one, samples, spare) -> Eliminated:
+def _joined(one, samples, spare=None) -> list[np.ndarray]:
     """All chunks, one after the other, without the last one's padding."""
     first = one(0)
     shapes = [(samples, *part.shape[1:]) for part in first]
     reused = spare is not None and [part.shape for part in spare] == shapes
-    out = spare if reused else Eliminated(*(np.empty(shape) for shape in shapes))
+    out = list(spare) if reused else [np.empty(shape) for shape in shapes]
 
     def put(start, found=None):
         for target, part in zip(out, one(start) if found is None else found, strict=True):

@@ -8,10 +8,9 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import gammaln
 
 from imuarray.engine.fit import normal
-from imuarray.engine.heldout import blocks_of
+from imuarray.engine.heldout import blocks_of, log_t
 from imuarray.engine.linearise import (
     CHUNK,
     KNOWN,
@@ -19,6 +18,7 @@ from imuarray.engine.linearise import (
     State,
     chunk_at,
     directions_of,
+    leverage_of,
     motion_step,
 )
 from imuarray.engine.parameters import Columns
@@ -72,7 +72,7 @@ def normal_pass(
             motion[part] += motion_step(readings, columns, here, start)[: samples - start]
         seen = chunk_at(readings, columns, here, directions, start)
         used = part.stop - part.start
-        residual, leverage = seen.residual[:used], _leverage(seen.basis[:used], count)
+        residual, leverage = seen.residual[:used], leverage_of(seen.basis[:used])
         left = np.where(readings.keep[part], 1.0 - leverage, 0.0)
         squares[part], freedom[part] = by_triad(residual**2), by_triad(left)
         unit[part] = by_triad(residual**2 / np.maximum(1.0 - leverage, LEAST_FREE))
@@ -118,11 +118,6 @@ def _inside(blocks, part: slice) -> list[tuple[int, slice]]:
         if first < last:
             found.append((number, slice(first - part.start, last - part.start)))
     return found
-
-
-def _leverage(basis, count) -> np.ndarray:
-    """Share of each reading's variance that the motion takes up, (T, N, 6)."""
-    return np.einsum("tij,tij->ti", basis, basis).reshape(len(basis), count, 6)
 
 
 def judged(readings: Readings, seen: Pass, owned, former: np.ndarray) -> Readings:
@@ -184,10 +179,6 @@ def freedoms(readings: Readings, seen: Pass) -> np.ndarray:
 def _log_likelihood(d, nu) -> float:
     """Log likelihood of squared distances (n,) of three readings, at the best scale."""
     scale = np.mean(d) / 3
-    if np.isinf(nu):
-        return float(-1.5 * len(d) * np.log(scale) - np.sum(d) / (2 * scale))
-    for _ in range(ROUNDS):
+    for _ in range(ROUNDS if np.isfinite(nu) else 0):
         scale = np.mean((nu + 3) / (nu + d / scale) * d) / 3
-    constant = gammaln((nu + 3) / 2) - gammaln(nu / 2) - 1.5 * np.log(nu / 2)
-    tail = (nu + 3) / 2 * np.log1p(d / (nu * scale))
-    return float(np.sum(constant - tail) - 1.5 * len(d) * np.log(scale))
+    return float(np.sum(log_t(d / scale, 3, nu)) - 1.5 * len(d) * np.log(scale))

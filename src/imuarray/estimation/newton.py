@@ -5,7 +5,6 @@ would double it.
 """
 
 from dataclasses import replace
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -78,17 +77,12 @@ def _covariance(given, here):
 def _prior(prior, data: Collapsed):
     """(mean, precision), copied; empty for none."""
     if prior is None:
-        return _none()
+        return np.empty(0), np.empty((0, 0))
     size = 3 * (len(data.specific_force) - 1)
     mean, precision = (np.array(part, float, order="C") for part in prior)
     require_shape("position prior's mean", mean, (size,))
     require_shape("position prior's precision", precision, (size, size))
     return mean, precision
-
-
-@cache
-def _none():
-    return np.empty(0), np.empty((0, 0))
 
 
 class Given(NamedTuple):
