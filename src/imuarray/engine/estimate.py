@@ -16,10 +16,10 @@ import numpy as np
 from imuarray.engine.alike import with_likely_spread
 from imuarray.engine.fit import (
     flat_parameters,
-    from_flat,
     movable,
     prior_means,
     scaled_solve,
+    stepped,
     with_derivatives,
     with_rough_prior,
 )
@@ -334,12 +334,6 @@ def _noise_change(before, after) -> float:
         float(np.max(np.abs(new.readings.sd / old.readings.sd - 1)[old.readings.exists]))
         for old, new in zip(before, after, strict=True)
     )
-
-
-def stepped(state: State, columns, active, step) -> State:
-    whole = flat_parameters(columns, state)
-    whole[active] += step
-    return from_flat(columns, state, whole)
 
 
 def means(found: Estimate) -> np.ndarray:

@@ -25,7 +25,6 @@ from imuarray.engine.widths import (
     OFFSETS,
     SCALES,
     SKEWS,
-    beside_maps,
     corrected,
     mask_of_left,
     settled,
@@ -128,7 +127,8 @@ def select_forward(
         groups = now.tried(names)
         now = now.with_kept([group.name for group in groups if group.kept])
         if set(now.kept) == before:
-            if GYROSCOPES in names and beside_maps(now.found)[1].get("gyroscope", 1.0) < CHANCE:
+            chance, _ = settled(now.found).maps_hold.get("gyroscope", (1.0, []))
+            if GYROSCOPES in names and chance < CHANCE:
                 groups = [
                     group._replace(kept=group.kept or group.name == GYROSCOPES) for group in groups
                 ]
@@ -174,8 +174,12 @@ class Selected(NamedTuple):
     def without(self, names) -> Selected:
         """Without some of those kept, their parameters back at zero."""
         now = self._replace(kept={n: mask for n, mask in self.kept.items() if n not in names})
-        recorded = tuple(without(self.found, now.active))
-        return now._replace(found=replace(self.found, recorded=recorded))
+        found, recorded = self.found, []
+        for one in found.recorded:
+            whole = flat_parameters(found.columns, one.state)
+            whole[found.active & ~now.active] = 0.0
+            recorded.append(replace(one, state=from_flat(found.columns, one.state, whole)))
+        return now._replace(found=replace(found, recorded=tuple(recorded)))
 
     def tried(self, names) -> list[EffectGroup]:
         """Gains of the groups, but those of which a clock is the whole."""
@@ -217,17 +221,6 @@ class Selected(NamedTuple):
                 for one, keep in zip(recorded, self.keep, strict=True)
             ]
         return self._replace(found=estimate(recorded, columns, self.active, steps=steps))
-
-
-def without(found: Estimate, active) -> list[Recorded]:
-    """The recordings of an estimate, what is not ``active`` back at zero."""
-    out = []
-    for one in found.recorded:
-        whole = flat_parameters(found.columns, one.state)
-        dropped = found.active & ~active
-        whole[dropped] = 0.0
-        out.append(replace(one, state=from_flat(found.columns, one.state, whole)))
-    return out
 
 
 def _left(found: Estimate) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -7,8 +7,8 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import chdtrc
 
-from imuarray.engine.estimate import Estimate, jackknifed, means, pinned, stepped, tested
-from imuarray.engine.fit import flat_parameters, from_flat, scaled_solve
+from imuarray.engine.estimate import Estimate, jackknifed, means, pinned, tested
+from imuarray.engine.fit import flat_parameters, from_flat, scaled_solve, stepped
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import Columns, columns_of, gauge_masks
 from imuarray.engine.readings import Left
@@ -32,20 +32,13 @@ def settled(found: Estimate) -> Estimate:
     Each as uncertain as that. One step of everything at once: such errors are so small that it is
     the last one. They stay out of the answer, as they belong to a recording's correction;
     ``information``, ``precision`` and ``blocks`` have them after the n parameters, those of each
-    recording.
-    """
-    return beside_maps(found)[0]
-
-
-def beside_maps(found: Estimate) -> tuple[Estimate, dict[str, float]]:
-    """`settled`, and how likely maps as far from the correction's as it takes them to be are.
-
-    {"accelerometer" or "gyroscope": p} of the kinds whose maps were corrected and not estimated.
-    Recordings that one calibration corrected have its errors of the maps in common.
+    recording. ``maps_hold``: of the kinds whose maps were corrected and not estimated, how likely
+    maps as far from the correction's as it takes them to be are. Recordings that one calibration
+    corrected have its errors of the maps in common.
     """
     lefts = [one.readings.left for one in found.recorded]
     if any(left is None for left in lefts):
-        return found, {}
+        return found
     wide = _with_maps(found)
     maps = mask_of_left(lefts, wide.columns, wide.active)
     active, count = wide.active | maps, len(found.values)
@@ -64,28 +57,27 @@ def beside_maps(found: Estimate) -> tuple[Estimate, dict[str, float]]:
     slope = sum(score for _, score in blocks)
     slope[:count] -= found.precision @ (found.values - means(found))
     whole = scaled_solve(information + precision, slope)[0]
-    step, off, likely, farthest = whole[:count], whole[count:], {}, {}
+    step, off, holds = whole[:count], whole[count:], {}
     for kind in KINDS:
         mine = np.char.startswith(names, kind) & np.isin(names, MAPS)
         own = np.unique([place[mine] - count for place in places])
         if own.size:
-            likely[kind] = float(chdtrc(own.size, _distance(off, spread, own)))
             imus, far = np.nonzero(maps)[0], {}
             for imu in np.unique(imus[mine]):
                 its = [place[mine & (imus == imu)] - count for place in places]
                 far[int(imu)] = _distance(off, spread, np.unique(its))
-            farthest[kind] = [k for k, each in far.items() if each > NEARLY * max(far.values())]
+            farthest = [k for k, each in far.items() if each > NEARLY * max(far.values())]
+            holds[kind] = float(chdtrc(own.size, _distance(off, spread, own))), farthest
     recorded = tuple(
         replace(one, state=stepped(one.state, found.columns, found.active, step[place]))
         for one, place in zip(found.recorded, found.places, strict=True)
     )
     # what the blocks say where the step ends: a jackknife takes the rest for their scatter
     blocks = [(inner, score - inner @ whole) for inner, score in blocks]
-    found = replace(
+    return replace(
         found, recorded=recorded, information=information, precision=precision, blocks=blocks,
-        maps_hold={kind: (p, farthest[kind]) for kind, p in likely.items()},
+        maps_hold=holds,
     )  # fmt: skip
-    return found, likely
 
 
 def _distance(off, spread, own) -> float:
