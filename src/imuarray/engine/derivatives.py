@@ -31,26 +31,24 @@ def polynomial_derivative(time, run, values, window, order, degree=4) -> np.ndar
 
     Zero in runs shorter than the window; ``degree``: of other polynomials.
     """
-    step, where = np.median(np.diff(time)), places_in(run, window)
+    step = np.median(np.diff(time))
+    taps = [polynomial_taps(window, place, order, degree) / step**order for place in range(window)]
     out = np.zeros_like(values)
-    for place in range(window):
-        mine = np.flatnonzero(where == place)
-        taps = polynomial_taps(window, place, order, degree) / step**order
-        out[mine] = sum(tap * values[mine - place + i] for i, tap in enumerate(taps))
+    half = window // 2
+    edges = np.flatnonzero(np.concatenate([[True], np.diff(run) > 0, [True]]))
+    for first, last in zip(edges[:-1], edges[1:], strict=True):
+        if last - first < window:
+            continue
+        middle = last - window + 1
+        out[first + half : last - half] = sum(
+            tap * values[first + i : middle + i] for i, tap in enumerate(taps[half])
+        )
+        for pos in range(half):
+            out[first + pos] = np.tensordot(taps[pos], values[first : first + window], 1)
+            out[last - half + pos] = np.tensordot(
+                taps[half + 1 + pos], values[last - window : last], 1
+            )
     return out
-
-
-def places_in(run, window) -> np.ndarray:
-    """Place (T,) of each sample in the window around it, within its run; -1 in shorter runs.
-
-    The middle, but near a run's ends.
-    """
-    first, inverse, count = np.unique(
-        run, return_index=True, return_inverse=True, return_counts=True
-    )[1:]
-    since, length = np.arange(len(run)) - first[inverse], count[inverse]
-    place = np.clip(window // 2, since - (length - window), since)
-    return np.where(length < window, -1, place)
 
 
 def polynomial_taps(window, place, order, degree) -> np.ndarray:

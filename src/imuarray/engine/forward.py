@@ -271,14 +271,13 @@ def mask_of(columns: Columns, effects) -> np.ndarray:
     return np.isin(columns.names, list(effects)) & columns.owner
 
 
-def gains(found: Estimate, masks: dict, kept: dict | None = None) -> list[EffectGroup]:
+def gains(found: Estimate, masks: dict, kept: dict) -> list[EffectGroup]:
     """Gain of each group on held-out time beside those kept, and those before it that gain.
 
     ``masks``, ``kept`` {group: (N, m) bool}. By one linearisation with all of them. Maps that first
     order has left are beside them all, as uncertain as it left them: what they explain is no
     group's gain.
     """
-    kept = kept or {}
     left = _left(found)
     every = [*masks.values(), *kept.values(), *(mask for mask, _ in left)]
     active = np.any([found.active, *every], axis=0)

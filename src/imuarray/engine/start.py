@@ -6,12 +6,7 @@ accelerometers leave it open about the line that joins them.
 
 import numpy as np
 
-from imuarray.engine.derivatives import (
-    no_derivatives,
-    places_in,
-    polynomial_derivative,
-    polynomial_taps,
-)
+from imuarray.engine.derivatives import no_derivatives, polynomial_derivative, polynomial_taps
 from imuarray.engine.linearise import State, TurningPrior
 from imuarray.engine.parameters import Columns
 from imuarray.engine.readings import Readings
@@ -85,7 +80,12 @@ def _slope(readings: Readings, rate, window, degree) -> tuple[np.ndarray, np.nda
     """The rate's slope (T, 3), and how noise of one reading shows in it (T,), 1/s; 0 for none."""
     slope = polynomial_derivative(readings.time, readings.run, rate, window, 1, degree)
     sizes = [np.linalg.norm(_taps(readings, window, degree, place)) for place in range(window)]
-    return slope, np.append(sizes, 0.0)[places_in(readings.run, window)]
+    first, count = np.unique(readings.run, return_index=True, return_counts=True)[1:]
+    begin, length = np.repeat(first, count), np.repeat(count, count)
+    place = np.arange(len(rate)) - begin
+    left, half = length - 1 - place, window // 2
+    place = np.where(place < half, place, np.where(left < half, window - 1 - left, half))
+    return slope, np.where(length < window, 0.0, np.array(sizes)[np.clip(place, 0, window - 1)])
 
 
 def start(readings: Readings, columns: Columns) -> State:

@@ -39,12 +39,11 @@ def parameter_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
 def _rows(sensor: str, labels, parts, sds, offset_unit: str) -> list[tuple]:
     rows = []
     for k, label in enumerate(labels):
-        for name, unit in (UNITS | {"offset": offset_unit}).items():
-            components = MISALIGNMENT if name == "misalignment" else "xyz"
-            if name in parts:
-                for i, component in enumerate(components):
-                    value, sd = parts[name][k, i], sds[name][k, i]
-                    rows.append((sensor, label, name, component, value, sd, unit))
+        for name, values in parts.items():
+            unit = UNITS.get(name, offset_unit)
+            for i, component in enumerate(MISALIGNMENT if name == "misalignment" else "xyz"):
+                value, sd = values[k, i], sds[name][k, i]
+                rows.append((sensor, label, name, component, value, sd, unit))
     return rows
 
 
