@@ -358,9 +358,12 @@ class Tested(NamedTuple):
         return found
 
 
-def tested(found: Estimate, active) -> Tested:
-    """An estimate's state, noise and weights with more parameters ``active`` (N, m) bool."""
-    places = places_of(found.columns, active, len(found.recorded))
+def tested(found: Estimate, active, places=None) -> Tested:
+    """An estimate's state, noise and weights with more parameters ``active`` (N, m) bool.
+
+    ``places`` of each recording's among all, by default those of `places_of`.
+    """
+    places = places or places_of(found.columns, active, len(found.recorded))
     recorded, passes = _passed(found.recorded, found.columns, active)
     values = _values(recorded, found.columns, active, places)
     precision = pinned(found.columns, active, places)

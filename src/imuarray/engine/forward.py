@@ -81,9 +81,8 @@ def resumed(readings: Readings, columns: Columns, active, state: State) -> Estim
     state = from_flat(few, state, flat_parameters(columns, state)[:, kept])
     columns, active = few, active[:, kept]
     recorded = Recorded.of(most_informative(readings, lambda text: None), columns, state)
-    clocked = active[:, columns.of(CLOCK)].any(axis=1) if CLOCK in columns.names else []
-    imus = [int(k) for k in np.flatnonzero(clocked)]
-    if imus:
+    imus = np.flatnonzero(active[:, columns.of(CLOCK)].any(axis=1))
+    if imus.size:
         recorded = timed(recorded, recorded.readings.keep, columns, imus)
     return settled(estimate([recorded], columns, active))
 
@@ -260,8 +259,9 @@ def _of_one_truth(found: Estimate, more: Estimate) -> bool:
 
 def _contradicted(parts, ridge, values, freed, spread) -> bool:
     """True where parameters known to be zero within ``spread`` (f, f) come out as others."""
-    spread = spread + scaled_inverse(sum(part[0] for part in parts) + ridge)[np.ix_(freed, freed)]
-    step = np.linalg.solve(sum(part[0] for part in parts) + ridge, sum(part[1] for part in parts))
+    information = sum(part[0] for part in parts) + ridge
+    spread = spread + scaled_inverse(information)[np.ix_(freed, freed)]
+    step = np.linalg.solve(information, sum(part[1] for part in parts))
     off = (step + values)[freed]
     return bool(chdtrc(len(off), off @ np.linalg.solve(spread, off)) < CHANCE)
 

@@ -310,8 +310,8 @@ def arrange(recording: Recording, sparse: bool = False) -> Readings:
             f"recording: expected at least {least} moving samples off the rails"
             f"{' in gapless runs' * gapless}, found {used.sum()} of {used.size}"
         )
-    count = max(recording.specific_force.shape[1], recording.angular_rate.shape[1])
     kinds = recording.specific_force.shape[1], recording.angular_rate.shape[1]
+    count = max(kinds)
     exists = np.arange(count)[:, None] < np.array(kinds)
     noise = recording.accelerometer_noise_sd, recording.gyroscope_noise_sd
     lost = by_imu(force, rate)[used]

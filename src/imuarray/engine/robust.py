@@ -38,8 +38,6 @@ class Pass(NamedTuple):
     information: np.ndarray  # (B, n, n)
     score: np.ndarray  # (B, n)
     motion: np.ndarray  # (T, D), improved
-    misfit: float  # squared residuals, the motion's prior included
-    taken: float  # of them what the motion's last step took out
     squares: np.ndarray  # (T, N, 2) squared residuals of each triad
     freedom: np.ndarray  # (T, N, 2) their expectation where noise is as assumed
     unit: np.ndarray  # (T, N, 2) the same squares, each reading's of unit expectation
@@ -81,19 +79,18 @@ def normal_pass(
             motion[part] += step[..., 0]
         rough = _seen_of_prior(here, motion[part], seen.inverse[:used], part)
         known = [(block, *normal(seen, few, rows)) for block, rows in _inside(blocks, part)]
-        taken = float(np.sum(seen.taken[:used] ** 2))
-        return known, float(np.sum(seen.misfit[:used])), taken, rough
+        return known, rough
 
     with ThreadPoolExecutor(THREADS) as pool:
         found = list(pool.map(one, range(0, samples, CHUNK)))
     size = int(active.sum())
     information, score = np.zeros((len(blocks), size, size)), np.zeros((len(blocks), size))
-    for block, inner, slope in (item for known, *_ in found for item in known):
+    for block, inner, slope in (item for known, _ in found for item in known):
         # in order, whichever thread was first
         information[block] += inner
         score[block] += slope
-    misfit, taken, rough = (sum(f[part] for f in found) for part in (1, 2, 3))
-    return Pass(information, score, motion, misfit, taken, squares, freedom, unit, rough)
+    rough = sum(one for _, one in found)
+    return Pass(information, score, motion, squares, freedom, unit, rough)
 
 
 def _seen_of_prior(state: State, motion, inverse, part) -> np.ndarray:

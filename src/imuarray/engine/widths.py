@@ -42,17 +42,16 @@ def settled(found: Estimate) -> Estimate:
     wide = _with_maps(found)
     maps = mask_of_left(lefts, wide.columns, wide.active)
     active, count = wide.active | maps, len(found.values)
-    given = tested(wide, active)
     names = np.array(wide.columns.names)[np.nonzero(maps)[1]]
     places, spread = _places_left(lefts, [spread_of(left, wide.columns, maps) for left in lefts],
                                   np.isin(names, MAPS), count)  # fmt: skip
     precision = block_diag(found.precision, np.linalg.inv(spread))
-    both, mine = [], maps[active]
-    for number, place in enumerate(given.places):
-        own = np.empty(len(place), int)
-        own[~mine], own[mine] = found.places[number], places[number]
-        both.append((place, own))
-    blocks = _placed(given.blocks, both, len(precision))
+    every, mine = [], maps[active]
+    for own, left in zip(found.places, places, strict=True):
+        place = np.empty(len(mine), int)
+        place[~mine], place[mine] = own, left
+        every.append(place)
+    blocks = tested(wide, active, every).blocks
     information = sum(inner for inner, _ in blocks)
     slope = sum(score for _, score in blocks)
     slope[:count] -= found.precision @ (found.values - means(found))
@@ -104,18 +103,6 @@ def _places_left(lefts, spreads, of_maps, begin):
             end += mine.sum()
         places.append(place)
     return places, block_diag(*parts)
-
-
-def _placed(blocks, places, size):
-    """[(information, score)] of ``size``, from those of each recording's ``places``: from, to."""
-    out, each = [], len(blocks) // len(places)
-    for number, (inner, score) in enumerate(blocks):
-        source, target = places[number // each]
-        whole, slope = np.zeros((size, size)), np.zeros(size)
-        whole[np.ix_(target, target)] = inner[np.ix_(source, source)]
-        slope[target] = score[source]
-        out.append((whole, slope))
-    return out
 
 
 def widths(found: Estimate) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -51,8 +51,8 @@ def compare(rate, time, usable, turn, labels) -> Relative | str:
     first = np.einsum("kji,tkj->tki", turn, rate)
     usable = usable & (np.linalg.norm(np.median(first, axis=1), axis=1) > SLOWEST)
     # a derivative needs both neighbours
-    usable[1:-1] &= np.diff(time)[1:] < 1.5 * np.median(np.diff(time))
-    usable[1:-1] &= np.diff(time)[:-1] < 1.5 * np.median(np.diff(time))
+    near = np.diff(time) < 1.5 * np.median(np.diff(time))
+    usable[1:-1] &= near[1:] & near[:-1]
     usable[[0, -1]] = False
     if usable.sum() < FEWEST:
         return f"fewer than {FEWEST} moving samples off the rails"
