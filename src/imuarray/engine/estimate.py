@@ -30,7 +30,6 @@ from imuarray.engine.robust import MEDIAN, Pass, distances, freedoms, judged, no
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import is_smooth, start
 from imuarray.model.effects import EFFECTS
-from imuarray.model.jax64 import jax
 
 ALIKE, APART = 0.85, 0.35  # share of a size's step that the next one is: about, and at most from it
 SHORT = 0.1  # log of a factor; longer steps are not yet those near the end
@@ -62,10 +61,7 @@ class Recorded:
 
     def select(self, used) -> Self:
         """The samples in ``used`` (T,) bool, where they are fitted."""
-        shared = {"positions": self.state.positions, "parameters": self.state.parameters}
-        ofsamples = self.state._replace(**dict.fromkeys(shared))
-        state = jax.tree.map(lambda field: field[used], ofsamples)._replace(**shared)
-        return replace(self, readings=self.readings.select(used), state=state)
+        return replace(self, readings=self.readings.select(used), state=self.state.select(used))
 
 
 @dataclass(frozen=True)

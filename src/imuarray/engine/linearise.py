@@ -76,6 +76,12 @@ class State(NamedTuple):
     rough_prior: RoughPrior | None = None  # where the motion is rough
     turning: TurningPrior | None = None
 
+    def select(self, used) -> State:
+        """At the samples ``used``, (T,) bool or indices."""
+        own = self.motion, self.derivatives, self.rough_prior, self.turning
+        motion, derivatives, prior, turning = jax.tree.map(lambda field: field[used], own)
+        return State(motion, self.positions, self.parameters, derivatives, prior, turning)
+
     @property
     def gyroscopes_free(self) -> bool:
         """True where the angular acceleration seen by the gyroscopes is free."""
