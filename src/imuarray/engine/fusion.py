@@ -270,11 +270,11 @@ def covariances(readings: Readings, model: ArrayModel, state: State, spread):
     for first in range(0, len(noise), CHUNK):
         part = slice(first, first + CHUNK)
         seen = chunk_at(readings, columns, state, directions, first)
-        turned = np.swapaxes(seen.inverse, 1, 2)[: len(noise[part])]
+        turned = np.swapaxes(seen.inverse, 1, 2)
         noise[part] = (turned @ np.swapaxes(turned, 1, 2))[:, :9, :9]
         if spread is not None:
             # the estimate's derivative by the parameters, with its sign turned
-            moved = (turned @ pick(seen.through, active)[1][: len(turned)])[:, :9]
+            moved = (turned @ pick(seen.through, active)[1])[:, :9]
             shared[part] = moved @ np.asarray(spread)[np.ix_(place, place)] @ moved.mT
         else:
             shared[part] = 0.0

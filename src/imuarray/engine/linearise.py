@@ -211,7 +211,6 @@ def _course(readings: Readings, index, whitened, sd) -> np.ndarray:
     total = np.maximum(np.sum(weights**2, axis=1), np.finfo(float).tiny)
     share = np.swapaxes(weights[..., None] * whitened[..., 3:, :], 1, 2) / total[..., None, None]
     run = readings.run[index]
-    run[1:][np.diff(index) == 0] = run[-1] + 1  # the padding of a last chunk
     slope = polynomial_derivative(readings.time, run, share, readings.window, 1)
     return slope / sd[..., None, None]
 
@@ -307,24 +306,24 @@ def directions_of(columns: Columns, wanted=None) -> np.ndarray:
 
 
 def chunk_at(readings: Readings, columns: Columns, state: State, directions, start) -> Eliminated:
-    """The `CHUNK` samples from ``start`` on, the last one repeated where there are fewer."""
-    index = padded(start, len(readings.values))
+    """The `CHUNK` samples from ``start`` on, or as many as there are."""
+    index, used = padded(start, len(readings.values)), slice(0, len(readings.values) - start)
     x, extra, (mean, sd) = _rows_of(readings, state, index)
     placed = bool(np.all(directions < columns.of(POSITION).size)) or not columns.model.chain
-    residual, motion, whitened, gram = _chunk(
+    made = _chunk(
         columns.model, readings.values.shape[1], placed, x, extra, readings.time[index],
         readings.span, state.positions, state.parameters,
         (readings.values[index], readings.weights_of(index)),
     )  # fmt: skip
+    residual, motion, whitened, gram = (np.asarray(part)[used] for part in made)
+    index, x, mean, sd = (part[used] for part in (index, x, mean, sd))
     bare = (mean - x[:, x.shape[1] - sd.shape[1] :]) / sd
-    whitened = np.asarray(whitened)[..., directions]
+    whitened = whitened[..., directions]
     course = np.zeros((len(index), 0, whitened.shape[1], len(directions)))
     if state.turning is not None and state.turning.follows.any():
         course = _course(readings, index, whitened, sd[:, :3])
     # factorisations are LAPACK's, called from here (see `jax64`)
-    return _eliminated(
-        np.asarray(residual), np.asarray(motion), whitened, np.array(gram), bare, sd, course
-    )
+    return _eliminated(residual, motion, whitened, gram.copy(), bare, sd, course)
 
 
 def padded(start: int, samples: int) -> np.ndarray:
@@ -347,13 +346,14 @@ def _rows_of(readings: Readings, state: State, index):
 
 
 def motion_step(readings: Readings, columns: Columns, state: State, start) -> np.ndarray:
-    """(CHUNK, D) the Gauss-Newton step of each sample's motion, the shared parameters as they are.
+    """The Gauss-Newton step of the motion of the samples of `chunk_at`, (n, D).
 
-    LinAlgError where the readings do not determine it.
+    The shared parameters as they are. LinAlgError where the readings do not determine it.
     """
     index = padded(start, len(readings.values))
     gram, slope, _ = motion_equations(readings, columns.model, state, index)
-    return np.linalg.solve(gram, slope[..., None])[..., 0]
+    step = np.linalg.solve(gram, slope[..., None])[..., 0]
+    return step[: len(readings.values) - start]
 
 
 def motion_equations(readings: Readings, model: ArrayModel, state: State, index, rails=None):

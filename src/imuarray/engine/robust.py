@@ -67,17 +67,16 @@ def normal_pass(
         part = slice(start, min(start + CHUNK, samples))
         here = state._replace(motion=motion)
         for _ in range(improved):
-            motion[part] += motion_step(readings, columns, here, start)[: samples - start]
+            motion[part] += motion_step(readings, columns, here, start)
         seen = chunk_at(readings, columns, here, directions, start)
-        used = part.stop - part.start
-        residual, leverage = seen.residual[:used], leverage_of(seen.basis[:used])
+        residual, leverage = seen.residual, leverage_of(seen.basis)
         left = np.where(readings.keep[part], 1.0 - leverage, 0.0)
         squares[part], freedom[part] = by_triad(residual**2), by_triad(left)
         unit[part] = by_triad(residual**2 / np.maximum(1.0 - leverage, LEAST_FREE))
         if not improved:
-            step = np.swapaxes(seen.inverse[:used], 1, 2) @ seen.taken[:used, :, None]
+            step = np.swapaxes(seen.inverse, 1, 2) @ seen.taken[..., None]
             motion[part] += step[..., 0]
-        rough = _seen_of_prior(here, motion[part], seen.inverse[:used], part)
+        rough = _seen_of_prior(here, motion[part], seen.inverse, part)
         known = [(block, *normal(seen, few, rows)) for block, rows in _inside(blocks, part)]
         return known, rough
 

@@ -128,7 +128,7 @@ class Rough(NamedTuple):
         for first in range(0, len(self.state.motion), CHUNK):
             seen = chunk_at(self.readings, self.columns, self.state, np.arange(0), first)
             out.append(np.swapaxes(seen.inverse, 1, 2) @ seen.inverse)
-        return self.lost * np.concatenate(out)[: len(self.state.motion)]
+        return self.lost * np.concatenate(out)
 
     def covariances(self, spread) -> tuple[np.ndarray, np.ndarray]:
         """(T, 9, 9) of the motion, and what parameters of a covariance ``spread`` have of it."""
