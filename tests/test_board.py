@@ -237,7 +237,7 @@ def test_offsets_that_corrections_left_are_each_recording_s_own(found):
     begun = [Recorded.of(one, columns) for one in readings]
     both = estimate(begun, columns, mask_of(columns, [POSITION]), steps=3)
     masks = {group: mask_of(columns, EFFECT_GROUPS[group]) for group in ("offsets", GYROSCOPES)}
-    assert [group.name for group in gains(both, masks)] == ["offsets", GYROSCOPES]
+    assert [group.name for group in gains(both, masks, {})] == ["offsets", GYROSCOPES]
 
 
 def test_a_corrected_recording_is_for_calibrate(folder, tmp_path):

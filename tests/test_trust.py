@@ -510,9 +510,9 @@ def test_a_map_that_does_not_hold_while_twisting_is_named(sound):
 
 def test_an_array_that_shrinks_while_it_moves_is_told(sound):
     """The scale of all gyroscopes rises by 0.5 %, and with its square the centrifugal force."""
-    assert reasons._grows(imuarray.calibrate(sound)) == []
+    assert doubts._grows(imuarray.calibrate(sound)) == []
     rise = np.linspace(1.0, 1.005, len(sound.time))[:, None, None]
-    (said,) = reasons._grows(
+    (said,) = doubts._grows(
         imuarray.calibrate(replace(sound, angular_rate=rise * sound.angular_rate))
     )
     assert "scales rise" in said and 0.9 < float(re.search(r"by (\S+) %", said)[1]) < 1.1

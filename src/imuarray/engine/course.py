@@ -1,13 +1,14 @@
 """An estimate along its recording: what more gains, residuals, how likely its readings are."""
 
 import numpy as np
-from scipy.special import chdtri, gammaln
+from scipy.special import chdtri
 
-from imuarray.engine.estimate import Estimate, Recorded
-from imuarray.engine.heldout import Scores, blocks_of, trained_elsewhere
+from imuarray.engine.estimate import Estimate
+from imuarray.engine.heldout import Scores, blocks_of, log_densities, scores_of
 from imuarray.engine.linearise import linearise
-from imuarray.engine.parameters import POSITION, Columns
-from imuarray.engine.robust import by_triad, distances
+from imuarray.engine.parameters import POSITION
+from imuarray.engine.readings import by_triad
+from imuarray.engine.robust import distances
 from imuarray.engine.widths import growing
 from imuarray.linear import scaled_inverse
 from imuarray.model.effects import KINDS
@@ -91,40 +92,8 @@ def block_scores(found: Estimate) -> Scores:
     Noise, degrees of freedom and clocks' phases are those of all blocks.
     """
     (one,) = found.recorded
-    nats = log_densities(one, found.columns, found.freedoms)
-    blocks = blocks_of(len(nats))
-    better = trained_elsewhere(found.blocks, found.precision)
-    each = np.array([nats[block].sum() for block in blocks])
-    return Scores(each + better, np.array([block.stop - block.start for block in blocks]))
-
-
-def log_densities(one: Recorded, columns: Columns, freedoms) -> np.ndarray:
-    """(T,) nats of each sample's readings, its motion integrated out (Laplace's approximation).
-
-    ``freedoms`` (2,) of Student's t, of accelerometers and gyroscopes. Omega, omega_dot and s have
-    a flat prior, so differences between models of the same readings alone mean anything. The
-    curvature is that of the weights in use, more than t's own: a sample's density is stated too
-    small rather than too large.
-    """
-    readings, state = one.readings, one.state
-    seen = linearise(readings, columns, state, [])
-    number, squares = by_triad(readings.keep), by_triad(seen.residual**2)
-    weighted = squares.sum(axis=(1, 2))
-    if readings.trust is not None:
-        squares = squares / readings.trust**2
-    nats = np.zeros(len(weighted))
-    for kind, nu in enumerate(freedoms):
-        n, d = number[..., kind], squares[..., kind]
-        if np.isfinite(nu):
-            scale = gammaln((nu + n) / 2) - gammaln(nu / 2) - n / 2 * np.log(nu * np.pi)
-            density = scale - (nu + n) / 2 * np.log1p(d / nu)
-        else:
-            density = -n / 2 * np.log(2 * np.pi) - d / 2
-        nats += np.sum(density - n * np.log(readings.sd[:, kind]), axis=1)
-    nats += seen.inverse.shape[1] / 2 * np.log(2 * np.pi) - seen.log_volume / 2
-    if state.rough_prior is not None:
-        sd = state.rough_prior.sd
-        nats -= np.sum(np.log(sd), axis=1) + sd.shape[1] / 2 * np.log(2 * np.pi)
-    if state.turning is not None:
-        nats -= state.turning.log_norm
-    return nats - (seen.misfit - weighted) / 2
+    seen = linearise(one.readings, found.columns, one.state, [])
+    nats = log_densities(
+        one.readings, one.state, seen.residual, seen.misfit, seen.log_volume, found.freedoms
+    )
+    return scores_of(nats, found.blocks, found.precision)

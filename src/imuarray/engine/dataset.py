@@ -242,14 +242,11 @@ def diagnosed(diagnosis) -> xr.Dataset:
     """
     recording, document = diagnosis.recording, diagnosis.document
     found = with_readings(engine_dataset([recording], diagnosis.extended.robust), [recording])
-    named = [cause["effect"] for cause in document["causes"]]
+    named = [cause["effect"] for cause in document["causes"] if cause["effect"] in DATA_EFFECTS]
+    mended = [name for name in named if DATA_EFFECTS[name].kind == "readings"]
     data = recording.specific_force, recording.angular_rate
     return found.assign_attrs(
-        model="diagnosis", mended=" ".join(name for name in named if _readings_effect(name)),
+        model="diagnosis", mended=" ".join(mended),
         reasons=json.dumps(document.get("reasons", [])),
         **stamp({"recording": digest(*data)}, document["seed"]),
     )  # fmt: skip
-
-
-def _readings_effect(name: str) -> bool:
-    return name in DATA_EFFECTS and DATA_EFFECTS[name].kind == "readings"

@@ -9,17 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from imuarray.engine.alike import with_likely_spread
 from imuarray.engine.fit import (
     flat_parameters,
-    from_flat,
     movable,
     prior_means,
     scaled_solve,
+    stepped,
     with_derivatives,
     with_rough_prior,
 )
@@ -30,7 +30,6 @@ from imuarray.engine.robust import MEDIAN, Pass, distances, freedoms, judged, no
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import is_smooth, start
 from imuarray.model.effects import EFFECTS
-from imuarray.model.jax64 import jax
 
 ALIKE, APART = 0.85, 0.35  # share of a size's step that the next one is: about, and at most from it
 SHORT = 0.1  # log of a factor; longer steps are not yet those near the end
@@ -62,10 +61,7 @@ class Recorded:
 
     def select(self, used) -> Self:
         """The samples in ``used`` (T,) bool, where they are fitted."""
-        shared = {"positions": self.state.positions, "parameters": self.state.parameters}
-        ofsamples = self.state._replace(**dict.fromkeys(shared))
-        state = jax.tree.map(lambda field: field[used], ofsamples)._replace(**shared)
-        return replace(self, readings=self.readings.select(used), state=state)
+        return replace(self, readings=self.readings.select(used), state=self.state.select(used))
 
 
 @dataclass(frozen=True)
@@ -189,13 +185,13 @@ def estimate(
         noisy = _judged(recorded, passes, columns, active, nu)
         change = _noise_change(recorded, noisy)
         information, score, blocks = _summed(passes, places)
-        precision = pinned(recorded, columns, active, places)
+        precision = pinned(columns, active, places)
         if number == 0 and not weighted:  # what is far out is to have no say in the first step
             recorded = noisy
             continue
         values = _values(recorded, columns, active, places)
         columns = with_likely_spread(columns, active, values, information + precision, places[0])
-        precision = pinned(recorded, columns, active, places)
+        precision = pinned(columns, active, places)
         slope = score - precision @ (values - _means(recorded, columns, active, places))
         step, sds = scaled_solve(information + precision, slope)
         sds = np.maximum(sds, jackknifed(information + precision, blocks))
@@ -269,10 +265,14 @@ def to_come(first, second, third) -> np.ndarray:
     return np.where(alike, 1.0 / np.clip(1.0 - shares[1], 1.0 / SETTINGS.farthest, 1.0), 1.0)
 
 
+def _size(places) -> int:
+    """n, from each recording's places among them."""
+    return 1 + max((int(place.max()) for place in places if len(place)), default=-1)
+
+
 def _summed(passes, places):
     """(information (n, n), score (n,), [(information, score)] of all blocks)."""
-    size = 1 + max((int(place.max()) for place in places if len(place)), default=-1)
-    blocks = []
+    size, blocks = _size(places), []
     for seen, place in zip(passes, places, strict=True):
         for inner, slope in zip(seen.information, seen.score, strict=True):
             whole, score = np.zeros((size, size)), np.zeros(size)
@@ -283,7 +283,7 @@ def _summed(passes, places):
 
 def _spread(parts, places) -> np.ndarray:
     """(n,) from each recording's (n_a,)."""
-    out = np.empty(1 + max((int(place.max()) for place in places if len(place)), default=-1))
+    out = np.empty(_size(places))
     for part, place in zip(parts, places, strict=True):
         out[place] = part
     return out
@@ -297,18 +297,12 @@ def _means(recorded, columns, active, places) -> np.ndarray:
     return _spread([prior_means(one.readings, columns)[active] for one in recorded], places)
 
 
-def pinned(recorded, columns, active, places, resized=True) -> np.ndarray:
+def pinned(columns, active, places, resized=True) -> np.ndarray:
     """Precision (n, n) of the priors, gauges pinned."""
     inner = prior_precision(columns, active, resized)
-    return _assembled([inner] * len(recorded), places)
-
-
-def _assembled(parts, places) -> np.ndarray:
-    """(n, n): what several recordings share is written by each of them."""
-    size = 1 + max((int(place.max()) for place in places if len(place)), default=-1)
-    out = np.zeros((size, size))
-    for part, place in zip(parts, places, strict=True):
-        out[np.ix_(place, place)] = part
+    out = np.zeros((_size(places),) * 2)
+    for place in places:  # what several recordings share is written by each of them
+        out[np.ix_(place, place)] = inner
     return out
 
 
@@ -338,24 +332,35 @@ def _noise_change(before, after) -> float:
     )
 
 
-def stepped(state: State, columns, active, step) -> State:
-    whole = flat_parameters(columns, state)
-    whole[active] += step
-    return from_flat(columns, state, whole)
-
-
 def means(found: Estimate) -> np.ndarray:
     """The priors' means of its parameters (n,)."""
     return _means(found.recorded, found.columns, found.active, found.places)
 
 
-def tested(found: Estimate, active):
-    """([(information, score)] of blocks, prior precision, values) with more parameters ``active``.
+class Tested(NamedTuple):
+    """[(information, score)] of blocks, prior precision (n, n) and values (n,) of ``active``."""
 
-    At an estimate's state, noise and weights.
+    blocks: list
+    precision: np.ndarray
+    values: np.ndarray
+    active: np.ndarray
+    places: tuple[np.ndarray, ...]
+
+    def chosen(self, mask) -> np.ndarray:
+        """(n,) bool of (N, m), in all recordings."""
+        found = np.zeros(len(self.values), bool)
+        for place in self.places:
+            found[place] |= mask[self.active]
+        return found
+
+
+def tested(found: Estimate, active, places=None) -> Tested:
+    """An estimate's state, noise and weights with more parameters ``active`` (N, m) bool.
+
+    ``places`` of each recording's among all, by default those of `places_of`.
     """
-    places = places_of(found.columns, active, len(found.recorded))
+    places = places or places_of(found.columns, active, len(found.recorded))
     recorded, passes = _passed(found.recorded, found.columns, active)
-    blocks = _summed(passes, places)[2]
     values = _values(recorded, found.columns, active, places)
-    return blocks, pinned(recorded, found.columns, active, places), values
+    precision = pinned(found.columns, active, places)
+    return Tested(_summed(passes, places)[2], precision, values, active, places)

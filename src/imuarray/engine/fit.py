@@ -16,6 +16,7 @@ from imuarray.engine.linearise import (
     RoughPrior,
     State,
     directions_of,
+    leverage_of,
     linearise,
     seen_again,
     through_of,
@@ -66,7 +67,7 @@ class Fit:
     @property
     def leverage(self) -> np.ndarray:
         """Share of each reading's variance that the motion takes up, (T, N, 6)."""
-        return np.einsum("tij,tij->ti", self.basis, self.basis).reshape(self.residual.shape)
+        return leverage_of(self.basis)
 
     def less_motion(self, values) -> np.ndarray:
         """Whitened readings (T, N, 6) without what the motion can explain of them."""
@@ -291,9 +292,14 @@ def advance(columns, state, active, step, few, seen: Eliminated, length) -> Stat
     moved = (along.reshape(len(along), 1, -1) @ seen.basis)[:, 0]
     moved += np.einsum("tdi,tikm,km->td", seen.expected, seen.course, blocks, optimize=True)
     move = np.einsum("tji,tj->ti", seen.inverse, seen.taken - moved)
+    return stepped(state._replace(motion=state.motion + move), columns, active, step)
+
+
+def stepped(state: State, columns: Columns, active, step) -> State:
+    """The state after a step (n,) of the ``active`` parameters (N, m) bool."""
     whole = flat_parameters(columns, state)
     whole[active] += step
-    return from_flat(columns, state._replace(motion=state.motion + move), whole)
+    return from_flat(columns, state, whole)
 
 
 def scaled_solve(information, right):

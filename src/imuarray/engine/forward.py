@@ -11,7 +11,7 @@ from scipy.linalg import block_diag
 from scipy.special import chdtrc
 
 from imuarray.engine.clocks import CLOCK, refined, shown_clocks, timed, with_clocks
-from imuarray.engine.estimate import Estimate, Recorded, estimate, places_of, tested
+from imuarray.engine.estimate import Estimate, Recorded, Tested, estimate, tested
 from imuarray.engine.fit import flat_parameters, from_flat, in_use
 from imuarray.engine.heldout import gain_of
 from imuarray.engine.linearise import State
@@ -25,7 +25,6 @@ from imuarray.engine.widths import (
     OFFSETS,
     SCALES,
     SKEWS,
-    beside_maps,
     corrected,
     mask_of_left,
     settled,
@@ -82,9 +81,8 @@ def resumed(readings: Readings, columns: Columns, active, state: State) -> Estim
     state = from_flat(few, state, flat_parameters(columns, state)[:, kept])
     columns, active = few, active[:, kept]
     recorded = Recorded.of(most_informative(readings, lambda text: None), columns, state)
-    clocked = active[:, columns.of(CLOCK)].any(axis=1) if CLOCK in columns.names else []
-    imus = [int(k) for k in np.flatnonzero(clocked)]
-    if imus:
+    imus = np.flatnonzero(active[:, columns.of(CLOCK)].any(axis=1))
+    if imus.size:
         recorded = timed(recorded, recorded.readings.keep, columns, imus)
     return settled(estimate([recorded], columns, active))
 
@@ -94,7 +92,11 @@ def groups_of(readings: Sequence[Readings]) -> list[str]:
     if sum(len(one.time) for one in readings) < 2 * SETTINGS.blocks:
         return []
     smooth = all(one.gapless for one in readings)
-    return [n for n, ids in EFFECT_GROUPS.items() if smooth or not any(map(_needs_neighbours, ids))]
+    return [name for name in EFFECT_GROUPS if smooth or not _needs_neighbours(name)]
+
+
+def _needs_neighbours(group: str) -> bool:
+    return any(EFFECTS[effect].derivatives for effect in EFFECT_GROUPS[group])
 
 
 def select_forward(
@@ -124,7 +126,8 @@ def select_forward(
         groups = now.tried(names)
         now = now.with_kept([group.name for group in groups if group.kept])
         if set(now.kept) == before:
-            if GYROSCOPES in names and beside_maps(now.found)[1].get("gyroscope", 1.0) < CHANCE:
+            chance, _ = settled(now.found).maps_hold.get("gyroscope", (1.0, []))
+            if GYROSCOPES in names and chance < CHANCE:
                 groups = [
                     group._replace(kept=group.kept or group.name == GYROSCOPES) for group in groups
                 ]
@@ -135,7 +138,7 @@ def select_forward(
     if not (now.kept or bare):
         return now.found, clocks + groups
     found = now.fitted().found
-    late = any(_needs_neighbours(effect) for name in now.kept for effect in EFFECT_GROUPS[name])
+    late = any(map(_needs_neighbours, now.kept))
     pair = readings[0].pair
     if all(one.smooth for one in found.recorded) and (pair or not late):
         begun = [
@@ -170,8 +173,12 @@ class Selected(NamedTuple):
     def without(self, names) -> Selected:
         """Without some of those kept, their parameters back at zero."""
         now = self._replace(kept={n: mask for n, mask in self.kept.items() if n not in names})
-        recorded = tuple(without(self.found, now.active))
-        return now._replace(found=replace(self.found, recorded=recorded))
+        found, recorded = self.found, []
+        for one in found.recorded:
+            whole = flat_parameters(found.columns, one.state)
+            whole[found.active & ~now.active] = 0.0
+            recorded.append(replace(one, state=from_flat(found.columns, one.state, whole)))
+        return now._replace(found=replace(found, recorded=tuple(recorded)))
 
     def tried(self, names) -> list[EffectGroup]:
         """Gains of the groups, but those of which a clock is the whole."""
@@ -215,17 +222,6 @@ class Selected(NamedTuple):
         return self._replace(found=estimate(recorded, columns, self.active, steps=steps))
 
 
-def without(found: Estimate, active) -> list[Recorded]:
-    """The recordings of an estimate, what is not ``active`` back at zero."""
-    out = []
-    for one in found.recorded:
-        whole = flat_parameters(found.columns, one.state)
-        dropped = found.active & ~active
-        whole[dropped] = 0.0
-        out.append(replace(one, state=from_flat(found.columns, one.state, whole)))
-    return out
-
-
 def _left(found: Estimate) -> list[tuple[np.ndarray, np.ndarray]]:
     """[(mask (N, m), covariance)] of both kinds' maps, and of the offsets, that were corrected.
 
@@ -263,14 +259,11 @@ def _of_one_truth(found: Estimate, more: Estimate) -> bool:
 
 def _contradicted(parts, ridge, values, freed, spread) -> bool:
     """True where parameters known to be zero within ``spread`` (f, f) come out as others."""
-    spread = spread + scaled_inverse(sum(part[0] for part in parts) + ridge)[np.ix_(freed, freed)]
-    step = np.linalg.solve(sum(part[0] for part in parts) + ridge, sum(part[1] for part in parts))
+    information = sum(part[0] for part in parts) + ridge
+    spread = spread + scaled_inverse(information)[np.ix_(freed, freed)]
+    step = np.linalg.solve(information, sum(part[1] for part in parts))
     off = (step + values)[freed]
     return bool(chdtrc(len(off), off @ np.linalg.solve(spread, off)) < CHANCE)
-
-
-def _needs_neighbours(effect: str) -> bool:
-    return EFFECTS[effect].derivatives
 
 
 def mask_of(columns: Columns, effects) -> np.ndarray:
@@ -278,19 +271,17 @@ def mask_of(columns: Columns, effects) -> np.ndarray:
     return np.isin(columns.names, list(effects)) & columns.owner
 
 
-def gains(found: Estimate, masks: dict, kept: dict | None = None) -> list[EffectGroup]:
+def gains(found: Estimate, masks: dict, kept: dict) -> list[EffectGroup]:
     """Gain of each group on held-out time beside those kept, and those before it that gain.
 
     ``masks``, ``kept`` {group: (N, m) bool}. By one linearisation with all of them. Maps that first
     order has left are beside them all, as uncertain as it left them: what they explain is no
     group's gain.
     """
-    kept = kept or {}
     left = _left(found)
     every = [*masks.values(), *kept.values(), *(mask for mask, _ in left)]
     active = np.any([found.active, *every], axis=0)
-    places, out = places_of(found.columns, active, len(found.recorded)), []
-    given = _Given(*tested(found, active), active, places)
+    given, out = tested(found, active), []
     beside = np.any([found.active, *kept.values()], axis=0)
     for name, mask in masks.items():
         out.append(_tried(name, given, mask, beside, left))
@@ -298,24 +289,7 @@ def gains(found: Estimate, masks: dict, kept: dict | None = None) -> list[Effect
     return out
 
 
-class _Given(NamedTuple):
-    """Information by block of n parameters, as `tested` gives it, and which they are."""
-
-    blocks: list
-    precision: np.ndarray
-    values: np.ndarray
-    active: np.ndarray
-    places: tuple[np.ndarray, ...]
-
-    def chosen(self, mask) -> np.ndarray:
-        """(n,) bool of (N, m), in all recordings."""
-        found = np.zeros(len(self.values), bool)
-        for place in self.places:
-            found[place] |= mask[self.active]
-        return found
-
-
-def _tried(name: str, given: _Given, own, beside, left) -> EffectGroup:
+def _tried(name: str, given: Tested, own, beside, left) -> EffectGroup:
     """A group's gain, and whether it is kept; ``own`` and ``beside`` (N, m) bool."""
     freed, used, ridge = given.chosen(own), given.chosen(beside | own), given.precision.copy()
     spare, known = np.zeros(len(used), bool), None

@@ -19,6 +19,7 @@ from imuarray.engine.linearise import (
     chunk_at,
     directions_of,
     motion_equations,
+    padded,
 )
 from imuarray.engine.parameters import Columns, columns_of
 from imuarray.engine.readings import Readings, by_imu, measured
@@ -114,10 +115,7 @@ def fuse(
     timed = any(item.shifts_time for item in model.chain)
     if timed and _followed(readings) and is_smooth(readings, found.motion):
         found, state = _with_neighbours(readings, model, state, rails)
-    parts = np.split(found.motion, found.motion.shape[1] // 3, axis=1)
-    motion = Motion(*parts) if len(parts) == 5 else Motion.of(*parts)
-    estimate = MotionEstimate(motion, found.cost, found.steps, found.converged)
-    return Fused(estimate, *covariances(readings, model, state, covariance))
+    return Fused(_estimate(found), *covariances(readings, model, state, covariance))
 
 
 def _followed(readings: Readings) -> bool:
@@ -132,9 +130,15 @@ def _with_neighbours(readings: Readings, model: ArrayModel, state: State, rails)
 
     A delay then counts to second order, and of gyroscopes to third.
     """
-    readings, every = replace(readings, gapless=True), np.arange(len(readings.time))
-    nothing = no_derivatives(len(every), len(state.positions))
-    state = State(state.motion[:, :9], state.positions, state.parameters, nothing)
+    readings = replace(readings, gapless=True)
+    nothing = no_derivatives(len(state.motion), len(state.positions))
+    first = State(state.motion[:, :9], state.positions, state.parameters, nothing)
+    return _in_turns(readings, model, first, rails)
+
+
+def _in_turns(readings: Readings, model: ArrayModel, state: State, rails=None):
+    """(`Motions`, state): the motion and the derivatives of its own course, in turns."""
+    every = np.arange(len(readings.time))
     for _ in range(TURNS):
         state = with_derivatives(readings, state, True)
         found = descend(readings, model, state, every, rails)
@@ -153,22 +157,20 @@ def _of_two(readings: Readings, model: ArrayModel, positions, effects, covarianc
     part = replace(part, gapless=_followed(part))
     state = start(part, columns_of(model.array, model.effects, np.inf))
     state = state._replace(positions=positions, parameters=np.asarray(effects))
-    for _ in range(TURNS):
-        state = with_derivatives(part, state, True)
-        found = descend(part, model, state, np.arange(len(seen)))
-        state = state._replace(motion=found.motion)
-    whole = [np.full((samples, *values.shape[1:]), np.nan) for values in (found.motion, found.cost)]
+    own, state = _in_turns(part, model, state)
+    nowhere = np.full((samples, 9), np.nan)
+    found = Motions(nowhere, np.zeros(samples, bool), np.zeros(samples, int), nowhere[:, 0].copy())
+    _put(found, seen, own)
+    spreads = np.full((2, samples, 9, 9), np.nan)
     # the parameters' share: the prior's mean moves with them
-    spreads = covariances(part, model, with_slope(part, state, follows=True), covariance)
-    both = [np.full((samples, 9, 9), np.nan) for _ in spreads]
-    steps, converged = np.zeros(samples, int), np.zeros(samples, bool)
-    for target, values in zip(
-        (*whole, *both, steps, converged),
-        (found.motion, found.cost, *spreads, found.steps, found.converged), strict=True,
-    ):  # fmt: skip
-        target[seen] = values
-    motion = Motion.of(*np.split(whole[0], 3, axis=1))
-    return Fused(MotionEstimate(motion, whole[1], steps, converged), *both)
+    spreads[:, seen] = covariances(part, model, with_slope(part, state, follows=True), covariance)
+    return Fused(_estimate(found), *spreads)
+
+
+def _estimate(found: Motions) -> MotionEstimate:
+    parts = np.split(found.motion, found.motion.shape[1] // 3, axis=1)
+    motion = Motion(*parts) if len(parts) == 5 else Motion.of(*parts)
+    return MotionEstimate(motion, found.cost, found.steps, found.converged)
 
 
 def _state(model: ArrayModel, motion: Motion, positions, effects) -> State:
@@ -218,9 +220,8 @@ def _put(found: Motions, index, part: Motions) -> None:
 
 
 def descend(
-    readings: Readings, model: ArrayModel, state: State, index, rails=None,
-    tolerance: float = TOLERANCE, limit: int = LIMIT,
-) -> Motions:  # fmt: skip
+    readings: Readings, model: ArrayModel, state: State, index, rails=None, tolerance=TOLERANCE
+) -> Motions:
     """The motion of the samples ``index`` (n,), each by itself, by Gauss-Newton from a state.
 
     Damped by halving: a step that raises its sample's cost is halved. Converged is a sample whose
@@ -230,7 +231,7 @@ def descend(
     found = Motions(x[index], *(np.zeros(len(index), t) for t in (bool, int, float)))
     information, slope, cost = equations(readings, model, state, index, rails)
     length, left = np.ones(len(index)), np.arange(len(index))
-    for _ in range(limit):
+    for _ in range(LIMIT):
         step = np.linalg.solve(information[left], slope[left][..., None])[..., 0]
         # in units of the step's own sds: its length in the metric of the information
         size = np.einsum("ti,tij,tj->t", step, information[left], step)
@@ -255,7 +256,7 @@ def equations(readings: Readings, model: ArrayModel, state: State, index, rails=
     """`motion_equations` of any number of samples, a chunk after the other."""
     parts = []
     for first in range(0, len(index), CHUNK):
-        rows = index[np.minimum(np.arange(first, first + CHUNK), len(index) - 1)]
+        rows = index[padded(first, len(index))]
         parts.append(motion_equations(readings, model, state, rows, rails))
     return [np.concatenate(part)[: len(index)] for part in zip(*parts, strict=True)]
 
@@ -269,11 +270,11 @@ def covariances(readings: Readings, model: ArrayModel, state: State, spread):
     for first in range(0, len(noise), CHUNK):
         part = slice(first, first + CHUNK)
         seen = chunk_at(readings, columns, state, directions, first)
-        turned = np.swapaxes(seen.inverse, 1, 2)[: len(noise[part])]
+        turned = np.swapaxes(seen.inverse, 1, 2)
         noise[part] = (turned @ np.swapaxes(turned, 1, 2))[:, :9, :9]
         if spread is not None:
             # the estimate's derivative by the parameters, with its sign turned
-            moved = (turned @ pick(seen.through, active)[1][: len(turned)])[:, :9]
+            moved = (turned @ pick(seen.through, active)[1])[:, :9]
             shared[part] = moved @ np.asarray(spread)[np.ix_(place, place)] @ moved.mT
         else:
             shared[part] = 0.0

@@ -3,8 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import gammaln
 
 from imuarray.engine.fit import Fit
+from imuarray.engine.linearise import State
+from imuarray.engine.readings import Readings, by_triad
 from imuarray.engine.settings import SETTINGS
 
 
@@ -32,29 +35,62 @@ def normal_blocks(fit: Fit, active) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def log_scores(fit: Fit, ridge) -> Scores:
+    """Scores of a fit under normal noise; ``ridge`` (n, n) prior precision of what is active."""
+    nats = log_densities(
+        fit.readings, fit.state, fit.residual, fit.misfits, fit.log_volume, (np.inf, np.inf)
+    )
+    return scores_of(nats, normal_blocks(fit, fit.active), ridge)
+
+
+def scores_of(nats, parts, ridge) -> Scores:
     """The log density of each block's readings, parameters trained on the other blocks.
 
-    The motion is integrated out sample by sample, with a flat prior where it has none (so only
-    differences between models of the same readings mean anything); noise sds are those of the
-    whole recording. Training without a block is one Gauss-Newton step from the optimum.
-    ``ridge`` (n, n) prior precision of the active parameters.
+    ``nats`` (T,) of the samples at the optimum of all, ``parts`` and ``ridge`` as for
+    `trained_elsewhere`. Noise sds are those of the whole recording.
     """
-    readings = fit.readings
-    blocks = blocks_of(len(fit.residual))
-    parts = normal_blocks(fit, fit.active)
-    fixed = np.where(readings.keep, np.repeat(np.log(readings.sd), 3, axis=1), 0.0)
-    constant = fixed.sum(axis=(1, 2)) + fit.log_volume / 2
-    constant += np.log(2 * np.pi) / 2 * (readings.keep.sum(axis=(1, 2)) - 9)
-    if fit.state.rough_prior is not None:
-        constant += np.log(fit.state.rough_prior.sd).sum(axis=1)
-    if fit.state.turning is not None:
-        constant += fit.state.turning.log_norm
-    better = trained_elsewhere(parts, ridge)
-    nats = [
-        -np.sum(fit.misfits[part]) / 2 - constant[part].sum() + more
-        for part, more in zip(blocks, better, strict=True)
-    ]
-    return Scores(np.array(nats), np.array([part.stop - part.start for part in blocks]))
+    blocks = blocks_of(len(nats))
+    each = np.array([nats[block].sum() for block in blocks])
+    samples = np.array([block.stop - block.start for block in blocks])
+    return Scores(each + trained_elsewhere(parts, ridge), samples)
+
+
+def log_densities(readings: Readings, state: State, residual, misfits, log_volume, freedoms):
+    """(T,) nats of each sample's readings, its motion integrated out (Laplace's approximation).
+
+    ``residual`` (T, N, 6), ``misfits`` and ``log_volume`` (T,) as `Eliminated` has them;
+    ``freedoms`` (2,) of Student's t, of accelerometers and gyroscopes, infinite for normal noise.
+    Omega, omega_dot and s have a flat prior, so differences between models of the same readings
+    alone mean anything. The curvature is that of the weights in use, more than t's own: a sample's
+    density is stated too small rather than too large.
+    """
+    number, squares = by_triad(readings.keep), by_triad(residual**2)
+    weighted = squares.sum(axis=(1, 2))
+    if readings.trust is not None:
+        squares = squares / readings.trust**2
+    nats = np.zeros(len(weighted))
+    for kind, nu in enumerate(freedoms):
+        n = number[..., kind]
+        density = log_t(squares[..., kind], n, nu)
+        nats += np.sum(density - n * np.log(readings.sd[:, kind]), axis=1)
+    nats += state.motion.shape[1] / 2 * np.log(2 * np.pi) - log_volume / 2
+    if state.rough_prior is not None:
+        sd = state.rough_prior.sd
+        nats -= np.sum(np.log(sd), axis=1) + sd.shape[1] / 2 * np.log(2 * np.pi)
+    if state.turning is not None:
+        nats -= state.turning.log_norm
+    return nats - (misfits - weighted) / 2
+
+
+def log_t(squares, number, freedom):
+    """Log density of ``number`` readings together at their sum of ``squares``, in units of the sd.
+
+    Student's t's of a finite ``freedom``, or a normal one's.
+    """
+    if np.isinf(freedom):
+        return -number / 2 * np.log(2 * np.pi) - squares / 2
+    scale = gammaln((freedom + number) / 2) - gammaln(freedom / 2)
+    scale = scale - number / 2 * np.log(freedom * np.pi)
+    return scale - (freedom + number) / 2 * np.log1p(squares / freedom)
 
 
 def trained_elsewhere(parts, ridge) -> np.ndarray:
@@ -95,7 +131,7 @@ def gain_of(parts, ridge, values, freed, spare=None) -> tuple[float, float]:
         trained = information - part[0] + ridge, score - part[1]
         trained, (block, slope) = _eliminated(trained, part, spare)
         without = _solve(*trained, values, freed, 0.0)
-        full = _solve(*trained, values, freed, None)
+        full = np.linalg.solve(*trained)
         found = (full + values)[freed]
         effective = _schur(trained[0], freed)
         statistic = found @ effective @ found
@@ -131,9 +167,7 @@ def _schur(information, chosen):
 
 
 def _solve(information, score, values, freed, target):
-    """Steps of all parameters where the freed ones go to ``target``, or anywhere if None."""
-    if target is None:
-        return np.linalg.solve(information, score)
+    """Steps of all parameters where the freed ones go to ``target``."""
     step = np.zeros(len(score))
     step[freed] = target - values[freed]
     rest = ~freed

@@ -76,6 +76,12 @@ class State(NamedTuple):
     rough_prior: RoughPrior | None = None  # where the motion is rough
     turning: TurningPrior | None = None
 
+    def select(self, used) -> State:
+        """At the samples ``used``, (T,) bool or indices."""
+        own = self.motion, self.derivatives, self.rough_prior, self.turning
+        motion, derivatives, prior, turning = jax.tree.map(lambda field: field[used], own)
+        return State(motion, self.positions, self.parameters, derivatives, prior, turning)
+
     @property
     def gyroscopes_free(self) -> bool:
         """True where the angular acceleration seen by the gyroscopes is free."""
@@ -205,7 +211,6 @@ def _course(readings: Readings, index, whitened, sd) -> np.ndarray:
     total = np.maximum(np.sum(weights**2, axis=1), np.finfo(float).tiny)
     share = np.swapaxes(weights[..., None] * whitened[..., 3:, :], 1, 2) / total[..., None, None]
     run = readings.run[index]
-    run[1:][np.diff(index) == 0] = run[-1] + 1  # the padding of a last chunk
     slope = polynomial_derivative(readings.time, run, share, readings.window, 1)
     return slope / sd[..., None, None]
 
@@ -241,6 +246,11 @@ def _less_motion(residual, basis, inverse, bare, sd):
     return left.reshape(residual.shape), taken[..., 0], unexpected, misfit
 
 
+def leverage_of(basis) -> np.ndarray:
+    """Share of each reading's variance that the motion takes up, (T, N, 6)."""
+    return np.einsum("tij,tij->ti", basis, basis).reshape(len(basis), -1, 6)
+
+
 def through_of(basis, whitened) -> np.ndarray:
     """(T, N, D, m) coordinates in the motion's basis of each IMU's derivatives (T, N, 6, m)."""
     return np.swapaxes(basis.reshape(*whitened.shape[:3], -1), 2, 3) @ whitened
@@ -263,7 +273,7 @@ def linearise(
     def one(start):
         return chunk_at(readings, columns, state, directions, start)
 
-    return _joined(one, len(readings.values), spare)
+    return Eliminated(*_joined(one, len(readings.values), spare))
 
 
 def seen_again(readings: Readings, columns: Columns, state: State, seen: Eliminated) -> Eliminated:
@@ -274,20 +284,17 @@ def seen_again(readings: Readings, columns: Columns, state: State, seen: Elimina
     count, first = readings.values.shape[1], seen.unexpected.shape[1]
 
     def one(start):
-        index, x, extra, (mean, sd) = _chunk_of(readings, state, start)
+        index = padded(start, len(readings.values))
+        x, extra, (mean, sd) = _rows_of(readings, state, index)
         values = np.asarray(_predicted(
             columns.model, count, False, x, extra, readings.time[index], readings.span,
             state.positions, state.parameters,
         ))  # fmt: skip
         residual = readings.weights_of(index) * (readings.values[index] - values)
         bare = (mean - x[:, x.shape[1] - sd.shape[1] :]) / sd
-        basis, inverse = (part[start : start + CHUNK] for part in (seen.basis, seen.inverse))
-        used = len(basis)  # less than a chunk, at last
-        return _less_motion(residual[:used], basis, inverse, bare[:used], sd[:used])
+        return _less_motion(residual, seen.basis[index], seen.inverse[index], bare, sd)
 
-    with ThreadPoolExecutor(THREADS) as pool:
-        parts = zip(*pool.map(one, range(0, len(seen.residual), CHUNK)), strict=True)
-        left, taken, unexpected, misfit = (np.concatenate(part) for part in parts)
+    left, taken, unexpected, misfit = _joined(one, len(readings.values))
     return seen._replace(
         residual=left, taken=taken, unexpected=unexpected[:, :first], misfit=misfit
     )
@@ -299,34 +306,33 @@ def directions_of(columns: Columns, wanted=None) -> np.ndarray:
 
 
 def chunk_at(readings: Readings, columns: Columns, state: State, directions, start) -> Eliminated:
-    """The `CHUNK` samples from ``start`` on, the last one repeated where there are fewer."""
-    index, x, extra, (mean, sd) = _chunk_of(readings, state, start)
+    """The `CHUNK` samples from ``start`` on, or as many as there are."""
+    index, used = padded(start, len(readings.values)), slice(0, len(readings.values) - start)
+    x, extra, (mean, sd) = _rows_of(readings, state, index)
     placed = bool(np.all(directions < columns.of(POSITION).size)) or not columns.model.chain
-    residual, motion, whitened, gram = _chunk(
+    made = _chunk(
         columns.model, readings.values.shape[1], placed, x, extra, readings.time[index],
         readings.span, state.positions, state.parameters,
         (readings.values[index], readings.weights_of(index)),
     )  # fmt: skip
+    residual, motion, whitened, gram = (np.asarray(part)[used] for part in made)
+    index, x, mean, sd = (part[used] for part in (index, x, mean, sd))
     bare = (mean - x[:, x.shape[1] - sd.shape[1] :]) / sd
-    whitened = np.asarray(whitened)[..., directions]
+    whitened = whitened[..., directions]
     course = np.zeros((len(index), 0, whitened.shape[1], len(directions)))
     if state.turning is not None and state.turning.follows.any():
         course = _course(readings, index, whitened, sd[:, :3])
     # factorisations are LAPACK's, called from here (see `jax64`)
-    return _eliminated(
-        np.asarray(residual), np.asarray(motion), whitened, np.array(gram), bare, sd, course
-    )
+    return _eliminated(residual, motion, whitened, gram.copy(), bare, sd, course)
 
 
-def _chunk_of(readings: Readings, state: State, start):
-    """(indices (CHUNK,), motion, derivatives, the motion's prior) of a chunk."""
-    return _rows_of(
-        readings, state, np.minimum(np.arange(start, start + CHUNK), len(readings.values) - 1)
-    )
+def padded(start: int, samples: int) -> np.ndarray:
+    """Indices (CHUNK,) of a chunk's samples, the last one repeated where there are fewer."""
+    return np.minimum(np.arange(start, start + CHUNK), samples - 1)
 
 
 def _rows_of(readings: Readings, state: State, index):
-    """`_chunk_of` for any samples."""
+    """(motion, derivatives, the motion's prior) of the samples ``index``."""
     extra = jax.tree.map(lambda field: field[index], (*state.derivatives, readings.wandered))
     nothing = np.zeros((len(index), 0))
     prior = (nothing, nothing)
@@ -336,17 +342,18 @@ def _rows_of(readings: Readings, state: State, index):
         free = np.zeros((len(index), 3)), np.full((len(index), 3), np.inf)  # of s
         parts = zip((part[index] for part in state.turning[:2]), free, prior, strict=True)
         prior = tuple(np.hstack(part) for part in parts)
-    return index, state.motion[index], extra, prior
+    return state.motion[index], extra, prior
 
 
 def motion_step(readings: Readings, columns: Columns, state: State, start) -> np.ndarray:
-    """(CHUNK, D) the Gauss-Newton step of each sample's motion, the shared parameters as they are.
+    """The Gauss-Newton step of the motion of the samples of `chunk_at`, (n, D).
 
-    LinAlgError where the readings do not determine it.
+    The shared parameters as they are. LinAlgError where the readings do not determine it.
     """
-    index, *_ = _chunk_of(readings, state, start)
+    index = padded(start, len(readings.values))
     gram, slope, _ = motion_equations(readings, columns.model, state, index)
-    return np.linalg.solve(gram, slope[..., None])[..., 0]
+    step = np.linalg.solve(gram, slope[..., None])[..., 0]
+    return step[: len(readings.values) - start]
 
 
 def motion_equations(readings: Readings, model: ArrayModel, state: State, index, rails=None):
@@ -355,7 +362,7 @@ def motion_equations(readings: Readings, model: ArrayModel, state: State, index,
     Information, score and squared residuals, the prior's included. ``rails`` (T, N, 6): weights of
     readings that count as far as the prediction falls short of them.
     """
-    index, x, extra, (mean, sd) = _rows_of(readings, state, index)
+    x, extra, (mean, sd) = _rows_of(readings, state, index)
     one_sided = None if rails is None else rails[index]
     gram, slope, cost = map(np.array, _motion(
         model, readings.values.shape[1], x, extra, readings.time[index], readings.span,
@@ -387,12 +394,12 @@ def _motion(model, count, x, extra, time, span, positions, parameters, data):
     return jnp.einsum("tri,trj->tij", motion, motion), slope, jnp.sum(residual**2, axis=1)
 
 
-def _joined(one, samples, spare) -> Eliminated:
+def _joined(one, samples, spare=None) -> list[np.ndarray]:
     """All chunks, one after the other, without the last one's padding."""
     first = one(0)
     shapes = [(samples, *part.shape[1:]) for part in first]
     reused = spare is not None and [part.shape for part in spare] == shapes
-    out = spare if reused else Eliminated(*(np.empty(shape) for shape in shapes))
+    out = list(spare) if reused else [np.empty(shape) for shape in shapes]
 
     def put(start, found=None):
         for target, part in zip(out, one(start) if found is None else found, strict=True):

@@ -54,15 +54,10 @@ class Columns:
         return len(self.names)
 
 
-def full_model(array: Array, effects) -> ArrayModel:
-    """The model with all effects; its noise is not looked at."""
-    noise = Noise(np.eye(3 * array.accelerometers), np.eye(3 * array.gyroscopes))
-    return ArrayModel(array, noise, tuple(effects))
-
-
 def columns_of(array: Array, effects, position_sd: float) -> Columns:
     """The columns for an array and a set of effects."""
-    model = full_model(array, effects)
+    noise = Noise(np.eye(3 * array.accelerometers), np.eye(3 * array.gyroscopes))  # not looked at
+    model = ArrayModel(array, noise, tuple(effects))
     count = max(array.accelerometers, array.gyroscopes)
     names, places, owner, sds = [POSITION] * 3, [(i,) for i in range(3)], [], [position_sd] * 3
     common = [0.0] * 3

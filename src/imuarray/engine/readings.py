@@ -219,15 +219,18 @@ def most_informative(readings: Readings, say: Callable[[str], None]) -> Readings
 
 def _stretches(readings: Readings, stretch, used) -> Readings:
     """The samples ``used`` (T,) bool, each ``stretch`` (T,) of a run a run of its own."""
-    both = readings.run[used] * (stretch[-1] + 1) + stretch[used]
+    chosen = np.flatnonzero(used)
+    both = readings.run[chosen] * (stretch[-1] + 1) + stretch[chosen]
     if readings.gapless:
-        run = np.unique(both, return_inverse=True)[1]
-        long = np.bincount(run)[run] >= readings.window
-        used = used.copy()
-        used[used] = long
-        both = both[long]
-    run = np.unique(both, return_inverse=True)[1]
-    return replace(readings.select(used), run=run)  # fmt: skip
+        long = _length(both) >= readings.window
+        chosen, both = chosen[long], both[long]
+    return replace(readings.select(chosen), run=np.unique(both, return_inverse=True)[1])
+
+
+def _length(run) -> np.ndarray:
+    """(T,) how many samples are of a sample's run."""
+    number = np.unique(run, return_inverse=True)[1]
+    return np.bincount(number)[number]
 
 
 def resolution(values) -> np.ndarray:
@@ -278,6 +281,11 @@ def by_imu(force, rate) -> np.ndarray:
     return out
 
 
+def by_triad(values) -> np.ndarray:
+    """(T, N, 2) sums over the axes of (T, N, 6)."""
+    return values.reshape(*values.shape[:2], 2, 3).sum(axis=-1)
+
+
 def arrange(recording: Recording, sparse: bool = False) -> Readings:
     """`Readings` of the moving samples whose motion is seen; InputError where too few are left.
 
@@ -302,8 +310,8 @@ def arrange(recording: Recording, sparse: bool = False) -> Readings:
             f"recording: expected at least {least} moving samples off the rails"
             f"{' in gapless runs' * gapless}, found {used.sum()} of {used.size}"
         )
-    count = max(recording.specific_force.shape[1], recording.angular_rate.shape[1])
     kinds = recording.specific_force.shape[1], recording.angular_rate.shape[1]
+    count = max(kinds)
     exists = np.arange(count)[:, None] < np.array(kinds)
     noise = recording.accelerometer_noise_sd, recording.gyroscope_noise_sd
     lost = by_imu(force, rate)[used]
@@ -377,13 +385,9 @@ def measured(
 
 def _long_runs(time, good) -> np.ndarray:
     """Good samples in gapless runs of at least a derivative's window, (T,) bool."""
-    index = np.flatnonzero(good)
-    if len(index) < 2:
-        return np.zeros_like(good)
-    number = np.cumsum(np.concatenate([[False], np.diff(index) > 1])) + runs(time)[index] * len(
-        time
-    )
-    _, which, lengths = np.unique(number, return_inverse=True, return_counts=True)
     kept = np.zeros_like(good)
-    kept[index[lengths[which] >= odd_window(time)]] = True
+    if good.sum() > 1:
+        # what is left out ends a run, too
+        run = (runs(time) + np.cumsum(~good))[good]
+        kept[good] = _length(run) >= odd_window(time)
     return kept

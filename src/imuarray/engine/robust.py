@@ -8,10 +8,9 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import gammaln
 
 from imuarray.engine.fit import normal
-from imuarray.engine.heldout import blocks_of
+from imuarray.engine.heldout import blocks_of, log_t
 from imuarray.engine.linearise import (
     CHUNK,
     KNOWN,
@@ -19,10 +18,11 @@ from imuarray.engine.linearise import (
     State,
     chunk_at,
     directions_of,
+    leverage_of,
     motion_step,
 )
 from imuarray.engine.parameters import Columns
-from imuarray.engine.readings import Readings
+from imuarray.engine.readings import Readings, by_triad
 from imuarray.estimation.threads import one_thread
 
 LEAST_FREE = 1e-3  # of a reading's variance that the motion leaves, or its size says nothing
@@ -38,8 +38,6 @@ class Pass(NamedTuple):
     information: np.ndarray  # (B, n, n)
     score: np.ndarray  # (B, n)
     motion: np.ndarray  # (T, D), improved
-    misfit: float  # squared residuals, the motion's prior included
-    taken: float  # of them what the motion's last step took out
     squares: np.ndarray  # (T, N, 2) squared residuals of each triad
     freedom: np.ndarray  # (T, N, 2) their expectation where noise is as assumed
     unit: np.ndarray  # (T, N, 2) the same squares, each reading's of unit expectation
@@ -69,31 +67,29 @@ def normal_pass(
         part = slice(start, min(start + CHUNK, samples))
         here = state._replace(motion=motion)
         for _ in range(improved):
-            motion[part] += motion_step(readings, columns, here, start)[: samples - start]
+            motion[part] += motion_step(readings, columns, here, start)
         seen = chunk_at(readings, columns, here, directions, start)
-        used = part.stop - part.start
-        residual, leverage = seen.residual[:used], _leverage(seen.basis[:used], count)
+        residual, leverage = seen.residual, leverage_of(seen.basis)
         left = np.where(readings.keep[part], 1.0 - leverage, 0.0)
         squares[part], freedom[part] = by_triad(residual**2), by_triad(left)
         unit[part] = by_triad(residual**2 / np.maximum(1.0 - leverage, LEAST_FREE))
         if not improved:
-            step = np.swapaxes(seen.inverse[:used], 1, 2) @ seen.taken[:used, :, None]
+            step = np.swapaxes(seen.inverse, 1, 2) @ seen.taken[..., None]
             motion[part] += step[..., 0]
-        rough = _seen_of_prior(here, motion[part], seen.inverse[:used], part)
+        rough = _seen_of_prior(here, motion[part], seen.inverse, part)
         known = [(block, *normal(seen, few, rows)) for block, rows in _inside(blocks, part)]
-        taken = float(np.sum(seen.taken[:used] ** 2))
-        return known, float(np.sum(seen.misfit[:used])), taken, rough
+        return known, rough
 
     with ThreadPoolExecutor(THREADS) as pool:
         found = list(pool.map(one, range(0, samples, CHUNK)))
     size = int(active.sum())
     information, score = np.zeros((len(blocks), size, size)), np.zeros((len(blocks), size))
-    for block, inner, slope in (item for known, *_ in found for item in known):
+    for block, inner, slope in (item for known, _ in found for item in known):
         # in order, whichever thread was first
         information[block] += inner
         score[block] += slope
-    misfit, taken, rough = (sum(f[part] for f in found) for part in (1, 2, 3))
-    return Pass(information, score, motion, misfit, taken, squares, freedom, unit, rough)
+    rough = sum(one for _, one in found)
+    return Pass(information, score, motion, squares, freedom, unit, rough)
 
 
 def _seen_of_prior(state: State, motion, inverse, part) -> np.ndarray:
@@ -118,16 +114,6 @@ def _inside(blocks, part: slice) -> list[tuple[int, slice]]:
         if first < last:
             found.append((number, slice(first - part.start, last - part.start)))
     return found
-
-
-def _leverage(basis, count) -> np.ndarray:
-    """Share of each reading's variance that the motion takes up, (T, N, 6)."""
-    return np.einsum("tij,tij->ti", basis, basis).reshape(len(basis), count, 6)
-
-
-def by_triad(values) -> np.ndarray:
-    """(T, N, 2) sums over the axes of (T, N, 6)."""
-    return values.reshape(*values.shape[:2], 2, 3).sum(axis=-1)
 
 
 def judged(readings: Readings, seen: Pass, owned, former: np.ndarray) -> Readings:
@@ -189,10 +175,6 @@ def freedoms(readings: Readings, seen: Pass) -> np.ndarray:
 def _log_likelihood(d, nu) -> float:
     """Log likelihood of squared distances (n,) of three readings, at the best scale."""
     scale = np.mean(d) / 3
-    if np.isinf(nu):
-        return float(-1.5 * len(d) * np.log(scale) - np.sum(d) / (2 * scale))
-    for _ in range(ROUNDS):
+    for _ in range(ROUNDS if np.isfinite(nu) else 0):
         scale = np.mean((nu + 3) / (nu + d / scale) * d) / 3
-    constant = gammaln((nu + 3) / 2) - gammaln(nu / 2) - 1.5 * np.log(nu / 2)
-    tail = (nu + 3) / 2 * np.log1p(d / (nu * scale))
-    return float(np.sum(constant - tail) - 1.5 * len(d) * np.log(scale))
+    return float(np.sum(log_t(d / scale, 3, nu)) - 1.5 * len(d) * np.log(scale))

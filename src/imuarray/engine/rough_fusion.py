@@ -20,11 +20,10 @@ from imuarray.engine.fusion import covariances, descend, fuse, one_sided
 from imuarray.engine.gyroscope_clocks import with_phases
 from imuarray.engine.linearise import CHUNK, State, chunk_at, predicted
 from imuarray.engine.parameters import Columns
-from imuarray.engine.readings import Readings
-from imuarray.engine.robust import by_triad, distances, normal_pass
+from imuarray.engine.readings import Readings, by_triad
+from imuarray.engine.robust import distances, normal_pass
 from imuarray.engine.settings import SETTINGS
 from imuarray.model import ArrayModel
-from imuarray.model.jax64 import jax
 from imuarray.model.timing import clock_turns
 
 ROUNDS, NEAR = 6, 1e-2  # of weights and turns; sds of the motion that a search may be off
@@ -47,14 +46,12 @@ class Rough(NamedTuple):
 
     def select(self, index) -> Rough:
         """Some of the samples; each of them is by itself."""
-        one = self.state
-        motion, derivatives, prior, rails, converged = jax.tree.map(
-            lambda part: part[index],
-            (one.motion, one.derivatives, one.rough_prior, self.rails, self.converged),
+        return self._replace(
+            readings=self.readings.select(index),
+            state=self.state.select(index),
+            rails=None if self.rails is None else self.rails[index],
+            converged=self.converged[index],
         )
-        state = one._replace(motion=motion, derivatives=derivatives, rough_prior=prior)
-        readings = self.readings.select(index)
-        return self._replace(readings=readings, state=state, rails=rails, converged=converged)
 
     def fused(self) -> Rough:
         """The most likely motion of every sample, readings far out having lost their say.
@@ -131,7 +128,7 @@ class Rough(NamedTuple):
         for first in range(0, len(self.state.motion), CHUNK):
             seen = chunk_at(self.readings, self.columns, self.state, np.arange(0), first)
             out.append(np.swapaxes(seen.inverse, 1, 2) @ seen.inverse)
-        return self.lost * np.concatenate(out)[: len(self.state.motion)]
+        return self.lost * np.concatenate(out)
 
     def covariances(self, spread) -> tuple[np.ndarray, np.ndarray]:
         """(T, 9, 9) of the motion, and what parameters of a covariance ``spread`` have of it."""

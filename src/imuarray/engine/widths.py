@@ -7,16 +7,8 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import chdtrc
 
-from imuarray.engine.estimate import (
-    Estimate,
-    jackknifed,
-    means,
-    pinned,
-    places_of,
-    stepped,
-    tested,
-)
-from imuarray.engine.fit import flat_parameters, from_flat, scaled_solve
+from imuarray.engine.estimate import Estimate, jackknifed, means, pinned, tested
+from imuarray.engine.fit import flat_parameters, from_flat, scaled_solve, stepped
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import Columns, columns_of, gauge_masks
 from imuarray.engine.readings import Left
@@ -40,60 +32,51 @@ def settled(found: Estimate) -> Estimate:
     Each as uncertain as that. One step of everything at once: such errors are so small that it is
     the last one. They stay out of the answer, as they belong to a recording's correction;
     ``information``, ``precision`` and ``blocks`` have them after the n parameters, those of each
-    recording.
-    """
-    return beside_maps(found)[0]
-
-
-def beside_maps(found: Estimate) -> tuple[Estimate, dict[str, float]]:
-    """`settled`, and how likely maps as far from the correction's as it takes them to be are.
-
-    {"accelerometer" or "gyroscope": p} of the kinds whose maps were corrected and not estimated.
-    Recordings that one calibration corrected have its errors of the maps in common.
+    recording. ``maps_hold``: of the kinds whose maps were corrected and not estimated, how likely
+    maps as far from the correction's as it takes them to be are. Recordings that one calibration
+    corrected have its errors of the maps in common.
     """
     lefts = [one.readings.left for one in found.recorded]
     if any(left is None for left in lefts):
-        return found, {}
+        return found
     wide = _with_maps(found)
     maps = mask_of_left(lefts, wide.columns, wide.active)
     active, count = wide.active | maps, len(found.values)
-    blocks, _, _ = tested(wide, active)
     names = np.array(wide.columns.names)[np.nonzero(maps)[1]]
     places, spread = _places_left(lefts, [spread_of(left, wide.columns, maps) for left in lefts],
                                   np.isin(names, MAPS), count)  # fmt: skip
     precision = block_diag(found.precision, np.linalg.inv(spread))
-    both, mine = [], maps[active]
-    for number, place in enumerate(places_of(wide.columns, active, len(lefts))):
-        own = np.empty(len(place), int)
-        own[~mine], own[mine] = found.places[number], places[number]
-        both.append((place, own))
-    blocks = _placed(blocks, both, len(precision))
+    every, mine = [], maps[active]
+    for own, left in zip(found.places, places, strict=True):
+        place = np.empty(len(mine), int)
+        place[~mine], place[mine] = own, left
+        every.append(place)
+    blocks = tested(wide, active, every).blocks
     information = sum(inner for inner, _ in blocks)
     slope = sum(score for _, score in blocks)
     slope[:count] -= found.precision @ (found.values - means(found))
     whole = scaled_solve(information + precision, slope)[0]
-    step, off, likely, farthest = whole[:count], whole[count:], {}, {}
+    step, off, holds = whole[:count], whole[count:], {}
     for kind in KINDS:
         mine = np.char.startswith(names, kind) & np.isin(names, MAPS)
         own = np.unique([place[mine] - count for place in places])
         if own.size:
-            likely[kind] = float(chdtrc(own.size, _distance(off, spread, own)))
             imus, far = np.nonzero(maps)[0], {}
             for imu in np.unique(imus[mine]):
                 its = [place[mine & (imus == imu)] - count for place in places]
                 far[int(imu)] = _distance(off, spread, np.unique(its))
-            farthest[kind] = [k for k, each in far.items() if each > NEARLY * max(far.values())]
+            farthest = [k for k, each in far.items() if each > NEARLY * max(far.values())]
+            holds[kind] = float(chdtrc(own.size, _distance(off, spread, own))), farthest
     recorded = tuple(
         replace(one, state=stepped(one.state, found.columns, found.active, step[place]))
         for one, place in zip(found.recorded, found.places, strict=True)
     )
     # what the blocks say where the step ends: a jackknife takes the rest for their scatter
     blocks = [(inner, score - inner @ whole) for inner, score in blocks]
-    found = replace(
+    return replace(
         found, recorded=recorded, information=information, precision=precision, blocks=blocks,
-        maps_hold={kind: (p, farthest[kind]) for kind, p in likely.items()},
+        maps_hold=holds,
     )  # fmt: skip
-    return found, likely
 
 
 def _distance(off, spread, own) -> float:
@@ -122,18 +105,6 @@ def _places_left(lefts, spreads, of_maps, begin):
     return places, block_diag(*parts)
 
 
-def _placed(blocks, places, size):
-    """[(information, score)] of ``size``, from those of each recording's ``places``: from, to."""
-    out, each = [], len(blocks) // len(places)
-    for number, (inner, score) in enumerate(blocks):
-        source, target = places[number // each]
-        whole, slope = np.zeros((size, size)), np.zeros(size)
-        whole[np.ix_(target, target)] = inner[np.ix_(source, source)]
-        slope[target] = score[source]
-        out.append((whole, slope))
-    return out
-
-
 def widths(found: Estimate) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Covariance (n, n); formal sds (n,), and a jackknife's: the covariance has the larger."""
     formal, count = _formal(found), len(found.values)
@@ -157,9 +128,7 @@ def _formal(found: Estimate) -> np.ndarray:
     """Gauges that the array's size takes up not pinned, but as large as they may well be."""
     known, gauges = np.isfinite(found.scale_sd), gauge_masks(found.columns, found.active)
     count, prior = len(found.values), found.precision.copy()
-    prior[:count, :count] = pinned(
-        found.recorded, found.columns, found.active, found.places, resized=known
-    )
+    prior[:count, :count] = pinned(found.columns, found.active, found.places, resized=known)
     sizes = [mask[found.active] for effect, mask in gauges if effect.resizes]
     if not known:
         for mine in sizes:
@@ -234,14 +203,11 @@ def _with_maps(found: Estimate) -> Estimate:
         return found
     readings = found.recorded[0].readings
     columns = columns_of(readings.array, (*old.model.effects, *missing), readings.position_prior_sd)
-    index = [
-        list(zip(columns.names, columns.places, strict=True)).index(one)
-        for one in zip(old.names, old.places, strict=True)
-    ]
+    known = np.isin(columns.names, old.names)
 
     def wider(values) -> np.ndarray:
         out = np.zeros((len(values), columns.size), values.dtype)
-        out[:, index] = values
+        out[:, known] = values
         return out
 
     def moved(state: State) -> State:

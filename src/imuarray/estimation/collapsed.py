@@ -15,24 +15,31 @@ from imuarray.geometry.array import require_planar_extent
 from imuarray.model import ArrayModel, structure_tensor
 from imuarray.motion import Motion
 
+TOLERANCE = 1e-10  # relative, of a step of omega from which a sample's search ends
+
 
 class Tables(NamedTuple):
-    """The structure tensor as the kernels want it: its non-zero terms."""
+    """The structure tensor G as the kernels want it: its non-zero terms, and its columns."""
 
     rows: np.ndarray  # (E, 3), unsigned: i, c, a of G[i, c, a]
     values: np.ndarray  # (E,)
     pairs: np.ndarray  # (P, 4), unsigned: i, j, a, b of sum_c G[i, c, a] G[j, c, b]
     products: np.ndarray  # (P,)
+    square: np.ndarray  # (12, 6) by the arm and axis, of w
+    linear: np.ndarray  # (12, 6), of phi
 
 
 @cache
 def tables() -> Tables:
-    """Non-zero terms of the structure tensor and of its products."""
+    """`Tables` of the structure tensor."""
     tensor = structure_tensor()
     rows = np.argwhere(tensor != 0.0).astype(np.uint64, order="C")
     gram = np.einsum("ica,jcb->ijab", tensor, tensor)
     pairs = np.argwhere(gram != 0.0).astype(np.uint64, order="C")
-    return Tables(rows, tensor[tuple(rows.T)].copy(), pairs, gram[tuple(pairs.T)].copy())
+    square, linear = (half.copy() for half in np.split(tensor.reshape(12, 12), 2, axis=1))
+    return Tables(
+        rows, tensor[tuple(rows.T)].copy(), pairs, gram[tuple(pairs.T)].copy(), square, linear
+    )
 
 
 class Arrays(NamedTuple):
@@ -193,7 +200,6 @@ def estimate_motion(
     angular_rate,
     positions=None,
     saturated=None,
-    tolerance: float = 1e-10,
     limit: int = 50,
 ) -> MotionEstimate:
     """Concentrated Gauss-Newton of Skog et al. (2017, eq. 5): phi is eliminated exactly.
@@ -215,22 +221,20 @@ def estimate_motion(
     positions = model.array.relative if positions is None else np.asarray(positions, float)
     require_planar_extent(positions, "positions")
     data = Collapsed.of(model, specific_force, angular_rate, saturated)
-    return motion_from(data, positions, tolerance, limit)
+    return motion_from(data, positions, limit)
 
 
-def motion_from(
-    data: Collapsed, positions, tolerance=1e-10, limit=50, start=None
-) -> MotionEstimate:
-    """`estimate_motion` for data already arranged, from ``start`` (T, 3) rad/s if given."""
+def motion_from(data: Collapsed, positions, limit: int = 50) -> MotionEstimate:
+    """`estimate_motion` for data already arranged, at most ``limit`` steps a sample."""
     found, logdet = data.reduce(positions)
     if np.isnan(logdet):
         raise IdentifiabilityError(
             "positions: expected triads from which omega_dot and s follow, found H'QH singular"
         )
-    rate = data.mean.copy() if start is None else np.array(start.T, order="C")
+    rate = data.mean.copy()
     cost, iterations = np.empty(data.samples), np.empty(data.samples, np.int64)
     angular_rates(
-        rate, found.C, found.b, data.mean, data.gyroscope_information, tolerance, limit, cost,
+        rate, found.C, found.b, data.mean, data.gyroscope_information, TOLERANCE, limit, cost,
         iterations,
     )  # fmt: skip
     state = np.empty((12, data.samples))

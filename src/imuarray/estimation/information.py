@@ -6,16 +6,13 @@ in (1, r_k). So the information is Lambda (x) sum_t Omega_t' Omega_t less a matr
 of what the motion takes up: sums over samples of 12 x 12, however many triads there are.
 """
 
-from functools import cache
-from typing import NamedTuple
-
 import numpy as np
 
 from imuarray.compiled import njit
 from imuarray.estimation import kernels
 from imuarray.estimation.collapsed import Collapsed, tables
 from imuarray.estimation.rates import lower, precision_at, rate_information
-from imuarray.model import ArrayModel, structure_tensor
+from imuarray.model import ArrayModel
 from imuarray.model.structure import products
 
 TILE = 128  # samples at a time
@@ -151,28 +148,13 @@ def _moments(entries, linear, inverse, square, taken):
                     taken[3 * m + i, 3 * n + j] = total
 
 
-class Halves(NamedTuple):
-    """The structure tensor, (12, 6) each by the arm and axis."""
-
-    square: np.ndarray  # of w
-    linear: np.ndarray  # of phi
-
-
-@cache
-def halves() -> Halves:
-    """The structure tensor's columns of w and of phi."""
-    tensor = structure_tensor().reshape(12, 12)
-    return Halves(np.ascontiguousarray(tensor[:, :6]), np.ascontiguousarray(tensor[:, 6:]))
-
-
 @njit
-def fisher(positions, weights, rate, entries, found, P, halves):
+def fisher(positions, weights, rate, entries, found, P, known):
     """`information`, compiled; ``entries`` (3, 3, T) are Omega_t, P (3, 3, T) the gyroscopes'."""
     square, taken = np.empty((3, 3)), np.empty((12, 12))
-    _moments(
-        entries, halves.linear, found.inverse, square, taken
-    )  # what omega_dot and s take up ...
-    left = (halves.square - halves.linear @ found.X).reshape(4, 3, 6)
+    # what omega_dot and s take up, then what omega does
+    _moments(entries, known.linear, found.inverse, square, taken)
+    left = (known.square - known.linear @ found.X).reshape(4, 3, 6)
     taken += _rate_gram(rate, found.C, P, entries, left)
     size = 3 * len(positions) - 3
     out = np.empty((size, size))
@@ -188,7 +170,7 @@ def information(data: Collapsed, positions, rate, made, found) -> np.ndarray:
     """
     positions = np.ascontiguousarray(positions, float)
     return fisher(
-        positions, data.weights, rate, made[1:], found, data.gyroscope_information, halves()
+        positions, data.weights, rate, made[1:], found, data.gyroscope_information, tables()
     )
 
 

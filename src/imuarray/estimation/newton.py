@@ -5,7 +5,6 @@ would double it.
 """
 
 from dataclasses import replace
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +14,7 @@ from imuarray.compiled import njit
 from imuarray.errors import IdentifiabilityError, require_shape
 from imuarray.estimation.collapsed import Arrays, Collapsed, motion_estimate
 from imuarray.estimation.identifiability import Calibration, arranged, require_rotation
-from imuarray.estimation.information import Halves, fisher, halves, information_at, slope
+from imuarray.estimation.information import fisher, information_at, slope
 from imuarray.estimation.rates import Work, most_likely, workspace
 from imuarray.estimation.threads import one_thread
 from imuarray.linear import FLOOR, scaled_eigh, scaled_inverse
@@ -49,7 +48,7 @@ def fisher_scoring(
     is below ``tolerance``: no coordinate then moves by more of its own sd. IdentifiabilityError
     where the information is singular.
     """
-    given = Given(data.arrays, *_prior(prior, data), halves())
+    given = Given(data.arrays, *_prior(prior, data))
     # one layout and one type each, or all would be compiled again
     start, tolerance, limit = np.array(start, float, order="C"), float(tolerance), max(limit, 0)
     require_shape("start", start, (len(data.specific_force), 3))
@@ -78,7 +77,7 @@ def _covariance(given, here):
 def _prior(prior, data: Collapsed):
     """(mean, precision), copied; empty for none."""
     if prior is None:
-        return _none()
+        return np.empty(0), np.empty((0, 0))
     size = 3 * (len(data.specific_force) - 1)
     mean, precision = (np.array(part, float, order="C") for part in prior)
     require_shape("position prior's mean", mean, (size,))
@@ -86,18 +85,12 @@ def _prior(prior, data: Collapsed):
     return mean, precision
 
 
-@cache
-def _none():
-    return np.empty(0), np.empty((0, 0))
-
-
 class Given(NamedTuple):
-    """Data, prior and tables of a search."""
+    """Data and prior of a search."""
 
     data: Arrays
     prior_mean: np.ndarray  # (3 (A - 1),), or (0,) for none
     prior_precision: np.ndarray  # its square
-    halves: Halves
 
 
 class Place(NamedTuple):
@@ -206,7 +199,7 @@ def _information(given, place):
     work = place.work
     known = fisher(
         place.positions, given.data.weights, place.rate, work.arms[1:], work.reduced,
-        given.data.rate_information, given.halves,
+        given.data.rate_information, given.data.tables,
     )  # fmt: skip
     for i in range(given.prior_mean.size):
         known[i] += given.prior_precision[i]

@@ -76,18 +76,16 @@ def information(recording: Recording) -> np.ndarray:
     omega is the gyroscopes' mean; omega_dot comes from the accelerometers at their nominal
     positions.
     """
-    sds = recording.accelerometer_noise_sd, recording.gyroscope_noise_sd
-    array = array_of(recording)
-    model = ArrayModel.isotropic(array, *sds)
-    return np.concatenate([_information(part, model) for part in recording.parts()])
-
-
-def _information(part: Recording, model: ArrayModel) -> np.ndarray:
-    data = Collapsed.of(model, part.specific_force, part.angular_rate)
-    turn = motion_from(data, model.array.relative).motion.angular_acceleration
-    rate = part.angular_rate.mean(axis=1)
-    # |Omega(w)^2|_F^2 = 2 |w|^4, |Omega(w')|_F^2 = 2 |w'|^2, and the two are orthogonal
-    return np.sqrt(2 * np.sum(rate**2, axis=1) ** 2 + 2 * np.sum(turn**2, axis=1))
+    sds, sizes = (recording.accelerometer_noise_sd, recording.gyroscope_noise_sd), []
+    model = ArrayModel.isotropic(array_of(recording), *sds)
+    for part in recording.parts():
+        data = Collapsed.of(model, part.specific_force, part.angular_rate)
+        turn = motion_from(data, model.array.relative).motion.angular_acceleration
+        rate = part.angular_rate.mean(axis=1)
+        # |Omega(w)^2|_F^2 = 2 |w|^4, |Omega(w')|_F^2 = 2 |w'|^2, and the two are orthogonal
+        squares = 2 * np.sum(rate**2, axis=1) ** 2 + 2 * np.sum(turn**2, axis=1)
+        sizes.append(np.sqrt(squares))
+    return np.concatenate(sizes)
 
 
 def select_dynamic(recording: Recording) -> Selection:

@@ -194,7 +194,7 @@ def _still(recording: Recording, shortest: float) -> Still:
 
 def _tells(still: Still) -> bool:
     """True where poses say more than offsets of their own: in two orientations they do not."""
-    means = np.array([f[:, 0].mean(axis=0) for f in still.pieces(still.recording.specific_force)])
+    means = np.array([force[:, 0].mean(axis=0) for force in still.force])
     apart = means - means.mean(axis=0)
     return len(means) > 2 and np.linalg.svd(apart, compute_uv=False)[1] > APART * GRAVITY
 
@@ -203,15 +203,12 @@ def _triads(every: Sequence[Still], gravity: float) -> TriadFit:
     """Fit of the poses of all recordings, one recording after the other."""
     mean, sd = [], []
     for one in every:
-        force = one.pieces(one.recording.specific_force)
-        step = usual_step(one.recording.time)
+        force, step = one.force, usual_step(one.recording.time)
         # a quantised reading that never changes has no spread of its own
         noise = np.maximum(averaged_sd(force, step), 1e-6 * GRAVITY)
-        mean += [piece.mean(axis=0) for piece in force]
-        least = steps_sd(force)
-        sd += [
-            np.maximum(noise / np.sqrt(len(p)), own) for p, own in zip(force, least, strict=True)
-        ]
+        for piece, least in zip(force, steps_sd(force), strict=True):
+            mean.append(piece.mean(axis=0))
+            sd.append(np.maximum(noise / np.sqrt(len(piece)), least))
     recording = np.repeat(np.arange(len(every)), [len(one.poses) for one in every])
     labels = every[0].recording.accelerometer_labels
     time = np.concatenate([_after_moving(one) for one in every])
@@ -220,29 +217,22 @@ def _triads(every: Sequence[Still], gravity: float) -> TriadFit:
 
 def _after_moving(still: Still) -> np.ndarray:
     """(P,) s of the poses' middles after that of the moving samples, where offsets are wanted."""
-    time, moving = still.recording.time, np.ones(len(still.recording.time), bool)
-    for pose in still.poses:
-        moving[pose] = False
+    time, moving = still.recording.time, still.moving
     middle = np.median(time[moving]) if moving.any() else time[-1]
     return np.array([time[pose].mean() for pose in still.poses]) - middle
 
 
 def _of_poses(still: Still, triads: TriadFit, gravity: float) -> FirstOrder:
     """First order by the still poses alone, which say nothing of the gyroscopes' maps."""
-    force = still.pieces(still.recording.specific_force)
-    rate, step = still.pieces(still.recording.angular_rate), usual_step(still.recording.time)
+    force, step = still.force, usual_step(still.recording.time)
+    rate = [still.recording.angular_rate[pose] for pose in still.poses]
+    counts = np.array([len(piece) for piece in rate], float)
+    sd = np.maximum(still.noise, 1e-9) / np.sqrt(counts)[:, None, None]
     return FirstOrder(
-        still.poses, triads, *_gyroscope_offsets(still),
+        still.poses, triads, *walked_mean(still.offsets, sd, _after_moving(still)),
         np.maximum(reading_sd(force, step), 1e-6 * GRAVITY), reading_sd(rate, step),
         lag_correlation(force), lag_correlation(rate), smoothing(force), smoothing(rate), gravity,
     )  # fmt: skip
-
-
-def _gyroscope_offsets(still: Still) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(G, 3) rad/s where the board moves, their sds, NaN of one pose alone, and their walks."""
-    counts = np.array([pose.stop - pose.start for pose in still.poses], float)
-    sd = np.maximum(still.noise, 1e-9) / np.sqrt(counts)[:, None, None]
-    return walked_mean(still.offsets, sd, _after_moving(still))
 
 
 def correct(recording: Recording, found: FirstOrder) -> Recording:

@@ -51,8 +51,8 @@ def compare(rate, time, usable, turn, labels) -> Relative | str:
     first = np.einsum("kji,tkj->tki", turn, rate)
     usable = usable & (np.linalg.norm(np.median(first, axis=1), axis=1) > SLOWEST)
     # a derivative needs both neighbours
-    usable[1:-1] &= np.diff(time)[1:] < 1.5 * np.median(np.diff(time))
-    usable[1:-1] &= np.diff(time)[:-1] < 1.5 * np.median(np.diff(time))
+    near = np.diff(time) < 1.5 * np.median(np.diff(time))
+    usable[1:-1] &= near[1:] & near[:-1]
     usable[[0, -1]] = False
     if usable.sum() < FEWEST:
         return f"fewer than {FEWEST} moving samples off the rails"
@@ -186,9 +186,18 @@ class Still(NamedTuple):
     offsets: np.ndarray
     noise: np.ndarray
 
-    def pieces(self, readings) -> list[np.ndarray]:
-        """Readings (T, K, 3) of each pose."""
-        return [readings[pose] for pose in self.poses]
+    @property
+    def force(self) -> list[np.ndarray]:
+        """Specific forces (n, A, 3) m/s^2 of each pose."""
+        return [self.recording.specific_force[pose] for pose in self.poses]
+
+    @property
+    def moving(self) -> np.ndarray:
+        """(T,) bool: in no pose."""
+        found = np.ones(len(self.recording.time), bool)
+        for pose in self.poses:
+            found[pose] = False
+        return found
 
     def rate(self) -> np.ndarray:
         """Angular rates (T, G, 3) rad/s without their offsets."""
@@ -198,13 +207,6 @@ class Still(NamedTuple):
     def good(self) -> np.ndarray:
         """(T,) bool: no gyroscope is at its rail."""
         return ~self.recording.at_rail("gyroscope")
-
-    def free(self) -> np.ndarray:
-        """(T,) bool: nor is the board still."""
-        free = self.good()
-        for pose in self.poses:
-            free[pose] = False
-        return free
 
 
 def calibrate_gyroscopes(every: Sequence[Still], triads: TriadFit) -> tuple[Gyroscopes, TriadFit]:
@@ -223,7 +225,7 @@ def calibrate_gyroscopes(every: Sequence[Still], triads: TriadFit) -> tuple[Gyro
         times.append(one.recording.time - one.recording.time[0] + begun)
         begun = times[-1][-1] + APART
     rate = np.concatenate([one.rate() for one in every])
-    free = np.concatenate([one.free() for one in every])
+    free = np.concatenate([one.good() & one.moving for one in every])
     start = _start(own.recording, triads)
     labels = own.recording.gyroscope_labels
     relative = compare(rate, np.concatenate(times), free, start, labels)
@@ -231,7 +233,8 @@ def calibrate_gyroscopes(every: Sequence[Still], triads: TriadFit) -> tuple[Gyro
         turn, maps = start, np.broadcast_to(np.eye(3), start.shape)
     else:
         turn, maps = relative.turn, relative.map
-    common = _common([(one, _moves(one, turn @ maps)) for one in every], triads)
+    moves = _moves(every, turn @ maps)
+    common = common_map(moves, triads.direction, triads.direction_covariance)
     matrix, covariance, by_common = _together(turn, maps, relative, common)
     maps_only = np.arange(12 * len(triads.matrix)).reshape(-1, 12)[:, :9].ravel()
     beside = np.zeros((len(covariance), len(maps_only)))
@@ -242,23 +245,18 @@ def calibrate_gyroscopes(every: Sequence[Still], triads: TriadFit) -> tuple[Gyro
     return Gyroscopes(matrix, covariance, beside, relative, common), triads
 
 
-def _moves(one: Still, matrix) -> list[Move]:
-    """Its moves, of the mean of rates with maps (G, 3, 3) taken out."""
-    back = np.linalg.inv(matrix)
+def _moves(every: Sequence[Still], matrix) -> list[Move]:
+    """Moves of the mean of rates, maps (G, 3, 3) taken out; the poses of all are numbered on."""
+    back, moves, poses = np.linalg.inv(matrix), [], 0
     count = len(back)
-    mean = np.einsum("kij,tkj->ti", back, one.recording.angular_rate) / count
-    still = np.einsum("kij,pkj->pi", back, one.offsets) / count
-    sd = float(np.sqrt(np.mean(one.noise**2) / count))
-    return gather(mean, one.recording.time, one.poses, still, one.good(), sd)
-
-
-def _common(several, triads: TriadFit) -> CommonMap | str:
-    """The map common to all gyroscopes from [(recording, moves)]."""
-    moves, poses = [], 0
-    for one, own in several:
+    for one in every:
+        mean = np.einsum("kij,tkj->ti", back, one.recording.angular_rate) / count
+        still = np.einsum("kij,pkj->pi", back, one.offsets) / count
+        sd = float(np.sqrt(np.mean(one.noise**2) / count))
+        own = gather(mean, one.recording.time, one.poses, still, one.good(), sd)
         moves += [move._replace(first=move.first + poses) for move in own]
         poses += len(one.poses)
-    return common_map(moves, triads.direction, triads.direction_covariance)
+    return moves
 
 
 def _start(recording: Recording, triads: TriadFit) -> np.ndarray:

@@ -47,12 +47,9 @@ class PoseNoise(NamedTuple):
         mine = np.swapaxes(used, 0, 1)[:, None]
         both = mine[..., None] & mine[..., None, :]
         walked = self.walk[:, None, None, None] * self.walked
-        spread = np.where(both, walked, 0.0) + _diagonal(self._variances(mine))
+        noise = self.factor[:, None, None] * np.moveaxis(self.sd, 0, -1) ** 2
+        spread = np.where(both, walked, 0.0) + _diagonal(np.where(mine, noise, 1.0))
         return np.where(both, np.linalg.inv(np.linalg.cholesky(spread)), 0.0)
-
-    def _variances(self, mine) -> np.ndarray:
-        squares = self.factor[:, None, None] * np.moveaxis(self.sd, 0, -1) ** 2
-        return np.where(mine, squares, 1.0)
 
     def misfits(self, used, residual) -> float:
         """The largest of the triads' residuals (P, A, 3) in their noise, over the usual of all."""
@@ -71,11 +68,11 @@ class PoseNoise(NamedTuple):
         rows, one = _Rows.of(misfit, slopes, fixed), np.ones(len(self.walk))
         unit = np.median(self.sd) ** 2
 
-        def judged(noise: PoseNoise) -> _Judged:
+        def judged(noise: PoseNoise) -> tuple[float, float]:
             return rows.judged(noise.whitening(used), used)
 
         found = minimize_scalar(
-            lambda x: judged(self._replace(walk=unit * np.exp(x) * one)).deviance,
+            lambda x: judged(self._replace(walk=unit * np.exp(x) * one))[0],
             bounds=np.log(RANGE), method="bounded", options={"xatol": 0.05},
         )  # fmt: skip
         # noise and walk that both grow: what of it is noise's, the fit's residual will show
@@ -85,16 +82,8 @@ class PoseNoise(NamedTuple):
             own, freedom = rows.own(self, used, unit)
             if freedom > FREEDOM:
                 ways.append((own, 2 * (SHOWN + 2 * len(one) - 2)))
-        best = min(ways, key=lambda way: judged(way[0]).deviance + way[1])[0]
-        grown = judged(best).grown
-        return best._replace(walk=best.walk * grown)
-
-
-class _Judged(NamedTuple):
-    """-2 log of the restricted likelihood, and the factor ``grown`` of all variances in it."""
-
-    deviance: float
-    grown: float
+        best = min(ways, key=lambda way: judged(way[0])[0] + way[1])[0]
+        return best._replace(walk=best.walk * judged(best)[1])
 
 
 class _Rows(NamedTuple):
@@ -136,8 +125,11 @@ class _Rows(NamedTuple):
         step = scale * np.linalg.solve(inner * np.outer(scale, scale), scale * right)
         return left, rows, inner, right, step
 
-    def judged(self, white, used) -> _Judged:
-        """Under ``white``, with the factor of all variances that fits best, at least 1."""
+    def judged(self, white, used) -> tuple[float, float]:
+        """-2 log of the restricted likelihood under ``white``, and a factor of all variances in it.
+
+        The factor is the one that fits best, at least 1.
+        """
         left, _, inner, right, step = self.solved(white)
         free, square = self.free(used), float(np.sum(left**2) - right @ step)
         grown = max(square / free, 1.0)
@@ -145,7 +137,7 @@ class _Rows(NamedTuple):
         scaled = inner / np.sqrt(np.outer(size, size))
         lost = np.linalg.slogdet(scaled)[1] + np.log(size).sum()
         logs = lost - 2 * np.log(known[known > 0]).sum()
-        return _Judged(float(free * np.log(grown) + square / grown + logs), grown)
+        return float(free * np.log(grown) + square / grown + logs), grown
 
     def own(self, noise: PoseNoise, used, unit: float) -> tuple[PoseNoise, float]:
         """With each triad's own walk and factor, at least 1; the fewest that judge a triad's.

@@ -39,12 +39,11 @@ def parameter_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
 def _rows(sensor: str, labels, parts, sds, offset_unit: str) -> list[tuple]:
     rows = []
     for k, label in enumerate(labels):
-        for name, unit in (UNITS | {"offset": offset_unit}).items():
-            components = MISALIGNMENT if name == "misalignment" else "xyz"
-            if name in parts:
-                for i, component in enumerate(components):
-                    value, sd = parts[name][k, i], sds[name][k, i]
-                    rows.append((sensor, label, name, component, value, sd, unit))
+        for name, values in parts.items():
+            unit = UNITS.get(name, offset_unit)
+            for i, component in enumerate(MISALIGNMENT if name == "misalignment" else "xyz"):
+                value, sd = values[k, i], sds[name][k, i]
+                rows.append((sensor, label, name, component, value, sd, unit))
     return rows
 
 
@@ -190,10 +189,9 @@ def _allan(poses, recording: Recording, sensor: str):
 
 def axes_of(recording: Recording, sensor: str, **first) -> pd.MultiIndex:
     """Rows of every axis of every triad, for each of what ``first`` names and lists."""
-    (name, values), labels = *first.items(), getattr(recording, f"{SENSORS[sensor]}_labels")
-    return pd.MultiIndex.from_product(
-        [[sensor], values, labels, list("xyz")], names=["sensor", name, "triad", "axis"]
-    )
+    labels = getattr(recording, f"{SENSORS[sensor]}_labels")
+    levels = {"sensor": [sensor], **first, "triad": labels, "axis": list("xyz")}
+    return pd.MultiIndex.from_product(levels.values(), names=list(levels))
 
 
 def noise_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
@@ -205,12 +203,8 @@ def noise_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
     parts = []
     for sensor, kind in SENSORS.items():
         taus, deviation, _ = _allan(found.poses, recording, sensor)
-        labels = getattr(recording, f"{kind}_labels")
         declared = getattr(recording, f"{kind}_noise_sd")
         sd = getattr(found, f"{kind}_noise").ravel()
-        index = pd.MultiIndex.from_product(
-            [[sensor], labels, list("xyz")], names=["sensor", "triad", "axis"]
-        )
         columns = {
             "declared": declared, "sd": sd, "ratio": sd / declared,
             "correlation": getattr(found, f"{kind}_correlation").ravel(),
@@ -218,7 +212,7 @@ def noise_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
             "floor": deviation.min(axis=0).ravel(),
             "floor_tau": taus[deviation.argmin(axis=0)].ravel(),
         }  # fmt: skip
-        parts.append(pd.DataFrame(columns, index).reset_index())
+        parts.append(pd.DataFrame(columns, axes_of(recording, sensor)).reset_index())
     return pd.concat(parts, ignore_index=True)
 
 

@@ -89,10 +89,10 @@ def averaged_sd(pieces, step: float) -> np.ndarray:
     return _deviation([_sums(piece) for piece in pieces], width) * np.sqrt(width)
 
 
-def lag_correlation(pieces, lag: int = 1) -> np.ndarray:
-    """Correlation of readings ``lag`` samples apart, (...); zero for white noise."""
+def lag_correlation(pieces) -> np.ndarray:
+    """Correlation of neighbouring readings, (...); zero for white noise."""
     centred = [piece - piece.mean(axis=0) for piece in pieces]
-    products = np.concatenate([x[lag:] * x[:-lag] for x in centred])
+    products = np.concatenate([x[1:] * x[:-1] for x in centred])
     squares = np.concatenate([x**2 for x in centred])
     return products.mean(axis=0) / squares.mean(axis=0)
 
@@ -121,7 +121,7 @@ def window_spread(readings: np.ndarray, window: int) -> np.ndarray:
     return np.sqrt(np.maximum(square - mean**2, 0.0).mean(axis=1))
 
 
-def still_poses(recording: Recording, window=WINDOW, shortest=SHORTEST) -> list[slice]:
+def still_poses(recording: Recording, shortest=SHORTEST) -> list[slice]:
     """Index ranges in which the array does not move, in the order of time.
 
     The spread of the array-averaged specific force and angular rate in a sliding window is
@@ -141,10 +141,10 @@ def still_poses(recording: Recording, window=WINDOW, shortest=SHORTEST) -> list[
     """
     require_plausible_rate(recording.time, "recording: time")
     step = usual_step(recording.time)
-    width = max(int(round(window / step)), 2)
+    width = max(int(round(WINDOW / step)), 2)
     if len(recording.time) < 2 * width:
         raise InputError(
-            f"recording: expected at least {2 * window:g} s to look for still poses in,"
+            f"recording: expected at least {2 * WINDOW:g} s to look for still poses in,"
             f" found {np.ptp(recording.time) if len(recording.time) else 0.0:.3g} s"
         )
     if recording.stationary is not None:

@@ -25,15 +25,11 @@ SMALL = np.radians(20.0)  # a triad turned by less starts from the drawing
 
 
 class Fitted(NamedTuple):
-    """All n parameters of a fit as `_unpack` has them, their covariance (n, n), and of what.
-
-    ``mean`` (P, A, 3) m/s^2 in the poses; ``magnitude`` of gravity, m/s^2.
-    """
+    """All n parameters of a fit as `_unpack` has them, their covariance (n, n), and of what."""
 
     values: np.ndarray
     covariance: np.ndarray
-    mean: np.ndarray
-    magnitude: float
+    given: Poses
 
 
 @dataclass(frozen=True)
@@ -75,7 +71,7 @@ class TriadFit:
 
     def beside_directions(self) -> np.ndarray:
         """Covariance (12 A, 3 P) of the matrices and offsets with all poses' directions."""
-        out = np.zeros((len(self.covariance), self.fitted.mean.shape[0] * 3))
+        out = np.zeros((len(self.covariance), 3 * len(self.fitted.given.mean)))
         place = _places(len(self.matrix))
         out[place] = self.fitted.covariance[: len(place), -out.shape[1] :]
         return out
@@ -89,9 +85,7 @@ class TriadFit:
         along = own.covariance[:, -len(score) :]
         values, spread = own.values + along @ score, along @ information @ along.T
         own = own._replace(values=values, covariance=own.covariance - spread)
-        return _result(
-            own, self.used, self.recording, self.residual_ratio, self.walk, self.doubtful
-        )
+        return _result(own, self.used, self.residual_ratio, self.walk, self.doubtful)
 
     @property
     def relied(self) -> np.ndarray:
@@ -159,12 +153,18 @@ class Poses(NamedTuple):
         matrices = np.eye(3)[UPPER], self.turns[1:].ravel()
         return np.concatenate([*matrices, offsets, self.unit.ravel()])
 
+    def misfit(self, p) -> np.ndarray:
+        """(P, A, 3) of the averages."""
+        return self.mean - np.asarray(_predict(p, len(self.turns), self.magnitude, self.recording))
+
+    def slopes(self, p) -> np.ndarray:
+        """(P, A, 3, n) of what the parameters predict."""
+        return np.asarray(_slopes(p, len(self.turns), self.magnitude, self.recording))
+
     def linearised(self, p) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Misfit (P, A, 3), slopes (P, A, 3, n) of the averages, information on free lengths."""
-        given = len(self.turns), self.magnitude, self.recording
-        misfit, slopes = self.mean - np.asarray(_predict(p, *given)), _slopes(p, *given)
+        """Misfit, slopes, and information (n, n) on free lengths."""
         lengths = np.asarray(_length_slopes(p, len(self.mean)))
-        return misfit, np.asarray(slopes), lengths.T @ lengths
+        return self.misfit(p), self.slopes(p), lengths.T @ lengths
 
 
 def doubted(noise: PoseNoise, doubtful) -> PoseNoise:
@@ -197,16 +197,15 @@ def least_squares(
 
     Both of averages as white as they can be reading by reading.
     """
-    poses, triads = used.shape
-    options = triads, given.magnitude, given.recording
+    poses = len(used)
     white = doubted(noise, doubtful).whitening(used)
 
     def residual(p):
-        misfit = np.moveaxis(given.mean - np.asarray(_predict(p, *options)), 0, -1)
+        misfit = np.moveaxis(given.misfit(p), 0, -1)
         return np.concatenate([(white @ misfit[..., None]).ravel(), _lengths(p, poses)])
 
     def slopes(p):
-        own = np.moveaxis(np.asarray(_slopes(p, *options)), 0, -2)
+        own = np.moveaxis(given.slopes(p), 0, -2)
         return np.concatenate([-(white @ own).reshape(-1, len(p)), _length_slopes(p, poses)])
 
     values, left, right = _solved(residual, slopes, start, poses)
@@ -217,9 +216,9 @@ def least_squares(
     freedom = 3 * int(used.sum()) + poses - values.size
     ratio = np.sqrt(rest @ rest / freedom) if freedom > 0 else np.nan
     scale = max(ratio, 1.0) if freedom > 0 else 1.0
-    own = Fitted(values, scale**2 * inverse @ inverse.T, given.mean, given.magnitude)
-    walk = np.sqrt(noise.walk)
-    return _result(own, used, given.recording, float(ratio), walk, doubtful.copy()), rows, misfit
+    own = Fitted(values, scale**2 * inverse @ inverse.T, given)
+    found = _result(own, used, float(ratio), np.sqrt(noise.walk), doubtful.copy())
+    return found, rows, misfit
 
 
 def _solved(residual, slopes, start, poses: int):
@@ -280,13 +279,12 @@ def _offset_of(own: Fitted, shape, number: int) -> tuple[np.ndarray, np.ndarray]
     return own.values[mine].reshape(triads, 3), covariance
 
 
-def _result(own: Fitted, used, recording, ratio: float, walk, doubtful) -> TriadFit:
+def _result(own: Fitted, used, ratio: float, walk, doubtful) -> TriadFit:
     poses, triads = used.shape
     matrices, _, directions = (np.asarray(x) for x in _unpack(own.values, triads, poses))
     offset, covariance = _offset_of(own, used.shape, 0)
     direction = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    residual = own.mean - np.asarray(_predict(own.values, triads, own.magnitude, recording))
     return TriadFit(
-        matrices, offset, direction, residual, covariance, ratio, used,
-        own.covariance[-3 * poses :, -3 * poses :], recording, walk, doubtful, own,
+        matrices, offset, direction, own.given.misfit(own.values), covariance, ratio, used,
+        own.covariance[-3 * poses :, -3 * poses :], own.given.recording, walk, doubtful, own,
     )  # fmt: skip
