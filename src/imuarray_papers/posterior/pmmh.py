@@ -1,11 +1,11 @@
-"""Pseudo-marginal Metropolis-Hastings (2021, Algorithm 1): chains side by side, and resumed."""
+"""Pseudo-marginal Metropolis-Hastings (2021, Algorithm 1), run by emcee."""
 
 import sys
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from pathlib import Path
 
+import emcee
 import numpy as np
 from tqdm import tqdm
 
@@ -14,6 +14,51 @@ from imuarray.posterior.chains import Chains
 from imuarray.provenance import atomic_write
 from imuarray.streams import stream
 from imuarray_papers.posterior.target import CompiledTarget
+
+
+class PseudoMarginalMove(emcee.moves.Move):
+    """An emcee move: each walker is a Metropolis-Hastings chain of its own.
+
+    One proposal runs ``thin`` transitions with the walk (27) in every chain and hands
+    back the last state with its noisy log target. Chain c at iteration i draws from the
+    stream (seed, names, c, i) alone: chains are independent, whatever the number of
+    threads, and a chain resumed at i continues bit for bit.
+    """
+
+    def __init__(
+        self,
+        target: CompiledTarget,
+        step: float,
+        thin: int,
+        seed: int,
+        names,
+        iteration=0,
+        threads=2,
+    ):  # fmt: skip
+        self.target, self.step, self.thin = target, step, thin
+        self.seed, self.names, self.iteration = seed, tuple(names), iteration
+        self.accepted: np.ndarray | None = None
+        self.pool = ThreadPoolExecutor(max_workers=threads)
+
+    def propose(self, model, state):
+        """Advance every chain; returns the new state and which chains moved at all."""
+        chains = len(state.coords)
+
+        def advance(chain):
+            rng = stream(self.seed, *self.names, "chain", chain, self.iteration)
+            theta = np.array(state.coords[chain])
+            accepted, value = self.target.transitions(
+                theta, float(state.log_prob[chain]), self.step, self.thin, rng
+            )
+            return theta, accepted, value
+
+        results = list(self.pool.map(advance, range(chains)))
+        self.iteration += 1
+        counts = np.array([accepted for _, accepted, _ in results])
+        self.accepted = counts if self.accepted is None else self.accepted + counts
+        coords = np.array([theta for theta, _, _ in results])
+        log_prob = np.array([value for _, _, value in results])
+        return emcee.State(coords, log_prob=log_prob), counts > 0
 
 
 def run_chains(
@@ -32,9 +77,6 @@ def run_chains(
 ) -> Chains:
     """Run one chain from each of ``starts`` (chains, size) for draws * thin transitions.
 
-    For draw i chain c draws from the stream (seed, names, c, i) alone: chains are independent,
-    whatever the number of threads, and a chain resumed at i continues bit for bit.
-
     Parameters
     ----------
     checkpoint : path or None
@@ -47,33 +89,26 @@ def run_chains(
         A start with no finite log target, or a checkpoint that belongs to another key.
     """
     starts = np.atleast_2d(np.asarray(starts, float))
-    kept, values = np.empty((len(starts), draws, starts.shape[1])), np.empty((len(starts), draws))
-    accepted = np.zeros(len(starts), np.int64)
-    first = _resumed(checkpoint, key, thin, kept, values, accepted) if checkpoint else 0
-    if first:
-        thetas, value = kept[:, first - 1].copy(), values[:, first - 1].copy()
-    else:
-        thetas, value = starts.copy(), _values_at(target, starts, seed, names)
-
-    def advance(chain: int, number: int) -> None:
-        rng = stream(seed, *names, "chain", chain, number)
-        # moves thetas[chain] in place
-        more, value[chain] = target.transitions(thetas[chain], float(value[chain]), step, thin, rng)
-        accepted[chain] += more
-
+    done = _load(checkpoint, key, starts.shape, thin, draws) if checkpoint else None
+    past, state, accepted = _begin(target, starts, seed, names) if done is None else done
+    move = PseudoMarginalMove(target, step, thin, seed, names, past[0].shape[1], threads)
+    move.accepted = accepted
+    sampler = emcee.EnsembleSampler(*starts.shape, _never, moves=move, vectorize=True)
     seldom = 0.2 if sys.stderr.isatty() else 15.0  # seconds; a log file needs few lines
-    with (
-        ThreadPoolExecutor(max_workers=threads) as pool,
-        tqdm(total=draws, initial=first, disable=quiet, unit="draw", mininterval=seldom) as bar,
-    ):
-        for number in range(first, draws):
-            list(pool.map(partial(advance, number=number), range(len(starts))))
-            kept[:, number], values[:, number] = thetas, value
-            bar.update()
-            made = number + 1
-            if checkpoint and ((made - first) % block == 0 or made == draws):
-                _save(checkpoint, key, thin, kept[:, :made], values[:, :made], accepted)
-    return Chains(kept, values, accepted / (thin * draws), thin, step)
+    first = past[0].shape[1]
+    with tqdm(total=draws, initial=first, disable=quiet, unit="draw", mininterval=seldom) as bar:
+        while past[0].shape[1] < draws:
+            count = min(block, draws - past[0].shape[1])
+            sampler.reset()
+            for new in sampler.sample(state, iterations=count, skip_initial_state_check=True):
+                state = new
+                bar.update()
+            past[0] = np.concatenate([past[0], sampler.get_chain().swapaxes(0, 1)], axis=1)
+            past[1] = np.concatenate([past[1], sampler.get_log_prob().T], axis=1)
+            if checkpoint:
+                _save(checkpoint, key, thin, past, move.accepted)
+    move.pool.shutdown()
+    return Chains(past[0], past[1], move.accepted / (thin * draws), thin, step)
 
 
 def spread_starts(centre, sd, rng, chains: int = 2) -> np.ndarray:
@@ -88,42 +123,47 @@ def checkpoint_beside(path: str | Path, key: str) -> Path:
     return path.with_name(f".{path.name}.{key[:16]}.npz")
 
 
-def _values_at(target, starts, seed, names) -> np.ndarray:
-    """Log target at each of the starts, (chains,)."""
+def _begin(target, starts, seed, names):
+    """Nothing drawn yet: ([draws, log target], emcee's state at the starts, accepted)."""
     values = [
         target.log_target(start, stream(seed, *names, "start", chain))
         for chain, start in enumerate(starts)
     ]
     if not np.all(np.isfinite(values)):
         raise InputError(f"pmmh: expected a finite log target at every start, found {values}")
-    return np.array(values)
+    past = [np.empty((len(starts), 0, starts.shape[1])), np.empty((len(starts), 0))]
+    state = emcee.State(starts.copy(), log_prob=np.array(values))
+    return past, state, np.zeros(len(starts), np.int64)
 
 
-def _save(path, key, thin, draws, log_target, accepted) -> None:
+def _never(theta):
+    """emcee must not evaluate the target by itself: that would redraw the estimate."""
+    raise AssertionError("the log target is handed over with the state")
+
+
+def _save(path, key, thin, past, accepted) -> None:
     with atomic_write(Path(path)) as temporary, open(temporary, "wb") as handle:
-        np.savez(handle, key=key, thin=thin, draws=draws, log_target=log_target, accepted=accepted)
+        np.savez(handle, key=key, thin=thin, draws=past[0], log_target=past[1], accepted=accepted)
 
 
-def _resumed(path, key, thin, draws, log_target, accepted) -> int:
-    """How many draws a checkpoint holds, which are filled in; 0 where there is none."""
+def _load(path, key, shape, thin, draws):
+    """Result of `_begin`, from a checkpoint; None where there is none."""
     if not Path(path).exists():
-        return 0
+        return None
     try:
         with np.load(path, allow_pickle=False) as stored:
             found = {name: stored[name] for name in stored.files}
         matches = str(found["key"]) == key and int(found["thin"]) == thin
-        matches &= found["draws"].shape[::2] == draws.shape[::2]
-        matches &= found["accepted"].shape == accepted.shape
+        matches &= found["draws"].shape[::2] == shape and len(found["accepted"]) == shape[0]
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         raise InputError(f"{path}: expected a checkpoint, found a broken file; delete it") from None
     if not matches:
         raise InputError(f"{path}: expected a checkpoint of this very run, found another's")
-    number = found["draws"].shape[1]
-    if number > draws.shape[1]:
+    if found["draws"].shape[1] > draws:
         raise InputError(
-            f"{path}: expected at most {draws.shape[1]} draws, found {number}: the run"
+            f"{path}: expected at most {draws} draws, found {found['draws'].shape[1]}: the run"
             " already went further"
         )
-    draws[:, :number], log_target[:, :number] = found["draws"], found["log_target"]
-    accepted[:] = found["accepted"]
-    return number
+    past = [found["draws"], found["log_target"]]
+    state = emcee.State(past[0][:, -1].copy(), log_prob=past[1][:, -1].copy())
+    return past, state, found["accepted"]
