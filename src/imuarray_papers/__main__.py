@@ -56,7 +56,7 @@ COMMANDS = (
 
 
 def papers_parser() -> argparse.ArgumentParser:
-    """As `make_parser`, of `COMMANDS`."""
+    """The parser of `COMMANDS`."""
     return make_parser(COMMANDS, "python -m imuarray_papers")
 
 

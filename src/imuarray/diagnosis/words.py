@@ -172,7 +172,7 @@ def part_in_words(part: str) -> str:
 
 
 def meaning(effect: str) -> list[str]:
-    """What an effect is, where nothing is known of its size."""
+    """The name of an effect in words, where nothing is known of its size."""
     return [known_effect(effect).meaning or words(effect)]
 
 

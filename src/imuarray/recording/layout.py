@@ -145,7 +145,7 @@ def numbers(layout, where: str) -> dict[str, float]:
 
 
 def si_units(section, quantity: str, where: str) -> float:
-    """How large a section's unit is in SI units; a bag's are SI units where it names none."""
+    """A section's unit in SI units; a bag's are SI units where it names none."""
     return factor(quantity, section["unit"], f"{where}: unit") if "unit" in section else 1.0
 
 

@@ -1,4 +1,4 @@
-"""Whether an answer holds: sentences why not, for the one who has to decide.
+"""Reasons why an answer is not to be trusted, as sentences; none where it holds.
 
 A calibration's file is whole and of these IMUs (`checked`); its numbers are held against the
 drawing, the still poses, and the recording taken for the motion of a rigid array.

@@ -130,7 +130,7 @@ def another_size(places: Places) -> str | None:
 
 
 def size_words(size: float) -> str:
-    """How far off a size is, and the scales, or the mistake, that would make it so."""
+    """Words on how far off a size is, and the scales, or the mistake, that would make it so."""
     off = factor_words(size)
     if SIZES[0] < size < SIZES[1]:
         return (

@@ -143,7 +143,7 @@ def _draw_effect(scene: Scene, case: Case, effect: str, sensors, rng) -> Change:
 
 
 def _truth(scene: Scene, case: Case, seed: int, changes, recording: Recording) -> dict:
-    """What `make` says of a recording."""
+    """The truth of a recording, as `make` gives it."""
     effects = []
     for change in changes:
         labels = [scene.array.labels[k] for k in change.sensors]

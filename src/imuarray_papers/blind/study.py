@@ -183,7 +183,7 @@ def grade(entry: dict) -> dict:
 
 
 def _answer_in_row(truth: dict, answer: dict | None) -> dict:
-    """What the diagnosis said, against the truth; after a crash it has said nothing."""
+    """The diagnosis' answer, against the truth; after a crash it has said nothing."""
     kind, imus = truth["case"]["kind"], truth["case"]["imus"]
     lost = answer is None
     causes = [] if lost else answer["causes"]

@@ -67,7 +67,7 @@ class Likelihood:
         return cls(data, DETERMINANTS[determinant], collapsed, mean.T, covariance, motion_sd)
 
     def marginal(self, positions, nodes: int | None = None) -> Marginal:
-        """What `estimate` estimates, without Monte Carlo noise (`Marginal.of`)."""
+        """The limit of `estimate`, without Monte Carlo noise (`Marginal.of`)."""
         if self.power != DETERMINANTS["derived"]:
             raise InputError("marginal: expected the derived determinant, found the printed one")
         rates = self.rate_mean, self.rate_covariance
