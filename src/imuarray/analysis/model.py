@@ -63,8 +63,8 @@ def require_together(
         known = ", ".join(methods.MODELS)
         raise InputError(f"model: expected any of {known} or a calibration (.nc), found {model!r}")
     if effects and model != "sensors":
-        other = "--model papers" if model == "papers" else "the model of a calibration"
-        raise InputError(f"--effects: expected none with {other}, found some")
+        what = "--model papers" if model == "papers" else "the model of a calibration"
+        raise InputError(f"--effects: expected none with {what}, found some")
     if model != "papers" and accelerometer_noise is not None:
         raise InputError(
             "--accelerometer-noise: expected it with --model papers only, found it where the noise"
