@@ -19,12 +19,10 @@ from scipy.optimize import minimize  # noqa: E402
 from written import publish  # noqa: E402
 
 import imuarray  # noqa: E402
-from imuarray.analysis.density import posterior_of, traced  # noqa: E402
-from imuarray.engine.parameters import model_of  # noqa: E402
 from imuarray.geometry import positions_of, sub_array  # noqa: E402
 from imuarray.model.jax64 import jax  # noqa: E402
 from imuarray_papers.config import read_config
-from imuarray_papers.sampling import sample  # noqa: E402
+from imuarray_papers.sampling import flat, sample  # noqa: E402
 from imuarray_papers.studies.bayes import simulate_dataset  # noqa: E402
 
 LEFT = (
@@ -46,9 +44,8 @@ ASSUMED = 1.9  # m/s^2, about the residual's own size on the measured board
 
 def density(recording):
     """(log density of theta under the flat prior and the declared noise, mode, covariance)."""
-    found = posterior_of(recording, model_of(recording), flat=True, known=(True, True))
-    log_density, data = traced(found)
-    return lambda theta: log_density(theta, *data), found.mode, found.covariance
+    found = flat(recording)
+    return found.exact(), found.posterior.mode, found.posterior.covariance
 
 
 def on_the_way(recording) -> np.ndarray:

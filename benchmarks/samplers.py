@@ -22,7 +22,6 @@ import numpy as np
 from samplers_figure import CONVERGED, statistics
 from written import publish
 
-from imuarray.analysis.density import posterior_of, traced
 from imuarray.engine.parameters import model_of
 from imuarray.geometry import positions_of
 from imuarray.posterior.diagnostics import ess, find_burn_in, rhat
@@ -31,8 +30,8 @@ from imuarray.provenance import write_csv
 from imuarray_papers import reference
 from imuarray_papers.config import read_config
 from imuarray_papers.posterior import tuning
-from imuarray_papers.posterior.likelihood import Likelihood
 from imuarray_papers.posterior.pmmh import run_chains
+from imuarray_papers.sampling import flat
 from imuarray_papers.studies.bayes import simulate_dataset
 
 WIDER = 1.05  # than the mode's curvature, for pCN proposals
@@ -67,12 +66,9 @@ class Problem:
         self.samples = samples
         self.recording, _ = simulate_dataset(config, samples)
         self.model = model_of(self.recording)
-        found = posterior_of(self.recording, self.model, flat=True, known=(True, True))
-        self.log_density, self.data = traced(found)
-        self.prior, self.mode, self.covariance = found.prior, found.mode, found.covariance
-        self.likelihood = Likelihood.of(
-            self.model, self.recording.specific_force, self.recording.angular_rate
-        )
+        found = flat(self.recording)
+        self.log_density, self.likelihood = found.exact(), found.likelihood
+        _, _, self.prior, self.mode, self.covariance, *_ = found.posterior
         self.factor = np.linalg.cholesky(self.covariance)
 
     def starts(self, rng, apart=None):
@@ -156,7 +152,7 @@ def nuts_row(problem, rng) -> Row:
     chains, spent = timed(
         lambda: run_nuts(
             problem.log_density, problem.mode, problem.covariance, problem.starts(rng), 300, 1000,
-            1, quiet=True, data=problem.data,
+            1, quiet=True,
         )
     )  # fmt: skip
     return judged("NUTS, exact marginal, compilation included", problem, chains, spent, 0.0)
@@ -167,7 +163,7 @@ def emcee_row(problem, seconds, rng) -> Row:
     from imuarray.model.jax64 import jax
 
     size = problem.mode.size
-    density = jax.jit(jax.vmap(lambda theta: problem.log_density(theta, *problem.data)))
+    density = jax.jit(jax.vmap(lambda theta: problem.log_density(theta)))
     count = 4 * size
     density(np.tile(problem.mode, (count // 2, 1)))
     made, spent = timed(

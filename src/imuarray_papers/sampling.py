@@ -7,7 +7,6 @@ import xarray as xr
 
 from imuarray.analysis.density import NOT_CONVERGED, Posterior, mode_search, prior_of
 from imuarray.analysis.model import Say, assumed, silent, usable
-from imuarray.analysis.noise import estimated_noise
 from imuarray.analysis.sampling import NUTS_STEPS, NUTS_WARMUP, tree_of
 from imuarray.engine.parameters import model_of
 from imuarray.errors import InputError, require_one_of
@@ -58,21 +57,17 @@ class Flat(NamedTuple):
         return log_density
 
 
-def flat(
-    recording: Recording, rates: str = "declared", known: bool = False, say: Say = silent
-) -> Flat:
-    """The posterior of a recording under the flat motion prior, around its mode.
+def flat(recording: Recording, rates: str = "declared", say: Say = silent) -> Flat:
+    """The posterior of a recording under the flat motion prior and the declared noise.
 
-    With ``rates="spread"``, equation (30), the noise is the declared one, as in the papers'
-    experiment; else it is estimated, but for the accelerometers' where that is ``known``.
+    Around its mode; with ``rates="spread"`` p(omega | y_g) is that of equation (30).
     """
     model, density = model_of(recording), None
     if rates == "spread":
         found = locate(recording, recording.accelerometer_noise_sd)
         mode, density = found.mean, sample_covariance(recording.angular_rate)
     else:
-        fitted = estimated_noise(recording, model, mode_search(recording), known, say)
-        model, found = fitted.model, fitted.calibration
+        found = mode_search(recording)(model)
         mode = found.positions
     if not found.converged:
         say(NOT_CONVERGED)
@@ -100,7 +95,7 @@ def sample(
     if rates == "spread":
         recording = _off_rails(recording, say)
     recording = assumed(recording, accelerometer_noise)
-    target = flat(recording, rates, accelerometer_noise is not None, say)
+    target = flat(recording, rates, say)
     say(f"the flat motion prior makes the array {target.shrinkage:.1f} posterior sds smaller than"
         " it is (docs/findings.md)")  # fmt: skip
     if method == "nuts":
