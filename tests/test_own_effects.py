@@ -187,7 +187,7 @@ def test_no_module_beside_the_finders_names_an_effect():
         "reading_effects",
         "noise_effects",
         "generic",  # names of sds
-        "plain",  # what the sensor model's own say in plain words; others are said by their names
+        "words",  # the sensor model's own in plain words; others by their names
         "export",  # what other tools have a place for
         "known",  # how a recording's own clocks are found beside a known board
     }
