@@ -7,9 +7,9 @@ import pytest
 from scipy import stats
 
 import imuarray
+from imuarray.analysis import sampling
 from imuarray.geometry import sub_array
 from imuarray.model.jax64 import jnp
-from imuarray.posterior import independent
 from imuarray.posterior.diagnostics import ess, rhat
 from imuarray.posterior.independent import UNRELIABLE, run_independent, walked
 
@@ -93,7 +93,7 @@ def test_where_it_is_not_enough_nuts_is_taken_and_that_is_told(monkeypatch):
     first = imuarray.sample(recording, "papers")
     assert first.attrs["sampler"] == "independent" and first.attrs["converged"]
     assert first.attrs["ess_min"] >= 1000 and first.attrs["rhat_max"] <= 1.01
-    monkeypatch.setattr(independent, "UNRELIABLE", -np.inf)
+    monkeypatch.setattr(sampling, "UNRELIABLE", -np.inf)
     refused = imuarray.sample(recording, "papers", method="independent")
     assert not refused.attrs["converged"]
     said: list[str] = []
