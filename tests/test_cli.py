@@ -73,7 +73,6 @@ def test_sample(calls):
 BAD = {
     "": "required: command",
     "frobnicate": "invalid choice",
-    "simulate --out new.nc --board my": "invalid choice: 'my'",
     "simulate": "required: --out",
     "calibrate --out new.nc": "required: recording",
     "calibrate no.nc --out new.nc": "no.nc: expected a file to read, found none",

@@ -58,7 +58,7 @@ def _placed(opened: Opened) -> Opened:
     found = opened.recording
     if not np.isnan(found.accelerometer_position).any():
         return opened
-    places, sd = rough_positions(found.time, found.specific_force, found.angular_rate)
+    places, sd = rough_positions(found)
     line = (
         f"no positions given: they begin from the motion, to {1e3 * sd:.2g} mm; no drawing was"
         " compared with the answer"

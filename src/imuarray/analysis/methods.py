@@ -2,7 +2,6 @@
 
 MODELS = ("sensors", "papers")  # or a calibration
 SAMPLING = ("auto", "independent", "nuts")
-BOARDS = ("mimu4444", "mimu4444_corners")
 EXPORTS = ("json", "kalibr", "urdf", "csv")
 
 

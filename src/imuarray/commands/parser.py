@@ -104,8 +104,8 @@ COMMANDS = (
         "Simulate a recording; its truth is stored in the group 'truth'.",
         "--out rec.nc", "recording to write (NetCDF-4)",
         (
-            option("--board", "its array (default: mimu4444_corners, 8 IMUs)",
-                    choices=methods.BOARDS, default="mimu4444_corners"),
+            option("--board", "its array: mimu4444_corners, 8 IMUs (default), or mimu4444",
+                    default="mimu4444_corners", metavar="NAME"),
             number("--duration", "S", "s of motion (default: 10)", 10.0),
             number("--rate", "HZ", "samples a second (default: 100)", 100.0), SEED, *EFFECTS,
         ),

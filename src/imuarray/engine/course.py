@@ -69,7 +69,7 @@ def size_growth(found: Estimate) -> tuple[float, float]:
     """(relative growth of the array from the beginning of the motion to its end, its sd).
 
     By a score test, all parameters refitted: an array that keeps its shape grows where the
-    gyroscopes' common scale changes.
+    gyroscopes' common scale changes. The sd is infinite where nothing is known of it.
     """
     size = np.zeros(len(found.information))
     placed = np.zeros_like(found.active)
@@ -83,7 +83,7 @@ def size_growth(found: Estimate) -> tuple[float, float]:
         along += when * (inner @ size)
         all_of_it += when**2 * (size @ inner @ size)
     left = all_of_it - along @ scaled_inverse(found.information + found.precision) @ along
-    return float(share / left), float(left**-0.5)
+    return (float(share / left), float(left**-0.5)) if left > 0 else (0.0, np.inf)
 
 
 def block_scores(found: Estimate) -> Scores:

@@ -257,6 +257,8 @@ def _first_order_dataset(recording: Recording, found) -> xr.Dataset:
         "accelerometer_walk": (("accelerometer",), fit.walk, {"units": "m s-2 s-0.5"}),
         "gyroscope_walk": (("gyroscope",), found.gyroscope_walk, {"units": "rad s-1 s-0.5"}),
         "gyroscope_noise": (gyroscope, found.gyroscope_noise, {"units": "rad s-1"}),
+        "accelerometer_smoothing": (accelerometer, found.accelerometer_smoothing, {"units": "1"}),
+        "gyroscope_smoothing": (gyroscope, found.gyroscope_smoothing, {"units": "1"}),
     }  # fmt: skip
     coords = {
         "accelerometer": list(recording.accelerometer_labels),

@@ -1,59 +1,61 @@
 """Positions to begin with where nobody has drawn the board: from the motion itself."""
 
+from functools import partial
+
 import numpy as np
 from scipy.signal import savgol_filter
 
-from imuarray.errors import InputError
+from imuarray.errors import require
+from imuarray.motion.state import lever
+from imuarray.recording.record import Recording
 
 WINDOW, ORDER = 7, 3  # samples and degree of the polynomial that gives the rates' derivative
 FAST = 0.5  # of the rates' root mean square: slower samples say little of positions
 SD = 0.05  # of the board's size, what gyroscopes and axes as bought leave uncertain
 SURE = 0.1  # of the board's size, beyond which the motion says too little
+UNKNOWNS = 15  # of a triad: arm, map of the first triad's force, offset
 
 
-def rough_positions(time, force, rate) -> tuple[np.ndarray, float]:
+def rough_positions(recording: Recording) -> tuple[np.ndarray, float]:
     """(positions (A, 3) m relative to the first triad, sd m) from readings as logged.
 
-    ``force`` (T, A, 3) m/s^2, ``rate`` (T, G, 3) rad/s, axes nearly parallel. Each triad's force is
-    a map of the first one's, an offset, and what rate and angular acceleration make of its lever
-    arm: linear least squares. InputError where the motion does not determine the arms.
+    Each triad's force is a map of the first one's, an offset, and what rate and angular
+    acceleration make of its lever arm: linear least squares, axes nearly parallel. InputError where
+    the motion does not determine the arms.
     """
-    step = np.median(np.diff(time))
-    mean = rate.mean(axis=1) - np.median(rate.mean(axis=1), axis=0)
-    mean, turning = (
-        savgol_filter(mean, WINDOW, ORDER, deriv=deriv, delta=step, axis=0) for deriv in (0, 1)
-    )
-    force = savgol_filter(force, WINDOW, ORDER, axis=0)
-    speed = np.linalg.norm(mean, axis=1)
-    used = speed > FAST * np.sqrt(np.mean(speed**2))
-    x, y, z = np.eye(3)
-    arms = np.stack(
-        [
-            np.cross(turning[used], axis) + np.cross(mean[used], np.cross(mean[used], axis))
-            for axis in (x, y, z)
-        ],
-        axis=-1,
-    )  # (M, 3, 3)
-    first = force[used, 0]
-    maps = np.einsum("ij,tk->tijk", np.eye(3), first).reshape(len(first), 3, 9)
-    offsets = np.broadcast_to(np.eye(3), arms.shape)
-    design = np.concatenate([arms, maps, offsets], axis=2).reshape(-1, 15)
-    positions, variance = np.zeros((force.shape[1], 3)), 0.0
+    count = recording.specific_force.shape[1]
+    design, right = _equations(recording)
     scale = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
-    inverse = np.linalg.pinv((design / scale).T @ (design / scale))
-    for k in range(1, force.shape[1]):
-        right = force[used, k].ravel()
-        found = inverse @ ((design / scale).T @ right)
-        left = right - (design / scale) @ found
-        positions[k] = (found / scale)[:3]
-        own = np.diag(inverse)[:3] / scale[:3] ** 2 * np.mean(left**2)
-        variance = max(variance, float(own.max()))
+    found, _, rank, _ = np.linalg.lstsq(design / scale, right, rcond=None)
+    positions, sd = np.zeros((count, 3)), np.inf
+    if rank == UNKNOWNS:
+        positions[1:] = (found / scale[:, None])[:3].T
+        left = np.mean((right - design @ (found / scale[:, None])) ** 2, axis=0).max()
+        spread = np.diag(np.linalg.inv((design / scale).T @ (design / scale)))[:3]
+        sd = float(np.sqrt(left * np.max(spread / scale[:3] ** 2)))
     size = float(np.ptp(positions, axis=0).max())
-    sd = float(np.hypot(np.sqrt(variance), SD * size))
-    if not np.sqrt(variance) < SURE * size:
-        raise InputError(
-            "positions: expected those of a drawing, or motion from which they follow, found motion"
-            f" that leaves them open by {1e3 * sd:.2g} mm: twist the board faster, about all axes,"
-            " or measure them with a ruler, from any point"
-        )
-    return positions, sd
+    require(
+        sd < SURE * size, "positions", "those of a drawing, or motion from which they follow",
+        "motion that leaves them open: twist the board faster, about all axes, or measure them with"
+        " a ruler, from any point",
+    )  # fmt: skip
+    return positions, float(np.hypot(sd, SD * size))
+
+
+def _equations(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients (n, `UNKNOWNS`) and forces (n, A - 1) of fast samples off the rails."""
+    lost = recording.at_rail("gyroscope") | recording.at_rail("accelerometer")
+    rate = recording.angular_rate.mean(axis=1)
+    if len(rate) < WINDOW:
+        return np.zeros((1, UNKNOWNS)), np.zeros((1, recording.specific_force.shape[1] - 1))
+    step = np.median(np.diff(recording.time))
+    smooth = partial(savgol_filter, window_length=WINDOW, polyorder=ORDER, delta=step, axis=0)
+    rate = rate - np.median(rate, axis=0)
+    force, rate, turning = smooth(recording.specific_force), smooth(rate), smooth(rate, deriv=1)
+    speed = np.linalg.norm(rate, axis=1)
+    used = (speed > FAST * np.sqrt(np.mean(speed**2))) & ~lost
+    arms = lever(rate[used, None], turning[used, None], np.eye(3)).swapaxes(1, 2)
+    maps = np.einsum("ij,tk->tijk", np.eye(3), force[used, 0]).reshape(-1, 3, 9)
+    offsets = np.broadcast_to(np.eye(3), arms.shape)
+    design = np.concatenate([arms, maps, offsets], axis=2).reshape(-1, UNKNOWNS)
+    return design, force[used, 1:].swapaxes(1, 2).reshape(len(design), -1)

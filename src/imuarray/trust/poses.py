@@ -31,10 +31,10 @@ def of_first_order(found: FirstOrder) -> Poses:
     """From the answer."""
     common = None if found.gyroscopes is None else found.gyroscopes.common
     scale = np.nan if common is None or isinstance(common, str) else common.scale
-    fit = found.triads
-    poses = _poses(fit.residual_ratio, fit.residual, fit.relied, scale, found.gyroscope_matrix)
-    follow = {kind: np.nanmedian(getattr(found, f"{kind}_smoothing")) for kind in KINDS}
-    return poses._replace(smoothed=tuple(kind for kind in KINDS if follow[kind] > SMOOTHED))
+    fit, follow = found.triads, [getattr(found, f"{kind}_smoothing") for kind in KINDS]
+    return _poses(
+        fit.residual_ratio, fit.residual, fit.relied, scale, found.gyroscope_matrix, follow
+    )
 
 
 def of_file(path) -> Poses:
@@ -47,14 +47,22 @@ def of_file(path) -> Poses:
         common = stored["gyroscope_common"][:] if "gyroscope_common" in stored else [[np.nan]]
         maps = stored["gyroscope_matrix"][:] if "gyroscope_matrix" in stored else None
         residual, used = stored["residual"][:], stored["used"][:] != 0
-    return _poses(ratio, residual, used, float(np.trace(common) / 3), maps)
+        names = (f"{kind}_smoothing" for kind in KINDS)
+        follow = [stored[name][:] if name in stored else np.zeros(1) for name in names]
+    return _poses(ratio, residual, used, float(np.trace(common) / 3), maps, follow)
 
 
-def _poses(ratio: float, residual, used, scale: float, maps) -> Poses:
-    """With residuals (P, A, 3) where they are ``used`` (P, A), gyroscopes' ``maps`` (G, 3, 3)."""
+def _poses(ratio: float, residual, used, scale: float, maps, follow) -> Poses:
+    """With residuals (P, A, 3) where they are ``used`` (P, A), gyroscopes' ``maps`` (G, 3, 3).
+
+    ``follow``: of both kinds, the correlation of neighbours in the fastest noise.
+    """
+    pairs = zip(KINDS, follow, strict=True)
+    smoothed = tuple(kind for kind, own in pairs if np.nanmedian(own) > SMOOTHED)
     squares = np.where(used[..., None], residual**2, np.nan)
     worst = np.sqrt(np.nanmax(np.nanmean(np.ascontiguousarray(squares), axis=(0, 2))))
-    return Poses(ratio, float(worst), scale, _chance(maps) if scale == scale else 1.0)
+    chance = _chance(maps) if scale == scale else 1.0
+    return Poses(ratio, float(worst), scale, chance, smoothed)
 
 
 def _chance(matrices) -> float:
