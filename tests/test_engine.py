@@ -373,7 +373,7 @@ def test_a_clock_that_wanders_is_read_at_other_ages():
     read = []
     for offset, turns in ((0.25e-3, 0.0), (0.0, 0.25)):
         clock = np.tile([1e-3, 0.5, 0.1, offset, 0.0], 3)
-        extra = np.zeros(3), np.zeros(3), flat, flat, np.full(3, turns)
+        extra = np.zeros(3), np.zeros(3), flat, flat, None, np.full(3, turns)
         read.append(reading(columns.model, 3, x, places, clock, extra, 1.0, 9.0))
     np.testing.assert_allclose(*read, rtol=1e-12)
     assert np.abs(read[0][0, 3:] - x[:3]).max() > 1e-4

@@ -4,35 +4,48 @@ from math import factorial
 
 import numpy as np
 
-from imuarray.engine.readings import Readings
-from imuarray.model.effects import Prediction
+from imuarray.engine.readings import Readings, odd_window
+from imuarray.engine.settings import SETTINGS
+from imuarray.model.effects import Prediction, Slow
 from imuarray.motion.state import lever
 
 
 def derivatives(readings: Readings, motion, positions) -> tuple:
-    """omega double dot, s dot and the readings' second and third derivatives, by polynomials.
+    """Derivatives of a fitted motion (T, ...) that effects look at.
 
-    Quartics over a short window of the fitted motion, whose noise is independent of the
-    residual's; the ideal readings are those of the papers' model.
+    omega double dot, s dot (T, 3), the ideal readings' second and third derivatives, and these
+    over a longer window: a filter undone by noisy ones would only amplify their noise. By
+    quartics, whose noise is independent of the residual's.
     """
     rate, turn, force = motion[:, :3], motion[:, 3:6], motion[:, 6:9]
     ideal = lever(rate[:, None], turn[:, None], positions) + force[:, None]
 
-    def along(values, order):
-        return polynomial_derivative(readings.time, readings.run, values, readings.window, order)
+    def along(values, order, window=readings.window, ends=None):
+        time, run = readings.time, readings.run
+        return polynomial_derivative(time, run, values, window, order, ends=ends)
 
-    second = Prediction(along(ideal, 2), along(rate, 2)[:, None])
-    third = Prediction(along(ideal, 3), along(rate, 3)[:, None])
-    return along(rate, 2), along(force, 1), second, third
+    def both(*how):
+        return [
+            Prediction(along(ideal, order, *how), along(rate, order, *how)[:, None])
+            for order in (2, 3)
+        ]
+
+    # at the ends of so long a window a quartic's third derivative has even the wrong sign
+    slow = both(odd_window(readings.time, SETTINGS.slow_window), 3)
+    return along(rate, 2), along(force, 1), *both(), Slow(*slow)
 
 
-def polynomial_derivative(time, run, values, window, order, degree=4) -> np.ndarray:
+def polynomial_derivative(time, run, values, window, order, degree=4, ends=None) -> np.ndarray:
     """The order-th derivative by local quartics, within runs; the ends use the end's polynomial.
 
-    Zero in runs shorter than the window; ``degree``: of other polynomials.
+    Zero in runs shorter than the window; ``degree``: of other polynomials, ``ends``: of the ends'.
     """
-    step = np.median(np.diff(time))
-    taps = [polynomial_taps(window, place, order, degree) / step**order for place in range(window)]
+    step, middle = np.median(np.diff(time)), window // 2
+    degrees = [degree if ends is None or place == middle else ends for place in range(window)]
+    taps = [
+        polynomial_taps(window, place, order, each) / step**order
+        for place, each in enumerate(degrees)
+    ]
     out = np.zeros_like(values)
     half = window // 2
     edges = np.flatnonzero(np.concatenate([[True], np.diff(run) > 0, [True]]))
@@ -64,4 +77,4 @@ def no_derivatives(samples, accelerometers) -> tuple:
     """All zero: a motion of which no derivative is known."""
     nothing = np.zeros((samples, 3))
     flat = Prediction(np.zeros((samples, accelerometers, 3)), np.zeros((samples, 1, 3)))
-    return nothing, nothing, flat, flat
+    return nothing, nothing, flat, flat, Slow(flat, flat)

@@ -35,14 +35,22 @@ from imuarray.linear import scaled_inverse
 from imuarray.model.effects import EFFECTS
 
 CLOCKS, DELAYS, GYROSCOPES = "clocks of the IMUs", "delay of each IMU", "gyroscope maps"
+LAG, FILTER = "lag of the gyroscopes", "filter of the gyroscopes"
+FILTERS = FILTER, "filters of the accelerometers"
 EFFECT_GROUPS = {
     CLOCKS: (CLOCK,),
     "offsets": OFFSETS,
     DELAYS: ("sensor_delay",),
-    "lag of the gyroscopes": ("gyroscope_delay",),
+    LAG: ("gyroscope_delay",),
+    FILTER: ("gyroscope_filter",),
+    FILTERS[1]: ("accelerometer_filter",),
     GYROSCOPES: ("gyroscope_scale", "gyroscope_misalignment"),
     "lever arms of the axes": ("size_effect",),
 }
+# Where motion is rough, what the gyroscopes see of it is free, and filters are in that; two IMUs
+# take their angular acceleration from the gyroscopes.
+ROUGH_GROUPS = {name: ids for name, ids in EFFECT_GROUPS.items() if name not in FILTERS}
+BENT = 2e-3  # s, a lag of filters that differ: by half its square in droop, a low pass's
 AGREES = 1.02  # times the residual that a prior of omega_dot may make
 CHANCE = 1e-3  # of maps as far from those of first order, of positions as far apart
 LEAST_SHARE = 0.03  # of the variance, by which two estimates may differ at least
@@ -106,16 +114,16 @@ def select_forward(
 
     Each sweep tests the groups in order, beside those that it has kept before; what is kept is
     fitted, then the others are tested again. At last each must still gain beside all others, but
-    for clocks, whose jumps a fit does not move. Gyroscope maps at odds with those of first order
-    are estimated, too. Where motion is smooth and no sensor late, the rate's own change is then a
+    for clocks, whose jumps a fit does not move, and for what the estimate of another calls for
+    (`Selected.needed`). Where motion is smooth and no sensor late, the rate's own change is then a
     prior of omega_dot. ``bare``: whether the last fit is wanted where no group is kept. InputError
     or LinAlgError where the readings do not determine positions or motion.
     """
     names = groups_of(readings)
-    effects = [effect for name in names for effect in EFFECT_GROUPS[name]]
-    effects += [name for name in corrected(*(one.left for one in readings)) if name not in effects]
-    columns = columns_of(readings[0].array, effects, readings[0].position_prior_sd)
-    begun = [Recorded.of(one, columns) for one in readings]
+    columns, begun = _begun(readings, names)
+    if FILTER in names and (readings[0].pair or not all(one.smooth for one in begun)):
+        names = [name for name in names if name in ROUGH_GROUPS]
+        columns, begun = _begun(readings, names)
     found = estimate(begun, columns, mask_of(columns, [POSITION]), steps=SETTINGS.group_steps)
     now = Selected(found, tuple(one.readings.keep for one in begun), {})
     clocks, groups = [], []
@@ -126,12 +134,9 @@ def select_forward(
         groups = now.tried(names)
         now = now.with_kept([group.name for group in groups if group.kept])
         if set(now.kept) == before:
-            chance, _ = settled(now.found).maps_hold.get("gyroscope", (1.0, []))
-            if GYROSCOPES in names and chance < CHANCE:
-                groups = [
-                    group._replace(kept=group.kept or group.name == GYROSCOPES) for group in groups
-                ]
-                now = now.with_kept([GYROSCOPES])
+            needed = now.needed(names)
+            groups = [group._replace(kept=group.kept or group.name in needed) for group in groups]
+            now = now.with_kept(needed)
             break
         now = now.fitted(SETTINGS.rung_again)
     now = now.without([group.name for group in groups if not group.kept])
@@ -150,6 +155,14 @@ def select_forward(
         if pair or (alike and _of_one_truth(found, better)):
             found = better
     return settled(found), clocks + groups
+
+
+def _begun(readings: Sequence[Readings], names) -> tuple[Columns, list[Recorded]]:
+    """Columns for some groups and for what corrections left, and where a search begins."""
+    effects = [effect for name in names for effect in EFFECT_GROUPS[name]]
+    effects += [name for name in corrected(*(one.left for one in readings)) if name not in effects]
+    columns = columns_of(readings[0].array, effects, readings[0].position_prior_sd)
+    return columns, [Recorded.of(one, columns) for one in readings]
 
 
 class Selected(NamedTuple):
@@ -187,6 +200,21 @@ class Selected(NamedTuple):
         masks = {name: mask_of(self.found.columns, EFFECT_GROUPS[name]) for name in asked}
         return gains(self.found, masks, self.kept)
 
+    def needed(self, names) -> list[str]:
+        """Groups that another one's estimate calls for, whatever they gain.
+
+        Gyroscope maps at odds with those of first order; the shape of filters behind a long lag.
+        """
+        columns, found = self.found.columns, []
+        chance, _ = settled(self.found).maps_hold.get("gyroscope", (1.0, []))
+        if chance < CHANCE:
+            found.append(GYROSCOPES)
+        if LAG in self.kept:
+            each = flat_parameters(columns, self.found.recorded[0].state)
+            if np.abs(each[:, columns.of(*EFFECT_GROUPS[LAG])]).max() > BENT:
+                found.append(FILTER)
+        return [name for name in found if name in names]
+
     def clocked(self) -> tuple[Selected, list[EffectGroup]]:
         """With clocks, if IMUs' ages show some and these gain; and that group, if there is one."""
         columns, recorded = self.found.columns, self.found.recorded
@@ -204,10 +232,10 @@ class Selected(NamedTuple):
         return (now._replace(kept={CLOCKS: mask} | self.kept) if group.kept else self), [group]
 
     def clocks_beside_delays(self) -> bool:
-        """True where ages show clocks once delays are fitted: a late IMU's misfit may, too."""
+        """True where ages show clocks once delays and filters are fitted: their misfit may, too."""
         if not all(one.smooth for one in self.found.recorded):
             return True
-        found = self.with_kept([DELAYS]).fitted(SETTINGS.rung_again).found
+        found = self.with_kept([DELAYS, *FILTERS]).fitted(SETTINGS.rung_again).found
         return any(shown_clocks(one, found.columns) for one in found.recorded)
 
     def fitted(self, steps: int = SETTINGS.iterations) -> Selected:

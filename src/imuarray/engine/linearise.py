@@ -72,7 +72,7 @@ class State(NamedTuple):
     motion: np.ndarray  # (T, D): omega, omega_dot, s, and what is `RoughPrior`
     positions: np.ndarray  # (A, 3) m, relative to the reference
     parameters: np.ndarray  # (P,) of the model with all effects
-    derivatives: tuple  # omega double dot, s dot (T, 3); second, third of (force, rate)
+    derivatives: tuple  # of its own course, as `imuarray.engine.derivatives.derivatives` has them
     rough_prior: RoughPrior | None = None  # where the motion is rough
     turning: TurningPrior | None = None
 
@@ -123,16 +123,16 @@ class Eliminated(NamedTuple):
 
 def _instant(x, positions, extra, time, span) -> Instant:
     """Quantities that effects may look at, at one sample."""
-    jerk, force_rate, second, third, wander = (*extra, 0.0)[:5]
+    jerk, force_rate, second, third, slow, wander = (*extra, None, 0.0)[:6]
     own = None
     if len(x) > KNOWN:
-        jerk, force_rate = x[9:12], x[12:15]
+        jerk, force_rate, slow = x[9:12], x[12:15], None
     if len(x) > 15:
         own = Turning(x[:3], x[3:6] + x[15:18], None)
     if len(x) > 18:
         own = Turning(x[:3] + x[21:24], own.acceleration, jerk + x[18:21])
     motion = Motion(x[:3], x[3:6], x[6:9], jerk, force_rate)
-    return Instant(motion, positions, time, span, second, third, own, wander=wander)
+    return Instant(motion, positions, time, span, second, third, own, slow=slow, wander=wander)
 
 
 def reading(model, count, x, positions, parameters, extra, time, span):

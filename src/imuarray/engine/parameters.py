@@ -63,14 +63,14 @@ def columns_of(array: Array, effects, position_sd: float) -> Columns:
     common = [0.0] * 3
     owner += [(np.arange(count) < array.accelerometers) & (np.arange(count) > 0)] * 3
     for item, shape in zip(model.chain, model.shapes, strict=True):
-        spread = np.broadcast_to(item.prior_sd, shape)[0]
+        spread, shared = (np.broadcast_to(sd, shape)[0] for sd in (item.prior_sd, item.common_sd))
         for place in np.ndindex(*shape[1:]):
             names.append(item.id)
             places.append(place)
             free = not (place and place[-1] in item.held)
             owner.append((np.arange(count) < shape[0]) & free)
             sds.append(float(spread[place]))
-            common.append(item.common_sd)
+            common.append(float(shared[place]))
     return Columns(
         model, tuple(names), tuple(places), np.array(owner).T, np.array(sds), np.array(common)
     )
@@ -78,7 +78,7 @@ def columns_of(array: Array, effects, position_sd: float) -> Columns:
 
 def catalogue_effects(without=()) -> tuple[str, ...]:
     """The mean effects that a diagnosis considers, in the catalogue's fixed order."""
-    return tuple(name for name in EFFECTS if name not in without)
+    return tuple(n for n, item in EFFECTS.items() if item.diagnosed and n not in without)
 
 
 def prior_precision(columns: Columns, active, resized: bool = True) -> np.ndarray:

@@ -261,9 +261,9 @@ def few_at_once(far) -> np.ndarray:
     return far & ~crowd
 
 
-def odd_window(time) -> int:
-    """Samples in `SETTINGS.window` seconds, odd, at least five."""
-    return max(5, 2 * int(SETTINGS.window / np.median(np.diff(time)) / 2) + 1)
+def odd_window(time, length=SETTINGS.window) -> int:
+    """Samples in so many seconds, odd, at least five."""
+    return max(5, 2 * int(length / np.median(np.diff(time)) / 2) + 1)
 
 
 def runs(time) -> np.ndarray:

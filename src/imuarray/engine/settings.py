@@ -19,6 +19,7 @@ class Settings:
     stretch: int = 128  # samples, of the stretches in which a long recording is looked at first
     most: int = 32000  # of IMUs, samples that positions are estimated from; more say little more
     window: float = 0.04  # s, length of the polynomials that give time derivatives
+    slow_window: float = 0.1  # s, of those of the rate that a filter's shape multiplies
     smooth: float = 0.8  # correlation of omega's slope and omega_dot from which motion is smooth
 
     # Gauss-Newton over motion and parameters (`fit`, `parameters`)

@@ -38,6 +38,13 @@ class Turning(NamedTuple):
     jerk: object  # rad/s^3, or None where it is not told apart
 
 
+class Slow(NamedTuple):
+    """The ideal measurement's time derivatives of second and third order, less their fast noise."""
+
+    second: Prediction
+    third: Prediction
+
+
 class Instant(NamedTuple):
     """The truth an effect may look at: the motion, where the triads are and what time it is.
 
@@ -53,6 +60,7 @@ class Instant(NamedTuple):
     second: Prediction = Prediction(0.0, 0.0)
     third: Prediction = Prediction(0.0, 0.0)
     gyroscopes: Turning | None = None  # as they see the motion, where that is free
+    slow: Slow | None = None  # where the motion's course is smooth
     axes: object = None  # rotations from the accelerometers' own axes to the array's, (A, 3, 3)
     wander: object = 0.0  # turns by which the IMUs' clocks depart from a steady drift, (N,)
 
@@ -118,9 +126,11 @@ class Effect:
     sized : bool
         Whether an estimate finds its size, ``prior_sd`` at first: the data would not keep what
         the motion takes up of it from being as large as a prior for any sensor allows.
-    common_sd : float
+    common_sd : float, or one for each as for ``prior_sd``
         Prior sd of what a parameter of all triads has in common, beside each one's own: chips of
         one kind are alike. How much they differ, ``prior_sd`` at first, an estimate finds.
+    diagnosed : bool
+        Whether a diagnosis considers it, too, not the standard sensor model alone.
     """
 
     id: str
@@ -149,7 +159,8 @@ class Effect:
     resizes: bool = False
     own: bool = False
     sized: bool = False
-    common_sd: float = 0.0
+    common_sd: float | tuple = 0.0
+    diagnosed: bool = True
 
     @property
     def scope(self) -> str:

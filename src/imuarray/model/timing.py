@@ -38,12 +38,16 @@ def _rate_later(tau, instant, common):
         if common:
             return tau * ((turn + own.acceleration) / 2 - tau / 12 * bent)
         return tau * (own.acceleration + (tau / 2 * own.jerk if jerk else 0.0))
-    return tau * (
-        turn + tau / 2 * (instant.second.angular_rate + tau / 3 * instant.third.angular_rate)
-    )
+    second, third = instant.second.angular_rate, instant.third.angular_rate
+    if common and instant.slow is not None:  # the rate is theirs: noise would feed on itself
+        slow = jnp.abs(tau) > LONG
+        second = jnp.where(slow, instant.slow.second.angular_rate, second)
+        third = jnp.where(slow, instant.slow.third.angular_rate, third)
+    return tau * (turn + tau / 2 * (second + tau / 3 * third))
 
 
 DELAY = (("delay",),)
+LONG = 2e-3  # s, a lag of gyroscopes whose square takes derivatives with little noise
 
 
 @effect(
@@ -64,6 +68,48 @@ def sensor_delay(delay, instant, predicted):
 def gyroscope_delay(delay, instant, predicted):
     """Gyroscope k shows the motion at t + tau_k, accelerometers at t (their filters differ)."""
     return later(delay, instant, predicted, accelerometers=False)
+
+
+FILTER = {"derivatives": True, "sampling": True, "diagnosed": False}
+
+
+@effect(
+    "gyroscope_filter", unit="s2, s3", prior_sd=(3e-6, 2e-8), common_sd=(3e-5, 2e-7),
+    shape=lambda a, g: (g, 2), components=(("droop", "skew"),), **FILTER,
+    against="angular acceleration",
+    meaning="the gyroscopes' filter differs from the accelerometers' by more than a delay",
+)  # fmt: skip
+def gyroscope_filter(shape, instant, predicted):
+    """The rate, with a times its second and b times its third derivative: droop, bent phase.
+
+    The ratio of two filters in powers of s beside the delay: of low passes of first order with
+    time constants p of gyroscopes and q of accelerometers a = (p^2 - q^2) / 2.
+    """
+    slow, own = instant.slow, instant.gyroscopes
+    if slow is None:
+        jerk = instant.motion.angular_jerk if own is None or own.jerk is None else own.jerk
+        return predicted._replace(angular_rate=predicted.angular_rate + shape[:, :1] * jerk)
+    bend = shape[:, :1] * slow.second.angular_rate + shape[:, 1:] * slow.third.angular_rate
+    return predicted._replace(angular_rate=predicted.angular_rate + bend)
+
+
+def _each_mean(shape, axes):
+    """The mean over triads of each parameter."""
+    return [np.broadcast_to(np.arange(shape[1]) == k, shape) for k in range(shape[1])]
+
+
+@effect(
+    "accelerometer_filter", unit="s, s2, s3", prior_sd=(2e-3, 3e-5, 3e-7),
+    shape=lambda a, g: (a, 3), components=(("lag", "droop", "skew"),), gauge=_each_mean, **FILTER,
+    against="specific force", meaning="accelerometers have filters of their own",
+)  # fmt: skip
+def accelerometer_filter(shape, instant, predicted):
+    """The force, with its derivatives times shares of each triad; the mean is the motion's."""
+    bend = shape[:, :1] * kinematics.force_rate(instant.motion, instant.positions)
+    if instant.slow is not None:
+        second, third = (one.specific_force for one in instant.slow)
+        bend += shape[:, 1:2] * second + shape[:, 2:] * third
+    return predicted._replace(specific_force=predicted.specific_force + bend)
 
 
 CLOCK = ("period", "frequency", "phase", "offset", "drift")

@@ -21,6 +21,9 @@ from imuarray.trust.rigid import COHERENT, FEW, SLOPE, Slope, elsewhere, kept, s
 from imuarray.trust.suspects import MIRRORED, clipped, common, gravity, wrapped
 
 GROWN = 6.0  # sds of the growth; clean and real boards' is within one
+# s^2, that a filter may droop by more than the other kind's. An accelerometer's makes centrifugal
+# forces those of no rate: 3e-5 (20 Hz) is 3 sds of error; a gyroscope's of 3e-5 is 1.
+DROOPS = 2e-5, 6e-5
 HOLD = 1e-6  # chance of maps that still poses gave; 0.97 and more of real and clean boards
 TRIAD = 10.0  # the same of one triad where the noise of each is estimated
 DRIFT = 3.0  # sds of the mean of all samples; offsets that differ by more bias positions
@@ -63,12 +66,47 @@ def reasons_of_calibration(
         reason if len(whose) == len(several) else f"recording {', '.join(whose)}: {reason}"
         for reason, whose in found.items()
     ]
-    judged += _moved_maps(calibration) + _grows(calibration)
+    judged = _filters(calibration) + judged + _moved_maps(calibration) + _grows(calibration)
     if not judged:
         corrected = all(one.correction is not None for one in several)
         judged = unsteady(calibration, corrected, len(several))
     root = little or any(map(UNIT.search, found))
     return judged + ([] if root else _not_converged(calibration.attrs))
+
+
+def _filters(calibration: xr.Dataset) -> list[str]:
+    """Words on filters so far apart that their first powers of frequency do not say it."""
+    if "effect_parameter" not in calibration:
+        return []
+    names = calibration["parameter"].to_numpy().astype(str)
+    values = calibration["effect_parameter"].to_numpy()
+
+    def of(start) -> dict[str, float]:
+        found = zip(names[mine := np.char.startswith(names, start)], values[mine], strict=True)
+        return {name.split()[1].split("_", 1)[1]: float(x) for name, x in found}
+
+    lag, droop = (
+        np.mean([*of(start).values()] or 0.0)
+        for start in ("gyroscope_delay delay", "gyroscope_filter droop")
+    )
+    lower, late = int(lag < 0), of("accelerometer_filter lag")
+    if abs(droop) > DROOPS[lower]:
+        others = f"the {KINDS[1 - lower]}s'"
+        return [_low(f"the {KINDS[lower]}s' low pass", abs(droop), others)]
+    each = {k: x - late[k] ** 2 / 2 for k, x in of("accelerometer_filter droop").items()}
+    usual = np.median([*each.values()] or 0.0)
+    return [
+        _low(f"the low pass of accelerometer {k}", x - usual, "the others'")
+        for k, x in each.items() if x - usual > DROOPS[0]
+    ]  # fmt: skip
+
+
+def _low(whose: str, droop: float, others: str) -> str:
+    corner = 1 / (2 * np.pi * np.sqrt(2 * droop))
+    return (
+        f"{whose}, of some {corner:.2g} Hz or less, is far below {others}: set the chips to filters"
+        " alike, and to a larger bandwidth"
+    )
 
 
 def _moved_maps(calibration: xr.Dataset) -> list[str]:

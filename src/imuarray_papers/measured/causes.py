@@ -7,14 +7,14 @@ import numpy as np
 import pandas as pd
 
 from imuarray.engine.estimate import Estimate, Recorded, estimate
-from imuarray.engine.forward import EFFECT_GROUPS, GYROSCOPES, Selected, gains, mask_of
+from imuarray.engine.forward import GYROSCOPES, LAG, ROUGH_GROUPS, Selected, gains, mask_of
 from imuarray.engine.parameters import POSITION, columns_of
 from imuarray.engine.readings import arrange, determined, most_informative
 from imuarray.engine.widths import widths
 from imuarray.recording import Recording
 from imuarray_papers.measured.positions import pairwise
 
-LAG, ARMS = "lag of the gyroscopes", "lever arms of the axes"
+ARMS = "lever arms of the axes"
 STEPS = {
     "normal": "papers' model, normal noise",
     "robust": "papers' model, Student's t",
@@ -57,7 +57,7 @@ def stepwise(recording: Recording) -> pd.DataFrame:
 
 def _fits(readings) -> Iterator[tuple[str, Estimate, tuple[float, float]]]:
     """(step, its estimate, (nats gained, their error)), all of `STEPS` in order."""
-    effects = [effect for ids in EFFECT_GROUPS.values() for effect in ids]
+    effects = [effect for ids in ROUGH_GROUPS.values() for effect in ids]
     columns = columns_of(readings.array, effects, readings.position_prior_sd)
     apart = replace(columns, common_sd=np.zeros(columns.size))
     begun, nothing = [Recorded.of(readings, columns)], (np.nan, np.nan)
@@ -79,7 +79,7 @@ def _fits(readings) -> Iterator[tuple[str, Estimate, tuple[float, float]]]:
 
 def _more(now: Selected, names) -> tuple[Selected, Estimate, tuple[float, float]]:
     """With more groups, and what they gain."""
-    mask = mask_of(now.found.columns, [effect for name in names for effect in EFFECT_GROUPS[name]])
+    mask = mask_of(now.found.columns, [effect for name in names for effect in ROUGH_GROUPS[name]])
     group = gains(now.found, {"all": mask}, now.kept)[0]
     now = now.with_kept(names).fitted()
     return now, now.found, (group.gain, group.error)

@@ -16,7 +16,7 @@ from imuarray.engine.course import block_scores
 from imuarray.engine.dataset import engine_dataset, places_among, positions_dataset
 from imuarray.engine.estimate import Estimate, Recorded, estimate, stepped
 from imuarray.engine.fit import flat_parameters, prior_means
-from imuarray.engine.forward import DELAYS, EFFECT_GROUPS, Selected, mask_of
+from imuarray.engine.forward import DELAYS, ROUGH_GROUPS, Selected, mask_of
 from imuarray.engine.fusion import fuse
 from imuarray.engine.heldout import gain
 from imuarray.engine.parameters import POSITION, columns_of
@@ -67,13 +67,13 @@ def _of_board(own: FirstOrder, other: FirstOrder) -> FirstOrder:
 def board_of(readings: Sequence[Readings]) -> Estimate:
     """All groups of the sensor model but the IMUs' delays, from recordings of rough motion."""
     columns = columns_of(
-        readings[0].array, [effect for ids in EFFECT_GROUPS.values() for effect in ids],
+        readings[0].array, [effect for ids in ROUGH_GROUPS.values() for effect in ids],
         readings[0].position_prior_sd,
     )  # fmt: skip
     begun = [Recorded.of(one, columns) for one in readings]
     found = estimate(begun, columns, mask_of(columns, [POSITION]), steps=SETTINGS.group_steps)
     now, _ = Selected(found, tuple(one.readings.keep for one in begun), {}).clocked()
-    return now.with_kept([n for n in EFFECT_GROUPS if n not in (*now.kept, DELAYS)]).fitted().found
+    return now.with_kept([n for n in ROUGH_GROUPS if n not in (*now.kept, DELAYS)]).fitted().found
 
 
 def predicted(recording: Recording, calibration: xr.Dataset) -> pd.DataFrame:
