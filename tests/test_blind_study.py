@@ -5,7 +5,6 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
-import pandas as pd
 import pytest
 import yaml
 
@@ -290,38 +289,6 @@ def test_coverage_is_judged_between_recordings():
     assert line([21], 21)["sure"] is None
 
 
-def test_gain_table_weighs_and_pools():
-    rows = [graded("one", [BIAS], [cause(BIAS)], False, gain) for gain in (1.0, 3.0)]
-    rows += [graded("one", [BIAS], "crash"), graded("clean", [], [])]
-    table = summary.gain_table(summary.recordings(rows)).set_index(["kind", "effect"])
-    line = table.loc["one", BIAS]
-    assert line.recordings == 2 and line.gain == 2.0
-    # 0.1 each: root 2 of it over 2
-    assert line.gain_se == pytest.approx(0.1 / np.sqrt(2))
-    assert line.extended_position_rmse_m == pytest.approx(1e-4)
-    assert line.base_coverage == 0.0 and line.extended_coverage == 1.0
-    assert list(table.index) == [("clean", summary.ALL), ("one", summary.ALL), ("one", BIAS)]
-
-
-def test_detection_bins():
-    sizes = [4.0, 4.0, 7.95, 12.0, 20.0, 50.0, 300.0, 5000.0]
-    rows = [graded("one", [BIAS], [cause(BIAS)] if s > 5 else [], size=s) for s in sizes]
-    rows += [graded("one", ["axis_swap"], [cause(SCALE)], size=2000.0) for _ in range(9)]
-    effects = summary.effects([*rows, graded("pair", [BIAS, SCALE], [])])
-    table = summary.detection(effects, "sigma")
-    bias = table[table.effect == BIAS]
-    assert bias.recordings.tolist() == [2, 1, 1, 1, 1, 1, 1] and bias.share.tolist()[:2] == [0, 1]
-    assert bias.centre.tolist() == pytest.approx([4, 7.95, 12, 20, 50, 300, 5000])
-    swap = table[table.effect == "axis_swap"]
-    assert swap.wrong_share.tolist() == [1.0] and swap.found.sum() == 0
-    assert table[table.effect == summary.ALL].recordings.sum() == 17
-    own = summary.detection(effects, "amplitude")
-    assert own[own.effect == BIAS].recordings.tolist() == [4, 4] and summary.ALL not in {
-        *own.effect
-    }
-    assert len(summary.detection(summary.effects([]), "sigma")) == 0
-
-
 def test_confusion_counts_right_and_wrong_names_apart():
     rows = [graded("one", [DELAY], [CLOCKLIKE]), graded("one", [DELAY], [cause(DELAY)], True)]
     rows += [graded("one", [DELAY], [cause(BIAS)]), graded("one", [DELAY], [])]
@@ -354,15 +321,6 @@ def study_of_everything():
 def test_figures_and_tables(tmp_path):
     given = {"rows": study_of_everything()}
     settings = {"scale": {"name": "quick"}, "seed": 1}
-    for against in ("sigma", "amplitude"):
-        draw, table = drawing.figure_blind_detection(given, against, settings)
-        figure = draw(table)
-        assert set(table.against.dropna()) == {against}
-        titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
-        assert len(titles) == len(CATALOGUE) + (against == "sigma")
-        for axes in figure.axes[: len(titles)]:
-            low, high = axes.get_xlim()
-            assert high > 2.9 * low and len(axes.get_xticks())
     draw, confusion = drawing.figure_blind_confusion(given, settings)
     axes = draw(confusion).axes[0]
     labels = [label.get_text() for label in axes.get_yticklabels()]
@@ -379,8 +337,6 @@ def test_figures_and_tables(tmp_path):
     assert {line.count("|") for line in lines} == {len(drawing.CRITERIA) + 1}
     assert any("short by" in line for line in lines)
     paths["tex"].read_text().encode("latin-1")  # what LaTeX reads as it is
-    write_table(*drawing.table_blind_gain(given, settings), **paths)
-    assert len(pd.read_csv(paths["csv"])) == len(EFFECTS) + len(CATALOGUE) + 5
 
 
 def test_config_names_matrices_that_exist():

@@ -363,6 +363,16 @@ def test_a_lag_within_two_sds_is_none():
     assert "run ahead of" in some
 
 
+def test_filters_are_said_by_what_they_take_of_motion():
+    given = sizes([[1e-5, 0], [1e-5, 0], [3e-5, 0]], ("droop", "skew"), sd=1e-6)
+    all_of_them, one = plain("gyroscope_filter", *given)
+    assert all_of_them.startswith("of motion at 5 Hz the gyroscopes show 0.987")
+    assert "gyroscope 3 shows 1.97" in one and "less than the others" in one
+    lone = [[1e-3, 0, 0], [1e-3, 0, 0], [-2e-3, 1e-5, 0]]
+    (said,) = plain("accelerometer_filter", *sizes(lone, ("lag", "droop", "skew"), sd=1e-7))
+    assert "accelerometer 3 shows 0.8389" in said
+
+
 def test_plain_words_hold_one_against_the_others():
     said = plain("sensor_delay", *sizes([[0.5e-3], [0.5e-3], [-1.0e-3]]))
     assert len(said) == 1 and re.match(r"IMU 3 is read 1.5000\s±\s0.0015 ms late", said[0])

@@ -49,13 +49,6 @@ BLIND = {
     "settings": lambda wc: blind_settings(config, wc.scale),
 }
 draw(
-    "blind.figure_blind_detection",
-    "figure: blind study, detection over {wildcards.against} ({wildcards.scale})",
-    GRADED,
-    output="blind_detection_{against}",
-    **BLIND,
-)
-draw(
     "blind.figure_blind_confusion",
     "figure: blind study, confusion ({wildcards.scale})",
     GRADED,
@@ -64,12 +57,6 @@ draw(
 draw(
     "blind.table_blind_bars",
     "table: blind study, acceptance criteria ({wildcards.scale})",
-    GRADED,
-    **BLIND,
-)
-draw(
-    "blind.table_blind_gain",
-    "table: blind study, gain ({wildcards.scale})",
     GRADED,
     **BLIND,
 )

@@ -21,7 +21,8 @@ MATRICES = ("accelerometer_scale", "accelerometer_misalignment", "gyroscope_scal
             "gyroscope_misalignment")  # fmt: skip
 # Of a triad's row of parameters, the entry that is a delay, and its sign.
 TIMES: dict[str, tuple] = {"sensor_delay": (KINDS, (), 1), "sensor_clock": (KINDS, (3,), -1),
-         "gyroscope_delay": (KINDS[1:], (), 1)}  # fmt: skip
+         "gyroscope_delay": (KINDS[1:], (), 1),
+         "accelerometer_filter": (KINDS[:1], (0,), 1)}  # fmt: skip
 FORMULAS = {
     "corrections": "for each step in turn x = inverse @ (x - offset), each component summed as"
     " (i0 x0 + i1 x1) + i2 x2; x begins as the recording's raw reading, which is axes @ the"

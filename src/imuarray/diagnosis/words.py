@@ -32,6 +32,7 @@ STATED = 3  # parameters that are stated one by one
 OUT = 5.0  # sds, and times the usual distance from the median, from which one stands out
 SURE = 3.0  # sds of a single turn that is spoken of
 SEEN = 2.0  # sds of a lag
+SHOWN_HZ = 5.0  # of a motion by hand, at which filters are compared
 FEW = 4  # IMUs that are spoken of one by one
 # Entries beside a matrix' diagonal (xy, xz, yx, yz, zx, zy) whose difference is a turn about x, y
 # and z, and whose sum is a skew.
@@ -259,6 +260,25 @@ def _lag(sizes: Sizes) -> list[str]:
     return said
 
 
+def _filtered(kind: str, sizes: Sizes) -> list[str]:
+    """By what sensors show less of a motion at `SHOWN_HZ`: gyroscopes, or one among the others."""
+    each = dict(zip(sizes.components, sizes.values.T, strict=True))
+    share = (2 * np.pi * SHOWN_HZ) ** 2
+    less = share * (each["droop"] - each.get("lag", 0.0) ** 2 / 2)
+    sds = share * sizes.sds[:, sizes.components.index("droop")]
+    out, usual = standing_out(less, sds) if len(less) > 2 else (np.zeros(len(less), bool), 0.0)
+    said = [(f"{kind} {sizes.labels[k]} shows", less[k] - usual, sds[k], "the others")
+            for k in np.flatnonzero(out)]  # fmt: skip
+    if "lag" not in each and not out.all():
+        mean, sd = np.mean(less[~out]), np.mean(sds[~out])
+        said.insert(0, ("the gyroscopes show", mean, sd, "the accelerometers"))
+    return [
+        f"of motion at {SHOWN_HZ:g} Hz {shows} {quantity(abs(x), sd, '%')}"
+        f" {'less' if x > 0 else 'more'} than {others}, by a filter"
+        for shows, x, sd, others in said
+    ]
+
+
 def _clocks(sizes: Sizes) -> list[str]:
     period, age = (sizes.components.index(name) for name in ("period", "offset"))
     periods = np.abs(sizes.values[:, period])
@@ -345,6 +365,8 @@ def _places(sizes: Sizes) -> list[str]:
 
 WORDS = {"sensor_delay": _late, "gyroscope_delay": _lag, "sensor_clock": _clocks}
 WORDS["size_effect"] = _places
+WORDS["gyroscope_filter"] = partial(_filtered, "gyroscope")
+WORDS["accelerometer_filter"] = partial(_filtered, "accelerometer")
 for _kind, _unit in (("accelerometer", "m s-2"), ("gyroscope", "rad s-1")):
     WORDS[f"{_kind}_misalignment"] = partial(_turned, _kind)
     WORDS[f"{_kind}_scale"] = partial(_scaled, _kind)

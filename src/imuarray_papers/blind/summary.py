@@ -1,4 +1,4 @@
-"""Graded rows as tables: recordings, effects, detection, confusion, gain and coverage."""
+"""Graded rows as tables: recordings, confusion and coverage."""
 
 from collections import Counter
 
@@ -7,17 +7,15 @@ import pandas as pd
 from scipy.stats import binomtest
 from scipy.stats import t as student
 
-from imuarray_papers.blind.cases import KINDS, SIZES
+from imuarray_papers.blind.cases import KINDS
 from imuarray_papers.blind.inject import EFFECTS
 from imuarray_papers.blind.study import GAINS, MODELS
 
 NOTHING, UNEXPLAINED, CRASH = "nothing", "unexplained", "crash"
-ALL = "all effects"
 STANDARD = {"imus": 8, "sampling_rate": 125.0, "duration": 24.0}  # what the criteria are set for
 LARGE = 8.0  # sigma, from which an effect is to be found
 LEVEL = 0.95  # of all intervals
 REACHED = 0.98  # of a size that was asked for counts as that size
-AMPLITUDE_BINS, PER_BIN = 6, 4  # at most so many bins, with at least so many recordings
 
 
 def share_limits(count: int, number: int) -> tuple[float, float]:
@@ -71,78 +69,6 @@ def recordings(rows: list[dict]) -> pd.DataFrame:
     return pd.DataFrame(lines)
 
 
-def effects(rows: list[dict]) -> pd.DataFrame:
-    """A line for each effect of the truth: sizes, amplitude, found, named, sensors_right, wrong.
-
-    ``sensors`` is "one", "two" or "all"; ``wrong``: whether its recording has a wrong name.
-    """
-    lines = []
-    for row in rows:
-        for effect in row["truth"]:
-            line = {name: row[name] for name in ("case", "kind", "rails")} | effect
-            few = "two" if len(effect["sensors"]) > 1 else "one"
-            many = "all" if effect["sensors"] == ["all"] else few
-            lines.append(line | {"sensors": many, "wrong": bool(row["wrong_names"])})
-    columns = ["case", "kind", "rails", "effect", "sensors", "sigma", "sigma_exact", "amplitude",
-               "unit", "found", "named", "sensors_right", "wrong"]  # fmt: skip
-    return pd.DataFrame(lines, columns=columns)
-
-
-def detection(table: pd.DataFrame, against: str) -> pd.DataFrame:
-    """Rates of single effects found, by size; ``table`` as `effects` returns it.
-
-    ``against``: "sigma" (bins around the sizes of the matrix, and all effects together too) or
-    "amplitude" (bins of equal counts, in each effect's own unit). Crashes count as missed.
-    """
-    single = table[table.kind == "one"]
-    groups = list(single.groupby("effect", sort=False))
-    lines = []
-    for name, part in groups + ([(ALL, single)] if against == "sigma" and groups else []):
-        bins = _sigma_bins(part) if against == "sigma" else _equal_bins(part, against)
-        lines += [_detected(name, against, members) for members in bins]
-    return pd.DataFrame(lines)
-
-
-def _sigma_bins(part: pd.DataFrame) -> list[pd.DataFrame]:
-    """Parts with similar sizes, split halfway between those of the matrix, and by decades above."""
-    levels = np.array([size for size in SIZES if size is not None])
-    edges = [*np.sqrt(levels[1:] * levels[:-1]), 100.0, 1000.0]
-    return [members for _, members in part.groupby(np.digitize(part.sigma, edges))]
-
-
-def _equal_bins(part: pd.DataFrame, column: str) -> list[pd.DataFrame]:
-    """Parts of about equal numbers in the order of ``column``; one if it does not vary."""
-    ordered = part.sort_values(column, kind="stable")
-    count = int(np.clip(len(part) // PER_BIN, 1, AMPLITUDE_BINS))
-    if ordered[column].nunique() == 1:
-        count = 1
-    return [ordered.iloc[places] for places in np.array_split(np.arange(len(part)), count)]
-
-
-def _detected(name: str, against: str, members: pd.DataFrame) -> dict:
-    values, number = members[against].to_numpy(float), len(members)
-    found, wrong = int(members.found.sum()), int(members.wrong.sum())
-    low, high = share_limits(found, number)
-    return {
-        "effect": name,
-        "against": against,
-        "unit": "sigma" if against == "sigma" else members.unit.iloc[0],
-        "smallest": values.min(),
-        # within them: the mean of one value may miss it by a rounding
-        "centre": float(np.clip(np.exp(np.log(values).mean()), values.min(), values.max())),
-        "largest": values.max(),
-        "recordings": number,
-        "found": found,
-        "share": found / number,
-        "low": low,
-        "high": high,
-        "named_itself": int(members.named.sum()),
-        "sensors_right": int(members.sensors_right.sum()),
-        "wrong": wrong,
-        "wrong_share": wrong / number,
-    }
-
-
 def confusion(rows: list[dict]) -> pd.DataFrame:
     """Names by truth, a line for each truth and each name that occurs (or `NOTHING`, ...).
 
@@ -184,39 +110,8 @@ def _columns(row: dict) -> dict[str, bool]:
 
 def _order(kind: str, name: str) -> tuple:
     """Kinds in the matrix' order; all effects first, then each in the registry's."""
-    known = [ALL, *EFFECTS]
+    known = [*EFFECTS]
     return KINDS.index(kind), known.index(name) if name in known else -1
-
-
-def gain_table(table: pd.DataFrame) -> pd.DataFrame:
-    """Gain, position RMSE and coverage by kind and effect; ``table`` from `recordings`.
-
-    Gains are means over recordings (nats per sample, held out), with the standard error that
-    comes of each recording's own; RMSE are pooled, metres; coverage is the mean share of the 3
-    (A - 1) intervals, with the standard error between recordings, whose coordinates go together.
-    """
-    there = table[~table.crash].copy()
-    groups = [(kind, ALL, part) for kind, part in there.groupby("kind")]
-    for kind, part in there[~there.kind.isin(["clean", "pair"])].groupby("kind"):
-        groups += [(kind, effect, few) for effect, few in part.groupby("effects")]
-    lines = [{"kind": kind, "effect": name} | _gained(part) for kind, name, part in groups]
-    lines.sort(key=lambda line: _order(line["kind"], line["effect"]))
-    return pd.DataFrame(lines)
-
-
-def _gained(part: pd.DataFrame) -> dict:
-    number = len(part)
-    line = {"recordings": number}
-    for name in GAINS:
-        line[name] = part[name].mean()
-        line[f"{name}_se"] = np.sqrt(np.sum(part[f"{name}_se"] ** 2)) / number
-        line[f"{name}_median"] = part[name].median()
-    for model in MODELS:
-        size = part[f"{model}_position_rmse_m"].astype(float)
-        line[f"{model}_position_rmse_m"] = np.sqrt(np.mean(size**2))
-        line[f"{model}_position_rmse_median_m"] = size.median()
-        line[f"{model}_coverage"], line[f"{model}_coverage_se"] = coverage(part, model)
-    return line
 
 
 def coverage(part: pd.DataFrame, model: str) -> tuple[float, float]:
