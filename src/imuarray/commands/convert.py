@@ -3,7 +3,8 @@
 import numpy as np
 
 from imuarray.commands.output import Output
-from imuarray.provenance import stamp
+from imuarray.errors import require
+from imuarray.provenance import stamp, write_bytes
 from imuarray.recording import Recording, write_recording
 
 
@@ -20,6 +21,18 @@ def convert_mimu(arguments) -> None:
     attrs = stamp({"source": str(arguments.data)}, 0) | account.attributes()
     write_recording(recording, arguments.out, attrs=attrs)
     _report(arguments, recording, account.lines())
+
+
+def draft_columns(arguments) -> None:
+    """A table's description, guessed from its header and readings; never over another one."""
+    from imuarray.recording.draft import draft
+
+    output, out = Output(arguments), arguments.out
+    require(not out.exists(), str(out), "a new file", "one that is there already")
+    text, asked = draft(arguments.data)
+    write_bytes(text.encode(), out)
+    output.say("\n".join([f"{out}: a draft; look at", *(f"- {line}" for line in asked)]))
+    output.done({"out": str(out), "not_known": asked})
 
 
 def convert_logs(arguments) -> None:

@@ -100,6 +100,13 @@ COMMANDS = (
         folder=True,
     ),
     Command(
+        "columns", "convert.draft_columns",
+        "Draft the YAML that describes a table: columns, units, rate, noise, and what it could not"
+        " know.",
+        "log.csv --out columns.yaml", "YAML to write, a new file",
+        (option("data", "CSV file with a header", type=InputFile),),
+    ),
+    Command(
         "simulate", "simulate.simulate",
         "Simulate a recording; its truth is stored in the group 'truth'.",
         "--out rec.nc", "recording to write (NetCDF-4)",

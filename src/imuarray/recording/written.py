@@ -26,7 +26,7 @@ def form_of(path: Path, named: set[str], given: dict) -> tuple[dict, list[str]]:
 
     The header is the first line that has the most of the columns, as its delimiter parts them.
     """
-    encoding = _encoding(path)
+    encoding = encoding_of(path)
     with open(path, encoding=encoding, errors="replace", newline=None) as file:
         lines = [line.rstrip("\n") for line in islice(file, HEAD)]
     asked = given.get("sep")
@@ -54,7 +54,7 @@ def _cells(line: str, delimiter: str) -> list[str]:
     return [part.strip().strip('"') for part in parts]
 
 
-def _encoding(path: Path) -> str:
+def encoding_of(path: Path) -> str:
     with open(path, "rb") as file:
         start = file.read(SNIFFED)
     for mark, name in MARKS.items():
