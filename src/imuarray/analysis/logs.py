@@ -111,7 +111,8 @@ def _opened(paths, columns, topics) -> Opened:
         return _together(bags.read_bags(logs, columns, topics))
     if columns is None:
         raise InputError(
-            f"{logs[0]}: expected a YAML that describes it, found none: name it by --columns (imuarray columns drafts one)"
+            f"{logs[0]}: expected a YAML that describes it, found none: name it by --columns"
+            " (imuarray columns drafts one)"
         )
     if len(logs) == 1 and logs[0].name.endswith(PACKETS):
         recording, account = read_board(logs[0], Path(columns))
