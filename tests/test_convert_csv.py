@@ -5,6 +5,7 @@ import pytest
 import yaml
 
 from imuarray.errors import InputError
+from imuarray.recording import read_recording, write_recording
 from imuarray.recording.layout import read_layout
 from imuarray.recording.table import load, recording_of
 
@@ -104,6 +105,14 @@ def test_delimiters(tmp_path, delimiter):
     found = read(tmp_path, table(), layout() | {"delimiter": delimiter}, between)
     np.testing.assert_array_equal(found.specific_force, expected.specific_force)
     np.testing.assert_array_equal(found.time, expected.time)
+
+
+def test_a_rate_that_is_declared_is_known_to_a_thousandth(tmp_path):
+    assert np.isnan(read(tmp_path, table()).clock_sd)
+    for own, sd in (({"rate": 100.0}, 1e-3), ({"rate": 100.0, "clock_sd": 1e-5}, 1e-5)):
+        found = read(tmp_path, table(), layout() | {"time": own})
+        write_recording(found, tmp_path / "rec.nc")
+        assert read_recording(tmp_path / "rec.nc").clock_sd == sd
 
 
 def test_scale_is_what_a_count_is_worth(tmp_path):

@@ -317,6 +317,14 @@ def test_recordings_of_a_board_are_fitted_jointly():
     )
 
 
+def test_a_clock_that_is_not_known_makes_the_size_twice_as_uncertain():
+    recording, _ = simulated(2.0)
+    found = [fitted(replace(recording, clock_sd=sd)) for sd in (np.nan, 1e-2)]
+    more = position_sds(found[1]) ** 2 - position_sds(found[0]) ** 2
+    expected = (2e-2 * found[0].positions[1:]) ** 2
+    np.testing.assert_allclose(more, expected, rtol=0.2, atol=1e-3 * expected.max())
+
+
 def test_a_prior_that_the_accelerometers_contradict_is_not_taken():
     """Stamps 0.2 % off: the rates' change is as wrong, and the residual hardly shows it."""
     recording, _ = simulated(6.0)

@@ -71,6 +71,7 @@ class Readings:
     gapless : bool, whether samples have neighbours that say something of time derivatives
     trust : (T, N, 2) square roots of a robust loss' weights, or None for all one
     period : s, of the clocks of sensors that have one, NaN where it is not declared
+    clock_sd : relative, of the steps of time
     resolution : (N, 2) least step between a triad's readings
     wander : (T, N) turns by which the IMUs' clocks depart from a steady drift, or None for none
     labels : N str
@@ -94,6 +95,7 @@ class Readings:
     trust: np.ndarray | None = None
     wander: np.ndarray | None = None
     period: float = np.nan
+    clock_sd: float = 0.0
     resolution: np.ndarray | None = None
 
     @property
@@ -323,7 +325,8 @@ def arrange(recording: Recording, sparse: bool = False) -> Readings:
         ~lost & np.repeat(exists, 3, axis=1), exists, np.tile(noise, (count, 1)),
         np.tile(noise, (count, 1)), runs(time[used]), tuple(longer), recording.position_prior_sd,
         gapless, float(recording.time[0]), recording.gyroscope_common_scale_sd,
-        _left(recording, count), period=recording.output_period, resolution=resolution(values),
+        _left(recording, count), period=recording.output_period,
+        clock_sd=float(np.nan_to_num(recording.clock_sd)), resolution=resolution(values),
     )  # fmt: skip
 
 

@@ -138,14 +138,14 @@ def _formal(found: Estimate) -> np.ndarray:
             # the mean of so many that differ by so much
             prior += np.outer(mean, mean) * len(chosen) / np.var(found.values[chosen], ddof=1)
     out = _lost(found.freedoms) * scaled_inverse(found.information + prior)[:count, :count]
+    # r goes with the rate's scale to the power of -2, and a clock's is in all rates
+    size, pairs = np.zeros(count), np.argwhere(found.active)
+    mine = pairs[:, 1] < 3
+    size[found.places[0][mine]] = 2.0 * found.positions[pairs[mine, 0], pairs[mine, 1]]
+    variance = np.mean([one.readings.clock_sd**2 for one in found.recorded])
     if known and sizes:
-        # r goes with the rate's scale to the power of -2
-        size = np.zeros(count)
-        pairs = np.argwhere(found.active)
-        mine = pairs[:, 1] < 3
-        size[found.places[0][mine]] = 2.0 * found.positions[pairs[mine, 0], pairs[mine, 1]]
-        out += found.scale_sd**2 * np.outer(size, size)
-    return out
+        variance += found.scale_sd**2
+    return out + variance * np.outer(size, size)
 
 
 def _lost(freedoms) -> float:

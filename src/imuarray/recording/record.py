@@ -80,7 +80,7 @@ NUMBERS = {
 }
 
 # Attributes that need not be there.
-OPTIONAL_NUMBERS = {"output_period": "s"}
+OPTIONAL_NUMBERS = {"output_period": "s", "clock_sd": "1"}
 
 # Optional variables without a unit.
 MATRICES = ("map_covariance", "accelerometer_axes")
@@ -210,6 +210,8 @@ class Recording:
     output_period : float, s, NaN where not declared
         Between readings that the sensors make on clocks of their own, where the host takes the
         newest.
+    clock_sd : float, no unit, NaN where the log's clock is taken to run right
+        Relative sd of the steps of time: of a rate that was declared and not stamped.
     title, source, license : str, empty if not known
     selected : str
         How many samples of how many, where these are not all that were recorded; else empty.
@@ -234,6 +236,7 @@ class Recording:
     correction: xr.Dataset | None = None
     alignment: xr.Dataset | None = None
     output_period: float = np.nan
+    clock_sd: float = np.nan
     title: str = ""
     source: str = ""
     license: str = ""

@@ -34,6 +34,7 @@ OFTEN = 0.1  # share of blank cells from which a sensor is slower than the log
 BLANK = "; `incomplete_rows: leave out` keeps the rows that are whole"
 WHITESPACE = r"\s+"  # the one delimiter longer than a character
 HALF = 0.5  # of the rows share their stamps: one row for each sensor, perhaps
+CLOCK_SD = 1e-3  # of a rate that is declared: oscillators of chips are off by up to some 1 %
 LONG = 400  # rows, in which missed readings are bridged; blanks in fewer are a damaged table
 
 
@@ -48,6 +49,7 @@ def recording_of(table: pd.DataFrame, layout, path, columns) -> tuple[Recording,
     given = numbers(layout, name)
     if "output_rate" in layout:
         given["output_period"] = 1 / positive(layout["output_rate"], f"{name}: output_rate")
+    given |= _clock(layout["time"], name)
     triads = layout["accelerometers"]["triads"]
     found = Recording(
         time=time, specific_force=force, angular_rate=rate,
@@ -157,12 +159,12 @@ def _turn(triad, where: str) -> np.ndarray:
 
 def stamps_of(table, section, where, layout_name, blank: bool = False) -> tuple[np.ndarray, float]:
     """A log's stamps, and what one is in s."""
-    if isinstance(section, dict) and set(section) == {"rate"}:
+    keys = set(section) - {"clock_sd"} if isinstance(section, dict) else set()
+    if keys == {"rate"}:
         rate = positive(section["rate"], f"{layout_name}: time: rate")
         return table.index.to_numpy() / rate, 1.0
-    stamped = isinstance(section, dict) and set(section) == {"column", "unit"}
     expected = "'column' and 'unit', or 'rate' in Hz"
-    require(stamped, f"{layout_name}: time", expected, repr(section))
+    require(keys == {"column", "unit"}, f"{layout_name}: time", expected, repr(section))
     name = str(section["column"])
     once = list(table.columns).count(name) == 1
     stamps, unit = written.seconds_of_dates(table[name]) if once else None, 1e-9
@@ -174,6 +176,13 @@ def stamps_of(table, section, where, layout_name, blank: bool = False) -> tuple[
         place = f"{where}: column {name!r}"
         require_plausible_rate(unit * (known - known[0]), place, section["unit"])
     return stamps, unit
+
+
+def _clock(section: dict, where: str) -> dict[str, float]:
+    """What the YAML says of the log's clock, or what a declared rate is worth."""
+    if "clock_sd" in section:
+        return {"clock_sd": positive(section["clock_sd"], f"{where}: time: clock_sd")}
+    return {"clock_sd": CLOCK_SD} if "rate" in section else {}
 
 
 def _time(table, section, where, layout_name) -> tuple[np.ndarray, np.ndarray, list[str]]:
