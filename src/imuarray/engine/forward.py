@@ -49,7 +49,7 @@ EFFECT_GROUPS = {
 }
 # Where motion is rough, what the gyroscopes see of it is free, and filters are in that; two IMUs
 # take their angular acceleration from the gyroscopes.
-ROUGH_GROUPS = {name: ids for name, ids in EFFECT_GROUPS.items() if name not in FILTERS}
+ROUGH_GROUPS = {name: ids for name, ids in EFFECT_GROUPS.items() if not EFFECTS[ids[0]].smooth}
 BENT = 2e-3  # s, a lag of filters that differ: by half its square in droop, a low pass's
 AGREES = 1.02  # times the residual that a prior of omega_dot may make
 CHANCE = 1e-3  # of maps as far from those of first order, of positions as far apart

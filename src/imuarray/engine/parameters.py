@@ -77,8 +77,8 @@ def columns_of(array: Array, effects, position_sd: float) -> Columns:
 
 
 def catalogue_effects(without=()) -> tuple[str, ...]:
-    """The mean effects that a diagnosis considers, in the catalogue's fixed order."""
-    return tuple(n for n, item in EFFECTS.items() if item.diagnosed and n not in without)
+    """The mean effects that any motion may tell: those of a diagnosis, in the catalogue's order."""
+    return tuple(n for n, one in EFFECTS.items() if n not in without and not one.smooth)
 
 
 def prior_precision(columns: Columns, active, resized: bool = True) -> np.ndarray:

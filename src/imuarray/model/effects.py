@@ -129,8 +129,8 @@ class Effect:
     common_sd : float, or one for each as for ``prior_sd``
         Prior sd of what a parameter of all triads has in common, beside each one's own: chips of
         one kind are alike. How much they differ, ``prior_sd`` at first, an estimate finds.
-    diagnosed : bool
-        Whether a diagnosis considers it, too, not the standard sensor model alone.
+    smooth : bool
+        Whether only smooth motion tells it: where it is rough, all that gyroscopes see is free.
     """
 
     id: str
@@ -160,7 +160,7 @@ class Effect:
     own: bool = False
     sized: bool = False
     common_sd: float | tuple = 0.0
-    diagnosed: bool = True
+    smooth: bool = False
 
     @property
     def scope(self) -> str:

@@ -70,7 +70,7 @@ def gyroscope_delay(delay, instant, predicted):
     return later(delay, instant, predicted, accelerometers=False)
 
 
-FILTER = {"derivatives": True, "sampling": True, "diagnosed": False}
+FILTER = {"derivatives": True, "sampling": True, "smooth": True}
 
 
 @effect(
