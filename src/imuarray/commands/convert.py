@@ -24,7 +24,7 @@ def convert_mimu(arguments) -> None:
 
 
 def draft_columns(arguments) -> None:
-    """A table's description, guessed from its header and readings; never over another one."""
+    """A log's description, guessed from its header and readings; never over another one."""
     from imuarray.recording.draft import draft
 
     output, out = Output(arguments), arguments.out

@@ -101,10 +101,13 @@ COMMANDS = (
     ),
     Command(
         "columns", "convert.draft_columns",
-        "Draft the YAML that describes a table: columns, units, rate, noise, and what it could not"
+        "Draft the YAML that describes a log: columns, units, rate, noise, and what it could not"
         " know.",
         "log.csv --out columns.yaml", "YAML to write, a new file",
-        (option("data", "CSV file with a header", type=InputFile),),
+        (
+            option("data", "CSV file with a header; several where IMUs logged each by itself",
+                    type=InputFile, nargs="+"),
+        ),
     ),
     Command(
         "simulate", "simulate.simulate",

@@ -1,6 +1,7 @@
 """A draft of the YAML that describes a table, from its header and its readings."""
 
 import re
+from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -36,33 +37,54 @@ class Triad(NamedTuple):
     columns: tuple[str, str, str]
 
 
-def draft(path: Path) -> tuple[str, list[str]]:
-    """The text of a ``columns.yaml`` for a table, and lines on what it could not know.
+def draft(paths: Sequence[Path]) -> tuple[str, list[str]]:
+    """The text of a ``columns.yaml`` for a table, or for a log of each IMU; and what is not known.
 
-    What is not known for sure is marked by a comment. InputError where the table has no columns
-    that go by x, y and z.
+    What is not known for sure is marked by a comment. InputError where a table has no columns that
+    go by x, y and z, or logs differ in them.
     """
-    table, sep = _read(path)
-    triads = triads_of(list(table.columns))
-    if not any(triad.kind == "accelerometers" for triad in triads):
+    tables = [_read(path) for path in paths]
+    found = [_triads(table, path) for table, path in zip(tables, paths, strict=True)]
+    time, rate, asked = _time(tables[0])
+    prior = ["position_unit: mm", "position_prior: 3.0  # mm, sd: 1.0 where machines placed them"]
+    sections: list[str] = []
+    for kind in KINDS:
+        own = [triad for triad in found[0] if triad.kind == kind]
+        lines, more = _section(tables[0], kind, own, rate)
+        sections, asked = sections + lines, asked + more
+        if len(paths) == 1:
+            place = "  # , position: [?, ?, ?]" if kind == "accelerometers" else ""
+            sections += ["  triads:"] + [
+                f'    "{t.label}": {{columns: [{", ".join(map(_quoted, t.columns))}]}}{place}'
+                for t in own
+            ]
+    parts = [time, *prior, *sections]
+    if len(paths) > 1:
+        six = [name for triad in found[0] for name in triad.columns]
+        for path, triads in zip(paths, found, strict=True):
+            same = [name for triad in triads for name in triad.columns] == six
+            require(same and len(six) == 6, path, "one IMU, its columns as the first log's", six)
+        parts.insert(1, f"columns: [{', '.join(map(_quoted, six))}]")
+        parts += ["imus:"] + [f'  "{path.stem}": {{}}  # position: [?, ?, ?]' for path in paths]
+    asked.append("positions: from the drawing, else they begin from the motion")
+    return "\n".join(parts) + "\n", asked + ["axes: where a chip is turned on the board"] * (
+        len(paths) == 1
+    )
+
+
+def _triads(table: pd.DataFrame, path: Path) -> list[Triad]:
+    """Accelerometers first; InputError for a table without one."""
+    triads = sorted(triads_of(list(table.columns)), key=lambda triad: triad.kind)
+    if not triads or triads[0].kind != "accelerometers":
         raise InputError(
             f"{path}: expected columns of accelerometers that differ by x, y, z (ax1, ay1, az1),"
             f" found {', '.join(map(str, table.columns[:12]))}"
         )
-    time, rate, asked = _time(table)
-    parts = [f"delimiter: {sep!r}"] * (sep != ",") + [time]
-    parts += ["position_unit: mm", "position_prior: 3.0  # mm, sd: 1.0 where machines placed them"]
-    for kind in KINDS:
-        own = [triad for triad in triads if triad.kind == kind]
-        lines, more = _section(table, kind, own, rate)
-        parts, asked = parts + lines, asked + more
-    asked.append("positions: from the drawing, else they begin from the motion")
-    asked.append("axes: where a chip is turned on the board")
-    return "\n".join(parts) + "\n", asked
+    return triads
 
 
-def _read(path: Path) -> tuple[pd.DataFrame, str]:
-    """The table, and its delimiter: the header is the first line as wide as those below it."""
+def _read(path: Path) -> pd.DataFrame:
+    """The table: its header is the first line of words that is as wide as those below it."""
     encoding = written.encoding_of(path)
     with expecting(path, "a CSV file with a header", (OSError, ValueError)):
         with open(path, encoding=encoding, errors="replace") as file:
@@ -75,7 +97,7 @@ def _read(path: Path) -> tuple[pd.DataFrame, str]:
             skipinitialspace=True, comment="#",
         )  # fmt: skip
     table.columns = [str(name).strip() for name in table.columns]
-    return table, sep
+    return table
 
 
 def _header(lines: list[str], sep: str) -> tuple[int, int, str]:
@@ -155,12 +177,6 @@ def _section(table, kind: str, triads: list[Triad], rate: float) -> tuple[list[s
         *([f"  scale: {scale:.6g}"] if scale else []),
         f"  noise: {noise:.2g}  # sd of a reading in the quietest second",
         f"  range: {least[0] if least else largest:g}  # ? full scale, as the chip is set",
-        "  triads:",
-    ]
-    place = "  # , position: [?, ?, ?]" if kind == "accelerometers" else ""
-    out += [
-        f'    "{t.label}": {{columns: [{", ".join(map(_quoted, t.columns))}]}}{place}'
-        for t in triads
     ]
     asked = [f"{kind}: range, the chip's full scale"]
     return out, asked + [f"{kind}: unit"] * (unit == UNKNOWN)
