@@ -45,12 +45,16 @@ def draft(paths: Sequence[Path]) -> tuple[str, list[str]]:
     """
     tables = [_read(path) for path in paths]
     found = [_triads(table, path) for table, path in zip(tables, paths, strict=True)]
-    time, rate, asked = _time(tables[0])
+    six = [name for triad in found[0] for name in triad.columns]
+    for path, triads in zip(paths, found, strict=True):
+        same = len(six) == 6 and [name for triad in triads for name in triad.columns] == six
+        require(same or len(paths) == 1, path, "one IMU, its columns as the first log's", six)
+    (time, rate, asked), table = _time(tables[0]), pd.concat(tables, ignore_index=True)
     prior = ["position_unit: mm", "position_prior: 3.0  # mm, sd: 1.0 where machines placed them"]
     sections: list[str] = []
     for kind in KINDS:
         own = [triad for triad in found[0] if triad.kind == kind]
-        lines, more = _section(tables[0], kind, own, rate)
+        lines, more = _section(table, kind, own, rate)
         sections, asked = sections + lines, asked + more
         if len(paths) == 1:
             place = "  # , position: [?, ?, ?]" if kind == "accelerometers" else ""
@@ -60,10 +64,6 @@ def draft(paths: Sequence[Path]) -> tuple[str, list[str]]:
             ]
     parts = [time, *prior, *sections]
     if len(paths) > 1:
-        six = [name for triad in found[0] for name in triad.columns]
-        for path, triads in zip(paths, found, strict=True):
-            same = [name for triad in triads for name in triad.columns] == six
-            require(same and len(six) == 6, path, "one IMU, its columns as the first log's", six)
         parts.insert(1, f"columns: [{', '.join(map(_quoted, six))}]")
         parts += ["imus:"] + [f'  "{path.stem}": {{}}  # position: [?, ?, ?]' for path in paths]
     asked.append("positions: from the drawing, else they begin from the motion")
