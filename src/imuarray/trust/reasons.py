@@ -92,11 +92,11 @@ def _filters(calibration: xr.Dataset) -> list[str]:
     lower, late = int(lag < 0), of("accelerometer_filter lag")
     if abs(droop) > DROOPS[lower]:
         others = f"the {KINDS[1 - lower]}s'"
-        return [_low(f"the {KINDS[lower]}s' low pass", abs(droop), others)]
+        return [_low(f"the {KINDS[lower]}s' low pass", float(abs(droop)), others)]
     each = {k: x - late[k] ** 2 / 2 for k, x in of("accelerometer_filter droop").items()}
     usual = np.median([*each.values()] or 0.0)
     return [
-        _low(f"the low pass of accelerometer {k}", x - usual, "the others'")
+        _low(f"the low pass of accelerometer {k}", float(x - usual), "the others'")
         for k, x in each.items() if x - usual > DROOPS[0]
     ]  # fmt: skip
 
