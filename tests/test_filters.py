@@ -100,10 +100,14 @@ def test_filters_too_far_apart_are_said(values, word):
 
 
 def test_one_accelerometers_low_pass_is_said():
-    names = [f"accelerometer_filter {what}_{k} s" for what in ("lag", "droop") for k in "abcd"]
+    names = [
+        f"accelerometer_filter {what}_{k} s"
+        for what in ("lag", "droop")
+        for k in ("a", "b", "c", "d 1")
+    ]
     file = xr.Dataset(
         {"effect_parameter": ("parameter", [2e-3] * 3 + [-4e-3] + [-1e-5] * 3 + [3e-5])},
         {"parameter": names},
     )
     (said,) = _filters(file)
-    assert "accelerometer d, of some 19 Hz" in said
+    assert "accelerometer d 1, of some 19 Hz" in said

@@ -83,7 +83,9 @@ def _filters(calibration: xr.Dataset) -> list[str]:
 
     def of(start) -> dict[str, float]:
         found = zip(names[mine := np.char.startswith(names, start)], values[mine], strict=True)
-        return {name.split()[1].split("_", 1)[1]: float(x) for name, x in found}
+        # "effect component_LABEL unit", where a label may have blanks
+        return {name.rpartition(" ")[0].split(" ", 1)[1].split("_", 1)[1]: float(x)
+                for name, x in found}  # fmt: skip
 
     lag, droop = (
         np.mean([*of(start).values()] or 0.0)
