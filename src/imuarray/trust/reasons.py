@@ -66,7 +66,9 @@ def reasons_of_calibration(
         reason if len(whose) == len(several) else f"recording {', '.join(whose)}: {reason}"
         for reason, whose in found.items()
     ]
-    judged = _filters(calibration) + judged + _moved_maps(calibration) + _grows(calibration)
+    first = [reason for reason in judged if reason in known]
+    judged = first + _filters(calibration) + [reason for reason in judged if reason not in known]
+    judged += _moved_maps(calibration) + _grows(calibration)
     if not judged:
         corrected = all(one.correction is not None for one in several)
         judged = unsteady(calibration, corrected, len(several))
