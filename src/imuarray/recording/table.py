@@ -179,7 +179,7 @@ def stamps_of(table, section, where, layout_name, blank: bool = False) -> tuple[
 
 
 def _clock(section: dict, where: str) -> dict[str, float]:
-    """What the YAML says of the log's clock, or what a declared rate is worth."""
+    """Relative sd of the log's clock: the YAML's, or that of a declared rate."""
     if "clock_sd" in section:
         return {"clock_sd": positive(section["clock_sd"], f"{where}: time: clock_sd")}
     return {"clock_sd": CLOCK_SD} if "rate" in section else {}
