@@ -36,14 +36,12 @@ from imuarray.model.effects import EFFECTS
 
 CLOCKS, DELAYS, GYROSCOPES = "clocks of the IMUs", "delay of each IMU", "gyroscope maps"
 LAG, FILTER = "lag of the gyroscopes", "filter of the gyroscopes"
-FILTERS = FILTER, "filters of the accelerometers"
 EFFECT_GROUPS = {
     CLOCKS: (CLOCK,),
     "offsets": OFFSETS,
     DELAYS: ("sensor_delay",),
     LAG: ("gyroscope_delay",),
     FILTER: ("gyroscope_filter",),
-    FILTERS[1]: ("accelerometer_filter",),
     GYROSCOPES: ("gyroscope_scale", "gyroscope_misalignment"),
     "lever arms of the axes": ("size_effect",),
 }
@@ -235,7 +233,7 @@ class Selected(NamedTuple):
         """True where ages show clocks once delays and filters are fitted: their misfit may, too."""
         if not all(one.smooth for one in self.found.recorded):
             return True
-        found = self.with_kept([DELAYS, *FILTERS]).fitted(SETTINGS.rung_again).found
+        found = self.with_kept([DELAYS, FILTER]).fitted(SETTINGS.rung_again).found
         return any(shown_clocks(one, found.columns) for one in found.recorded)
 
     def fitted(self, steps: int = SETTINGS.iterations) -> Selected:
