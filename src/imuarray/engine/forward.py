@@ -33,6 +33,7 @@ from imuarray.engine.widths import (
 from imuarray.errors import InputError
 from imuarray.linear import scaled_inverse
 from imuarray.model.effects import EFFECTS
+from imuarray.model.timing import LONG
 
 CLOCKS, DELAYS, GYROSCOPES = "clocks of the IMUs", "delay of each IMU", "gyroscope maps"
 LAG, FILTER = "lag of the gyroscopes", "filter of the gyroscopes"
@@ -48,7 +49,6 @@ EFFECT_GROUPS = {
 # Where motion is rough, what the gyroscopes see of it is free, and filters are in that; two IMUs
 # take their angular acceleration from the gyroscopes.
 ROUGH_GROUPS = {name: ids for name, ids in EFFECT_GROUPS.items() if not EFFECTS[ids[0]].smooth}
-BENT = 2e-3  # s, a lag of filters that differ: by half its square in droop, a low pass's
 AGREES = 1.02  # times the residual that a prior of omega_dot may make
 CHANCE = 1e-3  # of maps as far from those of first order, of positions as far apart
 LEAST_SHARE = 0.03  # of the variance, by which two estimates may differ at least
@@ -209,7 +209,7 @@ class Selected(NamedTuple):
             found.append(GYROSCOPES)
         if LAG in self.kept:
             each = flat_parameters(columns, self.found.recorded[0].state)
-            if np.abs(each[:, columns.of(*EFFECT_GROUPS[LAG])]).max() > BENT:
+            if np.abs(each[:, columns.of(*EFFECT_GROUPS[LAG])]).max() > LONG:
                 found.append(FILTER)
         return [name for name in found if name in names]
 

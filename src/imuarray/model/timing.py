@@ -47,7 +47,9 @@ def _rate_later(tau, instant, common):
 
 
 DELAY = (("delay",),)
-LONG = 2e-3  # s, a lag of gyroscopes whose square takes derivatives with little noise
+# s, a lag of gyroscopes that is a filter's: a low pass droops by half its square, and such a square
+# takes derivatives with little noise.
+LONG = 2e-3
 
 
 @effect(

@@ -11,6 +11,7 @@ import pandas as pd
 
 from imuarray.errors import InputError, expecting, require
 from imuarray.recording import written
+from imuarray.recording.table import load
 from imuarray.recording.units import FASTEST, GRAVITY, SLOWEST, UNITS
 
 KINDS = {"accelerometers": r"^a|acc|force", "gyroscopes": r"^g|^w|gyr|rate|omega|ang"}
@@ -85,19 +86,13 @@ def _triads(table: pd.DataFrame, path: Path) -> list[Triad]:
 
 def _read(path: Path) -> pd.DataFrame:
     """The table: its header is the first line of words that is as wide as those below it."""
-    encoding = written.encoding_of(path)
     with expecting(path, "a CSV file with a header", (OSError, ValueError)):
-        with open(path, encoding=encoding, errors="replace") as file:
+        with open(path, encoding=written.encoding_of(path), errors="replace") as file:
             lines = [line.rstrip("\n") for line in islice(file, written.HEAD)]
-        _, skip, sep = max(_header(lines, sep) for sep in written.DELIMITERS)
-        cells = [cell.strip() for line in lines[skip + 1 :] for cell in line.split(sep)]
-        comma = sep != "," and any(map(written.DECIMAL_COMMA.fullmatch, cells))
-        table = pd.read_csv(
-            path, sep=sep, skiprows=skip, encoding=encoding, decimal="," if comma else ".",
-            skipinitialspace=True, comment="#",
-        )  # fmt: skip
-    table.columns = [str(name).strip() for name in table.columns]
-    return table
+    width, number, sep = max(_header(lines, sep) for sep in written.DELIMITERS)
+    require(width >= 0, path, "a header with names that differ by x, y, z", "none")
+    names = [name.strip().strip('"') for name in lines[number].split(sep)]
+    return load(path, {"columns": names}, path)[0]
 
 
 def _header(lines: list[str], sep: str) -> tuple[int, int, str]:

@@ -42,14 +42,15 @@ def recording_of(table: pd.DataFrame, layout, path, columns) -> tuple[Recording,
     """A board's table as samples, and what was done to its rows; InputError as `read_tables`."""
     where, name = str(path), str(columns)
     table, account = _whole(table, layout, name)
-    time, rows, lines = _time(table, layout["time"], where, name)
+    section, clock = _clock(layout["time"], name)
+    time, rows, lines = _time(table, section, where, name)
     table = table.iloc[rows]
     force, labels = _sensors(table, layout, "accelerometers", where, name)
     rate, rate_labels = _sensors(table, layout, "gyroscopes", where, name)
     given = numbers(layout, name)
     if "output_rate" in layout:
         given["output_period"] = 1 / positive(layout["output_rate"], f"{name}: output_rate")
-    given |= _clock(layout["time"], name)
+    given |= clock
     triads = layout["accelerometers"]["triads"]
     found = Recording(
         time=time, specific_force=force, angular_rate=rate,
@@ -159,12 +160,12 @@ def _turn(triad, where: str) -> np.ndarray:
 
 def stamps_of(table, section, where, layout_name, blank: bool = False) -> tuple[np.ndarray, float]:
     """A log's stamps, and what one is in s."""
-    keys = set(section) - {"clock_sd"} if isinstance(section, dict) else set()
-    if keys == {"rate"}:
+    if isinstance(section, dict) and set(section) == {"rate"}:
         rate = positive(section["rate"], f"{layout_name}: time: rate")
         return table.index.to_numpy() / rate, 1.0
+    stamped = isinstance(section, dict) and set(section) == {"column", "unit"}
     expected = "'column' and 'unit', or 'rate' in Hz"
-    require(keys == {"column", "unit"}, f"{layout_name}: time", expected, repr(section))
+    require(stamped, f"{layout_name}: time", expected, repr(section))
     name = str(section["column"])
     once = list(table.columns).count(name) == 1
     stamps, unit = written.seconds_of_dates(table[name]) if once else None, 1e-9
@@ -178,11 +179,14 @@ def stamps_of(table, section, where, layout_name, blank: bool = False) -> tuple[
     return stamps, unit
 
 
-def _clock(section: dict, where: str) -> dict[str, float]:
-    """Relative sd of the log's clock: the YAML's, or that of a declared rate."""
-    if "clock_sd" in section:
-        return {"clock_sd": positive(section["clock_sd"], f"{where}: time: clock_sd")}
-    return {"clock_sd": CLOCK_SD} if "rate" in section else {}
+def _clock(section: Any, where: str) -> tuple[Any, dict[str, float]]:
+    """The section without what it says of a board's clock, and that, or a declared rate's sd."""
+    if not isinstance(section, dict):
+        return section, {}
+    rest = {key: value for key, value in section.items() if key != "clock_sd"}
+    if len(rest) < len(section):
+        return rest, {"clock_sd": positive(section["clock_sd"], f"{where}: time: clock_sd")}
+    return rest, {"clock_sd": CLOCK_SD} if "rate" in section else {}
 
 
 def _time(table, section, where, layout_name) -> tuple[np.ndarray, np.ndarray, list[str]]:

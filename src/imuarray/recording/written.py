@@ -55,6 +55,7 @@ def _cells(line: str, delimiter: str) -> list[str]:
 
 
 def encoding_of(path: Path) -> str:
+    """By the byte-order mark, or by what the first bytes can be read as."""
     with open(path, "rb") as file:
         start = file.read(SNIFFED)
     for mark, name in MARKS.items():

@@ -118,7 +118,8 @@ def _moved_maps(calibration: xr.Dataset) -> list[str]:
     return [
         f"the map that still poses gave {kind} {calibration.attrs[f'{kind}_maps_farthest']} does"
         " not hold while the board is twisted: did it turn or come loose in between, or does its"
-        " scale change with the rate, the force or the warmth? Record again, poses before and after"
+        " scale change with the rate, the force or the warmth, or is its filter another one? Record"
+        " again, poses before and after"
         for kind in KINDS if calibration.attrs.get(f"{kind}_maps_hold", 1.0) < HOLD
     ]  # fmt: skip
 

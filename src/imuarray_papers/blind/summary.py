@@ -109,9 +109,8 @@ def _columns(row: dict) -> dict[str, bool]:
 
 
 def _order(kind: str, name: str) -> tuple:
-    """Kinds in the matrix' order; all effects first, then each in the registry's."""
-    known = [*EFFECTS]
-    return KINDS.index(kind), known.index(name) if name in known else -1
+    """Kinds in the matrix' order, effects in the registry's."""
+    return KINDS.index(kind), [*EFFECTS].index(name) if name in EFFECTS else -1
 
 
 def coverage(part: pd.DataFrame, model: str) -> tuple[float, float]:
