@@ -1,5 +1,7 @@
 """Low passes of the chips, filtered at their own rate: found by kind and by chip, or refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -7,6 +9,7 @@ from scipy.signal import lfilter
 
 import imuarray
 from imuarray.engine import forward
+from imuarray.engine.derivatives import derivatives
 from imuarray.engine.fit import flat_parameters
 from imuarray.engine.forward import FILTER, select_forward, with_effects
 from imuarray.engine.readings import arrange
@@ -63,6 +66,16 @@ def test_a_low_pass_of_gyroscopes_is_found(gyroscopes, monkeypatch):
     assert z < 2.5 and off < 15e-6
     monkeypatch.setattr(forward, "EFFECT_GROUPS", forward.ROUGH_GROUPS)
     assert distance(select_forward(readings)[0], truth)[1] > 5 * off
+
+
+def test_runs_too_short_for_a_filter_have_the_derivatives_of_short_ones():
+    readings = arrange(filtered([98] * 4, [98] * 4)[0], sparse=True)
+    readings = replace(readings, run=np.arange(len(readings.time)) // 15)
+    motion = np.concatenate([readings.values[:, 0, 3:], np.zeros((len(readings.time), 6))], axis=1)
+    _, _, second, third, slow = derivatives(readings, motion, readings.array.relative)
+    for one, other in zip((second, third), slow, strict=True):
+        np.testing.assert_array_equal(one.angular_rate, other.angular_rate)
+    assert np.abs(slow.second.angular_rate).max() > 0
 
 
 def test_filters_alike_are_none():

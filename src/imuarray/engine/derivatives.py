@@ -4,18 +4,20 @@ from math import factorial
 
 import numpy as np
 
-from imuarray.engine.readings import Readings, odd_window
+from imuarray.engine.readings import Readings, odd_window, run_lengths
 from imuarray.engine.settings import SETTINGS
 from imuarray.model.effects import Prediction, Slow
 from imuarray.motion.state import lever
+
+MOST = 0.5  # of the samples
 
 
 def derivatives(readings: Readings, motion, positions) -> tuple:
     """Derivatives of a fitted motion (T, ...) that effects look at.
 
     omega double dot, s dot (T, 3), the ideal readings' second and third derivatives, and these
-    over a longer window: a filter undone by noisy ones would only amplify their noise. By
-    quartics, whose noise is independent of the residual's.
+    over a longer window, which most samples must have about them: a filter undone by noisy ones
+    would only amplify their noise. By quartics, whose noise is independent of the residual's.
     """
     rate, turn, force = motion[:, :3], motion[:, 3:6], motion[:, 6:9]
     ideal = lever(rate[:, None], turn[:, None], positions) + force[:, None]
@@ -31,8 +33,10 @@ def derivatives(readings: Readings, motion, positions) -> tuple:
         ]
 
     # at the ends of so long a window a quartic's third derivative has even the wrong sign
-    slow = both(odd_window(readings.time, SETTINGS.slow_window), 3)
-    return along(rate, 2), along(force, 1), *both(), Slow(*slow)
+    longer, short = odd_window(readings.time, SETTINGS.slow_window), both()
+    most = np.mean(run_lengths(readings.run) >= longer) > MOST
+    slow = both(longer, 3) if most else short
+    return along(rate, 2), along(force, 1), *short, Slow(*slow)
 
 
 def polynomial_derivative(time, run, values, window, order, degree=4, ends=None) -> np.ndarray:

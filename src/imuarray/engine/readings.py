@@ -224,12 +224,12 @@ def _stretches(readings: Readings, stretch, used) -> Readings:
     chosen = np.flatnonzero(used)
     both = readings.run[chosen] * (stretch[-1] + 1) + stretch[chosen]
     if readings.gapless:
-        long = _length(both) >= readings.window
+        long = run_lengths(both) >= readings.window
         chosen, both = chosen[long], both[long]
     return replace(readings.select(chosen), run=np.unique(both, return_inverse=True)[1])
 
 
-def _length(run) -> np.ndarray:
+def run_lengths(run) -> np.ndarray:
     """(T,) how many samples are of a sample's run."""
     number = np.unique(run, return_inverse=True)[1]
     return np.bincount(number)[number]
@@ -392,5 +392,5 @@ def _long_runs(time, good) -> np.ndarray:
     if good.sum() > 1:
         # what is left out ends a run, too
         run = (runs(time) + np.cumsum(~good))[good]
-        kept[good] = _length(run) >= odd_window(time)
+        kept[good] = run_lengths(run) >= odd_window(time)
     return kept
