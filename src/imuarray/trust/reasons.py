@@ -45,13 +45,14 @@ def reasons_of_calibration(
     """Why `imuarray.calibrate`'s answer for these recordings is not to be trusted.
 
     The root first. A unit that is named is the root of the rest, which is left out but for what is
-    ``known`` already; else a recording that says little, then what is known, then what follows.
-    That the search ends nowhere follows from either.
+    ``known`` already; else a recording that says little, then what is known, then filters too far
+    apart, then what follows. That the search ends nowhere follows from either.
     """
     several = [recordings] if isinstance(recordings, Recording) else list(recordings)
     found: dict[str, list[str]] = {}
     little: list[str] = []
     limit = RESIDUAL if is_papers(calibration) else TRIAD
+    filters = _filters(calibration)
     for number, recording in enumerate(several, 1):
         places = _places_of(recording, calibration)
         residual = residuals(recording, calibration, places)
@@ -60,14 +61,12 @@ def reasons_of_calibration(
         judged = _judged(recording, places, residual, limit)
         units = [reason for reason in judged if UNIT.search(reason)]
         judged += _drifts(recording) if is_papers(calibration) else []
-        for reason in [*units, *known] if units else [*little, *known, *judged]:
+        for reason in [*units, *known] if units else [*little, *known, *filters, *judged]:
             found.setdefault(reason, []).append(str(number))
     judged = [
         reason if len(whose) == len(several) else f"recording {', '.join(whose)}: {reason}"
         for reason, whose in found.items()
     ]
-    first = [reason for reason in judged if reason in known]
-    judged = first + _filters(calibration) + [reason for reason in judged if reason not in known]
     judged += _moved_maps(calibration) + _grows(calibration)
     if not judged:
         corrected = all(one.correction is not None for one in several)
