@@ -129,7 +129,7 @@ def test_a_changed_source_reruns_what_rests_on_it(quick, tmp_path):
     assert rerun(quick.parents[1], tmp_path / "src") == set()
     for names, rules in (
         (("imuarray_papers/blind/scene.py", "imuarray/report/write.py",
-          "imuarray/report/report.html.j2", "imuarray_papers/studies/joint.py"), set()),
+          "imuarray/report/report.html.j2", "imuarray_papers/studies/sbc.py"), set()),
         (("imuarray_papers/studies/rate_error.py",), {"rate_error", "claims_accelerometers_only",
                                       "figure_2017_fig3", "claims", "quick"}),
         (("imuarray_papers/studies/checks/timing.py",), {"claims_timing", "claims", "quick"}),

@@ -52,7 +52,7 @@ def resting_on(sources, name):
     [
         ("claims/registry.py", {"claims"}),
         ("studies/checks/timing.py", {"claims_timing"}),
-        ("studies/joint.py", {"joint_test"}),
+        ("studies/sbc.py", {"pit_values"}),
         ("blind/study.py", {"blind_diagnose"}),
         ("report/write.py", {"diagnose_recording"}),
         ("diagnosis/settings.py", {"blind_diagnose", "diagnose_recording"}),

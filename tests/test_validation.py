@@ -15,8 +15,7 @@ from imuarray.geometry import positions_of, sub_array
 from imuarray_papers.config import read_config
 from imuarray_papers.figures import uncertainty
 from imuarray_papers.figures.uncertainty import coverage
-from imuarray_papers.posterior.likelihood import Likelihood
-from imuarray_papers.studies import joint, sbc, truths
+from imuarray_papers.studies import sbc, truths
 from imuarray_papers.studies.sbc import METHODS
 from imuarray_papers.studies.truths import setting_from
 from tests.test_pipeline import ROOT
@@ -86,50 +85,6 @@ def test_samplers_agree_truth_by_truth_where_data_determine_little():
     table = coverage(values).set_index("method")
     assert table.apart[methods[0]] < 0.15 and np.isnan(table.apart["NUTS"])
     assert np.all(table.slow == 0)
-
-
-@pytest.mark.parametrize(("name", "rounds"), [("walk", 4000), ("pcn", 4000),
-                                              ("nuts", 2000)])  # fmt: skip
-def test_sampler_and_simulation_by_turns_keep_the_prior(name, rounds):
-    row = joint.joint_test(1, rounds, [name]).iloc[0]
-    assert row.ess_min > 300 and row.rounds == rounds
-    assert row.p > 1e-3
-
-
-def test_the_printed_determinant_does_not_keep_the_prior(monkeypatch):
-    """(25) and (26a) as printed, without the square root."""
-    right = Likelihood.of
-
-    def printed(*arguments, **options):
-        return right(*arguments, determinant="printed", **options)
-
-    monkeypatch.setattr(Likelihood, "of", printed)
-    assert joint.joint_test(1, 8000, ["walk"]).p[0] < 1e-3
-
-
-def test_noise_that_is_not_the_declared_one_does_not_either(monkeypatch):
-    """Half as large again."""
-    measure = joint.measure
-
-    def louder(model, *arguments):
-        noise = type(model.noise)(1.5**2 * model.noise.accelerometer, model.noise.gyroscope)
-        return measure(type(model)(model.array, noise), *arguments)
-
-    monkeypatch.setattr(joint, "measure", louder)
-    assert joint.joint_test(1, 6000, ["pcn"]).p[0] < 1e-3
-
-
-def test_a_sampler_that_does_not_look_at_the_data_is_seen(monkeypatch):
-    """Draws from the prior keep the prior: the misfit shows it."""
-
-    def blind(target, theta, log_target, step, count, rng):
-        theta[:] = target.prior.mean + target.prior.sd * rng.standard_normal(theta.size)
-        return count, log_target
-
-    monkeypatch.setattr(joint.CompiledTarget, "transitions", blind)
-    row = joint.joint_test(1, 2000, ["walk"]).iloc[0]
-    assert row.p < 1e-3 and row.misfit_z > 5
-    assert max(row.mean_z, row.square_z) < 4
 
 
 def test_local_optima_are_told_by_their_residuals_and_left():

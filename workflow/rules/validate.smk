@@ -27,25 +27,6 @@ rule pit_values:
         "../scripts/pit_values.py"
 
 
-rule joint_test:
-    output:
-        "results/{scale}/validation/joint.csv",
-    log:
-        "results/{scale}/logs/validation/joint.log",
-    benchmark:
-        "results/{scale}/benchmarks/validation/joint.tsv"
-    resources:
-        mem_mb=3000,
-        runtime=120,
-    params:
-        settings=sections("paper2021", "validation"),
-        code=code("joint_test"),
-    message:
-        "validation: joint distribution test ({wildcards.scale})"
-    script:
-        "../scripts/joint_test.py"
-
-
 ALL_PIT_VALUES = {
     "pit_values": lambda wc: expand(PIT_VALUES, scale=wc.scale, part=range(CORES.parts(wc.scale)))
 }
@@ -60,11 +41,5 @@ draw(
     "uncertainty.table_validation_coverage",
     "table: validation, coverage ({wildcards.scale})",
     ALL_PIT_VALUES,
-    settings=sections("paper2021", "validation"),
-)
-draw(
-    "uncertainty.table_validation_joint",
-    "table: validation, joint distribution test ({wildcards.scale})",
-    {"rows": "results/{scale}/validation/joint.csv"},
     settings=sections("paper2021", "validation"),
 )

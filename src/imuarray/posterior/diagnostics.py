@@ -32,11 +32,6 @@ def ess(draws) -> np.ndarray:
     return _arviz("ess", draws, method="bulk")
 
 
-def ess_of_mean(draws) -> np.ndarray:
-    """Effective sample size of the plain mean: independent draws that would estimate it as well."""
-    return _arviz("ess", draws, method="mean")
-
-
 def pareto_k(log_weights) -> float:
     """Shape of the tail of importance weights: their moments up to 1 / k exist; inf if none do."""
     import arviz

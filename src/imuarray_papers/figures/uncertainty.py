@@ -67,23 +67,6 @@ COVERAGE_NOTE = (
     " Slow: fewer than 50 of 199 kept draws are worth an independent one. Farthest from NUTS: the"
     " largest rms difference between both methods' PIT values of one truth; 0.05 is chance."
 )
-JOINT = (
-    Column("sampler", "sampler", "sampler"),
-    Column("rounds", "rounds", "rounds"),
-    Column("parameters", "unknowns", "unknowns"),
-    Column("ess_min", "smallest effective size", "ESS", "{:.0f}"),
-    Column("mean_z", "largest |z| of means", r"$|z|$, means", "{:.2f}"),
-    Column("square_z", "largest |z| of squares", r"$|z|$, squares", "{:.2f}"),
-    Column("misfit_z", "|z| of the misfit", r"$|z|$, misfit", "{:.2f}"),
-    Column("p", "p", "$p$", "{:.2g}"),
-)
-JOINT_NOTE = (
-    "Measurements are drawn given the positions, then the positions moved by the sampler given the"
-    " measurements, over and over: right samplers leave the positions' prior as it is, and the"
-    " misfit between both as in independent draws. z: means of the coordinates and their squares"
-    " against the prior's, of the misfit against the independent ones', in Monte Carlo standard"
-    " errors; p: of the largest, times the number of comparisons."
-)
 
 
 def table_theory_ranks(rows: pd.DataFrame, settings: dict):
@@ -259,12 +242,6 @@ def table_validation_coverage(pit_values: list[pd.DataFrame], settings: dict):
     table = coverage(pd.concat(pit_values))
     notes = [COVERAGE_NOTE, scale_line(settings)]
     return table, COVERAGE, "How often intervals hold the truth.", notes
-
-
-def table_validation_joint(rows: pd.DataFrame, settings: dict):
-    """The joint test of samplers and simulation; ``rows``: `studies.joint`."""
-    caption = "Samplers and simulation by turns: do the positions keep their prior?"
-    return rows, JOINT, caption, [JOINT_NOTE, scale_line(settings)]
 
 
 def histogram(values: pd.DataFrame) -> pd.DataFrame:

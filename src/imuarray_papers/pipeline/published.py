@@ -31,7 +31,7 @@ PLACES = {
     ),
     "theory_ranks": ("{scale}/tables/{name}", "paper2017 paper2021 theory"),
     "validation_ranks": ("{scale}/figures/{name}", "paper2021 validation"),
-    "validation_(?:coverage|joint)": ("{scale}/tables/{name}", "paper2021 validation"),
+    "validation_coverage": ("{scale}/tables/{name}", "paper2021 validation"),
     "blind_confusion": ("blind/{scale}/figures/{name}", "blind"),
     "blind_bars": ("blind/{scale}/tables/{name}", "blind"),
     "diagnosis_.*": ("measured/tables/{name}", "measured"),

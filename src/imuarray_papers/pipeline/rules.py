@@ -11,7 +11,7 @@ SIZES = {  # the sizes of a scale that a section of the configuration goes with
     "paper2021": ("variance_realisations", "acceptance_steps", "draws", "transitions"),
     "experiment": ("experiment_transitions", "measured_transitions"),
     "theory": ("theory_realisations", "theory_repeats"),
-    "validation": ("validation_replicates", "validation_rounds"),
+    "validation": ("validation_replicates",),
 }
 ALWAYS = ("seed", "array", "noise")
 
