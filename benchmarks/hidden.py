@@ -17,10 +17,10 @@ import pandas as pd
 
 from imuarray.recording import read_recording
 from imuarray_papers.blind.cases import Case, make
-from imuarray_papers.blind.inject import CATALOGUE, EFFECTS
-from imuarray_papers.blind.measured import NOT_FROM_READINGS, hide
+from imuarray_papers.blind.inject import CATALOGUE
+from imuarray_papers.blind.measured import SHOWN, hide
 
-SCALABLE = [n for n in CATALOGUE if n not in NOT_FROM_READINGS and EFFECTS[n].scalable]
+SCALABLE = [name for name in CATALOGUE if name in SHOWN]
 
 
 def named(found) -> dict[str, tuple]:

@@ -279,6 +279,13 @@ def _filtered(kind: str, sizes: Sizes) -> list[str]:
     ]
 
 
+def _curved(sizes: Sizes) -> list[str]:
+    rate = np.radians(1000.0)
+    mean, sd = rate * np.mean(sizes.values), rate * np.mean(sizes.sds)
+    more = "more" if mean > 0 else "less"
+    return [f"at 1000 deg/s the gyroscopes show {quantity(abs(mean), sd, '%')} {more} than at rest"]
+
+
 def _clocks(sizes: Sizes) -> list[str]:
     period, age = (sizes.components.index(name) for name in ("period", "offset"))
     periods = np.abs(sizes.values[:, period])
@@ -365,6 +372,7 @@ def _places(sizes: Sizes) -> list[str]:
 
 WORDS = {"sensor_delay": _late, "gyroscope_delay": _lag, "sensor_clock": _clocks}
 WORDS["size_effect"] = _places
+WORDS["gyroscope_curve"] = _curved
 WORDS["gyroscope_filter"] = partial(_filtered, "gyroscope")
 WORDS["accelerometer_filter"] = partial(_filtered, "accelerometer")
 for _kind, _unit in (("accelerometer", "m s-2"), ("gyroscope", "rad s-1")):

@@ -37,17 +37,19 @@ from imuarray.model.timing import LONG
 
 CLOCKS, DELAYS, GYROSCOPES = "clocks of the IMUs", "delay of each IMU", "gyroscope maps"
 LAG, FILTER = "lag of the gyroscopes", "filter of the gyroscopes"
+CURVE = "curve of the gyroscopes"
 EFFECT_GROUPS = {
     CLOCKS: (CLOCK,),
     "offsets": OFFSETS,
     DELAYS: ("sensor_delay",),
     LAG: ("gyroscope_delay",),
     FILTER: ("gyroscope_filter",),
+    CURVE: ("gyroscope_curve",),
     GYROSCOPES: ("gyroscope_scale", "gyroscope_misalignment"),
     "lever arms of the axes": ("size_effect",),
 }
-# Where motion is rough, what the gyroscopes see of it is free, and filters are in that; two IMUs
-# take their angular acceleration from the gyroscopes.
+# Where motion is rough, what the gyroscopes see of it is free, and these are in that; two IMUs take
+# their angular acceleration from the gyroscopes.
 ROUGH_GROUPS = {name: ids for name, ids in EFFECT_GROUPS.items() if not EFFECTS[ids[0]].smooth}
 AGREES = 1.02  # times the residual that a prior of omega_dot may make
 CHANCE = 1e-3  # of maps as far from those of first order, of positions as far apart
@@ -119,9 +121,9 @@ def select_forward(
     """
     names = groups_of(readings)
     columns, begun = _begun(readings, names)
-    if FILTER in names and (readings[0].pair or not all(one.smooth for one in begun)):
-        names = [name for name in names if name in ROUGH_GROUPS]
-        columns, begun = _begun(readings, names)
+    rough = [name for name in names if name in ROUGH_GROUPS]
+    if rough != names and (readings[0].pair or not all(one.smooth for one in begun)):
+        names, (columns, begun) = rough, _begun(readings, rough)
     found = estimate(begun, columns, mask_of(columns, [POSITION]), steps=SETTINGS.group_steps)
     now = Selected(found, tuple(one.readings.keep for one in begun), {})
     clocks, groups = [], []
@@ -142,17 +144,32 @@ def select_forward(
         return now.found, clocks + groups
     found = now.fitted().found
     late = any(map(_needs_neighbours, now.kept))
-    pair = readings[0].pair
-    if all(one.smooth for one in found.recorded) and (pair or not late):
-        begun = [
-            replace(one, state=turned(one.readings, one.state, follows=True))
-            for one in found.recorded
-        ]
-        better = estimate(begun, columns, found.active)
-        alike = better.residual_ratio() < AGREES * found.residual_ratio()
-        if pair or (alike and _of_one_truth(found, better)):
-            found = better
+    if all(one.smooth for one in found.recorded) and (readings[0].pair or not late):
+        found, curved = _with_slope(found, now.kept, CURVE in names)
+        groups = [group for group in groups if group.name not in curved] + [*curved.values()]
     return settled(found), clocks + groups
+
+
+def _with_slope(found: Estimate, kept: dict, curve: bool) -> tuple[Estimate, dict]:
+    """With the rate's own change as a prior of omega_dot, where that is of one truth with readings.
+
+    Angular acceleration is largest where rates are small, so that it tells a gyroscope whose scale
+    changes with the rate from a larger array: whether a ``curve`` is tested; {group: its gain}.
+    """
+    begun = [
+        replace(one, state=turned(one.readings, one.state, follows=True)) for one in found.recorded
+    ]
+    better, pair = estimate(begun, found.columns, found.active), found.recorded[0].readings.pair
+    if pair:
+        return better, {}
+    if better.residual_ratio() >= AGREES * found.residual_ratio():
+        return found, {}
+    if curve and CURVE not in kept:
+        mask = mask_of(found.columns, EFFECT_GROUPS[CURVE])
+        (group,) = gains(better, {CURVE: mask}, kept)
+        if group.kept:
+            return estimate(better.recorded, found.columns, found.active | mask), {CURVE: group}
+    return better if _of_one_truth(found, better) else found, {}
 
 
 def _begun(readings: Sequence[Readings], names) -> tuple[Columns, list[Recorded]]:

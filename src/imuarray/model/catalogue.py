@@ -144,6 +144,18 @@ def gyroscope_nonlinearity(curvature, instant, predicted):
     return predicted._replace(angular_rate=rate + curvature * rate**2)
 
 
+@effect(
+    "gyroscope_curve", unit="s rad-1", prior_sd=0.001 / FULL_SCALE_RATE,
+    common_sd=0.002 / FULL_SCALE_RATE, shape=lambda a, g: (g, 1), components=(("curve",),),
+    smooth=True,
+    meaning="the gyroscopes' scale changes with the rate", against="angular rate",
+)  # fmt: skip
+def gyroscope_curve(curvature, instant, predicted):
+    """(1 + c |omega_i|) omega_i, alike to both sides; the prior is as that of the nonlinearity."""
+    rate = predicted.angular_rate
+    return predicted._replace(angular_rate=rate * (1.0 + curvature * jnp.abs(rate)))
+
+
 data_effect(
     "stale_samples", kind="readings", meaning="former samples are repeated",
     remedy="repeated readings are left out", left_out=True,

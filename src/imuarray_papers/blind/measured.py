@@ -13,7 +13,8 @@ from imuarray_papers.blind.scene import Field, Pair
 from imuarray_papers.blind.study import classes
 
 NOT_FROM_READINGS = tuple(name for name, entry in EFFECTS.items() if not entry.from_readings)
-SHOWN = 2.0  # times the smallest size that a recording shows
+# Of which `diagnosis.json` has sizes that are the drawn parameters' own; a drift's are others.
+SHOWN = [n for n in EFFECTS if n not in (*NOT_FROM_READINGS, "bias_drift") and EFFECTS[n].scalable]
 
 
 class MeasuredScene:
@@ -136,7 +137,7 @@ def _within_rails(new, old, at_rail, limit) -> tuple[np.ndarray, np.ndarray]:
 
 
 def hide(
-    recording: Recording, document: dict, seed: int, times: float = SHOWN, effects=EFFECTS
+    recording: Recording, document: dict, seed: int, times: float = 2.0, effects=EFFECTS
 ) -> tuple[Recording, dict]:
     """The recording with an effect on one IMU, drawn from ``seed``, and the truth as plain JSON.
 
@@ -146,15 +147,28 @@ def hide(
     there = set().union(*classes(document["causes"]).values())
     known = {
         name: entry for name, entry in document["detectable"].items()
-        if name in effects and name not in (*NOT_FROM_READINGS, *there) and EFFECTS[name].scalable
+        if name in effects and name in SHOWN and name not in there
     }  # fmt: skip
     rng = stream(seed, "blind", "hidden", "measured")
     effect = str(rng.choice(sorted(known)))
     label = str(rng.choice(sorted(known[effect]["sizes"])))
-    least = float(np.median(list(known[effect]["sizes"][label].values())))
     given = recording, effect, (recording.accelerometer_labels.index(label),)
     drawn = next(iter(measured_change(*given, 1.0, seed).parameters.values()))
-    size = times * least / float(np.linalg.norm(drawn.value))
+    size = times / in_least(drawn.value, known[effect]["sizes"][label])
     change = measured_change(*given, size, seed)
-    truth = {"effect": effect, "sensors": [label], "least": least, **change.described()}
+    truth = {"effect": effect, "sensors": [label], "times": times, **change.described()}
     return inject_measured(*given, size, seed), {"effects": [truth]}
+
+
+def in_least(drawn, sizes: dict[str, float]) -> float:
+    """Root sum of squares of an IMU's ``drawn`` (1, ...) parameters in the least that show.
+
+    Those without a size show in nothing.
+    """
+    [values] = np.asarray(drawn, float)
+    if not values.ndim:
+        return abs(float(values)) / next(iter(sizes.values()))
+    names = ["".join("xyz"[axis] for axis in place) for place in np.ndindex(values.shape)]
+    shown = [x / sizes[name] for name, x in zip(names, values.ravel(), strict=True)
+             if name in sizes]  # fmt: skip
+    return float(np.linalg.norm(shown))
