@@ -31,7 +31,6 @@ def named(found) -> dict[str, tuple]:
 
 def tried(given, place, seconds, seed, times, effects, drawn):
     """Rows of one recording: {effect, times, named, right, others, recording}."""
-    from imuarray.diagnosis.detectable import detectable
     from imuarray.diagnosis.procedure import run_procedure
 
     if isinstance(given, Path):
@@ -42,7 +41,7 @@ def tried(given, place, seconds, seed, times, effects, drawn):
     first = run_procedure(recording)
     before = named(first)
     classes = [{"effect": e, "indistinguishable_from": sorted(c)} for e, (c, _) in before.items()]
-    document = {"causes": classes, "detectable": detectable(first.search)}
+    document = {"causes": classes, "detectable": first.search.detectable}
     rows = [{"recording": name, "effect": "", "times": 0.0, "others": " ".join(sorted(before))}]
     wanted = [(n, (e,)) for n, e in enumerate(effects)] if not drawn else [
         (n, tuple(effects)) for n in range(drawn)

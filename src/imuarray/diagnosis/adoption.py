@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from imuarray.diagnosis.detectable import detectable
 from imuarray.diagnosis.scores import (
     Candidate,
     Information,
@@ -75,6 +76,7 @@ def log_odds(search: Search, score) -> float:
 def adopt(search: Search, proposed=None) -> Search:
     """Forward: adopt while a test is significant, large enough and gains on held-out time.
 
+    What else would have been adopted is `detectable` there.
     ``proposed``: the `proposals` at the search as it is, where they are known.
     """
     vain = 0
@@ -88,7 +90,7 @@ def adopt(search: Search, proposed=None) -> Search:
         adopted = len(found.trace) > len(search.trace)
         proposed, vain = (None, 0) if adopted else (proposed[1:], vain + 1)
         search = found
-    return search
+    return replace(search, detectable=detectable(search))
 
 
 def likely(search: Search, score) -> bool:
@@ -126,9 +128,8 @@ def attempt(search: Search, score, values) -> Search:
 
 def keeps(search: Search, score, gain: float, error: float) -> bool:
     """True of a gain on held-out time that is clear, and a fair part of what the test predicted."""
-    least = SETTINGS.least_z if search.smooth else SETTINGS.rough_z
     predicted = score.statistic / 2 - SETTINGS.uncertain
-    return gain > least * error and gain > SETTINGS.kept * predicted
+    return gain > search.least_z * error and gain > SETTINGS.kept * predicted
 
 
 def predicted_gain(search: Search, candidate: Candidate, values) -> tuple[float, float]:

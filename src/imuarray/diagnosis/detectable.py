@@ -6,11 +6,14 @@ from scipy import special
 from imuarray.diagnosis.scores import Information, candidates, mask_of
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Search
+from imuarray.engine.heldout import normal_blocks
 from imuarray.engine.parameters import Columns
+from imuarray.linear import scaled_inverse
 from imuarray.model.array_model import component, unit_of
 from imuarray.model.effects import EFFECTS
 
 POWER = 0.8  # chance to be named of an effect of the size that is stated
+DEVIATES = special.ndtri(POWER)
 
 
 def detectable(search: Search) -> dict[str, dict]:
@@ -20,25 +23,28 @@ def detectable(search: Search) -> dict[str, dict]:
     that motion or positions take up are left out, as are effects that a scan looks for.
     From the score test's noncentral chi-square: with the score's slope M, the inverse covariance
     W along the directions seen and the least noncentrality that passes the level and the share of
-    the misfit that a cause must explain, size_i^2 = lambda / (M W M)_ii.
+    the misfit that a cause must explain, size_i^2 = lambda / (M W M)_ii. Its gain on held-out time
+    must exceed its error as often, which is as large as blocks of time scatter.
     """
     given, columns = search.given, search.columns
     active = given.places(search.active)
     inside = {part for c in search.causes for part in EFFECTS[c.effect].contains}
     effects = [effect for effect in search.effects if effect not in inside]
     every = candidates(columns, search.readings.exists, effects)
+    scores = np.array([score for _, score in normal_blocks(search.fit, search.fit.described)])
     found: dict[str, dict] = {}
     for candidate in every:
         mask = mask_of(columns, candidate)
-        chosen = np.sort(given.places(mask))
+        chosen = np.setdiff1d(given.places(mask), active)
         if len(candidate.imus) > 1 or not len(chosen):
             continue
-        seen = given.seen(given.conditional(np.setdiff1d(active, chosen), of=chosen), chosen)
+        seen = given.seen(given.conditional(active, of=chosen), chosen)
         tests = sum(each.effect == candidate.effect and not each.whole for each in every)
         least = max(noncentrality(search, candidate.effect, tests, len(seen.values)), search.least)
         slope = (seen.vectors * seen.values) @ np.linalg.cholesky(seen.precision)
         shown = np.sum(slope**2, axis=1)
-        sizes = np.sqrt(least / np.maximum(shown, 1e-30)) / seen.scale
+        clear = 2 * (search.least_z + DEVIATES) * scatter(given, scores, active, chosen)
+        sizes = np.sqrt(np.maximum(least, clear**2) / np.maximum(shown, 1e-30)) / seen.scale
         label = search.readings.labels[candidate.imus[0]]
         entry = found.setdefault(candidate.effect, {"units": {}, "sizes": {}})
         own = entry["sizes"].setdefault(label, {})
@@ -49,6 +55,18 @@ def detectable(search: Search) -> dict[str, dict]:
                 own[name] = min(float(size), own.get(name, np.inf))
                 entry["units"][name] = unit_of(candidate.effect, place)
     return {effect: entry for effect, entry in found.items() if entry["units"]}
+
+
+def scatter(given: Information, scores, active, chosen) -> np.ndarray:
+    """Sds of the scores of ``chosen`` places between blocks (B, K), in those of white noise.
+
+    All at the ``active`` places refitted. At least 1.
+    """
+    square, cross = np.ix_(active, active), given.information[np.ix_(chosen, active)]
+    gain = cross @ scaled_inverse(given.information[square] + given.precision[square])
+    left = scores[:, chosen] - scores[:, active] @ gain.T
+    own = np.diag(given.information)[chosen] - np.sum(gain * cross, axis=1)
+    return np.sqrt(np.maximum(len(scores) * np.var(left, axis=0, ddof=1) / own, 1.0))
 
 
 def noncentrality(search: Search, effect: str, tests: int, freedom: int) -> float:

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 import imuarray
-from imuarray.diagnosis.detectable import detectable
 from imuarray.diagnosis.noise import per_triad, standardised
 from imuarray.diagnosis.noise_effects import held_out
 from imuarray.diagnosis.procedure import Found, run_procedure
@@ -131,7 +130,7 @@ def diagnose(
         "discrepancies_after": [d.as_dict() for d in extended.discrepancies],
         "noise_sd": noise_of(found),
         "gain": gains(base, inflated, extended),
-        "detectable": detectable(search),
+        "detectable": search.detectable,
     }
     return Diagnosis(document, recording, found, base, inflated, extended)
 

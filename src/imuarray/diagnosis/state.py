@@ -7,7 +7,7 @@ zero, and on held-out time.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -92,6 +92,7 @@ class Search:
     excess : of the misfit over its degrees of freedom, before any cause
     jumps : (T, N, 6) bool, readings left out near a clock's jump
     allowed : (T, N, 6) bool, readings that count, outliers included
+    detectable : smallest sizes that would have been adopted, as `detectable` has them
     """
 
     readings: Readings
@@ -108,6 +109,7 @@ class Search:
     jumps: np.ndarray | bool = False
     allowed: np.ndarray | None = None
     trace: tuple[Adoption, ...] = ()
+    detectable: dict[str, dict] = field(default_factory=dict)
 
     @cached_property
     def active(self) -> np.ndarray:
@@ -147,6 +149,11 @@ class Search:
         """
         share = SETTINGS.share * (1.0 if self.smooth else SETTINGS.rough_share)
         return max(share * self.left, SETTINGS.trace * self.excess)
+
+    @property
+    def least_z(self) -> float:
+        """Standard errors that a cause's gain on held-out time must have."""
+        return SETTINGS.least_z if self.smooth else SETTINGS.rough_z
 
     def fitted(self, former: State | None = None) -> Search:
         """With the papers' model fitted, or what another search came to (``former``)."""
