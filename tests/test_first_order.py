@@ -413,6 +413,15 @@ def test_poses_read_in_coarse_steps_are_as_uncertain_as_a_step():
     assert (found > 0).all(axis=(0, 2)).any()
 
 
+def test_a_dead_band_says_nothing_of_noise():
+    recording, _, _, bias, *_ = board(np.random.default_rng(3))
+    rate = recording.angular_rate - bias
+    dead = replace(recording, angular_rate=np.where(np.abs(rate) < 0.02, 0.0, rate))
+    found = calibrate_first_order(dead, GRAVITY)
+    assert np.all(found.gyroscope_noise == recording.gyroscope_noise_sd)
+    assert not np.any(found.gyroscope_smoothing) and not np.any(found.gyroscope_correlation)
+
+
 def test_gravity_that_was_taken_out_is_named():
     mean = 0.3 * directions(15, np.random.default_rng(16))[:, None] * np.ones((1, 3, 1))
     with pytest.raises(InputError, match="gravity .* found 0.3 m/s.2: it was taken out"):

@@ -33,6 +33,7 @@ OUT = 5.0  # sds, and times the usual distance from the median, from which one s
 SURE = 3.0  # sds of a single turn that is spoken of
 SEEN = 2.0  # sds of a lag
 SHOWN_HZ = 5.0  # of a motion by hand, at which filters are compared
+FAST = np.radians(1000.0)  # rad/s, at which what grows with the rate is said
 FEW = 4  # IMUs that are spoken of one by one
 # Entries beside a matrix' diagonal (xy, xz, yx, yz, zx, zy) whose difference is a turn about x, y
 # and z, and whose sum is a skew.
@@ -280,10 +281,21 @@ def _filtered(kind: str, sizes: Sizes) -> list[str]:
 
 
 def _curved(sizes: Sizes) -> list[str]:
-    rate = np.radians(1000.0)
-    mean, sd = rate * np.mean(sizes.values), rate * np.mean(sizes.sds)
+    mean, sd = FAST * np.mean(sizes.values), FAST * np.mean(sizes.sds)
     more = "more" if mean > 0 else "less"
     return [f"at 1000 deg/s the gyroscopes show {quantity(abs(mean), sd, '%')} {more} than at rest"]
+
+
+def _with_rate(sizes: Sizes) -> list[str]:
+    """Of accelerometers whose readings grow with the square of the rate, against the others'."""
+    values = FAST**2 * (sizes.values - np.median(sizes.values, axis=0))
+    sds, said = FAST**2 * sizes.sds, []
+    for label, value, sd in zip(sizes.labels, values, sds, strict=True):
+        if np.any(np.abs(value) > OUT * sd):
+            rows = zip(sizes.components, value, sd, strict=True)
+            axes = joined(f"{axis} {quantity(x, error, 'm s-2')}" for axis, x, error in rows)
+            said.append(f"at 1000 deg/s accelerometer {label} is off by {axes}")
+    return said or ["accelerometers' offsets by the rate are allowed for, and none is surely there"]
 
 
 def _clocks(sizes: Sizes) -> list[str]:
@@ -372,6 +384,7 @@ def _places(sizes: Sizes) -> list[str]:
 
 WORDS = {"sensor_delay": _late, "gyroscope_delay": _lag, "sensor_clock": _clocks}
 WORDS["size_effect"] = _places
+WORDS["accelerometer_rate_square"] = _with_rate
 WORDS["gyroscope_curve"] = _curved
 WORDS["gyroscope_filter"] = partial(_filtered, "gyroscope")
 WORDS["accelerometer_filter"] = partial(_filtered, "accelerometer")

@@ -37,7 +37,7 @@ from imuarray.model.timing import LONG
 
 CLOCKS, DELAYS, GYROSCOPES = "clocks of the IMUs", "delay of each IMU", "gyroscope maps"
 LAG, FILTER = "lag of the gyroscopes", "filter of the gyroscopes"
-CURVE = "curve of the gyroscopes"
+CURVE, SQUARE = "curve of the gyroscopes", "rates in accelerometers"
 EFFECT_GROUPS = {
     CLOCKS: (CLOCK,),
     "offsets": OFFSETS,
@@ -46,6 +46,7 @@ EFFECT_GROUPS = {
     FILTER: ("gyroscope_filter",),
     CURVE: ("gyroscope_curve",),
     GYROSCOPES: ("gyroscope_scale", "gyroscope_misalignment"),
+    SQUARE: ("accelerometer_rate_square",),
     "lever arms of the axes": ("size_effect",),
 }
 # Where motion is rough, what the gyroscopes see of it is free, and these are in that; two IMUs take

@@ -16,6 +16,7 @@ from imuarray.firstorder.still import (
     SHORTEST,
     averaged_sd,
     lag_correlation,
+    outside_dead_band,
     reading_sd,
     smoothing,
     steps_sd,
@@ -189,7 +190,9 @@ def _still(recording: Recording, shortest: float) -> Still:
     poses = still_poses(recording, shortest=shortest)
     rate = [recording.angular_rate[pose] for pose in poses]
     offsets = np.array([piece.mean(axis=0) for piece in rate])
-    return Still(recording, poses, offsets, averaged_sd(rate, usual_step(recording.time)))
+    noise = averaged_sd(rate, usual_step(recording.time))
+    noise = outside_dead_band(noise, rate, recording.gyroscope_noise_sd)
+    return Still(recording, poses, offsets, noise)
 
 
 def _tells(still: Still) -> bool:
@@ -230,7 +233,8 @@ def _of_poses(still: Still, triads: TriadFit, gravity: float) -> FirstOrder:
     sd = np.maximum(still.noise, 1e-9) / np.sqrt(counts)[:, None, None]
     return FirstOrder(
         still.poses, triads, *walked_mean(still.offsets, sd, _after_moving(still)),
-        np.maximum(reading_sd(force, step), 1e-6 * GRAVITY), reading_sd(rate, step),
+        np.maximum(reading_sd(force, step), 1e-6 * GRAVITY),
+        outside_dead_band(reading_sd(rate, step), rate, still.recording.gyroscope_noise_sd),
         lag_correlation(force), lag_correlation(rate), smoothing(force), smoothing(rate), gravity,
     )  # fmt: skip
 

@@ -17,6 +17,7 @@ WINDOW = 1.0  # s, over which a reading's spread is judged
 SHORTEST = 3.0  # s, of a pose by default, its ends included
 KEPT = 2.0  # s, of a pose after its ends are cut, that no margin is taken from
 THRESHOLD = 3.0  # times the noise floor
+DEAD = 0.5  # of still readings, from which 0 is a dead band's and says nothing of noise
 FLOOR = 0.02  # quantile of the windows' spreads taken as the noise floor
 # A floor this many times the declared noise is motion, not noise: nothing was still.
 MOVING = 10.0
@@ -94,7 +95,7 @@ def lag_correlation(pieces) -> np.ndarray:
     centred = [piece - piece.mean(axis=0) for piece in pieces]
     products = np.concatenate([x[1:] * x[:-1] for x in centred])
     squares = np.concatenate([x**2 for x in centred])
-    return products.mean(axis=0) / squares.mean(axis=0)
+    return products.mean(axis=0) / _not_zero(squares.mean(axis=0))
 
 
 def smoothing(pieces) -> np.ndarray:
@@ -105,7 +106,17 @@ def smoothing(pieces) -> np.ndarray:
     """
     steps = [np.diff(piece, axis=0) for piece in pieces]
     products = np.concatenate([x[1:] * x[:-1] for x in steps]).mean(axis=0)
-    return 1 + 2 * products / np.concatenate([x**2 for x in steps]).mean(axis=0)
+    squares = np.concatenate([x**2 for x in steps]).mean(axis=0)
+    return np.where(squares > 0, 1 + 2 * products / _not_zero(squares), 0.0)
+
+
+def _not_zero(squares):
+    return np.where(squares > 0, squares, 1.0)
+
+
+def outside_dead_band(sd, pieces, declared: float) -> np.ndarray:
+    """Noise ``sd`` (...), the ``declared`` one where most still readings are exactly 0."""
+    return np.where(np.mean(np.concatenate(pieces) == 0.0, axis=0) > DEAD, declared, sd)
 
 
 def window_spread(readings: np.ndarray, window: int) -> np.ndarray:

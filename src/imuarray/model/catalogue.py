@@ -7,7 +7,7 @@ predicted measurement departs from them. Prior scales are those of consumer MEMS
 import numpy as np
 
 from imuarray.model import kinematics
-from imuarray.model.effects import KINDS, common_mean, data_effect, effect
+from imuarray.model.effects import KINDS, common_mean, data_effect, each_mean, effect
 from imuarray.model.jax64 import jnp
 
 # Rows and columns of the off-diagonal entries of a 3 x 3 matrix, row by row.
@@ -145,13 +145,24 @@ def gyroscope_nonlinearity(curvature, instant, predicted):
 
 
 @effect(
+    "accelerometer_rate_square", unit="m rad-2", prior_sd=5e-4, shape=lambda a, g: (a, 3),
+    gauge=each_mean, smooth=True, against="angular rate",
+    meaning="accelerometers read more with the square of the rate",
+)  # fmt: skip
+def accelerometer_rate_square(growth, instant, predicted):
+    """u + c omega^2, alike in all directions of omega; the mean of all is the motion's."""
+    square = jnp.sum(instant.motion.angular_rate**2)
+    return predicted._replace(specific_force=predicted.specific_force + growth * square)
+
+
+@effect(
     "gyroscope_curve", unit="s rad-1", prior_sd=0.001 / FULL_SCALE_RATE,
     common_sd=0.002 / FULL_SCALE_RATE, shape=lambda a, g: (g, 1), components=(("curve",),),
     smooth=True,
     meaning="the gyroscopes' scale changes with the rate", against="angular rate",
 )  # fmt: skip
 def gyroscope_curve(curvature, instant, predicted):
-    """(1 + c |omega_i|) omega_i, alike to both sides; the prior is as that of the nonlinearity."""
+    """A scale of 1 + c abs(omega_i), alike to both sides; the mean is as the nonlinearity's."""
     rate = predicted.angular_rate
     return predicted._replace(angular_rate=rate * (1.0 + curvature * jnp.abs(rate)))
 

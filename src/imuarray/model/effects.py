@@ -220,6 +220,11 @@ def common_mean(shape, axes=None) -> list[np.ndarray]:
     return [np.ones(shape, bool)]
 
 
+def each_mean(shape, axes=None) -> list[np.ndarray]:
+    """Gauges: the mean over triads of each parameter."""
+    return [np.broadcast_to(np.arange(shape[1]) == k, shape) for k in range(shape[1])]
+
+
 def _again(old, new) -> bool:
     """True where a notebook's cell is run once more: its new effect replaces the old one."""
     return old.__module__ == new.__module__ == "__main__"

@@ -7,7 +7,7 @@ order where the recording's smooth motion determines them (`Instant`).
 import numpy as np
 
 from imuarray.model import kinematics
-from imuarray.model.effects import KINDS, Prediction, common_mean, effect
+from imuarray.model.effects import KINDS, Prediction, common_mean, each_mean, effect
 from imuarray.model.jax64 import jnp
 
 
@@ -95,14 +95,9 @@ def gyroscope_filter(shape, instant, predicted):
     return predicted._replace(angular_rate=predicted.angular_rate + bend)
 
 
-def _each_mean(shape, axes):
-    """The mean over triads of each parameter."""
-    return [np.broadcast_to(np.arange(shape[1]) == k, shape) for k in range(shape[1])]
-
-
 @effect(
     "accelerometer_filter", unit="s, s2, s3", prior_sd=(2e-3, 3e-5, 3e-7),
-    shape=lambda a, g: (a, 3), components=(("lag", "droop", "skew"),), gauge=_each_mean, **FILTER,
+    shape=lambda a, g: (a, 3), components=(("lag", "droop", "skew"),), gauge=each_mean, **FILTER,
     against="specific force", meaning="accelerometers have filters of their own",
 )  # fmt: skip
 def accelerometer_filter(shape, instant, predicted):
