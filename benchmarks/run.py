@@ -38,8 +38,11 @@ from imuarray_papers.config import model_from, read_config  # noqa: E402
 from imuarray_papers.estimation.bcd import calibrate_bcd  # noqa: E402
 from imuarray_papers.posterior import kernels, normals
 from imuarray_papers.posterior.draws import TILE  # noqa: E402
-from imuarray_papers.posterior.likelihood import Likelihood  # noqa: E402
-from imuarray_papers.posterior.target import CompiledTarget, GaussianPrior  # noqa: E402
+from imuarray_papers.posterior.likelihood import (  # noqa: E402
+    CompiledTarget,
+    GaussianPrior,
+    Likelihood,  # noqa: E402
+)
 from imuarray_papers.reference import skew  # noqa: E402
 from imuarray_papers.studies.bound import paths  # noqa: E402
 from tests.oracles import joint_jacobian, most_likely_motion  # noqa: E402

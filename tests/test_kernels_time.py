@@ -20,7 +20,7 @@ from imuarray.estimation.collapsed import estimate_motion
 from imuarray.model import ArrayModel, kinematics
 from imuarray.model.jax64 import jax
 from imuarray.model.structure import _force
-from imuarray_papers.posterior.target import CompiledTarget
+from imuarray_papers.posterior.likelihood import CompiledTarget
 from imuarray.posterior.prior import GaussianPrior
 from imuarray_papers.posterior.likelihood import Likelihood
 from tests.cases import noises, simulate, small_array

@@ -11,9 +11,8 @@ from imuarray.model import ArrayModel
 from imuarray.posterior.prior import GaussianPrior
 from imuarray.streams import stream
 from imuarray_papers.posterior import pmmh
-from imuarray_papers.posterior.likelihood import Likelihood
+from imuarray_papers.posterior.likelihood import CompiledTarget, Likelihood
 from imuarray_papers.posterior.pmmh import run_chains
-from imuarray_papers.posterior.target import CompiledTarget
 from tests.cases import simulate, small_array
 from tests.generic import GenericTarget
 

@@ -13,9 +13,8 @@ from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.posterior.diagnostics import ess
 from imuarray.posterior.prior import GaussianPrior
-from imuarray_papers.posterior.likelihood import Likelihood
+from imuarray_papers.posterior.likelihood import CompiledTarget, Likelihood
 from imuarray_papers.posterior.pmmh import run_chains
-from imuarray_papers.posterior.target import CompiledTarget
 from tests import oracles
 from tests.cases import SHAPE, simulate
 from tests.generic import GenericTarget

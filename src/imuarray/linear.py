@@ -45,3 +45,8 @@ def scaled_square(matrix, vector, cutoff: float, scale=None) -> tuple[float, int
     seen = values > cutoff
     along = vectors[:, seen].T @ (vector / scale)
     return float(np.sum(along**2 / values[seen])), int(seen.sum())
+
+
+def shared_walk(time) -> np.ndarray:
+    """(P, P) s, how long a walk both ways from time 0 is the same at each two of ``time`` (P,)."""
+    return np.where(np.multiply.outer(time, time) > 0, np.minimum.outer(abs(time), abs(time)), 0.0)

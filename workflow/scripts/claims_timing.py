@@ -14,7 +14,7 @@ with job(snakemake) as settings:
     from imuarray.recording import read_recording, read_truth
     from imuarray.streams import stream
     from imuarray_papers.config import model_from
-    from imuarray_papers.posterior.target import CompiledTarget
+    from imuarray_papers.posterior.likelihood import CompiledTarget
     from imuarray_papers.studies.bayes import target_for
     from imuarray_papers.studies.checks import timing
     from imuarray_papers.studies.position_error import magnitudes

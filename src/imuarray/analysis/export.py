@@ -6,12 +6,12 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis import formats, methods
-from imuarray.analysis.plain import finite
 from imuarray.errors import InputError, require_one_of
 from imuarray.firstorder.noise import TERMS, StillNoise
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.model.effects import KINDS, Prediction
+from imuarray.provenance import finite
 from imuarray.recording.record import CORRECTION, NUMBERS
 from imuarray.recording.validate import is_rotation
 from imuarray.trust import effect_names, parameters_of, reasons_in, require_fit

@@ -6,8 +6,8 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-from imuarray.analysis.plain import finite
 from imuarray.errors import one_line, printable
+from imuarray.provenance import finite
 
 
 class Output:

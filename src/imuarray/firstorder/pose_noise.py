@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from imuarray.linear import scaled_inverse
-from imuarray.walk import shared_walk
+from imuarray.linear import scaled_inverse, shared_walk
 
 SHOWN = 2.0  # nats that a walk must gain
 SEEN = 1.2  # times the noise; a walk is looked for beyond

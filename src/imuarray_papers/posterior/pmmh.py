@@ -13,7 +13,7 @@ from imuarray.errors import InputError
 from imuarray.posterior.chains import Chains
 from imuarray.provenance import atomic_write
 from imuarray.streams import stream
-from imuarray_papers.posterior.target import CompiledTarget
+from imuarray_papers.posterior.likelihood import CompiledTarget
 
 
 class PseudoMarginalMove(emcee.moves.Move):

@@ -8,8 +8,7 @@ import numpy as np
 
 from imuarray.geometry import positions_of
 from imuarray.posterior.prior import GaussianPrior
-from imuarray_papers.posterior.likelihood import Likelihood
-from imuarray_papers.posterior.target import CompiledTarget
+from imuarray_papers.posterior.likelihood import CompiledTarget, Likelihood
 
 
 class Sweeps(NamedTuple):

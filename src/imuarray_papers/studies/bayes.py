@@ -15,10 +15,9 @@ from imuarray_papers.config import model_from, motion_sds
 from imuarray_papers.estimation.bcd import calibrate_bcd
 from imuarray_papers.measured.positions import locate
 from imuarray_papers.posterior import tuning
-from imuarray_papers.posterior.likelihood import Likelihood
+from imuarray_papers.posterior.likelihood import CompiledTarget, Likelihood
 from imuarray_papers.posterior.pmmh import checkpoint_beside, run_chains, spread_starts
 from imuarray_papers.posterior.proposals import rate_distribution
-from imuarray_papers.posterior.target import CompiledTarget
 
 
 def simulate_dataset(settings: dict, samples: int):

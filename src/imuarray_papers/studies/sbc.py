@@ -21,7 +21,7 @@ from imuarray.recording import Recording
 from imuarray.simulation.recordings import simulate_samples
 from imuarray.streams import stream
 from imuarray_papers.posterior import tuning
-from imuarray_papers.posterior.target import CompiledTarget
+from imuarray_papers.posterior.likelihood import CompiledTarget
 from imuarray_papers.studies.truths import SPARE, Replicate, Setting, misfit, replicate, run_batches
 
 DRAWS = 199  # kept of each posterior, nearly independent
