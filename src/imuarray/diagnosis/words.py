@@ -281,9 +281,9 @@ def _filtered(kind: str, sizes: Sizes) -> list[str]:
 
 
 def _curved(sizes: Sizes) -> list[str]:
-    mean, sd = FAST * np.mean(sizes.values), FAST * np.mean(sizes.sds)
-    more = "more" if mean > 0 else "less"
-    return [f"at 1000 deg/s the gyroscopes show {quantity(abs(mean), sd, '%')} {more} than at rest"]
+    mean = float(np.mean(sizes.values @ [FAST, FAST**2]))  # errors of the two go together
+    more, size = "more" if mean > 0 else "less", quantity(abs(mean), None, "%")
+    return [f"at 1000 deg/s the gyroscopes show {size} {more} than at rest"]
 
 
 def _with_rate(sizes: Sizes) -> list[str]:

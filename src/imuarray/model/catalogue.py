@@ -156,15 +156,17 @@ def accelerometer_rate_square(growth, instant, predicted):
 
 
 @effect(
-    "gyroscope_curve", unit="s rad-1", prior_sd=0.001 / FULL_SCALE_RATE,
-    common_sd=0.002 / FULL_SCALE_RATE, shape=lambda a, g: (g, 1), components=(("curve",),),
-    smooth=True,
+    "gyroscope_curve", unit="s rad-1, s2 rad-2",
+    prior_sd=(0.001 / FULL_SCALE_RATE, 0.001 / FULL_SCALE_RATE**2),
+    common_sd=(0.002 / FULL_SCALE_RATE, 0.002 / FULL_SCALE_RATE**2),
+    shape=lambda a, g: (g, 2), components=(("curve", "cubic"),), smooth=True,
     meaning="the gyroscopes' scale changes with the rate", against="angular rate",
 )  # fmt: skip
 def gyroscope_curve(curvature, instant, predicted):
-    """A scale of 1 + c abs(omega_i), alike to both sides; the mean is as the nonlinearity's."""
-    rate = predicted.angular_rate
-    return predicted._replace(angular_rate=rate * (1.0 + curvature * jnp.abs(rate)))
+    """A scale of 1 + c abs(omega_i) + d omega_i^2, alike to both sides."""
+    rate = jnp.abs(predicted.angular_rate)
+    scale = 1.0 + curvature[:, :1] * rate + curvature[:, 1:] * rate**2
+    return predicted._replace(angular_rate=scale * predicted.angular_rate)
 
 
 data_effect(
