@@ -115,6 +115,8 @@ def attempt(search: Search, score, values) -> Search:
             found = special.refine(found, candidate.imus)
         found = prune(found, effect)
         gain, error = heldout_gain(found, effect)
+        if set(found.imus_with(effect)) <= set(search.imus_with(effect)):  # pruned to what was
+            gain = -np.inf
     words = f"{effect} {candidate.variant} of {label(search, candidate)}"
     if not keeps(search, score, gain, error):
         search.say(f"refused {words}: held-out gain {gain:.1f} +- {error:.1f}")

@@ -262,13 +262,15 @@ def need(search: Search, effect: str, imus=None, among=None) -> tuple[float, int
     return search.given.test(conditional, freed)
 
 
-def heldout_gain(search: Search, effect: str, parts=None) -> tuple[float, float]:
+def heldout_gain(search: Search, effect: str, parts=None, imus=None) -> tuple[float, float]:
     """Nats gained on held-out blocks of time by an adopted effect, with standard error.
 
-    ``parts``: the blocks' equations, if they are known.
+    ``parts``: the blocks' equations, if they are known; ``imus``: of which it is asked, if not all.
     """
     columns, mask = search.columns, search.active
     freed = np.isin(columns.names, effect) & mask
+    if imus is not None:
+        freed[np.setdiff1d(np.arange(len(freed)), imus)] = False
     values = flat_parameters(columns, search.fit.state)[mask]
     parts = normal_blocks(search.fit, mask) if parts is None else parts
     return gain_of(parts, prior_precision(columns, mask), values, freed[mask])
@@ -279,19 +281,47 @@ def prune(search: Search, effect: str) -> Search:
     imus = search.imus_with(effect)
     if len(imus) < 3:
         return search
-    limit = SETTINGS.limit(effect)
-    keep = tuple(k for k in imus if needed(search, effect, limit - np.log(len(imus)), [k]))
+    keep = _needing(search, effect, imus) if search.smooth else _gaining(search, effect, imus)
     rest = [imu for imu in imus if imu not in keep]
-    if not keep or len(keep) > len(imus) / 2 or needed(search, effect, SETTINGS.others, rest):
+    if not keep:
         return search
     causes = tuple(
         replace(cause, imus=keep) if cause.effect == effect else cause for cause in search.causes
     )
-    search = replace(search, causes=causes)
-    state = search.started(effect)
+    pruned = replace(search, causes=causes)
+    state = pruned.started(effect)
     whole = flat_parameters(search.columns, state)
     whole[np.ix_(rest, search.columns.of(effect))] = 0.0
-    return search.refit(from_flat(search.columns, state, whole))
+    pruned = pruned.refit(from_flat(search.columns, state, whole))
+    if search.smooth:
+        return pruned
+    gains = [heldout_gain(one, effect)[0] for one in (pruned, search)]
+    return pruned if gains[0] > SETTINGS.pruned * gains[1] else search
+
+
+def _needing(search: Search, effect: str, imus) -> tuple[int, ...]:
+    """The IMUs that need an effect; none if they are the more, or the rest need it, too."""
+    limit = SETTINGS.limit(effect) - np.log(len(imus))
+    keep = tuple(k for k in imus if needed(search, effect, limit, [k]))
+    rest = [imu for imu in imus if imu not in keep]
+    few = len(keep) <= len(imus) / 2
+    return keep if few and not needed(search, effect, SETTINGS.others, rest) else ()
+
+
+def _gaining(search: Search, effect: str, imus) -> tuple[int, ...]:
+    """The fewest IMUs beside which the rest do not gain clearly on held-out time.
+
+    None if they are half of them. Rough motion leaves what is significant in all, and predicts
+    nothing.
+    """
+    parts = normal_blocks(search.fit, search.active)
+    own = {k: heldout_gain(search, effect, parts, [k])[0] for k in imus}
+    order = sorted(imus, key=own.__getitem__, reverse=True)
+    for number in range(1, (len(imus) + 1) // 2):
+        gain, error = heldout_gain(search, effect, parts, order[number:])
+        if gain < search.least_z * error:
+            return tuple(sorted(order[:number]))
+    return ()
 
 
 def needed(search: Search, effect: str, limit: float, imus=None) -> bool:
