@@ -287,7 +287,7 @@ def _curved(sizes: Sizes) -> list[str]:
 
 
 def _with_rate(sizes: Sizes) -> list[str]:
-    """Of accelerometers whose readings grow with the square of the rate, against the others'."""
+    """Accelerometers whose readings grow with the square of the rate, against the others."""
     values = FAST**2 * (sizes.values - np.median(sizes.values, axis=0))
     sds, said = FAST**2 * sizes.sds, []
     for label, value, sd in zip(sizes.labels, values, sds, strict=True):

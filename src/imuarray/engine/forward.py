@@ -56,6 +56,7 @@ AGREES = 1.02  # times the residual that a prior of omega_dot may make
 CHANCE = 1e-3  # of maps as far from those of first order, of positions as far apart
 LEAST_SHARE = 0.03  # of the variance, by which two estimates may differ at least
 LEAST_Z, LEAST_NATS = 2.0, 2.0  # standard errors of a gain, and nats, from which a group is kept
+CURVED_NATS = 10.0  # the same of a curve: two seconds of clean motion had three by chance
 
 
 class EffectGroup(NamedTuple):
@@ -147,7 +148,7 @@ def select_forward(
     late = any(map(_needs_neighbours, now.kept))
     if all(one.smooth for one in found.recorded) and (readings[0].pair or not late):
         found, curved = _with_slope(found, now.kept, CURVE in names)
-        groups = [group for group in groups if group.name not in curved] + [*curved.values()]
+        groups = [*groups, *curved.values()]
     return settled(found), clocks + groups
 
 
@@ -161,16 +162,19 @@ def _with_slope(found: Estimate, kept: dict, curve: bool) -> tuple[Estimate, dic
         replace(one, state=turned(one.readings, one.state, follows=True)) for one in found.recorded
     ]
     better, pair = estimate(begun, found.columns, found.active), found.recorded[0].readings.pair
+    shown: dict[str, EffectGroup] = {}
     if pair:
-        return better, {}
+        return better, shown
     if better.residual_ratio() >= AGREES * found.residual_ratio():
-        return found, {}
+        return found, shown
     if curve and CURVE not in kept:
         mask = mask_of(found.columns, EFFECT_GROUPS[CURVE])
         (group,) = gains(better, {CURVE: mask}, kept)
+        group = group._replace(kept=group.kept and group.gain > CURVED_NATS)
         if group.kept:
             return estimate(better.recorded, found.columns, found.active | mask), {CURVE: group}
-    return better if _of_one_truth(found, better) else found, {}
+        shown = {CURVE: group}
+    return better if _of_one_truth(found, better) else found, shown
 
 
 def _begun(readings: Sequence[Readings], names) -> tuple[Columns, list[Recorded]]:
@@ -210,9 +214,9 @@ class Selected(NamedTuple):
         return now._replace(found=replace(found, recorded=tuple(recorded)))
 
     def tried(self, names) -> list[EffectGroup]:
-        """Gains of the groups, but those of which a clock is the whole."""
-        part = EFFECTS[CLOCK].contains if CLOCKS in self.kept else ()
-        asked = [n for n in names if n != CLOCKS and not set(EFFECT_GROUPS[n]) <= set(part)]
+        """Gains of the groups, but those of which a clock is the whole, and `_with_slope`'s."""
+        part = {CLOCK, *EFFECTS[CLOCK].contains} if CLOCKS in self.kept else {CLOCK}
+        asked = [n for n in names if n != CURVE and not set(EFFECT_GROUPS[n]) <= part]
         masks = {name: mask_of(self.found.columns, EFFECT_GROUPS[name]) for name in asked}
         return gains(self.found, masks, self.kept)
 
