@@ -32,17 +32,14 @@ from imuarray.model import ArrayModel  # noqa: E402
 from imuarray.model.jax64 import jax  # noqa: E402
 from imuarray.motion import normal_motion, sphere_motion  # noqa: E402
 from imuarray.posterior.marginal import Marginal  # noqa: E402
+from imuarray.posterior.prior import GaussianPrior  # noqa: E402
 from imuarray.simulation.recordings import measure  # noqa: E402
 from imuarray_papers import reference
 from imuarray_papers.config import model_from, read_config  # noqa: E402
 from imuarray_papers.estimation.bcd import calibrate_bcd  # noqa: E402
 from imuarray_papers.posterior import kernels, normals
 from imuarray_papers.posterior.draws import TILE  # noqa: E402
-from imuarray_papers.posterior.likelihood import (  # noqa: E402
-    CompiledTarget,
-    GaussianPrior,
-    Likelihood,  # noqa: E402
-)
+from imuarray_papers.posterior.likelihood import CompiledTarget, Likelihood  # noqa: E402
 from imuarray_papers.reference import skew  # noqa: E402
 from imuarray_papers.studies.bound import paths  # noqa: E402
 from tests.oracles import joint_jacobian, most_likely_motion  # noqa: E402

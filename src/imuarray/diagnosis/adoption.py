@@ -115,7 +115,7 @@ def attempt(search: Search, score, values) -> Search:
             found = special.refine(found, candidate.imus)
         found = prune(found, effect)
         gain, error = heldout_gain(found, effect)
-        if set(found.imus_with(effect)) <= set(search.imus_with(effect)):  # pruned to what was
+        if not np.any(found.active & ~search.active):  # pruned to what was there
             gain = -np.inf
     words = f"{effect} {candidate.variant} of {label(search, candidate)}"
     if not keeps(search, score, gain, error):

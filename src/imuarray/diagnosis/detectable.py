@@ -6,7 +6,7 @@ from scipy import special
 from imuarray.diagnosis.scores import Information, candidates, mask_of
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Search
-from imuarray.engine.heldout import normal_blocks
+from imuarray.engine.heldout import blocks_of
 from imuarray.engine.parameters import Columns
 from imuarray.linear import scaled_inverse
 from imuarray.model.array_model import component, unit_of
@@ -23,15 +23,16 @@ def detectable(search: Search) -> dict[str, dict]:
     that motion or positions take up are left out, as are effects that a scan looks for.
     From the score test's noncentral chi-square: with the score's slope M, the inverse covariance
     W along the directions seen and the least noncentrality that passes the level and the share of
-    the misfit that a cause must explain, size_i^2 = lambda / (M W M)_ii. Its gain on held-out time
-    must exceed its error as often, which is as large as blocks of time scatter.
+    the misfit that a cause must explain, size_i^2 = lambda / (M W M)_ii. With the same chance its
+    gain on held-out time is clear of its error, which blocks of time show by their `scatter`.
     """
     given, columns = search.given, search.columns
     active = given.places(search.active)
     inside = {part for c in search.causes for part in EFFECTS[c.effect].contains}
     effects = [effect for effect in search.effects if effect not in inside]
     every = candidates(columns, search.readings.exists, effects)
-    scores = np.array([score for _, score in normal_blocks(search.fit, search.fit.described)])
+    described, blocks = search.fit.described, blocks_of(len(search.fit.residual))
+    scores = np.array([search.fit.normal(described, block)[1] for block in blocks])
     found: dict[str, dict] = {}
     for candidate in every:
         mask = mask_of(columns, candidate)

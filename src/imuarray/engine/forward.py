@@ -167,7 +167,7 @@ def _with_slope(found: Estimate, kept: dict, curve: bool) -> tuple[Estimate, dic
         return better, shown
     if better.residual_ratio() >= AGREES * found.residual_ratio():
         return found, shown
-    if curve and CURVE not in kept:
+    if curve:
         mask = mask_of(found.columns, EFFECT_GROUPS[CURVE])
         (group,) = gains(better, {CURVE: mask}, kept)
         group = group._replace(kept=group.kept and group.gain > CURVED_NATS)

@@ -151,7 +151,7 @@ def hide(
     }  # fmt: skip
     rng = stream(seed, "blind", "hidden", "measured")
     effect = str(rng.choice(sorted(known)))
-    label = str(rng.choice(sorted(known[effect]["sizes"])))
+    label = str(rng.choice(sorted(k for k, own in known[effect]["sizes"].items() if own)))
     given = recording, effect, (recording.accelerometer_labels.index(label),)
     drawn = next(iter(measured_change(*given, 1.0, seed).parameters.values()))
     size = times / in_least(drawn.value, known[effect]["sizes"][label])
