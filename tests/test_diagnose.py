@@ -134,6 +134,19 @@ def test_what_would_have_been_named_is():
             assert right if times > 1 else not causes
 
 
+def test_another_form_of_a_cause_is_not_what_was_there():
+    """Both kinds of one IMU drift: the second form is no other IMU's."""
+    recording, _ = make(Case("test-drift", duration=DURATION), SEED)
+    past = np.linspace(0, 1, len(recording.time))[:, None] * [1.0, -1.0, 0.5]
+    force, rate = recording.specific_force.copy(), recording.angular_rate.copy()
+    force[:, 2] += 0.3 * past
+    rate[:, 2] += 0.02 * past
+    drifting = replace(recording, specific_force=force, angular_rate=rate)
+    [cause] = run_procedure(drifting).search.causes
+    assert (cause.effect, cause.imus) == ("bias_drift", (2,))
+    assert {form.split()[0] for form in cause.variants} == {"accelerometer", "gyroscope"}
+
+
 def test_gyroscopes_offsets_that_walk_drift_by_what_they_walk():
     """No polynomial is a random walk; that is the same cause, and leaves nothing unexplained."""
     recording, _ = make(Case("test-walk", duration=DURATION), SEED)

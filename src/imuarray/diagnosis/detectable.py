@@ -36,15 +36,16 @@ def detectable(search: Search) -> dict[str, dict]:
     found: dict[str, dict] = {}
     for candidate in every:
         mask = mask_of(columns, candidate)
-        chosen = np.setdiff1d(given.places(mask), active)
+        chosen = np.sort(given.places(mask))
         if len(candidate.imus) > 1 or not len(chosen):
             continue
-        seen = given.seen(given.conditional(active, of=chosen), chosen)
+        beside = np.setdiff1d(active, chosen)
+        seen = given.seen(given.conditional(beside, of=chosen), chosen)
         tests = sum(each.effect == candidate.effect and not each.whole for each in every)
         least = max(noncentrality(search, candidate.effect, tests, len(seen.values)), search.least)
         slope = (seen.vectors * seen.values) @ np.linalg.cholesky(seen.precision)
         shown = np.sum(slope**2, axis=1)
-        clear = 2 * (search.least_z + DEVIATES) * scatter(given, scores, active, chosen)
+        clear = 2 * (search.least_z + DEVIATES) * scatter(given, scores, beside, chosen)
         sizes = np.sqrt(np.maximum(least, clear**2) / np.maximum(shown, 1e-30)) / seen.scale
         label = search.readings.labels[candidate.imus[0]]
         entry = found.setdefault(candidate.effect, {"units": {}, "sizes": {}})
