@@ -10,6 +10,7 @@ import pytest
 
 from imuarray.analysis.calibration import calibrate
 from imuarray.cli import main
+from imuarray.diagnosis import procedure
 from imuarray.diagnosis import state as elimination
 from imuarray.diagnosis.document import diagnose, precision_of, structural_gain
 from imuarray.diagnosis.final_checks import beside_left
@@ -132,6 +133,15 @@ def test_what_would_have_been_named_is():
             imu = int(truth["effects"][0]["sensors"][0]) - 1
             right = [(cause.effect, cause.imus) for cause in causes] == [(name, (imu,))]
             assert right if times > 1 else not causes
+
+
+def test_readings_that_cannot_be_put_right_have_sizes_too(monkeypatch):
+    """Nothing is adopted then, and the page shows how small an effect would have shown."""
+    whole = procedure.prepared
+    monkeypatch.setattr(procedure, "prepared", lambda *given: (*whole(*given)[:3], False))
+    recording, _ = make(Case("test-clean", duration=2.0), SEED)
+    found = run_procedure(recording)
+    assert found.unexplained and not found.search.causes and found.search.detectable
 
 
 def test_another_form_of_a_cause_is_not_what_was_there():

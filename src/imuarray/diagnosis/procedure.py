@@ -8,6 +8,7 @@ import numpy as np
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects
 from imuarray.diagnosis.adoption import adopt, proposals, rivals
+from imuarray.diagnosis.detectable import detectable
 from imuarray.diagnosis.final_checks import (
     final_checks,
     leave_out_clips,
@@ -72,6 +73,7 @@ def run_procedure(
     base, first = search.fit.only_active(), proposals(search)
     scores, base_checks = [s for s, _ in first], all_checks(search.fit, search.given, search.noise)
     if not mended:
+        search = replace(search, detectable=detectable(search))
         return Found(
             search, base, scores, base_checks, structural, [], base_checks, 0.0, True, raw, whole
         )
