@@ -28,11 +28,11 @@ def cause(effect, sensors, parameters, rivals=(), nats=100.0):
 def board():
     """Arguments of the board's figure: residuals twice the still noise, in two triads."""
     rows = [
-        (source, quantity, "angular_acceleration", triad, low, low + 1.0, size * (1 + low))
+        (source, quantity, triad, low, low + 1.0, size * (1 + low))
         for source, size in (("measured", 4.0), ("simulated", 1.0))
         for quantity in QUANTITIES for triad in "12" for low in (0.0, 1.0)
     ]  # fmt: skip
-    names = ["source", "quantity", "by", "triad", "bin_low", "bin_high", "rms"]
+    names = ["source", "quantity", "triad", "bin_low", "bin_high", "rms"]
     noise = [(quantity, int(triad), 2.0) for quantity in QUANTITIES for triad in "12"]
     turn = np.linspace(0.0, 9.0, 10)
     clock = pd.DataFrame({"x": [*turn, *(turn + 10)], "y": 0.1, "se": 0.01, "model": 0.1,

@@ -68,10 +68,7 @@ def test_an_own_recording_goes_through_the_measured_rules(tmp_path):
     assert np.abs(z).max() < 5 and chosen.accelerometer_sd.iloc[0] == pytest.approx(0.04, rel=0.15)
     # the same data twice: no difference at all
     assert (pd.read_csv(measured / "agreement" / "board.csv").coverage_50 == 1.0).all()
-    residuals = pd.read_csv(measured / "residuals" / "one.csv")
-    sizes = residuals[residuals["by"] == "axis"].groupby("source").rms.mean()
-    assert sizes["measured"] == pytest.approx(sizes["simulated"], rel=0.1)
-    for name in ("residuals_one.png", "noise_two.pdf", "agreement_board.png"):
+    for name in ("noise_two.pdf", "agreement_board.png"):
         assert (measured / "figures" / name).stat().st_size > 5000
     assert "| one | 1 |" in (measured / "tables" / "first_order_board.md").read_text()
 

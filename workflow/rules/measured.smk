@@ -133,8 +133,7 @@ rule residuals:
     input:
         recording=lambda wc: MEASURED.recording(wc.name),
     output:
-        summary="results/measured/residuals/{name}.csv",
-        histogram="results/measured/residuals/{name}_histogram.csv",
+        "results/measured/residuals/{name}.csv",
     log:
         "results/measured/logs/residuals/{name}.log",
     benchmark:
@@ -170,18 +169,6 @@ use rule judge_experiment as judge_measured with:
         kind=MEASURED_KINDS,
 
 
-draw(
-    "measured.figure_measured_residuals",
-    "figure: residuals of {wildcards.name}",
-    {
-        "summary": "results/measured/residuals/{name}.csv",
-        "histogram": "results/measured/residuals/{name}_histogram.csv",
-    },
-    folder="results/measured",
-    output="residuals_{name}",
-    category="Measured",
-    settings=effective(config, ""),
-)
 draw(
     "measured.figure_measured_noise",
     "figure: noise of {wildcards.name}",

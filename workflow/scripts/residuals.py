@@ -1,4 +1,4 @@
-"""Residuals beside the simulation's, in assumed sigmas -> summary and histogram, CSV."""
+"""Residuals beside the simulation's, in assumed sigmas -> CSV."""
 
 from imuarray_papers.pipeline.job import job
 
@@ -21,6 +21,4 @@ with job(snakemake) as settings:
     )
     moving = whole.select(select_dynamic(whole).usable)
     rng = stream(settings["seed"], "residuals", snakemake.wildcards.name)
-    summary, histogram = compare(moving, rng)
-    write_csv(summary, snakemake.output.summary)
-    write_csv(histogram, snakemake.output.histogram)
+    write_csv(compare(moving, rng), snakemake.output[0])

@@ -7,9 +7,9 @@ import pandas as pd
 
 from imuarray.geometry import Array
 from imuarray.pictures.style import BLACK, GREY, PAGE, logarithmic, new_figure, styled
-from imuarray_papers.figures.measured import QUANTITIES
 from imuarray_papers.figures.style import Column, marks, panels, rms
 
+QUANTITIES = {"specific_force": "accelerometers", "angular_rate": "gyroscopes"}
 STEPS = {  # of `measured.causes.STEPS`
     "normal": "papers'", "clocks": "+ clocks", "no arms": "+ lag, maps",
     "common arms": "+ lever arms",
@@ -60,12 +60,14 @@ def three_digits(table: pd.DataFrame) -> pd.DataFrame:
 def _against_acceleration(summary: pd.DataFrame, noise: pd.DataFrame) -> pd.DataFrame:
     """x in 10^3 deg/s^2; rms, least and largest over the IMUs, over the noise of still poses."""
     still = noise.groupby("sensor").ratio.apply(rms)
-    chosen = summary[summary["by"] == "angular_acceleration"]
     # the simulation has the noise that was declared
-    scale = np.where(chosen.source == "measured", chosen.quantity.map(still), 1.0)
-    chosen = chosen.assign(size=chosen.rms / scale)
-    chosen["x"] = np.degrees(chosen.bin_low + chosen.bin_high) / 2e3
-    rows = chosen.groupby(["source", "quantity", "x"])["size"].agg(y=rms, low="min", high="max")
+    scale = np.where(summary.source == "measured", summary.quantity.map(still), 1.0)
+    x = np.degrees(summary.bin_low + summary.bin_high) / 2e3
+    rows = (
+        summary.assign(size=summary.rms / scale, x=x)
+        .groupby(["source", "quantity", "x"])["size"]
+        .agg(y=rms, low="min", high="max")
+    )
     return rows.reset_index()
 
 

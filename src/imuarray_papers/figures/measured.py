@@ -1,4 +1,4 @@
-"""Measured recordings: residuals beside the simulation's, agreement, first order, still noise."""
+"""Measured recordings: agreement between them, first order, still noise."""
 
 from functools import partial
 
@@ -9,9 +9,7 @@ from scipy.special import ndtr
 from imuarray.pictures.noise import KINDS, deviation_lines
 from imuarray.pictures.style import (
     BLACK,
-    BLUE,
     PAGE,
-    VERMILLION,
     logarithmic,
     look,
     new_figure,
@@ -19,11 +17,6 @@ from imuarray.pictures.style import (
 )
 from imuarray_papers.figures.style import Column, panels, rms
 
-SOURCES = {
-    "measured": {"color": VERMILLION, "marker": "o", "linestyle": "-"},
-    "simulated": {"color": BLUE, "marker": "s", "linestyle": (0, (4, 1.5))},
-}
-QUANTITIES = {"specific_force": "accelerometers", "angular_rate": "gyroscopes"}
 FIRST_ORDER = (
     Column("recording", "recording", "recording"),
     Column("triad", "IMU", "IMU"),
@@ -90,77 +83,6 @@ def table_measured_agreement(summary: pd.DataFrame):
     )
     caption = "Do recordings of one board agree within their claimed widths?"
     return table, AGREEMENT, caption, [note]
-
-
-def figure_measured_residuals(
-    summary: pd.DataFrame, histogram: pd.DataFrame, name: str, settings: dict
-):
-    """Errors of the simulation; `measured.residuals.compare` of the recording ``name``."""
-    noise = settings["noise"]
-    footer = [
-        f"Recording {name}, seed {settings['seed']}. Papers' model with"
-        f" σa = {noise['accelerometer_sd']:g} m/s² and σg = {noise['gyroscope_sd_dps']:g} deg/s,"
-        " positions and motion fitted; the simulation has the fitted motion, this noise and the"
-        " same rails, and is fitted likewise."
-    ]
-    return partial(residual_figure, footer=footer), panels(summary=summary, shape=histogram)
-
-
-@styled
-def residual_figure(table: pd.DataFrame, footer=()):
-    """Standardised residuals, accelerometers above gyroscopes: distribution, sensors, motion.
-
-    ``table``: what `measured.residuals.compare` returns, as panels summary and shape.
-    """
-    shape = table[table.panel == "shape"]
-    figure = new_figure(footer, PAGE, 4.3)
-    axes = figure.subplots(2, 4)
-    for row, (quantity, name) in zip(axes, QUANTITIES.items(), strict=True):
-        chosen = table[table.quantity == quantity]
-        _distribution(row[0], shape[shape.quantity == quantity], name)
-        _sensors(row[1], chosen[chosen["by"] == "axis"])
-        _against(row[2], chosen[chosen["by"] == "angular_rate"], np.degrees(1.0), "|ω| (deg/s)")
-        _against(row[3], chosen[chosen["by"] == "angular_acceleration"], 1.0, "|ω'| (rad/s²)")
-        row[1].set_ylabel("rms (assumed σ)")
-    handles = [axes[0, 0].plot([], [], label=source, **style)[0]
-               for source, style in SOURCES.items()]  # fmt: skip
-    figure.legend(handles=handles, loc="outside upper center", ncols=2)
-    return figure
-
-
-def _distribution(axes, shape, name):
-    for source, style in SOURCES.items():
-        part = shape[(shape.source == source) & (shape.density > 0)]
-        centre = (part.low + part.high) / 2
-        axes.plot(centre, part.density, **style | {"marker": ""})
-    grid = np.linspace(-5, 5, 101)
-    axes.plot(grid, np.exp(-0.5 * grid**2) / np.sqrt(2 * np.pi), color=BLACK, linewidth=0.5)
-    axes.set(yscale="log", ylim=(1e-6, 1), xscale="symlog")
-    axes.set(xlabel="residual (assumed σ)", ylabel=f"{name}: density")
-    axes.set_xticks([-100, -1, 1, 100], ["−100", "−1", "1", "100"])
-
-
-def _sensors(axes, table):
-    labels = list(dict.fromkeys(table.triad.astype(str)))
-    for source, style in SOURCES.items():
-        part = table[table.source == source]
-        for i, axis in enumerate("xyz"):
-            values = part[part.axis == axis].rms.to_numpy()
-            places = np.arange(len(values)) + 0.22 * (i - 1)
-            axes.plot(places, values, **style | {"linestyle": "", "markersize": 2.5})
-    axes.axhline(1, color=BLACK, linewidth=0.5)
-    axes.set(yscale="log", xlabel="IMU (x, y, z)")
-    axes.set_xticks(range(len(labels)), labels)
-
-
-def _against(axes, table, factor, label):
-    for source, style in SOURCES.items():
-        bins = table[table.source == source].groupby("bin_low")
-        centre = factor * (bins.bin_low.first() + bins.bin_high.first()) / 2
-        size = bins.rms.apply(rms)
-        axes.plot(centre, size, markersize=3, **style)
-    axes.axhline(1, color=BLACK, linewidth=0.5)
-    axes.set(yscale="log", xlabel=label)
 
 
 def figure_measured_agreement(summary: pd.DataFrame, pairs: pd.DataFrame, group: str):

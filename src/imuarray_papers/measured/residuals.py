@@ -71,62 +71,33 @@ def simulate_like(recording: Recording, fit: Residuals, rng) -> Recording:
 
 
 def residual_summary(fit: Residuals, recording: Recording, source: str) -> pd.DataFrame:
-    """Per sensor and axis, and in bins of |omega| and |omega_dot|: rms and quantiles, in sigmas.
+    """Rms of each triad's residuals, in sigmas, in bins of |omega_dot|.
 
-    Rows have source, quantity, by (axis, angular_rate, angular_acceleration), triad, axis,
-    bin_low, bin_high (rad/s or rad/s^2), rms, q05, q50, q95.
+    Rows have source, quantity, triad, bin_low, bin_high (rad/s^2), rms.
     """
-    rows = []
-    for quantity in ("specific_force", "angular_rate"):
-        values = getattr(fit, quantity)
-        kind = "accelerometer" if quantity == "specific_force" else "gyroscope"
+    size = np.linalg.norm(fit.motion.angular_acceleration, axis=1)
+    edges, rows = np.quantile(size, np.linspace(0, 1, BINS + 1)), []
+    place = np.clip(np.searchsorted(edges, size, side="right") - 1, 0, BINS - 1)
+    for quantity, kind in (("specific_force", "accelerometer"), ("angular_rate", "gyroscope")):
         for k, label in enumerate(getattr(recording, f"{kind}_labels")):
-            for i, axis in enumerate("xyz"):
-                rows.append((quantity, "axis", label, axis, np.nan, np.nan, values[:, k, i]))
-        for by in ("angular_rate", "angular_acceleration"):
-            size = np.linalg.norm(getattr(fit.motion, by), axis=1)
-            edges = np.quantile(size, np.linspace(0, 1, BINS + 1))
-            place = np.clip(np.searchsorted(edges, size, side="right") - 1, 0, BINS - 1)
             for b in range(BINS):
-                for k, label in enumerate(getattr(recording, f"{kind}_labels")):
-                    chosen = values[place == b, k]
-                    rows.append((quantity, by, label, "all", edges[b], edges[b + 1], chosen))
-    names = ["quantity", "by", "triad", "axis", "bin_low", "bin_high"]
-    table = pd.DataFrame([row[:-1] for row in rows], columns=names)
-    table.insert(0, "source", source)
-    return table.assign(**_sizes([row[-1] for row in rows]))
+                values = getattr(fit, quantity)[place == b, k]
+                values = values[np.isfinite(values)]
+                rms = np.sqrt(np.mean(values**2)) if values.size else np.nan
+                rows.append((source, quantity, label, edges[b], edges[b + 1], rms))
+    names = ["source", "quantity", "triad", "bin_low", "bin_high", "rms"]
+    return pd.DataFrame(rows, columns=names)
 
 
-def _sizes(samples) -> dict[str, list[float]]:
-    finite = [x[np.isfinite(x)] for x in samples]
-    quantiles = [np.quantile(x, [0.05, 0.5, 0.95]) if x.size else [np.nan] * 3 for x in finite]
-    return {
-        "rms": [float(np.sqrt(np.mean(x**2))) if x.size else np.nan for x in finite],
-        **{name: [float(q[i]) for q in quantiles] for i, name in enumerate(("q05", "q50", "q95"))},
-    }
-
-
-def histogram(fit: Residuals, source: str, reach: float = 300.0) -> pd.DataFrame:
-    """Density of the standardised residuals: source, quantity, low, high, density."""
-    parts = []
-    for quantity in ("specific_force", "angular_rate"):
-        values = getattr(fit, quantity)
-        values = values[np.isfinite(values)]
-        # fine about zero, where the simulation is, and coarse far out
-        half = np.concatenate([np.linspace(0, 10, 21), np.geomspace(10, reach, 30)[1:]])
-        counts, edges = np.histogram(values, np.concatenate([-half[:0:-1], half]))
-        density = counts / values.size / np.diff(edges)
-        parts.append(pd.DataFrame({"source": source, "quantity": quantity, "low": edges[:-1],
-                                   "high": edges[1:], "density": density}))  # fmt: skip
-    return pd.concat(parts, ignore_index=True)
-
-
-def compare(recording: Recording, rng) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """(`residual_summary`, `histogram`) of the recording and of its simulation."""
+def compare(recording: Recording, rng) -> pd.DataFrame:
+    """`residual_summary` of the recording and of its simulation."""
     fit = fit_residuals(recording)
     simulated = simulate_like(recording, fit, rng)
     again = fit_residuals(simulated)
-    pairs = ((fit, recording, "measured"), (again, simulated, "simulated"))
-    summaries = [residual_summary(one, data, source) for one, data, source in pairs]
-    shapes = [histogram(one, source) for one, _, source in pairs]
-    return pd.concat(summaries, ignore_index=True), pd.concat(shapes, ignore_index=True)
+    return pd.concat(
+        [
+            residual_summary(fit, recording, "measured"),
+            residual_summary(again, simulated, "simulated"),
+        ],
+        ignore_index=True,
+    )

@@ -70,7 +70,6 @@ class Recordings:
         """Files of the measured data in the default target, for each recording and group."""
         paths = []
         for name in self.entries:
-            paths += [f"results/measured/figures/residuals_{name}.{kind}" for kind in FIGURE]
             paths.append(f"results/measured/positions/{name}.csv")
             if self.is_first_order(name):
                 paths += [f"results/measured/figures/noise_{name}.{kind}" for kind in FIGURE]
@@ -101,7 +100,7 @@ class Recordings:
     def published(self) -> dict[str, str]:
         """Names of the experiment's figures and tables in paper_figures/, and what they copy."""
         name, group = self.shown, self.group(self.shown)
-        copies = {"measured_residuals": f"figures/residuals_{name}"}
+        copies = {}
         if self.is_first_order(name):
             copies["measured_noise"] = f"figures/noise_{name}"
             copies["measured_first_order_table"] = f"tables/first_order_{group}"
