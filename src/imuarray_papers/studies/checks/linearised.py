@@ -7,37 +7,16 @@ is narrow; it is what the claims fall back on where the chains are too short to 
 import numpy as np
 import pandas as pd
 
+from imuarray.engine.derivatives import no_derivatives
+from imuarray.engine.fit import at
+from imuarray.engine.linearise import State
+from imuarray.engine.parameters import columns_of
+from imuarray.engine.readings import measured
 from imuarray.geometry import positions_of
+from imuarray.model import ArrayModel
 from imuarray.model.structure import design
 from imuarray.motion import Motion
 from imuarray_papers.posterior.likelihood import Likelihood
-from imuarray_papers.studies.checks.identifiability import lever_matrices, motion_jacobian
-
-
-def position_information(positions, motion: Motion, force_sd, rate_information, residual, offset):
-    """Information on theta with the motion eliminated, and the score, by Schur complements.
-
-    ``positions`` (A, 3) m relative to the reference; ``force_sd`` m/s^2 and the gyroscopes'
-    ``rate_information`` on omega (s^2/rad^2); ``residual`` (T, A, 3) m/s^2 measured minus
-    predicted and ``offset`` (T, 3) rad/s, gyroscopes' mean minus omega. Returns
-    (3 (A - 1), 3 (A - 1)) and (3 (A - 1),).
-    """
-    rates = np.asarray(motion.angular_rate)
-    samples, count = len(rates), len(positions)
-    levers = lever_matrices(motion)
-    force = motion_jacobian(positions, rates)
-    weight = force_sd**-2.0
-    own = weight * np.swapaxes(force, 1, 2) @ force
-    own[:, :3, :3] += rate_information * np.eye(3)
-    split = force.reshape(samples, count, 3, 9)[:, 1:]
-    cross = weight * np.einsum("tci,tkcx->tkix", levers, split).reshape(samples, -1, 9)
-    gain = np.linalg.solve(own, np.swapaxes(cross, 1, 2))
-    shared = weight * np.einsum("tci,tcj->ij", levers, levers)
-    information = np.kron(np.eye(count - 1), shared) - np.einsum("tpx,txq->pq", cross, gain)
-    pull = weight * np.einsum("tnx,tn->tx", force, residual.reshape(samples, -1))
-    pull[:, :3] += rate_information * offset
-    direct = weight * np.einsum("tci,tkc->ki", levers, residual[:, 1:]).ravel()
-    return information, direct - np.einsum("txp,tx->p", gain, pull)
 
 
 def linearise(recording, truth, model, accelerometer_sd, gyroscopes: int):
@@ -46,12 +25,15 @@ def linearise(recording, truth, model, accelerometer_sd, gyroscopes: int):
     ``accelerometer_sd`` is what the analysis assumes, ``gyroscopes`` the number whose average
     p(omega | y_g) stands for: (30b) is the covariance of one.
     """
-    motion = Motion.of(*(truth[name].to_numpy() for name in Motion._fields[:3]))
-    positions = truth["position"].to_numpy()
-    noise = accelerometer_sd, gyroscopes / model.noise.gyroscope[0, 0]
-    residual = recording.specific_force - model.predict_many(motion, positions).specific_force
-    offset = recording.angular_rate.mean(axis=1) - motion.angular_rate
-    information, score = position_information(positions, motion, *noise, residual, offset)
+    motion = np.hstack([truth[name].to_numpy() for name in Motion._fields[:3]])
+    positions, array = truth["position"].to_numpy(), model.array
+    rate_sd = np.sqrt(model.noise.gyroscope[0, 0] * array.gyroscopes / gyroscopes)
+    assumed = ArrayModel.isotropic(array, accelerometer_sd, float(rate_sd))
+    readings = measured(assumed, recording.specific_force, recording.angular_rate)
+    columns = columns_of(array, (), recording.position_prior_sd)
+    nothing = no_derivatives(len(motion), len(positions))
+    state = State(motion, positions, np.empty(0), nothing)
+    information, score = at(readings, columns, columns.owner, state, True).normal(columns.owner)
     weight = recording.position_prior_sd**-2.0
     pull = weight * (recording.relative_positions() - positions)[1:].ravel()
     covariance = np.linalg.inv(information + weight * np.eye(len(information)))
