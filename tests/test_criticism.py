@@ -10,7 +10,7 @@ from imuarray.geometry import mimu4444_corners
 from imuarray_papers.blind.cases import HIDDEN, hidden, make
 from imuarray_papers.figures import criticism
 from imuarray_papers.figures import hidden as hidden_figure
-from imuarray_papers.figures.measured import QUANTITIES
+from imuarray_papers.figures.criticism import QUANTITIES
 
 ROOT = Path(__file__).parents[1]
 STEPS = ("normal", "robust", "clocks", "no arms", "common arms")

@@ -1,11 +1,8 @@
 """`python -m imuarray_papers`: what the papers did, for a recording of one's own."""
 
-import json
-
 import numpy as np
 import pytest
 import xarray as xr
-import yaml
 
 import imuarray
 from imuarray.cli import main
@@ -45,14 +42,3 @@ def test_pmmh_says_how_far_the_flat_prior_shrinks_the_array(folder, capsys):
         assert tree.attrs["sampler"] == "pmmh" and tree.attrs["draws_per_sample"] > 0
         assert tree.attrs["shrunk_by_sds"] > 0 and tree.attrs["on_a_line"] == 0
         assert tree["posterior"]["position"].sizes["chain"] == 2
-
-
-def test_the_experiment_of_a_configuration(folder):
-    given = {"array": {"board": "mimu4444_corners"}, "experiment": {"duration": 1.0}}
-    (folder / "config.yaml").write_text(yaml.safe_dump(given))
-    assert run(folder, "simulate --config @config.yaml --out @simulated.nc") == 0
-    found = read_recording(folder / "simulated.nc")
-    assert len(found.accelerometer_labels) == 8
-    assert 0.9 < found.time[-1] <= 1.0
-    with xr.open_dataset(folder / "simulated.nc", engine="h5netcdf") as written:
-        assert json.loads(written.attrs["config"])["experiment"]["duration"] == 1.0

@@ -6,12 +6,10 @@ import sys
 from imuarray.cli import main
 from imuarray.commands.argument_types import count
 from imuarray.commands.parser import (
-    EFFECTS,
     NOISE,
     RECORDING,
     SEED,
     Command,
-    file_option,
     make_parser,
     number,
     option,
@@ -43,13 +41,6 @@ COMMANDS = (
                     type=count),
             SEED,
         ),
-        package=PACKAGE,
-    ),
-    Command(
-        "simulate", "simulate",
-        "Simulate the experiment of a configuration; its truth is stored in the group 'truth'.",
-        "--config config.yaml --out rec.nc", "recording to write (NetCDF-4)",
-        (file_option("--config", "configuration (YAML)", required=True), *EFFECTS),
         package=PACKAGE,
     ),
 )  # fmt: skip

@@ -7,14 +7,11 @@ from imuarray.analysis.model import assumed
 from imuarray.commands import calibrate as calibrating
 from imuarray.commands import sample as sampling
 from imuarray.commands.output import Output
-from imuarray.provenance import stamp
-from imuarray.recording import read_recording, write_recording
+from imuarray.recording import read_recording
 from imuarray.trust import of_file, reasons_of_poses, reasons_of_posterior
-from imuarray_papers.config import read_config
 from imuarray_papers.estimation.bcd import calibrate_bcd
 from imuarray_papers.sampling import SHRUNK
 from imuarray_papers.sampling import sample as sampled
-from imuarray_papers.studies.bayes import simulate_twisting
 
 
 def calibrate(arguments) -> None:
@@ -43,14 +40,3 @@ def sample(arguments) -> None:
             " take imuarray sample"
         )
     sampling.written(posterior, reasons, arguments.out, output)
-
-
-def simulate(arguments) -> None:
-    """A recording of hand twisting with the config's array, noise and sampling."""
-    output, config = Output(arguments), read_config(arguments.config)
-    noise = config["noise"]["accelerometer_sd"]
-    recording, truth = simulate_twisting(config, noise, arguments.effects)
-    write_recording(recording, arguments.out, truth, stamp(config, config["seed"]))
-    samples, accelerometers = recording.specific_force.shape[:2]
-    output.say(f"{arguments.out}: {samples} samples of {accelerometers} accelerometer triads")
-    output.done({"out": str(arguments.out), "samples": samples, "accelerometers": accelerometers})

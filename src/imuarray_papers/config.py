@@ -117,7 +117,7 @@ def _check_lengths(lengths, samples, draws, where) -> None:
             )
 
 
-def model_from(settings: dict, accelerometer_sd: float | None = None, effects=()):
+def model_from(settings: dict, accelerometer_sd: float | None = None):
     """The `ArrayModel` of a configuration; ``accelerometer_sd`` (m/s^2) replaces its own."""
     import numpy as np
 
@@ -127,7 +127,7 @@ def model_from(settings: dict, accelerometer_sd: float | None = None, effects=()
     noise = settings["noise"]
     force = noise["accelerometer_sd"] if accelerometer_sd is None else accelerometer_sd
     rate = np.radians(noise["gyroscope_sd_dps"])
-    return ArrayModel.isotropic(array_from_config(settings["array"]), force, rate, effects)
+    return ArrayModel.isotropic(array_from_config(settings["array"]), force, rate)
 
 
 def motion_sds(settings: dict) -> tuple[float, float, float]:

@@ -49,7 +49,7 @@ class Criterion(NamedTuple):
         number = len(part)
         if self.hit == COVERED:
             count = None
-            limits = coverage_limits(part, "extended") if number else (np.nan,) * 3
+            limits = coverage_limits(part) if number else (np.nan,) * 3
         else:
             # a crash leaves None
             count = int(part[self.hit].eq(True).sum())

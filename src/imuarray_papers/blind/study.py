@@ -16,14 +16,8 @@ import numpy as np
 from imuarray_papers.blind.cases import Case, make
 
 # What grading reads of `diagnosis.json`; the figures' discrepancies would be most of the file.
-KEPT = ("base", "inflated", "extended", "gain", "causes", "unexplained", "remaining")
+KEPT = ("extended", "causes", "unexplained")
 QUANTILE = 1.96  # of the normal law, for 95 % intervals
-MODELS = ("base", "inflated", "extended")  # sections of a diagnosis that have positions
-# Names in a row, and in the diagnosis' section "gain"; each has its standard error beside it.
-GAINS = {
-    "gain": "heldout_log_score_nats_per_sample",
-    "gain_over_inflated": "over_inflated_noise_nats_per_sample",
-}
 
 
 def batch_of(cases: Sequence[Case], batch: int, batches: int) -> list[Case]:
@@ -115,43 +109,6 @@ def is_confident(kind: str, causes: list[dict], unexplained: bool) -> bool:
     return bool(firm) and not unexplained
 
 
-def _grade(kind: str, wanted, causes, unexplained) -> str:
-    """One word for a recording; see `GRADES`."""
-    named = classes(causes)
-    if not named:
-        if unexplained:
-            return "unexplained"
-        return "clean" if kind == "clean" else "nothing"
-    if kind == "clean":
-        return "false alarm"
-    if kind in ("gauge", "outside", "struck"):
-        if is_confident(kind, causes, unexplained):
-            return "confident"
-        return "flagged" if unexplained else "class"
-    if right_set(wanted, named):
-        return "right"
-    wrong = wrong_names(wanted, named)
-    if not wrong:
-        return "inexact"
-    return "right and wrong" if len(wrong) < len(named) else "wrong"
-
-
-GRADES = {
-    "clean": "nothing named in a clean recording",
-    "false alarm": "a cause named in a clean recording",
-    "right": "exactly the right set, by class",
-    "inexact": "no wrong name, but not exactly the set: one missing, or one named twice",
-    "right and wrong": "one found and a wrong name given",
-    "wrong": "wrong names only",
-    "nothing": "there is something, nothing is named and nothing is unexplained",
-    "unexplained": "nothing named, `unexplained` raised",
-    "confident": "named without reserve what is not identifiable or not in the catalogue",
-    "flagged": "named, with `unexplained` raised",
-    "class": "named, but only as one of a class",
-    "crash": "no answer",
-}
-
-
 def grade(entry: dict) -> dict:
     """The graded row of a case.
 
@@ -167,10 +124,9 @@ def grade(entry: dict) -> dict:
         ``requested_sigma``, ``sigma`` and ``sigma_exact`` (of all effects), ``struck``; ``truth``:
         for each effect sensors, sizes, amplitude with unit, and ``found`` (by class), ``named``
         (itself), ``sensors_right``; ``causes``: the named ones with sensors and class;
-        ``wrong_names``, ``right_set``, ``confident``, ``unexplained``, ``grade`` (a key of
-        `GRADES`); `GAINS` of the extended model over the base model and over the base model
-        with larger noise (nats per sample, held out) and their ``_se``; `accuracy` of each of
-        `MODELS`; ``seconds``, ``cpu_seconds``; ``error``. After a crash the diagnosis' are None.
+        ``wrong_names``, ``right_set``, ``confident``, ``unexplained``; ``extended``: the `accuracy`
+        of its model; ``seconds``, ``cpu_seconds``; ``crash``, ``error``. After a crash the
+        diagnosis' are None.
     """
     truth, answer = entry["truth"], entry["diagnosis"]
     case = truth["case"]
@@ -190,7 +146,6 @@ def _answer_in_row(truth: dict, answer: dict | None) -> dict:
     unexplained = None if lost else bool(answer["unexplained"])
     wanted, named = [effect["effect"] for effect in truth["effects"]], classes(causes)
     keys = ("effect", "sensors", "indistinguishable_from")
-    gains = {f"{name}{end}": f"{key}{end}" for name, key in GAINS.items() for end in ("", "_se")}
     return {
         "truth": [_effect_in_row(effect, causes, imus) for effect in truth["effects"]],
         "causes": [{key: cause[key] for key in keys} for cause in causes],
@@ -198,12 +153,8 @@ def _answer_in_row(truth: dict, answer: dict | None) -> dict:
         "right_set": not lost and right_set(wanted, named),
         "confident": is_confident(kind, causes, unexplained),
         "unexplained": unexplained,
-        "grade": "crash" if lost else _grade(kind, wanted, causes, unexplained),
-        **{name: None if lost else answer["gain"][key] for name, key in gains.items()},
-        **{
-            name: None if lost else accuracy(answer[name], truth["positions_m"])
-            for name in MODELS
-        },
+        "crash": lost,
+        "extended": None if lost else accuracy(answer["extended"], truth["positions_m"]),
     }  # fmt: skip
 
 

@@ -9,7 +9,6 @@ from scipy.stats import t as student
 
 from imuarray_papers.blind.cases import KINDS
 from imuarray_papers.blind.inject import EFFECTS
-from imuarray_papers.blind.study import GAINS, MODELS
 
 NOTHING, UNEXPLAINED, CRASH = "nothing", "unexplained", "crash"
 STANDARD = {"imus": 8, "sampling_rate": 125.0, "duration": 24.0}  # what the criteria are set for
@@ -53,15 +52,12 @@ def recordings(rows: list[dict]) -> pd.DataFrame:
         line |= {name: row[name] for name in ("sigma", "sigma_exact")}
         line["least_sigma"] = min((effect["sigma"] for effect in truth), default=0.0)
         line |= {"says": said(row["causes"]), "unexplained": row["unexplained"]}
-        line["crash"] = row["grade"] == CRASH
-        line |= {name: row[name] for name in ("grade", "right_set", "confident")}
+        line |= {name: row[name] for name in ("crash", "right_set", "confident")}
         line |= {"named": bool(row["causes"]), "wrong": bool(row["wrong_names"])}
         for name in ("found", "sensors_right"):
             line[name] = all(effect[name] for effect in truth)
-        line |= {f"{name}{end}": row[f"{name}{end}"] for name in GAINS for end in ("", "_se")}
-        for model in MODELS:
-            for name in ("position_rmse_m", "covered", "coordinates"):
-                line[f"{model}_{name}"] = row[model][name] if row[model] else None
+        for name in ("position_rmse_m", "covered", "coordinates"):
+            line[name] = None if row["crash"] else row["extended"][name]
         line |= {"seconds": row["seconds"], "cpu_seconds": row["cpu_seconds"]}
         # either is an upper limit of what it takes where nothing else runs
         line["least_seconds"] = min(row["seconds"], row["cpu_seconds"])
@@ -98,7 +94,7 @@ def confusion(rows: list[dict]) -> pd.DataFrame:
 
 def _columns(row: dict) -> dict[str, bool]:
     """The columns of a recording in the confusion matrix, and whether each is right."""
-    if row["grade"] == CRASH:
+    if row["crash"]:
         return {CRASH: False}
     found = {cause["effect"]: cause["effect"] not in row["wrong_names"] for cause in row["causes"]}
     if not found and not row["unexplained"]:
@@ -113,21 +109,15 @@ def _order(kind: str, name: str) -> tuple:
     return KINDS.index(kind), [*EFFECTS].index(name) if name in EFFECTS else -1
 
 
-def coverage(part: pd.DataFrame, model: str) -> tuple[float, float]:
-    """Mean share of 95 % intervals that cover, and its standard error between recordings."""
-    share = (part[f"{model}_covered"] / part[f"{model}_coordinates"]).astype(float)
-    if len(share) < 2:
-        return float(share.mean()), np.nan
-    return float(share.mean()), float(share.std(ddof=1) / np.sqrt(len(share)))
-
-
-def coverage_limits(part: pd.DataFrame, model: str) -> tuple[float, float, float]:
-    """Mean coverage with 95 % limits (Student's t over the recordings).
+def coverage_limits(part: pd.DataFrame) -> tuple[float, float, float]:
+    """Mean share of 95 % intervals that cover, with 95 % limits (Student's t over the recordings).
 
     The error is no less than that of independent coordinates covered as they should be: a few
     recordings may agree by chance. No limits where there are fewer than two recordings.
     """
-    share, error = coverage(part, model)
-    least = np.sqrt(LEVEL * (1 - LEVEL) / part[f"{model}_coordinates"].sum())
-    reach = student.ppf((1 + LEVEL) / 2, len(part) - 1) * np.fmax(error, least)
+    shares = (part.covered / part.coordinates).astype(float)
+    share, count = float(shares.mean()), len(shares)
+    error = shares.std(ddof=1) / np.sqrt(count) if count > 1 else np.nan
+    least = np.sqrt(LEVEL * (1 - LEVEL) / part.coordinates.sum())
+    reach = student.ppf((1 + LEVEL) / 2, count - 1) * np.fmax(error, least)
     return share, float(np.maximum(share - reach, 0.0)), float(np.minimum(share + reach, 1.0))

@@ -12,7 +12,6 @@ from imuarray_papers.blind.inject import CATALOGUE
 from imuarray_papers.blind.summary import CRASH, NOTHING, UNEXPLAINED
 from imuarray_papers.figures.style import Column, scale_line
 
-# Amplitudes without a unit, said instead of "1".
 GROUPS = {
     "one": "one effect,\n8 σ or more", "clean": "", "gauge": "gauges",
     "outside": "outside the\ncatalogue", "struck": "",

@@ -42,16 +42,13 @@ def prior_mean(array: Array, error_sd: float, rng) -> np.ndarray:
     return array.positions + errors
 
 
-def simulate_twisting(settings: dict, accelerometer_sd: float, effects=()):
+def simulate_twisting(settings: dict, accelerometer_sd: float):
     """A recording of the board twisted by hand, as section IV-C describes the experiment.
 
-    Stands in for measured data until there are some. ``accelerometer_sd`` (m/s^2) is the
-    noise that is really there; effects get parameters drawn from their priors.
+    ``accelerometer_sd`` (m/s^2) is the noise that is really there.
     """
     paper, experiment, seed = settings["paper2021"], settings["experiment"], settings["seed"]
-    model = model_from(settings, accelerometer_sd, effects)
-    sizes = model.effect_prior_sd
-    parameters = sizes * stream(seed, "effects").standard_normal(sizes.shape)
+    model = model_from(settings, accelerometer_sd)
     motion = hand_twisting(
         stream(seed, "twisting"),
         np.radians(paper["angular_rate_sd_dps"]) / 2,
@@ -65,7 +62,6 @@ def simulate_twisting(settings: dict, accelerometer_sd: float, effects=()):
         experiment["sampling_rate"], experiment["duration"],
         gyroscope_range=np.radians(settings["paper2017"]["gyroscope_range_dps"]),
         position_prior_sd=paper["prior_sd"], title="simulated hand twisting",
-        parameters=parameters,
     )  # fmt: skip
 
 
