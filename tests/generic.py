@@ -88,7 +88,9 @@ class GenericTarget:
 
     def log_target(self, theta, rng) -> float:
         """log prior + log p-hat."""
-        return self.prior.log_density(theta) + self.estimate(theta, rng)
+        away = theta - self.prior.mean
+        root = getattr(self.prior, "root", np.diag(1.0 / self.prior.sd))
+        return self.estimate(theta, rng) - 0.5 * float(np.sum((root @ away) ** 2))
 
     def transitions(self, theta, log_target, step, count, rng) -> tuple[int, float]:
         """`CompiledTarget.transitions` in plain Python."""

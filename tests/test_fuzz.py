@@ -17,10 +17,8 @@ from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.provenance import is_damaged
 from imuarray.recording import channels, read_recording, write_recording
-from imuarray_papers.config import read_config
 from tests.test_convert_csv import HEADER, layout, table
 from tests.test_convert_csv import read as read_csv
-from tests.test_pipeline import ROOT
 from tests.test_recording import make
 
 FILES = 1000
@@ -114,26 +112,6 @@ def test_layouts_of_tables(tmp_path):
             assert found.specific_force.shape[0] == 6 and np.all(np.isfinite(found.angular_rate))
             assert found.specific_force.shape[1:] <= whole.specific_force.shape[1:]
     assert read < FILES // 2
-
-
-@pytest.mark.slow
-def test_configurations(tmp_path):
-    rng, read = np.random.default_rng(3), 0
-    content, path = (ROOT / "config.yaml").read_bytes(), tmp_path / "config.yaml"
-    for _ in range(FILES):
-        path.write_bytes(damaged(rng, content))
-        found = outcome(lambda: read_config(path))
-        read += found is not None
-        assert found is None or found["scale"] in found["scales"]
-    assert 0 < read < FILES
-
-
-def test_a_configuration_runs_no_code(tmp_path):
-    mark, path = tmp_path / "mark", tmp_path / "config.yaml"
-    path.write_text(f"seed: !!python/object/apply:os.system ['touch {mark}']\n")
-    with pytest.raises(InputError):
-        read_config(path)
-    assert not mark.exists()
 
 
 def test_recordings(tmp_path):

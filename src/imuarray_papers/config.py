@@ -11,14 +11,8 @@ SCHEMA = Path(__file__).parent / "schemas" / "config.schema.yaml"
 
 
 def read_config(path) -> dict:
-    """A validated configuration from a YAML file; InputError says what and where."""
-    try:
-        with open(path, encoding="utf-8") as handle:
-            config = yaml.safe_load(handle)
-    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
-        # ValueError: bytes that are no UTF-8, a date with a 13th month, thousands of digits
-        raise InputError(f"{path}: expected a readable YAML file: {error}") from None
-    return check_config(config, str(path))
+    """`check_config` of a YAML file."""
+    return check_config(yaml.safe_load(Path(path).read_text(encoding="utf-8")), str(path))
 
 
 def check_config(config, where: str = "config") -> dict:

@@ -20,10 +20,6 @@ class GaussianPrior:
         mean = np.asarray(mean, float)
         return cls(mean, np.broadcast_to(np.asarray(sd, float), mean.shape).copy())
 
-    def log_density(self, theta) -> float:
-        """Up to its constant."""
-        return -0.5 * float(np.sum(((theta - self.mean) / self.sd) ** 2))
-
 
 @dataclass(frozen=True)
 class TiedPrior(GaussianPrior):
@@ -35,7 +31,3 @@ class TiedPrior(GaussianPrior):
     def of(cls, mean, root) -> TiedPrior:
         """With the sds that follow."""
         return cls(mean, np.sqrt(np.sum(np.linalg.inv(root) ** 2, axis=1)), root)
-
-    def log_density(self, theta) -> float:
-        """Up to its constant."""
-        return -0.5 * float(np.sum((self.root @ (theta - self.mean)) ** 2))

@@ -110,48 +110,33 @@ def is_confident(kind: str, causes: list[dict], unexplained: bool) -> bool:
 
 
 def grade(entry: dict) -> dict:
-    """The graded row of a case.
-
-    Parameters
-    ----------
-    entry : dict
-        As `diagnosed` returns it.
+    """The graded row of a case; ``entry`` as `diagnosed` returns it.
 
     Returns
     -------
     dict
         ``case``, ``kind``, ``imus``, ``sampling_rate`` (Hz), ``duration`` (s), ``rails``,
-        ``requested_sigma``, ``sigma`` and ``sigma_exact`` (of all effects), ``struck``; ``truth``:
-        for each effect sensors, sizes, amplitude with unit, and ``found`` (by class), ``named``
-        (itself), ``sensors_right``; ``causes``: the named ones with sensors and class;
-        ``wrong_names``, ``right_set``, ``confident``, ``unexplained``; ``extended``: the `accuracy`
-        of its model; ``seconds``, ``cpu_seconds``; ``crash``, ``error``. After a crash the
-        diagnosis' are None.
+        ``sigma`` and ``sigma_exact`` (of all effects); ``truth``: for each effect sensors, sizes,
+        and ``found`` (by class), ``named`` (itself), ``sensors_right``; ``causes``: the named ones
+        with sensors and class; ``wrong_names``, ``right_set``, ``confident``, ``unexplained``;
+        ``extended``: the `accuracy` of its model; ``seconds``, ``cpu_seconds``; ``crash``,
+        ``error``. After a crash the diagnosis has said nothing.
     """
     truth, answer = entry["truth"], entry["diagnosis"]
-    case = truth["case"]
-    row = {"case": entry["case"]}
-    row |= {name: case[name] for name in ("kind", "imus", "sampling_rate", "duration", "rails")}
-    row |= {"requested_sigma": case["sigma"]}
-    row |= {name: truth[name] for name in ("sigma", "sigma_exact", "struck")}
-    row |= _answer_in_row(truth, answer)
-    return row | {name: entry[name] for name in ("seconds", "cpu_seconds", "error")}
-
-
-def _answer_in_row(truth: dict, answer: dict | None) -> dict:
-    """The diagnosis' answer, against the truth; after a crash it has said nothing."""
-    kind, imus = truth["case"]["kind"], truth["case"]["imus"]
-    lost = answer is None
+    case, lost = truth["case"], answer is None
     causes = [] if lost else answer["causes"]
     unexplained = None if lost else bool(answer["unexplained"])
     wanted, named = [effect["effect"] for effect in truth["effects"]], classes(causes)
     keys = ("effect", "sensors", "indistinguishable_from")
-    return {
-        "truth": [_effect_in_row(effect, causes, imus) for effect in truth["effects"]],
+    row = {name: case[name] for name in ("kind", "imus", "sampling_rate", "duration", "rails")}
+    row |= {name: truth[name] for name in ("sigma", "sigma_exact")}
+    row |= {name: entry[name] for name in ("case", "seconds", "cpu_seconds", "error")}
+    return row | {
+        "truth": [_effect_in_row(effect, causes, case["imus"]) for effect in truth["effects"]],
         "causes": [{key: cause[key] for key in keys} for cause in causes],
         "wrong_names": wrong_names(wanted, named),
         "right_set": not lost and right_set(wanted, named),
-        "confident": is_confident(kind, causes, unexplained),
+        "confident": is_confident(case["kind"], causes, unexplained),
         "unexplained": unexplained,
         "crash": lost,
         "extended": None if lost else accuracy(answer["extended"], truth["positions_m"]),
@@ -161,7 +146,6 @@ def _answer_in_row(truth: dict, answer: dict | None) -> dict:
 def _effect_in_row(effect: dict, causes: list[dict], imus: int) -> dict:
     """An effect of the truth: what it is; and found, named itself, on the right sensors or not."""
     row = {name: effect[name] for name in ("effect", "sensors", "sigma", "sigma_exact")}
-    row |= {"amplitude": effect["amplitude"]["value"], "unit": effect["amplitude"]["unit"]}
     name = effect["effect"]
     of_it = [c for c in causes if name in (c["effect"], *c["indistinguishable_from"])]
     itself = [c for c in of_it if c["effect"] == name]

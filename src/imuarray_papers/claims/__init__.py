@@ -11,5 +11,4 @@ from imuarray_papers.claims import (
     posterior2021,
     rate2017,
     theory2017,
-    tuning2021,
 )

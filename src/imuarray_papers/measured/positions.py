@@ -159,7 +159,6 @@ def agreement(pairs: pd.DataFrame, table: pd.DataFrame) -> dict:
         "coverage_50": float(np.mean(size < ndtri(0.75))),
         "coverage_95": float(np.mean(size < ndtri(0.975))),
         "z_rms": float(np.sqrt(np.mean(pairs.z**2))),
-        "z_median_abs": float(size.median()),
         "spread_m": float(np.sqrt(groups.mean_m.var(ddof=1).mean())),
         "claimed_m": float(np.sqrt(np.mean(table.sd_m**2))),
     }

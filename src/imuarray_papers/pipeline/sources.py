@@ -1,11 +1,15 @@
-"""The source files that a script of the workflow rests on, as a digest."""
+"""The files that the workflow rests on: where they are, and a script's as a digest."""
 
 import ast
 import json
+import os
+import sys
 from collections.abc import Callable
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
+
+from snakemake.sourcecache import LocalGitFile
 
 import imuarray
 from imuarray.provenance import digest
@@ -83,3 +87,41 @@ def _shape(node: Any) -> Any:
             fields["body"] = node.body[1:]
         return [type(node).__name__, *([name, _shape(value)] for name, value in fields.items())]
     return [_shape(item) for item in node] if isinstance(node, list) else repr(node)
+
+
+class Home:
+    """Where the workflow's own files are: a folder, or a repository that Snakemake reads from afar.
+
+    ``folder``: what Snakemake calls the basedir of the main Snakefile, workflow/.
+    """
+
+    def __init__(self, folder):
+        self.folder = folder
+        self.is_local = getattr(folder, "is_local", True) and not isinstance(folder, LocalGitFile)
+        if isinstance(folder, LocalGitFile):
+            LocalGitFile.join = _joined
+
+    def recording(self, path: str) -> str:
+        """A recording's file: in the working directory, or else one that came with the workflow.
+
+        Ends with one line and status 2 where there is none.
+        """
+        if os.path.exists(path):
+            return path
+        if not self.is_local and path.startswith("data/"):
+            return f"results/measured/data/{path}"
+        beside = Path(str(self.folder)).resolve().parent / path
+        if self.is_local and beside.exists():
+            return os.path.relpath(beside)
+        print(f"imuarray: {path}: expected a file to read, found none", file=sys.stderr)
+        sys.exit(2)
+
+    def blob(self, path: str) -> str:
+        """The command that prints a file of the repository: Snakemake's copies are text."""
+        repository = getattr(self.folder, "repo_path", None) or self.folder.hosted_repo.repo_clone
+        return f"git -C '{os.path.abspath(repository)}' cat-file blob '{self.folder.ref}:{path}'"
+
+
+def _joined(folder, path, join=LocalGitFile.join):
+    """Snakemake 9.27 joins texts only, but gives itself a path that is none (git+file)."""
+    return join(folder, str(path))

@@ -168,7 +168,8 @@ class CompiledTarget:
     def log_target(self, theta, rng) -> float:
         """log prior + log p-hat with fresh draws."""
         estimate = self.likelihood.estimate(positions_of(theta), self.draws, rng)
-        return self.prior.log_density(theta) + estimate
+        away = (theta - self.prior.mean) / self.prior.sd
+        return estimate - 0.5 * float(np.sum(away**2))
 
     def transitions(self, theta, log_target, step, count, rng) -> tuple[int, float]:
         """Advance ``theta`` in place by ``count`` steps; (accepted, the last log target).
