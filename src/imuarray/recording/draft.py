@@ -28,6 +28,7 @@ RANGES = {
 SPINNING = 40.0  # rad/s, faster than a hand turns a board
 LEAST = 3  # rows
 UNKNOWN = "?"
+SCHEMA = Path(__file__).with_name("columns.schema.json")
 
 
 class Triad(NamedTuple):
@@ -63,9 +64,9 @@ def draft(paths: Sequence[Path]) -> tuple[str, list[str]]:
                 f'    "{t.label}": {{columns: [{", ".join(map(_quoted, t.columns))}]}}{place}'
                 for t in own
             ]
-    parts = [time, *prior, *sections]
+    parts = [f"# yaml-language-server: $schema={SCHEMA}", time, *prior, *sections]
     if len(paths) > 1:
-        parts.insert(1, f"columns: [{', '.join(map(_quoted, six))}]")
+        parts.insert(2, f"columns: [{', '.join(map(_quoted, six))}]")
         parts += ["imus:"] + [f'  "{path.stem}": {{}}  # position: [?, ?, ?]' for path in paths]
     asked.append("positions: from the drawing, else they begin from the motion")
     return "\n".join(parts) + "\n", asked + ["axes: where a chip is turned on the board"] * (
