@@ -1,4 +1,4 @@
-"""The JSON schema of columns.yaml, by which an editor completes and checks: what the reader takes."""
+"""The JSON schema of columns.yaml, for editors: it takes what the reader takes."""
 
 import json
 from pathlib import Path
@@ -33,7 +33,7 @@ def test_it_has_the_readers_keys():
     assert [own_keys(own) for own in imus] == [layout.IMU, layout.BAG_IMU]
 
 
-@pytest.mark.parametrize("block", PAGE, ids=lambda block: block.note)
+@pytest.mark.parametrize("block", FILES, ids=lambda block: block.note)
 def test_it_takes_what_the_docs_show(block):
     jsonschema.validate(yaml.safe_load(block.text), SCHEMA)
 
