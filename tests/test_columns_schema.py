@@ -11,8 +11,10 @@ from imuarray.recording import layout
 from tests.doc_pages import ROOT, blocks
 
 SCHEMA = json.loads(Path(layout.__file__).with_name("columns.schema.json").read_text())
-PAGE = [
-    b for b in blocks(ROOT / "docs" / "convert.md") if b.language == "yaml" and b.kind == "file"
+FILES = [
+    block
+    for block in blocks(ROOT / "docs" / "convert.md")
+    if (block.language, block.kind) == ("yaml", "file")
 ]
 
 
