@@ -17,7 +17,7 @@ from imuarray.geometry import sub_array
 from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting
 from imuarray.simulation.recordings import simulate_samples
-from imuarray.trust.reasons import _filters
+from imuarray.trust.reasons import _arms, _filters
 from tests.test_engine import errors, position_sds
 
 CHIP = 2000  # Hz at which the chips filter
@@ -124,3 +124,15 @@ def test_one_accelerometers_low_pass_is_said():
     )
     (said,) = _filters(file)
     assert "accelerometer d 1, of some 19 Hz" in said
+
+
+def test_a_lever_arm_that_no_chip_has_room_for_is_said():
+    names = [f"size_effect {axes}_{k} m" for axes in ("xx", "zy") for k in ("a", "b 1")]
+    arms = np.array([1e-4, 2e-4, 0.0, 1.0])
+    file, sound = (
+        xr.Dataset({"effect_parameter": ("parameter", size * arms)}, {"parameter": names})
+        for size in (-3e-3, 2e-3)
+    )
+    (said,) = _arms(file)
+    assert said.startswith("axis z of accelerometer b 1 comes out 3 mm")
+    assert not _arms(sound) and not _arms(xr.Dataset())

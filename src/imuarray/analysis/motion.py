@@ -133,9 +133,9 @@ def _late(calibration: xr.Dataset) -> float:
     What is common to the delays of all IMUs is nowhere seen: their mean is taken for zero. With
     clocks of their own, the delays are the offsets of these.
     """
-    clocks = values_of(calibration, "sensor_clock offset")
-    delays = values_of(calibration, "sensor_delay ") or [-offset for offset in clocks]
-    return float(np.median(delays)) if delays else 0.0
+    clocks = values_of(calibration, "sensor_clock offset").values()
+    delays = values_of(calibration, "sensor_delay ").values() or [-offset for offset in clocks]
+    return float(np.median([*delays])) if delays else 0.0
 
 
 def _with_common_map(found, calibration: xr.Dataset, recording: Recording):

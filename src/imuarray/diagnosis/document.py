@@ -217,14 +217,8 @@ def rivals_of(found: Found) -> tuple[Fitted, Fitted]:
 def residual_sd(made: Fit) -> dict:
     """rms of the residual in m/s^2 and rad/s, corrected for what the motion takes up."""
     si = standardised(made) * np.repeat(made.readings.sd, 3, axis=1)
-    return {
-        "specific_force": _rms(si[..., :3]),
-        "angular_rate": _rms(si[..., 3:]),
-    }
-
-
-def _rms(values) -> float:
-    return float(np.sqrt(np.nanmean(values**2)))
+    parts = {"specific_force": si[..., :3], "angular_rate": si[..., 3:]}
+    return {name: float(np.sqrt(np.nanmean(part**2))) for name, part in parts.items()}
 
 
 def noise_of(found: Found) -> dict:
@@ -243,10 +237,7 @@ def noise_of(found: Found) -> dict:
 
 def gains(base: Fitted, inflated: Fitted, extended: Fitted) -> dict:
     """Held-out nats per sample over both rivals, residual ratios, and the positions' change."""
-    over_base, over_inflated = (
-        gain(base.scores, extended.scores),
-        gain(inflated.scores, extended.scores),
-    )
+    over_base, over_inflated = (gain(m.scores, extended.scores) for m in (base, inflated))
     before, after = residual_sd(base.fit), residual_sd(extended.fit)
     place = base.fit.columns.of("position")
     owner = base.fit.active[:, place][: len(base.fit.state.positions)]
@@ -280,16 +271,10 @@ def causes_of(found: Found, extended: Fitted) -> list[dict]:
             chi_square=statistic, degrees_of_freedom=freedom, placebo_gain_nats=placebo,
             gain_in_sample_nats=true,
         ))  # fmt: skip
-    causes += [
-        _entry(
-            item,
-            labels,
-            item.parameters,
-            (item.gain, item.gain_se),
-            **({"stretches_s": [list(pair) for pair in item.where]} if item.where else {}),
-        )
-        for item in found.in_noise
-    ]
+    for item in found.in_noise:
+        where = {"stretches_s": [list(pair) for pair in item.where]} if item.where else {}
+        nats = item.gain, item.gain_se
+        causes.append(_entry(item, labels, item.parameters, nats, **where))
     return causes
 
 

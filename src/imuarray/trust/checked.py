@@ -82,12 +82,16 @@ def parameters_of(calibration: xr.Dataset) -> dict[str, dict[str, float]]:
     return {str(name): {"value": value, "sd": sd} for name, value, sd in rows}
 
 
-def values_of(calibration: xr.Dataset, start: str) -> list[float]:
-    """Values of the effects' parameters whose names ``start`` so."""
+def values_of(calibration: xr.Dataset, start: str) -> dict[str, float]:
+    """Values of the effects' parameters whose names ``start`` so: by component and IMU ("xy_3")."""
     if "effect_parameter" not in calibration:
-        return []
+        return {}
     names, values = (calibration[name].to_numpy() for name in ("parameter", "effect_parameter"))
-    return [value for name, value in zip(names, values, strict=True) if name.startswith(start)]
+    # "effect component_IMU unit", where the name of an IMU may have blanks
+    return {
+        str(name).split(" ", 1)[1].rpartition(" ")[0]: float(value)
+        for name, value in zip(names, values, strict=True) if name.startswith(start)
+    }  # fmt: skip
 
 
 def reasons_in(calibration: xr.Dataset) -> list[str]:

@@ -14,7 +14,7 @@ import xarray as xr
 from imuarray.model.effects import EFFECTS, KINDS, Effect
 from imuarray.recording import Recording
 from imuarray.recording.channels import repeated
-from imuarray.trust.checked import effect_names, reasons_in
+from imuarray.trust.checked import effect_names, reasons_in, values_of
 from imuarray.trust.drawing import FAR, Places, another_size, departures, factor_words, size_of
 from imuarray.trust.misfit import RESIDUAL, is_papers, residuals, rigid, unfitting, unsteady
 from imuarray.trust.rigid import COHERENT, FEW, SLOPE, Slope, elsewhere, kept, slope, turning
@@ -24,6 +24,7 @@ GROWN = 6.0  # sds of the growth; clean and real boards' is within one
 # s^2, that a filter may droop by more than the other kind's. An accelerometer's makes centrifugal
 # forces those of no rate: 3e-5 (20 Hz) is 3 sds of error; a gyroscope's of 3e-5 is 1.
 DROOPS = 2e-5, 6e-5
+ROOM = 2.5e-3  # m, from an accelerometer's middle; packages are 3 to 5 mm wide
 HOLD = 1e-6  # chance of maps that still poses gave; 0.97 and more of real and clean boards
 TRIAD = 10.0  # the same of one triad where the noise of each is estimated
 DRIFT = 3.0  # sds of the mean of all samples; offsets that differ by more bias positions
@@ -67,7 +68,7 @@ def reasons_of_calibration(
         reason if len(whose) == len(several) else f"recording {', '.join(whose)}: {reason}"
         for reason, whose in found.items()
     ]
-    judged += _moved_maps(calibration) + _grows(calibration)
+    judged += _moved_maps(calibration) + _grows(calibration) + _arms(calibration)
     if not judged:
         corrected = all(one.correction is not None for one in several)
         judged = unsteady(calibration, corrected, len(several))
@@ -77,31 +78,37 @@ def reasons_of_calibration(
 
 def _filters(calibration: xr.Dataset) -> list[str]:
     """Words on filters so far apart that their first powers of frequency do not say it."""
-    if "effect_parameter" not in calibration:
-        return []
-    names = calibration["parameter"].to_numpy().astype(str)
-    values = calibration["effect_parameter"].to_numpy()
-
-    def of(start) -> dict[str, float]:
-        found = zip(names[mine := np.char.startswith(names, start)], values[mine], strict=True)
-        # "effect component_LABEL unit", where a label may have blanks
-        return {name.rpartition(" ")[0].split(" ", 1)[1].split("_", 1)[1]: float(x)
-                for name, x in found}  # fmt: skip
-
     lag, droop = (
-        np.mean([*of(start).values()] or 0.0)
+        np.mean([*values_of(calibration, start).values()] or 0.0)
         for start in ("gyroscope_delay delay", "gyroscope_filter droop")
     )
-    lower, late = int(lag < 0), of("accelerometer_filter lag")
+    lower = int(lag < 0)
     if abs(droop) > DROOPS[lower]:
         others = f"the {KINDS[1 - lower]}s'"
         return [_low(f"the {KINDS[lower]}s' low pass", float(abs(droop)), others)]
-    each = {k: x - late[k] ** 2 / 2 for k, x in of("accelerometer_filter droop").items()}
+    late, droops = (values_of(calibration, f"accelerometer_filter {x}") for x in ("lag", "droop"))
+    each = {
+        name.partition("_")[2]: x - y**2 / 2
+        for (name, x), y in zip(droops.items(), late.values(), strict=True)
+    }
     usual = np.median([*each.values()] or 0.0)
     return [
         _low(f"the low pass of accelerometer {k}", float(x - usual), "the others'")
         for k, x in each.items() if x - usual > DROOPS[0]
     ]  # fmt: skip
+
+
+def _arms(calibration: xr.Dataset) -> list[str]:
+    """Words on lever arms that no chip has room for: another error was taken for one."""
+    arms = values_of(calibration, "size_effect ")
+    worst = max(arms, key=lambda name: abs(arms[name]), default="")
+    if not worst or abs(arms[worst]) < ROOM:
+        return []
+    axis, _, label = worst.partition("_")
+    return [
+        f"axis {axis[0]} of accelerometer {label} comes out {1e3 * abs(arms[worst]):.2g} mm from"
+        " the others', farther than a chip has room for: an error that this model does not know"
+    ]
 
 
 def _low(whose: str, droop: float, others: str) -> str:

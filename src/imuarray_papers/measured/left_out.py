@@ -234,7 +234,7 @@ def _predicted(clipped: Recording, withheld, positions, lead: float) -> np.ndarr
 
 def lead_of(calibration: xr.Dataset) -> float:
     """By how much (s) the gyroscopes are ahead of the accelerometers, 0 where nobody found it."""
-    leads = values_of(calibration, "gyroscope_delay ")
+    leads = [*values_of(calibration, "gyroscope_delay ").values()]
     return float(np.mean(leads)) if leads else 0.0
 
 
