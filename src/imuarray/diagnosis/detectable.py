@@ -68,7 +68,8 @@ def scatter(given: Information, scores, active, chosen) -> np.ndarray:
     gain = cross @ scaled_inverse(given.information[square] + given.precision[square])
     left = scores[:, chosen] - scores[:, active] @ gain.T
     own = np.diag(given.information)[chosen] - np.sum(gain * cross, axis=1)
-    return np.sqrt(np.maximum(len(scores) * np.var(left, axis=0, ddof=1) / own, 1.0))
+    squares = len(scores) * np.var(left, axis=0, ddof=1)
+    return np.sqrt(np.maximum(squares / np.maximum(own, 1e-300), 1.0))
 
 
 def noncentrality(search: Search, effect: str, tests: int, freedom: int) -> float:

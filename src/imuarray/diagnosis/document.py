@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import imuarray
-from imuarray.diagnosis.noise import per_triad, standardised
+from imuarray.diagnosis.noise import judged, per_triad, standardised
 from imuarray.diagnosis.noise_effects import held_out
 from imuarray.diagnosis.procedure import Found, run_procedure
 from imuarray.diagnosis.replicates import Discrepancy, discrepancies
@@ -120,14 +120,14 @@ def diagnose(
         "samples": len(search.readings.time),
         "clock": {"origin_s": float(recording.time[0]), "span_s": search.readings.span},
         "base": base.section(),
-        "discrepancies": [d.as_dict() for d in base.discrepancies],
+        "discrepancies": [d._asdict() for d in base.discrepancies],
         "causes": causes_of(found, extended),
         "unexplained": bool(found.unexplained),
         "smooth": smooth_samples(robust, found),
         "remaining": [c.name for c in found.checks if c.log_p < SETTINGS.check],
         "inflated": inflated.section(),
         "extended": extended.section(),
-        "discrepancies_after": [d.as_dict() for d in extended.discrepancies],
+        "discrepancies_after": [d._asdict() for d in extended.discrepancies],
         "noise_sd": noise_of(found),
         "gain": gains(base, inflated, extended),
         "detectable": search.detectable,
@@ -205,8 +205,9 @@ def rivals_of(found: Found) -> tuple[Fitted, Fitted]:
         # as read: the rivals know neither of rails nor of repeats nor of exchanged axes
         bare = replace(bare, values=found.raw.values)
     declared = fit(bare, search.columns, alone, start, search.smooth, True, all_columns=False)
-    size = np.sqrt(np.nanmean(per_triad(standardised(declared)) ** 2, axis=-1))
-    inflated_sd = bare.declared * np.where(bare.exists, np.maximum(size, 1e-3), 1.0)
+    known = judged(bare, declared.basis)[..., None]
+    squares = np.where(known, per_triad(standardised(declared)) ** 2, 1.0)
+    inflated_sd = bare.declared * np.maximum(np.sqrt(np.nanmean(squares, axis=-1)), 1e-3)
     again = fit(
         bare.with_sd(inflated_sd), search.columns, alone, declared.state, search.smooth, True,
         all_columns=False,

@@ -161,10 +161,8 @@ def outlier_checks(search: Search) -> list[Check]:
     away = search.allowed & ~search.readings.keep & ~search.jumps
     whole = replace(search.readings, keep=search.allowed)
     # by the motion that was fitted without them: an outlier would be part of its own prediction
-    state, (columns, kept) = (
-        search.fit.state,
-        in_use(search.columns, search.active, search.fit.state),
-    )
+    state = search.fit.state
+    columns, kept = in_use(search.columns, search.active, state)
     state = from_flat(columns, state, flat_parameters(search.columns, state)[:, kept])
     # derivatives as the fit had them: compiled already
     seen = linearise(whole, columns, state, np.flatnonzero(search.active[:, kept].any(axis=0)))

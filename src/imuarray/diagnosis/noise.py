@@ -12,8 +12,9 @@ import numpy as np
 
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.fit import Fit, seen_through
-from imuarray.engine.linearise import CHUNK, THREADS
-from imuarray.engine.readings import Readings, few_at_once
+from imuarray.engine.linearise import CHUNK, THREADS, leverage_of
+from imuarray.engine.readings import Readings, by_triad, few_at_once
+from imuarray.engine.robust import LEAST_FREE
 from imuarray.tails import QUARTILE, log_normal, log_poisson
 
 DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / np.sqrt(70.0)
@@ -60,30 +61,39 @@ def standardised(fit: Fit) -> np.ndarray:
     return to_unit(fit.readings, fit.residual, fit.basis)
 
 
+def judged(readings: Readings, basis) -> np.ndarray:
+    """Triads (N, 2) bool whose noise a residual shows: a lone gyroscope has the motion for itself.
+
+    ``basis`` (T, 6 N, D) of the motion.
+    """
+    free = by_triad(np.where(readings.keep, 1.0 - leverage_of(basis), 0.0)).sum(axis=0)
+    return readings.exists & (free > LEAST_FREE * by_triad(readings.keep).sum(axis=0))
+
+
 def to_unit(readings: Readings, residual, basis) -> np.ndarray:
     """Residual of unit variance from residual (T, N, 6) and the motion's basis (T, 6 N, D)."""
-    leverage = np.einsum("tij,tij->ti", basis, basis).reshape(residual.shape)
-    share = np.sqrt(np.maximum(1.0 - leverage, 1e-6))
+    share = np.sqrt(np.maximum(1.0 - leverage_of(basis), 1e-6))
     return np.where(readings.keep, residual / share, np.nan)
 
 
 def judge(readings: Readings, residual, basis) -> Noise:
     """The noise of each triad from a residual (T, N, 6) and the motion's basis (T, 6 N, D)."""
-    unit = to_unit(readings, residual, basis)
+    known = judged(readings, basis)
+    unit = np.where(np.repeat(known, 3, axis=1), to_unit(readings, residual, basis), np.nan)
     fast = fast_part(unit, readings.run)
-    values = np.where(readings.exists[..., None], per_triad(fast), 1.0)
+    values = np.where(known[..., None], per_triad(fast), 1.0)
     counts = np.maximum(np.sum(np.isfinite(values), axis=-1), 1)
     core = np.maximum(np.nanmedian(np.abs(values), axis=-1) / QUARTILE, 1e-12)
     scale = np.maximum(np.sqrt(np.nanmean(values**2, axis=-1)), 1e-12)
     far = _outliers(fast, core)
     expected = 2 * np.exp(log_normal(SETTINGS.far)) * counts
-    slope, correlation = _colour(np.nan_to_num(unit), readings)
+    slope, correlation = _colour(np.nan_to_num(unit), known)
     passed = 1 + 2 * sum(
         value * correlation ** (lag + 1) for lag, value in enumerate(AUTOCORRELATION)
     )
     tails = np.nanmean(values**4, axis=-1) / scale**4 - 3.0
     error = np.sqrt(np.maximum(2 + tails, 1.0) * INFLATION / counts) / 2
-    sd = readings.sd * np.where(readings.exists, scale / np.sqrt(passed), 1.0)
+    sd = readings.sd * np.where(known, scale / np.sqrt(passed), 1.0)
     # beside readings that fit nothing, a triad may come to have the motion for itself
     sd = np.fmax(sd, SETTINGS.least_noise * readings.declared)
     return Noise(sd, error, far.sum(axis=0), expected, slope, correlation, far)
@@ -100,15 +110,15 @@ def _outliers(fast, core) -> np.ndarray:
     return few_at_once(peak)
 
 
-def _colour(unit, readings: Readings):
-    """(slope in sds, AR(1) correlation) from the upper spectrum of each triad, (N, 2)."""
+def _colour(unit, known):
+    """(slope in sds, AR(1) correlation) from the upper spectrum of each ``known`` triad, (N, 2)."""
     power = np.abs(np.fft.rfft(unit, axis=0)) ** 2
     part, low, high = _bands(len(unit))
     bands = [power[band].reshape(band.sum(), -1, 2, 3) for band in (low, high)]
     means = [np.maximum(b.mean(axis=(0, 3)), 1e-12) for b in bands]
     ratio = np.log(means[1] / means[0])
     error = _slope_error(low, high)
-    slope = np.where(readings.exists, ratio / error, 0.0)
+    slope = np.where(known, ratio / error, 0.0)
     grid = np.linspace(-0.95, 0.98, 194)
     expected = np.array([_ar_ratio(rho, part[low], part[high]) for rho in grid])
     correlation = grid[np.argmin(np.abs(expected[:, None, None] - ratio), axis=0)]

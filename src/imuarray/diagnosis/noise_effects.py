@@ -6,10 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis.noise import Noise, expected_ratio
+from imuarray.diagnosis.noise import Noise, expected_ratio, judged
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.fit import Fit
 from imuarray.engine.heldout import blocks_of
+from imuarray.engine.robust import LEAST_FREE
 from imuarray.model.effects import KINDS
 from imuarray.tails import QUARTILE, log_chi_square, log_normal
 
@@ -52,21 +53,23 @@ def triad(fit: Fit, imu: int, kind: int) -> np.ndarray:
     """A triad's residual (T, 3) as three uncorrelated ones of unit variance, NaN where left out.
 
     What the motion takes up correlates them: on a small array the sum of their squares would have
-    tails where the noise has none.
+    tails where the noise has none. NaN, too, where it leaves hardly anything.
     """
     rows = slice(6 * imu + 3 * kind, 6 * imu + 3 * kind + 3)
     basis, left = fit.basis[:, rows], fit.residual[:, imu, 3 * kind : 3 * kind + 3]
     covariance = np.eye(3) - basis @ basis.swapaxes(1, 2)
     out, factor = np.empty_like(left), np.zeros_like(covariance)
+    seen = fit.readings.keep[:, imu, 3 * kind : 3 * kind + 3].copy()
     for i in range(3):  # Cholesky's factor and the forward substitution, all samples at once
         for j in range(i):
             known = np.einsum("tk,tk->t", factor[:, i, :j], factor[:, j, :j])
             factor[:, i, j] = (covariance[:, i, j] - known) / factor[:, j, j]
         own = covariance[:, i, i] - np.sum(factor[:, i, :i] ** 2, axis=1)
-        factor[:, i, i] = np.sqrt(np.maximum(own, 1e-6))
+        seen[:, i] &= own > LEAST_FREE
+        factor[:, i, i] = np.sqrt(np.maximum(own, LEAST_FREE))
         taken = np.einsum("tk,tk->t", factor[:, i, :i], out[:, :i])
-        out[:, i] = (left[:, i] - taken) / factor[:, i, i]
-    return np.where(fit.readings.keep[:, imu, 3 * kind : 3 * kind + 3], out, np.nan)
+        out[:, i] = np.where(own > LEAST_FREE, left[:, i] - taken, 0.0) / factor[:, i, i]
+    return np.where(seen, out, np.nan)
 
 
 def held_out(nats) -> tuple[float, float, np.ndarray]:
@@ -103,7 +106,7 @@ def autocorrelation(fit: Fit, imu: int, kind: int) -> tuple[float, int]:
 
 
 def whole_scales(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
-    """(log ratio to the sd in use (n,), covariance (n, n)) of the n triads that exist.
+    """(log ratio to the sd in use (n,), covariance (n, n)) of the n triads that show their noise.
 
     One step of restricted maximum likelihood: the residual's squares against what the motion
     leaves of them, and the information of all triads' variances together.
@@ -123,10 +126,11 @@ def whole_scales(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
         information += 2 * squares.sum(axis=(1, 3))
         surplus = fit.residual[part].reshape(-1, 6 * count) ** 2 * mask - left[:, rows, rows]
         score += surplus.sum(axis=0).reshape(2 * count, 3).sum(axis=1)
-    there = readings.exists.ravel()
+    known = judged(readings, fit.basis)
+    there = known.ravel()
     # of two triads of a kind, how much of their difference is either's is not seen
     covariance = np.linalg.pinv(information[np.ix_(there, there)], ALIKE, hermitian=True)
-    wide = np.array([_width(fit, int(i), int(k)) for i, k in np.argwhere(readings.exists)])
+    wide = np.array([_width(fit, int(i), int(k)) for i, k in np.argwhere(known)])
     return covariance @ score[there], covariance * np.outer(wide, wide)
 
 
@@ -139,13 +143,13 @@ def _width(fit: Fit, imu: int, kind: int) -> float:
 
 
 def scales(fit: Fit, noise: Noise, untied: bool) -> tuple[np.ndarray, np.ndarray]:
-    """(log ratio to the declared sd (n,), covariance (n, n)) of the n triads that exist.
+    """(log ratio to the declared sd (n,), covariance (n, n)) of the n triads that show their noise.
 
     From the whole residual where that agrees with its fast part, or where nothing ties it to the
     motion (``untied``) and its spectrum is that of its own colour; else from the fast part, which
     smooth misfit does not reach.
     """
-    there = fit.readings.exists
+    there = judged(fit.readings, fit.basis)
     whole, covariance = whole_scales(fit)
     whole = whole + np.log(fit.readings.sd / fit.readings.declared)[there]
     fast = np.log(noise.sd / fit.readings.declared)[there]
@@ -175,7 +179,7 @@ def noise_scale(
     ``least`` (N,) log ratios below which a departure is not believed, ``skip`` IMUs to leave out.
     """
     readings = fit.readings
-    pairs = np.argwhere(readings.exists)
+    pairs = np.argwhere(judged(readings, fit.basis))
     log_ratio, covariance = scales(fit, noise, untied)
     chosen = np.flatnonzero(
         (pairs[:, 1] == kind)
@@ -185,7 +189,7 @@ def noise_scale(
     if not len(chosen):
         return None
     hits, log_p = verdict(log_ratio[chosen], covariance[np.ix_(chosen, chosen)], limit)
-    log_p += np.log(readings.exists[:, kind].sum() / len(chosen))
+    log_p += np.log(np.sum(pairs[:, 1] == kind) / len(chosen))
     if log_p > limit:
         return None
     chosen = chosen[hits] if len(hits) else chosen
@@ -237,7 +241,7 @@ def heavy_tails(fit: Fit, noise: Noise, limit: float):
     ``others`` are those where it may be so, once it is so somewhere: each by itself, or all the
     rest of a kind together.
     """
-    triads = np.argwhere(fit.readings.exists)
+    triads = np.argwhere(judged(fit.readings, fit.basis))
     tried = [(int(i), int(k), mixture(fit, i, k)) for i, k in triads]
     gains = np.array([_tail_gain(fit, noise, *item) for item in tried])
     for place, (imu, kind, _) in enumerate(tried):
@@ -306,12 +310,13 @@ def pooled_autocorrelation(fit: Fit, noise: Noise, lagged) -> float:
 
     0 where their spectra disagree.
     """
-    kind, exists = np.argwhere(fit.readings.exists)[:, 1], fit.readings.exists
+    known = judged(fit.readings, fit.basis)
+    kind = np.argwhere(known)[:, 1]
     implied = np.array([expected_ratio(value, len(fit.residual)) for value, _ in lagged])
     found = [0.0]
     for chosen in (np.ones(len(kind), bool), kind == 0, kind == 1):
         if chosen.any():
-            (rho, pairs), slopes = np.asarray(lagged)[chosen].T, noise.slope[exists][chosen]
+            (rho, pairs), slopes = np.asarray(lagged)[chosen].T, noise.slope[known][chosen]
             signed, root = np.sign(rho), np.sqrt(len(rho))
             apart = abs(np.sum(signed * (slopes - implied[chosen]))) / root
             there = -np.sum(signed * slopes) / root
@@ -326,10 +331,10 @@ def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Named | None
     ``untied``: no check finds the residual tied to the motion; else only the spectrum above the
     motion's frequencies counts.
     """
-    readings, number = fit.readings, int(fit.readings.exists.sum())
+    readings, triads = fit.readings, np.argwhere(judged(fit.readings, fit.basis))
+    number = len(triads)
     hits, nats, numbers, logs = [], np.zeros(len(fit.residual)), {}, []
     step = float(np.median(np.diff(readings.time)))
-    triads = np.argwhere(readings.exists)
     lagged = np.array([autocorrelation(fit, *pair) for pair in triads])
     # the common motion passes a little of one triad's autocorrelation on to the others
     passed = max(SETTINGS.flat, np.abs(lagged[:, 0]).max() / 5)

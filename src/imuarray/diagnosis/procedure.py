@@ -224,9 +224,10 @@ def fit_coloured_noise(search: Search, without) -> Search:
     """
     if COLOURED in without:
         return search
-    triads = np.argwhere(search.readings.exists)
+    known = noises.judged(search.readings, search.fit.basis)
+    triads = np.argwhere(known)
     lagged = np.array([noise_effects.autocorrelation(search.fit, *pair) for pair in triads])
-    coloured = search.noise.correlation[search.readings.exists] != 0
+    coloured = search.noise.correlation[known] != 0
     pooled = noise_effects.pooled_autocorrelation(search.fit, search.noise, lagged)
     if pooled < SETTINGS.limit(COLOURED):
         coloured |= np.abs(lagged[:, 0]) * np.sqrt(lagged[:, 1]) > SETTINGS.clear

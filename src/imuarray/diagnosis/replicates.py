@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis.noise import standardised
+from imuarray.diagnosis.noise import judged, standardised
 from imuarray.diagnosis.plain import first_up
 from imuarray.engine.fit import Fit
 from imuarray.model.effects import KINDS
@@ -49,10 +49,6 @@ class Discrepancy(NamedTuple):
     p_value: float
     sensors: list[str]
     says: str
-
-    def as_dict(self) -> dict:
-        """Entry of `diagnosis.json`."""
-        return dict(self._asdict())
 
 
 class Replicator:
@@ -129,9 +125,11 @@ class Part(NamedTuple):
 def quantities(fit: Fit, unit, seen: Seen | None = None) -> dict[str, Quantity]:
     """Test quantities of a standardised residual (T, N, 6), NaN where left out."""
     readings, found, seen = fit.readings, {}, seen or Seen(fit)
-    filled = np.nan_to_num(unit)
+    filled, known = np.nan_to_num(unit), judged(readings, fit.basis)
     for kind, name in enumerate(KINDS):
-        there = np.flatnonzero(readings.exists[:, kind])
+        there = np.flatnonzero(known[:, kind])
+        if not len(there):
+            continue
         labels = tuple(readings.labels[k] for k in there)
         axes = tuple(f"{label}{axis}" for label in labels for axis in "xyz")
         mask = np.zeros(unit.shape[1:], bool)

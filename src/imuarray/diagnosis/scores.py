@@ -114,8 +114,8 @@ class Information:
     (-1 where there is none), ``values`` (K,) of the parameters, ``ridge`` (K,) prior precision and
     ``usual`` (K,) before sizes were estimated, which tests go by, ``precision`` (K, K) that of what
     is fitted, gauges pinned.
-    ``meat`` (K, K) is the score's covariance where noise is not white, else None; ``correlation``
-    (N, 2) that of each triad's noise from sample to sample there.
+    ``meat`` (K, K) is the score's covariance where noise is not white or readings were corrected,
+    else None; ``correlation`` (N, 2) that of each triad's noise from sample to sample.
     """
 
     information: np.ndarray

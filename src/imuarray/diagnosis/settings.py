@@ -97,11 +97,6 @@ class Settings:
     implausible: float = 10.0  # prior sds of a parameter
     doubtful: float = 0.5  # share of a cause's gain that a placebo must not have
 
-    # The extended model for other commands (`extension`)
-    # of a prior sd: parameters that the diagnosis fixed or found no need of; so little that misfit
-    # does not move a clock's sawtooth past a sample
-    pinned: float = 1e-9
-
     def limit(self, effect: str, beside: object = False) -> float:
         """Critical log p of an effect: its own, where its test has another tail.
 

@@ -32,6 +32,7 @@ from imuarray.engine.parameters import POSITION, Columns, prior_precision
 from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS as CLOCKS
 from imuarray.engine.start import is_smooth, start
+from imuarray.engine.widths import mask_of_left, spread_of
 from imuarray.tails import log_chi_square
 
 
@@ -69,12 +70,18 @@ class Weighed:
 
     @cached_property
     def given(self) -> Information:
-        """Information of all parameters that the fit has derivatives by."""
-        plain = information_at(self.fit)
-        meat = noises.coloured_meat(self.fit, plain.information, self.correlation)
-        if meat is None:
-            return plain
-        return replace(plain, meat=meat, correlation=self.correlation)
+        """Information of all parameters that the fit has derivatives by.
+
+        The score's covariance has what a correction left of maps and offsets, too.
+        """
+        made, plain = self.fit, information_at(self.fit)
+        meat = noises.coloured_meat(made, plain.information, self.correlation)
+        mask = mask_of_left([made.readings.left], made.columns, made.active) & made.described
+        if mask.any():
+            seen = plain.information[:, plain.places(mask)]
+            spread = spread_of(made.readings.left, made.columns, mask)
+            meat = (plain.information if meat is None else meat) + seen @ spread @ seen.T
+        return plain if meat is None else replace(plain, meat=meat, correlation=self.correlation)
 
 
 @dataclass(frozen=True)

@@ -63,12 +63,8 @@ def _against_acceleration(summary: pd.DataFrame, noise: pd.DataFrame) -> pd.Data
     # the simulation has the noise that was declared
     scale = np.where(summary.source == "measured", summary.quantity.map(still), 1.0)
     x = np.degrees(summary.bin_low + summary.bin_high) / 2e3
-    rows = (
-        summary.assign(size=summary.rms / scale, x=x)
-        .groupby(["source", "quantity", "x"])["size"]
-        .agg(y=rms, low="min", high="max")
-    )
-    return rows.reset_index()
+    by = summary.assign(size=summary.rms / scale, x=x).groupby(["source", "quantity", "x"])
+    return by["size"].agg(y=rms, low="min", high="max").reset_index()
 
 
 def _first_clock(clock: pd.DataFrame) -> pd.DataFrame:

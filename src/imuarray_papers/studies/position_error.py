@@ -115,11 +115,7 @@ def against_motion(cases, errors: Errors, marks) -> pd.DataFrame:
 
 
 FORCES = (0.0, 1.0, 10.0, 100.0)  # m/s^2; section IV: |s| does not matter
-TABLES = {
-    "samples": against_samples,
-    "motion": against_motion,
-    "force": against_motion,
-}
+TABLES = {"samples": against_samples, "motion": against_motion, "force": against_motion}
 
 
 def magnitudes(paper: dict) -> tuple[float, float, float]:
