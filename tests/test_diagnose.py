@@ -191,6 +191,29 @@ def test_what_first_order_says_it_left_is_no_fault_of_the_model():
     assert least[0] < -20 and least[1] > SETTINGS.check
 
 
+def test_what_first_order_left_is_no_cause():
+    """Where it says how uncertain it is; where it does not, maps that are off are one."""
+    recording, _ = make(Case("test-maps", duration=DURATION), SEED)
+    off = 2e-4 * np.random.default_rng(SEED).standard_normal((8, 3, 3))
+    rate = np.einsum("kij,tkj->tki", np.eye(3) + off, recording.angular_rate)
+    read = replace(recording, angular_rate=rate)
+    left = np.diag(np.repeat([0.0, 4e-8], 72))
+    assert run_procedure(read).search.causes
+    found = run_procedure(replace(read, map_covariance=left))
+    assert not found.search.causes and not found.in_noise and not found.unexplained
+
+
+def test_a_lone_gyroscope_is_not_judged_by_what_the_motion_leaves_of_it(recwarn):
+    recording, _ = make(Case("test-lone", duration=DURATION), SEED)
+    lone = replace(
+        recording, angular_rate=recording.angular_rate[:, :1],
+        gyroscope_labels=recording.gyroscope_labels[:1],
+    )  # fmt: skip
+    document = diagnose(lone, replicates=REPLICATES).document
+    assert not document["causes"] and not document["unexplained"]
+    assert not any(issubclass(warning.category, RuntimeWarning) for warning in recwarn)
+
+
 def searched(recording):
     """A search with the papers' model fitted."""
     readings = arrange(recording)

@@ -110,7 +110,7 @@ def together(first: list[Structural], second: list[Structural]) -> list[Structur
 def lone_checks(search: Search, tailed) -> list[Check]:
     """The reading farthest from its prediction, but for triads whose tails are known."""
     known = {(imu, kind) for imu, kind, _ in tailed}
-    size = np.abs(search.fit.residual)
+    size = np.abs(beside_left(search)[0].residual)
     for imu, kind in known:
         size[:, imu, 3 * kind : 3 * kind + 3] = 0.0
     place = np.unravel_index(int(np.argmax(size)), size.shape)
@@ -198,7 +198,8 @@ def plausibility_checks(search: Search) -> list[Check]:
 def tail_checks(search: Search, tailed) -> list[Check]:
     """Triads whose residual a mixture describes better, where ``tailed`` does not say so."""
     there = {(imu, kind) for imu, kind, _ in tailed}
-    named, hits, _ = noise_effects.heavy_tails(search.fit, search.noise, SETTINGS.check)
+    made = beside_left(search)[0]
+    named, hits, _ = noise_effects.heavy_tails(made, search.noise, SETTINGS.check)
     left = sorted({imu for imu, kind, _ in hits if (imu, kind) not in there})
     return [Check("outliers' mixture", len(left), named.log_p, tuple(left))] if left else []
 

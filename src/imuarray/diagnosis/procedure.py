@@ -10,6 +10,7 @@ from imuarray.diagnosis import noise_effects
 from imuarray.diagnosis.adoption import adopt, proposals, rivals
 from imuarray.diagnosis.detectable import detectable
 from imuarray.diagnosis.final_checks import (
+    beside_left,
     final_checks,
     leave_out_clips,
     together,
@@ -195,7 +196,7 @@ def fit_heavy_tails(search: Search, without) -> tuple[Search, list, list]:
     if TAILS in without:
         return search, [], []
     limit = SETTINGS.limit(TAILS)
-    named, hits, others = noise_effects.heavy_tails(search.fit, search.noise, limit)
+    named, hits, others = noise_effects.heavy_tails(beside_left(search)[0], search.noise, limit)
     if named is None:
         return search, [], []
     left, before, search = hits, len(search.causes), search.light()
@@ -206,14 +207,15 @@ def fit_heavy_tails(search: Search, without) -> tuple[Search, list, list]:
         lost = np.repeat(few_at_once(far), 3, axis=2)
         search = replace(search, readings=search.readings.without(lost)).refit()
         # the farthest hide others, whose motion they have moved
-        left = noise_effects.heavy_tails(search.fit, search.noise, limit)[1]
+        left = noise_effects.heavy_tails(beside_left(search)[0], search.noise, limit)[1]
         if not left:
             break
     if search.smooth:  # what is left of rough motion is faster than the samples, and no cause
         search = adopt(search)
     if len(search.causes) > before:
         search = eliminate(search)
-    tailed = [(i, k, noise_effects.mixture(search.fit, i, k)) for i, k, _ in hits + others]
+    made = beside_left(search)[0]
+    tailed = [(i, k, noise_effects.mixture(made, i, k)) for i, k, _ in hits + others]
     return search, tailed, [named]
 
 
@@ -224,11 +226,12 @@ def fit_coloured_noise(search: Search, without) -> Search:
     """
     if COLOURED in without:
         return search
-    known = noises.judged(search.readings, search.fit.basis)
+    made = beside_left(search)[0]
+    known = noises.judged(made.readings, made.basis)
     triads = np.argwhere(known)
-    lagged = np.array([noise_effects.autocorrelation(search.fit, *pair) for pair in triads])
+    lagged = np.array([noise_effects.autocorrelation(made, *pair) for pair in triads])
     coloured = search.noise.correlation[known] != 0
-    pooled = noise_effects.pooled_autocorrelation(search.fit, search.noise, lagged)
+    pooled = noise_effects.pooled_autocorrelation(made, search.noise, lagged)
     if pooled < SETTINGS.limit(COLOURED):
         coloured |= np.abs(lagged[:, 0]) * np.sqrt(lagged[:, 1]) > SETTINGS.clear
     if not coloured.any():
@@ -236,7 +239,7 @@ def fit_coloured_noise(search: Search, without) -> Search:
     correlation, sd = search.noise.correlation.copy(), search.readings.sd.copy()
     for (imu, kind), (rho, _) in zip(triads[coloured], lagged[coloured], strict=True):
         correlation[imu, kind] = rho
-        sd[imu, kind] *= np.sqrt(np.nanmean(noise_effects.triad(search.fit, imu, kind) ** 2))
+        sd[imu, kind] *= np.sqrt(np.nanmean(noise_effects.triad(made, imu, kind) ** 2))
     readings = search.readings.with_sd(sd)
     made = fit(readings, search.columns, search.active, search.fit.state, search.smooth)
     noise = search.noise._replace(correlation=correlation, sd=sd)
@@ -248,7 +251,7 @@ def named_noise(search: Search, without, tailed, untied: bool) -> list[noise_eff
 
     ``untied``: no check finds the residual tied to the motion.
     """
-    found, made, readings = [], search.fit, search.readings
+    found, made, readings = [], beside_left(search)[0], search.readings
     for kind, name in enumerate(SCALES):
         if name not in without:
             # the mixture's core is the noise of a triad with heavy tails
