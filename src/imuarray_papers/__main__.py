@@ -5,15 +5,7 @@ import sys
 
 from imuarray.cli import main
 from imuarray.commands.argument_types import count
-from imuarray.commands.parser import (
-    NOISE,
-    RECORDING,
-    SEED,
-    Command,
-    make_parser,
-    number,
-    option,
-)
+from imuarray.commands.parser import NOISE, RECORDING, SEED, Command, make_parser, number, option
 
 PACKAGE = "imuarray_papers.commands"
 COMMANDS = (

@@ -16,14 +16,7 @@ from imuarray.diagnosis.scores import Information
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL
 from imuarray.diagnosis.state import Search, need
-from imuarray.engine.fit import (
-    Fit,
-    flat_parameters,
-    from_flat,
-    in_use,
-    prior_means,
-    scaled_solve,
-)
+from imuarray.engine.fit import Fit, flat_parameters, from_flat, in_use, prior_means, scaled_solve
 from imuarray.engine.linearise import linearise
 from imuarray.engine.widths import FIXED, mask_of_left, spread_of
 from imuarray.model.effects import KINDS

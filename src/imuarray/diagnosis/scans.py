@@ -8,12 +8,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from imuarray.diagnosis.scores import (
-    Candidate,
-    Information,
-    Scanned,
-    Score,
-)
+from imuarray.diagnosis.scores import Candidate, Information, Scanned, Score
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.fit import Fit, flat_parameters, from_flat
 from imuarray.engine.heldout import blocks_of

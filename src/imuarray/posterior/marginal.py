@@ -14,14 +14,7 @@ import numpy as np
 
 from imuarray.estimation.collapsed import Collapsed, motion_from
 from imuarray.model import structure_tensor
-from imuarray.model.jax64 import (
-    cholesky,
-    jax,
-    jnp,
-    log_determinant,
-    solve_lower,
-    solve_upper,
-)
+from imuarray.model.jax64 import cholesky, jax, jnp, log_determinant, solve_lower, solve_upper
 from imuarray.model.structure import CURVATURES, PAIRS
 
 NODE_COUNTS = (1, 3, 5, 7, 9, 11)  # nodes on each axis of omega

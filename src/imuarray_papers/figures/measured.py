@@ -7,14 +7,7 @@ import pandas as pd
 from scipy.special import ndtr
 
 from imuarray.pictures.noise import KINDS, deviation_lines
-from imuarray.pictures.style import (
-    BLACK,
-    PAGE,
-    logarithmic,
-    look,
-    new_figure,
-    styled,
-)
+from imuarray.pictures.style import BLACK, PAGE, logarithmic, look, new_figure, styled
 from imuarray_papers.figures.style import Column, panels, rms
 
 FIRST_ORDER = (
