@@ -56,6 +56,7 @@ AGREES = 1.02  # times the residual that a prior of omega_dot may make
 CHANCE = 1e-3  # of maps as far from those of first order, of positions as far apart
 LEAST_SHARE = 0.03  # of the variance, by which two estimates may differ at least
 LEAST_Z, LEAST_NATS = 2.0, 2.0  # standard errors of a gain, and nats, from which a group is kept
+KNOWN_SLOPE = 1e-2  # of the angular acceleration, to which slopes must know it to tell a curve
 CURVED_NATS = 10.0  # the same of a curve: two seconds of clean motion had three by chance
 
 
@@ -167,7 +168,9 @@ def _with_slope(found: Estimate, kept: dict, curve: bool) -> tuple[Estimate, dic
         return better, shown
     if better.residual_ratio() >= AGREES * found.residual_ratio():
         return found, shown
-    if curve:
+    slopes = [one.state.turning for one in begun]
+    told = all(np.median(x.sd) < KNOWN_SLOPE * np.sqrt(np.mean(x.mean**2)) for x in slopes)
+    if curve and told:
         mask = mask_of(found.columns, EFFECT_GROUPS[CURVE])
         (group,) = gains(better, {CURVE: mask}, kept)
         group = group._replace(kept=group.kept and group.gain > CURVED_NATS)
