@@ -44,6 +44,16 @@ def test_what_grows_with_the_rate_is_found(change, group):
     assert np.sqrt(np.mean((off / position_sds(found)) ** 2)) < 2 and np.abs(off).max() < 3e-5
 
 
+def test_a_curve_is_not_asked_of_motion_too_fast_for_slopes():
+    """At 50 Hz a polynomial knows nothing of motion up to 12 Hz; a curve took up its misfit."""
+    model = ArrayModel.isotropic(sub_array(imuarray.mimu4444(), 4), 0.04, 0.002)
+    rng, places = np.random.default_rng(1), model.array.relative
+    motion, time = hand_twisting(rng, np.radians(500), 4.0, 12.0), np.arange(0, 12, 0.02)
+    recording, _ = simulate_samples(model, motion.at(time), places, places, rng, time)
+    _, groups = select_forward([arrange(recording, sparse=True)])
+    assert CURVE not in {group.name for group in groups}
+
+
 def test_it_is_said_at_1000_deg_per_s():
     rate = np.radians(1000)
     found = {f"{axis}_{k}": (0.1 / rate**2 * (k == 2 and axis == "y"), 1e-6) for k in (1, 2, 3)
