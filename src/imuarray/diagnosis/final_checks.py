@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.diagnosis import noise_effects
+from imuarray.diagnosis.noise import Noise
 from imuarray.diagnosis.reading_effects import RAILS, Structural, rails_cause, unique
 from imuarray.diagnosis.residual_checks import Check, all_checks, normal_checks
 from imuarray.diagnosis.scores import Information
@@ -100,10 +101,10 @@ def together(first: list[Structural], second: list[Structural]) -> list[Structur
     return list(names.values())
 
 
-def lone_checks(search: Search, tailed) -> list[Check]:
+def lone_checks(made: Fit, tailed) -> list[Check]:
     """The reading farthest from its prediction, but for triads whose tails are known."""
     known = {(imu, kind) for imu, kind, _ in tailed}
-    size = np.abs(beside_left(search)[0].residual)
+    size = np.abs(made.residual)
     for imu, kind in known:
         size[:, imu, 3 * kind : 3 * kind + 3] = 0.0
     place = np.unravel_index(int(np.argmax(size)), size.shape)
@@ -138,12 +139,13 @@ def beside_left(search: Search) -> tuple[Fit, Information]:
 
 def final_checks(search: Search, tailed) -> list[Check]:
     """All tests of an extended model; ``tailed``: known mixtures."""
-    checks = all_checks(*beside_left(search), search.noise)
+    made, given = beside_left(search)
+    checks = all_checks(made, given, search.noise)
     checks += [*outlier_checks(search), *plausibility_checks(search)]
     for cause in search.causes:
         special = SPECIAL.get(cause.effect)
         checks += special.check(search, cause) if special and special.check else []
-    return [*checks, *tail_checks(search, tailed), *lone_checks(search, tailed)]
+    return [*checks, *tail_checks(made, search.noise, tailed), *lone_checks(made, tailed)]
 
 
 def outlier_checks(search: Search) -> list[Check]:
@@ -188,11 +190,10 @@ def plausibility_checks(search: Search) -> list[Check]:
     return found
 
 
-def tail_checks(search: Search, tailed) -> list[Check]:
+def tail_checks(made: Fit, noise: Noise, tailed) -> list[Check]:
     """Triads whose residual a mixture describes better, where ``tailed`` does not say so."""
     there = {(imu, kind) for imu, kind, _ in tailed}
-    made = beside_left(search)[0]
-    named, hits, _ = noise_effects.heavy_tails(made, search.noise, SETTINGS.check)
+    named, hits, _ = noise_effects.heavy_tails(made, noise, SETTINGS.check)
     left = sorted({imu for imu, kind, _ in hits if (imu, kind) not in there})
     return [Check("outliers' mixture", len(left), named.log_p, tuple(left))] if left else []
 

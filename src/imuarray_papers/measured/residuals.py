@@ -93,11 +93,6 @@ def compare(recording: Recording, rng) -> pd.DataFrame:
     """`residual_summary` of the recording and of its simulation."""
     fit = fit_residuals(recording)
     simulated = simulate_like(recording, fit, rng)
-    again = fit_residuals(simulated)
-    return pd.concat(
-        [
-            residual_summary(fit, recording, "measured"),
-            residual_summary(again, simulated, "simulated"),
-        ],
-        ignore_index=True,
-    )
+    measured = residual_summary(fit, recording, "measured")
+    again = residual_summary(fit_residuals(simulated), simulated, "simulated")
+    return pd.concat([measured, again], ignore_index=True)
