@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 from unittest.mock import patch
 
 import numpy as np
@@ -17,7 +18,7 @@ from imuarray.diagnosis.final_checks import beside_left
 from imuarray.diagnosis.noise_effects import verdict
 from imuarray.diagnosis.procedure import run_procedure
 from imuarray.diagnosis.reading_effects import find_structural
-from imuarray.diagnosis.residual_checks import all_checks
+from imuarray.diagnosis.residual_checks import all_checks, dependence, left_by_motion
 from imuarray.diagnosis.scans import Courses, maybe_grown
 from imuarray.diagnosis.scores import Candidate, Score
 from imuarray.diagnosis.settings import SETTINGS
@@ -219,6 +220,22 @@ def searched(recording):
     readings = arrange(recording)
     columns = columns_of(readings.array, catalogue_effects(), readings.position_prior_sd)
     return Search(readings, columns, (), str).fitted()
+
+
+def test_two_imus_residuals_vary_together_as_the_motion_leaves_them():
+    rng = stream(8, "two IMUs")
+    basis = np.linalg.qr(rng.standard_normal((12, 9)) + 0.3 * rng.standard_normal((60, 12, 9)))[0]
+    white = rng.standard_normal((4000, 60, 12))
+    left = white - np.einsum("tri,tsi,nts->ntr", basis, basis, white, optimize=True)
+    products = np.einsum("ntr,nts->nrs", left, left)
+    kept = SimpleNamespace(keep=np.ones((60, 2, 6), bool))
+    fit = SimpleNamespace(readings=kept, residual=left[0].reshape(60, 2, 6), basis=basis)
+    covariance, variance = left_by_motion(fit)
+    np.testing.assert_allclose(covariance, products.mean(axis=0), atol=0.4)
+    apart = ~np.eye(12, dtype=bool)
+    ratio = products.var(axis=0)[apart] / variance[apart]
+    np.testing.assert_allclose(ratio, 1.0, atol=0.2)
+    assert dependence(fit) > 2.0  # twelve axes, of which the motion leaves three
 
 
 def test_biases_put_back_gain_along_a_course_what_they_had_to_gain():

@@ -16,6 +16,8 @@ from imuarray.diagnosis.scores import Information
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.clocks import delay_score
 from imuarray.engine.fit import Fit, seen_through
+from imuarray.engine.linearise import CHUNK
+from imuarray.engine.robust import LEAST_FREE
 from imuarray.linear import scaled_inverse, scaled_square
 from imuarray.motion.state import lever
 from imuarray.tails import log_chi_square, log_normal
@@ -112,8 +114,34 @@ def regression_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]
                 chosen = np.flatnonzero(names == name)
                 groups.setdefault(name, []).append((imu, *_chi(block, score, bare, chosen)))
             axes.append((imu, *_chi(block, score, bare, np.arange(len(names)))))
-    checks = [_either(f"residual against {name}", found) for name, found in groups.items()]
-    return [*checks, _pooled("residual against all", axes), _worst("an axis against all", axes)]
+    alike = dependence(fit)
+    checks = [_either(f"residual against {name}", found, alike) for name, found in groups.items()]
+    every = _pooled("residual against all", axes, alike)
+    return [*checks, every, _worst("an axis against all", axes)]
+
+
+def left_by_motion(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+    """Covariance of the readings' residuals, and variance of their products, summed over time.
+
+    Both (6 N, 6 N): of white noise of unit variance, less the motion's share.
+    """
+    kept = fit.readings.keep.reshape(len(fit.residual), -1).astype(float)
+    free = np.sqrt(kept - np.sum(fit.basis**2, axis=2))
+    covariance, variance = np.diag(kept.sum(axis=0)), (free**2).T @ free**2
+    for basis in np.array_split(fit.basis, len(fit.basis) // CHUNK + 1):
+        shared = basis @ basis.swapaxes(1, 2)
+        covariance = covariance - shared.sum(axis=0)
+        variance = variance + np.sum(shared**2, axis=0)
+    return covariance, variance
+
+
+def dependence(fit: Fit) -> float:
+    """Variance of a sum of axes' chi-squares over that of independent ones: few IMUs share much."""
+    covariance = left_by_motion(fit)[0]
+    there = np.flatnonzero(np.diag(covariance) > LEAST_FREE * len(fit.residual))
+    size = np.sqrt(np.diag(covariance)[there])
+    together = covariance[np.ix_(there, there)] / np.outer(size, size)
+    return max(SETTINGS.crowd, float(np.sum(together**2)) / len(there))
 
 
 def _chi(block, score, bare, chosen):
@@ -123,17 +151,17 @@ def _chi(block, score, bare, chosen):
     return scaled_square(inner, score[chosen], SETTINGS.seen_feature, scale)
 
 
-def _pooled(name, found) -> Check:
-    """All axes together: the sum of chi-squares, its variance widened by `SETTINGS.crowd`."""
+def _pooled(name, found, alike) -> Check:
+    """All axes together: the sum of chi-squares, its variance ``alike`` times as large."""
     total, freedom = sum(f[1] for f in found), max(sum(f[2] for f in found), 1)
-    widened = freedom + (total - freedom) / np.sqrt(SETTINGS.crowd)
+    widened = freedom + (total - freedom) / np.sqrt(alike)
     worst = max(found, key=lambda f: f[1] - f[2])
     return Check(name, total / freedom, log_chi_square(max(widened, 1e-9), freedom), (worst[0],))
 
 
-def _either(name, found) -> Check:
+def _either(name, found, alike) -> Check:
     """All axes together, or the worst of them."""
-    together, worst = _pooled(name, found), _worst(name, found)
+    together, worst = _pooled(name, found, alike), _worst(name, found)
     best = min(together, worst, key=lambda check: check.log_p)
     return best._replace(log_p=min(best.log_p + np.log(2), 0.0))
 
@@ -224,16 +252,13 @@ def correlation_check(fit: Fit, noise: Noise) -> Check:
     """Correlations between axes beyond what the common motion explains."""
     samples = len(fit.residual)
     flat = np.where(fit.readings.keep, fit.residual, 0.0).reshape(samples, -1)
-    basis = fit.basis
-    kept = fit.readings.keep.reshape(samples, -1).astype(float)
-    expected = -np.einsum("tri,tsi->rs", basis, basis, optimize=True)
-    free = (kept - np.sum(basis**2, axis=2)) ** 0.5
-    spread = np.sqrt((free**2).T @ free**2)
+    expected, variance = left_by_motion(fit)
+    spread = np.sqrt(variance)
     # products of two autocorrelated series vary more
     rho = np.repeat(noise.correlation, 3, axis=1).ravel()
     rho = np.outer(rho, rho)
     spread = spread * np.sqrt((1 + rho) / (1 - rho))
-    there = np.flatnonzero(kept.any(axis=0))
+    there = np.flatnonzero(fit.readings.keep.any(axis=0).ravel())
     z = (flat.T @ flat - expected) / np.maximum(spread, 1e-9)
     upper = np.triu_indices(len(there), 1)
     values = z[np.ix_(there, there)][upper]

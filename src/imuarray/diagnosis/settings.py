@@ -92,7 +92,7 @@ class Settings:
     coarse: float = 2.0  # noise sds of a step between readings
     slow: int = 3  # turns in the recording; slower ages are a drift
     around: int = 101  # frequencies that give a periodogram's level
-    crowd: float = 1.3  # variance of the axes' sum against chi-square's: not quite independent
+    crowd: float = 1.3  # least variance of axes' sum over chi-square's: not quite independent
     little: float = 0.03  # of the noise's own misfit: so little left over is within tolerance
     implausible: float = 10.0  # prior sds of a parameter
     doubtful: float = 0.5  # share of a cause's gain that a placebo must not have
