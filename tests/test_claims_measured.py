@@ -20,7 +20,7 @@ VERDICT = {"converged": True, "burn_in_draws": 0, "most_draws": 100, "rhat_max":
 
 def measured(
     coverage=0.5, residual=2.0, noise=0.04, rate=0.001, variance=300.0, under=-5e-4,
-    correlation=0.2, spread=2.0, exact=0.1,
+    correlation=0.2, spread=2.0, exact=0.1, railed=10,
 ):  # fmt: skip
     """Contents by path: positions of a recording off by ``under`` on the underside, and so on."""
     rng = np.random.default_rng(0)
@@ -44,7 +44,13 @@ def measured(
             "correlation": [-0.01, correlation],
         }
     )
+    selection = pd.DataFrame(
+        [("all", 9000), ("still pose", 6000), ("slower than 100 deg/s", 1000),
+         ("accelerometer at a rail", 3), ("gyroscope at a rail", railed)],
+        columns=["criterion", "samples"],
+    )  # fmt: skip
     given = {
+        "../measured/subsets/mine_selection": selection,
         "../measured/positions/mine": places, "../measured/agreement/board": agreement,
         "../measured/first_order/mine_noise": noises, "chains/mine_T500": draws.reshape(2, 400, 21),
     }  # fmt: skip
@@ -67,6 +73,8 @@ def verdict(name, **changes):
         ("2021-46", {}, "holds"),
         ("2021-49", {}, "holds"),
         ("2021-49", {"under": 0.0}, "does not hold"),
+        ("2021-63", {}, "holds"),
+        ("2021-63", {"under": 0.0}, "does not hold"),
         ("2021-52", {"coverage": 0.5}, "holds"),
         ("2021-52", {"coverage": 0.95}, "does not hold"),
         ("2021-55", {"residual": 2.0}, "does not hold"),
@@ -82,6 +90,8 @@ def verdict(name, **changes):
         ("2021-60", {"residual": 0.05}, "does not hold"),
         ("2021-61", {}, "does not hold"),
         ("2021-61", {"spread": 1.1}, "holds"),
+        ("2021-62", {}, "holds"),
+        ("2021-62", {"railed": 300}, "does not hold"),
         ("2021-57", {"variance": 300.0}, "does not hold"),
         ("2021-57", {"variance": 0.1}, "holds"),
     ],

@@ -35,7 +35,6 @@ with job(snakemake) as settings:
         ),
         "unbiased": checks.unbiased(rng("unbiased"), count),
         "effective_draws": checks.effective_draws(rng("effective"), model, sds),
-        "spread": checks.spread_ratio(rng("spread"), model, sds),
         "theory": checks.theory(),
         "random_walk": checks.best_acceptance(rng("walk"), model.array.parameters.size),
         "stamp": stamp(settings, seed),

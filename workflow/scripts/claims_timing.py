@@ -1,4 +1,4 @@
-"""Processor seconds an iteration (2017) over N and a transition (2021) over T take -> CSV.
+"""Processor seconds that a transition (2021) takes over T -> CSV.
 
 Also how the acceptance depends on the variance at the longest T -> CSV (that one is reproducible).
 """
@@ -13,18 +13,11 @@ with job(snakemake) as settings:
     from imuarray.provenance import write_csv
     from imuarray.recording import read_recording, read_truth
     from imuarray.streams import stream
-    from imuarray_papers.config import model_from
     from imuarray_papers.posterior.likelihood import CompiledTarget
     from imuarray_papers.studies.bayes import target_for
     from imuarray_papers.studies.checks import timing
-    from imuarray_papers.studies.position_error import magnitudes
 
-    seed, paper = settings["seed"], settings["paper2017"]
-    longest = max(paper["fig4_samples"])
-    costs = timing.iteration_costs(
-        stream(seed, "timing"), model_from(settings), magnitudes(paper),
-        [longest // 10, longest // 3, longest, 3 * longest],
-    )  # fmt: skip
+    seed = settings["seed"]
     targets, thetas = {}, {}
     for path, tuned in zip(snakemake.input.recordings, snakemake.input.tuning, strict=True):
         with open(tuned, encoding="utf-8") as handle:
@@ -34,7 +27,7 @@ with job(snakemake) as settings:
         thetas[samples] = read_truth(path)["position"].to_numpy()[1:].ravel()
     rng = stream(seed, "timing transitions")
     moves = timing.transition_costs(targets, thetas, chosen["step_length_m"], rng)
-    write_csv(pd.concat([costs, moves]), snakemake.output.timing)
+    write_csv(moves, snakemake.output.timing)
     # the wide p(omega | y_g) of (30b) makes the variance really high
     sharp, wide = targets[samples], target_for(settings, read_recording(path), 1, spread=True)
     table = timing.acceptance_against_variance(

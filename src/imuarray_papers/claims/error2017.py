@@ -12,6 +12,7 @@ from imuarray_papers.claims.registry import (
     ratio,
     rises,
     show,
+    untested,
 )
 
 SAMPLES = "calibration/position_error_samples"
@@ -59,6 +60,26 @@ def inverse(results):
 def variance_inverse(results):
     slope, error, _ = _exponent(results)
     return judged(2 * slope, 2 * error, near(2 * slope, -1, 2 * error, 0.1))
+
+
+@claim("2017-44")
+def complete(results):
+    table = results.table(SAMPLES)
+    rmse = table[table.samples >= 10].pivot(index="iterations", columns="samples", values="rmse_m")
+    last = rmse.iloc[-1]
+    # what is left to go falls by the same factor in each iteration; the last two levels show it
+    left = np.sqrt(rmse**2 - last**2)[(rmse > 1.2 * last).all(axis=1)].tail(2)
+    if len(left) < 2:
+        return untested("no two numbers of iterations before convergence at this scale")
+    (first, second), (a, b) = left.index, left.to_numpy()
+    needed = second + np.log(b / (0.46 * last)) * (second - first) / np.log(a / b)
+    factors = (b / a) ** (1 / (second - first))
+    value = f"{listed(needed.iloc[[0, -1]])} iterations for N = {listed(needed.index[[0, -1]], 5)}"
+    remark = (
+        f"what is left falls by {show(1 - factors.max(), 2)} to {show(1 - factors.min(), 2)} of"
+        " itself in an iteration for each N, but goes down to the bound, as N^-1/2: N log N"
+    )
+    return judged(value, "", needed.iloc[-1] <= 1.1 * needed.iloc[0], remark)
 
 
 def _thousand(results) -> tuple[float, float, tuple[str, str]]:

@@ -9,6 +9,7 @@ from scipy.special import bdtr
 
 from imuarray.errors import InputError
 from imuarray.geometry import UNDERSIDE_ROTATION
+from imuarray.model.effects import KINDS
 from imuarray.recording.units import GRAVITY
 from imuarray_papers.claims.posterior2021 import covered
 from imuarray_papers.claims.registry import by_samples, claim, falls, judged, listed, show, untested
@@ -117,17 +118,6 @@ def doubled(results):
     return judged(value, "none", stands, remark)
 
 
-@claim("2021-51")
-def spread(results):
-    found = results.json("claims/marginalisation")["spread"]
-    stands = 0.5 < found["ratio"] < 2
-    remark = (
-        f"(30b) is one gyroscope's covariance, not that of the mean of {found['gyroscopes']}: it"
-        " widens on purpose or by slip"
-    )
-    return judged(show(found["ratio"], 4), found["se"], stands, "" if stands else remark)
-
-
 @claim("2021-53")
 def consistent(results):
     reason = "results of another paper on measured data"
@@ -169,19 +159,28 @@ def ellipses(results):
     return judged(f"{inside} of {top.sum()}", f"chance {show(chance, 2)}", chance < 0.05, remark)
 
 
+def _sides(results):
+    """(m) offsets x, y of the triads on the underside (n, 2) and on top (m, 2)."""
+    off, top, _, _, _ = _offsets(results)
+    return off[~top][:, :2], off[top][:, :2]
+
+
 @claim("2021-49")
 def quadrant(results):
-    off, top, _, _, _ = _offsets(results)
-    under, above = off[~top][:, :2], off[top][:, :2]
-    one = np.all(np.sign(under) == np.sign(under[0]))
-    small = np.linalg.norm(above.mean(axis=0)) < np.linalg.norm(under.mean(axis=0)) / 3
-    value = f"underside mean ({listed(1e3 * under.mean(axis=0))}) mm, topside"
-    value += f" ({listed(1e3 * above.mean(axis=0))}) mm"
+    under, _ = _sides(results)
     remark = (
         "with the y axis drawn downwards (-, -) is the upper left quadrant seen from above,"
         " the upper right one seen from below"
     )
-    return judged(value, "", bool(one and small), remark)
+    value = f"mean ({listed(1e3 * under.mean(axis=0))}) mm"
+    return judged(value, "", bool(np.all(np.sign(under) == np.sign(under[0]))), remark)
+
+
+@claim("2021-63")
+def centred(results):
+    under, above = (side.mean(axis=0) for side in _sides(results))
+    stands = np.linalg.norm(above) < np.linalg.norm(under) / 3
+    return judged(f"mean ({listed(1e3 * above)}) mm", "", bool(stands))
 
 
 def _agreement(results):
@@ -276,6 +275,18 @@ def repeated(results):
     row = table.loc[f"{results.settings['experiment']['accelerometer_sd']:g}"]
     value = f"{row.recordings} recordings differ by {show(row.z_rms)} claimed sds, rms"
     return judged(value, "", bool(row.z_rms < 1.5), f"T = {results.samples[-1]}")
+
+
+@claim("2021-62")
+def saturates(results):
+    table = results.measured_table(f"subsets/{results.measured}_selection")
+    counts = table.set_index("criterion").samples
+    slow = counts.index.str.startswith(("still", "slower"))
+    moving = counts["all"] - counts[slow].sum()
+    shares = {kind: 100 * counts[f"{kind} at a rail"] / moving for kind in KINDS}
+    value = ", ".join(f"{kind}s {show(share, 2)} %" for kind, share in shares.items())
+    remark = f"{results.measured}, of {moving} moving samples"
+    return judged(value, "", max(shares.values()) < 1, remark)
 
 
 @claim("2021-57")

@@ -4,11 +4,9 @@ import numpy as np
 
 from imuarray.recording.units import GRAVITY
 from imuarray_papers.claims.registry import (
-    CLOCK,
     claim,
     judged,
     listed,
-    power_law,
     show,
     tiny,
     untested,
@@ -20,16 +18,6 @@ TINY = 1e-9
 
 def _checks(results, part):
     return results.json("claims/identifiability")[part]
-
-
-@claim("2017-24")
-def linear_time(results):
-    table = results.table("claims/timing")
-    curve = table[table.what == "iteration"].sort_values("samples").tail(3)
-    slope, error = power_law(curve.samples, curve.seconds, curve.spread_s)
-    linear = abs(slope - 1) <= 0.4 + 3 * error
-    value = f"{'as' if linear else 'not as'} N, for N = {listed(curve.samples, 5)}"
-    return judged(value, "", linear, CLOCK)
 
 
 @claim("2017-25")

@@ -57,6 +57,7 @@ class Recordings:
         """Files that the claims on the experiment read."""
         name, group = self.shown, self.group(self.shown)
         paths = [f"results/measured/positions/{name}.csv"]
+        paths.append(f"results/measured/subsets/{name}_selection.csv")
         if self.is_first_order(name):
             paths.append(f"results/measured/first_order/{name}_noise.csv")
         if group in self.groups():

@@ -12,7 +12,6 @@ from imuarray.model.structure import design, products
 from imuarray.motion import normal_motion
 from imuarray.simulation.recordings import measure
 from imuarray_papers.posterior.likelihood import Likelihood
-from imuarray_papers.posterior.proposals import sample_covariance
 from imuarray_papers.reference import (
     draw_rates,
     linear_part,
@@ -218,18 +217,6 @@ def effective_draws(rng, model, sds, draws=4000, repeats=20) -> dict:
         off = y - nonlinear_part(near, positions)
         found["rao_blackwellised"].append(_kish(-0.5 * np.einsum("ni,ij,nj->n", off, S, off)))
     return {"draws": draws} | {name: float(np.median(values)) for name, values in found.items()}
-
-
-def spread_ratio(rng, model, sds, samples=200) -> dict:
-    """Covariance (30b) over that of p(omega_t | y_g) for G equal gyroscopes: mean ratio and se."""
-    motion = normal_motion(rng, (samples,), *sds)
-    rate = measure(model, motion, model.array.relative, rng)[1]
-    closed = model.noise.gyroscope[0, 0] / model.array.gyroscopes
-    ratios = np.trace(sample_covariance(rate)[1], axis1=1, axis2=2) / (3 * closed)
-    return {
-        "ratio": float(ratios.mean()), "se": float(ratios.std(ddof=1) / np.sqrt(samples)),
-        "gyroscopes": model.array.gyroscopes,
-    }  # fmt: skip
 
 
 def _kish(logs) -> float:

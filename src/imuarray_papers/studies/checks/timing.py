@@ -4,15 +4,11 @@ Times are by the clock: not reproducible to the byte, for rough comparisons only
 """
 
 import time
-from functools import partial
 
 import numpy as np
 import pandas as pd
 
 from imuarray.geometry import positions_of
-from imuarray.motion import sphere_motion
-from imuarray.simulation.recordings import measure
-from imuarray_papers.estimation.bcd import calibrate_bcd
 
 
 def _fastest(function, repeats: int) -> tuple[float, float]:
@@ -33,24 +29,6 @@ def _row(what, samples, seconds, spread, count) -> dict:
     return {
         "what": what, "samples": samples, "seconds": seconds / count, "spread_s": spread / count,
     }  # fmt: skip
-
-
-def iteration_costs(rng, model, motion_sizes, samples, iterations=10, repeats=7) -> pd.DataFrame:
-    """Seconds an iteration of Algorithm 1 (2017) takes, over N."""
-    rows = []
-    for number in samples:
-        motion = sphere_motion(rng, (number,), *motion_sizes)
-        force, rate, _ = measure(model, motion, model.array.relative, rng)
-
-        def run(limit, force=force, rate=rate):
-            calibrate_bcd(model, force, rate, tolerance=0.0, limit=limit)
-
-        # the difference leaves out arranging the data, which is done once
-        long, short = (
-            _fastest(partial(run, limit), repeats) for limit in (2 * iterations, iterations)
-        )
-        rows.append(_row("iteration", number, long[0] - short[0], long[1] + short[1], iterations))
-    return pd.DataFrame(rows)
 
 
 def transition_costs(targets, thetas, step, rng, count=50, repeats=3) -> pd.DataFrame:
