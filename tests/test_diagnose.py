@@ -204,6 +204,14 @@ def test_what_first_order_left_is_no_cause():
     assert not found.search.causes and not found.in_noise and not found.unexplained
 
 
+def test_noise_that_taking_maps_out_has_scaled_is_no_cause():
+    recording, _ = make(Case("test-pooled", duration=DURATION), SEED)
+    declared = replace(recording, gyroscope_noise_sd=0.95 * recording.gyroscope_noise_sd)
+    assert [item.effect for item in run_procedure(declared).in_noise] == ["gyroscope_noise"]
+    corrected = replace(declared, map_covariance=np.diag(np.repeat([0.0, 1e-10], 72)))
+    assert not run_procedure(corrected).in_noise
+
+
 def test_a_lone_gyroscope_is_not_judged_by_what_the_motion_leaves_of_it(recwarn):
     recording, _ = make(Case("test-lone", duration=DURATION), SEED)
     lone = replace(

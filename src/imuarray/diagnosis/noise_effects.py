@@ -188,7 +188,10 @@ def noise_scale(
     )
     if not len(chosen):
         return None
-    hits, log_p = verdict(log_ratio[chosen], covariance[np.ix_(chosen, chosen)], limit)
+    tested = covariance[np.ix_(chosen, chosen)]
+    if readings.left is not None:  # the correction scaled each triad's noise, and declared one
+        tested = tested + SETTINGS.pooled**2 * np.eye(len(chosen))
+    hits, log_p = verdict(log_ratio[chosen], tested, limit)
     log_p += np.log(np.sum(pairs[:, 1] == kind) / len(chosen))
     if log_p > limit:
         return None

@@ -74,6 +74,8 @@ class Settings:
     agree: float = 3.5  # sds within which two estimates are of one thing
     clear: float = 2.5  # sds of a triad's autocorrelation, where all together are beyond doubt
     tailed: float = 0.25  # log ratio by which a mixture's core may miss the noise
+    # sd of a triad's log noise about that of all, once maps of a few percent are taken out
+    pooled: float = 0.025
     delayed: float = 0.1  # log ratio of noise that a delay of a prior sd may bring with it
 
     # Shocks (`shocks`)
