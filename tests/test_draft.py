@@ -76,16 +76,18 @@ def test_what_is_no_table_is_refused(content, tmp_path):
         draft([tmp_path / "log.csv"])
 
 
-def test_logs_of_single_imus_are_a_rig(tmp_path):
-    for name in ("left", "right"):
+@pytest.mark.parametrize("paths", [("left.csv", "right.csv"), ("left/imu.csv", "right/imu.csv")])
+def test_logs_of_single_imus_are_a_rig(paths, tmp_path):
+    logs = [tmp_path / path for path in paths]
+    for path in logs:
         text = table(PLAIN, 1.0, 1.0, range(0, 4000, 10)).splitlines()
         lines = [",".join(line.split(",")[:7]) for line in text]
-        (tmp_path / f"{name}.csv").write_text("\n".join(lines) + "\n")
-    logs = [tmp_path / "left.csv", tmp_path / "right.csv"]
+        path.parent.mkdir(exist_ok=True)
+        path.write_text("\n".join(lines) + "\n")
     (tmp_path / "rig.yaml").write_text(draft(logs)[0])
     layout = read_layout(tmp_path / "rig.yaml")
     assert layout["columns"] == PLAIN[1:7] and [*layout["imus"]] == ["left", "right"]
     assert layout["accelerometers"]["unit"] == "m/s^2" and "triads" not in layout["gyroscopes"]
-    (tmp_path / "right.csv").write_text(table(LONG, 1.0, 1.0, range(400)))
+    logs[1].write_text(table(LONG, 1.0, 1.0, range(400)))
     with pytest.raises(InputError, match="expected one IMU, its columns as the first log's"):
         draft(logs)

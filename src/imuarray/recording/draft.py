@@ -67,7 +67,10 @@ def draft(paths: Sequence[Path]) -> tuple[str, list[str]]:
     parts = [f"# yaml-language-server: $schema={SCHEMA}", time, *prior, *sections]
     if len(paths) > 1:
         parts.insert(2, f"columns: [{', '.join(map(_quoted, six))}]")
-        parts += ["imus:"] + [f'  "{path.stem}": {{}}  # position: [?, ?, ?]' for path in paths]
+        names = [path.stem for path in paths], [path.parent.name for path in paths]
+        numbers = [str(number + 1) for number in range(len(paths))]
+        labels = next((own for own in names if len(set(own)) == len(own)), numbers)
+        parts += ["imus:"] + [f'  "{label}": {{}}  # position: [?, ?, ?]' for label in labels]
     asked.append("positions: from the drawing, else they begin from the motion")
     return "\n".join(parts) + "\n", asked + ["axes: where a chip is turned on the board"] * (
         len(paths) == 1
