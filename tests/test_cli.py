@@ -146,7 +146,7 @@ def test_an_answer_not_to_be_trusted(calls, capsys, monkeypatch):
     out, err = capsys.readouterr()
     said = ["positions off\\x1b[31m", "residual 7 times"]
     assert json.loads(out) == {"x": 1.0, "trusted": False, "reasons": said}
-    assert err == f"imuarray: not to be trusted: {'; '.join(said)}\n"
+    assert err == f"imuarray: not to be trusted: (1) {said[0]}; (2) {said[1]}\n"
     reasons.clear()
     assert main("calibrate rec.nc --out cal.nc --json".split()) == 0
     assert json.loads(capsys.readouterr().out) == {"x": 1.0, "trusted": True, "reasons": []}

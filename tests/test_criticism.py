@@ -67,7 +67,7 @@ def test_the_panels_have_what_was_computed(board):
     clock = table[table.panel == "cause"]
     assert clock.x.min() == 0 and clock.x.max() == pytest.approx(1.9)
     rms = table[table.panel == "gained"].rms_m
-    assert rms.tolist() == pytest.approx([1e-4, 4e-5, 1.2e-5, 7e-6])
+    assert rms.tolist() == pytest.approx([1e-4, 5e-5, 4e-5, 1.2e-5, 7e-6])
     lag = table[(table.panel == "causes") & (table.effect == "gyroscope_delay")].iloc[0]
     assert lag["mean"] == pytest.approx(1.5e-3) and lag.sd == 1e-5
 

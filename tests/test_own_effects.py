@@ -35,7 +35,7 @@ from imuarray.model.effects import effect
 
 def common_gain(shape, axes):
     """One gain of all accelerometers is a unit of length."""
-    return [np.ones(shape, bool)]
+    return [2.0 * np.ones(shape)]
 
 
 @effect(
@@ -130,6 +130,7 @@ def test_another_text_makes_other_chains(mine):
         (None, "expected a file to read"),
         # found when it is used first
         (CUBIC.format(sd="1.0").replace("curvature * force**3", "1.0"), "left as it is"),
+        (GAIN.replace('_gain"', '_cubic"').replace("s(shape)", "s(3)"), "gauge(shape, axes)"),
     ],
 )
 def test_a_wrong_file_is_one_line(text, said, tmp_path, capsys):
@@ -144,7 +145,7 @@ def test_a_wrong_file_is_one_line(text, said, tmp_path, capsys):
     error = capsys.readouterr().err
     assert said in error and len(error.splitlines()) == 1
     assert not (tmp_path / "cal.nc").exists()
-    if said != "left as it is":
+    if said not in ("left as it is", "gauge(shape, axes)"):
         assert known == EFFECTS
 
 

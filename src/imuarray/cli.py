@@ -17,7 +17,7 @@ from typing import NoReturn
 
 from imuarray.commands.argument_types import InputFile, InputLog
 from imuarray.commands.parser import make_parser
-from imuarray.errors import InputError, one_line
+from imuarray.errors import InputError, numbered, one_line
 
 NETCDF = (".nc", ".nc4", ".h5")
 FIGURES = (".png", ".pdf")
@@ -101,7 +101,7 @@ def main(argv: Sequence[str] | None = None, parser: argparse.ArgumentParser | No
     except Exception as error:
         return _unforeseen(error, getattr(arguments, "debug", False))
     if arguments.reasons:
-        return _fail(f"not to be trusted: {'; '.join(arguments.reasons)}", UNTRUSTED)
+        return _fail(f"not to be trusted: {numbered(arguments.reasons)}", UNTRUSTED)
     return OK
 
 

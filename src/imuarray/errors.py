@@ -59,6 +59,12 @@ def expecting(where: object, expected: str, errors=Exception) -> Iterator[None]:
         raise InputError(f"{where}: expected {expected}, found {found}") from error
 
 
+def numbered(reasons) -> str:
+    """All reasons in one line, (1) the root first."""
+    texts = list(reasons)
+    return "; ".join(f"({n}) {text}" for n, text in enumerate(texts, 1)) if texts[1:] else texts[0]
+
+
 def require_integer(name: str, value: object, least: int = 1) -> None:
     """InputError unless ``value`` is an integer of at least ``least``; a bool is none."""
     integral = isinstance(value, Integral) and not isinstance(value, bool)

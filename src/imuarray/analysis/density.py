@@ -140,11 +140,12 @@ def _known(found: Estimate) -> np.ndarray:
     values = flat_parameters(columns, found.recorded[0].state)
     for effect, mask in gauge_masks(columns, active):
         if effect.resizes:
-            mean, prior = mask[active] / mask.sum(), np.mean(np.diag(precision)[mask[active]])
-            more = max(1.0 / np.var(values[mask], ddof=1) - prior, 0.0) * mask.sum()
+            weights, own = mask[active] / np.abs(mask).sum(), mask[active] != 0
+            prior = np.mean(np.diag(precision)[own])
+            more = max(1.0 / np.var(values[mask != 0], ddof=1) - prior, 0.0) * own.sum()
             if effect.kinds == [1] and np.isfinite(found.scale_sd):
                 more = found.scale_sd**-2
-            precision += np.outer(mean, mean) * more
+            precision += np.outer(weights, weights) * more
     return precision
 
 

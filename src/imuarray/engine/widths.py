@@ -132,9 +132,8 @@ def _formal(found: Estimate) -> np.ndarray:
     sizes = [mask[found.active] for effect, mask in gauges if effect.resizes]
     if not known:
         for mine in sizes:
-            chosen = found.places[0][mine]
-            mean = np.zeros(len(prior))
-            mean[chosen] = 1.0 / len(chosen)
+            chosen, mean = found.places[0][mine != 0], np.zeros(len(prior))
+            mean[chosen] = mine[mine != 0] / np.abs(mine).sum()
             # the mean of so many that differ by so much
             prior += np.outer(mean, mean) * len(chosen) / np.var(found.values[chosen], ddof=1)
     out = _lost(found.freedoms) * scaled_inverse(found.information + prior)[:count, :count]

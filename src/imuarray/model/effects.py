@@ -222,7 +222,8 @@ def common_mean(shape, axes=None) -> list[np.ndarray]:
 
 def each_mean(shape, axes=None) -> list[np.ndarray]:
     """Gauges: the mean over triads of each parameter."""
-    return [np.broadcast_to(np.arange(shape[1]) == k, shape) for k in range(shape[1])]
+    each = np.eye(int(np.prod(shape[1:])), dtype=bool)
+    return [np.broadcast_to(row.reshape(shape[1:]), shape) for row in each]
 
 
 def _again(old, new) -> bool:

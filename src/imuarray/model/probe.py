@@ -38,6 +38,7 @@ def _probe(item: Effect, sd, rng) -> bool:
 
     later = tuple(fields[3:])
     axes = np.tile(np.eye(3), (ACCELEROMETERS, 1, 1))
+    _require_gauge(item, sd.shape, axes)
     nothing = _tried(item, sd.shape, lambda: predicted(np.zeros(sd.shape), later))
     _require_shapes(item, nothing, plain)
     for kind, old, new in zip(Prediction._fields, plain, nothing, strict=True):
@@ -105,6 +106,16 @@ def _tried(item: Effect, shape, function):
     except Exception as error:
         expected = f"a function of (parameters {shape}, instant, predicted) in jax.numpy"
         raise _wrong(item, expected, _first(error)) from error
+
+
+def _require_gauge(item: Effect, shape, axes) -> None:
+    expected = f"gauge(shape, axes) to return arrays of shape {shape}"
+    try:
+        shapes = {np.shape(own) for own in item.gauge(shape, axes)} if item.gauge else set()
+    except Exception as error:
+        raise _wrong(item, expected, _first(error)) from error
+    if shapes - {shape}:
+        raise _wrong(item, expected, (shapes - {shape}).pop())
 
 
 def _require_shapes(item: Effect, made, plain) -> None:

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 import imuarray
 from imuarray.diagnosis import plain, words
+from imuarray.errors import numbered
 from imuarray.model.effects import KINDS
 from imuarray.pictures import board as pictures
 from imuarray.pictures.style import PAGE, new_figure, saved, styled
@@ -104,5 +105,6 @@ def rendered(template: str, **given) -> str:
     environment = Environment(
         loader=PackageLoader("imuarray.report", "."), undefined=StrictUndefined, autoescape=True
     )
+    environment.filters["numbered"] = numbered
     environment.globals |= vars(plain) | vars(words)  # which the tables call
     return environment.get_template(template).render(version=imuarray.__version__, **given)

@@ -1,4 +1,4 @@
-"""Is an answer to be trusted? Sentences why not; none for a sound one (exit status 3, docs).
+"""Is an answer to be trusted? Sentences why not; none for a sound one (docs/trust.md).
 
 An answer that fits its own noise can still be wrong: units, signs, exchanged sensors and clocks
 leave no residual. What is known besides is the drawing, that rates and forces are of one motion,

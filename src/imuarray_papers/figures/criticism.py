@@ -11,8 +11,8 @@ from imuarray_papers.figures.style import Column, marks, panels, rms
 
 QUANTITIES = {"specific_force": "accelerometers", "angular_rate": "gyroscopes"}
 STEPS = {  # of `measured.causes.STEPS`
-    "normal": "papers'", "clocks": "+ clocks", "no arms": "+ lag, maps",
-    "common arms": "+ lever arms",
+    "normal": "papers'", "robust": "+ heavy tails", "clocks": "+ clocks",
+    "no arms": "+ lag, maps", "common arms": "+ arms, alike",
 }  # fmt: skip
 DIGITS = 3  # significant: all else differs between recordings, or between processors
 
@@ -44,9 +44,10 @@ def figure_criticism(
     footer = [
         f"Recording {name} (a, b), {chosen.recordings.max()} recordings of board {group} (c, d)."
         " (a) rms residual over the noise of still poses, bars: range of the IMUs. (b) points:"
-        " from the residuals alone, 1 sd; line: the clock that was found. (c) filled: smooth and"
-        " fast samples; open: all samples, shocks with them. (d) rms of differences between"
-        " recordings; open: at one size; dashed: an error of the size that all of them share."
+        " from the residuals alone, 1 sd, a turn drawn twice; line: the clock that was found; where"
+        " it falls a bin mixes both sides. (c) filled: smooth and fast samples; open: all samples,"
+        " shocks with them. (d) rms of differences between recordings, and the share of them that"
+        " 95 % intervals cover; open: at one size; dashed: an error of the size that all share."
     ]
     return partial(_draw, footer=footer), three_digits(table)
 
@@ -146,7 +147,7 @@ def _draw_clock(axes, rows, causes) -> None:
     axes.set(
         xlabel=f"turns of {imu}'s clock", ylabel="age of a reading (ms)",
         ylim=(1.7 * rows.predicted.min(), 1.15 * rows.predicted.max()),
-        title="Cause: a clock in each chip",
+        title="A cause: a clock in each chip",
     )  # fmt: skip
     lag = causes[causes.effect == "gyroscope_delay"]
     if len(lag):
