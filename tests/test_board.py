@@ -23,7 +23,7 @@ from imuarray.commands.board import answer
 from imuarray.commands.calibrate import position_lines
 from imuarray.diagnosis.words import plain
 from imuarray.engine.estimate import Recorded, estimate
-from imuarray.engine.forward import EFFECT_GROUPS, GYROSCOPES, gains, mask_of
+from imuarray.engine.forward import EFFECT_GROUPS, GYROSCOPES, gains
 from imuarray.engine.parameters import POSITION, columns_of
 from imuarray.engine.readings import arrange
 from imuarray.engine.widths import corrected
@@ -235,8 +235,8 @@ def test_offsets_that_corrections_left_are_each_recording_s_own(found):
     names = dict.fromkeys([*EFFECT_GROUPS[GYROSCOPES], *corrected(readings[0].left)])
     columns = columns_of(readings[0].array, names, readings[0].position_prior_sd)
     begun = [Recorded.of(one, columns) for one in readings]
-    both = estimate(begun, columns, mask_of(columns, [POSITION]), steps=3)
-    masks = {group: mask_of(columns, EFFECT_GROUPS[group]) for group in ("offsets", GYROSCOPES)}
+    both = estimate(begun, columns, columns.mask([POSITION]), steps=3)
+    masks = {group: columns.mask(EFFECT_GROUPS[group]) for group in ("offsets", GYROSCOPES)}
     assert [group.name for group in gains(both, masks, {})] == ["offsets", GYROSCOPES]
 
 

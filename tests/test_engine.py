@@ -10,7 +10,7 @@ import imuarray
 from imuarray.engine.dataset import engine_dataset
 from imuarray.engine.estimate import Recorded, estimate, jackknifed, to_come
 from imuarray.engine.fit import flat_parameters
-from imuarray.engine.forward import _of_one_truth, mask_of, select_forward
+from imuarray.engine.forward import _of_one_truth, select_forward
 from imuarray.engine.linearise import linearise, reading, seen_again
 from imuarray.engine.parameters import POSITION, columns_of
 from imuarray.engine.readings import arrange, most_informative, resolution
@@ -45,7 +45,7 @@ def position_sds(found):
 def fitted(recording, effects=(), **options):
     readings = arrange(recording, sparse=True)
     columns = columns_of(readings.array, effects, readings.position_prior_sd)
-    active = mask_of(columns, [POSITION, *effects])
+    active = columns.mask([POSITION, *effects])
     return estimate([Recorded.of(readings, columns)], columns, active, **options)
 
 
@@ -54,7 +54,7 @@ def test_normal_equations_are_the_dense_ones():
     recording, _ = simulated(0.12, effects=EFFECTS)
     readings = replace(arrange(recording, sparse=True), gapless=False)
     columns = columns_of(readings.array, EFFECTS, readings.position_prior_sd)
-    active = mask_of(columns, [POSITION, *EFFECTS])
+    active = columns.mask([POSITION, *EFFECTS])
     state = Recorded.of(readings, columns).state
     seen = normal_pass(readings, columns, state, active, improved=2)
     model, pairs = columns.model, np.argwhere(active)
@@ -164,7 +164,7 @@ def jointly(*recordings):
     readings = [arrange(one, sparse=True) for one in recordings]
     columns = columns_of(readings[0].array, (), readings[0].position_prior_sd)
     begun = [Recorded.of(one, columns) for one in readings]
-    return estimate(begun, columns, mask_of(columns, [POSITION]), robust=False)
+    return estimate(begun, columns, columns.mask([POSITION]), robust=False)
 
 
 def test_recordings_that_one_calibration_corrected_err_alike():
@@ -297,7 +297,7 @@ def test_recordings_of_a_board_are_fitted_jointly():
     alone = [fitted(one, effects) for one in recordings]
     readings = [arrange(one, sparse=True) for one in recordings]
     columns = columns_of(readings[0].array, effects, readings[0].position_prior_sd)
-    active = mask_of(columns, [POSITION, *effects])
+    active = columns.mask([POSITION, *effects])
     both = estimate([Recorded.of(one, columns) for one in readings], columns, active)
     assert len(both.values) == len(alone[0].values) + 4 * 3
     for one, other in zip(both.recorded, alone, strict=True):

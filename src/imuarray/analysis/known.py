@@ -9,7 +9,7 @@ from imuarray.analysis.model import Say, silent
 from imuarray.engine.clocks import CLOCK, refined, shown_clocks, timed, with_clocks
 from imuarray.engine.estimate import Estimate, Recorded, estimate
 from imuarray.engine.fit import flat_parameters
-from imuarray.engine.forward import mask_of, resumed
+from imuarray.engine.forward import resumed
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import POSITION, Columns, columns_of, model_of
 from imuarray.engine.readings import Readings, arrange, determined, measured, most_informative
@@ -35,7 +35,7 @@ def with_own(readings: Readings, effects, positions, values: dict) -> Estimate:
     kept = {name: value for name, value in values.items() if name not in own}
     state = State(np.empty((0, 9)), positions, columns.model.join(kept), ())
     one = Recorded.of(readings, columns, state)
-    free = mask_of(columns, [name for name in own if name != CLOCK])
+    free = columns.mask([name for name in own if name != CLOCK])
     if CLOCK not in own:
         return estimate([one], columns, free)
     one = estimate([one], columns, free, steps=SETTINGS.group_steps).recorded[0]
@@ -51,10 +51,9 @@ def _finished(one: Recorded, columns: Columns, effects, own, imus) -> Estimate:
     found = columns.model.split(one.state.parameters)
     columns = columns_of(one.readings.array, effects, one.readings.position_prior_sd)
     values = columns.model.join({name: found[name] for name in effects})
-    mask = mask_of(columns, [CLOCK])
-    mask[np.setdiff1d(np.arange(len(mask)), imus)] = False
+    mask = columns.mask([CLOCK], imus)
     one = replace(one, state=one.state._replace(parameters=values))
-    return estimate([one], columns, mask_of(columns, own) | mask)
+    return estimate([one], columns, columns.mask(own) | mask)
 
 
 def again(recording: Recording, calibration: xr.Dataset, say: Say = silent) -> Estimate:

@@ -8,7 +8,7 @@ import numpy as np
 from imuarray.analysis.model import Say, silent
 from imuarray.engine.derivatives import no_derivatives
 from imuarray.engine.fit import pick
-from imuarray.engine.linearise import CHUNK, Eliminated, State, chunk_at, directions_of
+from imuarray.engine.linearise import CHUNK, State, chunk_at
 from imuarray.engine.parameters import Columns, columns_of
 from imuarray.engine.readings import Readings, measured
 from imuarray.estimation.identifiability import Calibration
@@ -40,14 +40,11 @@ class Shown(NamedTuple):
 def shown(readings: Readings, columns: Columns, state: State, active, covariance) -> Shown:
     """Noise and motion's size of a fit, for the ``active`` (N, m) parameters' covariance."""
     wanted = np.flatnonzero(active.any(axis=0))
-    directions = directions_of(columns, wanted)
     few = active[:, wanted]
     samples, count = readings.values.shape[:2]
     squares, freedom, spread = np.zeros((count, 2)), np.zeros((count, 2)), []
     for start in range(0, samples, CHUNK):
-        used = slice(None, min(CHUNK, samples - start))
-        seen = chunk_at(readings, columns, state, directions, start)
-        seen = Eliminated(*(np.asarray(part)[used] for part in seen))
+        seen = chunk_at(readings, columns, state, wanted, start)
         keep = readings.keep[start : start + CHUNK]
         pairs, through = pick(seen.through, few)
         for k in range(count):

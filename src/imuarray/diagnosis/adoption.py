@@ -23,7 +23,6 @@ from imuarray.diagnosis.scores import (
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL, scans
 from imuarray.diagnosis.state import (
-    Adoption,
     Cause,
     Search,
     freed_places,
@@ -124,8 +123,7 @@ def attempt(search: Search, score, values) -> Search:
     search.say(
         f"adopted {words}: log p {score.log_p:.0f}, held-out gain {gain:.0f} +- {error:.0f} nats"
     )
-    adopted = Adoption(effect, candidate.imus, score.log_p, gain, error, found.fit.misfit)
-    return replace(found, trace=(*search.trace, adopted))
+    return replace(found, trace=(*search.trace, (effect, gain)))
 
 
 def keeps(search: Search, score, gain: float, error: float) -> bool:
@@ -204,9 +202,7 @@ def separability(given: Information, fit: Fit, adopted=()) -> Separability:
     Effects that only a scan sees (a clock, a step) have a direction once they are adopted, on the
     IMUs that have them; else they are left out.
     """
-    place = np.zeros_like(fit.active)
-    place[:, fit.columns.of(POSITION)] = True
-    left = conditional(given, given.places(place & fit.columns.owner))
+    left = conditional(given, given.places(fit.columns.mask([POSITION])))
     imus = dict(adopted)
     bases = {}
     for effect in fit.columns.model.effects:

@@ -196,9 +196,7 @@ def fitted(made: Fit, given: Information | None = None) -> Fitted:
 def rivals_of(found: Found) -> tuple[Fitted, Fitted]:
     """The papers' model on the extended model's readings: declared noise, and inflated."""
     search = found.search
-    alone = np.zeros_like(search.active)
-    alone[:, search.columns.of("position")] = True
-    alone &= search.columns.owner
+    alone = search.columns.mask([POSITION])
     start = found.base.state._replace(parameters=np.zeros_like(found.base.state.parameters))
     bare = replace(search.readings, sd=search.readings.declared)
     if found.structural:

@@ -15,7 +15,7 @@ from imuarray.engine.fit import Fit, seen_through
 from imuarray.engine.linearise import CHUNK, THREADS, leverage_of
 from imuarray.engine.readings import Readings, by_triad, few_at_once
 from imuarray.engine.robust import LEAST_FREE
-from imuarray.tails import QUARTILE, log_normal, log_poisson
+from imuarray.tails import QUARTILE, log_normal
 
 DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / np.sqrt(70.0)
 HALF = len(DIFFERENCE) // 2
@@ -146,11 +146,6 @@ def _ar_ratio(rho, low, high) -> float:
     """Expected log ratio of the two bands' mean power for an AR(1)."""
     power = [1 / (1 + rho**2 - 2 * rho * np.cos(2 * np.pi * f)) for f in (low, high)]
     return float(np.log(power[1].mean() / power[0].mean()))
-
-
-def tail_log_p(noise: Noise) -> np.ndarray:
-    """log p of so many outliers in Gaussian noise, (N, 2)."""
-    return log_poisson(noise.outliers, noise.expected)
 
 
 def coloured_meat(fit: Fit, information, correlation) -> np.ndarray | None:

@@ -30,6 +30,7 @@ from imuarray.engine.readings import Readings, arrange, determined, few_at_once,
 from imuarray.errors import InputError
 from imuarray.model.effects import EFFECTS
 from imuarray.recording import Recording
+from imuarray.tails import log_poisson
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,6 @@ class Found:
     search: Search
     base: Fit
     base_scores: list[Score]
-    base_checks: list[Check]
     structural: list[Structural]
     in_noise: list[noise_effects.Named]
     checks: list[Check]
@@ -72,12 +72,11 @@ def run_procedure(
     say("fitting the papers' model, then looking for causes")
     search = Search(readings, columns, effects, say).fitted()
     base, first = search.fit.only_active(), proposals(search)
-    scores, base_checks = [s for s, _ in first], all_checks(search.fit, search.given, search.noise)
+    scores = [score for score, _ in first]
     if not mended:
+        checks = all_checks(search.fit, search.given, search.noise)
         search = replace(search, detectable=detectable(search))
-        return Found(
-            search, base, scores, base_checks, structural, [], base_checks, 0.0, True, raw, whole
-        )
+        return Found(search, base, scores, structural, [], checks, 0.0, True, raw, whole)
     before, search = search.fit, drop_outliers(search)
     first = first if search.fit is before else None
     del before  # it has derivatives of its own
@@ -108,7 +107,7 @@ def run_procedure(
     say("looking for what cannot be distinguished")
     classes = {cause.effect: rivals(search, cause) for cause in search.causes}
     return Found(
-        search, base, scores, base_checks, together(structural, clips), in_noise, checks, explained,
+        search, base, scores, together(structural, clips), in_noise, checks, explained,
         failing, raw, whole, classes,
     )  # fmt: skip
 
@@ -131,12 +130,12 @@ def weak(item: noise_effects.Named, causes: int) -> bool:
     return item.log_p > SETTINGS.limit(item.effect, causes > 1)
 
 
-def prepared(recording: Recording, without=(), sparse=False):
+def prepared(recording: Recording, without=()):
     """(readings as recorded, causes in them, readings put right, whether they could be).
 
     InputError where a recording has too few moving samples.
     """
-    raw = arrange(recording, sparse)
+    raw = arrange(recording)
     structural, readings, mended = find_structural(raw, without)
     used = determined(readings)
     if not used.all():
@@ -181,7 +180,7 @@ def without_shocks(search: Search, used) -> tuple[Search, Fit]:
 
 def drop_outliers(search: Search) -> Search:
     """Leave out isolated outliers while means are looked for, whatever their cause is."""
-    if np.min(noises.tail_log_p(search.noise)) >= SETTINGS.limit(TAILS):
+    if np.min(log_poisson(search.noise.outliers, search.noise.expected)) >= SETTINGS.limit(TAILS):
         return search
     far = np.repeat(search.noise.far, 3, axis=2)
     return replace(search, readings=search.readings.without(far)).refit()

@@ -10,6 +10,7 @@ from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.derivatives import polynomial_derivative
 from imuarray.engine.readings import Readings, part_of
 from imuarray.model.effects import KINDS
+from imuarray.motion.state import lever
 from imuarray.recording.record import AXES
 from imuarray.tails import log_poisson
 
@@ -200,9 +201,7 @@ def _lever(readings: Readings, rate) -> np.ndarray:
     turning = polynomial_derivative(readings.time, readings.run, rate, readings.window, 1)
     places = np.zeros((len(readings.exists), 3))
     places[: readings.array.accelerometers] = readings.array.relative
-    return np.cross(rate[:, None], np.cross(rate[:, None], places)) + np.cross(
-        turning[:, None], places
-    )
+    return lever(rate[:, None], turning[:, None], places)
 
 
 def _axes(turn) -> str:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import median_filter
 
-from imuarray.diagnosis.noise import Noise, judged, standardised, tail_log_p
+from imuarray.diagnosis.noise import Noise, judged, standardised
 from imuarray.diagnosis.replicates import motion_sizes
 from imuarray.diagnosis.scores import Information
 from imuarray.diagnosis.settings import SETTINGS
@@ -20,7 +20,7 @@ from imuarray.engine.linearise import CHUNK
 from imuarray.engine.robust import LEAST_FREE
 from imuarray.linear import scaled_inverse, scaled_square
 from imuarray.motion.state import lever
-from imuarray.tails import log_chi_square, log_normal
+from imuarray.tails import log_chi_square, log_normal, log_poisson
 
 
 class Check(NamedTuple):
@@ -273,7 +273,7 @@ def correlation_check(fit: Fit, noise: Noise) -> Check:
 def noise_checks(noise: Noise, exists) -> list[Check]:
     """Outliers and colour that are still there."""
     triads = np.argwhere(exists)
-    tails = tail_log_p(noise)
+    tails = log_poisson(noise.outliers, noise.expected)
     worst = min(triads, key=lambda t: tails[tuple(t)])
     outliers = Check(
         "outliers", float(noise.outliers[tuple(worst)]),

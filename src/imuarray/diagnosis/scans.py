@@ -133,9 +133,7 @@ class Courses:
             values = flat_parameters(fit.columns, fit.state)[places].ravel()
         mask = beside.copy()
         mask[places] = True
-        number = np.full(mask.shape, -1)
-        number[mask] = np.arange(mask.sum())
-        own, rest = number[places].ravel(), number[beside]
+        own, rest = _places(mask, beside, imus, columns)
         blocks = blocks_of(len(fit.residual), SETTINGS.cuts)
         parts = [fit.normal(mask, block) for block in blocks]
         self.whole = np.array([part[0][np.ix_(own, own)] for part in parts])

@@ -196,9 +196,7 @@ def placebo_gain(search, cause) -> tuple[float, float]:
     if special and special.placebo:
         return special.placebo(search)
     given, columns = search.given, search.columns
-    every = np.zeros(search.active.shape, bool)
-    every[:, columns.of(cause.effect)] = search.active[:, columns.of(cause.effect)].any(axis=0)
-    every &= columns.owner
+    every = columns.mask([cause.effect]) & search.active.any(axis=0)
     flat = flat_parameters(columns, search.fit.state)
     rows = np.flatnonzero(every.any(axis=1))
     moved = flat.copy()

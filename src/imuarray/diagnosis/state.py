@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,20 +17,19 @@ from imuarray.diagnosis.scores import Candidate, Information, information_at, ma
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.alike import likely_sizes
 from imuarray.engine.clocks import CLOCK, estimated_again, started_by_gyroscopes, without_jumps
+from imuarray.engine.estimate import Recorded
 from imuarray.engine.fit import (
     Fit,
     at,
     flat_parameters,
     from_flat,
     search_optimum,
-    with_rough_prior,
 )
 from imuarray.engine.heldout import gain_of, normal_blocks
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import POSITION, Columns, prior_precision
 from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS as CLOCKS
-from imuarray.engine.start import is_smooth, start
 from imuarray.engine.widths import mask_of_left, spread_of
 from imuarray.tails import log_chi_square
 
@@ -45,17 +43,6 @@ class Cause:
     variants: frozenset[str]
     log_p: float
     tries: float = 0.0
-
-
-class Adoption(NamedTuple):
-    """One adoption: what, its test, its gain on held-out time (nats), the misfit after it."""
-
-    effect: str
-    imus: tuple[int, ...]
-    log_p: float
-    gain: float
-    gain_se: float
-    misfit: float
 
 
 @dataclass(frozen=True)
@@ -94,7 +81,7 @@ class Search:
     columns, effects : all parameters that are described, and the ids that may be adopted
     say : is told of every step
     smooth : whether the motion's derivatives may be had from neighbouring samples
-    causes : what is adopted, in order; ``refused`` what was and did not gain, ``trace`` adoptions
+    causes : what is adopted, in order; ``refused`` what was and did not gain, ``trace``: adoptions
     fit, noise, weighed : the fit of what is adopted, the noise and the information there
     excess : of the misfit over its degrees of freedom, before any cause
     jumps : (T, N, 6) bool, readings left out near a clock's jump
@@ -115,18 +102,17 @@ class Search:
     excess: float = 0.0
     jumps: np.ndarray | bool = False
     allowed: np.ndarray | None = None
-    trace: tuple[Adoption, ...] = ()
+    trace: tuple[tuple[str, float], ...] = ()
     detectable: dict[str, dict] = field(default_factory=dict)
 
     @cached_property
     def active(self) -> np.ndarray:
         """Positions and what the causes free, (N, m) bool."""
-        mask = np.zeros(self.columns.owner.shape, bool)
-        mask[:, self.columns.of(POSITION)] = True
+        mask = self.columns.mask([POSITION])
         for cause in self.causes:
             for variant in cause.variants:
                 mask |= mask_of(self.columns, Candidate(cause.effect, cause.imus, variant))
-        return mask & self.columns.owner
+        return mask
 
     @property
     def given(self) -> Information:
@@ -162,17 +148,10 @@ class Search:
         """Standard errors that a cause's gain on held-out time must have."""
         return SETTINGS.least_z if self.smooth else SETTINGS.rough_z
 
-    def fitted(self, former: State | None = None) -> Search:
-        """With the papers' model fitted, or what another search came to (``former``)."""
-        first = start(self.readings, self.columns)
-        if former is not None:
-            first = first._replace(positions=former.positions, parameters=former.parameters)
-        smooth = is_smooth(self.readings, first.motion)
-        if not smooth:
-            first = with_rough_prior(self.readings, first)
-            if former is not None and former.gyroscopes_free:
-                first = first._replace(rough_prior=first.rough_prior.freed())
-        search = replace(self, allowed=self.readings.keep, smooth=smooth).refit(first)
+    def fitted(self) -> Search:
+        """With the papers' model fitted."""
+        begun = Recorded.of(self.readings, self.columns)
+        search = replace(self, allowed=self.readings.keep, smooth=begun.smooth).refit(begun.state)
         return replace(search, excess=search.left)
 
     def light(self) -> Search:
@@ -252,10 +231,8 @@ class Search:
 
 def freed_places(search: Search, effect: str, imus=None, among=None) -> np.ndarray:
     """Places of an adopted effect's free parameters, of some of its IMUs or ``among`` columns."""
-    mask = search.active.copy()
     chosen = search.columns.of(effect) if among is None else among
-    others = np.setdiff1d(np.arange(search.columns.size), chosen)
-    mask[:, others] = False
+    mask = search.active & np.isin(np.arange(search.columns.size), chosen)
     if imus is not None:
         mask[np.setdiff1d(np.arange(len(mask)), imus)] = False
     return search.given.places(mask)
@@ -275,9 +252,7 @@ def heldout_gain(search: Search, effect: str, parts=None, imus=None) -> tuple[fl
     ``parts``: the blocks' equations, if they are known; ``imus``: of which it is asked, if not all.
     """
     columns, mask = search.columns, search.active
-    freed = np.isin(columns.names, effect) & mask
-    if imus is not None:
-        freed[np.setdiff1d(np.arange(len(freed)), imus)] = False
+    freed = columns.mask([effect], imus) & mask
     values = flat_parameters(columns, search.fit.state)[mask]
     parts = normal_blocks(search.fit, mask) if parts is None else parts
     return gain_of(parts, prior_precision(columns, mask), values, freed[mask])

@@ -72,8 +72,7 @@ def size_growth(found: Estimate) -> tuple[float, float]:
     gyroscopes' common scale changes. The sd is infinite where nothing is known of it.
     """
     size = np.zeros(len(found.information))
-    placed = np.zeros_like(found.active)
-    placed[:, found.columns.of(POSITION)] = True
+    placed = found.columns.mask([POSITION])
     size[found.places[0][placed[found.active]]] = found.positions[1:].ravel()
     share, along, all_of_it = 0.0, np.zeros(len(size)), 0.0
     counts = [len(seen.score) for seen in found.passes]

@@ -192,7 +192,7 @@ def estimate(
         values = _values(recorded, columns, active, places)
         columns = with_likely_spread(columns, active, values, information + precision, places[0])
         precision = pinned(columns, active, places)
-        slope = score - precision @ (values - _means(recorded, columns, active, places))
+        slope = score - precision @ (values - means(recorded, columns, active, places))
         step, sds = scaled_solve(information + precision, slope)
         sds = np.maximum(sds, jackknifed(information + precision, blocks))
         moved.append(float(np.max(np.abs(step) / sds, initial=0.0)))
@@ -293,7 +293,7 @@ def _values(recorded, columns, active, places) -> np.ndarray:
     return _spread([flat_parameters(columns, one.state)[active] for one in recorded], places)
 
 
-def _means(recorded, columns, active, places) -> np.ndarray:
+def means(recorded, columns, active, places) -> np.ndarray:
     return _spread([prior_means(one.readings, columns)[active] for one in recorded], places)
 
 
@@ -330,11 +330,6 @@ def _noise_change(before, after) -> float:
         float(np.max(np.abs(new.readings.sd / old.readings.sd - 1)[old.readings.exists]))
         for old, new in zip(before, after, strict=True)
     )
-
-
-def means(found: Estimate) -> np.ndarray:
-    """The priors' means of its parameters (n,)."""
-    return _means(found.recorded, found.columns, found.active, found.places)
 
 
 class Tested(NamedTuple):

@@ -15,7 +15,6 @@ from imuarray.engine.linearise import (
     Eliminated,
     RoughPrior,
     State,
-    directions_of,
     leverage_of,
     linearise,
     seen_again,
@@ -272,7 +271,7 @@ def at(
     readings: Readings, columns: Columns, active, state: State, converged: bool, all_columns=True
 ) -> Fit:
     """The fit's quantities at a state, with the derivative by every parameter or the active."""
-    wanted = directions_of(columns, None if all_columns else np.flatnonzero(active.any(axis=0)))
+    wanted = np.arange(columns.size) if all_columns else np.flatnonzero(active.any(axis=0))
     seen = linearise(readings, columns, state, wanted)
     return Fit(
         readings, columns, state, active, wanted, seen.residual, seen.whitened, seen.basis,

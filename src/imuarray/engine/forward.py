@@ -77,7 +77,7 @@ def with_effects(readings: Sequence[Readings], effects) -> Estimate:
             f"effects: expected such as change their own triad's readings alone, found"
             f" {', '.join(effects)}"
         )
-    active = mask_of(columns, [POSITION, *effects])
+    active = columns.mask([POSITION, *effects])
     recorded = [Recorded.of(one, columns) for one in readings]
     return settled(estimate(recorded, columns, active))
 
@@ -127,7 +127,7 @@ def select_forward(
     rough = [name for name in names if name in ROUGH_GROUPS]
     if rough != names and (readings[0].pair or not all(one.smooth for one in begun)):
         names, (columns, begun) = rough, _begun(readings, rough)
-    found = estimate(begun, columns, mask_of(columns, [POSITION]), steps=SETTINGS.group_steps)
+    found = estimate(begun, columns, columns.mask([POSITION]), steps=SETTINGS.group_steps)
     now = Selected(found, tuple(one.readings.keep for one in begun), {})
     clocks, groups = [], []
     for _ in names:
@@ -171,7 +171,7 @@ def _with_slope(found: Estimate, kept: dict, curve: bool) -> tuple[Estimate, dic
     slopes = [one.state.turning for one in begun]
     told = all(np.median(x.sd) < KNOWN_SLOPE * np.sqrt(np.mean(x.mean**2)) for x in slopes)
     if curve and told:
-        mask = mask_of(found.columns, EFFECT_GROUPS[CURVE])
+        mask = found.columns.mask(EFFECT_GROUPS[CURVE])
         (group,) = gains(better, {CURVE: mask}, kept)
         group = group._replace(kept=group.kept and group.gain > CURVED_NATS)
         if group.kept:
@@ -198,12 +198,12 @@ class Selected(NamedTuple):
     @property
     def active(self) -> np.ndarray:
         """Parameters (N, m) of the positions and of what is kept."""
-        placed = mask_of(self.found.columns, [POSITION])
+        placed = self.found.columns.mask([POSITION])
         return np.any([placed, *self.kept.values()], axis=0)
 
     def with_kept(self, names) -> Selected:
         """With more groups kept."""
-        new = {name: mask_of(self.found.columns, EFFECT_GROUPS[name]) for name in names}
+        new = {name: self.found.columns.mask(EFFECT_GROUPS[name]) for name in names}
         return self._replace(kept=new | self.kept)
 
     def without(self, names) -> Selected:
@@ -220,7 +220,7 @@ class Selected(NamedTuple):
         """Gains of the groups, but those of which a clock is the whole, and `_with_slope`'s."""
         part = {CLOCK, *EFFECTS[CLOCK].contains} if CLOCKS in self.kept else {CLOCK}
         asked = [n for n in names if n != CURVE and not set(EFFECT_GROUPS[n]) <= part]
-        masks = {name: mask_of(self.found.columns, EFFECT_GROUPS[name]) for name in asked}
+        masks = {name: self.found.columns.mask(EFFECT_GROUPS[name]) for name in asked}
         return gains(self.found, masks, self.kept)
 
     def needed(self, names) -> list[str]:
@@ -249,8 +249,7 @@ class Selected(NamedTuple):
             with_clocks(one, columns, own) for one, own in zip(recorded, each, strict=True)
         )
         now = self._replace(found=replace(self.found, recorded=hinted))
-        mask = mask_of(columns, [CLOCK])
-        mask[np.setdiff1d(np.arange(len(mask)), imus)] = False
+        mask = columns.mask([CLOCK], imus)
         group = gains(now.found, {CLOCKS: mask}, self.kept)[0]
         return (now._replace(kept={CLOCKS: mask} | self.kept) if group.kept else self), [group]
 
@@ -284,7 +283,7 @@ def _left(found: Estimate) -> list[tuple[np.ndarray, np.ndarray]]:
         return out
     known = mask_of_left(every, found.columns, np.zeros_like(found.active))
     for names in (*zip(SCALES, SKEWS, strict=True), OFFSETS, (DRIFT,)):
-        mask = known & mask_of(found.columns, names)
+        mask = known & found.columns.mask(names)
         if mask.any():
             own = every if EFFECTS[names[0]].own else every[:1]
             spread = block_diag(*(spread_of(left, found.columns, mask) for left in own))
@@ -315,11 +314,6 @@ def _contradicted(parts, ridge, values, freed, spread) -> bool:
     step = np.linalg.solve(information, sum(part[1] for part in parts))
     off = (step + values)[freed]
     return bool(chdtrc(len(off), off @ np.linalg.solve(spread, off)) < CHANCE)
-
-
-def mask_of(columns: Columns, effects) -> np.ndarray:
-    """(N, m) bool of the parameters of some effects, or the positions."""
-    return np.isin(columns.names, list(effects)) & columns.owner
 
 
 def gains(found: Estimate, masks: dict, kept: dict) -> list[EffectGroup]:

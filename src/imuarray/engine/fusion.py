@@ -17,7 +17,6 @@ from imuarray.engine.linearise import (
     RoughPrior,
     State,
     chunk_at,
-    directions_of,
     motion_equations,
     padded,
 )
@@ -266,7 +265,7 @@ def covariances(readings: Readings, model: ArrayModel, state: State, spread):
     columns = columns_of(model.array, model.effects, np.inf)
     noise, shared = np.empty((2, len(readings.time), 9, 9))
     active, place = _places(columns, 3 * (model.array.accelerometers - 1), model.effect_size)
-    directions = directions_of(columns)
+    directions = np.arange(columns.size)
     for first in range(0, len(noise), CHUNK):
         part = slice(first, first + CHUNK)
         seen = chunk_at(readings, columns, state, directions, first)

@@ -268,7 +268,7 @@ def linearise(
     ``spare`` : a former answer whose memory may be used again. LinAlgError where the readings do
     not determine the motion.
     """
-    directions = directions_of(columns, wanted)
+    directions = np.arange(columns.size) if wanted is None else np.asarray(wanted, int)
 
     def one(start):
         return chunk_at(readings, columns, state, directions, start)
@@ -298,11 +298,6 @@ def seen_again(readings: Readings, columns: Columns, state: State, seen: Elimina
     return seen._replace(
         residual=left, taken=taken, unexpected=unexpected[:, :first], misfit=misfit
     )
-
-
-def directions_of(columns: Columns, wanted=None) -> np.ndarray:
-    """The columns (m,) to differentiate by, all if None."""
-    return np.arange(columns.size) if wanted is None else np.asarray(wanted, int)
 
 
 def chunk_at(readings: Readings, columns: Columns, state: State, directions, start) -> Eliminated:

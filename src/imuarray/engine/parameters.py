@@ -43,6 +43,11 @@ class Columns:
         """The columns of an effect (or of the positions)."""
         return np.flatnonzero([name == effect for name in self.names])
 
+    def mask(self, effects, imus=None) -> np.ndarray:
+        """(N, m) bool of the parameters of some effects, or the positions; of all IMUs or some."""
+        own = np.isin(self.names, list(effects)) & self.owner
+        return own if imus is None else own & np.isin(np.arange(len(own)), list(imus))[:, None]
+
     @property
     def usual_sd(self) -> np.ndarray:
         """`prior_sd` (m,) before any size was estimated."""

@@ -17,7 +17,6 @@ from imuarray.engine.linearise import (
     THREADS,
     State,
     chunk_at,
-    directions_of,
     leverage_of,
     motion_step,
 )
@@ -57,7 +56,6 @@ def normal_pass(
     """
     samples, count = readings.values.shape[:2]
     wanted = np.flatnonzero(active.any(axis=0))
-    directions = directions_of(columns, wanted)
     few = active[:, wanted]
     blocks = blocks_of(samples)
     motion = state.motion.copy()
@@ -68,7 +66,7 @@ def normal_pass(
         here = state._replace(motion=motion)
         for _ in range(improved):
             motion[part] += motion_step(readings, columns, here, start)
-        seen = chunk_at(readings, columns, here, directions, start)
+        seen = chunk_at(readings, columns, here, wanted, start)
         residual, leverage = seen.residual, leverage_of(seen.basis)
         left = np.where(readings.keep[part], 1.0 - leverage, 0.0)
         squares[part], freedom[part] = by_triad(residual**2), by_triad(left)

@@ -54,7 +54,8 @@ def settled(found: Estimate) -> Estimate:
     blocks = tested(wide, active, every).blocks
     information = sum(inner for inner, _ in blocks)
     slope = sum(score for _, score in blocks)
-    slope[:count] -= found.precision @ (found.values - means(found))
+    mean = means(found.recorded, found.columns, found.active, found.places)
+    slope[:count] -= found.precision @ (found.values - mean)
     whole = scaled_solve(information + precision, slope)[0]
     step, off, holds = whole[:count], whole[count:], {}
     for kind in KINDS:

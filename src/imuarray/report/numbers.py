@@ -138,7 +138,7 @@ def gain_table(diagnosis: Diagnosis) -> pd.DataFrame:
     its numbers gain when they are given to other IMUs.
     """
     document = diagnosis.document
-    first = {step.effect: step.gain for step in reversed(diagnosis.found.search.trace)}
+    first = dict(reversed(diagnosis.found.search.trace))
     rows = []
     for cause in document["causes"]:
         # a single clock's ages have no other to go to: its placebo is exactly 0

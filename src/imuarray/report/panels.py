@@ -45,9 +45,7 @@ def signal_of(diagnosis: Diagnosis, cause) -> Signal:
     """The `Signal` of an adopted cause (effect, imus) in the extended model."""
     made, sds = diagnosis.extended.fit, diagnosis.extended.sds
     columns, flat = made.columns, flat_parameters(made.columns, made.state)
-    mask = np.zeros_like(made.active)
-    mask[np.ix_(list(cause.imus), columns.of(cause.effect))] = True
-    mask &= made.active
+    mask = columns.mask([cause.effect], cause.imus) & made.active
     sure = np.where(mask, np.abs(flat) / np.where(sds > 0, sds, np.inf), 0.0)
     left = made.less_motion(made.along(np.where(mask, flat, 0.0)))
     others = made.active & ~mask

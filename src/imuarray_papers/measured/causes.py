@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from imuarray.engine.estimate import Estimate, Recorded, estimate
-from imuarray.engine.forward import GYROSCOPES, LAG, ROUGH_GROUPS, Selected, gains, mask_of
+from imuarray.engine.forward import GYROSCOPES, LAG, ROUGH_GROUPS, Selected, gains
 from imuarray.engine.parameters import POSITION, columns_of
 from imuarray.engine.readings import arrange, determined, most_informative
 from imuarray.engine.widths import widths
@@ -61,7 +61,7 @@ def _fits(readings) -> Iterator[tuple[str, Estimate, tuple[float, float]]]:
     columns = columns_of(readings.array, effects, readings.position_prior_sd)
     apart = replace(columns, common_sd=np.zeros(columns.size))
     begun, nothing = [Recorded.of(readings, columns)], (np.nan, np.nan)
-    placed = mask_of(columns, [POSITION])
+    placed = columns.mask([POSITION])
     yield "normal", estimate(begun, columns, placed, robust=False), nothing
     robust = Selected(estimate(begun, apart, placed), (readings.keep,), {})
     yield "robust", robust.found, nothing
@@ -79,7 +79,7 @@ def _fits(readings) -> Iterator[tuple[str, Estimate, tuple[float, float]]]:
 
 def _more(now: Selected, names) -> tuple[Selected, Estimate, tuple[float, float]]:
     """With more groups, and what they gain."""
-    mask = mask_of(now.found.columns, [effect for name in names for effect in ROUGH_GROUPS[name]])
+    mask = now.found.columns.mask([effect for name in names for effect in ROUGH_GROUPS[name]])
     group = gains(now.found, {"all": mask}, now.kept)[0]
     now = now.with_kept(names).fitted()
     return now, now.found, (group.gain, group.error)

@@ -16,7 +16,7 @@ from imuarray.engine.course import block_scores
 from imuarray.engine.dataset import engine_dataset, places_among, positions_dataset
 from imuarray.engine.estimate import Estimate, Recorded, estimate, stepped
 from imuarray.engine.fit import flat_parameters, prior_means
-from imuarray.engine.forward import DELAYS, ROUGH_GROUPS, Selected, mask_of
+from imuarray.engine.forward import DELAYS, ROUGH_GROUPS, Selected
 from imuarray.engine.fusion import fuse
 from imuarray.engine.heldout import gain
 from imuarray.engine.parameters import POSITION, columns_of
@@ -71,7 +71,7 @@ def board_of(readings: Sequence[Readings]) -> Estimate:
         readings[0].position_prior_sd,
     )  # fmt: skip
     begun = [Recorded.of(one, columns) for one in readings]
-    found = estimate(begun, columns, mask_of(columns, [POSITION]), steps=SETTINGS.group_steps)
+    found = estimate(begun, columns, columns.mask([POSITION]), steps=SETTINGS.group_steps)
     now, _ = Selected(found, tuple(one.readings.keep for one in begun), {}).clocked()
     return now.with_kept([n for n in ROUGH_GROUPS if n not in (*now.kept, DELAYS)]).fitted().found
 
@@ -88,9 +88,9 @@ def predicted(recording: Recording, calibration: xr.Dataset) -> pd.DataFrame:
     readings, board = with_board(recording, calibration)
     effects = effect_names(calibration)
     shared = [POSITION, *(name for name in effects if not EFFECTS[name].own)]
-    every = board.active | mask_of(board.columns, shared)
+    every = board.active | board.columns.mask(shared)
     placed = columns_of(readings.array, (), readings.position_prior_sd)
-    active, begun = mask_of(placed, [POSITION]), [Recorded.of(readings, placed)]
+    active, begun = placed.mask([POSITION]), [Recorded.of(readings, placed)]
     fits = {
         "inflated": estimate(begun, placed, active, robust=False),
         "heavy": estimate(begun, placed, active),
@@ -129,7 +129,7 @@ def located(recording: Recording, calibration: xr.Dataset, samples: Sequence[int
 def _positions(found: Estimate, calibration: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     """Most likely (A, 3) m, and the covariance of r_2 ... r_A."""
     (one,), columns = found.recorded, found.columns
-    active = mask_of(columns, [POSITION])
+    active = columns.mask([POSITION])
     nominal = prior_means(one.readings, columns)[active]
     prior = np.diag(1.0 / np.broadcast_to(columns.prior_sd, active.shape)[active] ** 2)
     for _ in range(STEPS):
@@ -151,7 +151,7 @@ def _sensors(found: Estimate, calibration: xr.Dataset) -> tuple[np.ndarray, np.n
     (one,), columns = found.recorded, found.columns
     effects = effect_names(calibration)
     shared = [name for name in effects if not EFFECTS[name].own]
-    every = mask_of(columns, [POSITION, *shared])
+    every = columns.mask([POSITION, *shared])
     place, _ = places_among(replace(found, active=every, places=(np.arange(every.sum()),)), effects)
     information = normal_pass(one.readings, columns, one.state, every).information.sum(axis=0)
     position = np.isin(np.array(columns.names)[np.nonzero(every)[1]], POSITION)
