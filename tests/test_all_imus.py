@@ -36,7 +36,7 @@ def clean():
 def residual_of(search, noise):
     """(the fit with what is left of a noise (T, N, 6), what is judged of it)."""
     made = replace(search.fit, residual=search.fit.less_motion(noise))
-    return made, noises.judge(made.readings, made.residual, made.basis)
+    return made, noises.estimated(made.readings, made.residual, made.basis)
 
 
 def test_a_rail_that_each_gyroscope_reaches_once():
@@ -135,7 +135,7 @@ def test_parameters_of_which_nothing_is_known_cost_no_gain():
 def test_a_triad_that_the_motion_follows_keeps_some_noise(clean):
     residual = clean.fit.residual.copy()
     residual[:, 0, :3] = 0.0
-    judged = noises.judge(clean.readings, residual, clean.fit.basis)
+    judged = noises.estimated(clean.readings, residual, clean.fit.basis)
     declared = clean.readings.declared
     assert judged.sd[0, 0] == pytest.approx(SETTINGS.least_noise * declared[0, 0])
     assert np.all(np.isfinite(judged.sd[clean.readings.exists]))

@@ -160,7 +160,7 @@ def test_covariance_where_no_shorter_step_is_better():
     model = ArrayModel(small_array(5, 4), noises(rng, 5, 4)["isotropic"])
     _, force, rate = simulate(rng, model, 20)
     data = Collapsed.of(model, force, rate)
-    given = newton.Given(data.arrays, np.empty(0), np.empty((0, 0)))
+    given = newton.Problem(data.arrays, np.empty(0), np.empty((0, 0)))
     here, there = (newton._place(given, model.array.relative) for _ in range(2))
     cost, _ = newton._evaluate(given, here)
     before = newton._information(given, here)

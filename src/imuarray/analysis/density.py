@@ -10,7 +10,13 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from imuarray.analysis.model import Say, silent
-from imuarray.analysis.noise import Shown, estimated_noise, factors, noise_of, shown
+from imuarray.analysis.noise import (
+    NoiseEstimate,
+    estimated_noise,
+    factors,
+    noise_estimate,
+    noise_of,
+)
 from imuarray.engine.dataset import effects_of, parameters_of, places_among
 from imuarray.engine.estimate import Estimate
 from imuarray.engine.fit import flat_parameters
@@ -149,13 +155,13 @@ def _known(found: Estimate) -> np.ndarray:
     return precision
 
 
-def _judged(found: Estimate, covariance) -> tuple[Readings, Shown]:
+def _judged(found: Estimate, covariance) -> tuple[Readings, NoiseEstimate]:
     """The estimate's readings with the normal noise that they show; few of them share a factor."""
     one = found.recorded[0]
     squares = np.where(one.readings.exists, found.noise_sd() ** 2, np.nan)
     sds = np.broadcast_to(np.sqrt(np.nanmean(squares, axis=0)), squares.shape)
     readings = one.readings.with_noise(sds, None)
-    seen = shown(readings, found.columns, one.state, found.active, covariance)
+    seen = noise_estimate(readings, found.columns, one.state, found.active, covariance)
     return readings.with_sd(sds * factors(seen, readings.exists)), seen
 
 

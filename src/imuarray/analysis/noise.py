@@ -29,7 +29,7 @@ class Fitted(NamedTuple):
     freedom: np.ndarray  # (2,) degrees that the two kinds of noise rest on
 
 
-class Shown(NamedTuple):
+class NoiseEstimate(NamedTuple):
     """Noise and motion's size by residuals and motion of a fit."""
 
     squares: np.ndarray  # (N, 2) of each triad's residuals, in their sds
@@ -37,7 +37,9 @@ class Shown(NamedTuple):
     motion_sd: np.ndarray  # (3,) sizes of omega, omega_dot, s: what is not noise of their estimates
 
 
-def shown(readings: Readings, columns: Columns, state: State, active, covariance) -> Shown:
+def noise_estimate(
+    readings: Readings, columns: Columns, state: State, active, covariance
+) -> NoiseEstimate:
     """Noise and motion's size of a fit, for the ``active`` (N, m) parameters' covariance."""
     wanted = np.flatnonzero(active.any(axis=0))
     few = active[:, wanted]
@@ -58,7 +60,7 @@ def shown(readings: Readings, columns: Columns, state: State, active, covariance
         spread.append(np.einsum("trki,trkj->tkij", roots, roots))
     every = np.concatenate(spread)
     sizes = [_size(state.motion[:, 3 * k : 3 * k + 3], every[:, k]) for k in range(3)]
-    return Shown(squares, freedom, np.array(sizes))
+    return NoiseEstimate(squares, freedom, np.array(sizes))
 
 
 def _size(estimates, covariances) -> float:
@@ -72,7 +74,7 @@ def _size(estimates, covariances) -> float:
     return float(np.sqrt(found))
 
 
-def factors(seen: Shown, exists, known: bool = False) -> np.ndarray:
+def factors(seen: NoiseEstimate, exists, known: bool = False) -> np.ndarray:
     """By what the triads' sds are wrong (N, 2); 1 where they do not exist.
 
     And of accelerometers where theirs are ``known``. Of few triads, or with few degrees of freedom,
@@ -119,7 +121,7 @@ def estimated_noise(
         motion = np.hstack(found.motion.motion[:3])
         rest = no_derivatives(len(motion), len(found.positions))
         state = State(motion, found.positions, np.empty(0), rest)
-        seen = shown(readings, columns, state, columns.owner, found.covariance)
+        seen = noise_estimate(readings, columns, state, columns.owner, found.covariance)
         wrong = factors(seen, readings.exists, known)
         if np.abs(np.log(wrong)).max() < ENOUGH:
             break

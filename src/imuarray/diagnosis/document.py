@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 import imuarray
-from imuarray.diagnosis.noise import judged, per_triad, standardised
+from imuarray.diagnosis.noise import observable, per_triad, standardised
 from imuarray.diagnosis.noise_effects import held_out
-from imuarray.diagnosis.procedure import Found, run_procedure
+from imuarray.diagnosis.procedure import ProcedureResult, run_procedure
 from imuarray.diagnosis.replicates import Discrepancy, discrepancies
 from imuarray.diagnosis.scores import Information, information_at
 from imuarray.diagnosis.settings import SETTINGS
@@ -77,7 +77,7 @@ class Diagnosis:
 
     document: dict
     recording: Recording
-    found: Found
+    found: ProcedureResult
     base: Fitted
     inflated: Fitted
     extended: Fitted
@@ -135,7 +135,7 @@ def diagnose(
     return Diagnosis(document, recording, found, base, inflated, extended)
 
 
-def smooth_samples(robust: Estimate, found: Found) -> dict | None:
+def smooth_samples(robust: Estimate, found: ProcedureResult) -> dict | None:
     """Residual over the declared noise of each triad in the smooth samples of rough motion.
 
     ``unexplained``: more than shocks, which are among the causes, is left. The rms over the triads
@@ -154,7 +154,7 @@ def smooth_samples(robust: Estimate, found: Found) -> dict | None:
     return out
 
 
-def nats_beside(found: Found) -> np.ndarray:
+def nats_beside(found: ProcedureResult) -> np.ndarray:
     """Nats of each held-out block that the extended fit's own score does not have, (blocks,).
 
     Outliers are in no model's score, so what a mixture gains on them is not in the gain either;
@@ -193,7 +193,7 @@ def fitted(made: Fit, given: Information | None = None) -> Fitted:
     return Fitted(made, log_scores(made, precision_of(made)), sds)
 
 
-def rivals_of(found: Found) -> tuple[Fitted, Fitted]:
+def rivals_of(found: ProcedureResult) -> tuple[Fitted, Fitted]:
     """The papers' model on the extended model's readings: declared noise, and inflated."""
     search = found.search
     alone = search.columns.mask([POSITION])
@@ -203,7 +203,7 @@ def rivals_of(found: Found) -> tuple[Fitted, Fitted]:
         # as read: the rivals know neither of rails nor of repeats nor of exchanged axes
         bare = replace(bare, values=found.raw.values)
     declared = fit(bare, search.columns, alone, start, search.smooth, True, all_columns=False)
-    known = judged(bare, declared.basis)[..., None]
+    known = observable(bare, declared.basis)[..., None]
     squares = np.where(known, per_triad(standardised(declared)) ** 2, 1.0)
     inflated_sd = bare.declared * np.maximum(np.sqrt(np.nanmean(squares, axis=-1)), 1e-3)
     again = fit(
@@ -220,7 +220,7 @@ def residual_sd(made: Fit) -> dict:
     return {name: float(np.sqrt(np.nanmean(part**2))) for name, part in parts.items()}
 
 
-def noise_of(found: Found) -> dict:
+def noise_of(found: ProcedureResult) -> dict:
     """The noise sds of the extended model, by kind and IMU, and their correlation in time."""
     readings, noise = found.search.readings, found.search.noise
     return {
@@ -253,7 +253,7 @@ def gains(base: Fitted, inflated: Fitted, extended: Fitted) -> dict:
     }
 
 
-def causes_of(found: Found, extended: Fitted) -> list[dict]:
+def causes_of(found: ProcedureResult, extended: Fitted) -> list[dict]:
     """All causes: of whole readings, of the means in the order of adoption, of the noise."""
     search, labels = found.search, found.search.readings.labels
     causes = []
@@ -298,7 +298,7 @@ def _entry(item, labels, parameters, nats, rivals=(), says="", **tests) -> dict:
     return entry | {"says": cause_in_words(entry, labels, says)}
 
 
-def structural_gain(found: Found, item) -> tuple[float, float, np.ndarray]:
+def structural_gain(found: ProcedureResult, item) -> tuple[float, float, np.ndarray]:
     """Nats by which the readings, as recorded, miss the extended model's prediction.
 
     Returns their sum, its standard error and each held-out block's share.

@@ -61,7 +61,7 @@ def standardised(fit: Fit) -> np.ndarray:
     return to_unit(fit.readings, fit.residual, fit.basis)
 
 
-def judged(readings: Readings, basis) -> np.ndarray:
+def observable(readings: Readings, basis) -> np.ndarray:
     """Triads (N, 2) bool whose noise a residual shows: a lone gyroscope has the motion for itself.
 
     ``basis`` (T, 6 N, D) of the motion.
@@ -76,9 +76,9 @@ def to_unit(readings: Readings, residual, basis) -> np.ndarray:
     return np.where(readings.keep, residual / share, np.nan)
 
 
-def judge(readings: Readings, residual, basis) -> Noise:
+def estimated(readings: Readings, residual, basis) -> Noise:
     """The noise of each triad from a residual (T, N, 6) and the motion's basis (T, 6 N, D)."""
-    known = judged(readings, basis)
+    known = observable(readings, basis)
     unit = np.where(np.repeat(known, 3, axis=1), to_unit(readings, residual, basis), np.nan)
     fast = fast_part(unit, readings.run)
     values = np.where(known[..., None], per_triad(fast), 1.0)

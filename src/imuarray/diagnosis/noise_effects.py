@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis.noise import Noise, expected_ratio, judged
+from imuarray.diagnosis.noise import Noise, expected_ratio, observable
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.fit import Fit
 from imuarray.engine.heldout import blocks_of
@@ -19,7 +19,7 @@ ALIKE = 1e-9  # share of the largest information below which there is none
 SCALES = tuple(f"{kind}_noise" for kind in KINDS)
 
 
-class Named(NamedTuple):
+class NoiseCause(NamedTuple):
     """A cause in the noise: whose, log p, numbers, and what it gains on held-out time."""
 
     effect: str
@@ -126,7 +126,7 @@ def whole_scales(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
         information += 2 * squares.sum(axis=(1, 3))
         surplus = fit.residual[part].reshape(-1, 6 * count) ** 2 * mask - left[:, rows, rows]
         score += surplus.sum(axis=0).reshape(2 * count, 3).sum(axis=1)
-    known = judged(readings, fit.basis)
+    known = observable(readings, fit.basis)
     there = known.ravel()
     # of two triads of a kind, how much of their difference is either's is not seen
     covariance = np.linalg.pinv(information[np.ix_(there, there)], ALIKE, hermitian=True)
@@ -149,7 +149,7 @@ def scales(fit: Fit, noise: Noise, untied: bool) -> tuple[np.ndarray, np.ndarray
     motion (``untied``) and its spectrum is that of its own colour; else from the fast part, which
     smooth misfit does not reach.
     """
-    there = judged(fit.readings, fit.basis)
+    there = observable(fit.readings, fit.basis)
     whole, covariance = whole_scales(fit)
     whole = whole + np.log(fit.readings.sd / fit.readings.declared)[there]
     fast = np.log(noise.sd / fit.readings.declared)[there]
@@ -173,13 +173,13 @@ def alike(fit: Fit, noise: Noise, imu: int, kind: int) -> bool:
 
 def noise_scale(
     fit: Fit, noise: Noise, kind: int, limit, least, skip=(), untied=True
-) -> Named | None:
+) -> NoiseCause | None:
     """A triad's (0 accelerometer, 1 gyroscope) noise against the declared one, or None.
 
     ``least`` (N,) log ratios below which a departure is not believed, ``skip`` IMUs to leave out.
     """
     readings = fit.readings
-    pairs = np.argwhere(judged(readings, fit.basis))
+    pairs = np.argwhere(observable(readings, fit.basis))
     log_ratio, covariance = scales(fit, noise, untied)
     chosen = np.flatnonzero(
         (pairs[:, 1] == kind)
@@ -207,7 +207,7 @@ def noise_scale(
         error = ratio * float(np.sqrt(covariance[place, place]))
         numbers[f"ratio_{readings.labels[imu]}"] = (ratio, error, "1")
     imus = tuple(int(k) for k in pairs[chosen, 0])
-    return Named(SCALES[kind], imus, log_p, numbers, *held_out(nats))
+    return NoiseCause(SCALES[kind], imus, log_p, numbers, *held_out(nats))
 
 
 def mixture(fit: Fit, imu: int, kind: int, steps=60, without=None) -> Mixture:
@@ -239,12 +239,12 @@ def _tail_nats(axes, square, share, factor, core, plain) -> np.ndarray:
 
 
 def heavy_tails(fit: Fit, noise: Noise, limit: float):
-    """(Named or None, hits, others): triads [(imu, kind, Mixture)] that a mixture describes better.
+    """(NoiseCause or None, hits, others): triads [(imu, kind, Mixture)] with heavy tails.
 
     ``others`` are those where it may be so, once it is so somewhere: each by itself, or all the
     rest of a kind together.
     """
-    triads = np.argwhere(judged(fit.readings, fit.basis))
+    triads = np.argwhere(observable(fit.readings, fit.basis))
     tried = [(int(i), int(k), mixture(fit, i, k)) for i, k in triads]
     gains = np.array([_tail_gain(fit, noise, *item) for item in tried])
     for place, (imu, kind, _) in enumerate(tried):
@@ -277,7 +277,7 @@ def heavy_tails(fit: Fit, noise: Noise, limit: float):
     there = {item[:2] for item in hits}
     others = [m for m, may in zip(tried, maybe, strict=True) if may and m[:2] not in there]
     imus = tuple(sorted({imu for imu, *_ in hits}))
-    return Named(TAILS, imus, float(least), *_numbers(fit, hits)), hits, others
+    return NoiseCause(TAILS, imus, float(least), *_numbers(fit, hits)), hits, others
 
 
 def _all_tails(gains) -> float:
@@ -313,7 +313,7 @@ def pooled_autocorrelation(fit: Fit, noise: Noise, lagged) -> float:
 
     0 where their spectra disagree.
     """
-    known = judged(fit.readings, fit.basis)
+    known = observable(fit.readings, fit.basis)
     kind = np.argwhere(known)[:, 1]
     implied = np.array([expected_ratio(value, len(fit.residual)) for value, _ in lagged])
     found = [0.0]
@@ -328,13 +328,13 @@ def pooled_autocorrelation(fit: Fit, noise: Noise, lagged) -> float:
     return min(found)
 
 
-def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Named | None:
+def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> NoiseCause | None:
     """Noise correlated in time: neighbours alike, and a spectrum that agrees with it.
 
     ``untied``: no check finds the residual tied to the motion; else only the spectrum above the
     motion's frequencies counts.
     """
-    readings, triads = fit.readings, np.argwhere(judged(fit.readings, fit.basis))
+    readings, triads = fit.readings, np.argwhere(observable(fit.readings, fit.basis))
     number = len(triads)
     hits, nats, numbers, logs = [], np.zeros(len(fit.residual)), {}, []
     step = float(np.median(np.diff(readings.time)))
@@ -377,4 +377,4 @@ def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> Named | None
         nats[1:] += np.sum(unit[1:] ** 2 - jump - np.log1p(-(rho**2)), axis=1) / 2
     imus = tuple(sorted({imu for imu, _ in hits}))
     best = min(*logs, together, 0.0)
-    return Named(COLOURED, imus, best, numbers, *held_out(nats), True, ("whiteness",))
+    return NoiseCause(COLOURED, imus, best, numbers, *held_out(nats), True, ("whiteness",))

@@ -34,7 +34,7 @@ from imuarray.tails import log_poisson
 
 
 @dataclass(frozen=True)
-class Found:
+class ProcedureResult:
     """A diagnosis' end: its last `Search`, the base model's fit, tests, checks, all causes.
 
     ``explained``: share of the base model's excess misfit; ``unexplained``: whether checks fail
@@ -46,7 +46,7 @@ class Found:
     base: Fit
     base_scores: list[Score]
     structural: list[Structural]
-    in_noise: list[noise_effects.Named]
+    in_noise: list[noise_effects.NoiseCause]
     checks: list[Check]
     explained: float
     unexplained: bool
@@ -57,7 +57,7 @@ class Found:
 
 def run_procedure(
     recording: Recording, without=(), say: Callable[[str], None] = lambda text: None
-) -> Found:
+) -> ProcedureResult:
     """Find what the papers' model gets wrong; effects in ``without`` are not in the catalogue.
 
     InputError where a recording has too few moving samples.
@@ -76,7 +76,7 @@ def run_procedure(
     if not mended:
         checks = all_checks(search.fit, search.given, search.noise)
         search = replace(search, detectable=detectable(search))
-        return Found(search, base, scores, structural, [], checks, 0.0, True, raw, whole)
+        return ProcedureResult(search, base, scores, structural, [], checks, 0.0, True, raw, whole)
     before, search = search.fit, drop_outliers(search)
     first = first if search.fit is before else None
     del before  # it has derivatives of its own
@@ -106,13 +106,15 @@ def run_procedure(
     in_noise = [item for item in in_noise if not weak(item, len(in_noise) + len(search.causes))]
     say("looking for what cannot be distinguished")
     classes = {cause.effect: rivals(search, cause) for cause in search.causes}
-    return Found(
+    return ProcedureResult(
         search, base, scores, together(structural, clips), in_noise, checks, explained,
         failing, raw, whole, classes,
     )  # fmt: skip
 
 
-def ended(search: Search, without, tailed) -> tuple[Search, list[Check], list[noise_effects.Named]]:
+def ended(
+    search: Search, without, tailed
+) -> tuple[Search, list[Check], list[noise_effects.NoiseCause]]:
     """The search with the colour of its noise, the checks of what is left, causes in the noise."""
     search = fit_coloured_noise(search, without)
     checks = final_checks(search, tailed)
@@ -120,12 +122,12 @@ def ended(search: Search, without, tailed) -> tuple[Search, list[Check], list[no
     return search, checks, named_noise(search, without, tailed, untied)
 
 
-def sure(item: noise_effects.Named) -> bool:
+def sure(item: noise_effects.NoiseCause) -> bool:
     """True of a cause in the noise that gains on held-out time; a shock is in little of it."""
     return item.effect == SHOCK or item.gain > SETTINGS.least_z * item.gain_se
 
 
-def weak(item: noise_effects.Named, causes: int) -> bool:
+def weak(item: noise_effects.NoiseCause, causes: int) -> bool:
     """True of a cause in the noise that is there, but not worth a name beside others."""
     return item.log_p > SETTINGS.limit(item.effect, causes > 1)
 
@@ -226,7 +228,7 @@ def fit_coloured_noise(search: Search, without) -> Search:
     if COLOURED in without:
         return search
     made = beside_left(search)[0]
-    known = noises.judged(made.readings, made.basis)
+    known = noises.observable(made.readings, made.basis)
     triads = np.argwhere(known)
     lagged = np.array([noise_effects.autocorrelation(made, *pair) for pair in triads])
     coloured = search.noise.correlation[known] != 0
@@ -245,7 +247,7 @@ def fit_coloured_noise(search: Search, without) -> Search:
     return replace(search, readings=readings).ending(made, noise)
 
 
-def named_noise(search: Search, without, tailed, untied: bool) -> list[noise_effects.Named]:
+def named_noise(search: Search, without, tailed, untied: bool) -> list[noise_effects.NoiseCause]:
     """Scale and colour of the noise, where they depart from what is declared.
 
     ``untied``: no check finds the residual tied to the motion.

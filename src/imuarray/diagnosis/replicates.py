@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis.noise import judged, standardised
+from imuarray.diagnosis.noise import observable, standardised
 from imuarray.diagnosis.plain import first_up
 from imuarray.engine.fit import Fit
 from imuarray.model.effects import KINDS
@@ -125,7 +125,7 @@ class Part(NamedTuple):
 def quantities(fit: Fit, unit, seen: Seen | None = None) -> dict[str, Quantity]:
     """Test quantities of a standardised residual (T, N, 6), NaN where left out."""
     readings, found, seen = fit.readings, {}, seen or Seen(fit)
-    filled, known = np.nan_to_num(unit), judged(readings, fit.basis)
+    filled, known = np.nan_to_num(unit), observable(readings, fit.basis)
     for kind, name in enumerate(KINDS):
         there = np.flatnonzero(known[:, kind])
         if not len(there):

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import median_filter
 
-from imuarray.diagnosis.noise import Noise, judged, standardised
+from imuarray.diagnosis.noise import Noise, observable, standardised
 from imuarray.diagnosis.replicates import motion_sizes
 from imuarray.diagnosis.scores import Information
 from imuarray.diagnosis.settings import SETTINGS
@@ -178,7 +178,7 @@ def _worst(name, found) -> Check:
 def size_checks(fit: Fit) -> list[Check]:
     """Does the residual's size grow with the motion's? A regression of its square per triad."""
     unit = standardised(fit)
-    triads = np.argwhere(judged(fit.readings, fit.basis))
+    triads = np.argwhere(observable(fit.readings, fit.basis))
     checks = []
     for name, values in motion_sizes(fit).items():
         size = np.sum(values**2, axis=1)
@@ -300,5 +300,5 @@ def all_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]:
     return [
         *regression_checks(fit, given, noise), *size_checks(fit), timing_check(fit),
         jitter_check(fit), correlation_check(fit, noise),
-        *noise_checks(noise, judged(fit.readings, fit.basis)), resolution_check(fit),
+        *noise_checks(noise, observable(fit.readings, fit.basis)), resolution_check(fit),
     ]  # fmt: skip

@@ -58,7 +58,7 @@ class Conditional(NamedTuple):
     of: np.ndarray
 
 
-class Seen(NamedTuple):
+class ObservedDirections(NamedTuple):
     """The d directions that a recording sees of a candidate's k parameters, scaled.
 
     The information along them ``values`` (d,), themselves ``vectors`` (k, d), the parameters'
@@ -164,7 +164,7 @@ class Information:
         along = seen.vectors.T @ (conditional.score[mine] / seen.scale)
         return float(along @ seen.precision @ along), len(seen.values)
 
-    def seen(self, conditional: Conditional, chosen) -> Seen:
+    def seen(self, conditional: Conditional, chosen) -> ObservedDirections:
         """The directions that are seen of the parameters at ``chosen`` places."""
         information, _, meat, of = conditional
         mine = np.searchsorted(of, chosen)
@@ -179,7 +179,7 @@ class Information:
         else:
             spread = meat[np.ix_(mine, mine)] / np.outer(scale, scale)
             spread = vectors.T @ spread @ vectors
-        return Seen(values, vectors, scale, scaled_inverse(spread + ridge))
+        return ObservedDirections(values, vectors, scale, scaled_inverse(spread + ridge))
 
 
 def information_at(fit: Fit) -> Information:

@@ -46,7 +46,7 @@ class Cause:
 
 
 @dataclass(frozen=True)
-class Weighed:
+class ScoreAtFit:
     """Score and information at a fit, made when asked for: not every fit is tested.
 
     ``correlation`` (N, 2) of the noise in time.
@@ -97,7 +97,7 @@ class Search:
     causes: tuple[Cause, ...] = ()
     fit: Fit | None = None
     noise: noises.Noise | None = None
-    weighed: Weighed | None = None
+    weighed: ScoreAtFit | None = None
     refused: frozenset[Candidate] = frozenset()
     excess: float = 0.0
     jumps: np.ndarray | bool = False
@@ -170,7 +170,7 @@ class Search:
                 search.readings, search.columns, search.active, state, search.smooth, rough
             )
             readings = search.readings
-            judged = noises.judge(readings, seen.residual, seen.basis)
+            judged = noises.estimated(readings, seen.residual, seen.basis)
             del seen  # large
             change = np.max(np.abs(judged.sd / readings.sd - 1)[readings.exists])
             enough = turn > 0 or not search.clocks
@@ -182,7 +182,7 @@ class Search:
             state = estimated_again(search._with_jumps, search.columns, state, search.clocks)
             search = replace(search, readings=readings.with_sd(judged.sd))
         made = at(search.readings, search.columns, search.active, state, converged)
-        noise = noises.judge(made.readings, made.residual, made.basis)
+        noise = noises.estimated(made.readings, made.residual, made.basis)
         search = search.ending(made, noise)
         columns = likely_sizes(made)
         steady = np.allclose(columns.prior_sd, search.columns.prior_sd, rtol=SETTINGS.steady_size)
@@ -203,7 +203,7 @@ class Search:
 
     def ending(self, made: Fit, noise: noises.Noise) -> Search:
         """With a fit, and the noise there."""
-        return replace(self, fit=made, noise=noise, weighed=Weighed(made, noise.correlation))
+        return replace(self, fit=made, noise=noise, weighed=ScoreAtFit(made, noise.correlation))
 
     def started(self, effect: str = "", values: dict | None = None) -> State:
         """The present state, dropped effects at zero, an adopted ``effect`` where a scan found it.

@@ -26,7 +26,7 @@ from imuarray.engine.fit import (
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import Columns, prior_precision
 from imuarray.engine.readings import Readings
-from imuarray.engine.robust import MEDIAN, Pass, distances, freedoms, judged, normal_pass
+from imuarray.engine.robust import MEDIAN, Pass, distances, freedoms, normal_pass, reweighted
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import is_smooth, start
 from imuarray.model.effects import EFFECTS
@@ -320,7 +320,7 @@ def _judged(recorded, passes, columns, active, nu) -> tuple[Recorded, ...]:
         kinds = EFFECTS[name].kinds if name in EFFECTS else [0]  # positions
         paid[:, kinds] += active[:, [column]] / len(kinds)
     return tuple(
-        replace(one, readings=judged(one.readings, seen, paid / len(recorded), nu))
+        replace(one, readings=reweighted(one.readings, seen, paid / len(recorded), nu))
         for one, seen in zip(recorded, passes, strict=True)
     )
 

@@ -114,7 +114,7 @@ def _inside(blocks, part: slice) -> list[tuple[int, slice]]:
     return found
 
 
-def judged(readings: Readings, seen: Pass, owned, former: np.ndarray) -> Readings:
+def reweighted(readings: Readings, seen: Pass, owned, former: np.ndarray) -> Readings:
     """The readings with each triad's scale and weights as the residual of a pass shows them.
 
     ``owned`` (N, 2): parameters that a triad's readings have paid for. ``former`` (2,): degrees of

@@ -48,7 +48,7 @@ def fisher_scoring(
     is below ``tolerance``: no coordinate then moves by more of its own sd. IdentifiabilityError
     where the information is singular.
     """
-    given = Given(data.arrays, *_prior(prior, data))
+    given = Problem(data.arrays, *_prior(prior, data))
     # one layout and one type each, or all would be compiled again
     start, tolerance, limit = np.array(start, float, order="C"), float(tolerance), max(limit, 0)
     require_shape("start", start, (len(data.specific_force), 3))
@@ -85,7 +85,7 @@ def _prior(prior, data: Collapsed):
     return mean, precision
 
 
-class Given(NamedTuple):
+class Problem(NamedTuple):
     """Data and prior of a search."""
 
     data: Arrays

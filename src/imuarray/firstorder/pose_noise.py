@@ -67,11 +67,11 @@ class PoseNoise(NamedTuple):
         rows, one = _Rows.of(misfit, slopes, fixed), np.ones(len(self.walk))
         unit = np.median(self.sd) ** 2
 
-        def judged(noise: PoseNoise) -> tuple[float, float]:
-            return rows.judged(noise.whitening(used), used)
+        def profiled(noise: PoseNoise) -> tuple[float, float]:
+            return rows.profiled(noise.whitening(used), used)
 
         found = minimize_scalar(
-            lambda x: judged(self._replace(walk=unit * np.exp(x) * one))[0],
+            lambda x: profiled(self._replace(walk=unit * np.exp(x) * one))[0],
             bounds=np.log(RANGE), method="bounded", options={"xatol": 0.05},
         )  # fmt: skip
         # noise and walk that both grow: what of it is noise's, the fit's residual will show
@@ -81,8 +81,8 @@ class PoseNoise(NamedTuple):
             own, freedom = rows.own(self, used, unit)
             if freedom > FREEDOM:
                 ways.append((own, 2 * (SHOWN + 2 * len(one) - 2)))
-        best = min(ways, key=lambda way: judged(way[0])[0] + way[1])[0]
-        return best._replace(walk=best.walk * judged(best)[1])
+        best = min(ways, key=lambda way: profiled(way[0])[0] + way[1])[0]
+        return best._replace(walk=best.walk * profiled(best)[1])
 
 
 class _Rows(NamedTuple):
@@ -124,7 +124,7 @@ class _Rows(NamedTuple):
         step = scale * np.linalg.solve(inner * np.outer(scale, scale), scale * right)
         return left, rows, inner, right, step
 
-    def judged(self, white, used) -> tuple[float, float]:
+    def profiled(self, white, used) -> tuple[float, float]:
         """-2 log of the restricted likelihood under ``white``, and a factor of all variances in it.
 
         The factor is the one that fits best, at least 1.

@@ -5,7 +5,6 @@ from scipy.special import chdtrc
 
 from imuarray_papers.claims.registry import (
     claim,
-    judged,
     listed,
     near,
     power_law,
@@ -13,6 +12,7 @@ from imuarray_papers.claims.registry import (
     rises,
     show,
     untested,
+    verdict,
 )
 
 SAMPLES = "calibration/position_error_samples"
@@ -44,7 +44,7 @@ def _exponent(results):
 @claim("2017-01")
 def inverse_root(results):
     slope, error, late = _exponent(results)
-    return judged(slope, error, near(slope, -0.5, error, 0.05), late)
+    return verdict(slope, error, near(slope, -0.5, error, 0.05), late)
 
 
 @claim("2017-02")
@@ -53,13 +53,13 @@ def inverse(results):
     remark = (
         "the abstract's word is right for the variance, not for the error; section IV says -1/2"
     )
-    return judged(slope, error, near(slope, -1, error, 0.05), remark)
+    return verdict(slope, error, near(slope, -1, error, 0.05), remark)
 
 
 @claim("2017-03")
 def variance_inverse(results):
     slope, error, _ = _exponent(results)
-    return judged(2 * slope, 2 * error, near(2 * slope, -1, 2 * error, 0.1))
+    return verdict(2 * slope, 2 * error, near(2 * slope, -1, 2 * error, 0.1))
 
 
 @claim("2017-44")
@@ -79,7 +79,7 @@ def complete(results):
         f"what is left falls by {show(1 - factors.max(), 2)} to {show(1 - factors.min(), 2)} of"
         " itself in an iteration for each N, but goes down to the bound, as N^-1/2: N log N"
     )
-    return judged(value, "", needed.iloc[-1] <= 1.1 * needed.iloc[0], remark)
+    return verdict(value, "", needed.iloc[-1] <= 1.1 * needed.iloc[0], remark)
 
 
 def _thousand(results) -> tuple[float, float, tuple[str, str]]:
@@ -91,7 +91,7 @@ def _thousand(results) -> tuple[float, float, tuple[str, str]]:
 @claim("2017-04")
 def micrometre(results):
     rmse, _, shown = _thousand(results)
-    return judged(*shown, 1e-6 / np.sqrt(10) <= rmse <= 1e-6 * np.sqrt(10))
+    return verdict(*shown, 1e-6 / np.sqrt(10) <= rmse <= 1e-6 * np.sqrt(10))
 
 
 @claim("2017-05")
@@ -105,7 +105,7 @@ def two_samples(results):
         f" {last.iterations:.0f} iterations; {100 * last.converged_share:.0f} % of the runs had"
         " converged by then: slower than for N > 2, and heavy-tailed"
     )
-    return judged(value, error, value >= 1 - 3 * error, remark)
+    return verdict(value, error, value >= 1 - 3 * error, remark)
 
 
 @claim("2017-06")
@@ -118,7 +118,7 @@ def two_ill_posed(results):
         f"Cramer-Rao bound at N = 2: {show(bound.bound_m)} +- {show(bound.bound_se_m, 2)} m; slow"
         " convergence, not a missing condition, keeps the RMSE up"
     )
-    return judged(f"{deficient} of {len(two)} arrays deficient", "", deficient > 0, remark)
+    return verdict(f"{deficient} of {len(two)} arrays deficient", "", deficient > 0, remark)
 
 
 @claim("2017-07")
@@ -132,7 +132,7 @@ def more_iterations(results):
         value, error = ratio(a.rmse_m, a.rmse_se_m, b.rmse_m, b.rmse_se_m)
         worst = max(worst, value + 3 * error)
     text = f"largest (last / first + 3 errors) {show(worst)}; {up} steps up"
-    return judged(text, "in the value", up == 0 and worst < 1)
+    return verdict(text, "in the value", up == 0 and worst < 1)
 
 
 @claim("2017-08")
@@ -147,7 +147,7 @@ def more_samples(results):
         f"not so after the first iteration, where all N agree within a factor {show(spread, 2)}"
     )
     value = f"{listed(curve.rmse_m)} m for N = {listed(curve.samples, 4)}"
-    return judged(value, f"{listed(curve.rmse_se_m, 2)} m", up == 0 and falls, remark)
+    return verdict(value, f"{listed(curve.rmse_se_m, 2)} m", up == 0 and falls, remark)
 
 
 def _steps_up(results, table, along, across):
@@ -169,7 +169,7 @@ def faster_rotation(results):
     text, up, where, bounds = _steps_up(results, results.table(MOTION), *names)
     remark = f"at {where} deg/s^2; " if where else ""
     remark += f"the Cramer-Rao bound itself goes up in {bounds} steps"
-    return judged(text, "3 errors a step", up == 0, remark)
+    return verdict(text, "3 errors a step", up == 0, remark)
 
 
 def _beyond(table, limit) -> str:
@@ -202,7 +202,7 @@ def faster_acceleration(results):
     remark = f"at {where} deg/s; " if where else ""
     remark += "figure 5's axes are not in the text; the Cramer-Rao bound goes up in"
     remark += f" {bounds} steps of our whole grid{_beyond(whole, hand)}"
-    return judged(text, "3 errors a step", up == 0, remark)
+    return verdict(text, "3 errors a step", up == 0, remark)
 
 
 @claim("2017-11")
@@ -215,7 +215,7 @@ def translation(results):
     value = (
         f"{listed(table.rmse_m)} m at {listed(table.specific_force_mps2)} m/s^2 (p = {show(p, 2)})"
     )
-    return judged(value, f"{listed(table.rmse_se_m, 2)} m", p > 0.001)
+    return verdict(value, f"{listed(table.rmse_se_m, 2)} m", p > 0.001)
 
 
 @claim("2017-12")
@@ -225,10 +225,10 @@ def efficient(results):
     row = bound[bound.samples == last.samples].iloc[0]
     value, error = ratio(last.rmse_m, last.rmse_se_m, row.bound_m, row.bound_se_m)
     remark = "the paper leaves the bound for the calibration problem open; here it is computed"
-    return judged(value, error, value + 3 * error < 1.1, remark)
+    return verdict(value, error, value + 3 * error < 1.1, remark)
 
 
 @claim("2017-13")
 def reliable(results):
     rmse, error, shown = _thousand(results)
-    return judged(*shown, rmse + 3 * error < 1e-5)
+    return verdict(*shown, rmse + 3 * error < 1e-5)

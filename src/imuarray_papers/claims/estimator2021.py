@@ -6,13 +6,13 @@ import pandas as pd
 from imuarray_papers.claims.registry import (
     by_samples,
     claim,
-    judged,
     listed,
     near,
     power_law,
     rises,
     show,
     tiny,
+    verdict,
 )
 
 EXACT = "rounding only"
@@ -27,20 +27,20 @@ def _found(results, part):
 @claim("2021-01")
 def dimensions(results):
     size = len(results.table(f"posterior/T{results.samples[0]}"))
-    return judged(str(size), "none", size == 93)
+    return verdict(str(size), "none", size == 93)
 
 
 @claim("2021-02")
 def gyroscopes(results):
     change = results.json("claims/identifiability")["invariances"]["gyroscope_change"]
-    return judged(f"{change:g} rad/s", EXACT, change == 0.0)
+    return verdict(f"{change:g} rad/s", EXACT, change == 0.0)
 
 
 @claim("2021-03")
 def naive(results):
     found = _found(results, "effective_draws")
     value = f"{show(found['naive'])} of {found['draws']} draws count"
-    return judged(value, "", found["naive"] < 10, "prior sds as simulated, not even flat")
+    return verdict(value, "", found["naive"] < 10, "prior sds as simulated, not even flat")
 
 
 @claim("2021-04")
@@ -48,7 +48,7 @@ def rao_blackwell(results):
     found = _found(results, "effective_draws")
     ours, drawn = found["rao_blackwellised"], found["conditioned"]
     value = f"{show(ours, 4)} against {show(drawn)} of {found['draws']}"
-    return judged(value, "", ours > 10 * drawn)
+    return verdict(value, "", ours > 10 * drawn)
 
 
 @claim("2021-05")
@@ -58,7 +58,7 @@ def unbiased(results):
     value = ", ".join(f"{row['mean_ratio']:.5f}" for row in rows)
     value += f" for N = {listed([row['draws'] for row in rows])}"
     errors = listed([row["mean_se"] for row in rows], 2)
-    return judged(value, errors, np.max(np.abs(off)) < 4, UNBIASED)
+    return verdict(value, errors, np.max(np.abs(off)) < 4, UNBIASED)
 
 
 @claim("2021-06")
@@ -66,7 +66,7 @@ def variance_of_estimate(results):
     rows = pd.DataFrame(_found(results, "unbiased"))
     errors = rows.relative_variance * np.sqrt(2 / (rows.realisations - 1))
     slope, error = power_law(rows.draws, rows.relative_variance, errors)
-    return judged(slope, error, near(slope, -1, error, 0.05))
+    return verdict(slope, error, near(slope, -1, error, 0.05))
 
 
 @claim("2021-07")
@@ -74,14 +74,14 @@ def null_space(results):
     found = _found(results, "limits")
     value = f"{tiny(found['SH_relative'], 1e-9)}; rank {found['rank_S']} of {found['size']}"
     stands = found["SH_relative"] < 1e-9 and found["rank_S"] == found["size"] - 6
-    return judged(value, EXACT, stands)
+    return verdict(value, EXACT, stands)
 
 
 @claim("2021-08")
 def identities(results):
     found = _found(results, "limits")
     worst = max(found["inverse_identity"], abs(found["determinant_identity"]))
-    return judged(tiny(worst, 1e-9), EXACT, worst < 1e-9)
+    return verdict(tiny(worst, 1e-9), EXACT, worst < 1e-9)
 
 
 @claim("2021-09", column=1)
@@ -94,7 +94,7 @@ def limit(results, column):
     value = (
         f"exponent {show(slope, 4)}; relative distance {tiny(last, 1e-4)} at beta = {show(beta)}"
     )
-    return judged(value, EXACT, abs(slope + 1) < 0.05 and last < 1e-4)
+    return verdict(value, EXACT, abs(slope + 1) < 0.05 and last < 1e-4)
 
 
 @claim("2021-11")
@@ -103,7 +103,7 @@ def printed_power(results):
     remark = "(19) has the root of |M_t|, so (23) enters with power -1/2: print lost the root"
     stands = abs(found["power"] - 1) < 0.01
     value = f"{show(-found['power'])}; misfit {tiny(found['misfit'], 0.01)}"
-    return judged(value, EXACT, stands, remark)
+    return verdict(value, EXACT, stands, remark)
 
 
 def _printed(results, prefix, remark):
@@ -116,7 +116,7 @@ def _printed(results, prefix, remark):
         f" {listed(rows.width_ratio_min, 5)} for T = {listed(rows.samples)}"
     )
     stands = rows.shift_max_sd.max() < 0.1 and np.all(np.abs(rows.width_ratio_min - 1) < 0.1)
-    return judged(value, "none: linearised", stands, remark(rows))
+    return verdict(value, "none: linearised", stands, remark(rows))
 
 
 @claim("2021-12")
@@ -143,14 +143,14 @@ def six(results):
     value = f"{found['dimensions']} of {found['full']} dimensions"
     limit = 1e-6 * max(1, abs(found["value"]))
     value += f"; difference {tiny(found['difference'], float(show(limit)))}"
-    return judged(value, EXACT, found["dimensions"] == 6 and found["difference"] < limit)
+    return verdict(value, EXACT, found["dimensions"] == 6 and found["difference"] < limit)
 
 
 @claim("2021-15")
 def log_sum_exp(results):
     found = _found(results, "log_sum_exp")
     worst = found["worst_relative"]
-    return judged(tiny(worst, 1e-12), EXACT, worst < 1e-12)
+    return verdict(tiny(worst, 1e-12), EXACT, worst < 1e-12)
 
 
 @claim("2021-16")
@@ -161,14 +161,14 @@ def underflow(results):
         f" {show(row['median_exponent'])})"
         for row in found
     )
-    return judged(value, "", any(row["fails"] > 0 for row in found))
+    return verdict(value, "", any(row["fails"] > 0 for row in found))
 
 
 @claim("2021-17")
 def no_rotation(results):
     found = results.json("claims/identifiability")["common_axis"]
     value = f"rank {found['no rotation']} of {found['unknowns']}"
-    return judged(value, EXACT, found["no rotation"] == 0)
+    return verdict(value, EXACT, found["no rotation"] == 0)
 
 
 def _low(results):
@@ -183,7 +183,7 @@ def inverse_draws(results):
     }
     slopes, errors = ({t: fit[part] for t, fit in fits.items()} for part in (0, 1))
     stands = all(near(slope, -1, error, 0.1) for slope, error in fits.values())
-    return judged(by_samples(slopes), by_samples(errors, 2), stands)
+    return verdict(by_samples(slopes), by_samples(errors, 2), stands)
 
 
 def _scaled(results):
@@ -206,7 +206,7 @@ def grows(results):
     )
     stands = bool(np.all(up) and np.all(np.diff(chosen) >= 0) and chosen[-1] > chosen[0])
     remark = "no values of table I in the text"
-    return judged(value, listed(values * errors, 2), stands, remark)
+    return verdict(value, listed(values * errors, 2), stands, remark)
 
 
 @claim("2021-20")
@@ -214,7 +214,7 @@ def linear_in_samples(results):
     values, errors = _scaled(results)
     slope, error = power_law(results.samples, values, errors * values)
     remark = "each T has data of its own, whose information differs: hence the wide criterion"
-    return judged(slope, error, abs(slope - 1) < 0.3, remark)
+    return verdict(slope, error, abs(slope - 1) < 0.3, remark)
 
 
 @claim("2021-21")
@@ -228,7 +228,7 @@ def target_variance(results):
     remark = ""
     if any(n == 1 for _, n in pairs):
         remark = "the smallest N there is, 1, already does better for few samples"
-    return judged(value, f"{100 * np.sqrt(2 / (count - 1)):.0f} %", stands, remark)
+    return verdict(value, f"{100 * np.sqrt(2 / (count - 1)):.0f} %", stands, remark)
 
 
 @claim("2021-22")
@@ -236,7 +236,7 @@ def acceptance(results):
     low, high = results.settings["paper2021"]["acceptance_range"]
     found = {t: v["acceptance"] for t, v in results.each_json("posterior/T{}").items()}
     stands = all(low <= rate <= high for rates in found.values() for rate in rates)
-    return judged(by_samples(found), "over the whole run, burn-in included", stands)
+    return verdict(by_samples(found), "over the whole run, burn-in included", stands)
 
 
 @claim("2021-23")
@@ -245,7 +245,7 @@ def twenty_three(results):
     theory, walked = found["theory"]["acceptance"], found["random_walk"]["acceptance"]
     stands = abs(theory - 0.234) < 0.005 and abs(walked - 0.234) < 0.05
     value = f"{show(walked)} simulated, {show(theory, 4)} in the limit"
-    return judged(value, found["random_walk"]["se"], stands)
+    return verdict(value, found["random_walk"]["se"], stands)
 
 
 @claim("2021-24")
@@ -253,7 +253,7 @@ def three_point_three(results):
     found = results.json("claims/marginalisation")["theory"]
     variance, acceptance = found["noisy_variance"], found["noisy_acceptance"]
     stands = abs(variance - 3.3) < 0.05 and abs(acceptance - 0.07) < 0.005
-    return judged(f"{show(variance)}, {show(acceptance)}", "none", stands)
+    return verdict(f"{show(variance)}, {show(acceptance)}", "none", stands)
 
 
 @claim("2021-25")
@@ -267,7 +267,7 @@ def trade_off(results):
         largest = max(largest, sweep.acceptance_se.max())
     stands = up == 0 and all(a > 0.5 and b < 0.05 for a, b in ends.values())
     value = "; ".join(f"T = {t}: {show(a)} to {show(b)}" for t, (a, b) in ends.items())
-    return judged(f"{value}; {up} steps up", largest, stands)
+    return verdict(f"{value}; {up} steps up", largest, stands)
 
 
 @claim("2021-26")
@@ -276,4 +276,4 @@ def stuck(results):
     low, high = table.iloc[0], table.iloc[-1]
     error = float(np.hypot(low.acceptance_se, high.acceptance_se))
     value = f"{listed(table.acceptance)} at variance {listed(table.log_variance)} (at the truth)"
-    return judged(value, error, low.acceptance - high.acceptance > 3 * error)
+    return verdict(value, error, low.acceptance - high.acceptance > 3 * error)

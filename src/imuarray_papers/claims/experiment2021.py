@@ -12,7 +12,15 @@ from imuarray.geometry import UNDERSIDE_ROTATION
 from imuarray.model.effects import KINDS
 from imuarray.recording.units import GRAVITY
 from imuarray_papers.claims.posterior2021 import covered
-from imuarray_papers.claims.registry import by_samples, claim, falls, judged, listed, show, untested
+from imuarray_papers.claims.registry import (
+    by_samples,
+    claim,
+    falls,
+    listed,
+    show,
+    untested,
+    verdict,
+)
 
 RANGE = 157.0  # m/s^2, where the accelerometers saturate
 DEGREES = float(np.degrees(1.0))
@@ -31,13 +39,13 @@ def _sds(results, prefix):
 def half_percent(results):
     used = results.settings["experiment"]["accelerometer_sd"]
     value = 0.005 * RANGE
-    return judged(f"{show(value)} m/s^2, {show(used)} used", "none", abs(value / used - 1) < 0.01)
+    return verdict(f"{show(value)} m/s^2, {show(used)} used", "none", abs(value / used - 1) < 0.01)
 
 
 @claim("2021-41")
 def saturation(results):
     value = 16 * GRAVITY
-    return judged(f"{show(value, 4)} m/s^2", "none", abs(value / RANGE - 1) < 0.01)
+    return verdict(f"{show(value, 4)} m/s^2", "none", abs(value / RANGE - 1) < 0.01)
 
 
 def _linearised(results, prefix):
@@ -48,7 +56,7 @@ def _linearised(results, prefix):
 def widens(results):
     small, large = (_linearised(results, f"simulation_{n}") for n in ("small_noise_", ""))
     ratios = {t: large[t] / small[t] for t in results.samples}
-    return judged(by_samples(ratios), "none: linearised", min(ratios.values()) > 1)
+    return verdict(by_samples(ratios), "none: linearised", min(ratios.values()) > 1)
 
 
 @claim("2021-43")
@@ -57,7 +65,7 @@ def hundred(results):
     ratios = {t: wide[t] / narrow[t] for t in results.samples}
     stands = all(50 <= value <= 200 for value in ratios.values())
     source = results.sources("simulation_", "")
-    return judged(by_samples(ratios), "", stands, f"{source}; table II is not in the text")
+    return verdict(by_samples(ratios), "", stands, f"{source}; table II is not in the text")
 
 
 @claim("2021-44")
@@ -71,7 +79,7 @@ def attributed(results):
         "the rest is slower motion: twisting as simulated turns less than section IV-A's motion"
     )
     value = f"share {by_samples(share, 2)} of {by_samples(total)}"
-    return judged(value, "none: linearised", min(share.values()) > 0.5, remark)
+    return verdict(value, "none: linearised", min(share.values()) > 0.5, remark)
 
 
 @claim("2021-45")
@@ -83,7 +91,7 @@ def similar(results):
     stands = all(1 / 1.5 < ratio < 1.5 for ratio in ratios.values())
     remark = f"8 IMUs, {results.measured}; the widths follow from sigma_a and the motion, whatever"
     remark += f" the residuals are; {source}"
-    return judged(by_samples(ratios), "", stands, remark)
+    return verdict(by_samples(ratios), "", stands, remark)
 
 
 @claim("2021-46")
@@ -91,14 +99,14 @@ def experiment_shrinks(results):
     name = f"{results.measured}_"
     sds, source = _sds(results, name), results.sources(name)
     value = f"median sd {by_samples(sds)} m"
-    return judged(value, "", falls(sds.values()), f"8 IMUs; {source}")
+    return verdict(value, "", falls(sds.values()), f"8 IMUs; {source}")
 
 
 @claim("2021-47")
 def simulation_shrinks(results):
     sds = _sds(results, "simulation_")
     remark = results.sources("simulation_")
-    return judged(f"{by_samples(sds)} m", "", falls(sds.values()), remark)
+    return verdict(f"{by_samples(sds)} m", "", falls(sds.values()), remark)
 
 
 @claim("2021-50")
@@ -115,7 +123,7 @@ def doubled(results):
         " the shift therefore gives the in-package position only across that axis"
     )
     stands = np.allclose(factors[:2], 2) and not top.any()
-    return judged(value, "none", stands, remark)
+    return verdict(value, "none", stands, remark)
 
 
 @claim("2021-53")
@@ -156,7 +164,7 @@ def ellipses(results):
     remark = f"{under} of {(~top).sum()} on the underside; the board has {top.sum()} such IMUs here"
     if chance >= 0.05:
         return untested(f"too few to tell; {remark}", f"{inside} of {top.sum()}")
-    return judged(f"{inside} of {top.sum()}", f"chance {show(chance, 2)}", chance < 0.05, remark)
+    return verdict(f"{inside} of {top.sum()}", f"chance {show(chance, 2)}", chance < 0.05, remark)
 
 
 def _sides(results):
@@ -173,14 +181,14 @@ def quadrant(results):
         " the upper right one seen from below"
     )
     value = f"mean ({listed(1e3 * under.mean(axis=0))}) mm"
-    return judged(value, "", bool(np.all(np.sign(under) == np.sign(under[0]))), remark)
+    return verdict(value, "", bool(np.all(np.sign(under) == np.sign(under[0]))), remark)
 
 
 @claim("2021-63")
 def centred(results):
     under, above = (side.mean(axis=0) for side in _sides(results))
     stands = np.linalg.norm(above) < np.linalg.norm(under) / 3
-    return judged(f"mean ({listed(1e3 * above)}) mm", "", bool(stands))
+    return verdict(f"mean ({listed(1e3 * above)}) mm", "", bool(stands))
 
 
 def _agreement(results):
@@ -207,7 +215,7 @@ def underestimated(results):
     value = f"{100 * row.coverage_95:.0f} % covered, rms z {show(row.z_rms)}"
     remark = f"{row.recordings} recordings, T = {results.samples[-1]}; claimed sd"
     remark += f" {show(row.claimed_m)} m, between recordings {show(row.spread_m)} m"
-    return judged(value, "pairs and coordinates not independent", row.coverage_95 < 0.9, remark)
+    return verdict(value, "pairs and coordinates not independent", row.coverage_95 < 0.9, remark)
 
 
 @claim("2021-55")
@@ -219,7 +227,7 @@ def conservative(results):
     value = f"{show(found.accelerometer_sd)} m/s^2 in the residual"
     remark = f"with it {100 * found.coverage_95:.0f} % of the 95 % intervals cover, rms z"
     remark += f" {show(found.z_rms)}; what the residual consists of is not asked here"
-    return judged(value, "", found.accelerometer_sd <= used, remark)
+    return verdict(value, "", found.accelerometer_sd <= used, remark)
 
 
 def _still(results) -> pd.DataFrame | None:
@@ -237,7 +245,7 @@ def noise(results, sensor, key, unit, factor):
         return untested("a recording with still poses needed")
     found = factor * table[table.sensor == sensor].sd.median()
     stands = 1 / 1.5 < found / results.settings["noise"][key] < 1.5
-    return judged(
+    return verdict(
         f"{show(found)} {unit}", "", bool(stands), f"{results.measured}, neighbours' differences"
     )
 
@@ -251,7 +259,7 @@ def white(results):
     names = {"specific_force": "accelerometers", "angular_rate": "gyroscopes"}
     said = [f"{names[k]} {row['min']:.2f} to {row['max']:.2f}" for k, row in spans.iterrows()]
     stands = bool(spans.abs().to_numpy().max() < 0.05)
-    return judged("; ".join(said), "", stands, f"{results.measured}, still poses")
+    return verdict("; ".join(said), "", stands, f"{results.measured}, still poses")
 
 
 @claim("2021-60")
@@ -264,7 +272,7 @@ def valid(results):
     value = f"residual {show(ratio, 2)} times the noise of still poses"
     value += f"; {100 * row.coverage_95:.0f} % of the differences covered with it"
     remark = "what the model lacks: docs/measured.md"
-    return judged(value, "", bool(ratio < 1.5 and row.coverage_95 > 0.9), remark)
+    return verdict(value, "", bool(ratio < 1.5 and row.coverage_95 > 0.9), remark)
 
 
 @claim("2021-61")
@@ -274,7 +282,7 @@ def repeated(results):
         return untested("several measured recordings needed")
     row = table.loc[f"{results.settings['experiment']['accelerometer_sd']:g}"]
     value = f"{row.recordings} recordings differ by {show(row.z_rms)} claimed sds, rms"
-    return judged(value, "", bool(row.z_rms < 1.5), f"T = {results.samples[-1]}")
+    return verdict(value, "", bool(row.z_rms < 1.5), f"T = {results.samples[-1]}")
 
 
 @claim("2021-62")
@@ -286,7 +294,7 @@ def saturates(results):
     shares = {kind: 100 * counts[f"{kind} at a rail"] / moving for kind in KINDS}
     value = ", ".join(f"{kind}s {show(share, 2)} %" for kind, share in shares.items())
     remark = f"{results.measured}, of {moving} moving samples"
-    return judged(value, "", max(shares.values()) < 1, remark)
+    return verdict(value, "", max(shares.values()) < 1, remark)
 
 
 @claim("2021-57")
@@ -296,4 +304,4 @@ def localised(results):
     found = {t: v["variance_at_most_draws"] for t, v in verdicts.items()}
     most = max(v["most_draws"] for v in verdicts.values())
     remark = f"N = {most}; the chains here draw omega around the integrand's mode where it fails"
-    return judged(by_samples(found), "", all(v <= limit for v in found.values()), remark)
+    return verdict(by_samples(found), "", all(v <= limit for v in found.values()), remark)

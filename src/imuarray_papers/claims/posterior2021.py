@@ -10,10 +10,10 @@ from imuarray_papers.claims.registry import (
     by_samples,
     claim,
     falls,
-    judged,
     listed,
     show,
     untested,
+    verdict,
 )
 
 
@@ -30,14 +30,14 @@ def chains_agree(results):
         f"smallest effective sizes {by_samples(ess)}; largest |z| of the chains' means"
         f" {by_samples(z)}; steps {by_samples(steps, 7)}"
     )
-    return judged(by_samples(rhat, 4), "", max(rhat.values()) < 1.05, remark)
+    return verdict(by_samples(rhat, 4), "", max(rhat.values()) < 1.05, remark)
 
 
 @claim("2021-28")
 def means_agree(results):
     z, ess = _verdicts(results, "split_z_max", "ess_min")
     stands = max(z.values()) < 4.5 and min(ess.values()) > 100
-    return judged(by_samples(z), "1 by construction", stands)
+    return verdict(by_samples(z), "1 by construction", stands)
 
 
 @claim("2021-29")
@@ -48,7 +48,7 @@ def burn_in(results):
     (steps,) = _verdicts(results, "burn_in_steps")
     stands = max(best.values()) < results.settings["paper2021"]["rhat_threshold"]
     remark = f"burn-in chosen: {by_samples(steps, 7)} steps"
-    return judged(by_samples(best, 4), "", stands, remark)
+    return verdict(by_samples(best, 4), "", stands, remark)
 
 
 @claim("2021-30")
@@ -56,7 +56,7 @@ def narrower(results):
     prior = results.settings["paper2021"]["prior_sd"]
     ratios = {t: table.sd_m.max() / prior for t, table in results.posteriors().items()}
     value = f"largest sd / prior sd {by_samples(ratios)}"
-    return judged(value, "", max(ratios.values()) < 1, results.sources())
+    return verdict(value, "", max(ratios.values()) < 1, results.sources())
 
 
 @claim("2021-31")
@@ -66,7 +66,7 @@ def shrinks(results):
     median = by_samples({t: np.median(sd) for t, sd in sds.items()})
     own = by_samples({t: np.median(sd[second]) for t, sd in sds.items()})
     value = f"median sd {median} m; IMU 2 {own} m"
-    return judged(value, "", falls(sds.values()), results.sources())
+    return verdict(value, "", falls(sds.values()), results.sources())
 
 
 @claim("2021-32")
@@ -76,7 +76,7 @@ def closer(results):
         for t, table in results.posteriors().items()
     }
     value, stands = f"{by_samples(distance)} m", falls(distance.values())
-    return judged(value, "one data set a T", stands, results.sources())
+    return verdict(value, "one data set a T", stands, results.sources())
 
 
 @claim("2021-33")
@@ -86,7 +86,7 @@ def honest(results):
         for t, table in results.posteriors().items()
     }
     stands = all(0.3 < value < 3 for value in z.values())
-    return judged(by_samples(z), "correlated coordinates", stands, results.sources())
+    return verdict(by_samples(z), "correlated coordinates", stands, results.sources())
 
 
 @claim("2021-34")
@@ -97,7 +97,7 @@ def robust(results):
     stands = all(good.values()) and max(ratios.values()) < 0.1
     value = f"{sum(good.values())} of {len(good)} converged"
     value += f"; chains' largest sd / prior sd {by_samples(ratios)}"
-    return judged(value, "", stands)
+    return verdict(value, "", stands)
 
 
 @claim("2021-35")
@@ -123,7 +123,7 @@ def covered(draws, points, level=1 - 1 / 31):
 def level(results):
     count = len(results.table(f"posterior/T{results.samples[0]}")) // 3
     value = 100 * (1 - 1 / count)
-    return judged(f"{value:.2f} %", "none", round(value) == 97)
+    return verdict(f"{value:.2f} %", "none", round(value) == 97)
 
 
 @claim("2021-37")
@@ -136,7 +136,7 @@ def coverage(results):
     count, share = len(table) // 3, 1 / 31
     error = np.sqrt(count * share * (1 - share))
     remark = f"median sd {show(table.sd_m.median())} m"
-    return judged(f"{inside} of {count}", error, inside >= 26, remark)
+    return verdict(f"{inside} of {count}", error, inside >= 26, remark)
 
 
 @claim("2021-38")
@@ -145,7 +145,7 @@ def costs(results):
     rows = table[table.what == "transition"].sort_values("samples")
     dearer = rows.seconds.iloc[-1] > 3 * rows.seconds.iloc[0]
     value = f"{'more' if dearer else 'not more'} than 3 times from the first of T = "
-    return judged(f"{value}{listed(rows.samples)} to the last", "", dearer, CLOCK)
+    return verdict(f"{value}{listed(rows.samples)} to the last", "", dearer, CLOCK)
 
 
 @claim("2021-39")
@@ -188,4 +188,4 @@ def flat_prior(results):
         " (docs/findings.md)"
     )
     stands = all(abs(value) < 2 for value in off.values())
-    return judged(f"{by_samples(off, 2)} sd", by_samples(errors, 1), stands, remark)
+    return verdict(f"{by_samples(off, 2)} sd", by_samples(errors, 1), stands, remark)

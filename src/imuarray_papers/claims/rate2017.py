@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from imuarray_papers.claims.registry import claim, judged, listed, ratio, show, untested
+from imuarray_papers.claims.registry import claim, listed, ratio, show, untested, verdict
 
 COMPARABLE = 2.0  # "comparable" in the papers: within this factor
 SAME = 1.3  # "comparable to having no error at all"
@@ -40,7 +40,7 @@ def _against_average(results, saturated, remark):
     ratios = rows.array_rmse_dps / _average(results)
     errors = rows.array_rmse_se_dps / _average(results)
     stands = np.all(ratios + 3 * errors < COMPARABLE)
-    return judged(_at_rates(ratios, rows.angular_rate_dps), listed(errors, 2), stands, remark)
+    return verdict(_at_rates(ratios, rows.angular_rate_dps), listed(errors, 2), stands, remark)
 
 
 @claim("2017-15")
@@ -71,7 +71,7 @@ def one_micrometre(results, saturated):
         fine.array_rmse_dps, fine.array_rmse_se_dps, none.array_rmse_dps, none.array_rmse_se_dps
     )
     stands = np.all(np.maximum(values, 1 / values) - 3 * errors < SAME)
-    return judged(_at_rates(values, none.index), listed(errors, 2), stands)
+    return verdict(_at_rates(values, none.index), listed(errors, 2), stands)
 
 
 def _alone(results, position_sd):
@@ -91,7 +91,7 @@ def alone_worse(results):
         " angular acceleration, which gyroscopes do not measure: rate is meant"
     )
     stands = np.all(ratios - 3 * errors > 1) and np.all(none - 3 * spread < 1)
-    return judged(_at_rates(ratios, rates), listed(errors, 2), stands, remark)
+    return verdict(_at_rates(ratios, rates), listed(errors, 2), stands, remark)
 
 
 @claim("2017-20")
@@ -103,7 +103,7 @@ def alone_as_good(results):
         " accelerometers alone stay behind 32 gyroscopes at these rates"
     )
     stands = np.any(ratios + 3 * errors < COMPARABLE)
-    return judged(_at_rates(ratios, rates), listed(errors, 2), stands, remark)
+    return verdict(_at_rates(ratios, rates), listed(errors, 2), stands, remark)
 
 
 @claim("2017-21")
@@ -113,7 +113,7 @@ def where_it_matters(results):
     fine, coarse = (ratio(*values[sd][:2], *none[:2]) for sd in (1e-6, 1e-5))
     stands = fine[0] - 3 * fine[1] < SAME < coarse[0] - 3 * coarse[1]
     text = f"{show(fine[0])} at 1e-6 m, {show(coarse[0])} at 1e-5 m ({show(none[2])} deg/s)"
-    return judged(text, f"{show(fine[1], 2)}, {show(coarse[1], 2)}", stands)
+    return verdict(text, f"{show(fine[1], 2)}, {show(coarse[1], 2)}", stands)
 
 
 @claim("2017-22")
@@ -127,7 +127,7 @@ def improves_below(results):
     remark = f"immaterial; simulated, of the same noise, {both}"
     value = f"smaller by a share of {_at_rates(gain, rates[below], 2)}"
     error = listed(2 * gain * errors[below] / alone[below], 2)
-    return judged(value, error, bool(np.all(gain > 0)), remark)
+    return verdict(value, error, bool(np.all(gain > 0)), remark)
 
 
 @claim("2017-23")
@@ -136,4 +136,4 @@ def improves_above(results):
     ratios = rows.array_rmse_dps / rows.gyroscopes_rmse_dps
     errors = rows.array_rmse_se_dps / rows.gyroscopes_rmse_dps
     value = _at_rates(ratios, rows.angular_rate_dps)
-    return judged(value, listed(errors, 2), np.all(ratios + 3 * errors < 1))
+    return verdict(value, listed(errors, 2), np.all(ratios + 3 * errors < 1))

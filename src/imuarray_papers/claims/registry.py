@@ -98,7 +98,7 @@ def claim(id: str, **given):
     return register
 
 
-def judged(value: str | float, error: str | float, stands: bool, remark: str = "") -> Outcome:
+def verdict(value: str | float, error: str | float, stands: bool, remark: str = "") -> Outcome:
     """The outcome of a claim that can be tested; numbers get three digits, errors two."""
     value = value if isinstance(value, str) else show(value)
     error = error if isinstance(error, str) else show(error, 2)

@@ -5,11 +5,11 @@ import numpy as np
 from imuarray.recording.units import GRAVITY
 from imuarray_papers.claims.registry import (
     claim,
-    judged,
     listed,
     show,
     tiny,
     untested,
+    verdict,
 )
 
 EXACT = "rounding only"
@@ -25,7 +25,7 @@ def linear_operations(results):
     table = results.table("claims/inner_steps")
     each = table.inner_steps / table.samples
     value = f"{listed(each)} steps a sample for N = {listed(table.samples, 5)}"
-    return judged(value, "", each.iloc[-1] <= 1.1 * each.iloc[0] + 0.1)
+    return verdict(value, "", each.iloc[-1] <= 1.1 * each.iloc[0] + 0.1)
 
 
 @claim("2017-26")
@@ -33,7 +33,7 @@ def one_inverse(results):
     found = _checks(results, "invariances")
     size, difference = found["normal_matrix_size"], found["shared_inverse_difference_m"]
     value = f"{size}; difference {tiny(difference, 1e-12)} m"
-    return judged(value, EXACT, size == [3, 3] and difference < 1e-12)
+    return verdict(value, EXACT, size == [3, 3] and difference < 1e-12)
 
 
 @claim("2017-27", part="invariances", name="translation_position_change_m", limit=1e-12, unit=" m")
@@ -41,14 +41,14 @@ def one_inverse(results):
 @claim("2017-30", part="lemma", name="eigenvalue_relative", limit=TINY)
 def rounding_only(results, part, name, limit, unit=""):
     change = _checks(results, part)[name]
-    return judged(f"{tiny(change, limit)}{unit}", EXACT, change < limit)
+    return verdict(f"{tiny(change, limit)}{unit}", EXACT, change < limit)
 
 
 @claim("2017-29")
 def lemma(results):
     found = _checks(results, "lemma")
     value = f"{found['parallel_rank_2']} of {found['draws']} draws"
-    return judged(value, "", found["parallel_rank_2"] == found["draws"])
+    return verdict(value, "", found["parallel_rank_2"] == found["draws"])
 
 
 @claim("2017-31")
@@ -59,7 +59,7 @@ def not_parallel(results):
         "also sufficient: det A_n = -|omega x omega_dot|^2, here to a relative"
         f" difference {tiny(found['determinant_relative'], TINY)}"
     )
-    return judged(value, "", found["parallel_rank_2"] == found["draws"], remark)
+    return verdict(value, "", found["parallel_rank_2"] == found["draws"], remark)
 
 
 @claim("2017-32")
@@ -71,7 +71,7 @@ def unique(results):
         f" {axis['one axis, motion known']}; for unknown motion see 2017-35"
     )
     value = f"rank 3 in {lemma['free_rank_3']} of {lemma['draws']} draws"
-    return judged(value, "", lemma["free_rank_3"] == lemma["draws"], remark)
+    return verdict(value, "", lemma["free_rank_3"] == lemma["draws"], remark)
 
 
 @claim("2017-33")
@@ -86,7 +86,7 @@ def counting(results):
     remark = "for random motion the count is also sufficient: one gyroscope, K >= 3, N >= 2"
     if np.any(~full & table.count_allows):
         remark = "not sufficient: some ranks are deficient though the count allows them"
-    return judged(value, "", broken == 0, remark)
+    return verdict(value, "", broken == 0, remark)
 
 
 @claim("2017-34")
@@ -101,7 +101,7 @@ def observable(results):
         " is lost while turning"
     )
     stands = best == 9 and few < 9 and found["sign_blind"]
-    return judged(value, "", stands, remark)
+    return verdict(value, "", stands, remark)
 
 
 @claim("2017-35")
@@ -115,7 +115,7 @@ def not_sufficient(results):
         "joint rank, motion unknown; omega and omega_dot along one axis in all samples give"
         f" {axis['one axis']} of {axis['unknowns']}, along axes that vary {axis['axes vary']}"
     )
-    return judged(value, "", len(lacking) > 0, remark)
+    return verdict(value, "", len(lacking) > 0, remark)
 
 
 def displacement(acceleration, frequency):
@@ -128,19 +128,19 @@ def tens_of_nanometres(results):
     found = 1e9 * displacement(GRAVITY, [2000.0, 3000.0, 5000.0])
     stands = np.all((found >= 9.5) & (found < 95))  # one digit
     remark = f"1 kHz would give {show(1e9 * displacement(GRAVITY, 1000.0))} nm"
-    return judged(f"{listed(found)} nm at 2, 3, 5 kHz", "none", stands, remark)
+    return verdict(f"{listed(found)} nm at 2, 3, 5 kHz", "none", stands, remark)
 
 
 @claim("2017-37")
 def thirty_nanometres(results):
     found = 1e9 * displacement(GRAVITY * np.array([2.0, 3.0]), 5000.0)
-    return judged(f"{listed(found)} nm", "none", abs(found[1] / 30 - 1) < 0.1)
+    return verdict(f"{listed(found)} nm", "none", abs(found[1] / 30 - 1) < 0.1)
 
 
 @claim("2017-38")
 def factor_thirty(results):
     factor = float(1e-6 / displacement(3 * GRAVITY, 5000.0))
-    return judged(factor, "none", abs(factor / 30 - 1) < 0.25)
+    return verdict(factor, "none", abs(factor / 30 - 1) < 0.25)
 
 
 @claim("2017-39")
@@ -164,14 +164,14 @@ def two_to_three_g(results):
 @claim("2017-40")
 def just_below(results):
     share = results.json("claims/identifiability")["accelerations"][1]["saturated_share"]
-    return judged(f"{show(100 * share)} %", "", share < 0.01)
+    return verdict(f"{show(100 * share)} %", "", share < 0.01)
 
 
 @claim("2017-41")
 def elements(results):
     unknowns = int(results.table("claims/ranks").unknowns.max())
     found = 9 * (unknowns // 3 + 1)
-    return judged(str(found), "none", found == 288)
+    return verdict(str(found), "none", found == 288)
 
 
 NO_RATE = "the paper gives no sampling rate; 1000 samples in 5 s would need 200 Hz"
