@@ -367,6 +367,14 @@ def off(board, calibration):
     return (position - position[0] - board.truth.positions)[1:]
 
 
+def test_stamps_that_run_fast_make_the_size_uncertain():
+    """By 0.3 %: gyroscopes whose own scales hardly scatter do not explain what they share."""
+    sound = draw_board(6, replace(SHORT, ideal_gyroscopes=True)).recording()
+    fast = replace(sound, time=1.003 * sound.time)
+    known, doubtful = (correct(one, calibrate_first_order(one)).clock_sd for one in (sound, fast))
+    assert not known > 1e-3 and doubtful == pytest.approx(3e-3, abs=1e-3)
+
+
 def test_a_gyroscope_that_failed_is_not_one_of_another_scale(recording):
     rate = recording.angular_rate.copy()
     half = len(rate) // 2

@@ -244,13 +244,16 @@ def correct(recording: Recording, found: FirstOrder) -> Recording:
 
     Which readings were at a rail is kept as masks, as the corrected values no longer show it;
     the declared noise becomes the pooled noise found, the still poses become ``stationary``. All
-    is in the axes of the first accelerometer, the drawing too.
+    is in the axes of the first accelerometer, the drawing too. Where the time base is in doubt
+    (`Gyroscopes.time_base_sd`), ``clock_sd`` allows for it.
     """
     maps = found.gyroscope_matrix
     back, turn_back = np.linalg.inv(found.triads.matrix), np.linalg.inv(maps)
     still = np.zeros(len(recording.time), bool)
     for pose in found.poses:
         still[pose] = True
+    doubt = 0.0 if found.gyroscopes is None else found.gyroscopes.time_base_sd
+    clock_sd = np.hypot(np.nan_to_num(recording.clock_sd), doubt) if doubt else recording.clock_sd
     return replace(
         recording,
         specific_force=corrected(back, found.triads.offset, recording.specific_force),
@@ -263,6 +266,7 @@ def correct(recording: Recording, found: FirstOrder) -> Recording:
         ),
         gyroscope_range=nearest_rail(recording.gyroscope_range, maps, found.gyroscope_offset),
         map_covariance=found.left(),
+        clock_sd=float(clock_sd),
         stationary=still,
         accelerometer_axes=_axes(recording, found),
         specific_force_saturated=rails_shown(back, recording.saturated_accelerometers()),

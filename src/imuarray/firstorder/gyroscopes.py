@@ -6,6 +6,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 from scipy.linalg import block_diag
+from scipy.special import stdtr
 
 from imuarray.errors import InputError
 from imuarray.firstorder.moves import CommonMap, Move, common_map, gather, prior_precision
@@ -19,6 +20,7 @@ FLATTEST = 1e-3  # smallest share of the weakest axis in the mean squared rate
 SIZES = 0.5, 2.0  # of one gyroscope's rates over another's; beyond, a channel is not what it says
 BLOCK = 1.0  # s, within which residuals may be alike
 ROBUST_STEPS = 5
+ODD = 1e-4  # chance of a mean of all axes' scales, by how they scatter
 APART = 1000.0  # s, between recordings that are looked at as one
 
 
@@ -165,6 +167,16 @@ class Gyroscopes:
         """Sd of the scale that all gyroscopes share; NaN where the moves did not tell it."""
         return np.nan if isinstance(self.common, str) else self.common.scale_sd
 
+    @property
+    def time_base_sd(self) -> float:
+        """Relative sd of the log's time: a scale that all axes share may be a clock's that is off.
+
+        0 where so large a mean is likely, as the axes' scales scatter, or is within its sd.
+        """
+        if isinstance(self.common, str) or shared_chance(self.matrix) > ODD:
+            return 0.0
+        return float(np.sqrt(max((self.common.scale - 1) ** 2 - self.common.scale_sd**2, 0.0)))
+
     def between(self, poses: range) -> Self:
         """The maps with the moves between some of the poses, numbered from the first of them."""
         if isinstance(self.common, str):
@@ -173,6 +185,13 @@ class Gyroscopes:
         moves = {name: getattr(self.common, name)[own] for name in ("error", "weight")}
         first = self.common.first[own] - poses.start
         return replace(self, common=replace(self.common, first=first, **moves))
+
+
+def shared_chance(matrices) -> float:
+    """Chance (t distribution) of such a mean of the scales of axes, of maps (G, 3, 3)."""
+    scales = np.linalg.norm(matrices, axis=1).ravel() - 1
+    sd = scales.std(ddof=1) / np.sqrt(scales.size)
+    return float(2 * stdtr(scales.size - 1, -abs(scales.mean()) / max(sd, 1e-300)))
 
 
 class Still(NamedTuple):

@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import h5py
 import numpy as np
-from scipy.special import stdtr
 
 from imuarray.firstorder.correct import FirstOrder
+from imuarray.firstorder.gyroscopes import ODD, shared_chance
 from imuarray.model.effects import KINDS
 from imuarray.recording.record import FIRST_ORDER
 
@@ -14,7 +14,7 @@ POSES = 3.0  # times the noise of a pose's mean; real boards have up to 1.9
 BENT = 0.01  # m/s^2, a residual that matters: 0.1 % of gravity
 SMOOTHED = 0.5  # correlation of neighbours; a low pass at a fifth of the sampling rate makes 0.3
 SCALED = 0.03  # of all gyroscopes' common scale: three of its prior's sds
-SEEN, ODD = 5e-3, 1e-4  # the same, where the axes' own scales scatter by less than their mean
+SEEN = 5e-3  # the same, where the axes' own scales scatter by less; below, sds allow for it
 
 
 class Poses(NamedTuple):
@@ -61,15 +61,8 @@ def _poses(ratio: float, residual, used, scale: float, maps, follow) -> Poses:
     smoothed = tuple(kind for kind, own in pairs if np.nanmedian(own) > SMOOTHED)
     squares = np.where(used[..., None], residual**2, np.nan)
     worst = np.sqrt(np.nanmax(np.nanmean(np.ascontiguousarray(squares), axis=(0, 2))))
-    chance = _chance(maps) if scale == scale else 1.0
+    chance = shared_chance(maps) if scale == scale else 1.0
     return Poses(ratio, float(worst), scale, chance, smoothed)
-
-
-def _chance(matrices) -> float:
-    """Chance (t distribution) of such a mean of the scales of axes, of maps (G, 3, 3)."""
-    scales = np.linalg.norm(matrices, axis=1).ravel() - 1
-    sd = scales.std(ddof=1) / np.sqrt(scales.size)
-    return float(2 * stdtr(scales.size - 1, -abs(scales.mean()) / max(sd, 1e-300)))
 
 
 def reasons_of_poses(*several: Poses) -> list[str]:
