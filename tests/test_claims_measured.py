@@ -91,7 +91,7 @@ def verdict(name, **changes):
         ("2021-61", {}, "does not hold"),
         ("2021-61", {"spread": 1.1}, "holds"),
         ("2021-62", {}, "holds"),
-        ("2021-62", {"railed": 300}, "does not hold"),
+        ("2021-62", {"railed": 18}, "does not hold"),
         ("2021-57", {"variance": 300.0}, "does not hold"),
         ("2021-57", {"variance": 0.1}, "holds"),
     ],

@@ -60,7 +60,7 @@ def expecting(where: object, expected: str, errors=Exception) -> Iterator[None]:
 
 
 def numbered(reasons) -> str:
-    """All reasons in one line, (1) the root first."""
+    """All reasons in one line, each with its number where there are several."""
     texts = list(reasons)
     return "; ".join(f"({n}) {text}" for n, text in enumerate(texts, 1)) if texts[1:] else texts[0]
 

@@ -126,8 +126,8 @@ def left_by_motion(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     Both (6 N, 6 N): of white noise of unit variance, less the motion's share.
     """
     kept = fit.readings.keep.reshape(len(fit.residual), -1).astype(float)
-    free = np.sqrt(kept - np.sum(fit.basis**2, axis=2))
-    covariance, variance = np.diag(kept.sum(axis=0)), (free**2).T @ free**2
+    free = np.maximum(kept - np.sum(fit.basis**2, axis=2), 0.0)
+    covariance, variance = np.diag(kept.sum(axis=0)), free.T @ free
     for basis in np.array_split(fit.basis, len(fit.basis) // CHUNK + 1):
         shared = basis @ basis.swapaxes(1, 2)
         covariance = covariance - shared.sum(axis=0)
@@ -154,9 +154,9 @@ def _chi(block, score, bare, chosen):
 def _pooled(name, found, alike) -> Check:
     """All axes together: the sum of chi-squares, its variance ``alike`` times as large."""
     total, freedom = sum(f[1] for f in found), max(sum(f[2] for f in found), 1)
-    widened = freedom + (total - freedom) / np.sqrt(alike)
+    log_p = log_chi_square(max(total / alike, 1e-9), freedom / alike)  # Satterthwaite's
     worst = max(found, key=lambda f: f[1] - f[2])
-    return Check(name, total / freedom, log_chi_square(max(widened, 1e-9), freedom), (worst[0],))
+    return Check(name, total / freedom, log_p, (worst[0],))
 
 
 def _either(name, found, alike) -> Check:

@@ -81,7 +81,8 @@ class Search:
     columns, effects : all parameters that are described, and the ids that may be adopted
     say : is told of every step
     smooth : whether the motion's derivatives may be had from neighbouring samples
-    causes : what is adopted, in order; ``refused`` what was and did not gain, ``trace``: adoptions
+    causes : what is adopted, in order; ``refused`` what was and did not gain, ``trace`` (effect,
+        nats gained) of each adoption
     fit, noise, weighed : the fit of what is adopted, the noise and the information there
     excess : of the misfit over its degrees of freedom, before any cause
     jumps : (T, N, 6) bool, readings left out near a clock's jump

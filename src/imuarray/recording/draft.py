@@ -67,7 +67,7 @@ def draft(paths: Sequence[Path]) -> tuple[str, list[str]]:
     parts = [f"# yaml-language-server: $schema={SCHEMA}", time, *prior, *sections]
     if len(paths) > 1:
         parts.insert(2, f"columns: [{', '.join(map(_quoted, six))}]")
-        names = [path.stem for path in paths], [path.parent.name for path in paths]
+        names = [path.stem for path in paths], [path.resolve().parent.name for path in paths]
         numbers = [str(number + 1) for number in range(len(paths))]
         labels = next((own for own in names if len(set(own)) == len(own)), numbers)
         parts += ["imus:"] + [f'  "{label}": {{}}  # position: [?, ?, ?]' for label in labels]

@@ -211,7 +211,8 @@ class Recording:
         Between readings that the sensors make on clocks of their own, where the host takes the
         newest.
     clock_sd : float, no unit, NaN where the log's clock is taken to run right
-        Relative sd of the steps of time: of a rate that was declared and not stamped.
+        Relative sd of the steps of time: of a rate that was declared and not stamped, or what first
+        order doubts of the clock.
     title, source, license : str, empty if not known
     selected : str
         How many samples of how many, where these are not all that were recorded; else empty.

@@ -68,7 +68,8 @@ def complete(results):
     rmse = table[table.samples >= 10].pivot(index="iterations", columns="samples", values="rmse_m")
     last = rmse.iloc[-1]
     # what is left to go falls by the same factor in each iteration; the last two levels show it
-    left = np.sqrt(rmse**2 - last**2)[(rmse > 1.2 * last).all(axis=1)].tail(2)
+    going = rmse[(rmse > 1.2 * last).all(axis=1)].tail(2)
+    left = np.sqrt(going**2 - last**2)
     if len(left) < 2:
         return untested("no two numbers of iterations before convergence at this scale")
     (first, second), (a, b) = left.index, left.to_numpy()
