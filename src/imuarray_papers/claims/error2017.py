@@ -67,7 +67,8 @@ def complete(results):
     table = results.table(SAMPLES)
     rmse = table[table.samples >= 10].pivot(index="iterations", columns="samples", values="rmse_m")
     last = rmse.iloc[-1]
-    # what is left to go falls by the same factor in each iteration; the last two levels show it
+    # what is left to go falls by the same factor in each iteration, as the last two levels show;
+    # with 0.46 of the last RMSE left the RMSE is 10 % above it
     going = rmse[(rmse > 1.2 * last).all(axis=1)].tail(2)
     left = np.sqrt(going**2 - last**2)
     if len(left) < 2:
