@@ -270,6 +270,10 @@ def test_a_board_with_sensors_slower_than_its_log(tmp_path):
             imu.specific_force @ imu.axes.T, whole.specific_force[kept, i]
         )
         np.testing.assert_array_equal(imu.angular_rate @ imu.axes.T, whole.angular_rate[:, i])
+    without = layout()
+    for triad in without["accelerometers"]["triads"].values():
+        del triad["position"]
+    assert np.isnan([imu.position for imu in put(tmp_path, {"log.csv": rows}, without).logs]).all()
     wrong = layout()
     wrong["accelerometers"]["triads"]["1"]["columns"] = 5
     with pytest.raises(InputError, match="'1': expected three columns, found '5'"):

@@ -295,7 +295,8 @@ def _imus(layout, where: str) -> dict[str, dict]:
             )
         columns = [three_columns(one["columns"], f"{where}: {label!r}") for one in both]
         found[label] = {
-            "columns": sum(columns, []), "position": triad["position"], "axes": axes[0],
+            "columns": sum(columns, []), "axes": axes[0],
             **{kind: layout[kind] for kind in KINDS},
+            **{key: triad[key] for key in ("position",) if key in triad},
         }  # fmt: skip
     return found
