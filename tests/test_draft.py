@@ -7,6 +7,7 @@ from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.recording.draft import draft, triads_of
 from imuarray.recording.layout import read_layout
+from imuarray.recording.table import load, read_tables
 
 FORCE, RATE = [0.1, -0.2, 9.79], [0.01, -0.02, 0.03]  # m/s^2, rad/s at rest
 
@@ -38,7 +39,8 @@ DATES = [f"2026-03-01T12:00:{n // 100:02d}.{10 * (n % 100):03d}Z" for n in range
     (LONG, G, DEGREE, np.round(np.arange(400) / 200, 3), {"sep": ";", "comma": True},
      ("g", "deg/s"), None, ("s", 200)),
     (PLAIN, G / 4096, DEGREE / 16.4, range(0, 2_000_000, 5000), {"head": "board 7\nby me\n"},
-     ("g", "rad/s"), 1 / 4096, ("us", 200)),
+     ("g", "deg/s"), 1 / 4096, ("us", 200)),
+    (PLAIN, 1.0, DEGREE, range(0, 4000, 10), {}, ("m/s^2", "deg/s"), None, ("ms", 100)),
     (PLAIN, 1e-3 * G, 1.0, DATES, {"sep": "\t"}, ("mg", "rad/s"), None, ("ns", 100)),
 ])  # fmt: skip
 def test_a_draft_describes_its_table(
@@ -51,6 +53,7 @@ def test_a_draft_describes_its_table(
     kinds = layout["accelerometers"], layout["gyroscopes"]
     assert tuple(section["unit"] for section in kinds) == unit
     assert kinds[0].get("scale", 1.0) == pytest.approx(scale or 1.0, rel=1e-4)
+    assert (kinds[1].get("scale") == "?") is (scale is not None)  # of counts it is asked
     assert kinds[0]["noise"] == pytest.approx(0.02 / force * (scale or 1.0), rel=0.2)
     for section, first in zip(kinds, (1, 4), strict=True):
         assert [*section["triads"]] == ["1", "2"]
@@ -65,6 +68,47 @@ def test_a_magnetometer_is_left_out_and_one_triad_has_a_label():
     assert [(t.kind, t.label) for t in triads_of(names)] == [
         ("accelerometers", "1"), ("gyroscopes", "1"),
     ]  # fmt: skip
+
+
+def loggers(names):
+    """The triads that names in loggers' tables are, as (label, first column)."""
+    return {kind: [(t.label, t.columns[0]) for t in triads_of(names) if t.kind == kind]
+            for kind in ("accelerometers", "gyroscopes")}  # fmt: skip
+
+
+@pytest.mark.parametrize("three, accelerometers, gyroscopes", [
+    ("accelerometer_m_s2[{}] gyro_rad[{}]", "1", "1"),
+    ("imu[0].a{} imu[1].a{} imu[2].a{} imu[0].w{} imu[1].w{} imu[2].w{}", "0 1 2", "0 1 2"),
+    ("pelvis_Acc_{} pelvis_Gyr_{} torso_Acc_{} torso_Gyr_{}", "pelvis torso", "pelvis torso"),
+    ("mpu1A{} mpu2A{} mpu1G{} mpu2G{}", "1 2", "1 2"),
+    ("a_RS_S_{}_[m_s^-2] w_RS_S_{}_[rad_s^-1]", "1", "1"),
+    ("Acc{}(g) As{}(deg/s) Angle{}(deg) H{}(uT)", "1", "1"),
+    ("ACCEL_{}(10) ACCEL_{}(11) GYRO_{}(10) GYRO_{}(11)", "10 11", "10 11"),
+    ("accelerometer{} gravity{} orientation{} linear_velocity{} gyroscope{} q{}", "1", "1"),
+    ("omega_{} alpha_{}", "1", "1"),
+])  # fmt: skip
+def test_names_as_loggers_write_them(three, accelerometers, gyroscopes):
+    axes = "012" if "[{}]" in three else "XYZ" if "Acc" in three or "ACC" in three else "xyz"
+    names = [name.format(axis) for name in three.split() for axis in axes]
+    found = loggers(names)
+    assert [label for label, _ in found["accelerometers"]] == accelerometers.split()
+    assert [label for label, _ in found["gyroscopes"]] == gyroscopes.split()
+
+
+def test_a_row_of_units_and_counts(tmp_path):
+    """Units below the header are read, and are no data; of counts a gyroscope's scale is asked."""
+    text = table(PLAIN, 1.0, DEGREE, range(0, 4000, 10))
+    units = ",".join(["ms", *["m/(s^2)"] * 3, *["deg/s"] * 3, *["m/(s^2)"] * 3, *["deg/s"] * 3])
+    (tmp_path / "log.csv").write_text(text.replace("\n", f"\n{units}\n", 1))
+    said, _ = draft([tmp_path / "log.csv"])
+    assert "unit: deg/s" in said and "unit: m/s^2" in said and "unit: ms" in said
+    (tmp_path / "columns.yaml").write_text(said)
+    layout = read_layout(tmp_path / "columns.yaml")
+    found, lines = load(tmp_path / "log.csv", layout, "columns.yaml")
+    assert len(found) == 400 and "a line of units below the header left out" in lines[0]
+    (tmp_path / "log.csv").write_text(table(PLAIN, G / 16384, DEGREE / 131, range(0, 4000, 10)))
+    said, asked = draft([tmp_path / "log.csv"])
+    assert 'scale: "?"' in said and any("a count in deg/s" in line for line in asked)
 
 
 @pytest.mark.parametrize("content", [
@@ -91,3 +135,25 @@ def test_logs_of_single_imus_are_a_rig(paths, tmp_path):
     logs[1].write_text(table(LONG, 1.0, 1.0, range(400)))
     with pytest.raises(InputError, match="expected one IMU, its columns as the first log's"):
         draft(logs)
+
+
+def test_a_table_with_a_row_for_each_imu(tmp_path):
+    """A column numbers the IMUs: drafted, and read as logs of their own."""
+    lines = table(PLAIN, 1.0, 1.0, range(0, 4000, 10)).splitlines()[1:]
+    cells = [line.split(",") for line in lines]
+    rows = [",".join([c[0], k, *part]) for c in cells for k, part in (("3", c[1:7]), ("5", c[7:]))]
+    path, yaml = tmp_path / "log.csv", tmp_path / "columns.yaml"
+    path.write_text("\n".join(["t,I,ax,ay,az,gx,gy,gz", *rows]) + "\n")
+    said = draft([path])[0]
+    assert "sensor: I" in said
+    yaml.write_text(said)
+    rig, _ = read_tables([path], yaml)
+    assert [log.label for log in rig.logs] == ["3", "5"]
+    for log, part in zip(rig.logs, (slice(1, 4), slice(7, 10)), strict=True):
+        np.testing.assert_allclose(log.specific_force, [[float(x) for x in c[part]] for c in cells])
+    yaml.write_text(said.replace('"5":', '"6":'))
+    with pytest.raises(InputError, match="rows of it by column 'I', found 3, 5"):
+        read_tables([path], yaml)
+    yaml.write_text(said.replace("sensor: I", "sensor: K"))
+    with pytest.raises(InputError, match="a column 'K'"):
+        read_tables([path], yaml)

@@ -14,9 +14,16 @@ from imuarray.recording import written
 from imuarray.recording.table import load
 from imuarray.recording.units import FASTEST, GRAVITY, SLOWEST, UNITS
 
-KINDS = {"accelerometers": r"^a|acc|force", "gyroscopes": r"^g|^w|gyr|rate|omega|ang"}
-OTHERS = r"^m|mag|euler|^q"  # triads that are neither
-TIME = r"time|stamp|^t$|_t$|sec|millis|micros"
+# what a column's words, or else its unit, tell of the sensor; neither kind's are left out
+KINDS = {
+    "accelerometers": r"^(a|acc.*|force|alpha)$",
+    "gyroscopes": r"^(g|w|gyr.*|omega|ang.*|rate)$",
+}
+OF_UNIT = {"gyroscopes": r"(deg|rad|°|dps).*s", "accelerometers": r"^m?g$|^m.*s"}
+OTHERS = r"mag|grav|euler|quat|angle|orient"
+TIME = r"time|stamp|^t$|_t$|sec|millis|micros|^(ns|us|ms|s)$"
+UNIT = r"[\[(]([^\[(]*[^\[(\d][^\[(]*)[\])]"  # in brackets; a number there is none
+AXES = (("[xX]", {"x": "yz", "X": "YZ"}), (r"(?<=\[)0(?=\])", {"0": "12"}))
 WITHIN = 0.2  # of one unit of gravity, by which readings at rest may be off
 COUNTS = 2.0 ** np.arange(8, 17)  # of raw readings, in 1 g
 RANGES = {
@@ -26,17 +33,21 @@ RANGES = {
     "rad/s": tuple(round(float(np.radians(r)), 1) for r in (125, 250, 500, 1000, 2000, 4000)),
 }  # fmt: skip
 SPINNING = 40.0  # rad/s, faster than a hand turns a board
+NOISIEST = 0.025  # rad/s, sd of a gyroscope's readings
 LEAST = 3  # rows
-UNKNOWN = "?"
+UNKNOWN = '"?"'
+WORDS = {"deg/s": "deg|dps|°", "rad/s": "rad"}
+RAW = "scale", "noise", "range"  # not known of counts
 SCHEMA = Path(__file__).with_name("columns.schema.json")
 
 
 class Triad(NamedTuple):
-    """Three columns of a sensor, and the label of its IMU."""
+    """Three columns of a sensor, the label of its IMU, and their unit, if it is written."""
 
     kind: str
     label: str
     columns: tuple[str, str, str]
+    unit: str = ""
 
 
 def draft(paths: Sequence[Path]) -> tuple[str, list[str]]:
@@ -45,31 +56,36 @@ def draft(paths: Sequence[Path]) -> tuple[str, list[str]]:
     What is not known for sure is marked by a comment. InputError where a table has no columns that
     go by x, y and z, or logs differ in them.
     """
-    tables = [_read(path) for path in paths]
-    found = [_triads(table, path) for table, path in zip(tables, paths, strict=True)]
+    read = [_read(path) for path in paths]
+    found = [_triads(*each, path) for each, path in zip(read, paths, strict=True)]
     six = [name for triad in found[0] for name in triad.columns]
     for path, triads in zip(paths, found, strict=True):
         same = len(six) == 6 and [name for triad in triads for name in triad.columns] == six
         require(same or len(paths) == 1, path, "one IMU, its columns as the first log's", six)
-    (time, rate, asked), table = _time(tables[0]), pd.concat(tables, ignore_index=True)
+    (first, units), table = read[0], pd.concat([table for table, _ in read], ignore_index=True)
+    (time, rate, asked), sensor = _time(first, units), ""
+    if len(paths) == 1 and len(six) == 6 and "column:" in time:
+        sensor = written.numbering(table)
+    table = table.sort_values(sensor, kind="stable") if sensor else table
     prior = ["position_unit: mm", "position_prior: 3.0  # mm, sd: 1.0 where machines placed them"]
     sections: list[str] = []
     for kind in KINDS:
         own = [triad for triad in found[0] if triad.kind == kind]
-        lines, more = _section(table, kind, own, rate)
+        raw = any(line.startswith("  scale:") for line in sections)
+        lines, more = _section(table, kind, own, rate, raw)
         sections, asked = sections + lines, asked + more
-        if len(paths) == 1:
+        if len(paths) == 1 and not sensor:
             place = "  # , position: [?, ?, ?]" if kind == "accelerometers" else ""
-            sections += ["  triads:"] + [
+            sections += ["  triads:"] * bool(own) + [
                 f'    "{t.label}": {{columns: [{", ".join(map(_quoted, t.columns))}]}}{place}'
                 for t in own
             ]
     parts = [f"# yaml-language-server: $schema={SCHEMA}", time, *prior, *sections]
-    if len(paths) > 1:
+    if len(paths) > 1 or sensor:
+        labels = map(written.plain, table[sensor].unique()) if sensor else _labels_of(paths)
         parts.insert(2, f"columns: [{', '.join(map(_quoted, six))}]")
-        names = [path.stem for path in paths], [path.resolve().parent.name for path in paths]
-        numbers = [str(number + 1) for number in range(len(paths))]
-        labels = next((own for own in names if len(set(own)) == len(own)), numbers)
+        if sensor:
+            parts.insert(2, f"sensor: {_quoted(sensor)}  # the column that numbers the IMUs")
         parts += ["imus:"] + [f'  "{label}": {{}}  # position: [?, ?, ?]' for label in labels]
     asked.append("positions: from the drawing, else they begin from the motion")
     return "\n".join(parts) + "\n", asked + ["axes: where a chip is turned on the board"] * (
@@ -77,9 +93,16 @@ def draft(paths: Sequence[Path]) -> tuple[str, list[str]]:
     )
 
 
-def _triads(table: pd.DataFrame, path: Path) -> list[Triad]:
+def _labels_of(paths) -> list[str]:
+    """The files' names, or their folders' where those are one, or numbers."""
+    names = [path.stem for path in paths], [path.resolve().parent.name for path in paths]
+    numbers = [str(number + 1) for number in range(len(paths))]
+    return next((own for own in names if len(set(own)) == len(own)), numbers)
+
+
+def _triads(table: pd.DataFrame, units: dict[str, str], path: Path) -> list[Triad]:
     """Accelerometers first; InputError for a table without one."""
-    triads = sorted(triads_of(list(table.columns)), key=lambda triad: triad.kind)
+    triads = sorted(triads_of(list(table.columns), units), key=lambda triad: triad.kind)
     if not triads or triads[0].kind != "accelerometers":
         raise InputError(
             f"{path}: expected columns of accelerometers that differ by x, y, z (ax1, ay1, az1),"
@@ -88,49 +111,80 @@ def _triads(table: pd.DataFrame, path: Path) -> list[Triad]:
     return triads
 
 
-def _read(path: Path) -> pd.DataFrame:
-    """The table: its header is the first line of words that is as wide as those below it."""
+def _read(path: Path) -> tuple[pd.DataFrame, dict[str, str]]:
+    """The table, and units that a row of them gives to its columns.
+
+    Its header is the first line of words that is as wide as those below it.
+    """
     with expecting(path, "a CSV file with a header", (OSError, ValueError)):
         with open(path, encoding=written.encoding_of(path), errors="replace") as file:
             lines = [line.rstrip("\n") for line in islice(file, written.HEAD)]
     width, number, sep = max(_header(lines, sep) for sep in written.DELIMITERS)
-    require(width >= 0, path, "a header with names that differ by x, y, z", "none")
-    names = [name.strip().strip('"') for name in lines[number].split(sep)]
-    return load(path, {"columns": names}, path)[0]
+    expected = "a header with names that differ by x, y, z or [0], [1], [2]"
+    require(width >= 0, path, expected, "none")
+    names = written.cells_of(lines[number], sep)
+    below = written.cells_of("".join(lines[number + 1 : number + 2]), sep)
+    units = dict(zip(names, below, strict=False)) if written.are_words(below) else {}
+    return load(path, {"columns": names}, path)[0], units
 
 
 def _header(lines: list[str], sep: str) -> tuple[int, int, str]:
     """(delimiters, number of the header, ``sep``) of the first words as wide as most lines."""
     widths = [line.count(sep) for line in lines]
     most = int(np.median(widths or [0]))
-    words = [n for n, line in enumerate(lines) if widths[n] == most and re.search("[xX]", line)]
+    marks = "|".join(mark for mark, _ in AXES)
+    words = [n for n, line in enumerate(lines) if widths[n] == most and re.search(marks, line)]
     return (most, words[0], sep) if words else (-1, 0, sep)
 
 
-def triads_of(names: list[str]) -> list[Triad]:
-    """Columns that differ in one letter, x, y or z, by the kind of their sensor and its label."""
-    found: list[Triad] = []
+def triads_of(names: list[str], units: dict[str, str] | None = None) -> list[Triad]:
+    """Columns that differ in one letter, x, y or z, or as [0], [1], [2]: kind, label, names.
+
+    The kind follows from words in the names, or from units: theirs, or ``units`` by name.
+    """
+    found: list[tuple[str, str, tuple, str]] = []
     for name in names:
-        for place in [m.start() for m in re.finditer("[xX]", name)]:
-            x = name[place]
-            three = tuple(name[:place] + axis + name[place + 1 :] for axis in (x, *_after(x)))
+        for match, to in [(m, to) for mark, to in AXES for m in re.finditer(mark, name)]:
+            place = match.start()
+            three = tuple(name[:place] + one + name[place + 1 :] for one in match[0] + to[match[0]])
             if all(other in names for other in three):
-                plain = (name[:place] + name[place + 1 :]).lower()
-                words = re.sub(r"[\[(].*|imu|sensor|\d+", "", plain).strip(" _.-/")
-                kind = next((k for k, text in KINDS.items() if re.search(text, words)), UNKNOWN)
-                if kind == UNKNOWN or re.search(OTHERS, words):
-                    continue
-                numbers = re.findall(r"\d+", re.sub(r"[\[(].*", "", plain))
-                found.append(Triad(kind, numbers[0] if numbers else "1", three))
+                plain = name[:place] + name[place + 1 :]
+                unit = re.search(UNIT, plain)
+                plain = plain.replace(unit[0], "") if unit else plain
+                words = unit[1] if unit else (units or {}).get(name, "")
+                found.append((_kind(plain, words), plain, three, words))
                 break
-    return found
+    out = []
+    for kind in KINDS:
+        own = [item for item in found if item[0] == kind]
+        labels = _labels([plain for _, plain, _, _ in own])
+        out += [Triad(kind, label, *item[2:]) for label, item in zip(labels, own, strict=True)]
+    return out
 
 
-def _after(x: str) -> tuple[str, str]:
-    return ("y", "z") if x == "x" else ("Y", "Z")
+def _kind(plain: str, unit: str) -> str:
+    """The kind of sensor by its columns' name without the axis, and their unit; or ""."""
+    words = re.findall("[A-Z]?[a-z]+|[A-Z]+", re.sub("imu|sensor", " ", plain, flags=re.I))
+    if re.search(OTHERS, plain.lower()):
+        return ""
+    by_unit = next((kind for kind, text in OF_UNIT.items() if re.search(text, unit.lower())), "")
+    return by_unit or next(
+        (kind for kind, text in KINDS.items() if any(re.match(text, w.lower()) for w in words)), ""
+    )
 
 
-def _time(table: pd.DataFrame) -> tuple[str, float, list[str]]:
+def _labels(names: list[str]) -> list[str]:
+    """What tells sensors of one kind apart: words and numbers that are not in all names."""
+    parts = [re.findall(r"\d+|[A-Za-z]+", re.sub("m_?s_?2", "", name)) for name in names]
+    shared = set.intersection(*map(set, parts)) if len(parts) > 1 else set()
+    if len(parts) < 2:
+        return [next((part for part in own if part.isdigit()), "1") for own in parts]
+    labels = ["_".join(part for part in own if part not in shared) for own in parts]
+    alone = all(labels) and len(set(labels)) == len(labels)
+    return labels if alone else [str(number + 1) for number in range(len(names))]
+
+
+def _time(table: pd.DataFrame, given: dict[str, str]) -> tuple[str, float, list[str]]:
     """(the line on time, samples a second, what is not known)."""
     for name in table.columns:
         values = table[name]
@@ -144,7 +198,7 @@ def _time(table: pd.DataFrame) -> tuple[str, float, list[str]]:
         else:
             steps, units = np.diff(values.to_numpy(float)), UNITS["time"]
         step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else np.nan
-        hint = re.search(r"(?:\b|_)(ns|us|ms|s)(?:\b|_)", str(name).lower())
+        hint = re.search(r"(?:\b|_)(ns|us|ms|s)(?:\b|_)", f"{name} {given.get(name)}".lower())
         likely = [u for u, size in units.items() if SLOWEST <= 1 / (step * size) <= FASTEST / 5]
         likely = [u for u in likely if hint and u == hint[1]] or likely
         if likely:
@@ -154,8 +208,8 @@ def _time(table: pd.DataFrame) -> tuple[str, float, list[str]]:
     return "time: {rate: 100.0}  # ?", 100.0, ["time: no column of stamps: the rate in Hz"]
 
 
-def _section(table, kind: str, triads: list[Triad], rate: float) -> tuple[list[str], list[str]]:
-    """Lines of one kind of sensor, and what is not known of it."""
+def _section(table, kind: str, triads: list[Triad], rate: float, raw: bool):
+    """(lines of one kind of sensor, what is not known of it); ``raw``: the other's are counts."""
     if not triads:
         return [], [f"{kind}: no columns that go by x, y, z"]
     columns = [list(triad.columns) for triad in triads]
@@ -165,7 +219,16 @@ def _section(table, kind: str, triads: list[Triad], rate: float) -> tuple[list[s
     require(rows >= LEAST, kind, f"{LEAST} rows of numbers", rows)
     quiet = _quietest(values, rate)
     noise = float(np.nanmedian(np.nanstd(np.diff(values[quiet], axis=0), axis=0)) / np.sqrt(2))
-    unit, scale = _force(values[quiet]) if kind == "accelerometers" else _rate(values, triads)
+    if kind == "accelerometers":
+        unit, scale = _force(values[quiet])
+    else:
+        words = " ".join([*triads[0].columns, triads[0].unit]).lower()
+        named = [unit for unit, text in WORDS.items() if re.search(text, words)]
+        fast = np.nanmax(np.abs(values)) > SPINNING or noise > NOISIEST
+        unit, scale = [*named, "deg/s" if fast else "rad/s"][0], None
+        if raw and not named:
+            asked = f"{kind}: scale, a count in deg/s: 1/131 where the range is 250, 1/16.4 at 2000"
+            return [f"{kind}:", "  unit: deg/s", *(f"  {x}: {UNKNOWN}" for x in RAW)], [asked]
     largest = float(np.nanmax(np.abs(values)))
     shown = unit if unit in RANGES else next(iter(RANGES))
     least = [r for r in RANGES[shown] if r >= 0.99 * largest * (scale or 1.0)]
@@ -198,16 +261,6 @@ def _force(still) -> tuple[str, float | None]:
             return unit, None
     nearest = COUNTS[np.argmin(np.abs(np.log(COUNTS / max(size, 1e-300))))]
     return ("g", 1 / nearest) if abs(size / nearest - 1) < WITHIN else (UNKNOWN, None)
-
-
-def _rate(values, triads: list[Triad]) -> tuple[str, float | None]:
-    """By the columns' own words, or by what a hand can do."""
-    text = " ".join(triads[0].columns).lower()
-    if re.search("deg|dps", text):
-        return "deg/s", None
-    if "rad" in text:
-        return "rad/s", None
-    return ("deg/s" if np.nanmax(np.abs(values)) > SPINNING else "rad/s"), None
 
 
 def _quoted(name: str) -> str:

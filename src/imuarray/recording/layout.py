@@ -26,13 +26,15 @@ BOARD = {
 }  # fmt: skip
 SENSOR = {"unit": True, "scale": False, "noise": True, "range": True}
 BOARD_SENSOR = SENSOR | {"triads": True}
-RIG = {**_TABLE, "time": False, "columns": False, **_PLACES, **_SENSORS, "imus": True}
+RIG = {
+    **_TABLE, "time": False, "columns": False, "sensor": False, **_PLACES, **_SENSORS, "imus": True,
+}  # fmt: skip
 _OWN = {"position": False, "axes": False, "accelerometers": False, "gyroscopes": False}
 IMU = {"log": False, "columns": False, "time": False, **_OWN}
 BAG = {**_PLACES, **_SENSORS, "imus": True}
 BAG_SENSOR = {"unit": False, "noise": True, "range": True}  # those of sensor_msgs/Imu
 BAG_IMU = {"topic": False, **_OWN}
-_NAMES = "column", "columns", "log", "topic"
+_NAMES = "column", "columns", "log", "sensor", "topic"
 
 
 class _Loader(yaml.SafeLoader):

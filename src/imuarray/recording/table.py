@@ -86,7 +86,7 @@ def _named(section) -> set[str]:
         return set().union(*map(_named, section))
     if not isinstance(section, dict):
         return set()
-    own = [section[key] for key in ("column", "columns") if key in section]
+    own = [section[key] for key in ("column", "columns", "sensor") if key in section]
     names = {str(x) for one in own for x in (one if isinstance(one, list) else [one])}
     return names.union(*map(_named, section.values()))
 
@@ -250,13 +250,27 @@ def _read(loaded, layout, imus: dict[str, dict], name: str) -> Rig:
         require(isinstance(six, list) and len(six) == 6, where, expected, repr(six))
         unused = [path for path in unused if path not in paths]
         read[label] = [
-            _readings(loaded[path], str(path), names, time, unit, where)
+            _readings(_own(loaded[path], layout, label, where), str(path), names, time, unit, where)
             for path, names, time, unit in zip(paths, (six[:3], six[3:]), times, units, strict=True)
         ]
     if unused:
         raise InputError(f"{unused[0]}: expected an IMU of {name} to be in it, found none")
     rig = to_rig(imus, read, layout, name, ", ".join(path.name for path in loaded))
     return rig._replace(stamped=stamped)
+
+
+def _own(table: pd.DataFrame, layout, label: str, where: str) -> pd.DataFrame:
+    """The rows of one IMU, where a column numbers the IMUs."""
+    if "sensor" not in layout:
+        return table
+    stamped = "rate" not in str(layout.get("time"))
+    require(stamped, where, "stamps, as each row is of one sensor", "a rate")
+    name = str(layout["sensor"])
+    require(name in table.columns, where, f"a column {name!r}", _alike(name, table))
+    own = table[table[name].map(written.plain) == label]
+    have = ", ".join(map(written.plain, table[name].unique()[:FEW]))
+    require(len(own) > 0, where, f"rows of it by column {name!r}", have)
+    return own
 
 
 def _file(log: Any, label: str, files: list[Path], where: str) -> Path:

@@ -33,25 +33,41 @@ def form_of(path: Path, named: set[str], given: dict) -> tuple[dict, list[str]]:
     best, skip, sep = 0, 0, asked or ","
     for number, line in enumerate(lines):
         for delimiter in [asked] if asked else DELIMITERS:
-            found = len(named & set(_cells(line, delimiter)))
+            found = len(named & set(cells_of(line, delimiter)))
             if found > best:
                 best, skip, sep = found, number, delimiter
     comma = sep != "," and any(
-        DECIMAL_COMMA.fullmatch(cell) for line in lines[skip + 1 :] for cell in _cells(line, sep)
+        DECIMAL_COMMA.fullmatch(cell) for line in lines[skip + 1 :] for cell in cells_of(line, sep)
     )
+    below = cells_of("".join(lines[skip + 1 : skip + 2]), sep)
+    units = best > 0 and are_words(below)
     said = [f"encoding {encoding}"] * (encoding != "utf-8")
     said += [f"{skip} lines before the header left out"] * (skip > 0)
     said += [f"columns parted by {sep!r}"] * (sep != (asked or ","))
-    said += ["decimal commas"] * comma
+    said += ["decimal commas"] * comma + ["a line of units below the header left out"] * units
     options = given | {
-        "sep": sep, "skiprows": skip, "encoding": encoding, "decimal": "," if comma else ".",
+        "sep": sep, "skiprows": [*range(skip), *[skip + 1] * units], "encoding": encoding,
+        "decimal": "," if comma else ".",
     }  # fmt: skip
     return options, [f"{path.name}: {', '.join(said)}"] if said else []
 
 
-def _cells(line: str, delimiter: str) -> list[str]:
+def cells_of(line: str, delimiter: str) -> list[str]:
+    """A line's cells without blanks and quotes."""
     parts = line.split() if delimiter == r"\s+" else line.split(delimiter)
     return [part.strip().strip('"') for part in parts]
+
+
+def are_words(cells: list[str]) -> bool:
+    """True of cells most of which are there, and none begins as a number or a date does."""
+    words = [cell for cell in cells if cell and cell.lower() not in ("nan", "inf", "null", "na")]
+    numbers = any(re.match(r"[+-]?[.,]?\d", word) for word in words)
+    return 2 * len(words) > len(cells) and not numbers
+
+
+def plain(value) -> str:
+    """A sensor's number or name in a cell as a label: 2 and 2.0 are "2"."""
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def encoding_of(path: Path) -> str:
@@ -137,7 +153,7 @@ def shared_words(steps, table: pd.DataFrame) -> str:
     if name := numbering(table):
         return (
             f"{share} with the same stamp, and a column {name!r} that numbers the sensors: one row"
-            " for each sensor; expected one row for all, or a log of each sensor"
+            f" for each sensor; expected `sensor: {name}` and `imus` by its numbers"
         )
     return (
         f"{share} with the same stamp: bursts of packets, or ticks of a coarse clock; log the"
