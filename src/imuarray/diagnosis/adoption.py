@@ -22,14 +22,7 @@ from imuarray.diagnosis.scores import (
 )
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL, scans
-from imuarray.diagnosis.state import (
-    Cause,
-    Search,
-    freed_places,
-    heldout_gain,
-    need,
-    prune,
-)
+from imuarray.diagnosis.state import Cause, Search, freed_places, heldout_gain, need, prune
 from imuarray.engine.alike import likely_sizes
 from imuarray.engine.fit import Fit, at
 from imuarray.engine.heldout import normal_blocks

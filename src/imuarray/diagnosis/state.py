@@ -18,13 +18,7 @@ from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.alike import likely_sizes
 from imuarray.engine.clocks import CLOCK, estimated_again, started_by_gyroscopes, without_jumps
 from imuarray.engine.estimate import Recorded
-from imuarray.engine.fit import (
-    Fit,
-    at,
-    flat_parameters,
-    from_flat,
-    search_optimum,
-)
+from imuarray.engine.fit import Fit, at, flat_parameters, from_flat, search_optimum
 from imuarray.engine.heldout import gain_of, normal_blocks
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import POSITION, Columns, prior_precision

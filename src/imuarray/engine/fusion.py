@@ -12,14 +12,7 @@ import numpy as np
 
 from imuarray.engine.derivatives import no_derivatives
 from imuarray.engine.fit import flat_parameters, pick, with_derivatives
-from imuarray.engine.linearise import (
-    CHUNK,
-    RoughPrior,
-    State,
-    chunk_at,
-    motion_equations,
-    padded,
-)
+from imuarray.engine.linearise import CHUNK, RoughPrior, State, chunk_at, motion_equations, padded
 from imuarray.engine.parameters import Columns, columns_of
 from imuarray.engine.readings import Readings, by_imu, measured
 from imuarray.engine.settings import SETTINGS

@@ -195,12 +195,7 @@ class MotionEstimate:
 
 
 def estimate_motion(
-    model: ArrayModel,
-    specific_force,
-    angular_rate,
-    positions=None,
-    saturated=None,
-    limit: int = 50,
+    model: ArrayModel, specific_force, angular_rate, positions=None, saturated=None, limit: int = 50
 ) -> MotionEstimate:
     """Concentrated Gauss-Newton of Skog et al. (2017, eq. 5): phi is eliminated exactly.
 

@@ -10,10 +10,7 @@ from imuarray.model.effects import KINDS
 from imuarray.pictures.board import plain
 from imuarray.pictures.style import BLACK, BLUE, GREY, ORANGE, PAGE, VERMILLION, new_figure, styled
 
-MODELS = {
-    "base": {"color": VERMILLION, "marker": "o"},
-    "extended": {"color": BLUE, "marker": "s"},
-}
+MODELS = {"base": {"color": VERMILLION, "marker": "o"}, "extended": {"color": BLUE, "marker": "s"}}
 NAMES = {"base": "plain model", "extended": "extended model"}
 PLAIN = 0.05  # p-value below which a mark is filled
 

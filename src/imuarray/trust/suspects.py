@@ -261,18 +261,20 @@ def clipped(recording: Recording) -> list[str]:
 
 
 def wrapped(recording: Recording) -> list[str]:
-    """A sentence for each gyroscope axis that jumps from one end of its readings to the other."""
+    """A sentence if gyroscopes' axes jump from one end of their readings to the other."""
     step, rates = np.diff(recording.time), _as_read(recording, "gyroscope")
     near = step < 1.5 * np.median(step) if len(step) else step > 0
     jump, end = np.abs(np.diff(rates, axis=0)), np.abs(rates).max(axis=0)
     around = np.pad(jump, ((1, 1), (0, 0), (0, 0)))
     alone = np.maximum(around[:-2], around[2:]) < (2 - JUMP) * end
-    wraps = np.sum(near[:, None, None] & (jump > JUMP * end) & alone, axis=0)
+    wraps = np.sum(near[:, None, None] & (jump > JUMP * end) & alone, axis=0) >= TWICE
+    if not wraps.any():
+        return []
+    labels = zip(recording.gyroscope_labels, wraps, strict=True)
+    named = [f"{label} ({'xyz'[axis]})" for label, own in labels for axis in np.flatnonzero(own)]
     return [
-        f"gyroscope {recording.gyroscope_labels[k]}, axis {'xyz'[axis]}, jumps from one end of its"
-        f" readings to the other: it wraps at {np.degrees(end[k, axis]):.4g} deg/s, beyond its"
-        " range"
-        for k, axis in np.argwhere(wraps >= TWICE)
+        f"gyroscopes jump from one end of their readings to the other: {', '.join(named)}; they"
+        f" wrap at {np.degrees(end[wraps].max()):.4g} deg/s, beyond their range"
     ]
 
 

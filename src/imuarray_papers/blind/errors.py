@@ -275,10 +275,7 @@ def outside_cross_talk(scene, rng, sensors, size):
     others = [int(rng.choice([j for j in range(scene.accelerometers) if j != k])) for k in sensors]
     leak = matrices(rng, sensors, size)
     said = {"leak": Parameter(leak, "m s-1"), "from": Parameter(others, "index")}
-    return {
-        "parameters": said,
-        "force_error": lambda field: applied(leak, field.rate[:, others]),
-    }
+    return {"parameters": said, "force_error": lambda field: applied(leak, field.rate[:, others])}
 
 
 @effect(UNIT_FORCE, 0.02, 0.3)

@@ -3,14 +3,7 @@
 import numpy as np
 
 from imuarray.recording.units import GRAVITY
-from imuarray_papers.claims.registry import (
-    claim,
-    listed,
-    show,
-    tiny,
-    untested,
-    verdict,
-)
+from imuarray_papers.claims.registry import claim, listed, show, tiny, untested, verdict
 
 EXACT = "rounding only"
 TINY = 1e-9
