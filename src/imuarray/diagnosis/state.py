@@ -53,11 +53,13 @@ class ScoreAtFit:
     def given(self) -> Information:
         """Information of all parameters that the fit has derivatives by.
 
-        The score's covariance has what a correction left of maps and offsets, too.
+        The score's covariance has what a correction left of maps and offsets, much of which all
+        sensors share.
         """
         made, plain = self.fit, information_at(self.fit)
         meat = noises.coloured_meat(made, plain.information, self.correlation)
-        mask = mask_of_left([made.readings.left], made.columns, made.active) & made.described
+        # fitted ones, too: put back to zero they are what the others are; refitted, nothing is left
+        mask = mask_of_left([made.readings.left], made.columns, False) & made.described
         if mask.any():
             seen = plain.information[:, plain.places(mask)]
             spread = spread_of(made.readings.left, made.columns, mask)

@@ -281,7 +281,7 @@ def _left(found: Estimate) -> list[tuple[np.ndarray, np.ndarray]]:
     every, out = [one.readings.left for one in found.recorded], []
     if any(left is None for left in every):
         return out
-    known = mask_of_left(every, found.columns, np.zeros_like(found.active))
+    known = mask_of_left(every, found.columns, False)
     for names in (*zip(SCALES, SKEWS, strict=True), OFFSETS, (DRIFT,)):
         mask = known & found.columns.mask(names)
         if mask.any():

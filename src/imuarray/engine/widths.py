@@ -161,11 +161,11 @@ def corrected(*lefts: Left | None) -> tuple[str, ...]:
 
 
 def mask_of_left(lefts: Sequence[Left | None], columns: Columns, active) -> np.ndarray:
-    """(N, m) bool of maps and offsets that corrections left, where they are not estimated."""
+    """(N, m) bool of maps and offsets that corrections left, where they are not ``active``."""
     known, forces = corrected(*lefts), _accelerometers(columns)
     if any(len(left.maps) == forces for left in lefts if left is not None):
         known = tuple(name for name in known if name not in MAPS[1::2])
-    return np.isin(columns.names, known) & columns.owner & ~active
+    return np.isin(columns.names, known) & columns.owner & ~np.asarray(active)
 
 
 def _accelerometers(columns: Columns) -> int:
