@@ -214,15 +214,14 @@ def test_a_map_of_one_gyroscope_is_a_cause_beside_an_error_that_all_share():
     rng, ones = np.random.default_rng(SEED), np.ones((8, 8))
     maps = np.eye(3) + 3e-3 * rng.standard_normal((3, 3)) + 1e-4 * rng.standard_normal((8, 3, 3))
     maps[2] += 1.5e-3 * (np.ones((3, 3)) - np.eye(3))
-    read = replace(
-        recording, angular_rate=np.einsum("kij,tkj->tki", maps, recording.angular_rate),
-        map_covariance=block_diag(np.zeros((72, 72)), np.kron(9e-6 * ones + 1e-8 * np.eye(8), np.eye(9))),
-    )  # fmt: skip
-    found = run_procedure(read).search
+    rate = np.einsum("kij,tkj->tki", maps, recording.angular_rate)
+    left = block_diag(np.zeros((72, 72)), np.kron(9e-6 * ones + 1e-8 * np.eye(8), np.eye(9)))
+    found = run_procedure(replace(recording, angular_rate=rate, map_covariance=left)).search
     [cause] = found.causes
     assert (cause.effect, cause.imus) == ("gyroscope_misalignment", (2,))
     statistic, freedom = need(found, cause.effect)
-    assert freedom == 6 and log_chi_square(statistic, freedom) == pytest.approx(cause.log_p, rel=0.2)
+    assert freedom == 6
+    assert log_chi_square(statistic, freedom) == pytest.approx(cause.log_p, rel=0.2)
 
 
 def test_noise_that_taking_maps_out_has_scaled_is_no_cause():
