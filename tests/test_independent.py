@@ -96,6 +96,11 @@ def test_where_it_is_not_enough_nuts_is_taken_and_that_is_told(monkeypatch):
     monkeypatch.setattr(sampling, "UNRELIABLE", -np.inf)
     refused = imuarray.sample(recording, "papers", method="independent")
     assert not refused.attrs["converged"]
+    made = sampling.posterior_of
+    with monkeypatch.context() as patch:  # NUTS is not begun about a point that is no mode
+        patch.setattr(sampling, "posterior_of", lambda *a: made(*a)._replace(converged=False))
+        lost = imuarray.sample(recording, "papers")
+    assert lost.attrs["sampler"] == "independent" and not lost.attrs["converged"]
     said: list[str] = []
     other = imuarray.sample(recording, "papers", steps=250, say=said.append)
     assert other.attrs["sampler"] == "nuts" and "Pareto's k" in other.attrs["instead_of"]

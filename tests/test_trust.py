@@ -312,6 +312,12 @@ def test_a_posterior(sound):
     assert doubts.reasons_of_posterior(sound, tree) == [
         "the search or the chains have not converged"
     ]
+    # noise that has taken up what the model does not have
+    tree["posterior"]["effect_parameter"] = ("chain", "draw"), np.zeros((2, 100))
+    names = "accelerometer_noise_sd", "gyroscope_noise_sd"
+    tree.attrs |= {name: 3.5 * getattr(noisy, name) for name in names}
+    said, _ = doubts.reasons_of_posterior(noisy, tree)
+    assert "3.5 times the declared noise: gyroscope 3" in said
 
 
 def test_a_diagnosis(sound):

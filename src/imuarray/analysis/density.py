@@ -55,6 +55,7 @@ class Posterior(NamedTuple):
     scales: tuple[str, ...]  # of `SCALES`, those whose logs are unknown
     motion: np.ndarray | None = None  # (T, 9 or 15) at the mode; with effects
     readings: Readings | None = None  # with effects: what is sampled from, with its noise
+    converged: bool = True  # with effects: whether the search for the mode did
 
     @property
     def spread(self) -> np.ndarray:
@@ -121,6 +122,7 @@ def posterior_beyond(recording: Recording, found: Estimate) -> Posterior:
         TiedPrior.of(np.append(mean, before), block_diag(root, np.eye(len(SCALES)) / WIDE)),
         np.concatenate([mode, [0.0, 0.0], own]),
         block_diag(spread, np.diag(0.5 / np.maximum(freedom, 1.0))), SCALES, motion, readings,
+        found.converged,
     )  # fmt: skip
 
 

@@ -58,7 +58,7 @@ def sample(
         ``"independent"``: Metropolis-Hastings on the exact marginal likelihood with independent
         proposals from the normal density about the mode, in four chains; ``"nuts"``: the no-U-turn
         sampler on the same; ``"auto"``: the former where Pareto's k of its weights is 0.7 at most
-        and R-hat 1.01 and ESS 1000 are reached, else NUTS.
+        and R-hat 1.01 and ESS 1000 are reached, or the mode was not found, else NUTS.
     steps
         Transitions of each chain, after the warm-up in NUTS' case; by default as many as
         independent proposals need.
@@ -122,7 +122,8 @@ def _exact(
             log_density, mode, posterior.covariance, steps, seed, names, quiet, data
         )
         short = _short(chains, k, steps)
-        if method == "independent" or not short:
+        # NUTS would take hours about a point that is no mode
+        if method == "independent" or not short or not posterior.converged:
             attrs, key = {"sampler": "independent"}, _key(posterior, steps, seed, method)
             return tree_of(posterior, chains, attrs | {"pareto_k": k}, key, seed, bool(short))
         attrs |= {"pareto_k": k, "instead_of": short}

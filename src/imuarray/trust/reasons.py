@@ -171,7 +171,11 @@ def reasons_of_posterior(
     covariance = np.cov(draws.reshape(len(draws), -1), rowvar=False)
     places = _places(recording, draws.mean(axis=0), covariance)
     plain = "effect_parameter" not in posterior["posterior"]
-    residual = rigid(recording, places, spread) if plain else {}
+    noise = [f"{kind}_noise_sd" for kind in KINDS]
+    residual = (
+        rigid(recording, places, spread) if plain
+        else {"": max(posterior.attrs[name] / getattr(recording, name) for name in noise)}
+    )  # fmt: skip
     found = _little(recording, places) + _judged(recording, places, residual) + _drifts(recording)
     return found + _not_converged(posterior.attrs)
 
