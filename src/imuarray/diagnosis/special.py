@@ -11,16 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from imuarray.diagnosis import scans as along_time
 from imuarray.diagnosis.residual_checks import Check
-from imuarray.diagnosis.scans import (
-    SHIFT,
-    WARM_UP,
-    maybe_grown,
-    maybe_warming,
-    refine_instants,
-    scan_shifts,
-    scan_warming,
-)
 from imuarray.diagnosis.scores import Candidate, Information, Scanned, Score, score_all
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import need
@@ -154,7 +146,7 @@ def maybe_drift(search, cause, own) -> bool:
 
     Or as likely grows from nothing.
     """
-    if maybe_grown(search, cause):
+    if along_time.maybe_grown(search, cause):
         return True
     kind = EFFECTS[cause.effect].sensors
     tried = [Candidate(DRIFT, cause.imus, f"{kind} {form}") for form in ("linear", "cubic")]
@@ -180,9 +172,11 @@ SPECIAL = {
     CLOCK: Special(
         scan=sawtooth_scan, linear=False, maybe=maybe_clock, placebo=placebo_of_ages
     ),
-    SHIFT: Special(scan=lambda fit, given, imus, _: scan_shifts(fit, given, imus),
-                          refine=refine_instants),
-    WARM_UP: Special(scan=scan_warming, maybe=maybe_warming),
+    along_time.SHIFT: Special(
+        scan=lambda fit, given, imus, _: along_time.scan_shifts(fit, given, imus),
+        refine=along_time.refine_instants,
+    ),
+    along_time.WARM_UP: Special(scan=along_time.scan_warming, maybe=along_time.maybe_warming),
     DRIFT: Special(maybe=maybe_drift, check=drift_check),
 }  # fmt: skip
 

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import chdtrc
 
+from imuarray.engine import widths
 from imuarray.engine.clocks import CLOCK, refined, shown_clocks, timed, with_clocks
 from imuarray.engine.estimate import Estimate, Recorded, Tested, estimate, tested
 from imuarray.engine.fit import flat_parameters, from_flat, in_use
@@ -19,17 +20,6 @@ from imuarray.engine.parameters import POSITION, Columns, columns_of
 from imuarray.engine.readings import Readings, most_informative
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import turned
-from imuarray.engine.widths import (
-    DRIFT,
-    FIXED,
-    OFFSETS,
-    SCALES,
-    SKEWS,
-    corrected,
-    mask_of_left,
-    settled,
-    spread_of,
-)
 from imuarray.errors import InputError
 from imuarray.linear import scaled_inverse
 from imuarray.model.effects import EFFECTS
@@ -40,7 +30,7 @@ LAG, FILTER = "lag of the gyroscopes", "filter of the gyroscopes"
 CURVE, SQUARE = "curve of the gyroscopes", "rates in accelerometers"
 EFFECT_GROUPS = {
     CLOCKS: (CLOCK,),
-    "offsets": OFFSETS,
+    "offsets": widths.OFFSETS,
     DELAYS: ("sensor_delay",),
     LAG: ("gyroscope_delay",),
     FILTER: ("gyroscope_filter",),
@@ -79,7 +69,7 @@ def with_effects(readings: Sequence[Readings], effects) -> Estimate:
         )
     active = columns.mask([POSITION, *effects])
     recorded = [Recorded.of(one, columns) for one in readings]
-    return settled(estimate(recorded, columns, active))
+    return widths.settled(estimate(recorded, columns, active))
 
 
 def resumed(readings: Readings, columns: Columns, active, state: State) -> Estimate:
@@ -87,7 +77,7 @@ def resumed(readings: Readings, columns: Columns, active, state: State) -> Estim
 
     With columns for what the model has, and for maps that first order may have left.
     """
-    maps = corrected(readings.left)
+    maps = widths.corrected(readings.left)
     few, kept = in_use(columns, active, state, maps)
     state = from_flat(few, state, flat_parameters(columns, state)[:, kept])
     columns, active = few, active[:, kept]
@@ -95,7 +85,7 @@ def resumed(readings: Readings, columns: Columns, active, state: State) -> Estim
     imus = np.flatnonzero(active[:, columns.of(CLOCK)].any(axis=1))
     if imus.size:
         recorded = timed(recorded, recorded.readings.keep, columns, imus)
-    return settled(estimate([recorded], columns, active))
+    return widths.settled(estimate([recorded], columns, active))
 
 
 def groups_of(readings: Sequence[Readings]) -> list[str]:
@@ -150,7 +140,7 @@ def select_forward(
     if all(one.smooth for one in found.recorded) and (readings[0].pair or not late):
         found, curved = _with_slope(found, now.kept, CURVE in names)
         groups = [*groups, *curved.values()]
-    return settled(found), clocks + groups
+    return widths.settled(found), clocks + groups
 
 
 def _with_slope(found: Estimate, kept: dict, curve: bool) -> tuple[Estimate, dict]:
@@ -183,7 +173,9 @@ def _with_slope(found: Estimate, kept: dict, curve: bool) -> tuple[Estimate, dic
 def _begun(readings: Sequence[Readings], names) -> tuple[Columns, list[Recorded]]:
     """Columns for some groups and for what corrections left, and where a search begins."""
     effects = [effect for name in names for effect in EFFECT_GROUPS[name]]
-    effects += [name for name in corrected(*(one.left for one in readings)) if name not in effects]
+    effects += [
+        name for name in widths.corrected(*(one.left for one in readings)) if name not in effects
+    ]
     columns = columns_of(readings[0].array, effects, readings[0].position_prior_sd)
     return columns, [Recorded.of(one, columns) for one in readings]
 
@@ -229,7 +221,7 @@ class Selected(NamedTuple):
         Gyroscope maps at odds with those of first order; the shape of filters behind a long lag.
         """
         columns, found = self.found.columns, []
-        chance, _ = settled(self.found).maps_hold.get("gyroscope", (1.0, []))
+        chance, _ = widths.settled(self.found).maps_hold.get("gyroscope", (1.0, []))
         if chance < CHANCE:
             found.append(GYROSCOPES)
         if LAG in self.kept:
@@ -281,13 +273,13 @@ def _left(found: Estimate) -> list[tuple[np.ndarray, np.ndarray]]:
     every, out = [one.readings.left for one in found.recorded], []
     if any(left is None for left in every):
         return out
-    known = mask_of_left(every, found.columns, False)
-    for names in (*zip(SCALES, SKEWS, strict=True), OFFSETS, (DRIFT,)):
+    known = widths.mask_of_left(every, found.columns, False)
+    for names in (*zip(widths.SCALES, widths.SKEWS, strict=True), widths.OFFSETS, (widths.DRIFT,)):
         mask = known & found.columns.mask(names)
         if mask.any():
             own = every if EFFECTS[names[0]].own else every[:1]
-            spread = block_diag(*(spread_of(left, found.columns, mask) for left in own))
-            out.append((mask, spread + FIXED**2 * np.eye(len(spread))))
+            spread = block_diag(*(widths.spread_of(left, found.columns, mask) for left in own))
+            out.append((mask, spread + widths.FIXED**2 * np.eye(len(spread))))
     return out
 
 

@@ -9,17 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from imuarray.engine import linearise
 from imuarray.engine.fit import normal
 from imuarray.engine.heldout import blocks_of, log_t
-from imuarray.engine.linearise import (
-    CHUNK,
-    KNOWN,
-    THREADS,
-    State,
-    chunk_at,
-    leverage_of,
-    motion_step,
-)
 from imuarray.engine.parameters import Columns
 from imuarray.engine.readings import Readings, by_triad
 from imuarray.estimation.threads import one_thread
@@ -45,7 +37,7 @@ class Pass(NamedTuple):
 
 @one_thread()  # the chunks have one each
 def normal_pass(
-    readings: Readings, columns: Columns, state: State, active, improved: int = 1
+    readings: Readings, columns: Columns, state: linearise.State, active, improved: int = 1
 ) -> Pass:
     """The normal equations at a state, after ``improved`` Gauss-Newton steps of the motion.
 
@@ -62,12 +54,12 @@ def normal_pass(
     squares, freedom, unit = (np.empty((samples, count, 2)) for _ in range(3))
 
     def one(start):
-        part = slice(start, min(start + CHUNK, samples))
+        part = slice(start, min(start + linearise.CHUNK, samples))
         here = state._replace(motion=motion)
         for _ in range(improved):
-            motion[part] += motion_step(readings, columns, here, start)
-        seen = chunk_at(readings, columns, here, wanted, start)
-        residual, leverage = seen.residual, leverage_of(seen.basis)
+            motion[part] += linearise.motion_step(readings, columns, here, start)
+        seen = linearise.chunk_at(readings, columns, here, wanted, start)
+        residual, leverage = seen.residual, linearise.leverage_of(seen.basis)
         left = np.where(readings.keep[part], 1.0 - leverage, 0.0)
         squares[part], freedom[part] = by_triad(residual**2), by_triad(left)
         unit[part] = by_triad(residual**2 / np.maximum(1.0 - leverage, LEAST_FREE))
@@ -78,8 +70,8 @@ def normal_pass(
         known = [(block, *normal(seen, few, rows)) for block, rows in _inside(blocks, part)]
         return known, rough
 
-    with ThreadPoolExecutor(THREADS) as pool:
-        found = list(pool.map(one, range(0, samples, CHUNK)))
+    with ThreadPoolExecutor(linearise.THREADS) as pool:
+        found = list(pool.map(one, range(0, samples, linearise.CHUNK)))
     size = int(active.sum())
     information, score = np.zeros((len(blocks), size, size)), np.zeros((len(blocks), size))
     for block, inner, slope in (item for known, _ in found for item in known):
@@ -90,7 +82,7 @@ def normal_pass(
     return Pass(information, score, motion, squares, freedom, unit, rough)
 
 
-def _seen_of_prior(state: State, motion, inverse, part) -> np.ndarray:
+def _seen_of_prior(state: linearise.State, motion, inverse, part) -> np.ndarray:
     """(2, G) sums over a part's samples and each three components that rough motion adds.
 
     Squares of their distance from the prior's mean in its sds; and of how many of them the readings
@@ -99,8 +91,8 @@ def _seen_of_prior(state: State, motion, inverse, part) -> np.ndarray:
     if state.rough_prior is None:
         return np.zeros((2, 0))
     sd = state.rough_prior.sd[part]
-    off = (motion[:, KNOWN:] - state.rough_prior.mean[part]) / sd
-    left = np.sum(inverse[..., KNOWN:] ** 2, axis=1) / sd**2
+    off = (motion[:, linearise.KNOWN :] - state.rough_prior.mean[part]) / sd
+    left = np.sum(inverse[..., linearise.KNOWN :] ** 2, axis=1) / sd**2
     return np.array([np.sum(off**2, axis=0), np.sum(1.0 - left, axis=0)]).reshape(2, -1, 3).sum(-1)
 
 

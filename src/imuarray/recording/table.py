@@ -13,17 +13,8 @@ import numpy as np
 import pandas as pd
 
 from imuarray.errors import InputError, expecting, require
+from imuarray.recording import layout as layouts
 from imuarray.recording import written
-from imuarray.recording.layout import (
-    KINDS,
-    QUANTITIES,
-    numbers,
-    positions,
-    positive,
-    read_layout,
-    rotation,
-    three_columns,
-)
 from imuarray.recording.record import Recording
 from imuarray.recording.rig import Readings, Rig, pair, to_rig
 from imuarray.recording.units import factor, require_plausible_rate
@@ -47,14 +38,14 @@ def recording_of(table: pd.DataFrame, layout, path, columns) -> tuple[Recording,
     table = table.iloc[rows]
     force, labels = _sensors(table, layout, "accelerometers", where, name)
     rate, rate_labels = _sensors(table, layout, "gyroscopes", where, name)
-    given = numbers(layout, name)
+    given = layouts.numbers(layout, name)
     if "output_rate" in layout:
-        given["output_period"] = 1 / positive(layout["output_rate"], f"{name}: output_rate")
+        given["output_period"] = 1 / layouts.positive(layout["output_rate"], f"{name}: output_rate")
     given |= clock
     triads = layout["accelerometers"]["triads"]
     found = Recording(
         time=time, specific_force=force, angular_rate=rate,
-        accelerometer_position=positions(triads, layout, f"{name}: accelerometers"),
+        accelerometer_position=layouts.positions(triads, layout, f"{name}: accelerometers"),
         accelerometer_labels=labels, gyroscope_labels=rate_labels,
         accelerometer_axes=np.array([_turn(triad, f"{name}: {x}") for x, triad in triads.items()]),
         source=Path(path).name, selected=account, **given,
@@ -93,7 +84,7 @@ def _named(section) -> set[str]:
 
 def used(table: pd.DataFrame, layout) -> pd.DataFrame:
     """The columns that a board's triads name."""
-    return table.loc[:, table.columns.isin(_named([layout[kind] for kind in KINDS]))]
+    return table.loc[:, table.columns.isin(_named([layout[kind] for kind in layouts.KINDS]))]
 
 
 def _whole(table, layout, columns: str) -> tuple[pd.DataFrame, str]:
@@ -142,7 +133,7 @@ def _sensors(table, layout, kind, where, layout_name):
     parts = []
     for label, triad in section["triads"].items():
         place = f"{layout_name}: {kind} {label!r}"
-        names = three_columns(triad["columns"], place)
+        names = layouts.three_columns(triad["columns"], place)
         own = np.stack([column(table, name, where).astype(float) for name in names], axis=1)
         parts.append(unit * scale * own @ _turn(triad, place).T)
     return np.stack(parts, axis=1), tuple(str(label) for label in section["triads"])
@@ -150,18 +141,18 @@ def _sensors(table, layout, kind, where, layout_name):
 
 def unit_of(section, kind, where: str) -> tuple[float, float]:
     """A kind's unit in SI units, and how many units a count is."""
-    unit = factor(QUANTITIES[kind], section["unit"], f"{where}: {kind}: unit")
-    return unit, positive(section.get("scale", 1.0), f"{where}: {kind}: scale")
+    unit = factor(layouts.QUANTITIES[kind], section["unit"], f"{where}: {kind}: unit")
+    return unit, layouts.positive(section.get("scale", 1.0), f"{where}: {kind}: scale")
 
 
 def _turn(triad, where: str) -> np.ndarray:
-    return rotation(triad.get("axes", list("xyz")), where)
+    return layouts.rotation(triad.get("axes", list("xyz")), where)
 
 
 def stamps_of(table, section, where, layout_name, blank: bool = False) -> tuple[np.ndarray, float]:
     """A log's stamps, and what one is in s."""
     if isinstance(section, dict) and set(section) == {"rate"}:
-        rate = positive(section["rate"], f"{layout_name}: time: rate")
+        rate = layouts.positive(section["rate"], f"{layout_name}: time: rate")
         return table.index.to_numpy() / rate, 1.0
     stamped = isinstance(section, dict) and set(section) == {"column", "unit"}
     expected = "'column' and 'unit', or 'rate' in Hz"
@@ -185,7 +176,7 @@ def _clock(section: Any, where: str) -> tuple[Any, dict[str, float]]:
         return section, {}
     rest = {key: value for key, value in section.items() if key != "clock_sd"}
     if len(rest) < len(section):
-        return rest, {"clock_sd": positive(section["clock_sd"], f"{where}: time: clock_sd")}
+        return rest, {"clock_sd": layouts.positive(section["clock_sd"], f"{where}: time: clock_sd")}
     return rest, {"clock_sd": CLOCK_SD} if "rate" in section else {}
 
 
@@ -217,7 +208,7 @@ def read_tables(
     ``columns`` is the YAML of docs/convert.md. InputError, with the row or the key, for anything
     that does not fit.
     """
-    layout, files = read_layout(columns), [Path(path) for path in paths]
+    layout, files = layouts.read_layout(columns), [Path(path) for path in paths]
     several = "imus" in layout or len(files) == 1
     require(several, str(columns), "'imus', one for each log", "triads of one table")
     loaded, lines = {}, []
@@ -241,7 +232,7 @@ def _read(loaded, layout, imus: dict[str, dict], name: str) -> Rig:
     read, unused, stamped = {}, list(loaded), True
     for label, imu in imus.items():
         where = f"{name}: imus {label!r}"
-        units = [np.prod(unit_of(imu[kind], kind, where)) for kind in KINDS]
+        units = [np.prod(unit_of(imu[kind], kind, where)) for kind in layouts.KINDS]
         paths = [_file(log, label, list(loaded), where) for log in pair(imu.get("log"))]
         times = pair(imu.get("time", layout.get("time")))
         stamped &= len(loaded) == 1 or not any(isinstance(t, dict) and "rate" in t for t in times)
@@ -286,7 +277,7 @@ def _file(log: Any, label: str, files: list[Path], where: str) -> Path:
 
 
 def _readings(table, path: str, names, time, unit: float, where: str) -> Readings:
-    names = three_columns(names, where)
+    names = layouts.three_columns(names, where)
     values = [column(table, name, path, blank=True).astype(float) for name in names]
     stamps, second = stamps_of(table, time, path, where, blank=True)
     steps = np.diff(stamps[np.isfinite(stamps)])
@@ -297,7 +288,7 @@ def _readings(table, path: str, names, time, unit: float, where: str) -> Reading
 
 def _imus(layout, where: str) -> dict[str, dict]:
     """A board's triads as IMUs, where some are slower than the log: those of a label are one."""
-    force, rate = (layout[kind]["triads"] for kind in KINDS)
+    force, rate = (layout[kind]["triads"] for kind in layouts.KINDS)
     found = {}
     for label, triad in force.items():
         both = triad, rate.get(label, {})
@@ -307,10 +298,10 @@ def _imus(layout, where: str) -> dict[str, dict]:
                 f"{where}: {label!r}: expected, as some cells are blank, an accelerometer and a"
                 f" gyroscope of each label with the same axes, found others{BLANK}"
             )
-        columns = [three_columns(one["columns"], f"{where}: {label!r}") for one in both]
+        columns = [layouts.three_columns(one["columns"], f"{where}: {label!r}") for one in both]
         found[label] = {
             "columns": sum(columns, []), "axes": axes[0],
-            **{kind: layout[kind] for kind in KINDS},
+            **{kind: layout[kind] for kind in layouts.KINDS},
             **{key: triad[key] for key in ("position",) if key in triad},
         }  # fmt: skip
     return found

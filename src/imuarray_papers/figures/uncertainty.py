@@ -6,17 +6,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from imuarray.pictures.style import (
-    BLACK,
-    GREY,
-    MARKERS,
-    PAGE,
-    SKY,
-    logarithmic,
-    look,
-    new_figure,
-    styled,
-)
+from imuarray.pictures import style
 from imuarray_papers.figures.style import Column, marks, points, scale_line
 
 ESTIMATORS = ("maximum likelihood", "with the prior")
@@ -88,9 +78,9 @@ def figure_theory_efficiency(rows: pd.DataFrame, settings: dict):
     return partial(_draw_efficiency, footer=footer), rows
 
 
-@styled
+@style.styled
 def _draw_efficiency(table, footer):
-    figure = new_figure(footer, height=5.4)
+    figure = style.new_figure(footer, height=5.4)
     top, below, louder = figure.subplots(3, 1, height_ratios=[2, 1, 1])
     others = table[table.noise != 1.0]
     for index, name in enumerate(ESTIMATORS):
@@ -98,15 +88,15 @@ def _draw_efficiency(table, footer):
         alone = {"linestyle": "none", "label": f"RMSE, {name}"}
         points(top, rows.samples, rows.rmse_m, rows.rmse_se_m, index, **alone)
         label = "bound" if index == 0 else "linearised posterior"
-        top.plot(rows.samples, rows.bound_m, label=label, **look(index, "marker"))
+        top.plot(rows.samples, rows.bound_m, label=label, **style.look(index, "marker"))
         places = rows.samples * 1.04**index
         points(below, places, rows.ratio, rows.ratio_se, index, linestyle="none")
         rows = table[(table.estimator == name) & table.samples.isin(others.samples)]
         points(louder, rows.noise * 1.04**index, rows.ratio, rows.ratio_se, index)
     for panel in (below, louder):
-        panel.axhline(1.0, color=BLACK, linewidth=0.8)
+        panel.axhline(1.0, color=style.BLACK, linewidth=0.8)
         panel.set(ylabel="error / bound")
-    logarithmic(top, None, "RMSE of the positions (m)")
+    style.logarithmic(top, None, "RMSE of the positions (m)")
     below.set(xscale="log", xlabel="Time samples $N$ (count)")
     counts = ", ".join(map(str, others.samples.unique()))
     louder.set(xscale="log", xlabel=f"Noise, times the sensors' own ($N$ = {counts})")
@@ -126,9 +116,9 @@ def figure_theory_convergence(rows: pd.DataFrame, settings: dict):
     return partial(_draw_convergence, nominal_sd=nominal, footer=footer), rows
 
 
-@styled
+@style.styled
 def _draw_convergence(table, nominal_sd, footer):
-    figure = new_figure(footer, height=5.4)
+    figure = style.new_figure(footer, height=5.4)
     top, below = figure.subplots(2, 1)
     own = table[table.array == table.array.iloc[0]]
     for index, (acceleration, rows) in enumerate(own.groupby("angular_acceleration_dps2")):
@@ -138,26 +128,26 @@ def _draw_convergence(table, nominal_sd, footer):
         medians = counts.groupby("angular_rate_dps").median()
         never = medians.index[np.isinf(medians.bcd_iterations)]
         medians = medians.replace(np.inf, np.nan)
-        hollow = look(index) | {"markerfacecolor": "none"}
+        hollow = style.look(index) | {"markerfacecolor": "none"}
         height = np.full(len(never), 1.3 * rows.limit.max())
         top.plot(never, height, **marks(index, marker="^", markersize=7 - index))
         label = rf"$\|\dot\omega\|$ = {acceleration:g} deg/s²"
         top.plot(medians.index, medians.bcd_iterations, label=label, **hollow)
-        newton = hollow | {"color": GREY, "linestyle": ":"}
+        newton = hollow | {"color": style.GREY, "linestyle": ":"}
         top.plot(medians.index, medians.newton_iterations, **newton)
         below.plot(1 - rows.contraction, 1 - rows.observed, **hollow | {"linestyle": ""})
     for index, (name, rows) in enumerate(table[table.array != own.array.iloc[0]].groupby("array")):
         below.plot(
-            1 - rows.contraction, 1 - rows.observed, color=BLACK, linestyle="none",
-            marker=MARKERS[-1 - index], markerfacecolor="none", label=name,
+            1 - rows.contraction, 1 - rows.observed, color=style.BLACK, linestyle="none",
+            marker=style.MARKERS[-1 - index], markerfacecolor="none", label=name,
         )  # fmt: skip
-    top.plot([], [], color=GREY, linestyle=":", label="Gauss-Newton, each")
-    logarithmic(top, r"Angular rate $\|\omega\|$ (deg/s)", "iterations to 1.01 × bound")
+    top.plot([], [], color=style.GREY, linestyle=":", label="Gauss-Newton, each")
+    style.logarithmic(top, r"Angular rate $\|\omega\|$ (deg/s)", "iterations to 1.01 × bound")
     top.legend(loc="lower center", bbox_to_anchor=(0.5, 0.12), ncols=2, columnspacing=1.0)
     drawn = 1 - table.contraction[table.observed.notna()]
     ends = np.array([drawn.min() / 2, min(drawn.max() * 2, 1.0)])
-    below.plot(ends, ends, color=BLACK, linewidth=0.8)
-    logarithmic(below, "share of the error lost in an iteration, foreseen", "seen")
+    below.plot(ends, ends, color=style.BLACK, linewidth=0.8)
+    style.logarithmic(below, "share of the error lost in an iteration, foreseen", "seen")
     below.legend(loc="upper left", title="other arrays", title_fontsize=7)
     return figure
 
@@ -171,18 +161,18 @@ def figure_theory_size(rows: pd.DataFrame, settings: dict):
     return partial(_draw_size, footer=footer), rows
 
 
-@styled
+@style.styled
 def _draw_size(table, footer):
-    figure = new_figure(footer, height=4.0)
+    figure = style.new_figure(footer, height=4.0)
     top, below = figure.subplots(2, 1, sharex=True)
-    top.plot(1e3 * table.extent_m, 1e6 * table.bound_m, markerfacecolor="none", **look(0))
-    below.plot(1e3 * table.extent_m, 1e6 * table.relative, markerfacecolor="none", **look(2))
+    top.plot(1e3 * table.extent_m, 1e6 * table.bound_m, markerfacecolor="none", **style.look(0))
+    below.plot(1e3 * table.extent_m, 1e6 * table.relative, markerfacecolor="none", **style.look(2))
     # both panels over as many decades, so that what does not change looks so
     decades = np.log10(table.relative.max() / table.relative.min()) * 0.6
     middle = 1e6 * np.median(table.bound_m)
     span = (middle * 10**-decades, middle * 10**decades)
-    logarithmic(top, None, "bound (µm)", ylim=span)
-    logarithmic(below, "size of the array, corner to corner (mm)", "bound / size (ppm)")
+    style.logarithmic(top, None, "bound (µm)", ylim=span)
+    style.logarithmic(below, "size of the array, corner to corner (mm)", "bound / size (ppm)")
     return figure
 
 
@@ -277,17 +267,17 @@ def figure_validation_ranks(pit_values: list[pd.DataFrame], settings: dict):
     return partial(_draw_ranks, footer=footer), table
 
 
-@styled
+@style.styled
 def _draw_ranks(table, footer):
     groups = list(table.groupby(["setting", "samples", "method"], sort=False))
     lines = -(-len(groups) // ACROSS)
-    figure = new_figure(footer, PAGE, 0.5 + 1.35 * lines)
+    figure = style.new_figure(footer, style.PAGE, 0.5 + 1.35 * lines)
     panels = figure.subplots(lines, ACROSS, sharex=True, sharey=True, squeeze=False)
     for ((setting, samples, method), rows), axes in zip(groups, panels.flat, strict=False):
         width = stats.norm.isf(0.025 / BINS) * rows.se.mean()
-        axes.axhspan(1 - width, 1 + width, color=SKY, alpha=0.4, linewidth=0)
-        axes.axhline(1.0, color=BLACK, linewidth=0.6)
-        axes.stairs(rows.density, [*rows.low, 1.0], color=look(2)["color"], linewidth=1.2)
+        axes.axhspan(1 - width, 1 + width, color=style.SKY, alpha=0.4, linewidth=0)
+        axes.axhline(1.0, color=style.BLACK, linewidth=0.6)
+        axes.stairs(rows.density, [*rows.low, 1.0], color=style.look(2)["color"], linewidth=1.2)
         count = rows.replicates.max()
         axes.set_title(f"{setting}, T = {samples}\n{method}, n = {count}", size=7)
     for axes in panels.flat[len(groups) :]:
