@@ -14,8 +14,8 @@ import xarray as xr
 from imuarray.analysis.known import fused, used, with_board
 from imuarray.engine.course import block_scores
 from imuarray.engine.dataset import engine_dataset, places_among, positions_dataset
-from imuarray.engine.estimate import Estimate, Recorded, estimate, stepped
-from imuarray.engine.fit import flat_parameters, prior_means
+from imuarray.engine.estimate import Estimate, Recorded, estimate
+from imuarray.engine.fit import flat_parameters, prior_means, stepped
 from imuarray.engine.forward import DELAYS, ROUGH_GROUPS, Selected
 from imuarray.engine.fusion import fuse
 from imuarray.engine.heldout import gain
