@@ -4,8 +4,9 @@
     python benchmarks/hidden.py --files corrected/exp_*.nc --drawn 4 --times 2
 
 An effect in one IMU of simulated recordings (`blind`'s own injector), or of the files given: each
-of ``--effects`` in each, or ``--drawn`` ones of them in each. Named: it, or one of its class, and
-its IMU; what else is named that was not before. The same recordings without it are the controls.
+of ``--effects`` in each, or ``--drawn`` ones of them in each. Named: it, one of its class, or one
+that it is a part of (an offset of a drift), and its IMU; what else is named that was not before.
+The same recordings without it are the controls.
 """
 
 import argparse
@@ -15,6 +16,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from imuarray.model.effects import known_effect
 from imuarray.recording import read_recording
 from imuarray_papers.blind.cases import Case, make
 from imuarray_papers.blind.inject import CATALOGUE
@@ -57,7 +59,8 @@ def tried(given, place, seconds, seed, times, effects, drawn):
             [hidden] = truth["effects"]
             after = named(run_procedure(changed))
             imu = (recording.accelerometer_labels.index(hidden["sensors"][0]),)
-            mine = {e: i for e, (c, i) in after.items() if hidden["effect"] in c}
+            mine = {e: i for e, (c, i) in after.items()
+                    if hidden["effect"] in {*c, *known_effect(e).contains}}  # fmt: skip
             others = sorted(set(after) - set(before) - set(mine))
             rows.append({
                 "recording": name, "effect": hidden["effect"], "times": factor,
