@@ -7,7 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
-import tarfile
+import zipfile
 from contextlib import suppress
 from pathlib import Path
 
@@ -42,10 +42,10 @@ def committed(tmp_path_factory):
     """paper_figures/ as committed, whatever a run has left there; in a source archive as it is."""
     root, folder = Path(__file__).parents[1], tmp_path_factory.mktemp("committed")
     place = folder / "paper_figures"
-    command = ["git", "-C", str(root), "archive", "HEAD", "paper_figures"]
+    command = ["git", "-C", str(root), "archive", "--format=zip", "HEAD", "paper_figures"]
     if (root / ".git").exists():
         done = subprocess.run(command, capture_output=True, check=True)
-        tarfile.open(fileobj=io.BytesIO(done.stdout)).extractall(folder, filter="data")
+        zipfile.ZipFile(io.BytesIO(done.stdout)).extractall(folder)
     else:
         shutil.copytree(root / "paper_figures", place)
     return place

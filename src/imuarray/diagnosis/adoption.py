@@ -71,16 +71,18 @@ def adopt(search: Search, proposed=None) -> Search:
     What else would have been adopted is `detectable` there.
     ``proposed``: the `proposals` at the search as it is, where they are known.
     """
-    vain = 0
-    while len(search.causes) < SETTINGS.most_causes and vain < SETTINGS.patience:
+    vain: list[str] = []  # effects refused since the last was adopted
+    while len(search.causes) < SETTINGS.most_causes and len(vain) < SETTINGS.patience:
         proposed = proposals(search) if proposed is None else proposed
+        proposed = [p for p in proposed if vain.count(p[0].candidate.effect) < SETTINGS.of_one]
         best, values = (proposed or [(None, None)])[0]
         if best is None or not likely(search, best) or best.statistic < search.least:
             break
         found = attempt(search, best, values)
         # refused, it leaves all others' tests as they are
         adopted = len(found.trace) > len(search.trace)
-        proposed, vain = (None, 0) if adopted else (proposed[1:], vain + 1)
+        vain = [] if adopted else [*vain, best.candidate.effect]
+        proposed = None if adopted else proposed[1:]
         search = found
     return replace(search, detectable=detectable(search))
 

@@ -40,7 +40,8 @@ class Settings:
     # Score tests and adoption (`scores`, `adoption`, `state`, `special`, `heldout`)
     seen: float = 1e-5  # of a parameter's own information must survive the projection to count
     visible: float = 1e-3  # the same of a combination that is no gauge of motion and positions
-    patience: int = 8  # refusals in a row: what is left is none of the catalogue
+    patience: int = 16  # refusals in a row: what is left is none of the catalogue
+    of_one: int = 4  # of them, of one effect: rough motion makes it significant in all IMUs
     most_causes: int = 12  # causes
     others: float = -4.6  # log p of the other IMUs having what some surely have: chips are alike
     kept: float = 0.05  # of the gain that a test predicts must be there on held-out time
