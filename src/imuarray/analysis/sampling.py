@@ -122,8 +122,7 @@ def _exact(
             log_density, mode, posterior.covariance, steps, seed, names, quiet, data
         )
         short = _short(chains, k, steps)
-        # NUTS would take hours about a point that is no mode
-        if method == "independent" or not short or not posterior.converged:
+        if method == "independent" or not short or not posterior.converged:  # for hours
             attrs, key = {"sampler": "independent"}, _key(posterior, steps, seed, method)
             return tree_of(posterior, chains, attrs | {"pareto_k": k}, key, seed, bool(short))
         attrs |= {"pareto_k": k, "instead_of": short}

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from imuarray.errors import InputError, expecting, require
+from imuarray.errors import expecting, require
 from imuarray.recording import written
 from imuarray.recording.table import load
 from imuarray.recording.units import FASTEST, GRAVITY, SLOWEST, UNITS
@@ -103,11 +103,9 @@ def _labels_of(paths) -> list[str]:
 def _triads(table: pd.DataFrame, units: dict[str, str], path: Path) -> list[Triad]:
     """Accelerometers first; InputError for a table without one."""
     triads = sorted(triads_of(list(table.columns), units), key=lambda triad: triad.kind)
-    if not triads or triads[0].kind != "accelerometers":
-        raise InputError(
-            f"{path}: expected columns of accelerometers that differ by x, y, z (ax1, ay1, az1),"
-            f" found {', '.join(map(str, table.columns[:12]))}"
-        )
+    expected = "columns of accelerometers that differ by x, y, z (ax1, ay1, az1)"
+    found = ", ".join(map(str, table.columns[:12]))
+    require(triads and triads[0].kind == "accelerometers", path, expected, found)
     return triads
 
 
@@ -120,8 +118,7 @@ def _read(path: Path) -> tuple[pd.DataFrame, dict[str, str]]:
         with open(path, encoding=written.encoding_of(path), errors="replace") as file:
             lines = [line.rstrip("\n") for line in islice(file, written.HEAD)]
     width, number, sep = max(_header(lines, sep) for sep in written.DELIMITERS)
-    expected = "a header with names that differ by x, y, z or [0], [1], [2]"
-    require(width >= 0, path, expected, "none")
+    require(width >= 0, path, "a header with names that differ by x, y, z or [0], [1]", "none")
     names = written.cells_of(lines[number], sep)
     below = written.cells_of("".join(lines[number + 1 : number + 2]), sep)
     units = dict(zip(names, below, strict=False)) if written.are_words(below) else {}

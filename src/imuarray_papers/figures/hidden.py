@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from imuarray.geometry import Array
+from imuarray.model.effects import known_effect
 from imuarray.pictures.style import BLACK, PAGE, new_figure, styled
 from imuarray_papers.blind.study import accuracy, classes
 from imuarray_papers.figures.criticism import draw_gained, estimated, letter, three_digits
@@ -132,7 +133,10 @@ def table_criticism_hidden(diagnoses: list, truths: list, controls: list, names:
     ):
         hidden, before = truth["effects"][0], classes(control["causes"])
         new = [cause for cause in document["causes"] if cause["effect"] not in before]
-        mine = [c for c in new if hidden["effect"] in (c["effect"], *c["indistinguishable_from"])]
+        wider = [
+            (c, {*c["indistinguishable_from"], *known_effect(c["effect"]).contains}) for c in new
+        ]
+        mine = [c for c, parts in wider if hidden["effect"] in {c["effect"], *parts}]
         size, true_size = _sizes(mine, hidden)
         rows.append({
             "recording": name, "hidden": hidden["effect"], "sensors": " ".join(hidden["sensors"]),
