@@ -133,10 +133,8 @@ def table_criticism_hidden(diagnoses: list, truths: list, controls: list, names:
     ):
         hidden, before = truth["effects"][0], classes(control["causes"])
         new = [cause for cause in document["causes"] if cause["effect"] not in before]
-        wider = [
-            (c, {*c["indistinguishable_from"], *known_effect(c["effect"]).contains}) for c in new
-        ]
-        mine = [c for c, parts in wider if hidden["effect"] in {c["effect"], *parts}]
+        of = [(c, {*c["indistinguishable_from"], *known_effect(c["effect"]).contains}) for c in new]
+        mine = [c for c, parts in of if hidden["effect"] in {c["effect"], *parts}]
         size, true_size = _sizes(mine, hidden)
         rows.append({
             "recording": name, "hidden": hidden["effect"], "sensors": " ".join(hidden["sensors"]),
