@@ -122,7 +122,7 @@ def _exact(
             log_density, mode, posterior.covariance, steps, seed, names, quiet, data
         )
         short = _short(chains, k, steps)
-        if method == "independent" or not short or not posterior.converged:  # for hours
+        if method == "independent" or not short or not posterior.converged:  # NUTS would take hours
             attrs, key = {"sampler": "independent"}, _key(posterior, steps, seed, method)
             return tree_of(posterior, chains, attrs | {"pareto_k": k}, key, seed, bool(short))
         attrs |= {"pareto_k": k, "instead_of": short}
