@@ -20,7 +20,8 @@ VERDICT = {"converged": True, "burn_in_draws": 0, "most_draws": 100, "rhat_max":
 
 def measured(
     coverage=0.5, residual=2.0, noise=0.04, rate=0.001, variance=300.0, under=-5e-4,
-    correlation=0.2, spread=2.0, exact=0.1, railed=10,
+    correlation=0.2, spread=2.0, exact=0.1, railed=10, gain=4.0, turning=40.0, covered=0.97,
+    most="gyroscope_delay",
 ):  # fmt: skip
     """Contents by path: positions of a recording off by ``under`` on the underside, and so on."""
     rng = np.random.default_rng(0)
@@ -41,6 +42,7 @@ def measured(
         {
             "sensor": ["specific_force", "angular_rate"],
             "sd": [noise, rate],
+            "ratio": [1.0, 2.0],
             "correlation": [-0.01, correlation],
         }
     )
@@ -49,7 +51,19 @@ def measured(
          ("accelerometer at a rail", 3), ("gyroscope at a rail", railed)],
         columns=["criterion", "samples"],
     )  # fmt: skip
+    steps = pd.DataFrame({
+        "step": ["robust", "clocks", "no arms", "own arms"], "nats": [np.nan, gain, 1.0, gain],
+        "nats_error": 0.1, "smooth_ratio": [20.0, 2.0, 1.9, 0.9], "covered": covered, "rms_m": 7e-6,
+    })  # fmt: skip
+    residuals = pd.DataFrame({
+        "source": ["measured", "measured", "simulated"], "quantity": "angular_rate",
+        "bin_low": [0.0, 1.0, 1.0], "rms": [turning, 2 * turning, 1.0],
+    })  # fmt: skip
+    nats = {most: 1e4, "accelerometer_nonlinearity": 10.0}
+    causes = [{"effect": name, "heldout_gain_nats": value} for name, value in nats.items()]
     given = {
+        "../measured/causes_board": steps, "../measured/residuals/mine": residuals,
+        "../measured/diagnosis/mine/diagnosis.json": {"causes": causes},
         "../measured/subsets/mine_selection": selection,
         "../measured/positions/mine": places, "../measured/agreement/board": agreement,
         "../measured/first_order/mine_noise": noises, "chains/mine_T500": draws.reshape(2, 400, 21),
@@ -92,6 +106,16 @@ def verdict(name, **changes):
         ("2021-61", {"spread": 1.1}, "holds"),
         ("2021-62", {}, "holds"),
         ("2021-62", {"railed": 18}, "does not hold"),
+        ("2017-45", {}, "does not hold"),
+        ("2017-45", {"gain": 0.1}, "holds"),
+        ("2021-64", {}, "does not hold"),
+        ("2021-64", {"gain": 0.1}, "holds"),
+        ("2021-65", {}, "does not hold"),
+        ("2021-65", {"turning": 1.4}, "holds"),
+        ("2021-66", {}, "holds"),
+        ("2021-66", {"covered": 0.8}, "does not hold"),
+        ("2021-67", {}, "does not hold"),
+        ("2021-67", {"most": "gyroscope_nonlinearity"}, "holds"),
         ("2021-57", {"variance": 300.0}, "does not hold"),
         ("2021-57", {"variance": 0.1}, "holds"),
     ],

@@ -10,5 +10,6 @@ from imuarray_papers.claims import (
     experiment2021,
     posterior2021,
     rate2017,
+    sensors,
     theory2017,
 )

@@ -15,17 +15,25 @@ class Results:
     """Tables and summaries below ``root`` (results/<scale>), by path without the root.
 
     ``settings`` is the effective configuration; ``given`` replaces or adds contents by path.
-    The recording that is the experiment is ``measured``.
+    The recording that is the experiment is ``measured``, of ``board``.
     """
 
     def __init__(self, root, settings: dict, given: dict | None = None):
         self.root, self.settings = Path(root), settings
         self._read = dict(given or {})
         self.measured = settings["experiment"]["recording"]
+        self.board = settings["recordings"][self.measured].get("group", self.measured)
 
     def measured_table(self, path: str) -> pd.DataFrame:
         """A CSV file below results/measured, by its path without the ending."""
         return self._cached(f"../measured/{path}", ".csv", pd.read_csv)
+
+    def of_board(self, path: str) -> pd.DataFrame | None:
+        """`measured_table` of what only a board of several recordings has, or None."""
+        try:
+            return self.measured_table(path)
+        except InputError:
+            return None
 
     def replace(self, contents: dict) -> Results:
         """A copy with other ``contents`` by path."""

@@ -62,6 +62,13 @@ class Recordings:
             paths.append(f"results/measured/first_order/{name}_noise.csv")
         if group in self.groups():
             paths.append(f"results/measured/agreement/{group}.csv")
+        if self.is_criticised and scale != "quick":
+            rest = (
+                f"causes_{group}.csv",
+                f"residuals/{name}.csv",
+                f"diagnosis/{name}/diagnosis.json",
+            )
+            paths += [f"results/measured/{path}" for path in rest]
         for kind in (name, f"simulated_{name}"):
             paths += self.posterior(scale, kind, "posterior", ["csv", "json"])
             paths += self.posterior(scale, kind, "chains", ["nc"])
