@@ -41,6 +41,8 @@ DATES = [f"2026-03-01T12:00:{n // 100:02d}.{10 * (n % 100):03d}Z" for n in range
     (PLAIN, G / 4096, DEGREE / 16.4, range(0, 2_000_000, 5000), {"head": "board 7\nby me\n"},
      ("g", "deg/s"), 1 / 4096, ("us", 200)),
     (PLAIN, 1.0, DEGREE, range(0, 4000, 10), {}, ("m/s^2", "deg/s"), None, ("ms", 100)),
+    (["ts", *PLAIN[1:]], 1.0, 1.0, np.round(0.5 + np.arange(400) / 250, 6), {},
+     ("m/s^2", "rad/s"), None, ("s", 250)),
     (PLAIN, 1e-3 * G, 1.0, DATES, {"sep": "\t"}, ("mg", "rad/s"), None, ("ns", 100)),
 ])  # fmt: skip
 def test_a_draft_describes_its_table(

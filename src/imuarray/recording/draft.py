@@ -35,6 +35,7 @@ RANGES = {
 SPINNING = 40.0  # rad/s, faster than a hand turns a board
 NOISIEST = 0.025  # rad/s, sd of a gyroscope's readings
 LEAST = 3  # rows
+EVEN = 0.2  # of a step between stamps, by which half of them may differ
 UNKNOWN = '"?"'
 WORDS = {"deg/s": "deg|dps|°", "rad/s": "rad"}
 RAW = "scale", "noise", "range"  # not known of counts
@@ -183,10 +184,9 @@ def _labels(names: list[str]) -> list[str]:
 
 def _time(table: pd.DataFrame, given: dict[str, str]) -> tuple[str, float, list[str]]:
     """(the line on time, samples a second, what is not known)."""
-    for name in table.columns:
+    named = [name for name in table.columns if re.search(TIME, str(name).lower())]
+    for name in [*named, *filter(lambda name: _rises(table[name]), table.columns)]:
         values = table[name]
-        if not re.search(TIME, str(name).lower()):
-            continue
         if values.dtype.kind == "O":
             nanoseconds = written.seconds_of_dates(values)
             if nanoseconds is None:
@@ -203,6 +203,16 @@ def _time(table: pd.DataFrame, given: dict[str, str]) -> tuple[str, float, list[
             text = f"time: {{column: {_quoted(name)}, unit: {unit}}}  # {rate:.4g} samples a second"
             return text, rate, [f"time: in {unit} or in {likely[1]}?"] if likely[1:] else []
     return "time: {rate: 100.0}  # ?", 100.0, ["time: no column of stamps: the rate in Hz"]
+
+
+def _rises(values: pd.Series) -> bool:
+    """True of numbers that rise in nearly even steps, as stamps do; a count of rows is none."""
+    if values.dtype.kind not in "iuf" or len(values) <= LEAST:
+        return False
+    steps = np.diff(values.to_numpy(float))
+    step = np.median(steps)
+    even = np.mean(np.abs(steps - step) < EVEN * step)
+    return bool(np.all(steps > 0) and even > 0.5 and np.any(steps != 1))
 
 
 def _section(table, kind: str, triads: list[Triad], rate: float, raw: bool):
