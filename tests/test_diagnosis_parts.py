@@ -12,8 +12,16 @@ from scipy.stats import chi2, norm, poisson
 import imuarray
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects as variance
+from imuarray.diagnosis.adoption import narrowest
 from imuarray.diagnosis.replicates import Replicator, discrepancies
-from imuarray.diagnosis.scores import candidates, information_at, mask_of, score_all
+from imuarray.diagnosis.scores import (
+    Candidate,
+    Score,
+    candidates,
+    information_at,
+    mask_of,
+    score_all,
+)
 from imuarray.diagnosis.settings import SETTINGS as CRITICAL
 from imuarray.diagnosis.special import sawtooth_scan, wider
 from imuarray.diagnosis.state import Search
@@ -380,3 +388,16 @@ def test_too_few_samples_are_refused():
     recording, _ = make(Case("criticism-short", duration=1.0), 1)
     with pytest.raises(InputError, match="at least 200 moving samples"):
         arrange(recording)
+
+
+@pytest.mark.parametrize(
+    "alone, least, one", [(1046, 381, True), (1046, 100, False), (700, 600, False)]
+)
+def test_all_are_not_named_for_what_one_has(alone, least, one):
+    """In rough motion the rest of a test of all is often more than chance, and still no cause."""
+    every = Score(Candidate("bias_drift", (0, 1, 2), "gyroscope linear", True), 1240.0, 18, -532.0)
+    other = Score(Candidate("gyroscope_bias", (2,)), 1100.0, 3, -520.0)
+    single = Score(Candidate("bias_drift", (2,), "gyroscope linear"), float(alone), 6, -500.0)
+    proposed = [(every, None), (other, None), (single, None)]
+    assert narrowest(proposed, least)[0] is (single if one else every)
+    assert narrowest(proposed[1:], least)[0] is other

@@ -75,16 +75,34 @@ def adopt(search: Search, proposed=None) -> Search:
     while len(search.causes) < SETTINGS.most_causes and len(vain) < SETTINGS.patience:
         proposed = proposals(search) if proposed is None else proposed
         proposed = [p for p in proposed if vain.count(p[0].candidate.effect) < SETTINGS.of_one]
-        best, values = (proposed or [(None, None)])[0]
+        best, values = narrowest(proposed, search.least) if proposed else (None, None)
         if best is None or not likely(search, best) or best.statistic < search.least:
             break
         found = attempt(search, best, values)
         # refused, it leaves all others' tests as they are
         adopted = len(found.trace) > len(search.trace)
         vain = [] if adopted else [*vain, best.candidate.effect]
-        proposed = None if adopted else proposed[1:]
+        proposed = None if adopted else [p for p in proposed if p[0] is not best]
         search = found
     return replace(search, detectable=detectable(search))
+
+
+def narrowest(proposed, least: float):
+    """The first of the `proposals`, or its best IMU's where the rest explains too little.
+
+    ``least`` chi-square of a cause: what the others of all have beyond the one is below it, and the
+    one has most of it. Refused, it leaves the test of all to be the first again.
+    """
+    first = proposed[0][0]
+    if not first.candidate.whole:
+        return proposed[0]
+    form = first.candidate.effect, first.candidate.variant
+    alone = [p for p in proposed[1:] if (p[0].candidate.effect, p[0].candidate.variant) == form]
+    for score, values in alone[:1]:
+        rest = first.statistic - score.statistic
+        if rest < min(least, (1 - SETTINGS.most) * first.statistic):
+            return score, values
+    return proposed[0]
 
 
 def likely(search: Search, score) -> bool:
