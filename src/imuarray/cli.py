@@ -17,10 +17,9 @@ from typing import NoReturn
 
 from imuarray.commands.argument_types import InputFile, InputLog
 from imuarray.commands.parser import make_parser
-from imuarray.errors import InputError, numbered, one_line
+from imuarray.errors import InputError, numbered, one_line, require
 
 NETCDF = (".nc", ".nc4", ".h5")
-FIGURES = (".png", ".pdf")
 PAGES = ("recording.nc", "cal.nc", "positions.csv", "report.html", "diagnosis.json")  # in folders
 OK, UNFORESEEN, BAD_INPUT, UNTRUSTED, INTERRUPTED, CLOSED = 0, 1, 2, 3, 130, 141
 AGAIN = 0.05  # s, after which an interrupt that was dropped comes again
@@ -95,7 +94,8 @@ def main(argv: Sequence[str] | None = None, parser: argparse.ArgumentParser | No
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return CLOSED
     except OSError as error:
-        return _fail(_describe(error))
+        named = error.strerror and error.filename is not None
+        return _fail(f"{error.filename}: {error.strerror}" if named else error.strerror or error)
     except KeyboardInterrupt as error:
         return _fail(" ".join(["interrupted", *map(str, error.args)]), INTERRUPTED)
     except Exception as error:
@@ -115,13 +115,6 @@ def _unforeseen(error: Exception, debug: bool) -> int:
         traceback.print_exception(error)
     hint = "" if debug else " (--debug shows where)"
     return _fail(f"unforeseen: {type(error).__name__}: {error}{hint}", UNFORESEEN)
-
-
-def _describe(error: OSError) -> str:
-    """The system's error without its number."""
-    if error.strerror and error.filename is not None:
-        return f"{error.filename}: {error.strerror}"
-    return error.strerror or str(error)
 
 
 @contextmanager
@@ -174,22 +167,13 @@ def _interruptions() -> Iterator[None]:
 def _check_output(arguments: argparse.Namespace) -> None:
     """Refuse an output that cannot be written now, not after an hour of sampling."""
     out: Path = arguments.out
-    _require_writable("--out", out, arguments.folder)
-    figure: Path | None = getattr(arguments, "figure", None)
-    if figure is not None:
-        _require_writable("--figure", figure)
-        if figure.suffix.lower() not in FIGURES:
-            found = figure.suffix or "no ending"
-            raise InputError(f"--figure {figure}: expected {' or '.join(FIGURES)}, found {found}")
-        if figure.resolve() == out.resolve():
-            raise InputError(f"--figure {figure}: expected another file than --out, found the same")
+    _require_writable(out, arguments.folder)
     for source in _inputs(arguments):
         bag = isinstance(source, InputLog) and source.is_dir()
-        if not source.is_file() and not bag:
-            found = "a folder" if source.is_dir() else "none"
-            raise InputError(f"{source}: expected a file to read, found {found}")
-        if out.is_file() and out.samefile(source):
-            raise InputError(f"--out {out}: expected another file than the input, found the same")
+        found = "a folder" if source.is_dir() else "none"
+        require(source.is_file() or bag, str(source), "a file to read", found)
+        same = out.is_file() and out.samefile(source)
+        require(not same, f"--out {out}", "another file than the input", "the same")
         if arguments.folder and source.name in PAGES and source.resolve().parent == out.resolve():
             raise InputError(f"--out {out}: expected a folder without the input {source.name}")
         if source.suffix in NETCDF:
@@ -198,25 +182,23 @@ def _check_output(arguments: argparse.Namespace) -> None:
             require_readable(source)
 
 
-def _require_writable(option: str, path: Path, folder: bool = False) -> None:
+def _require_writable(out: Path, folder: bool) -> None:
     """InputError unless a file, or a folder, can be written there."""
     # folders that are missing are made, in the first that is there
-    parent = next(p for p in Path(os.path.realpath(path)).parents if os.path.lexists(p))
-    if not parent.is_dir():
-        raise InputError(f"{option} {path}: expected a folder, found the file {parent}")
-    if not os.access(parent, os.W_OK | os.X_OK):
-        raise InputError(f"{option} {path}: expected a folder one may write to, found {parent}")
+    parent = next(p for p in Path(os.path.realpath(out)).parents if os.path.lexists(p))
+    where = f"--out {out}"
+    require(parent.is_dir(), where, "a folder", f"the file {parent}")
+    require(os.access(parent, os.W_OK | os.X_OK), where, "a folder one may write to", parent)
     if folder:
-        if os.path.lexists(path) and not path.is_dir():
-            found = "a file" if path.exists() else "a link to nothing"
-            raise InputError(f"{option} {path}: expected a folder, found {found}")
+        found = "a file" if out.exists() else "a link to nothing"
+        require(out.is_dir() or not os.path.lexists(out), where, "a folder", found)
         return
     from imuarray.provenance import target_of
 
     try:
-        target_of(path)
+        target_of(out)
     except OSError as error:
-        raise InputError(f"{option} {path}: {error.strerror}") from None
+        raise InputError(f"{where}: {error.strerror}") from None
 
 
 def _read_effects(arguments: argparse.Namespace) -> None:
@@ -228,11 +210,9 @@ def _read_effects(arguments: argparse.Namespace) -> None:
 
     new = [name for path in files for name in read_effects(path)]
     of_file = isinstance(getattr(arguments, "model", None), InputFile)
-    if hasattr(arguments, "effects") and not arguments.effects and not of_file:
-        raise InputError(
-            f"--effect-file: expected --effects that names what to use of {', '.join(new)}, found"
-            " none"
-        )
+    if hasattr(arguments, "effects") and not of_file:
+        wanted = f"--effects that names what to use of {', '.join(new)}"
+        require(arguments.effects, "--effect-file", wanted, "none")
 
 
 def _inputs(arguments: argparse.Namespace) -> list[InputFile]:

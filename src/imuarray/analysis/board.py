@@ -7,7 +7,7 @@ from pathlib import Path
 from imuarray.analysis.calibration import calibrate
 from imuarray.analysis.logs import open_logs
 from imuarray.analysis.model import Say, silent
-from imuarray.errors import IdentifiabilityError, InputError
+from imuarray.errors import IdentifiabilityError, InputError, require
 from imuarray.firstorder.correct import FirstOrder, calibrate_first_order, correct
 from imuarray.firstorder.still import still_poses
 from imuarray.recording import Recording
@@ -33,17 +33,11 @@ def board(
     recording = opened.recording
     source = ", ".join(Path(path).name for path in logs)
     check_values(recording, source)
-    if recording.correction is not None:
-        raise InputError(
-            f"{source}: expected a log, or a recording as read, found one that is corrected:"
-            " imuarray calibrate takes that"
-        )
-    if len(recording.time) < FEWEST:
-        raise InputError(
-            f"{source}: expected at least {FEWEST} samples, found {len(recording.time)}"
-        )
-    count = len(recording.accelerometer_labels)
-    say(f"{len(recording.time)} samples of {count} IMUs; each sensor from still poses")
+    other = "one that is corrected: imuarray calibrate takes that"
+    require(recording.correction is None, source, "a log, or a recording as read", other)
+    samples, count = len(recording.time), len(recording.accelerometer_labels)
+    require(samples >= FEWEST, source, f"at least {FEWEST} samples", samples)
+    say(f"{samples} samples of {count} IMUs; each sensor from still poses")
     found = _first_order(recording, gravity)
     corrected = recording
     if isinstance(found, str):

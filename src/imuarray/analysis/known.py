@@ -16,7 +16,7 @@ from imuarray.engine.readings import Readings, arrange, determined, measured, mo
 from imuarray.engine.rough_fusion import Rough, roughly
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import start
-from imuarray.errors import InputError
+from imuarray.errors import InputError, require
 from imuarray.model.effects import EFFECTS
 from imuarray.recording import Recording
 from imuarray.trust import effect_names, require_fit
@@ -87,12 +87,9 @@ def used(recording: Recording, say: Say = silent) -> Readings:
     """The moving samples that a board is estimated from; InputError where there are none."""
     readings = arrange(recording, sparse=True)
     found = most_informative(readings.select(determined(readings, 1)), say)
-    if not len(found.time):
-        rate = 1 / np.median(np.diff(recording.time)) if len(recording.time) > 1 else 0.0
-        raise InputError(
-            f"recording: expected samples that determine the motion, found none, at {rate:.4g}"
-            " samples a second; is the unit of time right?"
-        )
+    rate = 1 / np.median(np.diff(recording.time)) if len(recording.time) > 1 else 0.0
+    none = f"none, at {rate:.4g} samples a second; is the unit of time right?"
+    require(len(found.time), "recording", "samples that determine the motion", none)
     return found
 
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from imuarray.errors import InputError
+from imuarray.errors import InputError, require
 from imuarray.firstorder.correct import rails_shown
 from imuarray.recording import Recording, read_recording
 from imuarray.recording.channels import repeated
@@ -109,11 +109,8 @@ def _opened(paths, columns, topics) -> Opened:
         raise InputError(f"logs: expected one recording, or what loggers wrote, found {len(logs)}")
     if all(map(bags.is_bag, logs)):
         return _together(bags.read_bags(logs, columns, topics))
-    if columns is None:
-        raise InputError(
-            f"{logs[0]}: expected a YAML that describes it, found none: name it by --columns"
-            " (imuarray columns drafts one)"
-        )
+    none = "none: name it by --columns (imuarray columns drafts one)"
+    require(columns is not None, str(logs[0]), "a YAML that describes it", none)
     if len(logs) == 1 and logs[0].name.endswith(PACKETS):
         recording, account = read_board(logs[0], Path(columns))
         return Opened(recording, account.lines())
@@ -236,12 +233,11 @@ def _require_gravity(log: Log) -> None:
     """InputError for forces in g or mg that are declared m/s^2: most logs lie still for a while."""
     usual = np.median(np.linalg.norm(log.specific_force, axis=1))
     for unit, gravity in (("g", 1.0), ("mg", 1000.0)):
-        if abs(usual / gravity - 1) < GRAVITY_WITHIN:
-            raise InputError(
-                f"accelerometer {log.label!r}: expected some {GRAVITY:.2g} m/s^2 of gravity, found"
-                f" {usual:.3g}: are they in {unit}, and the rates in deg/s? State each unit in the"
-                " YAML"
-            )
+        other = f"are they in {unit}, and the rates in deg/s? State each unit in the YAML"
+        require(
+            not abs(usual / gravity - 1) < GRAVITY_WITHIN, f"accelerometer {log.label!r}",
+            f"some {GRAVITY:.2g} m/s^2 of gravity", f"{usual:.3g}: {other}",
+        )  # fmt: skip
 
 
 def _railed(log: Log) -> tuple[Log, list[str]]:

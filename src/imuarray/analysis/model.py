@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from imuarray.analysis import methods
-from imuarray.errors import LARGEST, SMALLEST, InputError
+from imuarray.errors import LARGEST, SMALLEST, require
 from imuarray.geometry.array import require_planar_extent
 from imuarray.model.effects import find_effects
 from imuarray.recording import Recording
@@ -23,10 +23,8 @@ def assumed(recording: Recording, accelerometer_noise: float | None) -> Recordin
     """The recording with another accelerometer noise (m/s^2) than it declares, if one is given."""
     if accelerometer_noise is None:
         return recording
-    if not SMALLEST <= accelerometer_noise <= LARGEST:
-        raise InputError(
-            f"accelerometer_noise: expected a positive number, found {accelerometer_noise!r}"
-        )
+    sound = SMALLEST <= accelerometer_noise <= LARGEST
+    require(sound, "accelerometer_noise", "a positive number", repr(accelerometer_noise))
     return replace(recording, accelerometer_noise_sd=accelerometer_noise)
 
 
@@ -39,8 +37,7 @@ def usable(recording: Recording, say: Say = silent) -> Recording:
     require_live(recording)
     require_planar_extent(recording.accelerometer_position, "recording")
     lost = recording.at_rail("accelerometer")
-    if lost.all():
-        raise InputError("recording: expected samples off the rail, found every one at a rail")
+    require(not lost.all(), "recording", "samples off the rail", "every one at a rail")
     if lost.any():
         say(f"left out {lost.sum()} of {lost.size} samples with an accelerometer at its rail")
     if recording.stationary is not None and recording.stationary.any():
@@ -48,8 +45,7 @@ def usable(recording: Recording, say: Say = silent) -> Recording:
         still = recording.stationary & ~lost
         say(f"left out {still.sum()} of {lost.size} samples of still poses")
         lost = lost | still
-        if lost.all():
-            raise InputError("recording: expected moving samples, found still poses only")
+        require(not lost.all(), "recording", "moving samples", "still poses only")
     return recording.select(~lost) if lost.any() else recording
 
 
@@ -59,30 +55,22 @@ def require_together(
 ) -> None:  # fmt: skip
     """InputError where a model, its effects, noise and recordings do not go together."""
     find_effects(effects)  # an unknown one is named before anything else
-    if model not in methods.MODELS and not methods.is_file(model):
-        known = ", ".join(methods.MODELS)
-        raise InputError(f"model: expected any of {known} or a calibration (.nc), found {model!r}")
-    if effects and model != "sensors":
-        kind = "--model papers" if model == "papers" else "the model of a calibration"
-        raise InputError(f"--effects: expected none with {kind}, found some")
-    if model != "papers" and accelerometer_noise is not None:
-        raise InputError(
-            "--accelerometer-noise: expected it with --model papers only, found it where the noise"
-            " is estimated"
-        )
+    known = f"any of {', '.join(methods.MODELS)} or a calibration (.nc)"
+    require(model in methods.MODELS or methods.is_file(model), "model", known, repr(model))
+    kind = "--model papers" if model == "papers" else "the model of a calibration"
+    require(not effects or model == "sensors", "--effects", f"none with {kind}", "some")
+    taken = model == "papers" or accelerometer_noise is None
+    other = "it where the noise is estimated"
+    require(taken, "--accelerometer-noise", "it with --model papers only", other)
     if len(recordings) > 1:
-        if model != "sensors":
-            raise InputError(f"--model {model}: expected one recording, found {len(recordings)}")
-        for other in recordings[1:]:
-            if other.accelerometer_labels != recordings[0].accelerometer_labels or not np.allclose(
-                other.relative_positions(), recordings[0].relative_positions(), atol=1e-9
-            ):
-                raise InputError(
-                    "recordings: expected one board, found other labels or nominal positions"
-                )
-        ways = {None if r.map_covariance is None else len(r.map_covariance) for r in recordings}
-        if len(ways) > 1:
-            raise InputError(
-                "recordings: expected all of them corrected alike (imuarray first-order), or none,"
-                " found some with maps of sensors taken out that others have"
+        require(model == "sensors", f"--model {model}", "one recording", len(recordings))
+        first = recordings[0]
+        for one in recordings[1:]:
+            same = one.accelerometer_labels == first.accelerometer_labels and np.allclose(
+                one.relative_positions(), first.relative_positions(), atol=1e-9
             )
+            require(same, "recordings", "one board", "other labels or nominal positions")
+        ways = {None if r.map_covariance is None else len(r.map_covariance) for r in recordings}
+        alike = "all of them corrected alike (imuarray first-order), or none"
+        other = "some with maps of sensors taken out that others have"
+        require(len(ways) == 1, "recordings", alike, other)

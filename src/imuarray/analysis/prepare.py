@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from imuarray.errors import InputError, require_integer
+from imuarray.errors import InputError, require, require_integer
 from imuarray.firstorder.correct import calibrate_first_order, correct, rails_shown
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
@@ -42,8 +42,7 @@ def read_mimu(
 def read_calibration(path: str | PathLike) -> xr.Dataset:
     """A calibration from the file that `imuarray calibrate` has written; InputError for another."""
     found = load_dataset(Path(path))
-    if "position_covariance" not in found:
-        raise InputError(f"{path}: expected a calibration, found no position_covariance")
+    require("position_covariance" in found, str(path), "a calibration", "no position_covariance")
     return found
 
 
@@ -53,10 +52,8 @@ def read_posterior(path: str | PathLike) -> xr.DataTree:
     from imuarray.provenance import is_damaged
 
     path = Path(path)
-    if not path.is_file():
-        raise InputError(f"{path}: expected a posterior (a NetCDF-4 file), found none")
-    if is_damaged(path):
-        raise InputError(f"{path}: expected a file as it was written, found it damaged")
+    require(path.is_file(), str(path), "a posterior (a NetCDF-4 file)", "none")
+    require(not is_damaged(path), str(path), "a file as it was written", "it damaged")
     try:
         return read_chains(path)[1]
     except (OSError, KeyError, ValueError) as error:
@@ -101,11 +98,8 @@ def simulate(
     """
     from imuarray.simulation.recordings import simulate_recording
 
-    if not (duration > 0 and sampling_rate > 0):
-        raise InputError(
-            f"simulate: expected a positive duration and sampling rate, found {duration:g} s and"
-            f" {sampling_rate:g} Hz"
-        )
+    positive, found = duration > 0 and sampling_rate > 0, f"{duration:g} s and {sampling_rate:g} Hz"
+    require(positive, "simulate", "a positive duration and sampling rate", found)
     model = ArrayModel.isotropic(array, accelerometer_noise, gyroscope_noise, effects)
     motion = hand_twisting(stream(seed, "twisting"), angular_rate, specific_force, bandwidth)
     sizes = model.effect_prior_sd

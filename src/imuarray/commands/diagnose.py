@@ -2,7 +2,7 @@
 
 from imuarray.commands.output import Output
 from imuarray.diagnosis.document import diagnose as run
-from imuarray.errors import InputError
+from imuarray.errors import require
 from imuarray.model.effects import DATA_EFFECTS, EFFECTS
 from imuarray.recording import read_recording
 from imuarray.report.write import write_report
@@ -13,8 +13,7 @@ def diagnose(arguments) -> None:
     """Name what the plain model misses on a recording; a folder with the report."""
     known = {*EFFECTS, *DATA_EFFECTS}
     for name in arguments.without:
-        if name not in known:
-            raise InputError(f"--without: expected any of {', '.join(sorted(known))}, found {name}")
+        require(name in known, "--without", f"any of {', '.join(sorted(known))}", name)
     recording, output = read_recording(arguments.recording), Output(arguments)
     found = run(recording, arguments.seed, arguments.without, arguments.recording, output.step)
     reasons = reasons_of_poses(of_file(arguments.recording))
