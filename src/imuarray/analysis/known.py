@@ -106,8 +106,7 @@ def fused(recording: Recording, calibration: xr.Dataset, chosen) -> Rough:
     Moving samples before and after them say how rough it is.
     """
     _, own = with_board(recording, calibration)
-    still = recording.stationary
-    moving = chosen | (np.ones(len(chosen), bool) if still is None else ~still)
+    moving = chosen | ~recording.still()
     since, part = recording.time - recording.time[0], recording.select(moving)
     papers, rails = model_of(recording), part.saturated_gyroscopes()
     readings = measured(papers, part.specific_force, part.angular_rate, rails, since[moving])

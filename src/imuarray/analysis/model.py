@@ -40,9 +40,9 @@ def usable(recording: Recording, say: Say = silent) -> Recording:
     require(not lost.all(), "recording", "samples off the rail", "every one at a rail")
     if lost.any():
         say(f"left out {lost.sum()} of {lost.size} samples with an accelerometer at its rail")
-    if recording.stationary is not None and recording.stationary.any():
+    if recording.still().any():
         # they say nothing about the positions, and cost as much as the others
-        still = recording.stationary & ~lost
+        still = recording.still() & ~lost
         say(f"left out {still.sum()} of {lost.size} samples of still poses")
         lost = lost | still
         require(not lost.all(), "recording", "moving samples", "still poses only")

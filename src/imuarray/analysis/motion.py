@@ -207,8 +207,7 @@ def _with_own_clocks(found, calibration: xr.Dataset, recording: Recording, covar
 
     if CLOCK not in effect_names(calibration) or covariance is None:
         return found, False
-    still = recording.stationary
-    moving = np.ones(len(recording.time), bool) if still is None else ~still
+    moving = ~recording.still()
     rough = fused(recording, calibration, moving)
     if rough.readings.wander is None:
         return found, False

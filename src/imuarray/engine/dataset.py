@@ -136,8 +136,7 @@ def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
         motion = found.recorded[0].state.motion[:, :9]
         variables |= _motion(np.split(motion, 3, axis=1))
         coords["time"] = readings.time + readings.origin
-        still = first.stationary
-        more = course(found, first.time if still is None else first.time[~still])
+        more = course(found, first.time[~first.still()])
         variables, coords = variables | more[0], coords | more[1]
     if effects:
         model = model_of(first, effects)

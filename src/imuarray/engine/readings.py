@@ -298,9 +298,7 @@ def arrange(recording: Recording, sparse: bool = False) -> Readings:
     array = array_of(recording)
     force, rate = recording.saturated_accelerometers(), recording.saturated_gyroscopes()
     blind = rate.all(axis=1).any(axis=1)
-    bad = neighbours(blind)
-    if recording.stationary is not None:
-        bad |= recording.stationary
+    bad = neighbours(blind) | recording.still()
     used = _long_runs(recording.time, ~bad)
     step = np.median(np.diff(recording.time)) if len(bad) > 1 else np.inf
     dense = used.sum() > SETTINGS.dense * np.sum(~bad) and step < SETTINGS.longest_step
@@ -352,8 +350,7 @@ def _left(recording: Recording, count: int) -> Left | None:
 
 def _course(recording: Recording) -> np.ndarray:
     """(4, 4) covariance of polynomials laid through a walk of 1 a second, known where it moves."""
-    still = recording.stationary
-    time = recording.time if still is None else recording.time[~still]
+    time = recording.time[~recording.still()]
     time = np.quantile(time, np.linspace(0, 1, COURSE))
     whole = recording.time[-1] - recording.time[0] or 1.0
     back = np.linalg.pinv(legvander(2 * (time - recording.time[0]) / whole - 1, 3))

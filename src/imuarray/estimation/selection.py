@@ -97,7 +97,7 @@ def select_dynamic(recording: Recording) -> Selection:
     require_planar_extent(recording.accelerometer_position, "recording")
     rates = [part.angular_rate.mean(axis=1) for part in recording.parts()]
     speed = np.linalg.norm(np.concatenate(rates), axis=1)
-    still = np.zeros(speed.shape, bool) if recording.stationary is None else recording.stationary
+    still = recording.still()
     rails = recording.at_rail("accelerometer"), recording.at_rail("gyroscope")
     criteria = {
         "still pose": still,

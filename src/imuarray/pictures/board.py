@@ -46,10 +46,8 @@ def given_or_new(axes: Axes | None) -> Axes:
 
 def poses_of(recording: Recording) -> np.ndarray:
     """Where up was in each still pose, in the board's frame: unit vectors (P, 3)."""
-    if recording.stationary is None:
-        return np.zeros((0, 3))
-    force = np.median(recording.specific_force, axis=1)
-    means = [force[a:b].mean(axis=0) for a, b in runs(recording.stationary)]
+    force, poses = recording.specific_force, runs(recording.still())
+    means = [np.median(force[a:b], axis=1).mean(axis=0) for a, b in poses]
     ups = np.array(means).reshape(-1, 3)
     return ups / np.linalg.norm(ups, axis=1, keepdims=True)
 
@@ -243,14 +241,13 @@ def timeline(recording: Recording, calibration: xr.Dataset, axes: Axes | None = 
 def _rows(recording: Recording, calibration: xr.Dataset) -> list[tuple[str, str, np.ndarray]]:
     """Rows of a timeline: name, colour, (T,) bool."""
     count = len(recording.time)
-    still = np.zeros(count, bool) if recording.stationary is None else recording.stationary
     places = np.searchsorted(recording.time, calibration["time"].to_numpy() - 1e-9)
     used, shaken = (np.zeros(count, bool) for _ in range(2))
     used[np.clip(places, 0, count - 1)] = True
     shaken[np.clip(places, 0, count - 1)] = calibration["shaken"].to_numpy() > 0
     rails = [recording.at_rail(kind) for kind in KINDS]
     return [
-        ("still poses", SKY, still),
+        ("still poses", SKY, recording.still()),
         ("used for positions", GREEN, used),
         ("at a rail", ORANGE, np.any(rails, axis=0)),
         ("shocks", VERMILLION, shaken),

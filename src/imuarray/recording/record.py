@@ -300,6 +300,10 @@ class Recording:
             return self.specific_force_saturated
         return np.abs(self.specific_force) >= self.accelerometer_range * RAIL
 
+    def still(self) -> np.ndarray:
+        """Samples (T,) bool of still poses, none of them where these are not marked."""
+        return np.zeros(len(self.time), bool) if self.stationary is None else self.stationary
+
     def at_rail(self, kind: str) -> np.ndarray:
         """Samples (T,) with a reading at its rail of a ``kind``, accelerometer or gyroscope."""
         method = f"saturated_{kind}s"

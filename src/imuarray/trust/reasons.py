@@ -147,8 +147,7 @@ def _drifts(recording: Recording) -> list[str]:
     if recording.correction is None:
         return []
     walk = float(recording.correction["accelerometer_offset_walk"].max())
-    still = recording.stationary
-    time = recording.time if still is None else recording.time[~still]
+    time = recording.time[~recording.still()]
     far = walk * np.sqrt(np.mean(np.abs(time - np.median(time)))) if len(time) else 0.0
     if not far > DRIFT * recording.accelerometer_noise_sd / np.sqrt(max(len(time), 1)):
         return []

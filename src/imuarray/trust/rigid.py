@@ -141,9 +141,7 @@ def elsewhere(recording: Recording, positions) -> tuple[float, float]:
 def kept(recording: Recording) -> Recording:
     """Moving samples off the rails; of a long recording, stretches spread over it."""
     lost = recording.at_rail("accelerometer") | recording.at_rail("gyroscope")
-    if recording.stationary is not None:
-        lost |= recording.stationary
-    index = np.flatnonzero(~lost)
+    index = np.flatnonzero(~(lost | recording.still()))
     if len(index) > MOST:
         stretches = np.array_split(index, len(index) // STRETCH)
         index = np.concatenate(stretches[:: -(-len(index) // MOST)])

@@ -234,8 +234,8 @@ def _axes_named(names) -> str:
 
 def gravity(recording: Recording) -> list[str]:
     """Still poses that do not show gravity: a unit."""
-    still = recording.stationary
-    if still is None or not still.any():
+    still = recording.still()
+    if not still.any():
         return []
     force = recording.specific_force[few(np.flatnonzero(still))]
     size = float(np.median(np.linalg.norm(force, axis=2)))
