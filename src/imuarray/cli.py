@@ -99,7 +99,11 @@ def main(argv: Sequence[str] | None = None, parser: argparse.ArgumentParser | No
     except KeyboardInterrupt as error:
         return _fail(" ".join(["interrupted", *map(str, error.args)]), INTERRUPTED)
     except Exception as error:
-        return _unforeseen(error, getattr(arguments, "debug", False))
+        debug = getattr(arguments, "debug", False)
+        if debug:
+            traceback.print_exception(error)
+        hint = "" if debug else " (--debug shows where)"
+        return _fail(f"unforeseen: {type(error).__name__}: {error}{hint}", UNFORESEEN)
     if arguments.reasons:
         return _fail(f"not to be trusted: {numbered(arguments.reasons)}", UNTRUSTED)
     return OK
@@ -108,13 +112,6 @@ def main(argv: Sequence[str] | None = None, parser: argparse.ArgumentParser | No
 def _fail(message: object, status: int = BAD_INPUT) -> int:
     print(f"imuarray: {one_line(message)}", file=sys.stderr)
     return status
-
-
-def _unforeseen(error: Exception, debug: bool) -> int:
-    if debug:
-        traceback.print_exception(error)
-    hint = "" if debug else " (--debug shows where)"
-    return _fail(f"unforeseen: {type(error).__name__}: {error}{hint}", UNFORESEEN)
 
 
 @contextmanager
@@ -219,7 +216,3 @@ def _inputs(arguments: argparse.Namespace) -> list[InputFile]:
     """The files a command reads."""
     values = (value if isinstance(value, list) else [value] for value in vars(arguments).values())
     return [item for each in values for item in each if isinstance(item, InputFile)]
-
-
-if __name__ == "__main__":
-    script()

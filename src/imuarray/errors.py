@@ -68,17 +68,14 @@ def numbered(reasons) -> str:
 def require_integer(name: str, value: object, least: int = 1) -> None:
     """InputError unless ``value`` is an integer of at least ``least``; a bool is none."""
     integral = isinstance(value, Integral) and not isinstance(value, bool)
-    if not integral or value < least:
-        raise InputError(f"{name}: expected an integer of at least {least}, found {value!r}")
+    require(integral and value >= least, name, f"an integer of at least {least}", repr(value))
 
 
 def require_one_of(name: str, value: object, known: Iterable[str]) -> None:
     """InputError unless ``value`` is one of the texts ``known``."""
-    if value not in known:
-        raise InputError(f"{name}: expected any of {', '.join(known)}, found {value!r}")
+    require(value in known, name, f"any of {', '.join(known)}", repr(value))
 
 
 def require_shape(name: str, value, shape: tuple[int, ...]) -> None:
     """InputError unless the array ``value`` has that shape; compiled code checks no bounds."""
-    if value.shape != shape:
-        raise InputError(f"{name}: expected shape {shape}, found {value.shape}")
+    require(value.shape == shape, name, f"shape {shape}", value.shape)

@@ -1,13 +1,11 @@
 """Plots for a notebook: each draws into ``axes``, or into a new figure, and returns the axes."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 
 from imuarray.errors import require_one_of
+from imuarray.firstorder.noise import StillNoise
 from imuarray.pictures.board import (
     SURE,
     board,
@@ -18,12 +16,8 @@ from imuarray.pictures.board import (
     sphere,
     timeline,
 )
+from imuarray.pictures.noise import noise_figure
 from imuarray.pictures.style import GREY, look
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from imuarray.firstorder.noise import StillNoise
 
 __all__ = [
     "allan", "board", "length", "motion", "positions", "posterior",
@@ -105,6 +99,4 @@ def motion(dataset: xr.Dataset, quantity: str = "angular_rate", axes: Axes | Non
 
 def allan(noise: StillNoise) -> list[Axes]:
     """Allan deviations and spectra of all axes, and the terms found; of `imuarray.allan`."""
-    from imuarray.pictures.noise import noise_figure
-
     return noise_figure(noise).axes

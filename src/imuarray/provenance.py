@@ -242,10 +242,9 @@ def write_netcdf(
     data.to_netcdf(image, engine="h5netcdf")
     for name, dataset in (groups or {}).items():
         dataset.to_netcdf(image, mode="a", group=name, engine="h5netcdf")
-    content = image.getbuffer()
-    with atomic_write(path) as temporary, open(temporary, "wb") as handle:
-        handle.write(content)
-        handle.write(SEAL + hashlib.sha256(content).digest())
+    with atomic_write(path) as temporary:
+        temporary.write_bytes(image.getbuffer())
+        _seal(temporary)
 
 
 def write_netcdf_parts(

@@ -116,11 +116,6 @@ def _require_whole(calibration: xr.Dataset, model: ArrayModel) -> None:
             raise InputError(f"expected a calibration with {what}, found others, or none")
 
 
-def _values(calibration: xr.Dataset, model: ArrayModel) -> dict:
-    found = calibration.get("effect_parameter")
-    return model.split(np.empty(0) if found is None else found.to_numpy())
-
-
 def _steps(calibration: xr.Dataset, model: ArrayModel) -> dict[str, list[dict]]:
     """Corrections of each kind in turn, arrays with triads first."""
     out: dict[str, list[dict]] = {kind: [] for kind in KINDS}
@@ -132,7 +127,8 @@ def _steps(calibration: xr.Dataset, model: ArrayModel) -> dict[str, list[dict]]:
             out[kind][0][part] = calibration[name].isel(recording=0).to_numpy()
         for kind, left in formats.left_of(calibration).items():
             out[kind][0]["map_sd"] = np.sqrt(np.maximum(np.diag(left), 0)).reshape(-1, 3, 3)
-    values = _values(calibration, model)
+    found = calibration.get("effect_parameter")
+    values = model.split(np.empty(0) if found is None else found.to_numpy())
     for number, kind in enumerate(KINDS):
         if any(name.startswith(kind) for name in set(values) & {*MATRICES, *BIASES}):
             matrix, offset = _linear(model, values, number)

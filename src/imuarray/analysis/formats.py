@@ -143,7 +143,7 @@ def urdf(document: dict[str, Any]) -> str:
     ElementTree.SubElement(robot, "link", name="imuarray")
     names = _link_names([imu["label"] for imu in document["imus"]])
     for name, imu in zip(names, document["imus"], strict=True):
-        sds = ", ".join(_text(1e6 * sd, ".3g") for sd in imu["position_sd_m"])
+        sds = ", ".join(f"{1e6 * sd:.3g}" for sd in imu["position_sd_m"])
         ElementTree.SubElement(robot, "link", name=name)
         robot.append(ElementTree.Comment(f" {name}: sd {sds} um "))
         joint = ElementTree.SubElement(robot, "joint", name=f"{name}_joint", type="fixed")
@@ -216,10 +216,6 @@ def _number(value) -> str:
     """A number as YAML 1.1 reads it back: an exponent wants a decimal point before it."""
     text = repr(float(value))
     return text.replace("e", ".0e") if "e" in text and "." not in text else text
-
-
-def _text(value, form: str) -> str:
-    return "?" if value is None else format(value, form)
 
 
 def _row(values) -> str:

@@ -12,7 +12,6 @@ from imuarray.analysis.prepare import less_leak
 from imuarray.engine.parameters import model_of
 from imuarray.errors import InputError
 from imuarray.firstorder.correct import corrected, nearest_rail, rails_shown
-from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.model.array_model import parameter_names
 from imuarray.model.effects import KINDS, find_effects
@@ -161,14 +160,6 @@ def _with_common_map(found, calibration: xr.Dataset, recording: Recording):
     )
 
 
-def _noise(calibration: xr.Dataset, array: Array, accelerometer_noise: float | None) -> Noise:
-    """Noise of the calibration, unless another is assumed."""
-    sds = [calibration[f"{kind}_sd"].to_numpy()[:, 0] for kind in ("accelerometer", "gyroscope")]
-    if accelerometer_noise is not None:
-        sds[0] = np.full(len(sds[0]), accelerometer_noise)
-    return Noise.of(array.accelerometers, array.gyroscopes, *sds)
-
-
 def motion_under(
     calibration: xr.Dataset, recording: Recording, saturated,
     accelerometer_noise: float | None, origin: float,
@@ -192,7 +183,11 @@ def motion_under(
         whole = calibration.get("whole_covariance")
         covariance = None if whole is None else whole.to_numpy()
         since, span = recording.time - attrs["time_origin"], attrs["span"]
-    model = replace(model, noise=_noise(calibration, model.array, accelerometer_noise))
+    sds = [calibration[f"{kind}_sd"].to_numpy()[:, 0] for kind in KINDS]
+    if accelerometer_noise is not None:
+        sds[0] = np.full(len(sds[0]), accelerometer_noise)
+    noise = Noise.of(model.array.accelerometers, model.array.gyroscopes, *sds)
+    model = replace(model, noise=noise)
     found = fuse(
         model, recording.specific_force, recording.angular_rate, parameters, covariance,
         saturated, since, span,

@@ -1,9 +1,10 @@
 """The command line's parser: commands, options and their help; nothing heavy loads here."""
 
 import argparse
-from collections.abc import Callable, Sequence
-from importlib import import_module
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any, NamedTuple, NoReturn
 
 import imuarray
@@ -81,6 +82,8 @@ class Command(NamedTuple):
 
 TOPICS = option("--topics", "of ROS bags, the reference first (default: those of the YAML)",
                  nargs="+", default=(), metavar="/imu0")  # fmt: skip
+TABLES = option("data", "CSV file with a header; several where IMUs logged each by itself",
+                 type=InputFile, nargs="+")  # fmt: skip
 GRAVITY = number("--gravity", "G", "magnitude of gravity where it was recorded, m/s^2 (default:"
                   " 9.80665)", 9.80665)  # fmt: skip
 
@@ -104,10 +107,7 @@ COMMANDS = (
         "Draft the YAML that describes a log: columns, units, rate, noise, and what it could not"
         " know.",
         "log.csv --out columns.yaml", "YAML to write, a new file",
-        (
-            option("data", "CSV file with a header; several where IMUs logged each by itself",
-                    type=InputFile, nargs="+"),
-        ),
+        (TABLES,),
     ),
     Command(
         "simulate", "simulate.simulate",
@@ -145,11 +145,7 @@ COMMANDS = (
         "Read a table, or several of a rig; a small YAML names columns and units"
         " (docs/convert.md).",
         "log.csv --columns columns.yaml --out rec.nc", "recording to write (NetCDF-4)",
-        (
-            option("data", "CSV file with a header; several where IMUs logged each by itself",
-                    type=InputFile, nargs="+"),
-            file_option("--columns", "YAML: columns, units, positions", required=True),
-        ),
+        (TABLES, file_option("--columns", "YAML: columns, units, positions", required=True)),
     ),
     Command(
         "convert ros", "convert.convert_logs",
@@ -290,18 +286,14 @@ def make_parser(
     for command in commands_given:
         first, _, kind = command.name.partition(" ")
         if kind and kinds is None:
-            kinds = _add_convert(commands)
+            summary = "Turn a logger's file into a recording."
+            convert = commands.add_parser(
+                "convert", help=summary, description=summary,
+                epilog="example: imuarray convert csv log.csv --columns columns.yaml --out rec.nc",
+            )  # fmt: skip
+            kinds = convert.add_subparsers(dest="kind", metavar="format", required=True)
         _add(kinds if kind else commands, kind or first, command)
     return parser
-
-
-def _add_convert(commands):
-    summary = "Turn a logger's file into a recording."
-    parser = commands.add_parser(
-        "convert", help=summary, description=summary,
-        epilog="example: imuarray convert csv log.csv --columns columns.yaml --out rec.nc",
-    )  # fmt: skip
-    return parser.add_subparsers(dest="kind", metavar="format", required=True)
 
 
 def _add(commands, name: str, command: Command) -> None:
@@ -319,16 +311,10 @@ def _add(commands, name: str, command: Command) -> None:
     )
     for option_name, given in command.options:
         parser.add_argument(option_name, **given)
-    parser.set_defaults(
-        run=_later(f"{command.package}.{command.run}"), folder=command.folder, reasons=()
-    )
+    run = partial(_run, f"{command.package}.{command.run}")
+    parser.set_defaults(run=run, folder=command.folder, reasons=())
 
 
-def _later(place: str) -> Callable[[argparse.Namespace], None]:
-    """The function at ``place``, its module loaded when it is called."""
-    module, _, name = place.rpartition(".")
-
-    def run(arguments: argparse.Namespace) -> None:
-        getattr(import_module(module), name)(arguments)
-
-    return run
+def _run(place: str, arguments: argparse.Namespace) -> None:
+    """Calls the function at ``place``; its module is not loaded before."""
+    resolve_name(place)(arguments)

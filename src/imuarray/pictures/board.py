@@ -3,8 +3,6 @@
 And how a recording has excited its board: directions of still poses, axes of rotation.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -67,13 +65,6 @@ def spiral(count: int) -> np.ndarray:
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
 
 
-def turning_of(calibration: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Shares (3,) of the squared angular rate about its own axes (3, 3), the least first."""
-    rate = calibration["angular_rate"].to_numpy()
-    values, vectors = np.linalg.eigh(rate.T @ rate)
-    return values / values.sum(), vectors.T
-
-
 def missing(recording: Recording, calibration: xr.Dataset) -> list[str]:
     """Words on what has not been excited yet; nothing where all has."""
     said, poses = [], poses_of(recording)
@@ -82,10 +73,12 @@ def missing(recording: Recording, calibration: xr.Dataset) -> list[str]:
         if angle > GAP:
             components = ", ".join(fixed(value, 1) for value in where)
             said.append(f"no still pose within {angle:.0f} degrees of ({components}) up")
-    shares, axes = turning_of(calibration)
-    if shares[0] < LITTLE:
-        share = number(100 * shares[0], 2)
-        said.append(f"hardly any turning about {direction(axes[0])}: {share} % of the squared rate")
+    rate = calibration["angular_rate"].to_numpy()
+    squares, axes = np.linalg.eigh(rate.T @ rate)  # the least first
+    least, axis = squares[0] / squares.sum(), direction(axes[:, 0])
+    if least < LITTLE:
+        share = number(100 * least, 2)
+        said.append(f"hardly any turning about {axis}: {share} % of the squared rate")
     return said
 
 

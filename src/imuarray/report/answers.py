@@ -1,11 +1,10 @@
 """The four answers of a diagnosis in plain words, from its document."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from imuarray.diagnosis.document import Diagnosis
 from imuarray.diagnosis.plain import (
     NARROW,
     first_up,
@@ -20,9 +19,6 @@ from imuarray.diagnosis.plain import (
 from imuarray.diagnosis.words import equation, in_short, whose, words
 from imuarray.model.effects import DATA_EFFECTS, EFFECTS, KINDS
 from imuarray.report.numbers import in_noise_sds, noise_table, position_table
-
-if TYPE_CHECKING:
-    from imuarray.diagnosis.document import Diagnosis
 
 BELOW_NOISE = 1.1  # times the assumed noise: a residual that looks like noise
 USUAL = 0.05  # p-value of a check that is as expected

@@ -54,8 +54,13 @@ def discrepancy_figure(table: pd.DataFrame, footer=()):
                 _check(axes, row, names.index(row.label), shift)
         axes.set(xlabel="sds of the simulated band", ylim=(len(names) - 0.4, -0.6))
         _wide_scale(axes, part.standardised)
-    figure.axes[0].set_yticks(range(len(names)), names)
-    _discrepancy_legend(figure, figure.axes[0])
+    axes = figure.axes[0]
+    axes.set_yticks(range(len(names)), names)
+    handles = _model_handles(axes, 4.5)
+    handles += axes.plot([], [], linestyle="", marker="o", color=BLACK, markerfacecolor="white",
+                         markersize=4.5, label=f"open: p > {PLAIN:g}")  # fmt: skip
+    handles.append(axes.fill_between([], [], [], color="0.87", lw=0, label="95 % of simulations"))
+    legend_above(figure, handles)
     return figure
 
 
@@ -93,14 +98,6 @@ def _ticks_at_powers(axes, values, first: int, most: int, room: float, text):
     low = -powers[powers <= room * abs(min(values.min(), 0))][::-1]
     axes.set_xticks([*low, 0, *powers])
     axes.xaxis.set_major_formatter(ticks.FuncFormatter(text))
-
-
-def _discrepancy_legend(figure, axes):
-    handles = _model_handles(axes, 4.5)
-    handles += axes.plot([], [], linestyle="", marker="o", color=BLACK, markerfacecolor="white",
-                         markersize=4.5, label=f"open: p > {PLAIN:g}")  # fmt: skip
-    handles.append(axes.fill_between([], [], [], color="0.87", lw=0, label="95 % of simulations"))
-    legend_above(figure, handles)
 
 
 def _model_handles(axes, size) -> list:
@@ -187,7 +184,14 @@ def gain_figure(table: pd.DataFrame, footer=()):
     axes.set(xlabel="nats gained on held-out time (whiskers: 2 standard errors)")
     axes.set_ylim(len(table) - 0.5, -0.5)
     _gain_scale(axes, table)
-    _gain_legend(figure, axes, table)
+    handles = axes.plot([], [], "s", color=BLUE, label="beside all other causes")
+    if table.adopted.notna().any():
+        handles += axes.plot([], [], "D", color=ORANGE, markerfacecolor="white",
+                             label="when it was adopted")  # fmt: skip
+    if table.placebo.notna().any():
+        handles += axes.plot([], [], "x", color=VERMILLION,
+                             label="placebo: its numbers at other IMUs")  # fmt: skip
+    legend_above(figure, handles)
     return figure
 
 
@@ -215,17 +219,6 @@ def _power(value, _) -> str:
     if abs(value) < 1000:
         return f"{value:.0f}".replace("-", "−")
     return f"{'−' if value < 0 else ''}{power_of_ten(round(np.log10(abs(value))))}"
-
-
-def _gain_legend(figure, axes, table):
-    handles = axes.plot([], [], "s", color=BLUE, label="beside all other causes")
-    if table.adopted.notna().any():
-        handles += axes.plot([], [], "D", color=ORANGE, markerfacecolor="white",
-                             label="when it was adopted")  # fmt: skip
-    if table.placebo.notna().any():
-        handles += axes.plot([], [], "x", color=VERMILLION,
-                             label="placebo: its numbers at other IMUs")  # fmt: skip
-    legend_above(figure, handles)
 
 
 @styled

@@ -1,22 +1,16 @@
 """The numbers behind a diagnosis's figures, one table (a row per mark) for each of them."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pandas as pd
 from scipy.special import ndtri
 
 from imuarray.diagnosis.adoption import separability
+from imuarray.diagnosis.document import Diagnosis, Fitted
 from imuarray.diagnosis.noise import standardised
 from imuarray.diagnosis.replicates import TESTS
 from imuarray.diagnosis.settings import SETTINGS
+from imuarray.engine.fit import Fit
 from imuarray.model.effects import KINDS
-
-if TYPE_CHECKING:
-    from imuarray.diagnosis.document import Diagnosis, Fitted
-    from imuarray.engine.fit import Fit
 
 BAND = ndtri(0.975)  # sds of a 95 % band
 

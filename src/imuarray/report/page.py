@@ -1,7 +1,5 @@
 """Parts of the pages: drawings as they embed them, and the templates filled in."""
 
-from __future__ import annotations
-
 import base64
 from functools import partial
 from typing import NamedTuple

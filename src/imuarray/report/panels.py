@@ -5,13 +5,12 @@ refitted: what would be back in the residual without it. It is an added-variable
 residual and signal together are its ordinate, so that points on the line are explained.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
+from imuarray.diagnosis.document import Diagnosis
 from imuarray.engine.clocks import age_of, delay_score
 from imuarray.engine.fit import Fit, flat_parameters
 from imuarray.engine.heldout import blocks_of
@@ -21,9 +20,6 @@ from imuarray.model.array_model import component
 from imuarray.model.effects import EFFECTS, KINDS
 from imuarray.model.timing import clock_turns
 from imuarray.recording.record import AXES
-
-if TYPE_CHECKING:
-    from imuarray.diagnosis.document import Diagnosis
 
 BINS = 14
 

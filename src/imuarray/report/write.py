@@ -1,13 +1,11 @@
 """The report of a diagnosis: diagnosis.json, report.html and the figures, in one folder."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
+from imuarray.diagnosis.document import Diagnosis
 from imuarray.diagnosis.words import sensors_of, whose, words
 from imuarray.engine.dataset import diagnosed
 from imuarray.provenance import atomic_folder, write_bytes, write_netcdf
@@ -17,10 +15,6 @@ from imuarray.report.answers import USUAL, alarming, answers, verdict
 from imuarray.report.drawings_model import ALIKE, cause_figure, position_figure, separability_figure
 from imuarray.report.page import SUFFIXES, Drawing, files, pictured, rendered
 from imuarray.report.panels import cause_table, panels_of
-
-if TYPE_CHECKING:
-    from imuarray.diagnosis.document import Diagnosis
-
 
 FIGURES = {  # by name: table, drawing, title, caption
     "discrepancies": (
@@ -85,11 +79,8 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> None:
         write_netcdf(calibration, made / "cal.nc")
         write_bytes(page.encode(), made / "report.html")
         write_bytes(document.encode(), made / "diagnosis.json")
-    _remove_former(Path(folder), {drawing.name for drawing in drawings})
-
-
-def _remove_former(folder: Path, names) -> None:
-    """Figures of a former report that this one does not have."""
+    # figures of a former report that this one does not have
+    folder, names = Path(folder), {drawing.name for drawing in drawings}
     for suffix in SUFFIXES:
         for path in [*folder.glob(f"cause_[0-9][0-9]_*.{suffix}"), folder / f"gain.{suffix}"]:
             if path.stem not in names:
