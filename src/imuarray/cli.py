@@ -94,6 +94,7 @@ def main(argv: Sequence[str] | None = None, parser: argparse.ArgumentParser | No
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return CLOSED
     except OSError as error:
+        # without the system's number
         named = error.strerror and error.filename is not None
         return _fail(f"{error.filename}: {error.strerror}" if named else error.strerror or error)
     except KeyboardInterrupt as error:
@@ -187,8 +188,9 @@ def _require_writable(out: Path, folder: bool) -> None:
     require(parent.is_dir(), where, "a folder", f"the file {parent}")
     require(os.access(parent, os.W_OK | os.X_OK), where, "a folder one may write to", parent)
     if folder:
-        found = "a file" if out.exists() else "a link to nothing"
-        require(out.is_dir() or not os.path.lexists(out), where, "a folder", found)
+        if os.path.lexists(out) and not out.is_dir():
+            found = "a file" if out.exists() else "a link to nothing"
+            raise InputError(f"{where}: expected a folder, found {found}")
         return
     from imuarray.provenance import target_of
 
@@ -216,3 +218,7 @@ def _inputs(arguments: argparse.Namespace) -> list[InputFile]:
     """The files a command reads."""
     values = (value if isinstance(value, list) else [value] for value in vars(arguments).values())
     return [item for each in values for item in each if isinstance(item, InputFile)]
+
+
+if __name__ == "__main__":
+    script()

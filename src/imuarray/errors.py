@@ -39,9 +39,12 @@ class IdentifiabilityError(InputError):
 
 
 def require(holds: object, where: str, expected: str, found: object) -> None:
-    """InputError unless something ``holds``: "where: expected ..., found ..."."""
+    """InputError unless something ``holds``: "where: expected ..., found ...".
+
+    ``where`` is empty where the caller alone knows the file, and names it.
+    """
     if not holds:
-        raise InputError(f"{where}: expected {expected}, found {found}")
+        raise InputError((f"{where}: " if where else "") + f"expected {expected}, found {found}")
 
 
 @contextmanager

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis import formats, methods
-from imuarray.errors import InputError, require_one_of
+from imuarray.errors import InputError, require, require_one_of
 from imuarray.firstorder.noise import TERMS, StillNoise
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
@@ -112,8 +112,7 @@ def _require_whole(calibration: xr.Dataset, model: ArrayModel) -> None:
         (all((np.linalg.det(one) > 0).all() for one in maps), "inverses that mirror nothing"),
         (rate.dtype.kind == "f" and rate.size == 1 and rate > 0, "a rate in Hz"),
     ):
-        if not right:
-            raise InputError(f"expected a calibration with {what}, found others, or none")
+        require(right, "", f"a calibration with {what}", "others, or none")
 
 
 def _steps(calibration: xr.Dataset, model: ArrayModel) -> dict[str, list[dict]]:
@@ -207,8 +206,7 @@ def _noise(calibration: xr.Dataset, noise: StillNoise | None, kind: str, k: int,
     sensor = "specific_force" if kind == KINDS[0] else "angular_rate"
     label = str(calibration[kind].to_numpy()[k])
     table = noise.terms[(noise.terms.sensor == sensor) & (noise.terms.triad == label)]
-    if table.empty:
-        raise InputError(f"noise: expected that of {kind} {label}, found none")
+    require(not table.empty, "noise", f"that of {kind} {label}", "none")
     out: dict[str, Any] = {"from": "allan"}
     for term, part in table.groupby("term", sort=False):
         out[str(term)] = {name: part[name].to_numpy() for name in ("value", "sd", "below")}

@@ -16,7 +16,7 @@ from imuarray.engine.readings import Readings, arrange, determined, measured, mo
 from imuarray.engine.rough_fusion import Rough, roughly
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import start
-from imuarray.errors import InputError, require
+from imuarray.errors import require
 from imuarray.model.effects import EFFECTS
 from imuarray.recording import Recording
 from imuarray.trust import effect_names, require_fit
@@ -65,8 +65,7 @@ def again(recording: Recording, calibration: xr.Dataset, say: Say = silent) -> E
     require_fit(calibration, recording)
     for name in str(calibration.attrs.get("mended", "")).split():
         say(f"{name}: concerns readings, not the model; they are used as they are")
-    if "effect_parameter" not in calibration:
-        raise InputError("expected a calibration with effects, found one without")
+    require("effect_parameter" in calibration, "", "a calibration with effects", "one without")
     effects, readings = effect_names(calibration), used(recording)
     origin, span = calibration.attrs["time_origin"], calibration.attrs["span"]
     since = readings.time + readings.origin - origin

@@ -10,7 +10,7 @@ import xarray as xr
 from imuarray.analysis.model import assumed
 from imuarray.analysis.prepare import less_leak
 from imuarray.engine.parameters import model_of
-from imuarray.errors import InputError
+from imuarray.errors import InputError, require
 from imuarray.firstorder.correct import corrected, nearest_rail, rails_shown
 from imuarray.model import ArrayModel
 from imuarray.model.array_model import parameter_names
@@ -221,11 +221,9 @@ def _require_parameters(calibration: xr.Dataset, recording: Recording, model: Ar
     labels = recording.accelerometer_labels, recording.gyroscope_labels
     expected = parameter_names(model, labels)
     found = [str(name) for name in calibration["parameter"].to_numpy()]
-    if found != expected:
-        raise InputError(
-            f"expected {len(expected)} parameters of {', '.join(model.effects)}, found"
-            f" {len(found)}, or others: the effects are not those of the calibration"
-        )
+    wanted = f"{len(expected)} parameters of {', '.join(model.effects)}"
+    other = f"{len(found)}, or others: the effects are not those of the calibration"
+    require(found == expected, "", wanted, other)
 
 
 def motion_dataset(recording: Recording, found, lost) -> xr.Dataset:

@@ -93,21 +93,15 @@ def sample(
     require_together(model, [recording], effects, accelerometer_noise)
     moving, posterior = usable(recording, say), None
     if model != "papers":
-        posterior = _beyond(recording, str(model), effects, say)
+        found = fitted_beyond(recording, str(model), effects, say)
+        if found is not None and effects_of(found):
+            if not found.converged:
+                say(NOT_CONVERGED)
+            posterior = posterior_beyond(recording, found)
     if posterior is None:
         moving, known = assumed(moving, accelerometer_noise), accelerometer_noise is not None
         posterior = posterior_of(moving, model_of(moving), known, say)
     return _exact(posterior, method, steps, seed, not progress, say)
-
-
-def _beyond(recording: Recording, model: str, effects, say: Say) -> Posterior | None:
-    """Under a model that has more than the papers'; None where there is no more to be had."""
-    found = fitted_beyond(recording, model, effects, say)
-    if found is None or not effects_of(found):
-        return None
-    if not found.converged:
-        say(NOT_CONVERGED)
-    return posterior_beyond(recording, found)
 
 
 def _exact(

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 import numpy as np
 import xarray as xr
 
-from imuarray.errors import LARGEST, SMALLEST, InputError, one_line
+from imuarray.errors import LARGEST, SMALLEST, InputError, one_line, require
 from imuarray.model.effects import DATA_EFFECTS, EFFECTS, KINDS, own_version
 from imuarray.recording import Recording
 from imuarray.recording.record import CLOCKS, CORRECTION, DIMENSIONS, MATRICES
@@ -61,11 +61,9 @@ def _require_right_axes(mended: Iterable[str]) -> None:
     ``mended``: data effects that a diagnosis has found.
     """
     for name in mended:
-        if not (name in DATA_EFFECTS and DATA_EFFECTS[name].left_out):
-            raise InputError(
-                f"expected a calibration of readings with the right axes, found {name}: give the"
-                " axes in columns.yaml, convert the log again, and calibrate that"
-            )
+        right = name in DATA_EFFECTS and DATA_EFFECTS[name].left_out
+        found = f"{name}: give the axes in columns.yaml, convert the log again, and calibrate that"
+        require(right, "", "a calibration of readings with the right axes", found)
 
 
 def effect_names(calibration: xr.Dataset) -> list[str]:
@@ -126,11 +124,8 @@ def require_labels(calibration: xr.Dataset, recording: Recording) -> None:
         expected = getattr(recording, f"{kind}_labels")
         coordinate = calibration.coords.get(kind)
         labels = () if coordinate is None else tuple(map(str, coordinate.to_numpy().ravel()))
-        if labels != expected:
-            raise InputError(
-                f"expected {kind}s {', '.join(expected)}, as in the recording, found"
-                f" {', '.join(labels) or 'none'}"
-            )
+        wanted = f"{kind}s {', '.join(expected)}, as in the recording"
+        require(labels == expected, "", wanted, ", ".join(labels) or "none")
 
 
 def _require_sizes(calibration: xr.Dataset) -> None:
@@ -168,11 +163,9 @@ def _require_board(calibration: xr.Dataset, recording: Recording) -> None:
     apart = np.abs(drawn - drawn[0] - recording.relative_positions()).max(axis=1)
     prior = max(recording.position_prior_sd, _number(calibration, "position_prior_sd", 0.0))
     k = int(np.argmax(apart))
-    if apart[k] > SAME_BOARD * prior:
-        raise InputError(
-            f"expected a calibration of the recording's board, found one of another: accelerometer"
-            f" {recording.accelerometer_labels[k]} is {1e3 * apart[k]:.3g} mm off in its drawing"
-        )
+    off = f"{recording.accelerometer_labels[k]} is {1e3 * apart[k]:.3g} mm off in its drawing"
+    other = f"one of another: accelerometer {off}"
+    require(not apart[k] > SAME_BOARD * prior, "", "a calibration of the recording's board", other)
 
 
 def _require_effects(calibration: xr.Dataset) -> None:
@@ -182,21 +175,17 @@ def _require_effects(calibration: xr.Dataset) -> None:
             raise InputError(f"expected the attribute {name} in s, found none or no such number")
     effects = str(calibration.attrs.get("effects", "")).split(",")
     missing = [name for name in effects if name not in EFFECTS]
-    if missing:
-        raise InputError(
-            f"expected the effects of the calibration, found no {', '.join(missing)}: name the file"
-            " that defines them (--effect-file, imuarray.read_effects)"
-        )
+    remedy = "name the file that defines them (--effect-file, imuarray.read_effects)"
+    found = f"no {', '.join(missing)}: {remedy}"
+    require(not missing, "", "the effects of the calibration", found)
     try:
         known = " ".join(map(str, json.loads(calibration.attrs.get("versions", "{}")).values()))
     except (ValueError, TypeError, AttributeError):
         raise InputError("expected the attribute versions as JSON, found another text") from None
     for name in effects:
         text = own_version(name)
-        if text is not None and text not in known:
-            raise InputError(
-                f"expected the effect {name} as it was at the calibration, found another text"
-            )
+        same = text is None or text in known
+        require(same, "", f"the effect {name} as it was at the calibration", "another text")
 
 
 def _number(calibration: xr.Dataset, name: str, default: float) -> float:
