@@ -25,7 +25,6 @@ COMMANDS = (
     "select {recording} --out {out}",
     "board {recording} --out {folder}/answer",
     "diagnose {recording} --out {folder}/diagnosis",
-    "residuals {recording} --figure {folder}/figure.png --out {out}",
 )
 
 
