@@ -11,6 +11,7 @@ import pandas as pd
 
 from imuarray.errors import expecting, require
 from imuarray.recording import written
+from imuarray.recording.layout import SCHEMA
 from imuarray.recording.table import load
 from imuarray.recording.units import FASTEST, GRAVITY, SLOWEST, UNITS
 
@@ -39,7 +40,6 @@ EVEN = 0.2  # of a step between stamps, by which half of them may differ
 UNKNOWN = '"?"'
 WORDS = {"deg/s": "deg|dps|°", "rad/s": "rad"}
 RAW = "scale", "noise", "range"  # not known of counts
-SCHEMA = Path(__file__).with_name("columns.schema.json")
 
 
 class Triad(NamedTuple):

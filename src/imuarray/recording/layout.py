@@ -1,5 +1,6 @@
 """The small YAML that says what a log holds: columns or topics, units, positions, axes, noise."""
 
+import json
 from difflib import get_close_matches
 from os import PathLike
 from pathlib import Path
@@ -16,24 +17,10 @@ WIDEST = 2.0  # m; beyond this, positions without a declared unit are taken to b
 PRIOR = 3e-3  # m, sd of nominal positions where none is declared
 KINDS = "accelerometers", "gyroscopes"
 QUANTITIES = {"accelerometers": "force", "gyroscopes": "rate"}
-# What may be in each section, and whether it has to be. A board's triads share one table's rows;
-# a rig's IMUs have each their own log, or topic, and stamps.
-_PLACES = {"position_unit": False, "position_prior": False}
-_TABLE = {"delimiter": False, "comment": False}
-_SENSORS = {"accelerometers": True, "gyroscopes": True}
-BOARD = {
-    **_TABLE, "time": True, "incomplete_rows": False, **_PLACES, "output_rate": False, **_SENSORS,
-}  # fmt: skip
-SENSOR = {"unit": True, "scale": False, "noise": True, "range": True}
-BOARD_SENSOR = SENSOR | {"triads": True}
-RIG = {
-    **_TABLE, "time": False, "columns": False, "sensor": False, **_PLACES, **_SENSORS, "imus": True,
-}  # fmt: skip
-_OWN = {"position": False, "axes": False, "accelerometers": False, "gyroscopes": False}
-IMU = {"log": False, "columns": False, "time": False, **_OWN}
-BAG = {**_PLACES, **_SENSORS, "imus": True}
-BAG_SENSOR = {"unit": False, "noise": True, "range": True}  # those of sensor_msgs/Imu
-BAG_IMU = {"topic": False, **_OWN}
+# Which keys may be in each section, and which have to be there, the editors' schema says. A board's
+# triads share one table's rows; a rig's IMUs have each their own log, or topic, and stamps.
+SCHEMA = Path(__file__).with_name("columns.schema.json")
+BOARD, RIG, BAG = json.loads(SCHEMA.read_text(encoding="utf-8"))["anyOf"]
 _NAMES = "column", "columns", "log", "sensor", "topic"
 
 
@@ -69,33 +56,34 @@ def read_layout(path: str | PathLike, bag: bool = False) -> dict[str, Any]:
     with expecting(path, "YAML", (yaml.YAMLError, ValueError, RecursionError)):
         layout = yaml.load(path.read_text(encoding="utf-8"), _Loader)
     rig = bag or (isinstance(layout, dict) and "imus" in layout)
-    _require_keys(layout, BAG if bag else RIG if rig else BOARD, str(path))
-    keys = BAG_SENSOR if bag else SENSOR if rig else BOARD_SENSOR
+    schema = BAG if bag else RIG if rig else BOARD
+    _require_keys(layout, schema, str(path))
     for kind in KINDS:
-        where = f"{path}: {kind}"
-        _require_keys(layout[kind], keys, where)
+        where, known = f"{path}: {kind}", schema["properties"][kind]
+        _require_keys(layout[kind], known, where)
         if not rig:
-            triad = {"columns": True, "axes": False}
-            triad |= {"position": False} if kind == "accelerometers" else {}
-            _require_sections(layout[kind]["triads"], where, "triads", triad)
+            triads = known["properties"]["triads"]
+            _require_sections(layout[kind]["triads"], where, "triads", triads)
     if rig:
-        _require_sections(layout["imus"], f"{path}: imus", "IMUs", BAG_IMU if bag else IMU)
+        imus = schema["properties"]["imus"]
+        _require_sections(layout["imus"], f"{path}: imus", "IMUs", imus)
         for label, imu in layout["imus"].items():
             for kind in KINDS:
-                own = imu.get(kind, {})
-                _require_keys(own, dict.fromkeys(keys, False), f"{path}: imus {label!r}: {kind}")
+                own, known = imu.get(kind, {}), imus["additionalProperties"]["properties"][kind]
+                _require_keys(own, known, f"{path}: imus {label!r}: {kind}")
                 imu[kind] = layout[kind] | own
     return layout
 
 
-def _require_sections(sections: Any, where: str, what: str, keys: dict[str, bool]) -> None:
+def _require_sections(sections: Any, where: str, what: str, schema: dict) -> None:
     named = isinstance(sections, dict) and sections
     require(named, where, f"{what} by label", repr(sections))
     for label, section in sections.items():
-        _require_keys(section, keys, f"{where} {label!r}")
+        _require_keys(section, schema["additionalProperties"], f"{where} {label!r}")
 
 
-def _require_keys(section: Any, keys: dict[str, bool], where: str) -> None:
+def _require_keys(section: Any, schema: dict, where: str) -> None:
+    keys = {key: key in schema.get("required", ()) for key in schema["properties"]}
     require(isinstance(section, dict), where, _listed(keys), repr(section))
     for key in section:
         near = [] if key in keys else get_close_matches(str(key), keys, 1)
