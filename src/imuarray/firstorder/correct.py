@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 from scipy.linalg import block_diag
 
-from imuarray.errors import InputError, require_one_of
+from imuarray.errors import InputError, require, require_one_of
 from imuarray.estimation.threads import one_thread
 from imuarray.firstorder.gyroscopes import Gyroscopes, Still, calibrate_gyroscopes
 from imuarray.firstorder.outliers import fit_triads
@@ -147,9 +147,8 @@ def calibrate_together(
 
 def _all_still(recordings: Sequence[Recording], gyroscopes: str, shortest: float) -> list[Still]:
     require_one_of("gyroscopes", gyroscopes, GYROSCOPES)
-    for other in recordings[1:]:
-        if _labels(other) != _labels(recordings[0]):
-            raise InputError("recordings: expected one board, found sensors of other labels")
+    boards = {(*one.accelerometer_labels, *one.gyroscope_labels) for one in recordings}
+    require(len(boards) <= 1, "recordings", "one board", "sensors of other labels")
     require_apart(recordings)
     return [_still(one, shortest) for one in recordings]
 
@@ -178,10 +177,6 @@ def _calibrated(every: Sequence[Still], gravity: float, gyroscopes: str) -> list
         own = _of_poses(one, triads.of(number), gravity)
         found.append(replace(own, gyroscopes=None if maps is None else maps.between(poses)))
     return found
-
-
-def _labels(recording: Recording) -> tuple:
-    return *recording.accelerometer_labels, *recording.gyroscope_labels
 
 
 def _still(recording: Recording, shortest: float) -> Still:
@@ -247,28 +242,30 @@ def correct(recording: Recording, found: FirstOrder) -> Recording:
     is in the axes of the first accelerometer, the drawing too. Where the time base is in doubt
     (`Gyroscopes.time_base_sd`), ``clock_sd`` allows for it.
     """
-    maps = found.gyroscope_matrix
-    back, turn_back = np.linalg.inv(found.triads.matrix), np.linalg.inv(maps)
+    matrix, offset, maps = found.triads.matrix, found.triads.offset, found.gyroscope_matrix
+    back, turn_back = np.linalg.inv(matrix), np.linalg.inv(maps)
     still = np.zeros(len(recording.time), bool)
     for pose in found.poses:
         still[pose] = True
+    # from the accelerometers' own axes to those of the corrected readings
+    axes = np.swapaxes(nearest_orthogonal(matrix), 1, 2)
+    if recording.accelerometer_axes is not None:
+        axes = axes @ recording.accelerometer_axes
     doubt = 0.0 if found.gyroscopes is None else found.gyroscopes.time_base_sd
     clock_sd = np.hypot(np.nan_to_num(recording.clock_sd), doubt) if doubt else recording.clock_sd
     return replace(
         recording,
-        specific_force=corrected(back, found.triads.offset, recording.specific_force),
+        specific_force=corrected(back, offset, recording.specific_force),
         angular_rate=corrected(turn_back, found.gyroscope_offset, recording.angular_rate),
         accelerometer_position=recording.accelerometer_position @ found.drawing_turn,
-        accelerometer_noise_sd=_noise(found.triads.matrix, found.accelerometer_noise),
+        accelerometer_noise_sd=_noise(matrix, found.accelerometer_noise),
         gyroscope_noise_sd=_noise(maps, found.gyroscope_noise),
-        accelerometer_range=nearest_rail(
-            recording.accelerometer_range, found.triads.matrix, found.triads.offset
-        ),
+        accelerometer_range=nearest_rail(recording.accelerometer_range, matrix, offset),
         gyroscope_range=nearest_rail(recording.gyroscope_range, maps, found.gyroscope_offset),
         map_covariance=found.left(),
         clock_sd=float(clock_sd),
         stationary=still,
-        accelerometer_axes=_axes(recording, found),
+        accelerometer_axes=axes,
         specific_force_saturated=rails_shown(back, recording.saturated_accelerometers()),
         angular_rate_saturated=rails_shown(turn_back, recording.saturated_gyroscopes()),
         correction=_correction(recording, found, back, turn_back),
@@ -306,13 +303,6 @@ def _correction(recording: Recording, found: FirstOrder, *inverses) -> xr.Datase
             f"{kind}_offset_walk": (walk, rooted),
         }  # fmt: skip
     return xr.Dataset({name: (CORRECTION[name], *both) for name, both in variables.items()})
-
-
-def _axes(recording: Recording, found: FirstOrder) -> np.ndarray:
-    """Rotations (A, 3, 3) from the accelerometers' own axes to those of the corrected readings."""
-    own = recording.accelerometer_axes
-    back = np.swapaxes(nearest_orthogonal(found.triads.matrix), 1, 2)
-    return back if own is None else back @ own
 
 
 def rails_shown(inverse, rails) -> np.ndarray:

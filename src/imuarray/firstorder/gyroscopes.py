@@ -58,17 +58,13 @@ def compare(rate, time, usable, turn, labels) -> Relative | str:
     usable[[0, -1]] = False
     if usable.sum() < FEWEST:
         return f"fewer than {FEWEST} moving samples off the rails"
-    if _flat(first[usable]):
+    sizes = np.linalg.eigvalsh(np.einsum("tki,tkj->kij", first[usable], first[usable]))
+    if np.median(sizes[:, 0] / sizes[:, 2]) < FLATTEST:
         return "the array was turned about one or two axes only"
     turn = turn @ _turns(first[usable], turn, labels)
     aligned = np.einsum("kji,tkj->tki", turn, rate)
     maps, covariance = _maps(aligned, time, usable)
     return Relative(turn, maps, covariance, int(usable.sum()))
-
-
-def _flat(rate) -> bool:
-    values = np.linalg.eigvalsh(np.einsum("tki,tkj->kij", rate, rate))
-    return bool(np.median(values[:, 0] / values[:, 2]) < FLATTEST)
 
 
 def _turns(rate, turn, labels) -> np.ndarray:

@@ -92,10 +92,7 @@ def averaged_sd(pieces, step: float) -> np.ndarray:
 
 def lag_correlation(pieces) -> np.ndarray:
     """Correlation of neighbouring readings, (...); zero for white noise."""
-    centred = [piece - piece.mean(axis=0) for piece in pieces]
-    products = np.concatenate([x[1:] * x[:-1] for x in centred])
-    squares = np.concatenate([x**2 for x in centred])
-    return products.mean(axis=0) / _not_zero(squares.mean(axis=0))
+    return _neighbours([piece - piece.mean(axis=0) for piece in pieces], 0.0)
 
 
 def smoothing(pieces) -> np.ndarray:
@@ -104,14 +101,14 @@ def smoothing(pieces) -> np.ndarray:
     Of their differences, which no drift moves: -1/2 for white noise, -(1 - r) / 2 for noise of
     correlation r, 0 for a moving average.
     """
-    steps = [np.diff(piece, axis=0) for piece in pieces]
-    products = np.concatenate([x[1:] * x[:-1] for x in steps]).mean(axis=0)
-    squares = np.concatenate([x**2 for x in steps]).mean(axis=0)
-    return np.where(squares > 0, 1 + 2 * products / _not_zero(squares), 0.0)
+    return 1 + 2 * _neighbours([np.diff(piece, axis=0) for piece in pieces], -0.5)
 
 
-def _not_zero(squares):
-    return np.where(squares > 0, squares, 1.0)
+def _neighbours(pieces, constant: float) -> np.ndarray:
+    """Correlation of neighbours about zero, (...); ``constant`` where all are zero."""
+    products = np.concatenate([x[1:] * x[:-1] for x in pieces]).mean(axis=0)
+    squares = np.concatenate([x**2 for x in pieces]).mean(axis=0)
+    return np.where(squares > 0, products / np.where(squares > 0, squares, 1.0), constant)
 
 
 def outside_dead_band(sd, pieces, declared: float) -> np.ndarray:
@@ -167,11 +164,11 @@ def still_poses(recording: Recording, shortest=SHORTEST) -> list[slice]:
     still[breaks] = False
     found, least = runs(still), shortest - (2 * half + 0.5) * step
     lasts = [recording.time[b - 1] - recording.time[a] + step for a, b in found]
-    poses = [
-        _cut(a, b, half, int(round(KEPT / step)))
-        for (a, b), length in zip(found, lasts, strict=True)
-        if b - a >= 2 and length > least
-    ]  # fmt: skip
+    poses, kept = [], int(round(KEPT / step))
+    for (a, b), length in zip(found, lasts, strict=True):
+        if b - a >= 2 and length > least:
+            margin = min(half, max(b - a - kept, 0) // 2)
+            poses.append(slice(a + margin, b - margin))
     if recording.stationary is None:
         poses = _not_turning(recording, poses)
     if not poses:
@@ -225,12 +222,6 @@ def _together(readings) -> np.ndarray:
     if np.array_equal(turns, np.broadcast_to(np.eye(3), turns.shape)):
         return readings.mean(axis=1)
     return np.einsum("kij,tki->tj", turns, readings) / len(turns)
-
-
-def _cut(start: int, stop: int, margin: int, kept: int) -> slice:
-    """A pose without a margin at its ends, as far as ``kept`` samples are left."""
-    margin = min(margin, max(stop - start - kept, 0) // 2)
-    return slice(start + margin, stop - margin)
 
 
 def _steps(recording: Recording, step: float) -> np.ndarray:

@@ -66,8 +66,15 @@ def angle_of(rotations) -> np.ndarray:
 
 def parts_of(matrices) -> dict[str, np.ndarray]:
     """Scale, misalignment (xy, xz, yz) and orientation (rotation vector) of (K, 3, 3), (K, 3)."""
-    values = [_parts(matrix) for matrix in matrices]
-    return {name: np.array([value[name] for value in values]) for name in values[0]}
+    from scipy.spatial.transform import Rotation
+
+    uppers, rotations = map(np.array, zip(*map(upper_times_rotation, matrices), strict=True))
+    scale = np.einsum("kii->ki", uppers)
+    return {
+        "scale": scale,
+        "misalignment": uppers[:, *SKEW] / scale[:, SKEW[0]],
+        "orientation": Rotation.from_matrix(rotations).as_rotvec(),
+    }
 
 
 def parts_sd_of(matrices, covariances) -> dict[str, np.ndarray]:
@@ -85,19 +92,6 @@ def upper_times_rotation(matrix) -> tuple[np.ndarray, np.ndarray]:
     signs = np.sign(np.diag(upper))
     signs[0] *= np.sign(np.linalg.det(rotation * signs[:, None]))  # so that R stays a rotation
     return upper * signs, rotation * signs[:, None]
-
-
-def _parts(matrix) -> dict[str, np.ndarray]:
-    """Scale, misalignment (xy, xz, yz) and rotation vector of one triad's matrix, (3,) each."""
-    from scipy.spatial.transform import Rotation
-
-    upper, rotation = upper_times_rotation(matrix)
-    scale = np.diag(upper)
-    return {
-        "scale": scale,
-        "misalignment": upper[SKEW] / scale[SKEW[0]],
-        "orientation": Rotation.from_matrix(rotation).as_rotvec(),
-    }
 
 
 def _part_slopes(matrix) -> dict[str, np.ndarray]:
