@@ -121,8 +121,11 @@ def align(
     noise = np.sqrt(np.mean(np.reshape([one.noise_sd**2 for one in facts], (-1, 2)), axis=0))
     both = np.hypot(gyroscopes[0].noise_sd, [g.noise_sd for g in gyroscopes])
     agreement = np.array([np.nan, *(clock.residual for clock in clocks[1:])]) / both
+    unknown = np.full((3, 3), np.nan)
+    declared = np.array([unknown if log.axes is None else log.axes for log in logs])
     found = Alignment(
-        recording.accelerometer_labels, rotation, _declared(logs, rotation),
+        recording.accelerometer_labels, rotation,
+        angle_of(np.swapaxes(rotation, 1, 2) @ declared),
         _of_stamps(clocks, gyroscopes, origins), agreement,
         tuple(zip(facts[::2], facts[1::2], strict=True)), step, origins[0], int(whole.sum()),
         int((~whole).sum()), np.array([log.epoch for log in logs]), tuple(_ends(sensors)),
@@ -267,11 +270,3 @@ def _recording(logs, rotation, grid, sensors, knots) -> tuple[Recording, np.ndar
         max(log.gyroscope_range for log in logs), np.nan, specific_force_saturated=force_rails,
         angular_rate_saturated=rate_rails, accelerometer_axes=rotation,
     ), whole  # fmt: skip
-
-
-def _declared(logs: Sequence[Log], rotation) -> np.ndarray:
-    """(K,) rad between rotations found and declared, NaN where there are none declared."""
-    return np.array([
-        np.nan if log.axes is None else angle_of(found.T @ log.axes)
-        for log, found in zip(logs, rotation, strict=True)
-    ])  # fmt: skip
