@@ -225,8 +225,13 @@ def _of_stamps(clocks, gyroscopes, origins) -> tuple[Clock, ...]:
     """Clocks of the logs' own stamps; instants that stand for jittering ones are means of them."""
     unsure = np.array([g.jitter / np.sqrt(len(g.time)) for g in gyroscopes])
     unsure[1:], unsure[0] = np.hypot(unsure[1:], unsure[0]), 0.0
-    parts = zip(clocks, origins, unsure, strict=True)
-    return tuple(clock.of_stamps(origin, origins[0], sd) for clock, origin, sd in parts)
+    found = []
+    for clock, origin, sd in zip(clocks, origins, unsure, strict=True):
+        covariance = clock.covariance.copy()
+        covariance[0, 0] += sd**2
+        offset, middle = clock.offset + origin - origins[0], clock.middle + origin
+        found.append(clock._replace(offset=offset, middle=middle, covariance=covariance))
+    return tuple(found)
 
 
 def _require_slow(sensors: Sequence[Sensor]) -> None:

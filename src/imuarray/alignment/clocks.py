@@ -46,17 +46,6 @@ class Clock(NamedTuple):
         """On the first log's clock, s."""
         return stamps - self.offset - self.drift * (stamps - self.middle)
 
-    def of_stamps(self, own: float, first: float, unsure: float) -> Clock:
-        """The clock for stamps that count from ``own`` and, the first's, from ``first`` s.
-
-        ``unsure`` s: sd of the whole log's stamps against its readings.
-        """
-        covariance = self.covariance.copy()
-        covariance[0, 0] += unsure**2
-        return self._replace(
-            offset=self.offset + own - first, middle=self.middle + own, covariance=covariance
-        )
-
     @property
     def rotation(self) -> np.ndarray:
         """From the first's axes to the log's, (3, 3)."""

@@ -71,11 +71,6 @@ class Alignment:
     ends: tuple[str, ...]
 
     @property
-    def angle(self) -> np.ndarray:
-        """(K,) rad, between each chip's axes and the first's."""
-        return angle_of(np.swapaxes(self.rotation, 1, 2) @ self.rotation[0])
-
-    @property
     def angle_sd(self) -> np.ndarray:
         """(K,) rad, about one axis, mean over axes."""
         return np.sqrt([np.trace(clock.turn_covariance) / 3 for clock in self.clocks])
@@ -93,8 +88,9 @@ class Alignment:
 
     def _lies(self, k: int) -> str:
         clock, (ahead, faster) = self.clocks[k], np.sqrt(np.diag(self.clocks[k].covariance)[:2])
+        angle = angle_of(self.rotation[k].T @ self.rotation[0])
         text = (
-            f"turned by {_with(np.degrees(self.angle[k]), np.degrees(self.angle_sd[k]))} degrees"
+            f"turned by {_with(np.degrees(angle), np.degrees(self.angle_sd[k]))} degrees"
             f" against IMU {self.labels[0]}; its clock is"
             f" {_with(1e3 * abs(clock.offset), 1e3 * ahead)}"
             f" ms {'behind' if clock.offset < 0 else 'ahead'} at its middle and"

@@ -112,9 +112,8 @@ class Sensor:
         for axis in range(3):
             railed = self.time[self.railed[:, axis]]
             if len(railed):
-                after = np.clip(np.searchsorted(railed, at), 1, max(len(railed) - 1, 1))
-                beside = railed[[after - 1, np.minimum(after, len(railed) - 1)]]
-                found[:, axis] = np.abs(beside - at).min(axis=0) < reach
+                nearest = railed[np.searchsorted((railed[1:] + railed[:-1]) / 2, at)]
+                found[:, axis] = np.abs(nearest - at) < reach
         return found
 
 

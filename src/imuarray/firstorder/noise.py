@@ -13,7 +13,7 @@ from scipy.optimize import nnls
 from scipy.special import chdtrc
 
 from imuarray.errors import InputError
-from imuarray.firstorder.report import allan_table, axes_of
+from imuarray.firstorder.report import allan_table, axes_table
 from imuarray.firstorder.still import still_poses
 from imuarray.recording import Recording
 
@@ -230,13 +230,10 @@ def allan(recording: Recording) -> StillNoise:
     spectra, terms = [], []
     for sensor, units in UNITS.items():
         found = spectrum([getattr(recording, sensor)[pose] for pose in poses], 1 / rate)
-        index = axes_of(recording, sensor, frequency_hz=found.frequency)
-        density = {"density": np.sqrt(found.power).ravel()}
-        spectra.append(pd.DataFrame(density, index).reset_index())
-        fitted = noise_terms(found, rate)
-        index = axes_of(recording, sensor, term=TERMS)
-        columns = {name: part.ravel() for name, part in fitted._asdict().items()}
-        table = pd.DataFrame(columns, index).reset_index()
+        density = {"density": np.sqrt(found.power)}
+        spectra.append(axes_table(density, recording, sensor, frequency_hz=found.frequency))
+        fitted = noise_terms(found, rate)._asdict()
+        table = axes_table(fitted, recording, sensor, term=TERMS)
         table["unit"] = table.term.map(dict(zip(TERMS, units, strict=True)))
         terms.append(table)
     table = pd.concat(terms, ignore_index=True)

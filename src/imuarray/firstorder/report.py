@@ -119,13 +119,10 @@ def gyroscope_lines(maps: Gyroscopes | None, recording: Recording) -> list[str]:
             axes = Rotation.from_matrix(common.turn).as_rotvec(degrees=True).round()
             lines.append(f"gyroscopes: all turned against the accelerometers by {axes} degrees")
     parts = parts_of(maps.matrix)
+    scale, skew = 100 * (parts["scale"] - 1), 100 * parts["misalignment"]
     lines.append("triad  turned deg           scale %                misalignment %")
-    for k, label in enumerate(recording.gyroscope_labels):
-        shown = (
-            np.degrees(parts["orientation"][k]),
-            100 * (parts["scale"][k] - 1),
-            (100 * parts["misalignment"][k]),
-        )
+    rows = zip(np.degrees(parts["orientation"]), scale, skew, strict=True)
+    for label, shown in zip(recording.gyroscope_labels, rows, strict=True):
         text = [", ".join(f"{value:+.2f}" for value in row) for row in shown]
         lines.append(f"{label:>5}  {text[0]:19}  {text[1]:21}  {text[2]}")
     return lines
@@ -187,11 +184,13 @@ def _allan(poses, recording: Recording, sensor: str):
     return taus, deviation, deviation / np.sqrt(2 * apart)  # sds: IEEE Std 952, C.1
 
 
-def axes_of(recording: Recording, sensor: str, **first) -> pd.MultiIndex:
-    """Rows of every axis of every triad, for each of what ``first`` names and lists."""
+def axes_table(columns: dict, recording: Recording, sensor: str, **first) -> pd.DataFrame:
+    """``columns`` (..., K, 3) with rows of every axis of every triad, for each of ``first``."""
     labels = getattr(recording, f"{SENSORS[sensor]}_labels")
     levels = {"sensor": [sensor], **first, "triad": labels, "axis": list("xyz")}
-    return pd.MultiIndex.from_product(levels.values(), names=list(levels))
+    rows = pd.MultiIndex.from_product(levels.values(), names=list(levels))
+    flat = {name: values.ravel() for name, values in columns.items()}
+    return pd.DataFrame(flat, rows).reset_index()
 
 
 def noise_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
@@ -204,15 +203,14 @@ def noise_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
     for sensor, kind in SENSORS.items():
         taus, deviation, _ = _allan(found.poses, recording, sensor)
         declared = getattr(recording, f"{kind}_noise_sd")
-        sd = getattr(found, f"{kind}_noise").ravel()
+        sd = getattr(found, f"{kind}_noise")
         columns = {
-            "declared": declared, "sd": sd, "ratio": sd / declared,
-            "correlation": getattr(found, f"{kind}_correlation").ravel(),
-            "allan_1s": deviation[np.argmin(np.abs(taus - 1.0))].ravel(),
-            "floor": deviation.min(axis=0).ravel(),
-            "floor_tau": taus[deviation.argmin(axis=0)].ravel(),
+            "declared": np.full_like(sd, declared), "sd": sd, "ratio": sd / declared,
+            "correlation": getattr(found, f"{kind}_correlation"),
+            "allan_1s": deviation[np.argmin(np.abs(taus - 1.0))],
+            "floor": deviation.min(axis=0), "floor_tau": taus[deviation.argmin(axis=0)],
         }  # fmt: skip
-        parts.append(pd.DataFrame(columns, axes_of(recording, sensor)).reset_index())
+        parts.append(axes_table(columns, recording, sensor))
     return pd.concat(parts, ignore_index=True)
 
 
@@ -221,9 +219,8 @@ def allan_table(poses, recording: Recording) -> pd.DataFrame:
     parts = []
     for sensor in SENSORS:
         taus, deviation, sd = _allan(poses, recording, sensor)
-        columns = {"deviation": deviation.ravel(), "sd": sd.ravel()}
-        rows = axes_of(recording, sensor, tau_s=taus)
-        parts.append(pd.DataFrame(columns, rows).reset_index())
+        columns = {"deviation": deviation, "sd": sd}
+        parts.append(axes_table(columns, recording, sensor, tau_s=taus))
     return pd.concat(parts, ignore_index=True)
 
 

@@ -50,7 +50,6 @@ class TriadFit:
     used : (P, A) bool
         False where a triad's reading in a pose was left out as an outlier.
     direction_covariance : (3 P, 3 P), scaled like the other; along a direction it says nothing
-    recording : (P,) int, the recording of each pose
     walk : (A,) m/s^2 per root of a second, sd of an offset's walk; 0 where none shows
     doubtful : (P,) factor of a pose's noise, more than 1 where no triad says what the others do
     fitted : what the poses of all recordings gave
@@ -64,7 +63,6 @@ class TriadFit:
     residual_ratio: float
     used: np.ndarray
     direction_covariance: np.ndarray
-    recording: np.ndarray
     walk: np.ndarray
     doubtful: np.ndarray
     fitted: Fitted
@@ -94,14 +92,13 @@ class TriadFit:
 
     def of(self, number: int) -> Self:
         """The fit with one recording's poses only, and its offsets."""
-        own = self.recording == number
+        own = self.fitted.given.recording == number
         both = np.ix_(np.repeat(own, 3), np.repeat(own, 3))
         offset, covariance = _offset_of(self.fitted, self.used.shape, number)
         return replace(
             self, offset=offset, covariance=covariance, direction=self.direction[own],
             residual=self.residual[own], used=self.used[own],
-            direction_covariance=self.direction_covariance[both], recording=self.recording[own],
-            doubtful=self.doubtful[own],
+            direction_covariance=self.direction_covariance[both], doubtful=self.doubtful[own],
         )  # fmt: skip
 
     @property
@@ -286,5 +283,5 @@ def _result(own: Fitted, used, ratio: float, walk, doubtful) -> TriadFit:
     direction = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     return TriadFit(
         matrices, offset, direction, own.given.misfit(own.values), covariance, ratio, used,
-        own.covariance[-3 * poses :, -3 * poses :], own.given.recording, walk, doubtful, own,
+        own.covariance[-3 * poses :, -3 * poses :], walk, doubtful, own,
     )  # fmt: skip

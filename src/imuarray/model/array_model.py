@@ -198,13 +198,9 @@ def _predict_many(model, motion, positions, parameters, time, span):
         return model.predict(motion, positions, parameters, time=time, span=span)
 
     several = jax.vmap(at, in_axes=(0, 0, None, None))
-
-    def single(motion, positions, parameters):
-        return several(motion, time, positions, parameters)
-
     if positions.ndim == 3:
-        return jax.vmap(single, in_axes=(0, 0, None))(motion, positions, parameters)
-    return single(motion, positions, parameters)
+        several = jax.vmap(several, in_axes=(0, None, 0, None))
+    return several(motion, time, positions, parameters)
 
 
 def component(effect: str, place: tuple[int, ...]) -> str:

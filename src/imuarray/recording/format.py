@@ -23,23 +23,27 @@ def from_dataset(dataset: xr.Dataset, where: str = "recording", stored: bool = F
     """
     validate.check_structure(dataset, where)
     stored = stored and dataset.sizes["time"] > record.PART
+
+    def values(name: str, scale: float | None = None) -> np.ndarray | Stored:
+        """In SI units, or true or false; in memory, or left in the file."""
+        found = Stored(dataset[name].variable, scale)
+        return found if stored and name in record.SAMPLED and dataset[name].ndim > 1 else found[:]
+
     arrays = {
-        name: _in_si_units(dataset[name], where, stored and name in record.SAMPLED[1:])
-        for name in record.QUANTITIES
+        name: values(
+            name, factor(quantity, dataset[name].attrs.get("units"), f"{where}: {name}: units")
+        )
+        for name, quantity in record.QUANTITIES.items()
     }
     matrices = [name for name in record.MATRICES if name in dataset]
     corrected = [name for name in record.CORRECTION if name in dataset]
     numbers = [n for n in record.NUMBERS | record.OPTIONAL_NUMBERS if n in dataset.attrs]
-    flags = {
-        name: Stored(dataset[name].variable) if stored and dataset[name].ndim > 1
-        else dataset[name].values.astype(bool)
-        for name in record.FLAGS if name in dataset
-    }  # fmt: skip
+    flags = [name for name in record.FLAGS if name in dataset]
     recording = Recording(
         **arrays,
         accelerometer_labels=validate.labels_of(dataset["accelerometer"]),
         gyroscope_labels=validate.labels_of(dataset["gyroscope"]),
-        **flags,
+        **{name: values(name) for name in flags},
         **{name: dataset[name].values.astype(float) for name in matrices},
         correction=dataset[corrected] if corrected else None,
         **{name: float(np.asarray(dataset.attrs[name]).item()) for name in numbers},
@@ -47,15 +51,6 @@ def from_dataset(dataset: xr.Dataset, where: str = "recording", stored: bool = F
     )
     validate.check_values(recording, where)
     return recording
-
-
-def _in_si_units(variable: xr.DataArray, where: str, stored: bool) -> np.ndarray | Stored:
-    """Values as float64, or left in the file, by the attribute `units`; InputError if unknown."""
-    place = f"{where}: {variable.name}: units"
-    scale = factor(record.QUANTITIES[str(variable.name)], variable.attrs.get("units"), place)
-    if stored:
-        return Stored(variable.variable, scale)
-    return scale * np.asarray(variable.values, dtype=float)
 
 
 def read_recording(path: str | Path, stored: bool = False) -> Recording:
