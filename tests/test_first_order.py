@@ -253,7 +253,7 @@ def test_recordings_of_a_board_share_matrices_and_have_offsets_of_their_own():
     narrower = both.parts_sd()["scale"] / both.residual_ratio < alone.parts_sd()["scale"]
     assert narrower.all()
     own = both.of(0)
-    assert own.residual.shape == (9, 3, 3) and own.direction_covariance.shape == (27, 27)
+    assert own.residual.shape == (9, 3, 3) and own.direction.shape == (9, 3)
 
 
 def test_a_jumping_offset_is_left_out_where_it_jumps():

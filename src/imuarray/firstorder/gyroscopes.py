@@ -219,10 +219,6 @@ class Still(NamedTuple):
         counts = [pose.stop - pose.start for pose in self.poses]
         return self.recording.angular_rate - np.average(self.offsets, axis=0, weights=counts)
 
-    def good(self) -> np.ndarray:
-        """(T,) bool: no gyroscope is at its rail."""
-        return ~self.recording.at_rail("gyroscope")
-
 
 def calibrate_gyroscopes(every: Sequence[Still], triads: TriadFit) -> tuple[Gyroscopes, TriadFit]:
     """Maps of all gyroscopes: relative to their mean, and one common map from the moves.
@@ -240,7 +236,7 @@ def calibrate_gyroscopes(every: Sequence[Still], triads: TriadFit) -> tuple[Gyro
         times.append(one.recording.time - one.recording.time[0] + begun)
         begun = times[-1][-1] + APART
     rate = np.concatenate([one.rate() for one in every])
-    free = np.concatenate([one.good() & one.moving for one in every])
+    free = np.concatenate([one.moving & ~one.recording.at_rail("gyroscope") for one in every])
     start = _start(own.recording, triads)
     labels = own.recording.gyroscope_labels
     relative = compare(rate, np.concatenate(times), free, start, labels)
@@ -249,7 +245,8 @@ def calibrate_gyroscopes(every: Sequence[Still], triads: TriadFit) -> tuple[Gyro
     else:
         turn, maps = relative.turn, relative.map
     moves = _moves(every, turn @ maps)
-    common = common_map(moves, triads.direction, triads.direction_covariance)
+    count = triads.direction.size
+    common = common_map(moves, triads.direction, triads.fitted.covariance[-count:, -count:])
     matrix, covariance, by_common = _together(turn, maps, relative, common)
     maps_only = np.arange(12 * len(triads.matrix)).reshape(-1, 12)[:, :9].ravel()
     beside = np.zeros((len(covariance), len(maps_only)))
@@ -268,7 +265,8 @@ def _moves(every: Sequence[Still], matrix) -> list[Move]:
         mean = np.einsum("kij,tkj->ti", back, one.recording.angular_rate) / count
         still = np.einsum("kij,pkj->pi", back, one.offsets) / count
         sd = float(np.sqrt(np.mean(one.noise**2) / count))
-        own = gather(mean, one.recording.time, one.poses, still, one.good(), sd)
+        good = ~one.recording.at_rail("gyroscope")
+        own = gather(mean, one.recording.time, one.poses, still, good, sd)
         moves += [move._replace(first=move.first + poses) for move in own]
         poses += len(one.poses)
     return moves

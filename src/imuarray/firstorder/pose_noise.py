@@ -66,12 +66,8 @@ class PoseNoise(NamedTuple):
             return self
         rows, one = _Rows.of(misfit, slopes, fixed), np.ones(len(self.walk))
         unit = np.median(self.sd) ** 2
-
-        def profiled(noise: PoseNoise) -> tuple[float, float]:
-            return rows.profiled(noise.whitening(used), used)
-
         found = minimize_scalar(
-            lambda x: profiled(self._replace(walk=unit * np.exp(x) * one))[0],
+            lambda x: rows.profiled(self._replace(walk=unit * np.exp(x) * one), used)[0],
             bounds=np.log(RANGE), method="bounded", options={"xatol": 0.05},
         )  # fmt: skip
         # noise and walk that both grow: what of it is noise's, the fit's residual will show
@@ -81,8 +77,8 @@ class PoseNoise(NamedTuple):
             own, freedom = rows.own(self, used, unit)
             if freedom > FREEDOM:
                 ways.append((own, 2 * (SHOWN + 2 * len(one) - 2)))
-        best = min(ways, key=lambda way: profiled(way[0])[0] + way[1])[0]
-        return best._replace(walk=best.walk * profiled(best)[1])
+        best = min(ways, key=lambda way: rows.profiled(way[0], used)[0] + way[1])[0]
+        return best._replace(walk=best.walk * rows.profiled(best, used)[1])
 
 
 class _Rows(NamedTuple):
@@ -106,10 +102,6 @@ class _Rows(NamedTuple):
         own = np.take_along_axis(padded, columns[:, None, None], axis=-1)
         return cls(np.moveaxis(misfit, 0, -1), own, columns, fixed)
 
-    def free(self, used) -> int:
-        """Number of misfits more than parameters that they determine."""
-        return 3 * int(used.sum()) - (len(self.fixed) - np.linalg.matrix_rank(self.fixed))
-
     def solved(self, white):
         """Whitened misfits and slopes; information (n, n), its right side (n,) and solution."""
         count = len(self.fixed)
@@ -124,13 +116,16 @@ class _Rows(NamedTuple):
         step = scale * np.linalg.solve(inner * np.outer(scale, scale), scale * right)
         return left, rows, inner, right, step
 
-    def profiled(self, white, used) -> tuple[float, float]:
-        """-2 log of the restricted likelihood under ``white``, and a factor of all variances in it.
+    def profiled(self, noise: PoseNoise, used) -> tuple[float, float]:
+        """-2 log of the restricted likelihood of a noise, and a factor of all variances in it.
 
         The factor is the one that fits best, at least 1.
         """
+        white = noise.whitening(used)
         left, _, inner, right, step = self.solved(white)
-        free, square = self.free(used), float(np.sum(left**2) - right @ step)
+        # misfits more than parameters that they determine
+        free = 3 * int(used.sum()) - (len(self.fixed) - np.linalg.matrix_rank(self.fixed))
+        square = float(np.sum(left**2) - right @ step)
         grown = max(square / free, 1.0)
         known, size = np.diagonal(white, axis1=-2, axis2=-1), np.diag(inner)
         scaled = inner / np.sqrt(np.outer(size, size))

@@ -49,7 +49,6 @@ class TriadFit:
         nothing else is there.
     used : (P, A) bool
         False where a triad's reading in a pose was left out as an outlier.
-    direction_covariance : (3 P, 3 P), scaled like the other; along a direction it says nothing
     walk : (A,) m/s^2 per root of a second, sd of an offset's walk; 0 where none shows
     doubtful : (P,) factor of a pose's noise, more than 1 where no triad says what the others do
     fitted : what the poses of all recordings gave
@@ -62,7 +61,6 @@ class TriadFit:
     covariance: np.ndarray
     residual_ratio: float
     used: np.ndarray
-    direction_covariance: np.ndarray
     walk: np.ndarray
     doubtful: np.ndarray
     fitted: Fitted
@@ -93,12 +91,10 @@ class TriadFit:
     def of(self, number: int) -> Self:
         """The fit with one recording's poses only, and its offsets."""
         own = self.fitted.given.recording == number
-        both = np.ix_(np.repeat(own, 3), np.repeat(own, 3))
-        offset, covariance = _offset_of(self.fitted, self.used.shape, number)
+        offset, covariance = _offset_of(self.fitted, len(self.matrix), number)
         return replace(
             self, offset=offset, covariance=covariance, direction=self.direction[own],
-            residual=self.residual[own], used=self.used[own],
-            direction_covariance=self.direction_covariance[both], doubtful=self.doubtful[own],
+            residual=self.residual[own], used=self.used[own], doubtful=self.doubtful[own],
         )  # fmt: skip
 
     @property
@@ -265,9 +261,8 @@ def _places(triads: int) -> np.ndarray:
     )
 
 
-def _offset_of(own: Fitted, shape, number: int) -> tuple[np.ndarray, np.ndarray]:
+def _offset_of(own: Fitted, triads: int, number: int) -> tuple[np.ndarray, np.ndarray]:
     """A recording's offsets (A, 3), and the covariance (12 A, 12 A) of matrices and these."""
-    poses, triads = shape
     place, split = _places(triads), 6 + 9 * (triads - 1)
     mine = split + 3 * triads * number + np.arange(3 * triads)
     index = np.ix_(*2 * [np.concatenate([np.arange(split), mine])])
@@ -279,9 +274,9 @@ def _offset_of(own: Fitted, shape, number: int) -> tuple[np.ndarray, np.ndarray]
 def _result(own: Fitted, used, ratio: float, walk, doubtful) -> TriadFit:
     poses, triads = used.shape
     matrices, _, directions = (np.asarray(x) for x in _unpack(own.values, triads, poses))
-    offset, covariance = _offset_of(own, used.shape, 0)
+    offset, covariance = _offset_of(own, triads, 0)
     direction = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     return TriadFit(
         matrices, offset, direction, own.given.misfit(own.values), covariance, ratio, used,
-        own.covariance[-3 * poses :, -3 * poses :], walk, doubtful, own,
+        walk, doubtful, own,
     )  # fmt: skip

@@ -133,16 +133,12 @@ class ArrayModel:
         triad, ``parameters`` (P,) flat effect parameters; ``when`` is what else an `Instant`
         holds: time (s), span (s), second and third derivatives.
         """
-        instant = self.placed(Instant(motion, positions, **when))
+        instant = Instant(motion, positions, axes=self.array.turns, **when)
         predicted = self.ideal(instant)
         values = self.split(jnp.asarray(parameters)) if self.effects else {}
         for item in self.chain:
             predicted = item.apply(values[item.id], instant, predicted)
         return predicted
-
-    def placed(self, instant: Instant) -> Instant:
-        """An instant that knows how the triads are mounted."""
-        return instant._replace(axes=self.array.turns)
 
     def ideal(self, instant: Instant) -> Prediction:
         """The prediction without effects: what they are applied to."""

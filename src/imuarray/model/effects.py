@@ -193,7 +193,9 @@ def effect(id, *, unit, prior_sd, shape, sensors=None, **fields):
     def register(function):
         if "," in id or " " in id:
             raise ValueError(f"effect {id!r}: expected an id without commas and spaces")
-        if id in EFFECTS and not _again(EFFECTS[id].apply, function):
+        # a notebook's cell that is run once more replaces its own effect
+        again = id in EFFECTS and EFFECTS[id].apply.__module__ == function.__module__ == "__main__"
+        if id in EFFECTS and not again:
             raise ValueError(f"effect {id}: expected a new id, found it registered already")
         if (what := fields.get("against", "")) not in AGAINST:
             raise ValueError(f"effect {id}: expected against one of {AGAINST[1:]}, found {what!r}")
@@ -224,11 +226,6 @@ def each_mean(shape, axes=None) -> list[np.ndarray]:
     """Gauges: the mean over triads of each parameter."""
     each = np.eye(int(np.prod(shape[1:])), dtype=bool)
     return [np.broadcast_to(row.reshape(shape[1:]), shape) for row in each]
-
-
-def _again(old, new) -> bool:
-    """True where a notebook's cell is run once more: its new effect replaces the old one."""
-    return old.__module__ == new.__module__ == "__main__"
 
 
 def find_effects(ids) -> tuple[Effect, ...]:

@@ -25,7 +25,7 @@ def by_effects(model: ArrayModel, count: int, instant: Instant, parameters):
     what comes after it is a 6 x 6 matrix of each IMU: directions through the whole chain, one for
     each parameter, took several times as long.
     """
-    instant = model.placed(instant)
+    instant = instant._replace(axes=model.array.turns)
     predicted = model.ideal(instant)
     values, slopes = model.split(parameters), []
     before = Prediction(*(_each(part.shape, 3 * kind, 6) for kind, part in enumerate(predicted)))

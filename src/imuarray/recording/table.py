@@ -82,11 +82,6 @@ def _named(section) -> set[str]:
     return names.union(*map(_named, section.values()))
 
 
-def used(table: pd.DataFrame, layout) -> pd.DataFrame:
-    """The columns that a board's triads name."""
-    return table.loc[:, table.columns.isin(_named([layout[kind] for kind in layouts.KINDS]))]
-
-
 def _whole(table, layout, columns: str) -> tuple[pd.DataFrame, str]:
     """The rows to be used, numbered as in the file, and how many of how many."""
     if "incomplete_rows" not in layout:
@@ -129,20 +124,19 @@ def column(table, name, where, blank: bool = False) -> np.ndarray:
 def _sensors(table, layout, kind, where, layout_name):
     """Readings (T, K, 3) in SI units in the array frame, and the labels."""
     section = layout[kind]
-    unit, scale = unit_of(section, kind, layout_name)
-    parts = []
+    unit, parts = unit_of(section, kind, layout_name), []
     for label, triad in section["triads"].items():
         place = f"{layout_name}: {kind} {label!r}"
         names = layouts.three_columns(triad["columns"], place)
         own = np.stack([column(table, name, where).astype(float) for name in names], axis=1)
-        parts.append(unit * scale * own @ _turn(triad, place).T)
+        parts.append(unit * own @ _turn(triad, place).T)
     return np.stack(parts, axis=1), tuple(str(label) for label in section["triads"])
 
 
-def unit_of(section, kind, where: str) -> tuple[float, float]:
-    """A kind's unit in SI units, and how many units a count is."""
+def unit_of(section, kind, where: str) -> float:
+    """What 1 in a kind's columns is in SI units, by its unit and how many units a count is."""
     unit = factor(layouts.QUANTITIES[kind], section["unit"], f"{where}: {kind}: unit")
-    return unit, layouts.positive(section.get("scale", 1.0), f"{where}: {kind}: scale")
+    return unit * layouts.positive(section.get("scale", 1.0), f"{where}: {kind}: scale")
 
 
 def _turn(triad, where: str) -> np.ndarray:
@@ -218,7 +212,8 @@ def read_tables(
     if "imus" in layout:
         return _read(loaded, layout, layout["imus"], str(columns)), lines
     table = loaded[files[0]]
-    blank = used(table, layout).isna().mean()
+    of_triads = table.columns.isin(_named([layout[kind] for kind in layouts.KINDS]))
+    blank = table.loc[:, of_triads].isna().mean()
     slow = (blank > (0.0 if len(table) > LONG else OFTEN)).any()
     if slow and "incomplete_rows" not in layout:
         freely = "output_rate" not in layout
@@ -232,7 +227,7 @@ def _read(loaded, layout, imus: dict[str, dict], name: str) -> Rig:
     read, unused, stamped = {}, list(loaded), True
     for label, imu in imus.items():
         where = f"{name}: imus {label!r}"
-        units = [np.prod(unit_of(imu[kind], kind, where)) for kind in layouts.KINDS]
+        units = [unit_of(imu[kind], kind, where) for kind in layouts.KINDS]
         paths = [_file(log, label, list(loaded), where) for log in pair(imu.get("log"))]
         times = pair(imu.get("time", layout.get("time")))
         stamped &= len(loaded) == 1 or not any(isinstance(t, dict) and "rate" in t for t in times)
