@@ -13,6 +13,7 @@ from imuarray.firstorder.correct import rails_shown
 from imuarray.recording import Recording, read_recording
 from imuarray.recording.channels import repeated
 from imuarray.recording.layout import read_layout, rotation
+from imuarray.recording.record import KINDS, RAIL
 from imuarray.recording.rig import Log, Rig, recording_of
 from imuarray.recording.undrawn import rough_positions
 from imuarray.recording.units import GRAVITY
@@ -20,8 +21,6 @@ from imuarray.trust import ends
 
 RECORDINGS = (".nc", ".nc4", ".h5")
 PACKETS = (".bin", ".bin.xz")
-RAIL = 1 - 1e-6  # of the range
-READ = {"accelerometer": "specific_force", "gyroscope": "angular_rate"}
 GRAVITY_WITHIN = 0.1  # of 1 (g) or of 1000 (mg), by which most readings' size is told
 SURE = 0.8  # of the rates' roughness is left at even instants; a motion too slow shows nothing
 RARE = 0.05  # of the rows: more are no garbage
@@ -76,7 +75,7 @@ def _with_rails(recording: Recording, layout=None) -> Recording:
     if layout is not None:
         triads = layout["gyroscopes"]["triads"].values()
         rates = np.array([rotation(one.get("axes", list("xyz")), "gyroscopes") for one in triads])
-    for (kind, name), turns in zip(READ.items(), (forces, rates), strict=True):
+    for (kind, name), turns in zip(KINDS.items(), (forces, rates), strict=True):
         if (np.isclose(turns, 0) | np.isclose(np.abs(turns), 1)).all():
             continue
         own = np.einsum("kji,tkj->tki", turns, getattr(recording, name))
@@ -172,7 +171,7 @@ def _less_garbage(recording: Recording) -> tuple[Recording, list[str]]:
     if 0 < empty.sum() < RARE * empty.size:
         recording = recording.select(~empty)
         lines.append(f"{empty.sum()} rows of zeros left out")
-    for kind, name in READ.items():
+    for kind, name in KINDS.items():
         values = getattr(recording, name)
         spikes = _spikes(values, getattr(recording, f"{kind}_noise_sd"))
         if not 0 < spikes.sum() < RARE * len(values):
@@ -244,7 +243,7 @@ def _railed(log: Log) -> tuple[Log, list[str]]:
     """With the rails that readings show within the declared ranges, and lines that say so."""
     ranges: dict[str, Any] = {}
     lines = []
-    for kind, name in READ.items():
+    for kind, name in KINDS.items():
         limit, values = getattr(log, f"{kind}_range"), getattr(log, name)
         least = _rail(values, limit, np.abs(values).max())
         if least < limit:
@@ -257,7 +256,7 @@ def _railed_triads(recording: Recording) -> tuple[Recording, list[str]]:
     """A board's triads, each with rails of its own, and lines that say so."""
     changed: dict[str, Any] = {}
     lines = []
-    for kind, name in READ.items():
+    for kind, name in KINDS.items():
         limit, values = getattr(recording, f"{kind}_range"), getattr(recording, name)
         largest = np.abs(values).max(initial=0.0)
         rails = np.array([_rail(own, limit, largest) for own in values.swapaxes(0, 1)])

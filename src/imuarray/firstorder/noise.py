@@ -16,6 +16,7 @@ from imuarray.errors import InputError
 from imuarray.firstorder.report import allan_table, axes_table
 from imuarray.firstorder.still import still_poses
 from imuarray.recording import Recording
+from imuarray.recording.record import KINDS
 
 BINS = 8  # an octave
 SLOWEST = 16  # of the readings' rate, the share up to which noise is fitted: filters shape the rest
@@ -29,8 +30,8 @@ WHITE, FLICKER, WALK = range(3)
 LONG = 0.5  # of the longest still stretch, what the others last that are pooled with it
 TERMS = ("noise_density", "bias_instability", "random_walk")
 UNITS = {
-    "specific_force": ("m s-2 Hz-1/2", "m s-2", "m s-3 Hz-1/2"),
-    "angular_rate": ("rad s-1 Hz-1/2", "rad s-1", "rad s-2 Hz-1/2"),
+    "accelerometer": ("m s-2 Hz-1/2", "m s-2", "m s-3 Hz-1/2"),
+    "gyroscope": ("rad s-1 Hz-1/2", "rad s-1", "rad s-2 Hz-1/2"),
 }
 OPEN = "left open: not seen in a record of this length"
 
@@ -228,12 +229,12 @@ def allan(recording: Recording) -> StillNoise:
             f" found {sum(lengths)}"
         )
     spectra, terms = [], []
-    for sensor, units in UNITS.items():
-        found = spectrum([getattr(recording, sensor)[pose] for pose in poses], 1 / rate)
+    for kind, units in UNITS.items():
+        found = spectrum([getattr(recording, KINDS[kind])[pose] for pose in poses], 1 / rate)
         density = {"density": np.sqrt(found.power)}
-        spectra.append(axes_table(density, recording, sensor, frequency_hz=found.frequency))
+        spectra.append(axes_table(density, recording, kind, frequency_hz=found.frequency))
         fitted = noise_terms(found, rate)._asdict()
-        table = axes_table(fitted, recording, sensor, term=TERMS)
+        table = axes_table(fitted, recording, kind, term=TERMS)
         table["unit"] = table.term.map(dict(zip(TERMS, units, strict=True)))
         terms.append(table)
     table = pd.concat(terms, ignore_index=True)

@@ -11,11 +11,10 @@ from imuarray.firstorder.still import allan_deviation
 from imuarray.firstorder.turns import TURNED, angle_of, nearest_orthogonal, parts_of, parts_sd_of
 from imuarray.provenance import digest, stamp
 from imuarray.recording import Recording, write_recording
-from imuarray.recording.record import FIRST_ORDER
+from imuarray.recording.record import FIRST_ORDER, KINDS
 
 MISALIGNMENT = ("xy", "xz", "yz")
 APART = 3.0  # times the usual walk, from which a sensor's is told by itself
-SENSORS = {"specific_force": "accelerometer", "angular_rate": "gyroscope"}
 
 
 UNITS = {"scale": "1", "misalignment": "1", "orientation": "rad"}
@@ -175,19 +174,19 @@ def residual_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
     })  # fmt: skip
 
 
-def _allan(poses, recording: Recording, sensor: str):
+def _allan(poses, recording: Recording, kind: str):
     """Averaging times (S,) s, Allan deviations (S, K, 3) of the still poses and their sds."""
-    step, readings = float(np.median(np.diff(recording.time))), getattr(recording, sensor)
+    step, readings = float(np.median(np.diff(recording.time))), getattr(recording, KINDS[kind])
     taus, deviation = allan_deviation([readings[pose] for pose in poses], step)
     lengths = np.array([[step * (pose.stop - pose.start)] for pose in poses])
     apart = np.sum(np.maximum(lengths / taus - 1, 0), axis=0)[:, None, None]
     return taus, deviation, deviation / np.sqrt(2 * apart)  # sds: IEEE Std 952, C.1
 
 
-def axes_table(columns: dict, recording: Recording, sensor: str, **first) -> pd.DataFrame:
+def axes_table(columns: dict, recording: Recording, kind: str, **first) -> pd.DataFrame:
     """``columns`` (..., K, 3) with rows of every axis of every triad, for each of ``first``."""
-    labels = getattr(recording, f"{SENSORS[sensor]}_labels")
-    levels = {"sensor": [sensor], **first, "triad": labels, "axis": list("xyz")}
+    labels = getattr(recording, f"{kind}_labels")
+    levels = {"sensor": [KINDS[kind]], **first, "triad": labels, "axis": list("xyz")}
     rows = pd.MultiIndex.from_product(levels.values(), names=list(levels))
     flat = {name: values.ravel() for name, values in columns.items()}
     return pd.DataFrame(flat, rows).reset_index()
@@ -200,8 +199,8 @@ def noise_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
     the averaging time nearest to 1 s; ``floor`` the smallest one and ``floor_tau`` (s) where.
     """
     parts = []
-    for sensor, kind in SENSORS.items():
-        taus, deviation, _ = _allan(found.poses, recording, sensor)
+    for kind in KINDS:
+        taus, deviation, _ = _allan(found.poses, recording, kind)
         declared = getattr(recording, f"{kind}_noise_sd")
         sd = getattr(found, f"{kind}_noise")
         columns = {
@@ -210,17 +209,17 @@ def noise_table(found: FirstOrder, recording: Recording) -> pd.DataFrame:
             "allan_1s": deviation[np.argmin(np.abs(taus - 1.0))],
             "floor": deviation.min(axis=0), "floor_tau": taus[deviation.argmin(axis=0)],
         }  # fmt: skip
-        parts.append(axes_table(columns, recording, sensor))
+        parts.append(axes_table(columns, recording, kind))
     return pd.concat(parts, ignore_index=True)
 
 
 def allan_table(poses, recording: Recording) -> pd.DataFrame:
     """Allan deviations of still poses: sensor, tau_s, triad, axis, deviation, sd (SI units)."""
     parts = []
-    for sensor in SENSORS:
-        taus, deviation, sd = _allan(poses, recording, sensor)
+    for kind in KINDS:
+        taus, deviation, sd = _allan(poses, recording, kind)
         columns = {"deviation": deviation, "sd": sd}
-        parts.append(axes_table(columns, recording, sensor, tau_s=taus))
+        parts.append(axes_table(columns, recording, kind, tau_s=taus))
     return pd.concat(parts, ignore_index=True)
 
 

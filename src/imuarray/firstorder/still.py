@@ -10,6 +10,7 @@ from imuarray.errors import InputError
 from imuarray.firstorder.turns import nearest_orthogonal
 from imuarray.recording import Recording
 from imuarray.recording.channels import runs
+from imuarray.recording.record import KINDS
 from imuarray.recording.units import require_plausible_rate
 
 AVERAGED, BLOCK = 1.0, 0.25  # s
@@ -241,12 +242,8 @@ def _steps(recording: Recording, step: float) -> np.ndarray:
 def _quiet(recording: Recording, width: int) -> np.ndarray:
     """Samples whose window shows no more than THRESHOLD times the floor, (T,) bool."""
     still = np.ones(len(recording.time), bool)
-    kinds = (
-        ("specific_force", recording.accelerometer_noise_sd),
-        ("angular_rate", recording.gyroscope_noise_sd),
-    )
-    for name, declared in kinds:
-        readings = getattr(recording, name)
+    for kind, name in KINDS.items():
+        readings, declared = getattr(recording, name), getattr(recording, f"{kind}_noise_sd")
         spread = window_spread(_together(readings), width)
         floor = np.quantile(spread, FLOOR)
         if floor > MOVING * declared:

@@ -46,8 +46,13 @@ def _probe(item: Effect, sd, rng, where: str) -> bool:
     function = f"a function of (parameters {sd.shape}, instant, predicted) in jax.numpy"
     with _running(where, function):
         nothing = predicted(np.zeros(sd.shape), later)
-    _require_shapes(nothing, plain, where)
-    for kind, old, new in zip(Prediction._fields, plain, nothing, strict=True):
+    right, found = isinstance(nothing, Prediction), type(nothing).__name__
+    require(right, where, "predicted._replace(...) returned", found)
+    kinds = list(zip(Prediction._fields, plain, nothing, strict=True))
+    for kind, old, new in kinds:
+        same = np.shape(new) == np.shape(old)
+        require(same, where, f"{kind} of shape {np.shape(old)}", np.shape(new))
+    for kind, old, new in kinds:
         same = np.allclose(old, new, rtol=1e-9, atol=1e-12)
         require(same, where, f"{kind} left as it is by parameters of zero", "it changed")
     drawn = sd * rng.standard_normal(sd.shape)
@@ -118,14 +123,6 @@ def _require_gauge(item: Effect, shape, axes, where: str) -> None:
         shapes = {np.shape(own) for own in item.gauge(shape, axes)} if item.gauge else set()
     wrong = shapes - {shape}
     require(not wrong, where, expected, next(iter(wrong), None))
-
-
-def _require_shapes(made, plain, where: str) -> None:
-    right, found = isinstance(made, Prediction), type(made).__name__
-    require(right, where, "predicted._replace(...) returned", found)
-    for kind, old, new in zip(Prediction._fields, plain, made, strict=True):
-        same = np.shape(new) == np.shape(old)
-        require(same, where, f"{kind} of shape {np.shape(old)}", np.shape(new))
 
 
 def _require_own(slopes, where: str) -> bool:

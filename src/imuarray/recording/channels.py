@@ -12,7 +12,7 @@ import numpy as np
 
 from imuarray.errors import InputError, require
 from imuarray.provenance import seal_of
-from imuarray.recording.record import AXES, Recording
+from imuarray.recording.record import AXES, KINDS, Recording
 
 LEAST = 10  # samples below which equal readings may be chance
 TURNING = 0.2  # rad/s; at rest, coarse readings do repeat
@@ -20,7 +20,6 @@ HELD = 0.3  # share of repeated readings; a sensor of half the rate, filled up, 
 FROZEN = 20  # readings in a row
 COARSE, MANY = 5, 100  # values of a dead axis that flickers, in at least so many samples
 ALIKE = 1e-6  # share of a triad's readings that is its own; noise is 2e-5 of a MEMS sensor's range
-_KINDS = {"accelerometer": "specific_force", "gyroscope": "angular_rate"}
 SIGNATURE = b"\x89HDF"
 PATIENCE = 60.0  # s, and as many again for each
 SIZE = 500e6  # bytes
@@ -74,7 +73,7 @@ def dead(recording: Recording) -> list[str]:
         return []
     return [
         sentence
-        for kind in _KINDS
+        for kind in KINDS
         for sentence in (*_constant(recording, kind), *_copied(recording, kind))
     ]
 
@@ -88,14 +87,14 @@ def repeated(recording: Recording) -> list[str]:
     turning = _turning(recording)
     if turning.sum() < LEAST:
         return []
-    held = [sentence for kind in _KINDS for sentence in _held(recording, kind, turning)]
+    held = [sentence for kind in KINDS for sentence in _held(recording, kind, turning)]
     return dead(recording.select(turning)) + held + _twice(recording, turning)
 
 
 def _parts(recording: Recording, kind: str):
     """(n, K, 3) readings in turn, and which are at a rail, where they are constant by right."""
     for part in recording.parts():
-        yield getattr(part, _KINDS[kind]), getattr(part, f"saturated_{kind}s")()
+        yield getattr(part, KINDS[kind]), getattr(part, f"saturated_{kind}s")()
 
 
 def _constant(recording: Recording, kind: str) -> list[str]:
@@ -244,7 +243,7 @@ def _turning(recording: Recording) -> np.ndarray:
 
 def _rows(recording: Recording) -> np.ndarray:
     """(T, 3 (A + G)) all readings of each sample."""
-    parts = [getattr(recording, name) for name in _KINDS.values()]
+    parts = [getattr(recording, name) for name in KINDS.values()]
     return np.concatenate([part.reshape(len(part), 3 * part.shape[1]) for part in parts], axis=1)
 
 

@@ -23,6 +23,9 @@ MAX_VALUES = 200_000_000  # 1.6 GB as float64: what is held in memory at once
 NEAR = 64  # samples between two that are read in one go
 AXES = ("x", "y", "z")
 
+# Kinds of sensors, and what they read.
+KINDS = {"accelerometer": "specific_force", "gyroscope": "angular_rate"}
+
 # Group with what a simulated recording was made from.
 TRUTH = "truth"
 
@@ -35,7 +38,7 @@ ALIGNMENT = "alignment"
 # Optional variables, all or none: how the readings were corrected, inverse @ (raw - offset).
 CORRECTION = {
     f"{kind}_{name}": (kind, *dims)
-    for kind in ("accelerometer", "gyroscope")
+    for kind in KINDS
     for name, dims in (
         ("inverse", ("axis", "axis_other")), ("offset", ("axis",)), ("offset_sd", ("axis",)),
         ("offset_walk", ()),
@@ -67,8 +70,6 @@ QUANTITIES = {
 }
 
 SI = {name: next(iter(UNITS[quantity])) for name, quantity in QUANTITIES.items()}
-
-LABELS = ("accelerometer", "gyroscope")
 
 # Attributes that are positive numbers, and their units.
 NUMBERS = {

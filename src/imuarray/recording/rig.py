@@ -8,7 +8,7 @@ import numpy as np
 
 from imuarray.errors import LARGEST, InputError, require
 from imuarray.recording.layout import numbers, positions, rotation
-from imuarray.recording.record import Recording
+from imuarray.recording.record import KINDS, Recording
 
 LONGEST = 86400.0  # s, between two readings: beyond, nothing on common instants would fit in memory
 
@@ -83,7 +83,7 @@ def to_rig(imus: Mapping[str, dict], read: Mapping[str, list[Readings]], layout,
     places, lines, whole = positions(imus, layout, f"{where}: imus"), [], {}
     for label, kinds in read.items():
         whole[label] = []
-        for kind, readings in zip(("accelerometer", "gyroscope"), kinds, strict=True):
+        for kind, readings in zip(KINDS, kinds, strict=True):
             kept, said = _in_order(readings)
             lines += [f"{label}: {kind}: {part}" for part in said]
             whole[label].append(kept)

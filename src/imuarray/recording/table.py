@@ -89,9 +89,7 @@ def _whole(table, layout, columns: str) -> tuple[pd.DataFrame, str]:
     rule = layout["incomplete_rows"]
     require(rule == LEAVE_OUT, f"{columns}: incomplete_rows", f"'{LEAVE_OUT}'", repr(rule))
     whole = table.loc[:, table.columns.isin(_named(layout))].notna().all(axis=1)
-    if whole.all():
-        return table, ""
-    return table[whole], f"{whole.sum()} of {len(table)} samples"
+    return table[whole], "" if whole.all() else f"{whole.sum()} of {len(table)} samples"
 
 
 def _alike(name: str, table) -> str:
@@ -177,9 +175,8 @@ def _clock(section: Any, where: str) -> tuple[Any, dict[str, float]]:
 def _time(table, section, where, layout_name) -> tuple[np.ndarray, np.ndarray, list[str]]:
     """Times (T,) s, the rows that they are of, and lines on what was done to the stamps."""
     values, unit = stamps_of(table, section, where, layout_name)
-    rows, lines = np.arange(len(values)), []
     if "rate" in section:
-        return values, rows, lines
+        return values, np.arange(len(values)), []
     values, rows, lines = written.in_order(values, table, f"{where}: column {section['column']!r}")
     table = table.iloc[rows]
     back = np.flatnonzero(np.diff(values) <= 0)

@@ -51,12 +51,12 @@ def check_sizes(file: h5py.File, where: str, whole: bool = True) -> None:
 
 def check_structure(dataset: xr.Dataset, where: str) -> None:
     """Variables, dimensions, labels' type and attributes; units and values are for later."""
-    for name in (*record.QUANTITIES, *record.LABELS, "axis"):
+    for name in (*record.QUANTITIES, *record.KINDS, "axis"):
         _check_present(dataset, name, where)
     for name in record.QUANTITIES:
         kind = dataset[name].dtype
         require(kind.kind in "fiu", f"{where}: {name}", "real numbers", f"type {kind}")
-    for name in record.LABELS:
+    for name in record.KINDS:
         text = all(isinstance(label, str | bytes) for label in dataset[name].values.tolist())
         found = f"type {dataset[name].dtype}"
         require(text, f"{where}: {name}", "text as labels", found)
@@ -95,15 +95,13 @@ def check_values(recording: Recording, where: str) -> None:
     require(len(recording.time), f"{where}: time", "at least 1 sample", 0)
     if not recording.gyroscope_labels:
         raise IdentifiabilityError(f"{where}: expected at least 1 gyroscope triad, found 0")
-    for kind in record.LABELS:
+    for kind in record.KINDS:
         require_count(len(getattr(recording, f"{kind}_labels")), where, kind)
-    for kind in record.LABELS:
+    for kind in record.KINDS:
         for label, times in Counter(getattr(recording, f"{kind}_labels")).items():
             found = f"{label!r} {times} times"
             require(times == 1, f"{where}: {kind}", "labels that are all different", found)
-    limits = {
-        "specific_force": recording.accelerometer_range, "angular_rate": recording.gyroscope_range
-    }  # fmt: skip
+    limits = {name: getattr(recording, f"{kind}_range") for kind, name in record.KINDS.items()}
     for name in record.QUANTITIES:
         _check_finite(recording, name, limits.get(name, np.inf), where)
     _check_time(recording.time, where, declared=bool(recording.selected))
@@ -158,7 +156,7 @@ def _check_boolean(dataset: xr.Dataset, name: str, where: str) -> None:
 
 def _check_covariance(dataset: xr.Dataset, name: str, where: str) -> None:
     values = _numbers(dataset[name], where)
-    first, second = (9 * dataset.sizes[kind] for kind in record.LABELS)
+    first, second = (9 * dataset.sizes[kind] for kind in record.KINDS)
     square = values.shape in ((first, first), (first + second, first + second))
     finite = square and (np.abs(values) <= LARGEST).all()
     found = f"{' x '.join(map(str, values.shape))}, or others"
