@@ -10,7 +10,7 @@ import pytest
 from imuarray.errors import InputError
 from imuarray.geometry import mimu4444_corners
 from imuarray.recording.mimu import read_mimu
-from imuarray.recording.mimu_recording import read_positions, to_recording, turned_labels
+from imuarray.recording.mimu_recording import read_board, read_positions
 from tests.mimu_writer import PERIOD, acknowledgement, packet, packets, readings
 
 DATA = Path(__file__).parents[1] / "data" / "mimu4444"
@@ -94,9 +94,8 @@ def test_units_rails_and_the_underside(tmp_path):
     counts = np.zeros((2, 8, 6), np.int16)
     counts[0, 0] = [2048, 0, -32768, 164, 0, 32767]  # IMU 1, top
     counts[0, 1] = [2048, 4096, 6144, 164, 328, 492]  # IMU 2, turned over
-    board = mimu4444_corners()
-    stream = read_mimu(stored(tmp_path, b"".join(packets(counts))))
-    found = to_recording(stream, board.positions, board.labels, turned_labels(board.labels, None))
+    path = stored(tmp_path, b"".join(packets(counts)))
+    found, _ = read_board(path, DATA / "IMU_positions.csv")
     g, dps = 9.80665, np.pi / 180
     np.testing.assert_allclose(found.specific_force[0, 0], [g, 0, -16 * g])
     np.testing.assert_allclose(found.angular_rate[0, 0, 0], 10 * dps)
@@ -141,8 +140,8 @@ def test_the_published_recordings(number):
     counts = found.account.attributes()
     assert counts["packets_lost"] == counts["packets_bad"] == 0
     assert counts["packets_out_of_sequence"] == 0
-    positions, labels = read_positions(DATA / "IMU_positions.csv")
+    recording, _ = read_board(DATA / f"exp_{number}.bin.xz", DATA / "IMU_positions.csv")
+    positions = recording.accelerometer_position
     np.testing.assert_allclose(positions, mimu4444_corners().positions)
-    recording = to_recording(found, positions, labels, turned_labels(labels, None))
     still = np.linalg.norm(recording.specific_force[:600].mean(axis=0), axis=1)
     assert np.all(np.abs(still - 9.8) < 0.6)  # raw offsets reach 0.6 m/s^2

@@ -95,7 +95,7 @@ def require_planar_extent(positions: np.ndarray, where: str = "array") -> None:
             " `apply` and `diagnose` take it from the gyroscopes' change, from sample to sample"
         )
     spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
-    if spread[1] <= 1e-9 * max(spread[0], 1e-300) or spread[0] == 0.0:
+    if spread[1] <= 1e-9 * spread[0]:
         raise IdentifiabilityError(
             f"{where}: expected accelerometer triads that span a plane, found them collinear"
         )

@@ -17,10 +17,10 @@ FULL_SCALE_FORCE = 157.0  # m/s^2, 16 g: non-linearity is given as a share of it
 FULL_SCALE_RATE = 34.9  # rad/s, 2000 deg/s
 
 
-def _off_diagonal(entries):
-    """(n, 3, 3) matrices from their (n, 6) off-diagonal entries."""
-    matrix = jnp.zeros((len(entries), 3, 3))
-    return matrix.at[:, OFF_ROWS, OFF_COLUMNS].set(entries)
+def _skewed(vectors, entries):
+    """Vectors (n, 3), each with M times it, M (n, 3, 3) of (n, 6) off-diagonal entries."""
+    matrix = jnp.zeros((len(entries), 3, 3)).at[:, OFF_ROWS, OFF_COLUMNS].set(entries)
+    return vectors + jnp.einsum("kij,kj->ki", matrix, vectors)
 
 
 @effect(
@@ -48,10 +48,7 @@ def accelerometer_scale(scale, instant, predicted):
 )  # fmt: skip
 def accelerometer_misalignment(entries, instant, predicted):
     """u + M u, M without diagonal: xy, xz, yx, yz, zx, zy."""
-    force = predicted.specific_force
-    return predicted._replace(
-        specific_force=force + jnp.einsum("kij,kj->ki", _off_diagonal(entries), force)
-    )
+    return predicted._replace(specific_force=_skewed(predicted.specific_force, entries))
 
 
 @effect(
@@ -116,10 +113,7 @@ def gyroscope_bias(bias, instant, predicted):
 )  # fmt: skip
 def gyroscope_misalignment(entries, instant, predicted):
     """omega + M omega, M without diagonal: xy, xz, yx, yz, zx, zy."""
-    rate = predicted.angular_rate
-    return predicted._replace(
-        angular_rate=rate + jnp.einsum("kij,kj->ki", _off_diagonal(entries), rate)
-    )
+    return predicted._replace(angular_rate=_skewed(predicted.angular_rate, entries))
 
 
 @effect(

@@ -7,7 +7,7 @@ import numpy as np
 
 from imuarray.errors import expecting, require
 from imuarray.geometry.boards import UNDERSIDE_ROTATION
-from imuarray.recording.mimu import Account, MimuStream, read_mimu
+from imuarray.recording.mimu import Account, read_mimu
 from imuarray.recording.record import Recording
 from imuarray.recording.units import GRAVITY
 
@@ -50,36 +50,23 @@ def turned_labels(labels, text: str | None) -> tuple[str, ...]:
 
 
 def read_board(
-    path: str | Path, positions: str | Path, underside: str | None = None, **declared
-) -> tuple[Recording, Account]:
-    """A file of packets as a recording, and the account of what was dropped.
-
-    ``positions`` as `read_positions` has them, ``underside`` as `turned_labels`; ``declared``
-    goes to `to_recording`.
-    """
-    places, labels = read_positions(positions)
-    turned = turned_labels(labels, underside)
-    stream = read_mimu(path)
-    declared = {"source": Path(path).name, **declared}
-    return to_recording(stream, places, labels, turned, **declared), stream.account
-
-
-def to_recording(
-    stream: MimuStream,
-    positions,
-    labels,
-    turned,
+    path: str | Path,
+    positions: str | Path,
+    underside: str | None = None,
     accelerometer_noise_sd: float = 0.04,
     gyroscope_noise_sd: float = float(np.radians(0.06)),
     position_prior_sd: float = 3e-3,
     output_rate: float = OUTPUT_RATE,
-    source: str = "",
-) -> Recording:
-    """Counts to SI units, the underside's axes turned into the array frame.
+) -> tuple[Recording, Account]:
+    """A file of packets as a recording, and the account of what was dropped.
 
-    ``positions`` (A, 3) m; ``turned`` are the labels of those that `UNDERSIDE_ROTATION` turns.
-    InputError where the IMUs are not as many as the positions.
+    Counts become SI units, and the underside's axes are turned into the array frame.
+    ``positions`` as `read_positions` has them, ``underside`` as `turned_labels`. InputError where
+    the IMUs are not as many as the positions.
     """
+    places, labels = read_positions(positions)
+    turned = turned_labels(labels, underside)
+    stream = read_mimu(path)
     count = stream.counts.shape[1]
     require(count == len(labels), "positions", f"{count} IMUs, as the packets hold", len(labels))
     force = stream.counts[..., :3] * (GRAVITY / COUNTS_PER_G)
@@ -88,12 +75,13 @@ def to_recording(
     axes = np.where(under[:, None, None], UNDERSIDE_ROTATION, np.eye(3))
     for values in (force, rate):
         values[:, under] = values[:, under] @ UNDERSIDE_ROTATION.T
-    return Recording(
+    recording = Recording(
         time=stream.time, specific_force=force, angular_rate=rate,
-        accelerometer_position=np.asarray(positions, float), accelerometer_labels=tuple(labels),
-        gyroscope_labels=tuple(labels), accelerometer_noise_sd=accelerometer_noise_sd,
+        accelerometer_position=places, accelerometer_labels=labels,
+        gyroscope_labels=labels, accelerometer_noise_sd=accelerometer_noise_sd,
         gyroscope_noise_sd=gyroscope_noise_sd, position_prior_sd=position_prior_sd,
         accelerometer_range=RAIL / COUNTS_PER_G * GRAVITY,
-        gyroscope_range=float(np.radians(RAIL / COUNTS_PER_DPS)), source=source,
+        gyroscope_range=float(np.radians(RAIL / COUNTS_PER_DPS)), source=Path(path).name,
         accelerometer_axes=axes, output_period=1 / output_rate,
     )  # fmt: skip
+    return recording, stream.account
