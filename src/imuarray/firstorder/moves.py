@@ -178,19 +178,15 @@ def _other_axes(moves, direction) -> np.ndarray | None:
     )
 
 
-def _steps(move: Move, change) -> np.ndarray:
-    """Rotations (n - 1, 3, 3) within the steps, to fourth order: a spline, Magnus' two nodes."""
+def _to_end(move: Move, change) -> np.ndarray:
+    """Rotations (n, 3, 3) of the array from each sample of the move to its end."""
     step = np.diff(move.time)
     spline = CubicSpline(move.time, move.rate @ change.T)
+    # within the steps, to fourth order: Magnus' two nodes
     one, two = (spline(move.time[:-1] + (0.5 + s) * step) for s in (-NODE, NODE))
     step = step[:, None]
     vector = step / 2 * (one + two) + step**2 * NODE / 2 * np.cross(one, two)
-    return Rotation.from_rotvec(vector).as_matrix()
-
-
-def _to_end(move: Move, change) -> np.ndarray:
-    """Rotations (n, 3, 3) of the array from each sample of the move to its end."""
-    steps, width = _steps(move, change), 1
+    steps, width = Rotation.from_rotvec(vector).as_matrix(), 1
     while width < len(steps):  # products of 1, 2, 4, ... steps
         steps[:-width] = steps[:-width] @ steps[width:]
         width *= 2

@@ -133,7 +133,7 @@ class ArrayModel:
         triad, ``parameters`` (P,) flat effect parameters; ``when`` is what else an `Instant`
         holds: time (s), span (s), second and third derivatives.
         """
-        instant = Instant(motion, positions, axes=self.array.turns, **when)
+        instant = Instant(motion, positions, **when)._replace(axes=self.array.turns)
         predicted = self.ideal(instant)
         values = self.split(jnp.asarray(parameters)) if self.effects else {}
         for item in self.chain:

@@ -112,18 +112,15 @@ def accelerometer_filter(shape, instant, predicted):
 CLOCK = ("period", "frequency", "phase", "offset", "drift")
 
 
-def _common_offset(shape, axes):
-    """The mean age of all IMUs is the motion's."""
-    return [np.broadcast_to(np.array(CLOCK) == "offset", shape)]
-
-
 # A sawtooth jumps, so a scan fixes its frequency, phase and drift. So many sawtooths are tried that
 # its test has a tail of its own (`benchmarks/thresholds.py`). Where the motion is rough a period
-# and the fast angular acceleration that it multiplies are one.
+# and the fast angular acceleration that it multiplies are one. The mean age of all IMUs is the
+# motion's.
 @effect(
     "sensor_clock", unit="s, Hz, 1, s, Hz/s", prior_sd=(1e-3, 50.0, 1.0, 1e-3, 1e-3),
     shape=lambda a, g: (max(a, g), 5), derivatives=True, sampling=True, scanned=True,
-    held=(1, 2, 4), held_rough=(0,), critical=-12.0, gauge=_common_offset, components=(CLOCK,),
+    held=(1, 2, 4), held_rough=(0,), critical=-12.0, components=(CLOCK,),
+    gauge=lambda shape, axes: [np.broadcast_to(np.array(CLOCK) == "offset", shape)],
     contains=("sensor_delay",), resembles=("gyroscope_delay",), against="age", own=True,
     meaning="the IMUs sample on clocks of their own, so that a reading's age is a sawtooth",
 )  # fmt: skip

@@ -109,7 +109,11 @@ def read_mimu(path: str | Path) -> MimuStream:
     """
     path = Path(path)
     require(path.is_file(), str(path), "a file of MIMU packets", "none")
-    data = np.frombuffer(_content(path), np.uint8)
+    content = path.read_bytes()
+    if content.startswith(XZ):
+        with expecting(path, "a whole file compressed by xz", lzma.LZMAError):
+            content = lzma.decompress(content)
+    data = np.frombuffer(content, np.uint8)
     starts, size = _sound_packets(data, str(path))
     accepted, number, ticks, strangers = _in_sequence(data, starts, str(path))
     several = len(accepted) > 1 or data.size <= MOST_AROUND_ONE * size
@@ -119,14 +123,6 @@ def read_mimu(path: str | Path) -> MimuStream:
     packets = data[accepted[:, None] + np.arange(8, size - 2)]
     counts = packets.view(">i2").astype(np.int16).reshape(len(accepted), -1, 6)
     return MimuStream(counts, ticks, number, account)
-
-
-def _content(path: Path) -> bytes:
-    content = path.read_bytes()
-    if not content.startswith(XZ):
-        return content
-    with expecting(path, "a whole file compressed by xz", lzma.LZMAError):
-        return lzma.decompress(content)
 
 
 def _big_endian(data, at, count) -> np.ndarray:
