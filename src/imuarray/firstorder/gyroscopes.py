@@ -230,15 +230,16 @@ def calibrate_gyroscopes(every: Sequence[Still], triads: TriadFit) -> tuple[Gyro
 
     InputError for a gyroscope that is mirrored or dead, for wrong units and for left-handed axes.
     """
-    own, begun = every[0], 0.0
+    first, begun = every[0].recording, 0.0
     times = []
     for one in every:  # one after the other, far apart
         times.append(one.recording.time - one.recording.time[0] + begun)
         begun = times[-1][-1] + APART
     rate = np.concatenate([one.rate() for one in every])
     free = np.concatenate([one.moving & ~one.recording.at_rail("gyroscope") for one in every])
-    start = _start(own.recording, triads)
-    labels = own.recording.gyroscope_labels
+    labels, turns = first.gyroscope_labels, nearest_orthogonal(triads.matrix)
+    turned = dict(zip(first.accelerometer_labels, turns, strict=True))
+    start = np.array([turned.get(label, np.eye(3)) for label in labels])
     relative = compare(rate, np.concatenate(times), free, start, labels)
     if isinstance(relative, str):
         turn, maps = start, np.broadcast_to(np.eye(3), start.shape)
@@ -248,11 +249,9 @@ def calibrate_gyroscopes(every: Sequence[Still], triads: TriadFit) -> tuple[Gyro
     count = triads.direction.size
     common = common_map(moves, triads.direction, triads.fitted.covariance[-count:, -count:])
     matrix, covariance, by_common = _together(turn, maps, relative, common)
-    maps_only = np.arange(12 * len(triads.matrix)).reshape(-1, 12)[:, :9].ravel()
-    beside = np.zeros((len(covariance), len(maps_only)))
+    beside = np.zeros((len(covariance), 9 * len(triads.matrix)))
     if not isinstance(common, str):
-        own = triads.beside_directions()[maps_only]
-        beside = -by_common @ (own @ common.beside).T
+        beside = -by_common @ (triads.beside_directions() @ common.beside).T
         triads = triads.carried(common.score, common.information)
     return Gyroscopes(matrix, covariance, beside, relative, common), triads
 
@@ -270,13 +269,6 @@ def _moves(every: Sequence[Still], matrix) -> list[Move]:
         moves += [move._replace(first=move.first + poses) for move in own]
         poses += len(one.poses)
     return moves
-
-
-def _start(recording: Recording, triads: TriadFit) -> np.ndarray:
-    """Turns (G, 3, 3): of the accelerometer of the same label, or none."""
-    turns = nearest_orthogonal(triads.matrix)
-    own = dict(zip(recording.accelerometer_labels, turns, strict=True))
-    return np.array([own.get(label, np.eye(3)) for label in recording.gyroscope_labels])
 
 
 def _together(turn, maps, relative, common) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

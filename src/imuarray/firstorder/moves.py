@@ -241,7 +241,10 @@ def _fit(moves, direction, covariance, turn, before) -> CommonMap:
         gradient = solved.T @ errors - prior @ (change - np.eye(3)).ravel()
         delta = np.linalg.solve(normal, gradient)
         change = change + delta.reshape(3, 3)
-        free = _free_share(total, total - slopes @ np.linalg.solve(normal, slopes.T))
+        # share of each move's variance that the map has left in its error
+        rest = total - slopes @ np.linalg.solve(normal, slopes.T)
+        shares = np.einsum("nii->n", np.linalg.solve(_each(total), _each(rest))) / 2
+        free = np.clip(shares, 0.05, 1.0)
         inflation, size = _weights(errors - slopes @ delta, given, own, size, free)
         if np.abs(delta).max() < CLOSE:
             break
@@ -256,20 +259,15 @@ def _fit(moves, direction, covariance, turn, before) -> CommonMap:
     )  # fmt: skip
 
 
-def _free_share(total, left) -> np.ndarray:
-    """(n,) share of each move's variance, of all (2 n, 2 n), that the map has left in its error."""
-    count = len(total) // 2
-    whole, rest = (
-        part.reshape(count, 2, count, 2)[range(count), :, range(count)] for part in (total, left)
-    )
-    return np.clip(np.einsum("nii->n", np.linalg.solve(whole, rest)) / 2, 0.05, 1.0)
+def _each(covariance) -> np.ndarray:
+    """(n, 2, 2) of each move, of all (2 n, 2 n)."""
+    count = len(covariance) // 2
+    return covariance.reshape(count, 2, count, 2)[range(count), :, range(count)]
 
 
 def _weights(left, given, own, size, free):
     """Inflation of each move's variance by its own error, and of all by the typical one."""
-    count = len(own)
-    left = left.reshape(count, 2)
-    blocks = given.reshape(count, 2, count, 2)[range(count), :, range(count)]
+    left, blocks = left.reshape(-1, 2), _each(given)
 
     def squares(size):
         solved = np.linalg.solve(blocks + size * own, left[..., None])[..., 0]

@@ -66,11 +66,11 @@ class TriadFit:
     fitted: Fitted
 
     def beside_directions(self) -> np.ndarray:
-        """Covariance (12 A, 3 P) of the matrices and offsets with all poses' directions."""
+        """Covariance (9 A, 3 P) of the matrices with all poses' directions."""
         out = np.zeros((len(self.covariance), 3 * len(self.fitted.given.mean)))
         place = _places(len(self.matrix))
         out[place] = self.fitted.covariance[: len(place), -out.shape[1] :]
-        return out
+        return out.reshape(-1, 12, out.shape[1])[:, :9].reshape(-1, out.shape[1])
 
     def carried(self, score, information) -> TriadFit:
         """The fit once rates have carried gravity from pose to pose.

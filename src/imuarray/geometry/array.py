@@ -1,6 +1,6 @@
 """An array of triads on one rigid body: labels, nominal positions, sides."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,7 +28,7 @@ class Array:
     labels: tuple[str, ...]
     gyroscopes: int
     name: str = "array"
-    package: tuple[float, float, float] = field(default=(0.004, 0.004, 0.001))
+    package: tuple[float, float, float] = (0.004, 0.004, 0.001)
     axes: np.ndarray | None = None
 
     @property
