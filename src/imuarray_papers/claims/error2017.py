@@ -25,41 +25,36 @@ def _curve(results, iterations=None):
     return table[table.iterations == (iterations or table.iterations.max())].sort_values("samples")
 
 
-def _exponent(results):
-    """Exponent of RMSE against N >= 10, its error, and a remark on that for N >= 3.
+def _exponent(results, least=10):
+    """Exponent of RMSE against N >= ``least``, its error, and the least share that converged (%).
 
     Below N = 10 too many runs stop at the last iteration without having converged.
     """
     curve = _curve(results)
-    every, late = curve[curve.samples >= 3], curve[curve.samples >= 10]
-    fits = [power_law(c.samples, c.rmse_m, c.rmse_se_m) for c in (late, every)]
-    shares = [100 * c.converged_share.min() for c in (late, every)]
-    remark = (
-        f"at least {show(shares[0])} % of the runs converged for each N >= 10; over N >= 3"
-        f" {show(fits[1][0])} +- {show(fits[1][1], 2)}, where as few as {show(shares[1])} % have"
-    )
-    return *fits[0], remark
+    curve = curve[curve.samples >= least]
+    fit = power_law(curve.samples, curve.rmse_m, curve.rmse_se_m)
+    return *fit, 100 * curve.converged_share.min()
 
 
 @claim("2017-01")
 def inverse_root(results):
-    slope, error, late = _exponent(results)
-    return verdict(slope, error, near(slope, -0.5, error, 0.05), late)
-
-
-@claim("2017-02")
-def inverse(results):
-    slope, error, _ = _exponent(results)
+    (slope, error, share), (wider, spread, fewer) = (_exponent(results, n) for n in (10, 3))
     remark = (
-        "the abstract's word is right for the variance, not for the error; section IV says -1/2"
+        f"at least {show(share)} % of the runs converged for each N >= 10; over N >= 3"
+        f" {show(wider)} +- {show(spread, 2)}, where as few as {show(fewer)} % have"
     )
-    return verdict(slope, error, near(slope, -1, error, 0.05), remark)
+    return verdict(slope, error, near(slope, -0.5, error, 0.05), remark)
 
 
-@claim("2017-03")
-def variance_inverse(results):
-    slope, error, _ = _exponent(results)
-    return verdict(2 * slope, 2 * error, near(2 * slope, -1, 2 * error, 0.1))
+ERROR_NOT = "the abstract's word is right for the variance, not for the error; section IV says -1/2"
+
+
+@claim("2017-02", power=1, remark=ERROR_NOT)
+@claim("2017-03", power=2)
+def inverse(results, power, remark=""):
+    """Of the error, and of its square, the variance."""
+    slope, error = (power * part for part in _exponent(results)[:2])
+    return verdict(slope, error, near(slope, -1, error, 0.05 * power), remark)
 
 
 @claim("2017-44")
@@ -84,16 +79,13 @@ def complete(results):
     return verdict(value, "", needed.iloc[-1] <= 1.1 * needed.iloc[0], remark)
 
 
-def _thousand(results) -> tuple[float, float, tuple[str, str]]:
-    """RMSE at N = 1000 and its error, m; both as they are shown."""
+@claim("2017-04", least=1e-6 / np.sqrt(10), most=1e-6 * np.sqrt(10))
+@claim("2017-13", most=1e-5, errors=3)
+def thousand(results, most, least=0.0, errors=0):
+    """RMSE at N = 1000, with so many standard errors."""
     row = _curve(results).set_index("samples").loc[1000]
-    return row.rmse_m, row.rmse_se_m, (f"{show(row.rmse_m)} m", f"{show(row.rmse_se_m, 2)} m")
-
-
-@claim("2017-04")
-def micrometre(results):
-    rmse, _, shown = _thousand(results)
-    return verdict(*shown, 1e-6 / np.sqrt(10) <= rmse <= 1e-6 * np.sqrt(10))
+    stands = least <= row.rmse_m and row.rmse_m + errors * row.rmse_se_m <= most
+    return verdict(f"{show(row.rmse_m)} m", f"{show(row.rmse_se_m, 2)} m", stands)
 
 
 @claim("2017-05")
@@ -228,9 +220,3 @@ def efficient(results):
     value, error = ratio(last.rmse_m, last.rmse_se_m, row.bound_m, row.bound_se_m)
     remark = "the paper leaves the bound for the calibration problem open; here it is computed"
     return verdict(value, error, value + 3 * error < 1.1, remark)
-
-
-@claim("2017-13")
-def reliable(results):
-    rmse, error, shown = _thousand(results)
-    return verdict(*shown, rmse + 3 * error < 1e-5)

@@ -59,12 +59,9 @@ class Results:
     def chains(self, name: str) -> np.ndarray:
         """Draws (chains, n, A - 1, 3) m of chains/``name``, the burn-in left out."""
 
-        def read(place):
-            from imuarray.posterior.chains import read_chains
+        from imuarray.posterior.chains import read_chains
 
-            return read_chains(place)[0].draws
-
-        chains = self._cached(f"chains/{name}", ".nc", read)
+        chains = self._cached(f"chains/{name}", ".nc", lambda place: read_chains(place)[0].draws)
         left = chains[:, self.json(f"posterior/{name}")["burn_in_draws"] :]
         return left.reshape(*left.shape[:2], left.shape[-1] // 3, 3)
 
