@@ -41,7 +41,7 @@ from imuarray_papers.posterior import kernels, normals
 from imuarray_papers.posterior.draws import TILE  # noqa: E402
 from imuarray_papers.posterior.likelihood import CompiledTarget, Likelihood  # noqa: E402
 from imuarray_papers.reference import skew  # noqa: E402
-from imuarray_papers.studies.bound import paths  # noqa: E402
+from imuarray_papers.studies.bound import descents  # noqa: E402
 from tests.oracles import joint_jacobian, most_likely_motion  # noqa: E402
 
 
@@ -301,20 +301,20 @@ def one_to_the_bound(model, rng, samples):
     motion = sphere_motion(rng, (samples,), np.radians(2000), np.radians(2000), 10.0)
     truth = model.array.relative + 1e-3 * rng.standard_normal(model.array.positions.shape)
     force, rate, saturated = measure(model, motion, truth - truth[0], rng)
-    made = paths(model, force, rate, saturated)
+    _, bcd, newton, _ = descents(model, force, rate, saturated)
 
     def slow():
-        calibrate_bcd(model, force, rate, tolerance=0.0, limit=int(made.bcd))
+        calibrate_bcd(model, force, rate, tolerance=0.0, limit=int(bcd))
 
     def fast(covariance):
         data = Collapsed.of(model, force, rate, saturated)
-        fisher_scoring(data, model.array.relative, limit=int(made.newton), covariance=covariance)
+        fisher_scoring(data, model.array.relative, limit=int(newton), covariance=covariance)
 
     def arranged():
         Collapsed.of(model, force, rate, saturated)
 
     seconds = interleaved([slow, lambda: fast(False), lambda: fast(True), arranged], 15)
-    return list(zip((made.bcd, made.newton, made.newton, 0), seconds, strict=True))
+    return list(zip((bcd, newton, newton, 0), seconds, strict=True))
 
 
 def against_scipy(model, rng, samples=30):

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from imuarray_papers.config import read_config
-from imuarray_papers.studies.position_error import TABLES, joined, realise, study
+from imuarray_papers.studies.position_error import joined, realise, study, table_of
 from imuarray_papers.studies.sbc import pit_values
 from imuarray_papers.studies.truths import share
 from tests.test_bound import model
@@ -31,7 +31,7 @@ def test_position_errors(name):
     assert any(part.status.shape[1] == 0 for part in parts)  # four batches
     for one, other in zip(whole, joined(parts), strict=True):
         np.testing.assert_array_equal(one, other)
-    table = TABLES[name](cases[:2], whole, options["marks"])
+    table = table_of(name, cases[:2], whole, options["marks"])
     assert np.all(table.realisations == 80) and np.all(table.rmse_m > 0)
 
 

@@ -6,7 +6,7 @@ with job(snakemake) as settings:
     import numpy as np
 
     from imuarray.provenance import write_csv
-    from imuarray_papers.studies.position_error import TABLES, Errors, joined, study
+    from imuarray_papers.studies.position_error import Errors, joined, study, table_of
 
     name = snakemake.wildcards.study
     cases, options = study(settings, name)
@@ -14,4 +14,4 @@ with job(snakemake) as settings:
     for path in snakemake.input.parts:
         with np.load(path) as stored:
             shares.append(Errors(**stored))
-    write_csv(TABLES[name](cases, joined(shares), options["marks"]), snakemake.output[0])
+    write_csv(table_of(name, cases, joined(shares), options["marks"]), snakemake.output[0])

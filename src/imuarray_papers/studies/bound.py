@@ -1,7 +1,6 @@
 """The Cramer-Rao bound of the positions: who reaches it, how fast, and what it depends on."""
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -125,47 +124,48 @@ def convergence(
 
     def job(which):
         number, repeat = which
-        rng = stream(seed, "bound", "convergence", number, repeat)
-        return _convergence_row(model, rng, samples, motions[number], options)
+        rng, motion = stream(seed, "bound", "convergence", number, repeat), motions[number]
+        moves, truth, force, rate, saturated = _draw(model, rng, samples, motion, options)
+        known = information_at(model, moves, truth, saturated)
+        bound, bcd, newton, observed = descents(model, force, rate, saturated, options["limit"])
+        return {
+            "array": model.array.name,
+            "angular_rate_dps": np.degrees(motion[0]),
+            "angular_acceleration_dps2": np.degrees(motion[1]),
+            "samples": samples,
+            "bound_m": bound,
+            "bcd_iterations": bcd,
+            "newton_iterations": newton,
+            "contraction": contraction(known, block_information(model, moves)),
+            "limit": options["limit"],
+            "observed": observed,
+        }
 
     jobs = [(number, repeat) for number in range(len(motions)) for repeat in range(count)]
     return pd.DataFrame(run_batches(job, jobs, threads, True, "convergence"))
 
 
-class Paths(NamedTuple):
-    """Paths of ML-BCD and Gauss-Newton to the same optimum from the nominal positions.
+def _observed(bound, marks, away) -> float:
+    """The factor by which ML-BCD's last steps shrink its distance ``away`` at ``marks``."""
+    # not so far that rounding is what is left
+    floor = max(1e-3 * bound, 10 * away.min())
+    late = np.flatnonzero((away < 0.3 * away[0]) & (away > floor))
+    if len(late) < 2:
+        return np.nan
+    first, last = late[len(late) // 2], late[-1]
+    return float((away[last] / away[first]) ** (1 / max(marks[last] - marks[first], 1)))
 
-    Without marks and iterations where there is no optimum that is found.
+
+def descents(model: ArrayModel, force, rate, saturated, limit: int = BCD_LIMIT):
+    """ML-BCD and Gauss-Newton from the nominal positions to the optimum, on the same measurements.
+
+    The bound (m, rms), iterations of each to 1.01 times it, NaN if never, and `_observed`.
     """
-
-    bound: float  # m, rms
-    marks: np.ndarray  # iterations of ML-BCD
-    away: np.ndarray  # m, rms distance from the optimum there
-    bcd: float  # iterations to 1.01 times the bound, NaN if never
-    newton: float
-
-    @property
-    def observed(self) -> float:
-        """The factor by which ML-BCD's last steps shrink its error."""
-        if not self.away.size:
-            return np.nan
-        # not so far that rounding is what is left
-        floor = max(1e-3 * self.bound, 10 * self.away.min())
-        late = np.flatnonzero((self.away < 0.3 * self.away[0]) & (self.away > floor))
-        if len(late) < 2:
-            return np.nan
-        first, last = late[len(late) // 2], late[-1]
-        apart = max(self.marks[last] - self.marks[first], 1)
-        return float((self.away[last] / self.away[first]) ** (1 / apart))
-
-
-def paths(model: ArrayModel, force, rate, saturated, limit: int = BCD_LIMIT) -> Paths:
-    """Both methods on the same measurements (T, A, 3) and (T, G, 3)."""
     data = Collapsed.of(model, force, rate, saturated)
     best = fisher_scoring(data, model.array.relative)
     bound = np.sqrt(np.trace(best.covariance) / len(best.covariance))
     if not best.converged:  # data that determine too little: there is no way to go
-        return Paths(bound, np.empty(0, int), np.empty(0), np.nan, np.nan)
+        return bound, np.nan, np.nan, np.nan
     enough = bound * np.sqrt(NEAR**2 - 1)  # distance from the optimum, errors adding in squares
     marks = np.unique(np.geomspace(1, limit, 1000).astype(int))
     slow = calibrate_bcd(
@@ -179,25 +179,8 @@ def paths(model: ArrayModel, force, rate, saturated, limit: int = BCD_LIMIT) -> 
         if np.sqrt(np.mean((tried.positions - best.positions)[1:] ** 2)) <= enough:
             newton = iteration
             break
-    return Paths(bound, marks, away, marks[near[0]] if len(near) else np.nan, newton)
-
-
-def _convergence_row(model, rng, samples, motion, options):
-    moves, truth, force, rate, saturated = _draw(model, rng, samples, motion, options)
-    made = paths(model, force, rate, saturated, options["limit"])
-    known = information_at(model, moves, truth, saturated)
-    return {
-        "array": model.array.name,
-        "angular_rate_dps": np.degrees(motion[0]),
-        "angular_acceleration_dps2": np.degrees(motion[1]),
-        "samples": samples,
-        "bound_m": made.bound,
-        "bcd_iterations": made.bcd,
-        "newton_iterations": made.newton,
-        "contraction": contraction(known, block_information(model, moves)),
-        "limit": options["limit"],
-        "observed": made.observed,
-    }
+    bcd = marks[near[0]] if len(near) else np.nan
+    return bound, bcd, newton, _observed(bound, marks, away)
 
 
 def against_size(model: ArrayModel, seed, samples, motion, factors, count=20) -> pd.DataFrame:

@@ -84,8 +84,11 @@ def joined(shares) -> Errors:
     return Errors(*(np.concatenate(one, axis=1) for one in zip(*shares, strict=True)))
 
 
-def _table(cases, errors: Errors, marks) -> pd.DataFrame:
-    """A row for each case and number of iterations."""
+def table_of(name: str, cases, errors: Errors, marks) -> pd.DataFrame:
+    """RMSE for each case and number of iterations of a `study`.
+
+    Of "samples" over N and iterations (figure 4), else for |omega|, |omega_dot|, |s| (figure 5).
+    """
     rows = []
     for case, squares, iterations, status in zip(cases, *errors, strict=True):
         good = status >= 0
@@ -100,22 +103,13 @@ def _table(cases, errors: Errors, marks) -> pd.DataFrame:
                 "converged_share": float(np.mean(status == 1)),
                 "median_iterations": float(np.median(iterations[good])),
             })  # fmt: skip
-    return pd.DataFrame(rows)
-
-
-def against_samples(cases, errors: Errors, marks) -> pd.DataFrame:
-    """Figure 4: RMSE over N and iterations; one row for each pair."""
-    return _table(cases, errors, marks).loc[:, "samples":]
-
-
-def against_motion(cases, errors: Errors, marks) -> pd.DataFrame:
-    """Figure 5: RMSE for each case's |omega|, |omega_dot| and |s|."""
-    last = Errors(errors.squares[..., -1:], errors.iterations, errors.status)
-    return _table(cases, last, marks[-1:]).drop(columns=["not_identifiable", "median_iterations"])
+    table = pd.DataFrame(rows)
+    if name == "samples":
+        return table.loc[:, "samples":]
+    return table.drop(columns=["not_identifiable", "median_iterations"])
 
 
 FORCES = (0.0, 1.0, 10.0, 100.0)  # m/s^2; section IV: |s| does not matter
-TABLES = {"samples": against_samples, "motion": against_motion, "force": against_motion}
 
 
 def magnitudes(paper: dict) -> tuple[float, float, float]:
@@ -130,29 +124,23 @@ def study(settings: dict, name: str) -> tuple[list[Case], dict]:
     Figure 4, figure 5, and figure 5's remark that the specific force does not matter.
     """
     paper = settings["paper2017"]
-    own = magnitudes(paper)
+    own, marks = magnitudes(paper), paper["fig4_iterations"]
     if name == "samples":
         cases = [Case(("position", name, n), n, own) for n in paper["fig4_samples"]]
-        return cases, _options(settings, paper["fig4_iterations"])
-    if name == "motion":
-        marks = [paper["fig5_iterations"]]
-        motions = [
-            (np.radians(rate), np.radians(acceleration), own[2])
-            for acceleration in paper["fig5_accelerations_dps2"]
-            for rate in paper["fig5_rates_dps"]
-        ]
     else:
-        marks, motions = [max(paper["fig4_iterations"])], [(*own[:2], force) for force in FORCES]
-    cases = [
-        Case(("position", name, number), paper["fig5_samples"], motion)
-        for number, motion in enumerate(motions)
-    ]
-    return cases, _options(settings, marks)
-
-
-def _options(settings: dict, marks) -> dict:
-    paper = settings["paper2017"]
-    return {
+        marks, motions = [max(marks)], [(*own[:2], force) for force in FORCES]
+        if name == "motion":
+            marks = [paper["fig5_iterations"]]
+            motions = [
+                (np.radians(rate), np.radians(acceleration), own[2])
+                for acceleration in paper["fig5_accelerations_dps2"]
+                for rate in paper["fig5_rates_dps"]
+            ]
+        cases = [
+            Case(("position", name, number), paper["fig5_samples"], motion)
+            for number, motion in enumerate(motions)
+        ]
+    return cases, {
         "realisations": settings["scale"]["realisations"],
         "marks": sorted(marks),
         "position_sd": paper["position_sd"],

@@ -249,18 +249,22 @@ def pit_values(
     made = run_batches(
         lambda number: replicate(setting, number), replicates, threads, True, "replicates"
     )
-    names, numbers, frames = np.array(names_of(setting)), np.array(replicates), []
+    names, frames = names_of(setting), []
     for method in methods:
-        found, independent = METHODS[method](setting, made, threads)
-        rows, columns = np.indices(found.shape)
-        frames.append(
-            pd.DataFrame(
-                {"setting": setting.name, "method": method, "samples": setting.samples,
-                 "replicate": numbers[rows.ravel()], "quantity": names[columns.ravel()],
-                 "pit": found.ravel(), "independent": independent[rows.ravel()]}
-            )
-        )  # fmt: skip
+        found = METHODS[method](setting, made, threads)
+        frames.append(_table(setting, method, replicates, names, *found))
     return pd.concat(frames, ignore_index=True)
+
+
+def _table(setting: Setting, method: str, replicates, names, pit, independent) -> pd.DataFrame:
+    """A row for each replicate (R,) and quantity (Q,); ``pit`` (R, Q), ``independent`` (R,)."""
+    rows, columns = np.indices(pit.shape)
+    return pd.DataFrame({
+        "setting": setting.name, "method": method, "samples": setting.samples,
+        "replicate": np.array(replicates)[rows.ravel()],
+        "quantity": np.array(names)[columns.ravel()], "pit": pit.ravel(),
+        "independent": independent[rows.ravel()],
+    })  # fmt: skip
 
 
 def drawn(setting: Setting, number: int) -> tuple[np.ndarray, Recording]:
@@ -290,7 +294,7 @@ def pit_values_by_default(
     names = names_of(setting)[: size.size]
     names += [f"effect_{place}" for place in range(setting.model.effect_size)]
 
-    def one(number: int) -> pd.DataFrame:
+    def one(number: int) -> Found:
         truth, recording = drawn(setting, number)
         tree = sample(recording, seed=number, effects=setting.model.effects)
         draws = chains_of(tree).draws[..., : len(names)]
@@ -298,11 +302,8 @@ def pit_values_by_default(
         both = np.column_stack([both, both[:, : size.size] @ size])
         where = setting.name, setting.samples, number
         pit = _pit(both, stream(setting.seed, "calibrated", METHOD, "rank", *where))
-        return pd.DataFrame(
-            {"setting": setting.name, "method": METHOD, "samples": setting.samples,
-             "replicate": number, "quantity": [*names, "size"], "pit": pit,
-             "independent": ess(draws).min()}
-        )  # fmt: skip
+        return pit, ess(draws).min()
 
-    frames = run_batches(one, list(replicates), threads, True, METHOD)
-    return pd.concat(frames, ignore_index=True)
+    found = run_batches(one, list(replicates), threads, True, METHOD)
+    pit, independent = map(np.array, zip(*found, strict=True))
+    return _table(setting, METHOD, replicates, [*names, "size"], pit, independent)

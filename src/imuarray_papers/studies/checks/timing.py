@@ -25,12 +25,6 @@ def _fastest(function, repeats: int) -> tuple[float, float]:
     return min(spans), float(np.std(spans, ddof=1))
 
 
-def _row(what, samples, seconds, spread, count) -> dict:
-    return {
-        "what": what, "samples": samples, "seconds": seconds / count, "spread_s": spread / count,
-    }  # fmt: skip
-
-
 def transition_costs(targets, thetas, step, rng, count=50, repeats=3) -> pd.DataFrame:
     """Seconds a transition of Algorithm 1 (2021) takes for each T: target in ``targets``."""
     rows = []
@@ -41,7 +35,10 @@ def transition_costs(targets, thetas, step, rng, count=50, repeats=3) -> pd.Data
         def run(target=target, theta=theta, value=value):
             target.transitions(theta.copy(), value, step, count, rng)
 
-        rows.append(_row("transition", samples, *_fastest(run, repeats), count))
+        seconds, spread = (part / count for part in _fastest(run, repeats))
+        rows.append(
+            {"what": "transition", "samples": samples, "seconds": seconds, "spread_s": spread}
+        )
     return pd.DataFrame(rows)
 
 
