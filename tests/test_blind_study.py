@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from imuarray_papers.blind import criteria, study, summary
+from imuarray_papers.blind import study, summary
 from imuarray_papers.blind.cases import Case, matrix
 from imuarray_papers.blind.inject import CATALOGUE, EFFECTS
 from imuarray_papers.figures import blind as drawing
@@ -213,7 +213,7 @@ def test_limits_of_shares():
 
 
 def bars_of(rows):
-    table = criteria.criteria(summary.recordings(rows))
+    table = summary.criteria(summary.recordings(rows))
     return {row["id"]: row for row in table.to_dict("records")}
 
 
@@ -231,7 +231,7 @@ def test_bars_count_the_recordings_they_are_set_for():
     assert found["one_found"]["all_recordings"] == 11
     assert (found["crashes"]["recordings"], found["crashes"]["count"]) == (11, 1)
     assert found["crashes"]["verdict"].startswith("short")
-    assert found["pair_set"]["verdict"] == criteria.NONE
+    assert found["pair_set"]["verdict"] == summary.NONE
     # 7.95 sigma was 8 when asked for, 7 was not
     near = [graded("one", one, [], size=size) for size in (7.95, 7.0)]
     assert bars_of(near)["one_found"]["recordings"] == 1

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 
 from imuarray.recording import Recording
 from imuarray.streams import stream
-from imuarray_papers.blind.change import Change, noisy_readings
+from imuarray_papers.blind.change import noisy_readings
 from imuarray_papers.blind.inject import CATALOGUE, EFFECTS, GAUGE, OUTSIDE
 from imuarray_papers.blind.scene import Scene
 from imuarray_papers.blind.sizes import draw_seeded, scale_to, size_of
@@ -93,7 +93,13 @@ def make(case: Case, seed: int) -> tuple[Recording, dict]:
     """
     rng = stream(seed, "blind", case.id)
     scene = Scene.draw(rng, case.imus, case.sampling_rate, case.duration, case.rails)
-    changes = [_draw_effect(scene, case, *effect, rng) for effect in case.effects]
+    changes = []
+    for effect, sensors in case.effects:
+        directions = int(rng.integers(2**63))
+        amplitude = EFFECTS[effect].realistic(rng)
+        if case.sigma is not None and EFFECTS[effect].scalable:
+            amplitude = scale_to(scene, effect, sensors, directions, case.sigma)
+        changes.append(draw_seeded(scene, effect, sensors, directions, amplitude))
     readings = noisy_readings(scene, changes, rng)
     recording = Recording(
         time=scene.time,
@@ -110,7 +116,22 @@ def make(case: Case, seed: int) -> tuple[Recording, dict]:
         source="simulated",
         accelerometer_axes=scene.array.axes,
     )
-    return recording, _truth(scene, case, seed, changes, recording)
+    effects = []
+    for change in changes:
+        labels = [scene.array.labels[k] for k in change.sensors]
+        effects.append({
+            "effect": change.effect,
+            "sensors": ["all"] if len(labels) == scene.accelerometers else labels,
+            **change.described(), "sigma": size_of(scene, change),
+            "sigma_exact": size_of(scene, change, EXACT_STEPS),
+        })  # fmt: skip
+    at_rail = recording.at_rail("accelerometer") | recording.at_rail("gyroscope")
+    return recording, {
+        "case": asdict(case), "seed": int(seed), "effects": effects,
+        "sigma": size_of(scene, changes), "sigma_exact": size_of(scene, changes, EXACT_STEPS),
+        "struck": list(case.struck), "positions_m": scene.positions.tolist(),
+        "at_rail": float(at_rail.mean()),
+    }  # fmt: skip
 
 
 HIDDEN = ("lever_arms", "drawn", "nothing")
@@ -130,36 +151,6 @@ def hidden(which: str, seed: int) -> Case:
         name = str(rng.choice([name for name in CATALOGUE if EFFECTS[name].scalable]))
         effects, sigma = ((name, (int(rng.integers(8)),)),), float(rng.uniform(*HIDDEN_SIZES))
     return Case("hidden", effects, sigma, kind="one" if effects else "clean")
-
-
-def _draw_effect(scene: Scene, case: Case, effect: str, sensors, rng) -> Change:
-    """One effect of the case at its size, or at a realistic amplitude."""
-    entry = EFFECTS[effect]
-    directions = int(rng.integers(2**63))
-    amplitude = entry.realistic(rng)
-    if case.sigma is not None and entry.scalable:
-        amplitude = scale_to(scene, effect, sensors, directions, case.sigma)
-    return draw_seeded(scene, effect, sensors, directions, amplitude)
-
-
-def _truth(scene: Scene, case: Case, seed: int, changes, recording: Recording) -> dict:
-    """The truth of a recording, as `make` gives it."""
-    effects = []
-    for change in changes:
-        labels = [scene.array.labels[k] for k in change.sensors]
-        effects.append({
-            "effect": change.effect,
-            "sensors": ["all"] if len(labels) == scene.accelerometers else labels,
-            **change.described(), "sigma": size_of(scene, change),
-            "sigma_exact": size_of(scene, change, EXACT_STEPS),
-        })  # fmt: skip
-    at_rail = recording.at_rail("accelerometer") | recording.at_rail("gyroscope")
-    return {
-        "case": asdict(case), "seed": int(seed), "effects": effects,
-        "sigma": size_of(scene, changes), "sigma_exact": size_of(scene, changes, EXACT_STEPS),
-        "struck": list(case.struck), "positions_m": scene.positions.tolist(),
-        "at_rail": float(at_rail.mean()),
-    }  # fmt: skip
 
 
 def matrix(scale: str = "default") -> list[Case]:

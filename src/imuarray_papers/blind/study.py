@@ -94,21 +94,6 @@ def right_set(wanted: list[str], named: dict[str, set[str]]) -> bool:
     )
 
 
-def wrong_names(wanted: list[str], named: dict[str, set[str]]) -> list[str]:
-    """Named effects whose class holds nothing of the truth."""
-    return [name for name, members in named.items() if not members & set(wanted)]
-
-
-def is_confident(kind: str, causes: list[dict], unexplained: bool) -> bool:
-    """True of a name that is given without reserve.
-
-    For gauges a class is reserve enough; for what the catalogue does not hold only
-    ``unexplained`` is.
-    """
-    firm = [c for c in causes if kind != "gauge" or not c["indistinguishable_from"]]
-    return bool(firm) and not unexplained
-
-
 def grade(entry: dict) -> dict:
     """The graded row of a case; ``entry`` as `diagnosed` returns it.
 
@@ -127,6 +112,9 @@ def grade(entry: dict) -> dict:
     causes = [] if lost else answer["causes"]
     unexplained = None if lost else bool(answer["unexplained"])
     wanted, named = [effect["effect"] for effect in truth["effects"]], classes(causes)
+    # Without reserve: for gauges a class is reserve enough; for what the catalogue does not hold
+    # only ``unexplained`` is.
+    firm = [c for c in causes if case["kind"] != "gauge" or not c["indistinguishable_from"]]
     keys = ("effect", "sensors", "indistinguishable_from")
     row = {name: case[name] for name in ("kind", "imus", "sampling_rate", "duration", "rails")}
     row |= {name: truth[name] for name in ("sigma", "sigma_exact")}
@@ -134,9 +122,9 @@ def grade(entry: dict) -> dict:
     return row | {
         "truth": [_effect_in_row(effect, causes, case["imus"]) for effect in truth["effects"]],
         "causes": [{key: cause[key] for key in keys} for cause in causes],
-        "wrong_names": wrong_names(wanted, named),
+        "wrong_names": [name for name, known in named.items() if not known & set(wanted)],
         "right_set": not lost and right_set(wanted, named),
-        "confident": is_confident(case["kind"], causes, unexplained),
+        "confident": bool(firm) and not unexplained,
         "unexplained": unexplained,
         "crash": lost,
         "extended": None if lost else accuracy(answer["extended"], truth["positions_m"]),

@@ -7,7 +7,6 @@ import pandas as pd
 
 from imuarray.pictures.style import BLACK, BLUE, PAGE, VERMILLION, new_figure, shade, styled
 from imuarray_papers.blind import summary
-from imuarray_papers.blind.criteria import criteria
 from imuarray_papers.blind.inject import CATALOGUE
 from imuarray_papers.blind.summary import CRASH, NOTHING, UNEXPLAINED
 from imuarray_papers.figures.style import Column, scale_line
@@ -131,7 +130,7 @@ def _separate(axes, lines, columns) -> None:
 def table_blind_bars(rows: dict, settings: dict):
     """Bars of the diagnosis beside what was measured; ``rows``: graded recordings."""
     found = summary.recordings(rows["rows"])
-    table = criteria(found)
+    table = summary.criteria(found)
     # empty where there is no verdict to be sure of
     table["sure"] = table.sure.map({True: "yes", False: "no"}).fillna("")
     notes = [
