@@ -5,11 +5,10 @@ And its recordings' diagnoses: do positions, and the causes' numbers, agree?
 
 import numpy as np
 import pandas as pd
-import xarray as xr
 
 from imuarray.pictures.style import PAGE, logarithmic, look, new_figure, styled
 from imuarray_papers.figures.style import Column, rms
-from imuarray_papers.measured.positions import agreement, pairwise
+from imuarray_papers.measured.positions import agreement, coordinate_table, pairwise
 
 MODELS = ("base", "inflated", "extended")  # sections of a diagnosis that have positions
 SERIES = {
@@ -94,10 +93,15 @@ def table_experiment(located: list, names: list[str], summary: pd.DataFrame, gro
     noise = np.where(assumed == "residual", "the residual's", assumed + " m/s²")
     rows = [summary.assign(model=[f"papers', σa {each}" for each in noise])]
     for each in located[0].samples.to_numpy():
-        table = pd.concat([
-            _coordinates(one.sel(samples=each)).assign(recording=name)
-            for name, one in zip(names, located, strict=True)
-        ])  # fmt: skip
+        tables = []
+        for name, one in zip(names, located, strict=True):
+            few = one.sel(samples=each)
+            variance = np.einsum("aiai->ai", few.position_covariance.to_numpy())
+            labels, positions = few.accelerometer.to_numpy()[1:], few.position.to_numpy()[1:]
+            tables.append(
+                coordinate_table(labels, positions, np.sqrt(variance)[1:], recording=name)
+            )
+        table = pd.concat(tables)
         found = agreement(pairwise(table), table)
         rows.append(pd.DataFrame([found | {"samples": int(each), "model": "sensors"}]))
     table = pd.concat(rows, ignore_index=True).sort_values("samples", kind="stable")
@@ -109,14 +113,6 @@ def table_experiment(located: list, names: list[str], summary: pd.DataFrame, gro
     )
     table = table[[column.name for column in EXPERIMENT]]
     return table, EXPERIMENT, "Table II of 2021 once more: sds of the positions, measured", [note]
-
-
-def _coordinates(one: xr.Dataset) -> pd.DataFrame:
-    """A row a coordinate: accelerometer, axis, mean_m, sd_m."""
-    count = 3 * one.sizes["accelerometer"]
-    sd = np.sqrt(np.diag(one.position_covariance.to_numpy().reshape(count, count)))
-    table = one.position.to_series().rename("mean_m").to_frame().assign(sd_m=sd)
-    return table.reset_index().iloc[3:]
 
 
 PAST_RAIL = (
@@ -183,7 +179,11 @@ def positions_agreement(documents: dict[str, dict]) -> pd.DataFrame:
     """
     rows = []
     for model in MODELS:
-        table = pd.concat([coordinates(d[model], name) for name, d in documents.items()])
+        tables = []
+        for name, document in documents.items():
+            means, sds = (document[model][key][1:] for key in ("positions_m", "positions_sd_m"))
+            tables.append(coordinate_table(range(len(means)), means, sds, recording=name))
+        table = pd.concat(tables)
         pairs = pairwise(table)
         found = agreement(pairs, table)
         rows.append({
@@ -194,14 +194,6 @@ def positions_agreement(documents: dict[str, dict]) -> pd.DataFrame:
             "z_rms": found["z_rms"], "coverage_95": found["coverage_95"],
         })  # fmt: skip
     return pd.DataFrame(rows)
-
-
-def coordinates(section: dict, recording: str) -> pd.DataFrame:
-    """A model's positions as `imuarray_papers.measured.positions.pairwise` takes them, m."""
-    means, sds = (np.array(section[key])[1:] for key in ("positions_m", "positions_sd_m"))
-    rows = [(number, axis) for number in range(len(means)) for axis in "xyz"]
-    table = pd.DataFrame(rows, columns=["accelerometer", "axis"])
-    return table.assign(recording=recording, mean_m=means.ravel(), sd_m=sds.ravel())
 
 
 def parameters_agreement(documents: dict[str, dict]) -> pd.DataFrame:

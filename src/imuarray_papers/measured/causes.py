@@ -12,7 +12,7 @@ from imuarray.engine.parameters import POSITION, columns_of
 from imuarray.engine.readings import arrange, determined, most_informative
 from imuarray.engine.widths import widths
 from imuarray.recording import Recording
-from imuarray_papers.measured.positions import pairwise
+from imuarray_papers.measured.positions import coordinate_table, pairwise
 
 ARMS = "lever arms of the axes"
 STEPS = {
@@ -43,15 +43,14 @@ def stepwise(recording: Recording) -> pd.DataFrame:
         smooth = found.smooth_ratio()
         pairs = np.argwhere(found.active)
         mine = found.places[0][pairs[:, 1] < 3]
-        parts.append(pd.DataFrame({
-            "step": step, "accelerometer": np.repeat(labels, 3), "axis": list("xyz") * len(labels),
-            "mean_m": found.positions[1:].ravel(), "sd_m": np.sqrt(np.diag(covariance)[mine]),
-            "residual_ratio": found.residual_ratio(),
-            "smooth_ratio": np.nan if smooth is None else np.median(smooth),
-            "nats": gain[0] / len(readings.time),
-            "nats_error": gain[1] / len(readings.time), "converged": found.converged,
-            "common_scale_sd": recording.gyroscope_common_scale_sd,
-        }))  # fmt: skip
+        sd = np.sqrt(np.diag(covariance)[mine])
+        parts.append(coordinate_table(labels, found.positions[1:], sd, step=step).assign(
+            residual_ratio=found.residual_ratio(),
+            smooth_ratio=np.nan if smooth is None else np.median(smooth),
+            nats=gain[0] / len(readings.time),
+            nats_error=gain[1] / len(readings.time), converged=found.converged,
+            common_scale_sd=recording.gyroscope_common_scale_sd,
+        ))  # fmt: skip
     return pd.concat(parts, ignore_index=True)
 
 

@@ -25,12 +25,7 @@ from imuarray.engine.robust import normal_pass
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.widths import settled
 from imuarray.errors import InputError
-from imuarray.firstorder.correct import (
-    FirstOrder,
-    calibrate_first_order,
-    calibrate_together,
-    correct,
-)
+from imuarray.firstorder.correct import calibrate_first_order, calibrate_together, correct
 from imuarray.model import ArrayModel
 from imuarray.model.effects import EFFECTS
 from imuarray.recording import Recording, array_of
@@ -55,13 +50,9 @@ def left_out(
     corrected = [correct(one, first) for one, first in zip(others, firsts, strict=True)]
     own = calibrate_first_order(recording, gyroscopes="offset", **options)
     calibration = engine_dataset(corrected, settled(board_of([used(one) for one in corrected])))
-    return correct(recording, _of_board(own, firsts[0])), calibration
-
-
-def _of_board(own: FirstOrder, other: FirstOrder) -> FirstOrder:
-    """A recording's first order, its maps another's of the same board."""
-    triads = replace(own.triads, matrix=other.triads.matrix)
-    return replace(own, triads=triads, gyroscopes=other.gyroscopes)
+    triads = replace(own.triads, matrix=firsts[0].triads.matrix)
+    of_board = replace(own, triads=triads, gyroscopes=firsts[0].gyroscopes)
+    return correct(recording, of_board), calibration
 
 
 def board_of(readings: Sequence[Readings]) -> Estimate:
@@ -194,18 +185,17 @@ def past_rail(
     withheld = np.broadcast_to(withheld, chosen.angular_rate.shape)
     hidden = _hidden(recording, index, withheld, lowest)
     clipped = hidden.select(index)
-    found = {"clipped": clipped.angular_rate}
-    positions, lead = calibration["position"].to_numpy(), lead_of(calibration)
-    ways = {
-        "nominal": (recording.relative_positions(), 0.0), "calibrated": (positions, 0.0),
-        "delayed": (positions, lead),
-    }  # fmt: skip
-    for name, way in ways.items():
-        found[name] = _predicted(clipped, withheld, *way)
+    nominal, positions = recording.relative_positions(), calibration["position"].to_numpy()
     whole = fused(hidden, calibration, np.isin(recording.time, chosen.time))
     values, sd = (part[:, : withheld.shape[1], 3:] for part in whole.predictions())
+    found = {
+        "clipped": clipped.angular_rate,
+        "nominal": _predicted(clipped, withheld, nominal, 0.0),
+        "calibrated": _predicted(clipped, withheld, positions, 0.0),
+        "delayed": _predicted(clipped, withheld, positions, lead_of(calibration)),
+        "board": values,
+    }
     errors = {name: value - chosen.angular_rate for name, value in found.items()}
-    errors["board"] = values - chosen.angular_rate
     rates = np.abs(chosen.angular_rate.mean(axis=1, keepdims=True))
     rates = np.broadcast_to(rates, withheld.shape)
     return _table(errors, {"board": sd}, withheld, np.degrees(rates), bins)

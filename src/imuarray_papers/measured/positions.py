@@ -8,7 +8,6 @@ import pandas as pd
 from scipy.special import ndtri
 
 from imuarray.estimation.collapsed import Collapsed
-from imuarray.estimation.identifiability import Calibration
 from imuarray.estimation.newton import calibrate_gauss_newton
 from imuarray.model import ArrayModel
 from imuarray.model.structure import product_slopes
@@ -64,41 +63,31 @@ def locate(recording: Recording, accelerometer_sd: float | None = None) -> Posit
 
 
 def _fit(recording: Recording, assumed: float, start=None):
-    """(model with one gyroscope, data, options of the prior, `Calibration`)."""
+    """(model with one gyroscope, mean and covariance of its rates, `Calibration`)."""
     mean, covariance = rate_distribution(recording)
-    array = array_of(recording, 1)
-    model = ArrayModel.isotropic(array, assumed, recording.gyroscope_noise_sd)
-    data = recording.specific_force, mean[:, None]
-    given = {
-        "position_prior": (array.parameters, recording.position_prior_sd),
-        "rate_covariance": covariance,
-    }
+    model = ArrayModel.isotropic(array_of(recording, 1), assumed, recording.gyroscope_noise_sd)
     found = calibrate_gauss_newton(
-        model, *data, start=start, tolerance=TOLERANCE, limit=LIMIT, **given
-    )
-    return model, data, given, found
+        model, recording.specific_force, mean[:, None], start=start, tolerance=TOLERANCE,
+        limit=LIMIT, position_prior=(model.array.parameters, recording.position_prior_sd),
+        rate_covariance=covariance,
+    )  # fmt: skip
+    return model, mean, covariance, found
 
 
 def _locate(recording, assumed, start=None) -> Positions:
-    model, data, prior, found = _fit(recording, assumed, start)
-    predicted = model.predict_many(found.motion.motion, found.positions).specific_force
-    residual = recording.specific_force - predicted
-    freedom = residual.size - _explained(model, data, found, prior["rate_covariance"])
+    model, mean, covariance, found = _fit(recording, assumed, start)
+    motion, force = found.motion.motion, recording.specific_force
+    residual = force - model.predict_many(motion, found.positions).specific_force
+    # the motion uses up 9 degrees of freedom a sample, less what the prior of omega supplies
+    prior, slope = np.linalg.inv(covariance), product_slopes(motion.angular_rate)
+    reduced, _ = Collapsed.of(model, force, mean[:, None]).reduce(found.positions)
+    known = prior + np.einsum("tai,ab,tbj->tij", slope, reduced.C, slope)
+    supplied = np.einsum("tij,tji->", np.linalg.inv(known), prior)
+    freedom = residual.size - (9 * len(known) - float(supplied))
     sd = float(np.sqrt(np.sum(residual**2) / (freedom - found.positions[1:].size)))
     return Positions(
         found.positions, found.covariance, assumed, sd, found.converged, len(found.cost)
     )
-
-
-def _explained(model: ArrayModel, data, found: Calibration, rate_covariance) -> float:
-    """Degrees of freedom of the accelerometers that the motion uses up: 9 a sample, less
-    what the prior of omega supplies of them."""
-    prior = np.linalg.inv(rate_covariance)
-    slope = product_slopes(found.motion.motion.angular_rate)
-    reduced, _ = Collapsed.of(model, *data).reduce(found.positions)
-    known = prior + np.einsum("tai,ab,tbj->tij", slope, reduced.C, slope)
-    supplied = np.einsum("tij,tji->", np.linalg.inv(known), prior)
-    return 9 * len(known) - float(supplied)
 
 
 def bcd_positions(recording: Recording, accelerometer_sd: float) -> Positions:
@@ -121,12 +110,11 @@ def bcd_positions(recording: Recording, accelerometer_sd: float) -> Positions:
     )
 
 
-def position_table(found: Positions, labels, /, **columns) -> pd.DataFrame:
-    """One row a coordinate: ``columns``, then accelerometer, axis, mean_m, sd_m."""
-    others = labels[1:]
+def coordinate_table(labels, means, sds, **columns) -> pd.DataFrame:
+    """One row a coordinate: ``columns``, then accelerometer, axis, mean_m, sd_m; (A, 3) m each."""
     return pd.DataFrame({
-        **columns, "accelerometer": np.repeat(others, 3), "axis": list("xyz") * len(others),
-        "mean_m": found.mean[1:].ravel(), "sd_m": found.sd.ravel(),
+        **columns, "accelerometer": np.repeat(labels, 3), "axis": list("xyz") * len(labels),
+        "mean_m": np.ravel(means), "sd_m": np.ravel(sds),
     })  # fmt: skip
 
 
@@ -180,7 +168,7 @@ def simulate_subset(recording: Recording, accelerometer_sd: float, rng):
 
 
 def locate_table(recording: Recording, sigmas, /, **columns) -> pd.DataFrame:
-    """`position_table` for each of ``sigmas``, for the estimated sigma_a, and of ML-BCD.
+    """`coordinate_table` for each of ``sigmas``, for the estimated sigma_a, and of ML-BCD.
 
     Columns ``method`` (map, bcd), ``assumed`` (a number as text, or residual),
     ``accelerometer_sd``, ``residual_sd`` (m/s^2), ``converged``, ``iterations``, and
@@ -190,8 +178,8 @@ def locate_table(recording: Recording, sigmas, /, **columns) -> pd.DataFrame:
     parts = []
     for method, locating, assumed in [*ways, ("bcd", bcd_positions, sigmas[-1])]:
         found = locating(recording, assumed)
-        parts.append(position_table(
-            found, recording.accelerometer_labels, **columns, method=method,
+        parts.append(coordinate_table(
+            recording.accelerometer_labels[1:], found.mean[1:], found.sd, **columns, method=method,
             assumed="residual" if assumed is None else f"{assumed:g}",
             accelerometer_sd=found.accelerometer_sd, residual_sd=found.residual_sd,
             converged=found.converged, iterations=found.iterations,

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
+from imuarray.engine.parameters import model_of
 from imuarray.estimation.newton import calibrate_gauss_newton
-from imuarray.model import ArrayModel
 from imuarray.motion import Motion
-from imuarray.recording import Recording, array_of
+from imuarray.recording import Recording
 from imuarray.simulation.recordings import clip, measure
 from imuarray_papers.measured.positions import LIMIT
 
@@ -33,33 +33,29 @@ class Residuals:
     angular_rate: np.ndarray
     motion: Motion
     positions: np.ndarray
-    converged: bool
 
 
 def fit_residuals(recording: Recording) -> Residuals:
     """Fit the papers' model with the recording's declared noise to all its samples."""
-    array = array_of(recording)
-    sds = recording.accelerometer_noise_sd, recording.gyroscope_noise_sd
-    model = ArrayModel.isotropic(array, *sds)
-    saturated = recording.saturated_gyroscopes()
+    model, saturated = model_of(recording), recording.saturated_gyroscopes()
     found = calibrate_gauss_newton(
         model, recording.specific_force, recording.angular_rate, saturated=saturated,
-        position_prior=(array.parameters, recording.position_prior_sd), tolerance=TOLERANCE,
+        position_prior=(model.array.parameters, recording.position_prior_sd), tolerance=TOLERANCE,
         limit=LIMIT,
     )  # fmt: skip
     motion = found.motion.motion
     predicted = model.predict_many(motion, found.positions)
-    rate = (recording.angular_rate - predicted.angular_rate) / sds[1]
+    force = recording.specific_force - predicted.specific_force
+    rate = recording.angular_rate - predicted.angular_rate
     return Residuals(
-        (recording.specific_force - predicted.specific_force) / sds[0],
-        np.where(saturated, np.nan, rate), motion, found.positions, found.converged,
+        force / recording.accelerometer_noise_sd,
+        np.where(saturated, np.nan, rate / recording.gyroscope_noise_sd), motion, found.positions,
     )  # fmt: skip
 
 
 def simulate_like(recording: Recording, fit: Residuals, rng) -> Recording:
     """The recording as the papers' model would have given it, with its rails and noise."""
-    sds = recording.accelerometer_noise_sd, recording.gyroscope_noise_sd
-    model = ArrayModel.isotropic(array_of(recording), *sds)
+    model = model_of(recording)
     force, rate, _ = measure(
         model, fit.motion, fit.positions, rng, gyroscope_range=recording.gyroscope_range
     )

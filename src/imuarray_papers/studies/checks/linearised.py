@@ -16,6 +16,7 @@ from imuarray.geometry import positions_of
 from imuarray.model import ArrayModel
 from imuarray.model.structure import design
 from imuarray.motion import Motion
+from imuarray_papers.measured.positions import coordinate_table
 from imuarray_papers.posterior.likelihood import Likelihood
 
 
@@ -43,11 +44,9 @@ def linearise(recording, truth, model, accelerometer_sd, gyroscopes: int):
 def coordinates(recording, truth, model, accelerometer_sd, gyroscopes, name) -> pd.DataFrame:
     """Per coordinate: truth, mean and sd (m) of the linearised posterior called ``name``."""
     error, covariance = linearise(recording, truth, model, accelerometer_sd, gyroscopes)
-    labels = recording.accelerometer_labels[1:]
-    table = pd.DataFrame([(name, label, axis) for label in labels for axis in "xyz"],
-                         columns=["name", "accelerometer", "axis"])  # fmt: skip
-    table["truth_m"] = truth["position"].to_numpy()[1:].ravel()
-    table["mean_m"], table["sd_m"] = table.truth_m + error, np.sqrt(np.diag(covariance))
+    labels, true = recording.accelerometer_labels[1:], truth["position"].to_numpy()[1:].ravel()
+    table = coordinate_table(labels, true + error, np.sqrt(np.diag(covariance)), name=name)
+    table.insert(3, "truth_m", true)
     return table
 
 
