@@ -22,17 +22,13 @@ from imuarray_papers.claims.registry import (
 RANGE = 157.0  # m/s^2, where the accelerometers saturate
 
 
-def _medians(tables) -> dict[int, float]:
+def _sds(results, prefix) -> dict[int, float]:
     """Median sd (m) over coordinates for each T."""
-    return {t: table.sd_m.median() for t, table in tables.items()}
-
-
-def _sds(results, prefix):
-    return _medians(results.posteriors(prefix))
+    return {t: table.sd_m.median() for t, table in results.posteriors(prefix).items()}
 
 
 def _linearised(results, prefix):
-    return _medians({t: results.linearised(f"{prefix}T{t}") for t in results.samples})
+    return {t: results.linearised(f"{prefix}T{t}").sd_m.median() for t in results.samples}
 
 
 @claim("2021-40")

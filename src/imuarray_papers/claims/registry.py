@@ -136,19 +136,10 @@ COLUMNS = {
 }  # fmt: skip
 
 
-def counts(table: pd.DataFrame) -> pd.DataFrame:
-    """Number of claims by paper and verdict."""
-    return pd.crosstab(table.paper, table.verdict).reindex(columns=VERDICTS, fill_value=0)
-
-
-def _cell(value) -> str:
-    return " ".join(str(value).split()).replace("|", "\\|")
-
-
 def _rows(frame: pd.DataFrame, header) -> list[str]:
     lines = ["| " + " | ".join(header) + " |", "|" + " --- |" * len(header)]
-    cells = frame.to_numpy().tolist()
-    return lines + ["| " + " | ".join(map(_cell, row)) + " |" for row in cells]
+    cells = frame.map(lambda value: " ".join(str(value).split()).replace("|", "\\|"))
+    return lines + ["| " + " | ".join(row) + " |" for row in cells.to_numpy()]
 
 
 def markdown(table: pd.DataFrame, settings: dict) -> str:
@@ -162,7 +153,8 @@ def markdown(table: pd.DataFrame, settings: dict) -> str:
         " papers are not in their text, so only what the text says is compared.",
         f"Ratios of clock times, with room for any machine: {clock}.", "",
     ]  # fmt: skip
-    lines += _rows(counts(table).reset_index(), ["Paper", *VERDICTS])
+    counts = pd.crosstab(table.paper, table.verdict).reindex(columns=VERDICTS, fill_value=0)
+    lines += _rows(counts.reset_index(), ["Paper", *VERDICTS])
     for paper, title in TITLES.items():
         lines += ["", f"## {title}", ""]
         lines += _rows(table.loc[table.paper == paper, list(COLUMNS)], COLUMNS.values())
