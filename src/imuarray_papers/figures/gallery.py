@@ -50,14 +50,12 @@ def gallery(
 
     ``chains``: lines on how good the chains are, by the data they are of.
     """
-    groups = []
-    for data, lines in chains.items():
-        groups.append("\n".join([f"{data}:\n", *(f"- {line}" for line in lines)]))
-    head = HEAD.format(
-        scale=settings["scale"]["name"], seed=settings["seed"],
-        chains="\n\n".join(groups),
-    )  # fmt: skip
-    parts = [head]
+    groups = [
+        "\n".join([f"{data}:\n", *(f"- {line}" for line in lines)])
+        for data, lines in chains.items()
+    ]
+    name, seed = settings["scale"]["name"], settings["seed"]
+    parts = [HEAD.format(scale=name, seed=seed, chains="\n\n".join(groups))]
     for name, text in figures.items():
         links = f"[PDF]({name}.pdf), [PNG]({name}.png), [numbers (CSV)]({name}.csv)"
         picture = f"![{title(name)}]({name}.png)"

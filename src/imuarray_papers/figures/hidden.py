@@ -39,22 +39,17 @@ def figure_criticism_hidden(diagnosis: tuple, truth: dict, recordings: Array):
         left_out=pd.DataFrame([nats], columns=["over_inflated", "over_inflated_error"]),
     )  # fmt: skip
     hidden = truth["effects"][0]
+    named = ", ".join(f"{c['effect']} ({' '.join(c['sensors'])})" for c in document["causes"])
     size = 1e3 * hidden["amplitude"]["value"]
     footer = [
         f"Lever arms of all IMUs, {size:.2g} mm, hidden in a simulated recording by code that"
-        f" shares nothing with the model; named: {_named(document)}. (a) rms residual over the"
+        f" shares nothing with the model; named: {named or 'nothing'}. (a) rms residual over the"
         " declared noise; open: under the extended model. (b) what the cause predicts, and what is"
         " back in the residual without it, in noise sds. (c) parameters less what motion and"
         " positions take up. (d) rms error of the positions, and how many of the 95 % intervals"
         " hold the truth."
     ]
     return partial(_draw_hidden, footer=footer), three_digits(table)
-
-
-def _named(document: dict) -> str:
-    """Causes with their sensors: 'size_effect (all)'."""
-    said = [f"{cause['effect']} ({' '.join(cause['sensors'])})" for cause in document["causes"]]
-    return ", ".join(said) or "nothing"
 
 
 def _arms(document: dict, truth: dict, turns) -> pd.DataFrame:
@@ -136,13 +131,14 @@ def table_criticism_hidden(diagnoses: list, truths: list, controls: list, names:
         of = [(c, {*c["indistinguishable_from"], *known_effect(c["effect"]).contains}) for c in new]
         mine = [c for c, parts in of if hidden["effect"] in {c["effect"], *parts}]
         size, true_size = _sizes(mine, hidden)
+        too = "this too" if hidden["effect"] in set().union(*before.values()) else "not this"
         rows.append({
             "recording": name, "hidden": hidden["effect"], "sensors": " ".join(hidden["sensors"]),
             "named": ", ".join(cause["effect"] for cause in new) or "nothing",
             "named_sensors": ", ".join(" ".join(cause["sensors"]) for cause in new),
             "size": size, "true_size": true_size,
             "gain": f"{mine[0]['heldout_gain_nats']:.3g}" if mine else "",
-            "control": "nothing" if not before else _there(hidden["effect"], before),
+            "control": f"{len(before)} of its own, {too}" if before else "nothing",
         })  # fmt: skip
     note = (
         "Effect, IMU and size are drawn from the seed by code that shares nothing with the model;"
@@ -150,12 +146,6 @@ def table_criticism_hidden(diagnoses: list, truths: list, controls: list, names:
         " not said to have. Lever arms: with the means that no recording shows."
     )
     return pd.DataFrame(rows), HIDDEN, "Effects that were hidden, and what was found", [note]
-
-
-def _there(effect: str, named: dict[str, set[str]]) -> str:
-    """Words on what the recording without the effect has of it, beside its own causes."""
-    there = effect in set().union(*named.values())
-    return f"{len(named)} of its own, {'this too' if there else 'not this'}"
 
 
 def _sizes(causes: list, hidden: dict) -> tuple[str, str]:

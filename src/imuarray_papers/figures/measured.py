@@ -106,8 +106,11 @@ def _draw_agreement(table, footer):
         hollow = style | {"markerfacecolor": "none"}
         size = np.sort(pairs[pairs.assumed == name].z.abs())
         share = (np.arange(size.size) + 0.5) / size.size
-        left.plot(size, share, label=_assumed(name, summary, most), **look(index, "marker"))
         rows = summary[summary.assumed == name].sort_values("samples")
+        label = f"$\\sigma_a$ = {name} m/s²"
+        if name == "residual":
+            label = f"$\\sigma_a$ from the residual ({rows.accelerometer_sd.iloc[-1]:.2f} m/s²)"
+        left.plot(size, share, label=label, **look(index, "marker"))
         middle.plot(rows.samples, 1e6 * rows.spread_m, **style)
         dotted = hollow | {"linestyle": (0, (1, 1)), "linewidth": 0.7}
         middle.plot(rows.samples, 1e6 * rows.claimed_m, **dotted)
@@ -127,13 +130,6 @@ def _draw_agreement(table, footer):
               title="95 % intervals (filled)\nand 50 % intervals (open)")  # fmt: skip
     figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=4)
     return figure
-
-
-def _assumed(name, summary, most):
-    row = summary[(summary.assumed == name) & (summary.samples == most)].iloc[0]
-    if name == "residual":
-        return f"$\\sigma_a$ from the residual ({row.accelerometer_sd:.2f} m/s²)"
-    return f"$\\sigma_a$ = {name} m/s²"
 
 
 def figure_measured_noise(allan: pd.DataFrame, name: str, settings: dict):

@@ -148,7 +148,7 @@ def _draw_fig5(table, start, footer):
     figure = new_figure(footer, height=3.0)
     axes = figure.subplots()
     for index, (value, rows) in enumerate(table.groupby("angular_acceleration_dps2")):
-        label = _number(value)
+        label = f"{value:.0f}" if value < 1e4 else f"${_power(value)}$"
         points(axes, rows.angular_rate_dps, rows.rmse_m, rows.rmse_se_m, index, label=label)
     level(axes, start, r"start ($\sigma_r$)", color=GREY)
     logarithmic(axes, RATE, "RMSE of the positions (m)")
@@ -161,7 +161,3 @@ def _power(value: float) -> str:
     factor, exponent = f"{value:.0e}".split("e")
     power = f"10^{{{int(exponent)}}}"
     return power if factor == "1" else rf"{factor}\times{power}"
-
-
-def _number(value: float) -> str:
-    return f"{value:.0f}" if value < 1e4 else f"${_power(value)}$"

@@ -89,7 +89,11 @@ def _draw_fig3(table, burn_in_steps, name, footer):
     for panel in ("whole", "trace"):
         _traces(mosaic[panel], table, burn_in_steps)
     _histograms(mosaic["histogram"], table)
-    _correlations(mosaic["correlation"], table)
+    for chain, rows in table[table.panel == "autocorrelation"].groupby("chain"):
+        mosaic["correlation"].plot(rows.step, rows.value, **_ink(chain), label=f"chain {chain}")
+    mosaic["correlation"].axhline(0, color=GREY, linewidth=0.6)
+    mosaic["correlation"].set(xlabel="Lag (steps)", ylabel="Autocorrelation (1)", xlim=(0, None))
+    mosaic["correlation"].set_title("(b) after burn-in", size=8)
     mosaic["whole"].set_title(f"(a) {name}: whole trace, and zoomed", size=8)
     mosaic["whole"].tick_params(labelbottom=False)
     bins = table[(table.panel == "histogram") & (table.value > 0)]
@@ -165,14 +169,6 @@ def _histograms(axes, table):
     axes.set_xticks([0, tick], ["0", significant(tick)])
 
 
-def _correlations(axes, table):
-    for chain, rows in table[table.panel == "autocorrelation"].groupby("chain"):
-        axes.plot(rows.step, rows.value, **_ink(chain), label=f"chain {chain}")
-    axes.axhline(0, color=GREY, linewidth=0.6)
-    axes.set(xlabel="Lag (steps)", ylabel="Autocorrelation (1)", xlim=(0, None))
-    axes.set_title("(b) after burn-in", size=8)
-
-
 def _ink(chain: int) -> dict:
     """Colour and dashes of a chain: blue and full, vermillion and dashed, ..."""
     return look({1: 2, 2: 0}.get(int(chain), int(chain)), "marker")
@@ -225,7 +221,9 @@ def _draw_fig4(table, name, footer):
         truth = f"{1e3 * rows.truth_m.iloc[0]:.4g}".replace("-", "−")
         title = f"({letter}) {axis} of {name}, true value {truth} mm"
         row[0].set(ylabel="Density / peak (1)", ylim=(0, 1.08), title=title)
-        row[1].set_title(_spreads(rows))
+        sds = rows[rows.samples > 0].groupby("samples").sd_um.first()
+        spreads = [f"$T={samples}$: {significant(sd)}" for samples, sd in sds.items()]
+        row[1].set_title(f"sd (µm) {', '.join(spreads)}")
     widest = table[table.samples > 0].deviation_um
     near = (widest.min(), widest.max())
     panels[-1, 0].set(xlabel="Deviation from the true value (µm)", xlim=near)
@@ -292,9 +290,3 @@ def _density(axes, rows, style, label):
 
 def _dashes(number: int):
     return "-" if number == 0 else (0, (4, 2))
-
-
-def _spreads(rows) -> str:
-    sds = rows.groupby("samples").sd_um.first()
-    parts = [f"$T={samples}$: {significant(sd)}" for samples, sd in sds.items() if samples > 0]
-    return f"sd (µm) {', '.join(parts)}"
