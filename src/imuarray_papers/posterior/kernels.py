@@ -58,15 +58,10 @@ def collapse(positions, data, out):
 @njit(inline="always")
 def _log_mean_exp(exponent):
     """log of the mean of exp(exponent), safe from over- and underflow (Appendix A)."""
-    top = exponent[0]
-    for n in range(1, exponent.size):
-        top = max(top, exponent[n])
+    top = exponent.max()
     if exponent.size == 1 or not top > -math.inf:
         return top
-    total = 0.0
-    for n in range(exponent.size):
-        total += math.exp(exponent[n] - top)
-    return top + math.log(total / exponent.size)
+    return top + math.log(np.exp(exponent - top).mean())
 
 
 @njit

@@ -66,7 +66,20 @@ class Likelihood:
             if np.isfinite(motion_sd[0]):
                 raise InputError("motion_sd: expected none of omega beside rate_distribution")
         mean = np.ascontiguousarray(mean.T)
-        data = _arrange(collapsed, mean, covariance, np.full(3, float(motion_sd[1]) ** -2.0))
+        general = collapsed.weights is None
+        data = kernels.LikelihoodData(
+            collapsed.weighted,
+            collapsed.energy,
+            collapsed.base,
+            mean,
+            _lower(covariance),
+            np.empty((10, 0)),
+            np.empty(0) if general else collapsed.weights,
+            np.ascontiguousarray(collapsed.precision) if general else np.empty((0, 0)),
+            np.array(structure_tensor()),
+            tables(),
+            np.full(3, float(motion_sd[1]) ** -2.0),
+        )
         return cls(data, DETERMINANTS[determinant], collapsed, mean.T, covariance, motion_sd)
 
     def marginal(self, positions, nodes: int | None = None) -> Marginal:
@@ -128,23 +141,6 @@ def _lower(covariance) -> np.ndarray:
     """Cholesky factors of (T, 3, 3) as the kernels want them, (6, T)."""
     factor = np.linalg.cholesky(covariance)
     return np.array([factor[:, i, j] for i in range(3) for j in range(i + 1)])
-
-
-def _arrange(collapsed: Collapsed, mean, covariance, ridge) -> kernels.LikelihoodData:
-    general = collapsed.weights is None
-    return kernels.LikelihoodData(
-        collapsed.weighted,
-        collapsed.energy,
-        collapsed.base,
-        np.ascontiguousarray(mean),
-        _lower(covariance),
-        np.empty((10, 0)),
-        np.empty(0) if general else collapsed.weights,
-        np.ascontiguousarray(collapsed.precision) if general else np.empty((0, 0)),
-        np.array(structure_tensor()),
-        tables(),
-        ridge,
-    )
 
 
 @dataclass(frozen=True)

@@ -32,12 +32,13 @@ class PseudoMarginalMove(emcee.moves.Move):
         thin: int,
         seed: int,
         names,
-        iteration=0,
-        threads=2,
+        iteration: int,
+        accepted: np.ndarray,
+        threads: int,
     ):  # fmt: skip
         self.target, self.step, self.thin = target, step, thin
         self.seed, self.names, self.iteration = seed, tuple(names), iteration
-        self.accepted: np.ndarray | None = None
+        self.accepted = accepted  # of each chain, so far
         self.pool = ThreadPoolExecutor(max_workers=threads)
 
     def propose(self, model, state):
@@ -55,7 +56,7 @@ class PseudoMarginalMove(emcee.moves.Move):
         results = list(self.pool.map(advance, range(chains)))
         self.iteration += 1
         counts = np.array([accepted for _, accepted, _ in results])
-        self.accepted = counts if self.accepted is None else self.accepted + counts
+        self.accepted = self.accepted + counts
         coords = np.array([theta for theta, _, _ in results])
         log_prob = np.array([value for _, _, value in results])
         return emcee.State(coords, log_prob=log_prob), counts > 0
@@ -91,11 +92,10 @@ def run_chains(
     starts = np.atleast_2d(np.asarray(starts, float))
     done = _load(checkpoint, key, starts.shape, thin, draws) if checkpoint else None
     past, state, accepted = _begin(target, starts, seed, names) if done is None else done
-    move = PseudoMarginalMove(target, step, thin, seed, names, past[0].shape[1], threads)
-    move.accepted = accepted
+    first = past[0].shape[1]
+    move = PseudoMarginalMove(target, step, thin, seed, names, first, accepted, threads)
     sampler = emcee.EnsembleSampler(*starts.shape, _never, moves=move, vectorize=True)
     seldom = 0.2 if sys.stderr.isatty() else 15.0  # seconds; a log file needs few lines
-    first = past[0].shape[1]
     with tqdm(total=draws, initial=first, disable=quiet, unit="draw", mininterval=seldom) as bar:
         while past[0].shape[1] < draws:
             count = min(block, draws - past[0].shape[1])
