@@ -56,19 +56,15 @@ class Recordings:
     def claims(self, scale: str) -> list[str]:
         """Files that the claims on the experiment read."""
         name, group = self.shown, self.group(self.shown)
-        paths = [f"results/measured/positions/{name}.csv"]
-        paths.append(f"results/measured/subsets/{name}_selection.csv")
+        made = [f"positions/{name}.csv", f"subsets/{name}_selection.csv"]
         if self.is_first_order(name):
-            paths.append(f"results/measured/first_order/{name}_noise.csv")
+            made.append(f"first_order/{name}_noise.csv")
         if group in self.groups():
-            paths.append(f"results/measured/agreement/{group}.csv")
+            made.append(f"agreement/{group}.csv")
         if self.is_criticised and scale != "quick":
-            rest = (
-                f"causes_{group}.csv",
-                f"residuals/{name}.csv",
-                f"diagnosis/{name}/diagnosis.json",
-            )
-            paths += [f"results/measured/{path}" for path in rest]
+            made += [f"causes_{group}.csv", f"residuals/{name}.csv"]
+            made.append(f"diagnosis/{name}/diagnosis.json")
+        paths = [f"results/measured/{path}" for path in made]
         for kind in (name, f"simulated_{name}"):
             paths += self.posterior(scale, kind, "posterior", ["csv", "json"])
             paths += self.posterior(scale, kind, "chains", ["nc"])

@@ -47,19 +47,14 @@ def names_of(setting: Setting) -> list[str]:
     return [f"{label}_{axis}" for label in labels for axis in "xyz"] + ["size", "misfit"]
 
 
-def _size(setting: Setting, thetas) -> np.ndarray:
-    """The array's size along its nominal shape, (...)."""
-    nominal = setting.prior.mean
-    return np.asarray(thetas) @ nominal / np.linalg.norm(nominal)
-
-
 def of_draws(setting: Setting, made, draws, name: str) -> np.ndarray:
     """PIT values (R, P + 2) of the truths among draws (R, L, P), uniform between two draws."""
-    out = []
+    out, nominal = [], setting.prior.mean
     for one, thetas in zip(made, draws, strict=True):
         both = np.vstack([one.truth, thetas])
         misfits = [misfit(one.likelihood, theta) for theta in both]
-        values = np.column_stack([both, _size(setting, both), misfits])
+        along = both @ nominal / np.linalg.norm(nominal)
+        values = np.column_stack([both, along, misfits])
         rng = stream(setting.seed, "calibrated", name, setting.name, setting.samples, one.number)
         out.append(_pit(values, rng))
     return np.array(out)

@@ -110,20 +110,13 @@ def replicate(setting: Setting, number: int) -> Replicate:
     force, rate, _ = measure(model, motion, positions_of(truth), rng)
     likelihood = Likelihood.of(model, force, rate, motion_sd=setting.motion_sd[:2])
     best = _most_likely(setting, likelihood, rng)
-    return Replicate(
-        number, truth, likelihood, best.positions[1:].ravel(), best.covariance,
-        *_without_prior(likelihood, best.positions),
-    )  # fmt: skip
-
-
-def _without_prior(likelihood: Likelihood, start):
-    """(most likely positions (P,), their covariance, converged); NaN where not determined."""
+    mode = best.positions[1:].ravel()
     try:
-        found = fisher_scoring(likelihood.collapsed, start)
+        found = fisher_scoring(likelihood.collapsed, best.positions)
+        free = found.positions[1:].ravel(), found.covariance, found.converged
     except IdentifiabilityError:
-        size = start[1:].size
-        return np.full(size, np.nan), np.full((size, size), np.nan), False
-    return found.positions[1:].ravel(), found.covariance, found.converged
+        free = np.full(mode.size, np.nan), np.full((mode.size,) * 2, np.nan), False
+    return Replicate(number, truth, likelihood, mode, best.covariance, *free)
 
 
 def _most_likely(setting: Setting, likelihood: Likelihood, rng):

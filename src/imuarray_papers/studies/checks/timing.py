@@ -11,34 +11,24 @@ import pandas as pd
 from imuarray.geometry import positions_of
 
 
-def _fastest(function, repeats: int) -> tuple[float, float]:
-    """Shortest of ``repeats`` runs after one to warm up, and their sd, in seconds.
-
-    The thread's own time, so that a busy machine matters less.
-    """
-    function()
-    spans = []
-    for _ in range(repeats):
-        start = time.thread_time()
-        function()
-        spans.append(time.thread_time() - start)
-    return min(spans), float(np.std(spans, ddof=1))
-
-
 def transition_costs(targets, thetas, step, rng, count=50, repeats=3) -> pd.DataFrame:
-    """Seconds a transition of Algorithm 1 (2021) takes for each T: target in ``targets``."""
+    """Seconds a transition of Algorithm 1 (2021) takes for each T: target in ``targets``.
+
+    The shortest of ``repeats`` runs after one to warm up, and their sd. The thread's own time, so
+    that a busy machine matters less.
+    """
     rows = []
     for samples, target in targets.items():
         theta = np.array(thetas[samples])
-        value = target.log_target(theta, rng)
-
-        def run(target=target, theta=theta, value=value):
+        value, spans = target.log_target(theta, rng), []
+        for _ in range(repeats + 1):
+            start = time.thread_time()
             target.transitions(theta.copy(), value, step, count, rng)
-
-        seconds, spread = (part / count for part in _fastest(run, repeats))
-        rows.append(
-            {"what": "transition", "samples": samples, "seconds": seconds, "spread_s": spread}
-        )
+            spans.append((time.thread_time() - start) / count)
+        rows.append({
+            "what": "transition", "samples": samples, "seconds": min(spans[1:]),
+            "spread_s": np.std(spans[1:], ddof=1),
+        })  # fmt: skip
     return pd.DataFrame(rows)
 
 
