@@ -145,7 +145,7 @@ def convergence(
     return pd.DataFrame(run_batches(job, jobs, threads, True, "convergence"))
 
 
-def _observed(bound, marks, away) -> float:
+def rate_seen(bound, marks, away) -> float:
     """The factor by which ML-BCD's last steps shrink its distance ``away`` at ``marks``."""
     # not so far that rounding is what is left
     floor = max(1e-3 * bound, 10 * away.min())
@@ -159,7 +159,7 @@ def _observed(bound, marks, away) -> float:
 def descents(model: ArrayModel, force, rate, saturated, limit: int = BCD_LIMIT):
     """ML-BCD and Gauss-Newton from the nominal positions to the optimum, on the same measurements.
 
-    The bound (m, rms), iterations of each to 1.01 times it, NaN if never, and `_observed`.
+    The bound (m, rms), iterations of each to 1.01 times it, NaN if never, and `rate_seen`.
     """
     data = Collapsed.of(model, force, rate, saturated)
     best = fisher_scoring(data, model.array.relative)
@@ -180,7 +180,7 @@ def descents(model: ArrayModel, force, rate, saturated, limit: int = BCD_LIMIT):
             newton = iteration
             break
     bcd = marks[near[0]] if len(near) else np.nan
-    return bound, bcd, newton, _observed(bound, marks, away)
+    return bound, bcd, newton, rate_seen(bound, marks, away)
 
 
 def against_size(model: ArrayModel, seed, samples, motion, factors, count=20) -> pd.DataFrame:
