@@ -124,18 +124,21 @@ def study(settings: dict, name: str) -> tuple[list[Case], dict]:
     Figure 4, figure 5, and figure 5's remark that the specific force does not matter.
     """
     paper = settings["paper2017"]
-    own, marks = magnitudes(paper), paper["fig4_iterations"]
+    own = magnitudes(paper)
+    if name == "motion":  # whose rule is given figure 5's settings alone
+        marks = [paper["fig5_iterations"]]
+        motions = [
+            (np.radians(rate), np.radians(acceleration), own[2])
+            for acceleration in paper["fig5_accelerations_dps2"]
+            for rate in paper["fig5_rates_dps"]
+        ]
+    else:
+        marks = paper["fig4_iterations"]
+        motions = [(*own[:2], force) for force in FORCES]
     if name == "samples":
         cases = [Case(("position", name, n), n, own) for n in paper["fig4_samples"]]
     else:
-        marks, motions = [max(marks)], [(*own[:2], force) for force in FORCES]
-        if name == "motion":
-            marks = [paper["fig5_iterations"]]
-            motions = [
-                (np.radians(rate), np.radians(acceleration), own[2])
-                for acceleration in paper["fig5_accelerations_dps2"]
-                for rate in paper["fig5_rates_dps"]
-            ]
+        marks = [max(marks)]
         cases = [
             Case(("position", name, number), paper["fig5_samples"], motion)
             for number, motion in enumerate(motions)
