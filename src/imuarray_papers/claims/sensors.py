@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 
+from imuarray.model.effects import EFFECTS
 from imuarray_papers.claims.experiment2021 import agreement
 from imuarray_papers.claims.registry import claim, show, untested, verdict
 
@@ -132,7 +133,7 @@ def nonlinear(results):
     if _steps(results) is None:
         return SEVERAL
     causes = results.json(f"../measured/diagnosis/{results.measured}/diagnosis")["causes"]
-    nats = {cause["effect"]: cause["heldout_gain_nats"] for cause in causes}
+    nats = {c["effect"]: c["heldout_gain_nats"] for c in causes if c["effect"] in EFFECTS}
     most = max(nats, key=nats.__getitem__)
     own = sum(gain for effect, gain in nats.items() if "nonlinearity" in effect)
     value = f"{show(own, 2)} nats of {show(nats[most], 2)} ({most})"
