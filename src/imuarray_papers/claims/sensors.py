@@ -3,11 +3,11 @@
 import numpy as np
 import pandas as pd
 
-from imuarray.model.effects import EFFECTS
 from imuarray_papers.claims.experiment2021 import agreement
 from imuarray_papers.claims.registry import claim, show, untested, verdict
 
 DEGREES = float(np.degrees(1.0))
+OF_NOISE = "accelerometer_noise", "gyroscope_noise", "coloured_noise", "heavy_tails", "shock"
 SEVERAL = untested(
     "several measured recordings with still poses needed, and more than the quick scale"
 )
@@ -133,7 +133,7 @@ def nonlinear(results):
     if _steps(results) is None:
         return SEVERAL
     causes = results.json(f"../measured/diagnosis/{results.measured}/diagnosis")["causes"]
-    nats = {c["effect"]: c["heldout_gain_nats"] for c in causes if c["effect"] in EFFECTS}
+    nats = {c["effect"]: c["heldout_gain_nats"] for c in causes if c["effect"] not in OF_NOISE}
     most = max(nats, key=nats.__getitem__)
     own = sum(gain for effect, gain in nats.items() if "nonlinearity" in effect)
     value = f"{show(own, 2)} nats of {show(nats[most], 2)} ({most})"
