@@ -172,7 +172,7 @@ def _kind(plain: str, unit: str) -> str:
 
 
 def _labels(names: list[str]) -> list[str]:
-    """What tells sensors of one kind apart: words and numbers that are not in all names."""
+    """Labels of sensors of one kind: words and numbers that are not in all names."""
     parts = [re.findall(r"\d+|[A-Za-z]+", re.sub("m_?s_?2", "", name)) for name in names]
     shared = set.intersection(*map(set, parts)) if len(parts) > 1 else set()
     if len(parts) < 2:

@@ -52,7 +52,7 @@ ERROR_NOT = "the abstract's word is right for the variance, not for the error; s
 @claim("2017-02", power=1, remark=ERROR_NOT)
 @claim("2017-03", power=2)
 def inverse(results, power, remark=""):
-    """Of the error, and of its square, the variance."""
+    """Verdict on the exponent of the error (power 1), or of its square, the variance."""
     slope, error = (power * part for part in _exponent(results)[:2])
     return verdict(slope, error, near(slope, -1, error, 0.05 * power), remark)
 

@@ -84,7 +84,7 @@ def saturates(results):
 
 
 def _steps(results) -> pd.DataFrame | None:
-    """What each cause gains on the board, by step (`measured.causes`); None of one recording."""
+    """Gain of each cause on the board, by step (`measured.causes`); None of one recording."""
     table = results.of_board(f"causes_{results.board}")
     return table if table is None else table.set_index("step")
 
