@@ -7,7 +7,9 @@ import pandas as pd
 import pytest
 
 from imuarray.errors import InputError
+from imuarray.geometry import mimu4444_corners
 from imuarray.motion import normal_motion
+from imuarray.recording import Recording
 from imuarray.simulation.recordings import measure
 from imuarray_papers.claims.registry import (
     CLAIMS,
@@ -23,7 +25,7 @@ from imuarray_papers.claims.registry import (
 from imuarray_papers.claims.results import Results
 from imuarray_papers.config import model_from, read_config
 from imuarray_papers.studies.bound import bound_table
-from imuarray_papers.studies.checks import identifiability, marginalisation
+from imuarray_papers.studies.checks import identifiability, marginalisation, statements
 from imuarray_papers.studies.position_error import magnitudes
 from imuarray_papers.studies.rate_error import accelerometers_only
 from tests.test_claims_measured import SETTINGS as MEASURED
@@ -154,8 +156,18 @@ def studies(settings):
     effect = {"method": "linearised", "shift_max_sd": 0.01, "shift_along_sd": 0.02}
     effect |= {"width_ratio_min": 1.0}
     effects = [{"name": f"{p}T{t}", "samples": t} | effect for p in SDS for t in SAMPLES]
+    motion = normal_motion(rng, (2000,), *sds)
+    said = {
+        "bound_m": statements.any_motion(model, 1, 1000, sizes, sds, (5.0, 62.5), motion),
+        "motion": statements.motion_efficiency(model, 1, 200, sizes),
+        "differentiation": statements.differentiation(model, 1, 200, sds, 5.0, 62.5),
+        "sds": [field.std() for field in motion[:3]],
+        "averaging": {"specific_force": 1.0, "angular_rate": 1.0},
+    }
     return {
-        "claims/identifiability.json": checks, "claims/marginalisation.json": estimator,
+        "claims/dependence": statements.dependence(model, 1, 20, sizes),
+        "claims/statements.json": said, "claims/identifiability.json": checks,
+        "claims/marginalisation.json": estimator,
         "claims/ranks": identifiability.ranks(rng, model.array, (3, 5), (1, 2, 3)),
         "claims/inner_steps": identifiability.inner_steps(rng, model, sizes, (2, 50)),
         "claims/position_bound": bound_table(model, 1, cases),
@@ -184,7 +196,7 @@ def table(results):
 def test_ids():
     assert all(re.fullmatch(r"20(17|21)-\d\d", item) for item in CLAIMS)
     assert set(CLAIMS) == set(REGISTER)
-    for paper, last in (("2017", 45), ("2021", 67)):
+    for paper, last in (("2017", 49), ("2021", 71)):
         withdrawn = {"2017-24", "2021-51"}
         every = {f"{paper}-{number:02d}" for number in range(1, last + 1)} - withdrawn
         assert {item for item in CLAIMS if item.startswith(paper)} == every
@@ -207,7 +219,7 @@ def test_every_claim_has_a_verdict(table):
 
 
 # What no choice of the made-up results can make hold: they rest on the studies themselves.
-REAL = {"2017-02", "2017-06", "2017-19", "2017-20", "2017-44", "2021-11"}
+REAL = {"2017-02", "2017-06", "2017-19", "2017-20", "2017-44", "2017-46", "2021-11"}
 
 
 def test_verdicts_in_a_world_where_the_papers_are_right(table):
@@ -252,6 +264,21 @@ FLIPS = [
     ("2017-23", scaled(RATE, "gyroscopes_rmse_dps", "angular_rate_dps > 2000", 1e-6)),
     ("2017-25", scaled("claims/inner_steps", "inner_steps", "samples == 50", 3.0)),
     ("2017-33", scaled("claims/ranks", "rank", "samples == 1", lambda old: old + 3)),
+    ("2017-47", scaled("claims/dependence", "factor", "change == 'one gyroscope'", 1.1)),
+    ("2017-48", replaced("claims/statements", bound_m={"normal": 2e-5})),
+    ("2017-49", replaced("claims/statements", motion={"ratio": 1.2, "se": 0.01})),
+    ("2021-68", replaced("claims/statements", sds=[10.0, 600.0, 20.0])),
+    (
+        "2021-69",
+        replaced("claims/statements", averaging={"specific_force": 3.0, "angular_rate": 1.0}),
+    ),
+    (
+        "2021-70",
+        replaced(
+            "claims/statements",
+            differentiation={"one sample": 9.0, "difference": 8.0, "noise": 0.1},
+        ),
+    ),
     ("2021-13", scaled("claims/determinant", "shift_max_sd", "samples == 500", 50.0)),
     ("2021-18", scaled("tuning/variance_T50", "variance", "draws > 5", 3.0)),
     ("2021-19", scaled("tuning/variance_T500", "variance", "draws > 0", 0.01)),
@@ -278,6 +305,32 @@ def test_verdict_flips(results, name, change):
     assert CLAIMS[name](results).verdict == HOLDS
     changed = results.replace(change(results))
     assert CLAIMS[name](changed).verdict == FAILS
+
+
+def test_accuracy_rests_on_what_it_is_said_to(results):
+    changes = ["noise of the gyroscopes", "geometry", "angular rate"]
+    table = pd.DataFrame({"change": [*changes, "one gyroscope"], "factor": 1.5}).assign(factor_se=0)
+    extra = pd.DataFrame({"change": ["angular acceleration", "specific force"], "factor": 1.0})
+    whole = pd.concat([table, extra], ignore_index=True)
+    assert CLAIMS["2017-46"](results.replace({"claims/dependence": whole})).verdict == HOLDS
+
+
+def test_the_mean_of_triads_with_noise_of_their_own():
+    rng = np.random.default_rng(0)
+    common = rng.standard_normal((4000, 1, 3))
+    shapes = {"specific_force": rng.standard_normal((4000, 4, 3)), "angular_rate": 0 * common}
+    shapes["angular_rate"] = common + np.zeros((1, 4, 1))
+    labels = tuple("1234")
+    made = Recording(
+        time=np.arange(4000.0), stationary=np.ones(4000, bool), **shapes,
+        accelerometer_labels=labels, gyroscope_labels=labels,
+        accelerometer_position=mimu4444_corners().positions[:4], accelerometer_noise_sd=1.0,
+        gyroscope_noise_sd=1.0, accelerometer_range=99.0, gyroscope_range=99.0,
+        position_prior_sd=1e-3,
+    )  # fmt: skip
+    found = statements.averaging(made)
+    assert found["specific_force"] == pytest.approx(1.0, abs=0.05)
+    assert found["angular_rate"] == pytest.approx(2.0, abs=0.05)
 
 
 def test_a_complete_calibration_takes_more_iterations_for_more_samples(results):

@@ -94,6 +94,25 @@ rule claims_linearised:
         "../scripts/claims_linearised.py"
 
 
+rule claims_statements:
+    input:
+        recording=MEASURED.recording(MEASURED.shown),
+    output:
+        dependence="results/{scale}/claims/dependence.csv",
+        checks="results/{scale}/claims/statements.json",
+    log:
+        "results/{scale}/logs/claims/statements.log",
+    benchmark:
+        "results/{scale}/benchmarks/claims/statements.tsv"
+    params:
+        settings=sections("paper2017", "paper2021", "experiment"),
+        code=code("claims_statements"),
+    message:
+        "claims: what accuracy rests on ({wildcards.scale})"
+    script:
+        "../scripts/claims_statements.py"
+
+
 rule claims_timing:
     input:
         recordings=of_samples("recordings/T{samples}.nc"),
@@ -144,6 +163,8 @@ rule claims:
         marginalisation="results/{scale}/claims/marginalisation.json",
         linearised="results/{scale}/claims/linearised.csv",
         determinant="results/{scale}/claims/determinant.csv",
+        dependence="results/{scale}/claims/dependence.csv",
+        statements="results/{scale}/claims/statements.json",
         timing="results/{scale}/claims/timing.csv",
         acceptance="results/{scale}/claims/acceptance_variance.csv",
         experiment=lambda wc: MEASURED.claims(wc.scale),

@@ -102,14 +102,19 @@ def assumed(results, step, without):
     return verdict(value, row.nats_error, bool(row.nats < 2 * row.nats_error), remark)
 
 
+def _turning(table: pd.DataFrame) -> pd.Series:
+    """Rms residual of the gyroscopes in bins of angular acceleration, the slowest first."""
+    mine = table[(table.quantity == "angular_rate") & (table.source == "measured")]
+    return mine.groupby("bin_low").rms.agg(lambda rms: rms.pow(2).mean() ** 0.5)
+
+
 @claim("2021-65")
 def one_rate(results):
     table, still = results.of_board(f"residuals/{results.measured}"), _still(results)
     if table is None or still is None:
         return SEVERAL
     noise = still[still.sensor == "angular_rate"].ratio.pow(2).mean() ** 0.5
-    mine = table[(table.quantity == "angular_rate") & (table.source == "measured")]
-    sizes = mine.groupby("bin_low").rms.agg(lambda rms: rms.pow(2).mean() ** 0.5) / noise
+    sizes = _turning(table) / noise
     value = f"residual {show(sizes.min(), 2)} to {show(sizes.max(), 2)} times the noise"
     remark = f"{results.measured}: axes and scales differ, and accelerometers lag behind"
     return verdict(value, "", bool(sizes.max() < 1.5), remark)
@@ -139,3 +144,47 @@ def nonlinear(results):
     value = f"{show(own, 2)} nats of {show(nats[most], 2)} ({most})"
     remark = f"{results.measured}, gains on held-out time, each beside all others"
     return verdict(value, "", "nonlinearity" in most, remark)
+
+
+@claim("2021-68")
+def by_hand(results):
+    found, paper = results.json("claims/statements")["sds"], results.settings["paper2021"]
+    sds = DEGREES * found[0], DEGREES * found[1], found[2]
+    keys = "angular_rate_sd_dps", "angular_acceleration_sd_dps2", "specific_force_sd"
+    off = [sd / paper[key] for sd, key in zip(sds, keys, strict=True)]
+    value = f"{show(sds[0])} deg/s, {show(sds[1])} deg/s^2, {show(sds[2])} m/s^2"
+    remark = f"{results.measured}, samples beyond 100 deg/s, one by one"
+    return verdict(value, "", min(off) > 1 / 1.5 and max(off) < 1.5, remark)
+
+
+@claim("2021-69")
+def averaging(results):
+    found = results.json("claims/statements")["averaging"]
+    if found is None:
+        return untested("a recording with still poses needed")
+    ratios = list(found.values())
+    value = f"accelerometers {show(ratios[0])}, gyroscopes {show(ratios[1])} times sd / root K"
+    return verdict(value, "", max(ratios) < 1.25, f"{results.measured}, neighbours' differences")
+
+
+@claim("2021-70")
+def single_sample(results):
+    found = results.json("claims/statements")["differentiation"]
+    one, other = found["one sample"], found["difference"]
+    value = f"error {show(one)} rad/s^2 of one sample, {show(other)} of the central difference"
+    rate = results.settings["experiment"]["sampling_rate"]
+    remark = (
+        f"noise has {show(found['noise'], 2)} of it at {show(rate)} Hz: its delay is the reason"
+    )
+    return verdict(value, "", one < other, remark)
+
+
+@claim("2021-71")
+def error_grows(results):
+    table = results.of_board(f"residuals/{results.measured}")
+    if table is None:
+        return SEVERAL
+    sizes = _turning(table)
+    value = f"residual {show(sizes.iloc[-1] / sizes.iloc[0], 2)} times that of the slowest eighth"
+    remark = f"{results.measured}, the fastest eighth of the samples by angular acceleration"
+    return verdict(value, "", bool(sizes.iloc[-1] > 1.5 * sizes.iloc[0]), remark)

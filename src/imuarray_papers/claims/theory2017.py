@@ -175,3 +175,38 @@ QUOTED = "quoted from [14]: another array, another method, measured data not pub
 @claim("2017-43", reason=QUOTED)
 def not_here(results, reason):
     return untested(reason)
+
+
+def _statements(results, part):
+    return results.json("claims/statements")[part]
+
+
+@claim("2017-46")
+def expected(results):
+    table = results.table("claims/dependence").set_index("change").factor
+    table = table.drop(["one gyroscope", "angular acceleration", "specific force"])
+    without = table.index[np.abs(table - 1) < 0.01]
+    value = f"factors {listed(table)} for half of: {', '.join(table.index)}"
+    remark = f"no matter at these rates: {', '.join(without)}" if len(without) else ""
+    return verdict(value, "", not len(without), remark)
+
+
+@claim("2017-47")
+def one_gyroscope(results):
+    row = results.table("claims/dependence").set_index("change").loc["one gyroscope"]
+    value = f"one gyroscope widens the bound by {100 * (row.factor - 1):.2g} %"
+    return verdict(value, "", row.factor < 1.01)
+
+
+@claim("2017-48")
+def any_motion(results):
+    bounds = _statements(results, "bound_m")
+    value = "; ".join(f"{name} {show(size)} m" for name, size in bounds.items())
+    return verdict(value, "", max(bounds.values()) < 1e-5)
+
+
+@claim("2017-49")
+def motion_bound(results):
+    found = _statements(results, "motion")
+    stands = abs(found["ratio"] - 1) < max(0.02, 3 * found["se"])
+    return verdict(found["ratio"], found["se"], stands, "at the true positions")
