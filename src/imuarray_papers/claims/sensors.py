@@ -173,9 +173,7 @@ def single_sample(results):
     one, other = found["one sample"], found["difference"]
     value = f"error {show(one)} rad/s^2 of one sample, {show(other)} of the central difference"
     rate = results.settings["experiment"]["sampling_rate"]
-    remark = (
-        f"noise has {show(found['noise'], 2)} of it at {show(rate)} Hz: its delay is the reason"
-    )
+    remark = f"{show(found['noise'], 2)} of it is noise; at {show(rate)} Hz it misses fast motion"
     return verdict(value, "", one < other, remark)
 
 
