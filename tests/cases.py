@@ -26,6 +26,11 @@ def small_array(accelerometers=5, gyroscopes=2) -> Array:
     return Array(SHAPE[:accelerometers].copy(), labels, gyroscopes, "small")
 
 
+def model():
+    """Five accelerometers and gyroscopes with the noise of a good chip."""
+    return ArrayModel.isotropic(small_array(5, 5), 0.04, 0.02)
+
+
 def random_covariance(rng, size, sd) -> np.ndarray:
     """A covariance (size, size) with sds near ``sd`` and strong correlations."""
     raw = rng.standard_normal((size, 2 * size))

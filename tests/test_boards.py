@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from benchmarks.board import GRAVITY, Options, draw_board, draw_hand, write
-from tests.test_convert_csv import read_csv
+from tests.recording.cases import read_csv
 
 FEW = Options(poses=3, still=1.0, twisting=3.0, shock=0.5)
 

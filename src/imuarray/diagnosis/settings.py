@@ -13,7 +13,7 @@ class Settings:
 
     The critical values come from simulations. The others were set by judgement while the procedure
     was made: what they lead to together is held by the tests on injected effects
-    (tests/test_diagnose.py) and by the blind study.
+    (tests/diagnosis/test_diagnose.py) and by the blind study.
     """
 
     # Critical values, from simulating the whole procedure on clean recordings

@@ -124,7 +124,7 @@ def _most_likely(setting: Setting, likelihood: Likelihood, rng):
 
     Few triads, few samples and a wide prior have local optima: from the nominal positions alone
     the search ends in one in 4 of the first 200 data sets of 4 triads and 5 samples with positions
-    off by 3 mm (`tests/test_validation.py`). Their residuals, far beyond the noise, show it.
+    off by 3 mm (`tests/papers/test_validation.py`). Their residuals, far beyond the noise, show it.
     """
     prior, data = setting.prior, likelihood.collapsed
     enough = GOOD * 3 * setting.model.array.accelerometers * setting.samples

@@ -1,0 +1,54 @@
+"""A few bad readings of a log do not condemn it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import imuarray
+from imuarray.analysis.logs import _less_garbage
+from tests.cases import model
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return imuarray.simulate(model().array, 5.0, 200.0, seed=4, angular_rate=10.0)[0]
+
+
+def test_a_clean_log_stays_as_it_is(recording):
+    found, lines = _less_garbage(recording)
+    assert found is recording and not lines
+
+
+def test_rows_of_zeros_are_left_out(recording):
+    force, rate = recording.specific_force.copy(), recording.angular_rate.copy()
+    force[[7, 300]] = rate[[7, 300]] = 0
+    found, lines = _less_garbage(replace(recording, specific_force=force, angular_rate=rate))
+    assert lines == ["2 rows of zeros left out"] and len(found.time) == len(recording.time) - 2
+
+
+@pytest.mark.parametrize("kind", ["accelerometer", "gyroscope"])
+def test_spikes_are_bridged_and_lost(recording, kind):
+    name = {"accelerometer": "specific_force", "gyroscope": "angular_rate"}[kind]
+    values = getattr(recording, name).copy()
+    for row, axis in ((50, 0), (120, 2), (400, 1)):
+        values[row, 1, axis] += 50.0
+    found, lines = _less_garbage(replace(recording, **{name: values}))
+    lost = getattr(found, f"saturated_{kind}s")()
+    before = getattr(recording, f"saturated_{kind}s")()
+    assert lost[[50, 120, 400], 1].all() and (lost & ~before).sum() == 9
+    label = getattr(recording, f"{kind}_labels")[1]
+    assert lines == [f"{kind} {label}: 3 spikes left out"]
+    assert np.abs(getattr(found, name) - getattr(recording, name)).max() < 5.0
+
+
+def test_a_step_of_one_triad_is_no_spike(recording):
+    values = recording.specific_force.copy()
+    values[300:, 1] += 50.0
+    assert not _less_garbage(replace(recording, specific_force=values))[1]
+
+
+def test_what_is_often_so_is_no_garbage(recording):
+    values = recording.specific_force.copy()
+    values[::10, 1] += 50.0
+    assert not _less_garbage(replace(recording, specific_force=values))[1]

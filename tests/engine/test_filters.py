@@ -1,0 +1,138 @@
+"""Low passes of the chips, filtered at their own rate: found by kind and by chip, or refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.signal import lfilter
+
+import imuarray
+from imuarray.engine import forward
+from imuarray.engine.derivatives import derivatives
+from imuarray.engine.fit import flat_parameters
+from imuarray.engine.forward import FILTER, select_forward, with_effects
+from imuarray.engine.readings import arrange
+from imuarray.geometry import sub_array
+from imuarray.model import ArrayModel
+from imuarray.motion import hand_twisting
+from imuarray.simulation.recordings import simulate_samples
+from imuarray.trust.reasons import _arms, _filters
+from tests.engine.test_engine import errors, position_sds
+
+CHIP = 2000  # Hz at which the chips filter
+LOGGED = slice(CHIP // 2, None, 10)  # of their samples
+
+
+def low_passed(x, corners):
+    """First order and causal, along time; (T, n, 3) of n sensors with ``corners`` (n,) in Hz."""
+    out = np.empty_like(x)
+    for k, hz in enumerate(corners):
+        a = 1 - np.exp(-2 * np.pi * hz / CHIP)
+        out[:, k] = lfilter([a], [1, a - 1], x[:, k] - x[0, k], axis=0) + x[0, k]
+    return out
+
+
+def filtered(gyroscopes, accelerometers):
+    """(recording, truth) of four IMUs with low passes at so many Hz, (4,) each."""
+    model = ArrayModel.isotropic(sub_array(imuarray.mimu4444(), 4), 0.04, 0.002)
+    rng, places = np.random.default_rng(1), model.array.relative
+    motion, time = hand_twisting(rng, np.radians(700), 3.0), np.arange(12 * CHIP) / CHIP
+    recording, truth = simulate_samples(
+        model, motion.at(time[LOGGED]), places, places, rng, time[LOGGED]
+    )
+    ideal = model.predict_many(motion.at(time), places)
+    for clean, corners, read in zip(
+        ideal, (accelerometers, gyroscopes),
+        (recording.specific_force, recording.angular_rate), strict=True,
+    ):  # fmt: skip
+        read += (low_passed(clean, corners) - clean)[LOGGED]
+    return recording, truth
+
+
+def distance(found, truth):
+    """Root mean square error, in sds and in m."""
+    off = errors(found, truth)
+    return [np.sqrt(np.mean(x**2)) for x in (off / position_sds(found), off)]
+
+
+@pytest.mark.parametrize("gyroscopes", [[20] * 4, [98, 98, 25, 98]])
+def test_a_low_pass_of_gyroscopes_is_found(gyroscopes, monkeypatch):
+    recording, truth = filtered(gyroscopes, [98] * 4)
+    readings = [arrange(recording, sparse=True)]
+    found, groups = select_forward(readings)
+    assert FILTER in {group.name for group in groups if group.kept}
+    z, off = distance(found, truth)
+    assert z < 2.5 and off < 15e-6
+    monkeypatch.setattr(forward, "EFFECT_GROUPS", forward.ROUGH_GROUPS)
+    assert distance(select_forward(readings)[0], truth)[1] > 5 * off
+
+
+def test_runs_too_short_for_a_filter_have_the_derivatives_of_short_ones():
+    readings = arrange(filtered([98] * 4, [98] * 4)[0], sparse=True)
+    readings = replace(readings, run=np.arange(len(readings.time)) // 15)
+    motion = np.concatenate([readings.values[:, 0, 3:], np.zeros((len(readings.time), 6))], axis=1)
+    _, _, second, third, slow = derivatives(readings, motion, readings.array.relative)
+    for one, other in zip((second, third), slow, strict=True):
+        np.testing.assert_array_equal(one.angular_rate, other.angular_rate)
+    assert np.abs(slow.second.angular_rate).max() > 0
+
+
+def test_filters_alike_are_none():
+    readings = [arrange(filtered([98] * 4, [98] * 4)[0], sparse=True)]
+    assert FILTER not in {group.name for group in select_forward(readings)[1] if group.kept}
+
+
+def test_an_accelerometers_low_pass_is_found():
+    recording, truth = filtered([98] * 4, [98, 98, 40, 98])
+    effects = "gyroscope_delay", "accelerometer_filter"
+    found = with_effects([arrange(recording, sparse=True)], effects)
+    assert distance(found, truth)[0] < 2 and found.residual_ratio() < 1.02
+    shape = flat_parameters(found.columns, found.recorded[0].state)
+    lag, droop, _ = shape[:, found.columns.of("accelerometer_filter")].T
+    times = 1 / (2 * np.pi * np.array([40.0, 98.0]))
+    late, wide = (each[2] - np.mean(each[[0, 1, 3]]) for each in (lag, droop - lag**2 / 2))
+    assert late == pytest.approx(times[1] - times[0], rel=0.02)
+    assert wide == pytest.approx((times[0] ** 2 - times[1] ** 2) / 2, rel=0.4)
+
+
+LAG, DROOP = "gyroscope_delay delay", "gyroscope_filter droop"
+
+
+@pytest.mark.parametrize("values, word", [
+    ({}, ""), ({LAG: -5e-3, DROOP: 3e-5}, ""),
+    ({LAG: -9e-3, DROOP: 9e-5}, "the gyroscopes' low pass, of some 12 Hz"),
+    ({LAG: 9e-3, DROOP: -3e-5}, "the accelerometers' low pass, of some 21 Hz"),
+])  # fmt: skip
+def test_filters_too_far_apart_are_said(values, word):
+    names = [f"{name}_{k} s" for name in values for k in "ab"]
+    numbers = np.repeat([*values.values()], 2)
+    file = xr.Dataset({"effect_parameter": ("parameter", numbers)}, {"parameter": names})
+    assert word in " ".join(_filters(file)) and bool(word) == bool(_filters(file))
+    assert not _filters(xr.Dataset())
+
+
+def test_one_accelerometers_low_pass_is_said():
+    names = [
+        f"accelerometer_filter {what}_{k} s"
+        for what in ("lag", "droop")
+        for k in ("a", "b", "c", "d 1")
+    ]
+    file = xr.Dataset(
+        {"effect_parameter": ("parameter", [2e-3] * 3 + [-4e-3] + [-1e-5] * 3 + [3e-5])},
+        {"parameter": names},
+    )
+    (said,) = _filters(file)
+    assert "accelerometer d 1, of some 19 Hz" in said
+
+
+def test_a_lever_arm_that_no_chip_has_room_for_is_said():
+    names = [f"size_effect {axes}_{k} m" for axes in ("xx", "zy") for k in ("a", "b 1")]
+    arms = np.array([1e-4, 2e-4, 0.0, 1.0])
+    file, sound = (
+        xr.Dataset({"effect_parameter": ("parameter", size * arms)}, {"parameter": names})
+        for size in (-3e-3, 2e-3)
+    )
+    (said,) = _arms(file)
+    assert said.startswith("axis z of accelerometer b 1 comes out 3 mm")
+    assert not _arms(sound) and not _arms(xr.Dataset())

@@ -1,0 +1,113 @@
+"""Tables as loggers and spreadsheets write them: read, and said; or the reason in one line."""
+
+import numpy as np
+import pytest
+import yaml
+
+from imuarray.errors import InputError
+from imuarray.recording.table import read_tables
+from tests.recording.cases import HEADER, layout, table
+
+ROWS = 200
+PERIOD = 10  # ms
+IN_SECONDS = {"column": "t", "unit": "s"}
+
+
+def read(folder, content, columns=None):
+    """(recording, lines)."""
+    content = content if isinstance(content, bytes) else content.encode()
+    (folder / "log.csv").write_bytes(content)
+    (folder / "columns.yaml").write_text(yaml.safe_dump(columns or layout()))
+    return read_tables([folder / "log.csv"], folder / "columns.yaml")
+
+
+def text(rows, delimiter=","):
+    return "\n".join(delimiter.join(row) for row in rows) + "\n"
+
+
+@pytest.fixture
+def plain(tmp_path):
+    return read(tmp_path, text(table(ROWS)))[0]
+
+
+def stamped(stamps):
+    return [HEADER, *([str(s), *row[1:]] for s, row in zip(stamps, table(ROWS)[1:], strict=True))]
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (text(table(ROWS), ";").replace(".", ","), "columns parted by ';', decimal commas"),
+        (text(table(ROWS), "\t"), "columns parted by '\\t'"),
+        (text(table(ROWS)).encode("utf-16"), "encoding utf-16"),
+        ("Logger 2.1\nSN 42, rev b\nRate;200 Hz\n" + text(table(ROWS)), "3 lines before"),
+        (b"# \xb5g\n" + text(table(ROWS)).encode(), "encoding cp1252"),
+    ],
+)
+def test_a_table_s_form_is_found_and_said(tmp_path, plain, content, words):
+    found, lines = read(tmp_path, content)
+    np.testing.assert_array_equal(found.specific_force, plain.specific_force)
+    np.testing.assert_array_equal(found.time, plain.time)
+    assert len(lines) == 1 and words in lines[0]
+
+
+@pytest.mark.parametrize(
+    "form", ["2026-03-01T12:00:{:09.6f}Z", "2026-03-01 12:00:{:06.3f}", "12:00:{:06.3f}"]
+)
+def test_stamps_may_be_dates(tmp_path, plain, form):
+    rows = stamped(form.format(0.001 * PERIOD * k) for k in range(ROWS))
+    np.testing.assert_allclose(read(tmp_path, text(rows))[0].time, plain.time, atol=1e-9)
+
+
+def test_a_plain_table_needs_no_words(tmp_path):
+    assert read(tmp_path, text(table(ROWS)))[1] == []
+
+
+def test_rows_out_of_order_are_sorted(tmp_path, plain):
+    rows = table(ROWS)
+    rows[20], rows[21] = rows[21], rows[20]
+    found, lines = read(tmp_path, text(rows))
+    np.testing.assert_array_equal(found.specific_force, plain.specific_force)
+    assert "1 rows out of order" in lines[0]
+
+
+def test_a_clock_that_was_set_back_is_no_disorder(tmp_path):
+    stamps = PERIOD * np.arange(ROWS)
+    stamps[100:] -= 37
+    with pytest.raises(InputError, match="a time that increases, found 963 after 990"):
+        read(tmp_path, text(stamped(stamps)))
+
+
+def test_a_stamp_given_twice_is_put_midway_and_a_copied_row_left_out(tmp_path, plain):
+    stamps = PERIOD * np.arange(ROWS)
+    stamps[50] = stamps[49]
+    found, lines = read(tmp_path, text(stamped(stamps)))
+    np.testing.assert_allclose(found.time, plain.time)
+    assert "1 rows with the stamp of the row before" in lines[0]
+    seconds = read(tmp_path, text(stamped(stamps / 1e3)), layout() | {"time": IN_SECONDS})[0]
+    np.testing.assert_allclose(seconds.time, plain.time, atol=1e-9)
+    rows = table(ROWS)
+    found, lines = read(tmp_path, text([*rows[:60], rows[59], *rows[60:]]))
+    np.testing.assert_array_equal(found.specific_force, plain.specific_force)
+    assert "1 rows are there twice" in lines[0]
+
+
+@pytest.mark.parametrize("bits", [16, 32])
+def test_a_counter_that_begins_anew_is_carried_on(tmp_path, plain, bits):
+    stamps = (2**bits - 990 + PERIOD * np.arange(ROWS)) % 2**bits
+    found, lines = read(tmp_path, text(stamped(stamps)))
+    np.testing.assert_allclose(found.time, plain.time)
+    assert f"a counter of {bits} bits" in lines[0]
+
+
+@pytest.mark.parametrize("every", [4, 10])
+def test_bursts_and_ticks_are_named(tmp_path, every):
+    stamps = PERIOD * every * (np.arange(ROWS) // every)
+    with pytest.raises(InputError, match="with the same stamp: bursts of packets, or ticks"):
+        read(tmp_path, text(stamped(stamps)))
+
+
+def test_one_row_for_each_sensor_is_named(tmp_path):
+    rows = [[str(PERIOD * (k // 3)), str(k % 3), *row[1:]] for k, row in enumerate(table(ROWS)[1:])]
+    with pytest.raises(InputError, match="column 'sensor' that numbers the sensors: one row for"):
+        read(tmp_path, text([["t", "sensor", *HEADER[1:]], *rows]))
