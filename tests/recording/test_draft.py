@@ -7,7 +7,7 @@ from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.recording.draft import draft, triads_of
 from imuarray.recording.layout import read_layout
-from imuarray.recording.table import load, read_tables
+from imuarray.recording.table import load, read_tables, stamps_of
 
 FORCE, RATE = [0.1, -0.2, 9.79], [0.01, -0.02, 0.03]  # m/s^2, rad/s at rest
 
@@ -111,6 +111,16 @@ def test_a_row_of_units_and_counts(tmp_path):
     (tmp_path / "log.csv").write_text(table(PLAIN, G / 16384, DEGREE / 131, range(0, 4000, 10)))
     said, asked = draft([tmp_path / "log.csv"])
     assert 'scale: "?"' in said and any("a count in deg/s" in line for line in asked)
+
+
+def test_tenths_of_milliseconds_by_the_name_of_who_counts_them(tmp_path):
+    text = table(PLAIN, 1.0, 1.0, range(0, 40000, 100)).replace("t,", "SampleTimeFine,", 1)
+    (tmp_path / "log.csv").write_text(text)
+    said, _ = draft([tmp_path / "log.csv"])
+    assert 'time: {column: SampleTimeFine, unit: "0.1 ms"}  # 100 samples a second' in said
+    (tmp_path / "columns.yaml").write_text(said)
+    time = read_layout(tmp_path / "columns.yaml")["time"]
+    assert stamps_of(load(tmp_path / "log.csv", {}, "")[0], time, "", "")[1] == pytest.approx(1e-4)
 
 
 @pytest.mark.parametrize("content", [

@@ -23,6 +23,7 @@ KINDS = {
 OF_UNIT = {"gyroscopes": r"(deg|rad|°|dps).*s", "accelerometers": r"^m?g$|^m.*s"}
 OTHERS = r"mag|grav|euler|quat|angle|orient"
 TIME = r"time|stamp|^t$|_t$|sec|millis|micros|^(ns|us|ms|s)$"
+FINE = "sampletimefine"  # as Xsens has it, in 0.1 ms
 UNIT = r"[\[(]([^\[(]*[^\[(\d][^\[(]*)[\])]"  # in brackets; a number there is none
 AXES = (("[xX]", {"x": "yz", "X": "YZ"}), (r"(?<=\[)0(?=\])", {"0": "12"}))
 WITHIN = 0.2  # of one unit of gravity, by which readings at rest may be off
@@ -193,14 +194,17 @@ def _time(table: pd.DataFrame, given: dict[str, str]) -> tuple[str, float, list[
                 continue
             steps, units = np.diff(nanoseconds), {"ns": 1e-9}
         else:
-            steps, units = np.diff(values.to_numpy(float)), UNITS["time"]
+            fine = FINE in str(name).lower()
+            units = {u: size for u, size in UNITS["time"].items() if fine == (u == "0.1 ms")}
+            steps = np.diff(values.to_numpy(float))
         step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else np.nan
         hint = re.search(r"(?:\b|_)(ns|us|ms|s)(?:\b|_)", f"{name} {given.get(name)}".lower())
         likely = [u for u, size in units.items() if SLOWEST <= 1 / (step * size) <= FASTEST / 5]
         likely = [u for u in likely if hint and u == hint[1]] or likely
         if likely:
             rate, unit = 1 / (step * units[likely[0]]), likely[0]
-            text = f"time: {{column: {_quoted(name)}, unit: {unit}}}  # {rate:.4g} samples a second"
+            text = f"time: {{column: {_quoted(name)}, unit: {_quoted(unit)}}}"
+            text += f"  # {rate:.4g} samples a second"
             return text, rate, [f"time: in {unit} or in {likely[1]}?"] if likely[1:] else []
     return "time: {rate: 100.0}  # ?", 100.0, ["time: no column of stamps: the rate in Hz"]
 

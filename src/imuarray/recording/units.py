@@ -11,7 +11,7 @@ _DEGREE = math.pi / 180
 
 # The first of each is SI, and what is written.
 UNITS = {
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "0.1 ms": 1e-4},
     "length": {"m": 1.0, "mm": 1e-3},
     "force": {"m s-2": 1.0, "m/s^2": 1.0, "m/s2": 1.0, "g": GRAVITY, "mg": 1e-3 * GRAVITY},
     "rate": {
