@@ -55,7 +55,7 @@ def set_key(layout, path, value):
     [
         ("time", None, "no 'time'"),
         ("times", 3, "unknown key 'times'"),
-        ("time/unit", "minutes", "unit of s, ms, us, ns, found 'minutes'"),
+        ("time/unit", "minutes", "unit of s, ms, us, ns, 0.1 ms, found 'minutes'"),
         ("time/column", "stamp", "expected a column 'stamp', found t, ax1"),
         ("accelerometers/unit", "G", "unit of m s-2, m/s.2, m/s2, g, mg, found 'G'"),
         ("accelerometers/noise", -1, "positive number, found -1"),
