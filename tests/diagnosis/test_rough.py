@@ -74,7 +74,7 @@ def rough_recording(seed):
 @pytest.fixture(scope="module")
 def made():
     recording, positions, aliases = rough_recording(2)
-    return diagnose(recording, replicates=9), positions, aliases
+    return diagnose(recording, replicates=1), positions, aliases
 
 
 def numbers(document, effect, name):

@@ -52,14 +52,14 @@ def test_widths_that_are_wrong_are_seen(monkeypatch, factor):
         return measure(type(model)(model.array, noise), *arguments)
 
     monkeypatch.setattr(truths, "measure", measured)
-    values = sbc.pit_values(setting(), range(60), methods=["PmMH, pCN"])
-    assert np.sign(np.log(factor)) * coverage(values).width_z[0] > 5
+    values = sbc.pit_values(setting(), range(30), methods=["PmMH, pCN"])
+    assert np.sign(np.log(factor)) * coverage(values).width_z[0] > 3
 
 
 def test_the_command_as_it_is_needs_neither_the_noise_nor_the_motions_size():
-    """6 truths; told a quarter of the noise, its intervals are too narrow, and that is seen."""
-    values = sbc.pit_values_by_default(setting("default"), range(6), imuarray.sample)
-    assert len(values) == 6 * 10
+    """Three truths; six told a quarter of the noise, its intervals are too narrow, and that is seen."""
+    values = sbc.pit_values_by_default(setting("default"), range(3), imuarray.sample)
+    assert len(values) == 3 * 10
     row = coverage(values).iloc[0]
     assert row.p > 1e-3 and row.none == row.slow == 0
     assert np.all(np.abs(row[["shift_z", "width_z", "size_z"]].astype(float)) < 4)

@@ -172,7 +172,7 @@ def test_unknown_noise_and_motion_of_the_generic_likelihood():
     same = ArrayModel(model.array, model.noise, (), motion_sd=(*MOTION_SD, np.inf))
     start = np.hstack([rate.mean(axis=1), np.zeros((len(rate), 3)), force.mean(axis=1)])
     generic = GenericLikelihood(
-        same, measured(same, force, rate), start, steps=8, logs=np.eye(5)[:, :4]
+        same, measured(same, force, rate), start, steps=4, logs=np.eye(5)[:, :4]
     )
 
     def one(theta):
@@ -208,25 +208,24 @@ def test_laplace_of_the_generic_likelihood(monkeypatch):
     """With effects: against its own estimate by importance sampling, and its own differences."""
     rng = np.random.default_rng(7)
     array = small_array(5, 2)
-    model = ArrayModel.isotropic(array, 0.04, 0.02, ("gyroscope_scale", "sensor_delay"))
+    model = ArrayModel.isotropic(array, 0.04, 0.02, ("sensor_delay",))
     _, force, rate = simulate(rng, ArrayModel.isotropic(array, 0.04, 0.02), 3)
     model = ArrayModel(array, model.noise, model.effects, motion_sd=(10.0, 300.0, 20.0))
     start = np.zeros((3, 15))
     start[:, :3], start[:, 6:9] = rate.mean(axis=1), force.mean(axis=1)
-    generic = GenericLikelihood(model, measured(model, force, rate), start, draws=400, steps=4)
+    generic = GenericLikelihood(model, measured(model, force, rate), start, draws=400, steps=3)
     p = np.concatenate([array.parameters, 1e-3 * model.effect_prior_sd])
     values = [generic(p, rng) for _ in range(8)]
-    whole = float(jax.jit(generic.log_density)(p))
-    jax.clear_caches()
-    error = np.std(values, ddof=1) / np.sqrt(8)
-    assert whole == pytest.approx(np.mean(values), abs=5 * error + 1e-3)
-    monkeypatch.setattr(generic_likelihood, "CHUNK", 2)
     both = jax.jit(jax.value_and_grad(generic.log_density))
-    value, slope = both(p)
-    assert float(value) == pytest.approx(whole, abs=1e-8)
+    whole, slope = both(p)
+    error = np.std(values, ddof=1) / np.sqrt(8)
+    assert float(whole) == pytest.approx(np.mean(values), abs=5 * error + 1e-3)
     slope = np.asarray(slope)
     for place in rng.permutation(p.size)[:6]:
         step = 1e-4 * np.concatenate([np.full(12, 3e-3), model.effect_prior_sd])[place]
         moved = [p + sign * step * np.eye(p.size)[place] for sign in (1, -1)]
         ends = [float(both(q)[0]) for q in moved]
         assert slope[place] * step == pytest.approx((ends[0] - ends[1]) / 2, rel=1e-3, abs=1e-4)
+    jax.clear_caches()
+    monkeypatch.setattr(generic_likelihood, "CHUNK", 2)
+    assert float(jax.jit(generic.log_density)(p)) == pytest.approx(float(whole), abs=1e-8)
