@@ -1,6 +1,7 @@
 """The parts of a diagnosis, each against a slow and obvious oracle."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ from imuarray.diagnosis.scores import (
 )
 from imuarray.diagnosis.settings import SETTINGS as CRITICAL
 from imuarray.diagnosis.special import sawtooth_scan, wider
-from imuarray.diagnosis.state import Search
+from imuarray.diagnosis.state import Cause, Search, heldout_gain
 from imuarray.engine.clocks import sawtooth
 from imuarray.engine.derivatives import polynomial_taps
 from imuarray.engine.fit import (
@@ -391,13 +392,32 @@ def test_too_few_samples_are_refused():
 
 
 @pytest.mark.parametrize(
-    "alone, least, one", [(1046, 381, True), (1046, 100, False), (700, 600, False)]
+    "alone, least, chosen",
+    [(1046, 381, "single"), (1046, 100, "every"), (700, 600, "every"), (1046, None, "part")],
 )
-def test_all_are_not_named_for_what_one_has(alone, least, one):
-    """In rough motion the rest of a test of all is often more than chance, and still no cause."""
+def test_all_are_not_named_for_what_one_has(alone, least, chosen):
+    """Rough motion (None) leaves a rest of a test of all that is more than chance, and no cause."""
     every = Score(Candidate("bias_drift", (0, 1, 2), "gyroscope linear", True), 1240.0, 18, -532.0)
-    other = Score(Candidate("gyroscope_bias", (2,)), 1100.0, 3, -520.0)
+    part = Score(Candidate("gyroscope_bias", (2,)), 1100.0, 3, -520.0)
     single = Score(Candidate("bias_drift", (2,), "gyroscope linear"), float(alone), 6, -500.0)
-    proposed = [(every, None), (other, None), (single, None)]
-    assert narrowest(proposed, least)[0] is (single if one else every)
-    assert narrowest(proposed[1:], least)[0] is other
+    proposed = [(every, None), (part, None), (single, None)]
+    search = SimpleNamespace(smooth=least is not None, least=least)
+    assert (
+        narrowest(proposed, search)[0] is {"every": every, "part": part, "single": single}[chosen]
+    )
+    assert narrowest(proposed[1:], search)[0] is part
+
+
+def test_another_imu_is_judged_by_what_it_adds(scaled):
+    """The gain of both is no evidence for the one beside which the other has the effect."""
+    both = replace(scaled, causes=(Cause("gyroscope_scale", (2, 4), frozenset({""}), -99.0),))
+    both = both.refit(both.started())
+    there = [
+        np.where(np.arange(len(both.active))[:, None] == k, both.active, False) for k in (2, 4)
+    ]
+    whole, error = heldout_gain(both, "gyroscope_scale")
+    assert whole > 3 * error
+    gain, error = heldout_gain(both, "gyroscope_scale", there=there[0])
+    assert gain < 1.5 * error
+    gain, error = heldout_gain(both, "gyroscope_scale", there=there[1])
+    assert gain > 3 * error

@@ -57,7 +57,7 @@ def test_widths_that_are_wrong_are_seen(monkeypatch, factor):
 
 
 def test_the_command_as_it_is_needs_neither_the_noise_nor_the_motions_size():
-    """Three truths; six told a quarter of the noise, its intervals are too narrow, and that is seen."""
+    """Three truths; six, told a quarter of the noise, have intervals that are too narrow."""
     values = sbc.pit_values_by_default(setting("default"), range(3), imuarray.sample)
     assert len(values) == 3 * 10
     row = coverage(values).iloc[0]

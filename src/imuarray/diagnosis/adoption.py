@@ -75,7 +75,7 @@ def adopt(search: Search, proposed=None) -> Search:
     while len(search.causes) < SETTINGS.most_causes and len(vain) < SETTINGS.patience:
         proposed = proposals(search) if proposed is None else proposed
         proposed = [p for p in proposed if vain.count(p[0].candidate.effect) < SETTINGS.of_one]
-        best, values = narrowest(proposed, search.least) if proposed else (None, None)
+        best, values = narrowest(proposed, search) if proposed else (None, None)
         if best is None or not likely(search, best) or best.statistic < search.least:
             break
         found = attempt(search, best, values)
@@ -87,22 +87,28 @@ def adopt(search: Search, proposed=None) -> Search:
     return replace(search, detectable=detectable(search))
 
 
-def narrowest(proposed, least: float):
-    """The first of the `proposals`, or its best IMU's where the rest explains too little.
+def narrowest(proposed, search: Search):
+    """The first of the `proposals`, or a narrower one that has most of its test.
 
-    ``least`` chi-square of a cause: what the others of all have beyond the one is below it, and the
-    one has most of it. Refused, it leaves the test of all to be the first again.
+    One IMU's of an effect of all, if what the others have beyond it is too little for a cause. In
+    rough motion, which leaves something for all that has parameters, parts of an effect as well,
+    whatever the rest has. Refused, it leaves the wider one to be the first again.
     """
-    first = proposed[0][0]
-    if not first.candidate.whole:
-        return proposed[0]
-    form = first.candidate.effect, first.candidate.variant
-    alone = [p for p in proposed[1:] if (p[0].candidate.effect, p[0].candidate.variant) == form]
-    for score, values in alone[:1]:
-        rest = first.statistic - score.statistic
-        if rest < min(least, (1 - SETTINGS.most) * first.statistic):
-            return score, values
-    return proposed[0]
+    first, own = proposed[0][0], proposed[0][0].candidate
+    parts = EFFECTS[own.effect].contains + EFFECTS[own.effect].resembles
+    rest = (1 - SETTINGS.most) * first.statistic
+    if search.smooth:
+        parts, rest = (), min(search.least, rest)
+
+    def narrower(score) -> bool:
+        one = score.candidate
+        same = (one.effect, one.variant) == (own.effect, own.variant)
+        inside = (same or one.effect in parts) and {*one.imus} <= {*own.imus}
+        less = score.freedom < first.freedom and first.statistic - score.statistic < rest
+        return inside and less
+
+    found = [proposal for proposal in proposed[1:] if narrower(proposal[0])]
+    return min(found, key=lambda proposal: proposal[0].freedom, default=proposed[0])
 
 
 def likely(search: Search, score) -> bool:
@@ -120,15 +126,14 @@ def attempt(search: Search, score, values) -> Search:
     if special and not special.linear:
         gain, error = np.inf, 0.0
     else:
-        gain, error = predicted_gain(found, candidate, values)
+        gain, error = predicted_gain(found, candidate, values, search.active)
     if keeps(search, score, gain, error):
         found = found.refit(found.started(effect, values))
         if special and special.refine:
             found = special.refine(found, candidate.imus)
         found = prune(found, effect)
-        gain, error = heldout_gain(found, effect)
-        if not np.any(found.active & ~search.active):  # pruned to what was there
-            gain = -np.inf
+        new = np.any(found.active & ~search.active)  # or pruned to what was there
+        gain, error = heldout_gain(found, effect, there=search.active) if new else (-np.inf, 0.0)
     words = f"{effect} {candidate.variant} of {label(search, candidate)}"
     if not keeps(search, score, gain, error):
         search.say(f"refused {words}: held-out gain {gain:.1f} +- {error:.1f}")
@@ -145,15 +150,20 @@ def keeps(search: Search, score, gain: float, error: float) -> bool:
     return gain > search.least_z * error and gain > SETTINGS.kept * predicted
 
 
-def predicted_gain(search: Search, candidate: Candidate, values) -> tuple[float, float]:
-    """The held-out gain that one linearisation predicts: it spares hopeless fits."""
+def predicted_gain(search: Search, candidate: Candidate, values, there) -> tuple[float, float]:
+    """The held-out gain that one linearisation predicts: it spares hopeless fits.
+
+    ``there`` (N, m) bool: parameters adopted before.
+    """
     state, made = search.started(candidate.effect, values), search.fit
     if not np.array_equal(state.parameters, made.state.parameters):
         made = at(search.readings, search.columns, search.active, state, False, all_columns=False)
     made = replace(made, active=search.active)
     parts = normal_blocks(made, made.active)
     columns = likely_sizes(made, [sum(part) for part in zip(*parts, strict=True)])
-    return heldout_gain(replace(search, fit=made, columns=columns), candidate.effect, parts)
+    return heldout_gain(
+        replace(search, fit=made, columns=columns), candidate.effect, parts, there=there
+    )
 
 
 def label(search: Search, candidate) -> str:

@@ -243,13 +243,16 @@ def need(search: Search, effect: str, imus=None, among=None) -> tuple[float, int
     return search.given.test(conditional, freed)
 
 
-def heldout_gain(search: Search, effect: str, parts=None, imus=None) -> tuple[float, float]:
+def heldout_gain(
+    search: Search, effect: str, parts=None, imus=None, there=False
+) -> tuple[float, float]:
     """Nats gained on held-out blocks of time by an adopted effect, with standard error.
 
-    ``parts``: the blocks' equations, if they are known; ``imus``: of which it is asked, if not all.
+    ``parts``: the blocks' equations, if they are known; ``imus``: of which it is asked, if not all,
+    beside its parameters that are ``there`` (N, m) bool.
     """
     columns, mask = search.columns, search.active
-    freed = columns.mask([effect], imus) & mask
+    freed = columns.mask([effect], imus) & mask & ~np.asarray(there)
     values = flat_parameters(columns, search.fit.state)[mask]
     parts = normal_blocks(search.fit, mask) if parts is None else parts
     return gain_of(parts, prior_precision(columns, mask), values, freed[mask])
