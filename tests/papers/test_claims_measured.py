@@ -21,7 +21,7 @@ VERDICT = {"converged": True, "burn_in_draws": 0, "most_draws": 100, "rhat_max":
 def measured(
     coverage=0.5, residual=2.0, noise=0.04, rate=0.001, variance=300.0, under=-5e-4,
     correlation=0.2, spread=2.0, exact=0.1, railed=10, gain=4.0, turning=40.0, covered=0.97,
-    most="gyroscope_delay", grown=2.0,
+    most="gyroscope_delay", grown=2.0, named="gyroscope_scale",
 ):  # fmt: skip
     """Contents by path: positions of a recording off by ``under`` on the underside, and so on."""
     rng = np.random.default_rng(0)
@@ -57,11 +57,12 @@ def measured(
     })  # fmt: skip
     residuals = pd.DataFrame({
         "source": ["measured", "measured", "simulated"], "quantity": "angular_rate",
-        "bin_low": [0.0, 1.0, 1.0], "rms": [turning, grown * turning, 1.0],
+        "bin_low": [0.0, 1.0, 1.0], "rms": [turning, 2 * turning, 1.0],
     })  # fmt: skip
-    nats = {most: 1e4, "accelerometer_nonlinearity": 10.0}
+    nats = {most: 1e4, named: 20.0, "accelerometer_nonlinearity": 10.0}
     causes = [{"effect": name, "heldout_gain_nats": value} for name, value in nats.items()]
     given = {
+        "claims/statements.json": {"spread": {"slow": 0.1, "fast": 0.1 * grown}},
         "../measured/causes_board": steps, "../measured/residuals/mine": residuals,
         "../measured/diagnosis/mine/diagnosis.json": {"causes": causes},
         "../measured/subsets/mine_selection": selection,
@@ -114,6 +115,7 @@ def verdict(name, **changes):
         ("2021-65", {"turning": 1.4}, "holds"),
         ("2021-71", {}, "holds"),
         ("2021-71", {"grown": 1.1}, "does not hold"),
+        ("2021-71", {"named": "gyroscope_bias"}, "does not hold"),
         ("2021-66", {}, "holds"),
         ("2021-66", {"covered": 0.8}, "does not hold"),
         ("2021-67", {}, "does not hold"),

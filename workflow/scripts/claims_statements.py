@@ -11,16 +11,9 @@ with job(snakemake) as settings:
     from imuarray_papers.studies.checks import statements as checks
     from imuarray_papers.studies.position_error import magnitudes
 
-    model, seed, count = (
-        model_from(settings),
-        settings["seed"],
-        settings["paper2017"]["fig4_samples"][-1],
-    )
-    sizes, normal, experiment = (
-        magnitudes(settings["paper2017"]),
-        motion_sds(settings),
-        settings["experiment"],
-    )
+    paper, experiment, seed = settings["paper2017"], settings["experiment"], settings["seed"]
+    model, count = model_from(settings), paper["fig4_samples"][-1]
+    sizes, normal = magnitudes(paper), motion_sds(settings)
     recording = read_recording(snakemake.input.recording)
     hand = experiment["bandwidth"], experiment["sampling_rate"]
     real = checks.moving(recording)
@@ -33,6 +26,7 @@ with job(snakemake) as settings:
             "differentiation": checks.differentiation(model, seed, count, normal, *hand),
             "sds": [float(np.std(field)) for field in real[:3]],
             "averaging": checks.averaging(recording) if recording.still().any() else None,
+            "spread": checks.spread_by_rate(recording),
             "stamp": stamp(settings, seed),
         },
         snakemake.output.checks,

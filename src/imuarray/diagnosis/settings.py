@@ -46,7 +46,7 @@ class Settings:
     others: float = -4.6  # log p of the other IMUs having what some surely have: chips are alike
     kept: float = 0.05  # of the gain that a test predicts must be there on held-out time
     uncertain: float = 50.0  # nats; smaller predicted gains need not be confirmed
-    most: float = 0.67  # share of a test of all IMUs that one must have to be named alone
+    most: float = 0.67  # share of a wider test (of all IMUs) that a narrower must have to go first
     pruned: float = 0.8  # of a cause's gain that some of its IMUs must keep, where motion is rough
     least_z: float = 1.5  # standard errors that a gain on held-out time must have
     rough_z: float = 2.0  # the same where the motion is rough, and few stretches decide

@@ -102,19 +102,14 @@ def assumed(results, step, without):
     return verdict(value, row.nats_error, bool(row.nats < 2 * row.nats_error), remark)
 
 
-def _turning(table: pd.DataFrame) -> pd.Series:
-    """Rms residual of the gyroscopes in bins of angular acceleration, the slowest first."""
-    mine = table[(table.quantity == "angular_rate") & (table.source == "measured")]
-    return mine.groupby("bin_low").rms.agg(lambda rms: rms.pow(2).mean() ** 0.5)
-
-
 @claim("2021-65")
 def one_rate(results):
     table, still = results.of_board(f"residuals/{results.measured}"), _still(results)
     if table is None or still is None:
         return SEVERAL
     noise = still[still.sensor == "angular_rate"].ratio.pow(2).mean() ** 0.5
-    sizes = _turning(table) / noise
+    mine = table[(table.quantity == "angular_rate") & (table.source == "measured")]
+    sizes = mine.groupby("bin_low").rms.agg(lambda rms: rms.pow(2).mean() ** 0.5) / noise
     value = f"residual {show(sizes.min(), 2)} to {show(sizes.max(), 2)} times the noise"
     remark = f"{results.measured}: axes and scales differ, and accelerometers lag behind"
     return verdict(value, "", bool(sizes.max() < 1.5), remark)
@@ -173,16 +168,19 @@ def single_sample(results):
     one, other = found["one sample"], found["difference"]
     value = f"error {show(one)} rad/s^2 of one sample, {show(other)} of the central difference"
     rate = results.settings["experiment"]["sampling_rate"]
-    remark = f"{show(found['noise'], 2)} of it is noise; at {show(rate)} Hz it misses fast motion"
+    remark = f"its noise is {show(found['noise'], 2)}; at {show(rate)} Hz it misses fast motion"
     return verdict(value, "", one < other, remark)
 
 
 @claim("2021-71")
 def error_grows(results):
-    table = results.of_board(f"residuals/{results.measured}")
-    if table is None:
+    if _steps(results) is None:
         return SEVERAL
-    sizes = _turning(table)
-    value = f"residual {show(sizes.iloc[-1] / sizes.iloc[0], 2)} times that of the slowest eighth"
-    remark = f"{results.measured}, the fastest eighth of the samples by angular acceleration"
-    return verdict(value, "", bool(sizes.iloc[-1] > 1.5 * sizes.iloc[0]), remark)
+    causes = results.json(f"../measured/diagnosis/{results.measured}/diagnosis")["causes"]
+    named = any(cause["effect"] == "gyroscope_scale" for cause in causes)
+    found = results.json("claims/statements")["spread"]
+    value = f"{show(DEGREES * found['fast'])} deg/s, slow samples {show(DEGREES * found['slow'])}"
+    remark = (
+        f"{results.measured}; the diagnosis {'names' if named else 'does not name'} their scale"
+    )
+    return verdict(value, "", named and found["fast"] > 1.5 * found["slow"], remark)

@@ -8,6 +8,7 @@ import pandas as pd
 from imuarray.engine.parameters import model_of
 from imuarray.estimation.collapsed import estimate_motion
 from imuarray.estimation.information import information_at
+from imuarray.estimation.newton import calibrate_gauss_newton
 from imuarray.geometry import sub_array
 from imuarray.model import ArrayModel
 from imuarray.motion import Motion, hand_twisting, normal_motion, sphere_motion
@@ -18,6 +19,7 @@ from imuarray_papers.studies.bound import rms_width
 from imuarray_papers.studies.checks.identifiability import motion_jacobian
 
 REPEATS = 20  # motions averaged over
+OFF = 1e-3  # m, sd by which positions are off at the start
 MOVING = np.radians(100.0)  # rad/s, from which a sample is one of twisting
 SIZES = "angular rate", "angular acceleration", "specific force"
 
@@ -31,14 +33,17 @@ def _isotropic(model: ArrayModel, accelerometer=1.0, gyroscope=1.0, array=None) 
 def dependence(model: ArrayModel, seed, samples: int, sizes) -> pd.DataFrame:
     """Factor on the bound of the positions of one change alone, and its standard error.
 
-    Of half the sensors' accuracy, half an array, half the motion, one gyroscope for all.
+    Of half the sensors' accuracy, half an array, half its thickness, half the motion, one
+    gyroscope for all.
     ``sizes``: magnitudes (rad/s, rad/s^2, m/s^2) of random motion, the same with each change.
     """
     array = model.array
+    flat = array.positions * [1.0, 1.0, 0.5]
     models = {
         "noise of the gyroscopes": _isotropic(model, gyroscope=2.0),
         "noise of the accelerometers": _isotropic(model, accelerometer=2.0),
-        "geometry": _isotropic(model, array=replace(array, positions=array.positions / 2)),
+        "size": _isotropic(model, array=replace(array, positions=array.positions / 2)),
+        "thickness": _isotropic(model, array=replace(array, positions=flat)),
         "IMUs": _isotropic(model, array=sub_array(array, array.accelerometers // 2)),
         "one gyroscope": _isotropic(model, array=replace(array, gyroscopes=1)),
     }
@@ -81,19 +86,24 @@ def any_motion(model: ArrayModel, seed, samples: int, sizes, normal, hand, real:
 
 
 def motion_efficiency(model: ArrayModel, seed, samples: int, sizes) -> dict:
-    """Root of the mean of e' I e / 9 over samples: 1 where the motion's error is at its bound."""
+    """Root of the mean of e' I e / 9 over samples: 1 where the motion's error is at its bound.
+
+    The bound knows the positions; the motion is at those that the same samples calibrate.
+    """
     rng, positions = stream(seed, "motion efficiency"), model.array.relative
     motion = sphere_motion(rng, (samples,), *sizes)
     force, rate, _ = measure(model, motion, positions, rng)
-    found = estimate_motion(model, force, rate).motion
+    start = (
+        positions
+        + OFF * rng.standard_normal(positions.shape) * (positions != 0).any(axis=1)[:, None]
+    )
+    found = calibrate_gauss_newton(model, force, rate, start=start).motion.motion
     error = np.hstack([np.asarray(a) - b for a, b in zip(found[:3], motion[:3], strict=True)])
-    slopes = motion_jacobian(positions, motion.angular_rate)
-    squares = np.sum(np.einsum("tri,ti->tr", slopes, error) ** 2, axis=1)
-    squares = squares / model.noise.accelerometer[0, 0]
+    squares = np.einsum("tri,ti->tr", motion_jacobian(positions, motion.angular_rate), error) ** 2
     mine = np.sum(error[:, :3] ** 2, axis=1) * model.array.gyroscopes / model.noise.gyroscope[0, 0]
-    each = (squares + mine) / 9
-    return {"ratio": float(np.sqrt(each.mean())),
-            "se": float(each.std(ddof=1) / np.sqrt(samples) / 2)}  # fmt: skip
+    each = (squares.sum(axis=1) / model.noise.accelerometer[0, 0] + mine) / 9
+    error = each.std(ddof=1) / np.sqrt(samples) / 2
+    return {"ratio": float(np.sqrt(each.mean())), "se": float(error)}
 
 
 def differentiation(model: ArrayModel, seed, samples: int, normal, bandwidth, rate) -> dict:
@@ -141,3 +151,20 @@ def averaging(recording: Recording) -> dict:
         whole = np.sqrt(np.mean(steps.mean(axis=1).std(axis=0) ** 2))
         found[kind] = float(whole / own * np.sqrt(steps.shape[1]))
     return found
+
+
+def spread_by_rate(recording: Recording) -> dict:
+    """Rms difference (rad/s) of gyroscopes from their mean, slow and fast samples of the twisting.
+
+    Fast: the eighth with the largest rates; slow: with the smallest, of those that `moving` takes.
+    Samples with a gyroscope at its rail are left out.
+    """
+    rail = recording.at_rail("gyroscope")
+    rate = recording.select(~recording.still() & ~rail).in_memory().angular_rate
+    mean = rate.mean(axis=1)
+    size = np.linalg.norm(mean, axis=1)
+    rms = np.sqrt(np.mean((rate - mean[:, None]) ** 2, axis=(1, 2)))[size > MOVING]
+    order = np.argsort(size[size > MOVING], kind="stable")
+    eighth = len(order) // 8
+    ends = {"slow": order[:eighth], "fast": order[-eighth:]}
+    return {name: float(np.sqrt(np.mean(rms[index] ** 2))) for name, index in ends.items()}
