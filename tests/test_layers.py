@@ -15,7 +15,7 @@ TOOL, PAPERS = (Path(package.__file__).parent for package in (imuarray, imuarray
 LAYERS = {
     TOOL: (
         ("errors", "caches", "linear", "tails", "walk"), ("compiled",),
-        ("streams", "provenance", "geometry"), ("motion",), ("model",),
+        ("streams", "provenance", "geometry"), ("motion",), ("model",), ("words",),
         ("recording",), ("simulation", "firstorder", "estimation"), ("alignment", "engine"),
         ("posterior",), ("diagnosis",), ("pictures",), ("report", "plots"), ("trust",),
         ("analysis",), ("commands",), ("cli",), ("__main__",),

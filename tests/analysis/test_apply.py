@@ -7,9 +7,9 @@ import pytest
 import xarray as xr
 
 import imuarray
-from imuarray.analysis.prepare import less_leak_by_others
 from imuarray.cli import main
-from imuarray.firstorder.correct import corrected, rails_shown
+from imuarray.firstorder.correct import corrected
+from imuarray.firstorder.rails import less_leak_by_others, rails_shown
 from imuarray.motion import normal_motion
 from imuarray.recording import read_recording, write_recording
 from imuarray.recording.record import CORRECTION

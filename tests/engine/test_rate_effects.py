@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import imuarray
-from imuarray.diagnosis.words import plain
 from imuarray.engine.forward import CURVE, SQUARE, select_forward
 from imuarray.engine.readings import arrange
 from imuarray.geometry import sub_array
 from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting
 from imuarray.simulation.recordings import simulate_samples
+from imuarray.words import sentences
 from tests.engine.test_engine import errors, position_sds
 
 
@@ -58,9 +58,9 @@ def test_it_is_said_at_1000_deg_per_s():
     rate = np.radians(1000)
     found = {f"{axis}_{k}": (0.1 / rate**2 * (k == 2 and axis == "y"), 1e-6) for k in (1, 2, 3)
              for axis in "xyz"}  # fmt: skip
-    (said,) = plain("accelerometer_rate_square", found, ["1", "2", "3"])
+    (said,) = sentences("accelerometer_rate_square", found, ["1", "2", "3"])
     assert "accelerometer 2 is off by" in said and "y 0.10000" in said
     less = {f"{what}_{k}": (-0.0005 / rate**power, 1e-6) for k in (1, 2)
             for power, what in ((1, "curve"), (2, "cubic"))}  # fmt: skip
-    (said,) = plain("gyroscope_curve", less, ["1", "2"])
+    (said,) = sentences("gyroscope_curve", less, ["1", "2"])
     assert said.startswith("at 1000 deg/s the gyroscopes show 0.1") and "less" in said

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from imuarray.engine.directions import patterns, weak_directions
 from imuarray.estimation.information import information_at
-from imuarray.estimation.selection import patterns, weak_directions
 from imuarray.geometry import mimu4444
 from imuarray.model import ArrayModel
 from imuarray.motion import normal_motion

@@ -20,8 +20,7 @@ from imuarray.analysis.board import board
 from imuarray.analysis.motion import _late, as_calibrated
 from imuarray.cli import main
 from imuarray.commands.board import answer
-from imuarray.commands.calibrate import position_lines
-from imuarray.diagnosis.words import plain
+from imuarray.commands.lines import position_lines
 from imuarray.engine.estimate import Recorded, estimate
 from imuarray.engine.forward import EFFECT_GROUPS, GYROSCOPES, gains
 from imuarray.engine.parameters import POSITION, columns_of
@@ -31,6 +30,7 @@ from imuarray.errors import InputError
 from imuarray.pictures.board import missing
 from imuarray.report.board import advice, facts, html, noises, turned, verdict, write_board
 from imuarray.trust import of_file, of_first_order, reasons_of_calibration, reasons_of_motion
+from imuarray.words import sentences
 from tests.browser import in_browser, needs_browser
 
 matplotlib.use("agg")
@@ -357,34 +357,34 @@ def sizes(rows, components=("value",), sd=1e-6):
 
 
 def test_a_lag_within_two_sds_is_none():
-    (none,) = plain("gyroscope_delay", *sizes([[1.4e-5]] * 3, sd=1.7e-5))
+    (none,) = sentences("gyroscope_delay", *sizes([[1.4e-5]] * 3, sd=1.7e-5))
     assert none.startswith("no lag seen") and "0.017 ms" in none
-    (some,) = plain("gyroscope_delay", *sizes([[1.4e-5]] * 3, sd=1e-6))
+    (some,) = sentences("gyroscope_delay", *sizes([[1.4e-5]] * 3, sd=1e-6))
     assert "run ahead of" in some
 
 
 def test_filters_are_said_by_what_they_take_of_motion():
     given = sizes([[1e-5, 0], [1e-5, 0], [3e-5, 0]], ("droop", "skew"), sd=1e-6)
-    all_of_them, one = plain("gyroscope_filter", *given)
+    all_of_them, one = sentences("gyroscope_filter", *given)
     assert all_of_them.startswith("of motion at 5 Hz the gyroscopes show 0.987")
     assert "gyroscope 3 shows 1.97" in one and "less than the others" in one
     lone = [[1e-3, 0, 0], [1e-3, 0, 0], [-2e-3, 1e-5, 0]]
-    (said,) = plain("accelerometer_filter", *sizes(lone, ("lag", "droop", "skew"), sd=1e-7))
+    (said,) = sentences("accelerometer_filter", *sizes(lone, ("lag", "droop", "skew"), sd=1e-7))
     assert "accelerometer 3 shows 0.8389" in said
 
 
 def test_plain_words_hold_one_against_the_others():
-    said = plain("sensor_delay", *sizes([[0.5e-3], [0.5e-3], [-1.0e-3]]))
+    said = sentences("sensor_delay", *sizes([[0.5e-3], [0.5e-3], [-1.0e-3]]))
     assert len(said) == 1 and re.match(r"IMU 3 is read 1.5000\s±\s0.0015 ms late", said[0])
-    assert "IMU 2 is read" in plain("sensor_delay", *sizes([[1e-3], [-1e-3]]))[0]
-    many = plain("sensor_delay", *sizes([[-2e-4], [1e-4], [3e-4], [-1e-4], [-1e-4]]))
+    assert "IMU 2 is read" in sentences("sensor_delay", *sizes([[1e-3], [-1e-3]]))[0]
+    many = sentences("sensor_delay", *sizes([[-2e-4], [1e-4], [3e-4], [-1e-4], [-1e-4]]))
     assert many == [
         "the IMUs are read at instants of their own, from 0.2 ms late to 0.3 ms early against"
         " their mean"
     ]
     names = ("period", "frequency", "phase", "offset", "drift")
     clocks = [[0, 0, 0, 0, 0], [0, 0, 0, 0, 0], [0, 0, 0, 2e-3, 0], [1e-3, 1.5, 0.2, 0, 0]]
-    said = plain("sensor_clock", *sizes(clocks, names))
+    said = sentences("sensor_clock", *sizes(clocks, names))
     assert re.match(r"IMU 4 samples on a clock of its own: a reading is up to 1\sms old", said[0])
     assert re.match(r"IMU 3 is read 2.0000\s±\s0.0010 ms late", said[1]) and len(said) == 2
     # reading = (1 + M) rate: a turn about z by 0.6 degrees
@@ -392,7 +392,7 @@ def test_plain_words_hold_one_against_the_others():
     rows = np.zeros((4, 6))
     rows[2, [0, 2]] = -turn, turn
     names = ("xy", "xz", "yx", "yz", "zx", "zy")
-    said = plain("gyroscope_misalignment", *sizes(rows, names, 1e-5))
+    said = sentences("gyroscope_misalignment", *sizes(rows, names, 1e-5))
     assert re.match(r"gyroscope 3 is turned by 0.600\d*\s±\s0.000\d+ degrees", said[0])
-    said = plain("gyroscope_scale", *sizes([[0, 0, 0], [0, 0, 0], [0.01] * 3], "xyz", 1e-5))
+    said = sentences("gyroscope_scale", *sizes([[0, 0, 0], [0, 0, 0], [0.01] * 3], "xyz", 1e-5))
     assert said[0].startswith("gyroscope 3 shows 1.000") and len(said) == 1

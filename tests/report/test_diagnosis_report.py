@@ -17,10 +17,9 @@ from imuarray.diagnosis.adoption import (
     separability,
     squared_correlations,
 )
+from imuarray.diagnosis.causes import cause_in_words
 from imuarray.diagnosis.document import diagnose
-from imuarray.diagnosis.plain import number, plus_minus, probability, quantity, ratio, span
 from imuarray.diagnosis.replicates import _beside
-from imuarray.diagnosis.words import cause_in_words, equation, sizes, split_name
 from imuarray.model.effects import DATA_EFFECTS, EFFECTS
 from imuarray.report import drawings as drawn
 from imuarray.report import numbers
@@ -28,6 +27,17 @@ from imuarray.report import write as report
 from imuarray.report.answers import answers, verdict
 from imuarray.report.drawings_model import cause_figure
 from imuarray.report.panels import abscissa, binned, cause_table, signal_of
+from imuarray.words import (
+    equation,
+    number,
+    plus_minus,
+    probability,
+    quantity,
+    ratio,
+    span,
+    split_name,
+)
+from imuarray.words.effects import sizes
 from imuarray_papers.blind.cases import Case, make
 from tests.browser import in_browser, needs_browser
 

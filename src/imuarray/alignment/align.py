@@ -13,7 +13,7 @@ from imuarray.alignment.clocks import Clock, compare
 from imuarray.alignment.found import KINDS, Alignment, Carried
 from imuarray.alignment.resample import WIDEST, Sensor, Splines
 from imuarray.errors import InputError, require
-from imuarray.firstorder.correct import rails_shown
+from imuarray.firstorder.rails import rails_shown
 from imuarray.firstorder.turns import angle_of
 from imuarray.recording import Recording
 from imuarray.recording.record import RAIL, pieces

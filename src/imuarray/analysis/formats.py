@@ -10,8 +10,8 @@ import pandas as pd
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
+from imuarray.engine.directions import position_sds
 from imuarray.errors import printable
-from imuarray.estimation.selection import position_sds
 from imuarray.firstorder.turns import nearest_orthogonal, upper_times_rotation
 from imuarray.model.effects import KINDS
 from imuarray.recording.record import by_kind

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from imuarray.errors import InputError, require
-from imuarray.firstorder.correct import rails_shown
+from imuarray.firstorder.rails import rails_shown
 from imuarray.recording import Recording, read_recording
 from imuarray.recording.channels import repeated
 from imuarray.recording.layout import read_layout, rotation

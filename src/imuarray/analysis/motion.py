@@ -8,10 +8,10 @@ import numpy as np
 import xarray as xr
 
 from imuarray.analysis.model import assumed
-from imuarray.analysis.prepare import less_leak
 from imuarray.engine.parameters import model_of
 from imuarray.errors import InputError, require
-from imuarray.firstorder.correct import corrected, nearest_rail, rails_shown
+from imuarray.firstorder.correct import corrected
+from imuarray.firstorder.rails import less_leak, nearest_rail, rails_shown
 from imuarray.model import ArrayModel
 from imuarray.model.array_model import parameter_names
 from imuarray.model.effects import KINDS, find_effects

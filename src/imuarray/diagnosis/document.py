@@ -8,18 +8,15 @@ from pathlib import Path
 import numpy as np
 
 import imuarray
+from imuarray.diagnosis.causes import causes_of, structural_gain
 from imuarray.diagnosis.noise import observable, per_triad, standardised
-from imuarray.diagnosis.noise_effects import held_out
 from imuarray.diagnosis.procedure import ProcedureResult, run_procedure
 from imuarray.diagnosis.replicates import Discrepancy, discrepancies
 from imuarray.diagnosis.scores import Information, information_at
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.shocks import SHOCK
-from imuarray.diagnosis.special import placebo_gain
-from imuarray.diagnosis.state import heldout_gain, need
-from imuarray.diagnosis.words import cause_in_words, parameters_of, sensors_of
 from imuarray.engine.estimate import Estimate
-from imuarray.engine.fit import Fit, at, fit
+from imuarray.engine.fit import Fit, fit
 from imuarray.engine.forward import resumed
 from imuarray.engine.heldout import Scores, gain, log_scores
 from imuarray.engine.parameters import POSITION, prior_precision
@@ -31,8 +28,6 @@ from imuarray.model.effects import DATA_EFFECTS, KINDS
 from imuarray.recording import Recording
 from imuarray.recording.channels import require_live
 from imuarray.streams import stream
-
-LEAST = -1e6  # log p; JSON has no infinity
 
 
 @dataclass(frozen=True)
@@ -121,7 +116,7 @@ def diagnose(
         "clock": {"origin_s": float(recording.time[0]), "span_s": search.readings.span},
         "base": base.section(),
         "discrepancies": [d._asdict() for d in base.discrepancies],
-        "causes": causes_of(found, extended),
+        "causes": causes_of(found, extended.sds),
         "unexplained": bool(found.unexplained),
         "smooth": smooth_samples(robust, found),
         "remaining": [c.name for c in found.checks if c.log_p < SETTINGS.check],
@@ -251,66 +246,3 @@ def gains(base: Fitted, inflated: Fitted, extended: Fitted) -> dict:
         "position_change_sd": float(np.sqrt(np.mean((change / sds) ** 2))),
         "position_change_m": float(np.sqrt(np.mean(change**2))),
     }
-
-
-def causes_of(found: ProcedureResult, extended: Fitted) -> list[dict]:
-    """All causes: of whole readings, of the means in the order of adoption, of the noise."""
-    search, labels = found.search, found.search.readings.labels
-    causes = []
-    for item in found.structural:
-        nats = structural_gain(found, item)[:2]
-        if not item.doubtful or nats[0] > 0:
-            causes.append(_entry(item, labels, item.parameters, nats, says=item.says))
-    for cause in search.causes:
-        statistic, freedom = need(search, cause.effect)
-        true, placebo = placebo_gain(search, cause)
-        causes.append(_entry(
-            cause, labels, parameters_of(search, cause, extended.sds),
-            heldout_gain(search, cause.effect), found.rivals.get(cause.effect, ()),
-            chi_square=statistic, degrees_of_freedom=freedom, placebo_gain_nats=placebo,
-            gain_in_sample_nats=true,
-        ))  # fmt: skip
-    for item in found.in_noise:
-        where = {"stretches_s": [list(pair) for pair in item.where]} if item.where else {}
-        nats = item.gain, item.gain_se
-        causes.append(_entry(item, labels, item.parameters, nats, **where))
-    return causes
-
-
-def _entry(item, labels, parameters, nats, rivals=(), says="", **tests) -> dict:
-    """One cause of `diagnosis.json`; parameters are dicts or (value, sd, unit)."""
-    plain = {
-        name: value if isinstance(value, dict)
-        else {"value": value[0], "sd": value[1], "unit": value[2]}
-        for name, value in parameters.items()
-    }  # fmt: skip
-    entry = {
-        "effect": item.effect,
-        "sensors": sensors_of(labels, item.imus),
-        "parameters": plain,
-        "p_value": float(np.exp(item.log_p)),
-        "log10_p_value": float(max(item.log_p, LEAST) / np.log(10)),
-        "heldout_gain_nats": nats[0],
-        "heldout_gain_se": nats[1],
-        "indistinguishable_from": list(rivals),
-        **tests,
-    }
-    return entry | {"says": cause_in_words(entry, labels, says)}
-
-
-def structural_gain(found: ProcedureResult, item) -> tuple[float, float, np.ndarray]:
-    """Nats by which the readings, as recorded, miss the extended model's prediction.
-
-    Returns their sum, its standard error and each held-out block's share.
-    Nothing was fitted to the readings that were left out, so this is held out as it stands.
-    What the other effects of whole readings did stays mended: theirs is not counted here.
-    """
-    search, raw = found.search, found.raw
-    touched, values = raw.keep & ~search.allowed, search.readings.values
-    if not DATA_EFFECTS[item.effect].left_out:  # it is mended
-        touched, values = raw.keep & (raw.values != values), raw.values
-    mine = np.zeros_like(touched)
-    mine[:, list(item.imus)] = touched[:, list(item.imus)]
-    readings = replace(search.readings, values=values, keep=search.readings.keep | mine)
-    seen = at(readings, search.columns, search.active, search.fit.state, True, all_columns=False)
-    return held_out((seen.misfits - search.fit.misfits - mine.sum(axis=(1, 2))) / 2)

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.diagnosis.noise import observable, standardised
-from imuarray.diagnosis.plain import first_up
 from imuarray.engine.fit import Fit
 from imuarray.model.effects import KINDS
+from imuarray.words import first_up
 
 REPLICATES = 99
 

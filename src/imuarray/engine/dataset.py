@@ -1,4 +1,4 @@
-"""A calibration as a labelled dataset: of the papers' estimators, the engine, or a diagnosis."""
+"""A calibration as a labelled dataset: of the engine's estimate, or of a diagnosis."""
 
 import json
 from collections.abc import Sequence
@@ -69,47 +69,12 @@ def noise_variables(noise: Noise) -> dict:
     }
 
 
-def _motion(fields) -> dict:
+def motion_variables(fields) -> dict:
     """angular rate, angular acceleration and specific force, (T, 3) each, as variables."""
     return {
         name: (("time", "axis"), field, {"units": unit})
         for (name, unit), field in zip(UNITS.items(), fields, strict=True)
     }
-
-
-def papers_dataset(recording: Recording, model: ArrayModel, found) -> xr.Dataset:
-    """Calibration of an estimator of the papers' model."""
-    from imuarray.estimation.newton import parameter_covariance
-
-    covariance = found.covariance
-    if covariance is None:
-        covariance = parameter_covariance(model, found, recording.saturated_gyroscopes())
-    dataset = positions_dataset(recording, found.positions, covariance)
-    variables = _motion(found.motion.motion[:3]) | noise_variables(model.noise)
-    variables |= {
-        "motion_converged": (("time",), found.motion.converged),
-        "cost": (("iteration",), found.cost),
-        "position_step": (("iteration",), found.step, {"units": "m"}),
-    }
-    dataset = dataset.assign(variables).assign_coords(time=recording.time)
-    dataset.attrs |= {"converged": int(found.converged), "samples": len(recording.time)}
-    dataset.attrs["residual_ratio"] = residual_ratio(recording, model, found)
-    return dataset
-
-
-def residual_ratio(recording: Recording, model: ArrayModel, found) -> float:
-    """Rms residual over the declared noise, degrees of freedom allowed for; NaN without any."""
-    samples, count = recording.specific_force.shape[:2]
-    freedom, misfit, start = 3 * samples * (count + recording.angular_rate.shape[1]), 0.0, 0
-    freedom -= 9 * samples + 3 * (count - 1)
-    for part in recording.parts():
-        motion = found.motion.motion.select(slice(start, start + len(part.time)))
-        force, rate = model.predict_many(motion, found.positions)
-        saturated = part.saturated_gyroscopes()
-        off = part.specific_force - force, part.angular_rate - rate
-        misfit += model.noise.misfit(*off, saturated)
-        freedom, start = freedom - int(saturated.sum()), start + len(part.time)
-    return float(np.sqrt(misfit / freedom)) if freedom > 0 else float("nan")
 
 
 def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
@@ -134,7 +99,7 @@ def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
     coords: dict[str, object] = {}
     if len(recordings) == 1:
         motion = found.recorded[0].state.motion[:, :9]
-        variables |= _motion(np.split(motion, 3, axis=1))
+        variables |= motion_variables(np.split(motion, 3, axis=1))
         coords["time"] = readings.time + readings.origin
         more = course(found, first.time[~first.still()])
         variables, coords = variables | more[0], coords | more[1]

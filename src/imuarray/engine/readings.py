@@ -11,13 +11,13 @@ from numpy.polynomial.legendre import legvander
 
 from imuarray.engine.settings import SETTINGS
 from imuarray.errors import InputError
-from imuarray.estimation.selection import neighbours
 from imuarray.geometry import Array
 from imuarray.linear import shared_walk
 from imuarray.model import ArrayModel
 from imuarray.model.effects import KINDS
 from imuarray.model.structure import design
 from imuarray.recording import Recording, array_of
+from imuarray.recording.record import neighbours
 
 SAME = 0.05  # of their sds, from which maps are another calibration's
 COURSE = 200  # instants of a walk that a polynomial is laid through

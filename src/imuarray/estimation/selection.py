@@ -1,10 +1,8 @@
-"""Selection of samples: moving, off the rails, informative; what they leave open."""
+"""Selection of samples: moving, off the rails, informative."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from imuarray.errors import InputError
 from imuarray.estimation.collapsed import Collapsed, motion_from
@@ -12,13 +10,11 @@ from imuarray.geometry.array import require_planar_extent
 from imuarray.model import ArrayModel
 from imuarray.recording import Recording, array_of
 from imuarray.recording.channels import require_once
-from imuarray.recording.record import few
+from imuarray.recording.record import few, neighbours
 
 SLOWEST = np.radians(100.0)  # rad/s; slower samples say nearly nothing of the positions
 SHAKEN = 3.0  # m/s^2, sd; a board in a hand that does not turn it has less
 INFORMATIVE = 0.5  # the share of the moving, unsaturated samples that is kept: a half
-AXES = "xyz"
-NAMED = 0.5  # share of a direction that a pattern must make up to give it its name
 
 
 @dataclass(frozen=True)
@@ -60,14 +56,6 @@ def disjoint(left: np.ndarray, counts) -> dict[int, np.ndarray]:
         chosen[count] = left[picks]
         left = np.delete(left, picks)
     return chosen
-
-
-def neighbours(mask: np.ndarray) -> np.ndarray:
-    """Samples next to one in the mask, and those themselves."""
-    near = mask.copy()
-    near[1:] |= mask[:-1]
-    near[:-1] |= mask[1:]
-    return near
 
 
 def information(recording: Recording) -> np.ndarray:
@@ -132,64 +120,3 @@ def _shaken(recording: Recording, still, speed) -> str:
         f"; the specific force varies by {moving.std(axis=0).max():.2g} m/s^2 at rates of at most"
         f" {np.degrees(speed.max()):.2g} deg/s: rates in rad/s declared deg/s?"
     )
-
-
-class Direction(NamedTuple):
-    """A unit combination of the coordinates of r_2 ... r_A, and how well it is known."""
-
-    sd: float  # m, of the combination
-    vector: np.ndarray  # (A - 1, 3)
-    words: str
-
-
-def patterns(positions) -> dict[str, np.ndarray]:
-    """Unit directions with a name, (3 (A - 1),) each: the array as a whole, its reference triad."""
-    relative = np.asarray(positions, float)[1:] - positions[0]
-    found = {}
-    for i, axis in enumerate(AXES):
-        # r_k - r_1 of all triads at once: it is the reference that lies elsewhere
-        found[f"the reference triad along {axis}"] = np.tile(np.eye(3)[i], (len(relative), 1))
-    found["the size of the array"] = relative
-    for i, axis in enumerate(AXES):
-        found[f"the array turned about {axis}"] = np.cross(np.eye(3)[i], relative)
-        found[f"the array's extent along {axis}"] = relative * np.eye(3)[i]
-    return {
-        name: value.ravel() / np.linalg.norm(value)
-        for name, value in found.items()
-        if np.linalg.norm(value) > 1e-12
-    }
-
-
-def weak_directions(positions, covariance, labels, count: int = 3) -> list[Direction]:
-    """The ``count`` worst known directions, the worst first.
-
-    ``positions`` (A, 3) m, ``covariance`` (3 (A - 1),) squared of r_2 ... r_A, m^2; ``labels`` of
-    all A triads. A direction is named after a pattern that makes up half of it, or a coordinate
-    that makes up a quarter.
-    """
-    values, vectors = np.linalg.eigh(covariance)
-    known = patterns(positions)
-    found = []
-    for value, vector in list(zip(values, vectors.T, strict=True))[::-1][:count]:
-        shares = {name: float(pattern @ vector) ** 2 for name, pattern in known.items()}
-        best = max(shares, key=shares.get)
-        if shares[best] < NAMED:
-            place = int(np.argmax(np.abs(vector)))
-            best = "a mixture of all positions"
-            if vector[place] ** 2 > NAMED / 2:
-                best = f"IMU {labels[1 + place // 3]} along {AXES[place % 3]}, mostly"
-        found.append(Direction(float(np.sqrt(max(value, 0.0))), vector.reshape(-1, 3), best))
-    return found
-
-
-def position_sds(calibration: xr.Dataset) -> np.ndarray:
-    """Sds of the positions that `imuarray.calibrate` gave, (A, 3) m."""
-    return np.sqrt(np.einsum("kaka->ka", calibration["position_covariance"].to_numpy()))
-
-
-def weakest_of(calibration: xr.Dataset) -> list[Direction]:
-    """`weak_directions` of what `imuarray.calibrate` gave."""
-    positions = calibration["position"].to_numpy()
-    size = 3 * (len(positions) - 1)
-    covariance = calibration["position_covariance"].to_numpy()[1:, :, 1:].reshape(size, size)
-    return weak_directions(positions, covariance, calibration["accelerometer"].to_numpy())

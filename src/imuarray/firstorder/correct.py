@@ -12,6 +12,7 @@ from imuarray.estimation.threads import one_thread
 from imuarray.firstorder.gyroscopes import Gyroscopes, Still, calibrate_gyroscopes
 from imuarray.firstorder.outliers import fit_triads
 from imuarray.firstorder.pose_noise import walked_mean
+from imuarray.firstorder.rails import nearest_rail, rails_shown
 from imuarray.firstorder.still import (
     SHORTEST,
     averaged_sd,
@@ -33,7 +34,6 @@ from imuarray.recording.units import GRAVITY
 
 GYROSCOPES = ("calibrate", "offset")
 APART = 0.2  # of gravity, root of the sum of squares: poses in more than two orientations
-COUPLED = 0.1  # a rail of one axis shows in another that the correction mixes it into by this much
 
 
 @dataclass(frozen=True)
@@ -305,18 +305,7 @@ def _correction(recording: Recording, found: FirstOrder, *inverses) -> xr.Datase
     return xr.Dataset({name: (CORRECTION[name], *both) for name, both in variables.items()})
 
 
-def rails_shown(inverse, rails) -> np.ndarray:
-    """Where rails (T, K, 3) show when maps with an inverse (K, 3, 3) are taken out."""
-    near = np.abs(inverse) > COUPLED
-    return np.einsum("kij,tkj->tki", near.astype(np.int8), rails.astype(np.int8)) > 0
-
-
 def _noise(matrix, noise) -> float:
     """Pooled sd of a corrected reading."""
     squares = np.einsum("kij,kj->ki", np.linalg.inv(matrix) ** 2, noise**2)
     return float(np.sqrt(squares.mean()))
-
-
-def nearest_rail(limit: float, matrix, offset) -> float:
-    """The rail after correction, at its nearest."""
-    return float((limit - np.abs(offset).max()) / np.abs(matrix).max())

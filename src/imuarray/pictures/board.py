@@ -9,13 +9,13 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Ellipse
 from matplotlib.ticker import LogLocator
 
-from imuarray.diagnosis.plain import fixed, joined, number
+from imuarray.engine.directions import position_sds
 from imuarray.errors import require_one_of
-from imuarray.estimation.selection import position_sds
 from imuarray.model.effects import KINDS
 from imuarray.pictures.style import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILLION, look
 from imuarray.recording import Recording
 from imuarray.recording.channels import runs
+from imuarray.words import fixed, joined, number
 
 GAP = 80.0  # deg, from a pose, of a direction that is missed; six faces leave 55
 LITTLE = 0.1  # of the squared rate about an axis; a third is even

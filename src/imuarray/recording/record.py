@@ -166,6 +166,14 @@ def pieces(breaks) -> list[slice]:
     return [slice(first, last) for first, last in pairwise(ends)]
 
 
+def neighbours(mask: np.ndarray) -> np.ndarray:
+    """Samples next to one in the mask, and those themselves."""
+    near = mask.copy()
+    near[1:] |= mask[:-1]
+    near[:-1] |= mask[1:]
+    return near
+
+
 def few(index: np.ndarray) -> np.ndarray:
     """Some of many samples' indices, spread over them."""
     return index[:: max(1, -(-len(index) // PART))]

@@ -5,20 +5,23 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.diagnosis.document import Diagnosis
-from imuarray.diagnosis.plain import (
+from imuarray.model.effects import DATA_EFFECTS, EFFECTS, KINDS
+from imuarray.report.numbers import in_noise_sds, noise_table, position_table
+from imuarray.words import (
     NARROW,
+    equation,
     first_up,
+    imus_named,
+    in_short,
     joined,
     number,
     plus_minus,
     quantity,
     ratio,
     span,
+    spelled,
     symbols,
 )
-from imuarray.diagnosis.words import equation, in_short, whose, words
-from imuarray.model.effects import DATA_EFFECTS, EFFECTS, KINDS
-from imuarray.report.numbers import in_noise_sds, noise_table, position_table
 
 BELOW_NOISE = 1.1  # times the assumed noise: a residual that looks like noise
 USUAL = 0.05  # p-value of a check that is as expected
@@ -52,7 +55,7 @@ def verdict(diagnosis: Diagnosis) -> str:
         return "Nothing: the plain model simulates this recording as far as it can show."
     parts = [f"{first_up(in_short(cause, labels))}." for cause in causes[:FEW]]
     if len(causes) > FEW:
-        others = joined(words(cause["effect"]) for cause in causes[FEW:])
+        others = joined(spelled(cause["effect"]) for cause in causes[FEW:])
         parts.append(f"And {others}.")
     before, after = (in_noise_sds(model) for model in (diagnosis.base, diagnosis.extended))
     worst = max(before, key=before.get)
@@ -173,7 +176,7 @@ def extended(diagnosis: Diagnosis) -> Answer:
         lead = f"It is the plain model as it stands, {PAPERS}."
         return Answer(question, lead, [noise])
     items = [
-        f"{words(cause['effect'])} ({whose(cause['sensors'])}): {equation(cause['effect'])}"
+        f"{spelled(cause['effect'])} ({imus_named(cause['sensors'])}): {equation(cause['effect'])}"
         for cause in document["causes"]
     ]
     fits = diagnosis.base.fit, diagnosis.extended.fit
@@ -289,7 +292,7 @@ def onward(diagnosis: Diagnosis) -> Answer:
             " were turned back in memory only."
         )
     elif named:
-        own = [words(name) for name in named if name in EFFECTS and EFFECTS[name].own]
+        own = [spelled(name) for name in named if name in EFFECTS and EFFECTS[name].own]
         less = f" Without {joined(own)}: that is of this recording alone." if own else ""
         items.append(
             "Use the model that has the causes, cal.nc beside this page: imuarray apply cal.nc and"

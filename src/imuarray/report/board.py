@@ -10,9 +10,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from imuarray.diagnosis.plain import DEGREE, first_up, number, plus_minus, quantity
-from imuarray.diagnosis.words import meaning, plain
-from imuarray.estimation.selection import position_sds, weakest_of
+from imuarray.engine.directions import position_sds, weakest_of
 from imuarray.firstorder.correct import FirstOrder
 from imuarray.firstorder.report import parameter_table, turned_lines, write_corrected
 from imuarray.model.effects import KINDS
@@ -20,6 +18,7 @@ from imuarray.pictures.board import SURE, levelled, missing
 from imuarray.provenance import atomic_folder, trust, write_bytes, write_csv, write_netcdf
 from imuarray.recording import Recording, write_recording
 from imuarray.report.page import PICTURES, pictured, rendered
+from imuarray.words import DEGREE, first_up, meaning, number, plus_minus, quantity, sentences
 
 SLOW = np.radians(300.0)  # rad/s rms, of motion that says little of positions
 MISFIT = 1.5  # times the noise: a residual that is looked into
@@ -171,7 +170,7 @@ def causes(calibration: xr.Dataset) -> list[str]:
     return [
         f"{first_up(line)}."
         for effect, values in found.items()
-        for line in plain(effect, values, labels) or meaning(effect)
+        for line in sentences(effect, values, labels) or meaning(effect)
     ]
 
 

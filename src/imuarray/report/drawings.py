@@ -4,11 +4,10 @@ import matplotlib.ticker as ticks
 import numpy as np
 import pandas as pd
 
-from imuarray.diagnosis.plain import number, power_of_ten
-from imuarray.diagnosis.words import words
 from imuarray.model.effects import KINDS
 from imuarray.pictures.board import plain
 from imuarray.pictures.style import BLACK, BLUE, GREY, ORANGE, PAGE, VERMILLION, new_figure, styled
+from imuarray.words import number, power_of_ten, spelled
 
 MODELS = {"base": {"color": VERMILLION, "marker": "o"}, "extended": {"color": BLUE, "marker": "s"}}
 NAMES = {"base": "plain model", "extended": "extended model"}
@@ -199,7 +198,7 @@ def _row_name(row) -> str:
     if row.sensors == "model":
         return f"all, {row.what}"
     whose = "all IMUs" if row.sensors == "all" else f"IMU {row.sensors}"
-    return f"{words(row.what)} ({plain(whose if len(whose) < 24 else f'{whose[:22]}…')})"
+    return f"{spelled(row.what)} ({plain(whose if len(whose) < 24 else f'{whose[:22]}…')})"
 
 
 def _gain_scale(axes, table):
@@ -239,7 +238,7 @@ def detectable_figure(table: pd.DataFrame, footer=()):
         axes.annotate(said, (1.01, place), xycoords=("axes fraction", "data"), size=6.5,
                       va="center")  # fmt: skip
     axes.plot(table.found / table.typical, range(len(table)), "o", color=VERMILLION, label="found")
-    axes.set_yticks(range(len(table)), [words(effect) for effect in table.effect])
+    axes.set_yticks(range(len(table)), [spelled(effect) for effect in table.effect])
     axes.set(xscale="log", xlabel="size over that of a common chip", ylim=(len(table) - 0.4, -0.6))
     axes.legend()
     return figure

@@ -4,10 +4,10 @@ import numpy as np
 import pandas as pd
 
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.diagnosis.words import words
 from imuarray.pictures.board import SURE
 from imuarray.pictures.style import BLACK, BLUE, LOOKS, PAGE, VERMILLION, new_figure, shade, styled
 from imuarray.report.drawings import MODELS, NAMES, imu_ticks, legend_above, plain
+from imuarray.words import spelled
 
 ALIKE = SETTINGS.alike  # squared correlation from which two effects are one class
 DARK = 0.75  # from which numbers are white
@@ -54,7 +54,7 @@ def separability_figure(table: pd.DataFrame, footer=()):
         i, j = names.index(row.effect), names.index(row.other)
         if i != j:
             _cell(axes, i, j, row.largest if i > j else row.mean)
-    labels = [words(name) for name in names]
+    labels = [spelled(name) for name in names]
     axes.set_yticks(range(len(names)), labels, size=7)
     axes.set_xticks(range(len(names)), labels, size=7, rotation=60, ha="left",
                     rotation_mode="anchor")  # fmt: skip

@@ -10,7 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 import imuarray
-from imuarray.diagnosis import plain, words
+from imuarray import words
 from imuarray.errors import numbered
 from imuarray.model.effects import KINDS
 from imuarray.pictures import board as pictures
@@ -104,5 +104,7 @@ def rendered(template: str, **given) -> str:
         loader=PackageLoader("imuarray.report", "."), undefined=StrictUndefined, autoescape=True
     )
     environment.filters["numbered"] = numbered
-    environment.globals |= vars(plain) | vars(words)  # which the tables call
+    environment.globals |= {
+        name: getattr(words, name) for name in words.__all__
+    }  # which the tables call
     return environment.get_template(template).render(version=imuarray.__version__, **given)

@@ -6,7 +6,6 @@ import numpy as np
 import xarray as xr
 
 from imuarray.diagnosis.document import Diagnosis
-from imuarray.diagnosis.words import sensors_of, whose, words
 from imuarray.engine.dataset import diagnosed
 from imuarray.provenance import atomic_folder, write_bytes, write_netcdf
 from imuarray.report import drawings as drawn
@@ -15,6 +14,7 @@ from imuarray.report.answers import USUAL, alarming, answers, verdict
 from imuarray.report.drawings_model import ALIKE, cause_figure, position_figure, separability_figure
 from imuarray.report.page import SUFFIXES, Drawing, files, pictured, rendered
 from imuarray.report.panels import cause_table, panels_of
+from imuarray.words import imus_named, sensors_of, spelled
 
 FIGURES = {  # by name: table, drawing, title, caption
     "discrepancies": (
@@ -98,7 +98,7 @@ def draw(diagnosis: Diagnosis, calibration: xr.Dataset) -> list[Drawing]:
         sensors = sensors_of(diagnosis.found.search.readings.labels, cause.imus)
         found.append(Drawing(
             f"cause_{place + 1:02d}_{cause.effect}",
-            f"Cause: {words(cause.effect)}, {whose(sensors)}",
+            f"Cause: {spelled(cause.effect)}, {imus_named(sensors)}",
             CAUSE_CAPTION.format(panels_of(cause.effect)[1]),
             files(cause_figure(table, said), table),
         ))  # fmt: skip

@@ -3,12 +3,12 @@
 import numpy as np
 import xarray as xr
 
-from imuarray.diagnosis.plain import joined
 from imuarray.model.effects import KINDS
 from imuarray.recording import Recording
 from imuarray.trust.drawing import Places
 from imuarray.trust.rigid import FEW, kept, turning
 from imuarray.trust.suspects import suspects
+from imuarray.words import joined
 
 UNSTEADY = 2.5  # times what noise explains between parts of a recording; 1.3 at most of sound ones
 APART = 1.5  # times that of the other IMUs: what disturbs one disturbs all a little

@@ -2,13 +2,14 @@
 
 import numpy as np
 
-from imuarray.estimation.selection import disjoint, neighbours
+from imuarray.estimation.selection import disjoint
 from imuarray.geometry import Array
 from imuarray.motion import hand_twisting, normal_motion
 from imuarray.posterior.chains import chain_tree
 from imuarray.posterior.prior import GaussianPrior
 from imuarray.provenance import code_digest, digest, stamp, write_netcdf
 from imuarray.recording import Recording
+from imuarray.recording.record import neighbours
 from imuarray.simulation.recordings import simulate_recording, simulate_samples
 from imuarray.streams import stream
 from imuarray_papers.config import model_from, motion_sds

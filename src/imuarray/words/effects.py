@@ -1,6 +1,6 @@
-"""Causes in words: what they are, how large, how sure, what cannot be distinguished from them.
+"""Effects in words: what they are, how large, how sure.
 
-The sentences of `diagnosis.json` and of both pages. A delay or a turn common to all IMUs is
+For the sentences of `diagnosis.json` and of both pages. A delay or a turn common to all IMUs is
 nobody's: where one IMU stands out, the others are what it is held against.
 """
 
@@ -9,24 +9,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis.plain import (
+from imuarray.model.effects import known_effect
+from imuarray.words.numbers import (
     DEGREE,
-    NARROW,
-    first_up,
     joined,
     number,
     plus_minus,
-    probability,
     quantity,
     span,
     symbols,
     unit_shown,
 )
-from imuarray.diagnosis.settings import SETTINGS
-from imuarray.diagnosis.state import Cause, Search
-from imuarray.engine.fit import flat_parameters
-from imuarray.model.array_model import component, unit_of
-from imuarray.model.effects import known_effect
 
 STATED = 3  # parameters that are stated one by one
 OUT = 5.0  # sds, and times the usual distance from the median, from which one stands out
@@ -40,40 +33,19 @@ FEW = 4  # IMUs that are spoken of one by one
 BELOW, ABOVE = [5, 1, 2], [3, 4, 0]
 
 
-def parameters_of(search: Search, cause: Cause, sds) -> dict:
-    """{name: {value, sd, unit}} of a cause; ``sds`` (N, m), of what a scan fixed there is none."""
-    values, columns = flat_parameters(search.columns, search.fit.state), search.columns
-    active, item = search.active, known_effect(cause.effect)
-    held = (*item.held, *(item.held_rough if search.fit.state.gyroscopes_free else ()))
-    found = {}
-    for imu in cause.imus:
-        for column in columns.of(cause.effect):
-            place = columns.places[column]
-            fixed = bool(place) and place[-1] in held
-            if not (active[imu, column] or fixed):
-                continue
-            name = f"{component(cause.effect, place)}_{search.readings.labels[imu]}"
-            found[name] = {
-                "value": float(values[imu, column]),
-                "sd": None if fixed else float(sds[imu, column]),
-                "unit": unit_of(cause.effect, place),
-            }
-    return found
-
-
 def sensors_of(labels, imus) -> list[str]:
     """Labels of the IMUs, or ["all"]."""
     return ["all"] if len(imus) == len(labels) else [labels[k] for k in imus]
 
 
-def whose(sensors) -> str:
+def imus_named(sensors) -> str:
     """'all IMUs', 'IMU 3', 'IMUs 3, 4'."""
     if sensors == ["all"]:
         return "all IMUs"
     return f"IMU{'s' if len(sensors) > 1 else ''} {', '.join(sensors)}"
 
 
-def words(effect: str) -> str:
+def spelled(effect: str) -> str:
     """An effect's id without underscores."""
     return effect.replace("_", " ")
 
@@ -82,40 +54,19 @@ def equation(effect: str) -> str:
     """Change that an effect makes in a reading, in the model's own words."""
     item = known_effect(effect)
     if item.apply is None:
-        return item.remedy or words(effect)
+        return item.remedy or spelled(effect)
     text = symbols((item.apply.__doc__ or "").strip().split("\n")[0].rstrip("."))
     return text[:1].lower() + text[1:] if text[1:2].islower() else text
-
-
-def cause_in_words(cause: dict, labels, says: str = "") -> str:
-    """A cause of `diagnosis.json` with its size, or what was read (``says``), test and class."""
-    text = in_short(cause, labels, says)
-    if stretches := cause.get("stretches_s"):
-        first = [f"{a:.4g} to {b:.4g}" for a, b in stretches[:STATED]]
-        text += f"; longest at {', '.join(first)} s"
-    gain = plus_minus(cause["heldout_gain_nats"], cause["heldout_gain_se"])
-    p_value = probability(cause["log10_p_value"])
-    equals = "" if p_value.startswith("<") else f"={NARROW}"
-    text += f". Gain on held-out time {gain} nats, p{NARROW}{equals}{p_value}."
-    true, placebo = cause.get("gain_in_sample_nats", 0.0), cause.get("placebo_gain_nats", 0.0)
-    if cause["sensors"] != ["all"] and 0 < SETTINGS.doubtful * true < placebo:
-        text += (
-            " Its placebo, the same numbers at other IMUs, gains too: it is doubtful whose it is."
-        )
-    if cause["indistinguishable_from"]:
-        rivals = joined(words(name) for name in cause["indistinguishable_from"])
-        text += f" On this recording it cannot be distinguished from {rivals}: one class."
-    return first_up(text)
 
 
 def in_short(cause: dict, labels, says: str = "") -> str:
     """Name of a cause, its kind and size in the words of one who holds the board."""
     effect, rows = cause["effect"], cause["parameters"]
     values = {name: (item["value"], item["sd"]) for name, item in rows.items()}
-    found = plain(effect, values, labels)
+    found = sentences(effect, values, labels)
     told = says if says or found else sizes(cause, labels)
     said = "; ".join(filter(None, [*(found or meaning(effect)), told]))
-    return f"{words(effect)}, {whose(cause['sensors'])}: {said}"
+    return f"{spelled(effect)}, {imus_named(cause['sensors'])}: {said}"
 
 
 def sizes(cause: dict, labels) -> str:
@@ -175,10 +126,10 @@ def part_in_words(part: str) -> str:
 
 def meaning(effect: str) -> list[str]:
     """The name of an effect in words, where nothing is known of its size."""
-    return [known_effect(effect).meaning or words(effect)]
+    return [known_effect(effect).meaning or spelled(effect)]
 
 
-def plain(effect: str, found: dict[str, tuple[float, float | None]], labels) -> list[str]:
+def sentences(effect: str, found: dict[str, tuple[float, float | None]], labels) -> list[str]:
     """Sentences on an effect without its name; none where there are no plainer words than it.
 
     ``found``: {parameter: (value, sd)} in SI units, of the IMUs named ``labels``.

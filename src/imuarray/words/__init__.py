@@ -1,0 +1,38 @@
+"""Numbers with units, and effects, in the words that people read.
+
+What leaves the room: the functions below, which pages, pictures, messages and `diagnosis.json` use.
+"""
+
+from imuarray.words.effects import (
+    equation,
+    imus_named,
+    in_short,
+    meaning,
+    part_in_words,
+    sensors_of,
+    sentences,
+    spelled,
+    split_name,
+)
+from imuarray.words.numbers import (
+    DEGREE,
+    NARROW,
+    first_up,
+    fixed,
+    joined,
+    number,
+    plus_minus,
+    power_of_ten,
+    probability,
+    quantity,
+    ratio,
+    span,
+    symbols,
+    unit_shown,
+)
+
+__all__ = [
+    "DEGREE", "NARROW", "equation", "first_up", "fixed", "imus_named", "in_short", "joined",
+    "meaning", "number", "part_in_words", "plus_minus", "power_of_ten", "probability", "quantity",
+    "ratio", "sensors_of", "sentences", "span", "spelled", "split_name", "symbols", "unit_shown",
+]  # fmt: skip
