@@ -139,3 +139,22 @@ def test_a_triad_that_the_motion_follows_keeps_some_noise(clean):
     declared = clean.readings.declared
     assert judged.sd[0, 0] == pytest.approx(SETTINGS.least_noise * declared[0, 0])
     assert np.all(np.isfinite(judged.sd[clean.readings.exists]))
+
+
+def test_a_pinned_mean_does_not_blow_up_what_one_imu_has():
+    """Readings show differences of four IMUs' parameters; their mean is pinned by the prior.
+
+    How hard it is pinned makes no difference to what the first one's gains.
+    """
+    rng = np.random.default_rng(3)
+    values = np.array([2.0, -1.0, 0.5, -1.5])
+    differences = np.eye(4) - 0.25
+    parts = []
+    for _ in range(10):
+        noise = differences @ rng.normal(size=4) * np.sqrt(50.0)
+        parts.append((50.0 * differences, noise))
+    first, pin = np.arange(4) == 0, np.full((4, 4), 1 / 16)
+    tight, less = (
+        gain_of(parts, 0.1 * np.eye(4) + size * pin, values, first) for size in (1e9, 1e5)
+    )
+    assert tight[0] == pytest.approx(less[0], rel=0.05) and tight[0] > 3 * tight[1]

@@ -125,8 +125,9 @@ def gain_of(parts, ridge, values, freed, spare=None) -> tuple[float, float]:
     """
     information, score = sum(p[0] for p in parts), sum(p[1] for p in parts)
     spare = np.zeros(len(freed), bool) if spare is None else spare
-    prior = ridge[np.ix_(freed & ~spare, freed & ~spare)]
     freed, values, gains = freed[~spare], values[~spare], []
+    # a pinned mean holds those of some IMUs no more than the other IMUs let it
+    prior = _schur(ridge[np.ix_(~spare, ~spare)], freed)
     for part in parts:
         trained = information - part[0] + ridge, score - part[1]
         trained, (block, slope) = _eliminated(trained, part, spare)
