@@ -16,7 +16,8 @@ from imuarray.firstorder.report import gyroscope_lines, parameter_table, turned_
 from imuarray.firstorder.still import still_poses
 from imuarray.recording import read_recording, write_recording
 from imuarray.recording.format import load_dataset
-from imuarray.trust.poses import POSES, Poses, of_file, reasons_of_poses
+from imuarray.trust.poses import Poses, of_file, reasons_of_poses
+from imuarray.trust.settings import SETTINGS as TRUST
 
 SHORT = Options(sampling_rate=100.0, still=3.2, move=1.5, twisting=4.0)
 
@@ -336,7 +337,7 @@ def test_poses_that_fit_badly_are_told(tmp_path, recording, capsys):
     given = ["first-order", str(tmp_path / "rec.nc"), "--gravity", str(GRAVITY), "--out", out]
     assert main(given) == 3
     assert "not to be trusted: the still poses fit" in capsys.readouterr().err
-    assert of_file(out).ratio > POSES
+    assert of_file(out).ratio > TRUST.pose_noise
     cal = ["calibrate", out, "--model", "papers", "--out", str(tmp_path / "cal.nc"), "--quiet"]
     assert main(cal) == 3
     assert "still poses fit" in load_dataset(tmp_path / "cal.nc").attrs["reasons"]

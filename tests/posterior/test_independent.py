@@ -11,7 +11,8 @@ from imuarray.analysis import sampling
 from imuarray.geometry import sub_array
 from imuarray.model.jax64 import jnp
 from imuarray.posterior.diagnostics import ess, rhat
-from imuarray.posterior.independent import UNRELIABLE, run_independent, walked
+from imuarray.posterior.independent import run_independent, walked
+from imuarray.posterior.settings import SETTINGS
 
 MEAN = np.array([1.0, -2.0, 0.5])
 FACTOR = np.array([[2.0, 0.0, 0.0], [1.0, 0.3, 0.0], [-1.0, 0.2, 1e-3]])
@@ -45,7 +46,7 @@ def test_a_normal_target_is_drawn_from_wherever_the_search_ended(capsys):
 def test_a_target_that_is_not_normal_is_drawn_from_exactly():
     """Quantiles within five standard errors of those by summation."""
     chains, k = run_independent(skewed, np.zeros(2), np.eye(2), 5000, seed=2, quiet=True)
-    assert k < UNRELIABLE and 0.3 < chains.acceptance.min() < 0.9
+    assert k < SETTINGS.unreliable and 0.3 < chains.acceptance.min() < 0.9
     grid, levels = np.linspace(-6, 6, 4001), np.array([0.05, 0.25, 0.5, 0.75, 0.95])
     density = np.exp([skewed(value[None]) for value in grid])
     law, sizes = np.cumsum(density) / density.sum(), ess(chains.draws)
@@ -62,7 +63,7 @@ def test_tails_that_proposals_do_not_reach_are_told():
     _, k = run_independent(
         lambda t: -2.0 * jnp.log1p(t[0] ** 2 / 3), np.zeros(1), np.eye(1), 4000, seed=3, quiet=True
     )
-    assert k > UNRELIABLE
+    assert k > SETTINGS.unreliable
 
 
 def test_walk_takes_what_is_denser_and_what_it_must_of_the_rest():
@@ -93,7 +94,7 @@ def test_where_it_is_not_enough_nuts_is_taken_and_that_is_told(monkeypatch):
     first = imuarray.sample(recording, "papers")
     assert first.attrs["sampler"] == "independent" and first.attrs["converged"]
     assert first.attrs["ess_min"] >= 1000 and first.attrs["rhat_max"] <= 1.01
-    monkeypatch.setattr(sampling, "UNRELIABLE", -np.inf)
+    monkeypatch.setattr(sampling, "SETTINGS.unreliable", -np.inf)
     refused = imuarray.sample(recording, "papers", method="independent")
     assert not refused.attrs["converged"]
     made = sampling.posterior_of

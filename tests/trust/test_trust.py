@@ -13,7 +13,8 @@ import imuarray
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.firstorder.correct import corrected
-from imuarray.firstorder.gyroscopes import ODD, shared_chance
+from imuarray.firstorder.gyroscopes import shared_chance
+from imuarray.firstorder.settings import SETTINGS as FIRSTORDER
 from imuarray.geometry import mimu4444, mimu4444_corners
 from imuarray.recording.record import CORRECTION
 from imuarray.trust import poses
@@ -529,7 +530,7 @@ def test_an_odd_scale_of_all_gyroscopes_is_the_time_base_or_theirs():
     rng, maps = np.random.default_rng(3), np.tile(np.eye(3), (6, 1, 1))
     maps += 0.005 * rng.standard_normal((6, 3, 1)) * np.eye(3)
     chances = [shared_chance(part * maps) for part in (1.0, 1.015)]
-    assert chances[0] > ODD > chances[1]
+    assert chances[0] > FIRSTORDER.odd_scale > chances[1]
     assert poses.reasons_of_poses(poses.Poses(scale=1.0, chance=chances[0])) == []
     (said,) = poses.reasons_of_poses(poses.Poses(scale=1 / 1.015, chance=chances[1]))
     assert "read 1.5 % too much" in said and "time base" in said

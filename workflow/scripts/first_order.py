@@ -6,7 +6,7 @@ with job(snakemake):
     from imuarray.firstorder import report
     from imuarray.firstorder.correct import calibrate_first_order
     from imuarray.firstorder.report import write_corrected
-    from imuarray.firstorder.still import SHORTEST
+    from imuarray.firstorder.settings import SETTINGS as FIRSTORDER
     from imuarray.provenance import write_csv
     from imuarray.recording import read_recording
     from imuarray.recording.units import GRAVITY
@@ -17,7 +17,7 @@ with job(snakemake):
         recording,
         entry.get("gravity", GRAVITY),
         entry.get("gyroscopes", "calibrate"),
-        entry.get("shortest_pose", SHORTEST),
+        entry.get("shortest_pose", FIRSTORDER.shortest),
     )
     write_csv(report.parameter_table(found, recording), made.parameters)
     write_csv(report.residual_table(found, recording), made.residuals)

@@ -11,25 +11,14 @@ from scipy.interpolate import make_interp_spline, make_lsq_spline
 
 from imuarray.alignment.clocks import Clock, compare
 from imuarray.alignment.found import KINDS, Alignment, Carried
-from imuarray.alignment.resample import WIDEST, Sensor, Splines
+from imuarray.alignment.resample import Sensor, Splines
+from imuarray.alignment.settings import SETTINGS
 from imuarray.errors import InputError, require
 from imuarray.firstorder.rails import rails_shown
 from imuarray.firstorder.turns import angle_of
 from imuarray.recording import Recording
 from imuarray.recording.record import RAIL, pieces
 from imuarray.recording.rig import Log
-
-PACES = 1e9, 60.0, 20.0, 5.0  # s between knots of a pace that changes slowly
-RUN = 8.5  # steps, beyond which a gap begins another run
-FEWEST = 16  # readings of a run
-ROUNDED = 3  # different steps of rounded stamps
-FASTEST = 0.75  # quantile of the readings' change, above which stamps show in them
-SLOWER = 1.5  # times the common rate, from which a sensor's readings are averaged
-LITTLE = 0.3  # of the noise that is left, what averaging may miss
-SHORTEST = 100  # readings of a sensor, and common instants
-UNBROKEN = 32  # readings of a sensor, but for a few missing ones
-PAUSED = 100  # times as long as its readings take, which a log may last
-UNEVEN = 2.0  # s, by which logs may begin and end apart without a line
 
 
 def steadied(time, values, enough: float = 1.0) -> tuple[np.ndarray, float]:
@@ -40,7 +29,9 @@ def steadied(time, values, enough: float = 1.0) -> tuple[np.ndarray, float]:
     smoother. Else the stamps.
     """
     steps = np.diff(time)
-    even = np.concatenate([_paced(time[part]) for part in pieces(steps > RUN * np.median(steps))])
+    even = np.concatenate(
+        [_paced(time[part]) for part in pieces(steps > SETTINGS.run * np.median(steps))]
+    )
     off = float(np.sqrt(np.mean((even - time) ** 2)))
     if (np.diff(even) <= 0).any() or _roughness(even, values) > enough * _roughness(time, values):
         return time, 0.0
@@ -49,16 +40,18 @@ def steadied(time, values, enough: float = 1.0) -> tuple[np.ndarray, float]:
 
 def _paced(time) -> np.ndarray:
     """Stamps of a run as a line in the readings' numbers, or a spline where that tells."""
-    if len(time) < FEWEST:
+    if len(time) < SETTINGS.least_run:
         return time
     steps, every = np.diff(time), np.arange(float(len(time)))
     usual = steps[steps < 1.5 * np.median(steps)]
     step = np.mean(usual)
     missed = np.concatenate([[0.0], np.cumsum(np.maximum(np.round(steps / step), 1.0))])
     # Where stamps jitter by half a step, rounding would see gaps that are none.
-    tried = [_line(time, number, pace) for number in (every, missed) for pace in PACES]
-    lines = [found for _, found in tried[:: len(PACES)]]
-    if len(np.unique(np.round(usual, 7))) <= ROUNDED:  # a spline would follow the rounding's jumps
+    tried = [_line(time, number, pace) for number in (every, missed) for pace in SETTINGS.paces]
+    lines = [found for _, found in tried[:: len(SETTINGS.paces)]]
+    if (
+        len(np.unique(np.round(usual, 7))) <= SETTINGS.rounded
+    ):  # a spline would follow the rounding's jumps
         lines = [found for found in lines if np.abs(found - time).max() <= np.ptp(usual)]
         tried = [(0.0, found) for found in lines[:1]] or tried
     return min(tried, key=lambda one: one[0])[1]
@@ -82,7 +75,7 @@ def _roughness(time, values) -> float:
     spline = make_interp_spline(time[::2], values[::2], 3)
     odd = slice(1, 2 * len(change), 2)
     off = np.linalg.norm(values[odd] - spline(time[odd]), axis=1)
-    return float(np.median(off[change >= np.quantile(change, FASTEST)]))
+    return float(np.median(off[change >= np.quantile(change, SETTINGS.fast_quantile)]))
 
 
 def align(
@@ -148,9 +141,11 @@ def _sensors(logs: Sequence[Log]) -> tuple[list[tuple[Sensor, Sensor]], list[flo
         )  # fmt: skip
         for kind, (time, *_) in zip(KINDS, parts, strict=True):
             name, count = f"{kind} {log.label!r}", len(time)
-            require(count >= SHORTEST, name, f"{SHORTEST} readings at least", count)
+            require(
+                count >= SETTINGS.shortest, name, f"{SETTINGS.shortest} readings at least", count
+            )
             step, lasts = np.quantile(np.diff(time), 0.99), time[-1] - time[0]
-            paused = step > 0 and lasts > PAUSED * count * step
+            paused = step > 0 and lasts > SETTINGS.paused * count * step
             days = f"within {lasts / 86400:.3g} days"
             found = f"{count} readings {step:.3g} s apart or less {days}"
             require(not paused, name, "stamps of one recording", found)
@@ -183,7 +178,7 @@ def _ends(sensors: Sequence[Sensor]) -> Iterator[str]:
             (sensor.time[0] - first, "begins {:.1f} s after"),
             (last - sensor.time[-1], "ends {:.1f} s before"),
         ):
-            if late > UNEVEN:
+            if late > SETTINGS.uneven:
                 yield f"{sensor.name} {what.format(late)} the others: what it has not is left out"
 
 
@@ -199,8 +194,8 @@ def _grid(sensors: Sequence[Sensor]) -> tuple[np.ndarray, float]:
 
 
 def _require_common(count: int) -> None:
-    expected = f"{SHORTEST} instants at least that all sensors have readings around"
-    require(count >= SHORTEST, "logs", expected, count)
+    expected = f"{SETTINGS.shortest} instants at least that all sensors have readings around"
+    require(count >= SETTINGS.shortest, "logs", expected, count)
 
 
 def _knots(sensor: Sensor, grid, step: float) -> np.ndarray | None:
@@ -209,7 +204,10 @@ def _knots(sensor: Sensor, grid, step: float) -> np.ndarray | None:
     What it and the slowest one keep of the motion is the same then, and no reading is thrown away.
     """
     left = sensor.noise_sd * np.sqrt(sensor.step / step)
-    averaged = SLOWER * sensor.step < step and sensor.error(step) < LITTLE * left
+    averaged = (
+        SETTINGS.slower * sensor.step < step
+        and sensor.error(step) < SETTINGS.averaging_missed * left
+    )
     return grid if averaged else None
 
 
@@ -240,9 +238,10 @@ def _require_slow(sensors: Sequence[Sensor]) -> None:
     And where readings are too scattered to tell.
     """
     for sensor in sensors:
-        run = max(len(sensor.time[part]) for part in sensor.runs(WIDEST + 0.5))
-        expected = f"stretches of {UNBROKEN} readings with at most {WIDEST - 1} missing in a row"
-        require(run >= UNBROKEN, sensor.name, expected, f"{run} at most")
+        run = max(len(sensor.time[part]) for part in sensor.runs(SETTINGS.widest + 0.5))
+        most = SETTINGS.widest - 1
+        expected = f"stretches of {SETTINGS.unbroken} readings with at most {most} missing in a row"
+        require(run >= SETTINGS.unbroken, sensor.name, expected, f"{run} at most")
     worst = max(sensors, key=lambda sensor: sensor.error(sensor.step) / sensor.noise_sd)
     missed = worst.error(worst.step)
     if missed > worst.noise_sd:

@@ -8,22 +8,12 @@ import numpy as np
 from scipy.signal import argrelextrema, correlate
 
 from imuarray.alignment.resample import Sensor, Splines
+from imuarray.alignment.settings import SETTINGS
 from imuarray.errors import InputError, require
-from imuarray.firstorder.gyroscopes import FEWEST, FLATTEST, SLOWEST
+from imuarray.firstorder.gyroscopes import SLOWEST
+from imuarray.firstorder.settings import SETTINGS as FIRSTORDER
 from imuarray.firstorder.turns import nearest_orthogonal, procrustes
 from imuarray.linear import scaled_inverse
-
-COARSE = 0.01  # s, of the grid on which speeds are compared
-WINDOW, HOP = 20.0, 5.0  # s: the piece of a log that is looked for, and further ones around it
-AHEAD = 0.05  # s, that a further piece may be off beside what the drift does
-FASTEST = 1e-3  # of a clock against another
-ALIKE = 0.9  # correlation of two speeds from which they are one motion
-NEARLY = 0.02  # of correlations, within which two places are equally good
-PIECES = 8  # that are tried
-SLACK = 0.05  # sd of the map's entries about a rotation
-WILD = 0.25  # of the usual step, that stamps may be wrong
-BLOCK = 0.5  # s, within which residuals may be alike
-STEPS, CLOSE = 20, 1e-9  # of Gauss-Newton, s
 
 
 class Clock(NamedTuple):
@@ -75,12 +65,13 @@ def compare(first: Sensor, other: Sensor, ahead: float = 0.0) -> Clock:
     base = splines(at)
     used = ~(first.near_rail(at).any(axis=1) | other.railed.any(axis=1))
     used &= np.linalg.norm(np.nan_to_num(base), axis=1) > SLOWEST
-    expected = f"{FEWEST} readings in turning motion off the rails to find rotation and clock from"
-    require(used.sum() >= FEWEST, other.name, expected, used.sum())
+    least = FIRSTORDER.least_moving
+    expected = f"{least} readings in turning motion off the rails to find rotation and clock from"
+    require(used.sum() >= least, other.name, expected, used.sum())
     turn = procrustes(other.values[used], base[used])
     _require_turning(base[used], turn, other.name)
     found = _fit(splines, other, clock._replace(map=turn), used)
-    if found.stray > WILD * max(first.step, other.step):
+    if found.stray > SETTINGS.wild * max(first.step, other.step):
         raise InputError(
             f"{other.name}: expected stamps that tell when it was read, found rates as far from the"
             f" first's as if stamps were {1e3 * found.stray:.2g} ms wrong; let the sensor or its"
@@ -97,7 +88,7 @@ def _require_turning(rate, turn, name: str) -> None:
     values = np.linalg.eigvalsh(rate.T @ rate)
     hint = "turn the rig about other axes, too"
     found = f"one axis only: the rotation of this IMU about it is not determined; {hint}"
-    several = values[1] >= FLATTEST * values[2]
+    several = values[1] >= FIRSTORDER.weakest_axis * values[2]
     require(several, name, "motion about two axes at least", found)
 
 
@@ -107,7 +98,7 @@ def _fit(splines: Splines, other: Sensor, clock: Clock, used) -> Clock:
     values = np.concatenate([[clock.offset, clock.drift], turn.ravel(), np.zeros(3)])
     far = time - clock.middle
     ridge = np.zeros(14)
-    for step in range(STEPS):
+    for step in range(SETTINGS.steps):
         at = time - values[0] - values[1] * far
         rate, slope = splines(at), splines(at, 1)
         here = np.isfinite(rate).all(axis=1)
@@ -122,13 +113,13 @@ def _fit(splines: Splines, other: Sensor, clock: Clock, used) -> Clock:
         columns[..., 1] = columns[..., 0] * far[:, None]
         for i in range(3):
             columns[:, i, 2 + 3 * i : 5 + 3 * i], columns[:, i, 11 + i] = found, 1.0
-        ridge[2:11] = size / SLACK**2
+        ridge[2:11] = size / SETTINGS.slack**2
         flat = (columns * weight[:, None, None]).reshape(-1, 14)
         inverse = scaled_inverse(flat.T @ columns.reshape(-1, 14) + np.diag(ridge))
         slope_ = flat.T @ left.ravel() - ridge * (values - np.r_[0, 0, turn.ravel(), 0, 0, 0])
         change = inverse @ slope_
         values = values + change
-        if step > 3 and abs(change[0]) + abs(change[1]) * np.ptp(far) < CLOSE:
+        if step > 3 and abs(change[0]) + abs(change[1]) * np.ptp(far) < SETTINGS.close:
             break
     # what the scores change by, as weights change with the residuals, too
     bend = weight * (1 - 2 / 3 * squares / (4 * size + squares))
@@ -143,7 +134,7 @@ def _fit(splines: Splines, other: Sensor, clock: Clock, used) -> Clock:
 
 def _sandwich(columns, weight, left, time, inverse) -> np.ndarray:
     """Covariance (14, 14) that allows residuals within one block of time to be alike."""
-    _, block = np.unique(time // BLOCK, return_inverse=True)
+    _, block = np.unique(time // SETTINGS.block, return_inverse=True)
     scores = np.zeros((block.max() + 1, 14))
     np.add.at(scores, block, np.einsum("n,nim,ni->nm", weight, columns, left))
     scores = scores @ inverse
@@ -155,21 +146,21 @@ def _coarse(first: Sensor, other: Sensor, ahead: float) -> tuple[float, float, f
     """(middle, offset, drift) to some milliseconds, from the speeds' correlation."""
     base, start = _speed(first)
     speed, own = _speed(other)
-    length = min(round(WINDOW / COARSE), len(speed), len(base))
+    length = min(round(SETTINGS.window / SETTINGS.coarse), len(speed), len(base))
     begin, lag = _placed(base, speed, length, start - own + ahead, other.name)
     # further pieces of the same log, about where the first one lies
-    half = round(AHEAD / COARSE)
-    short = min(length, round(HOP / COARSE))
+    half = round(SETTINGS.ahead / SETTINGS.coarse)
+    short = min(length, round(SETTINGS.hop / SETTINGS.coarse))
     centre, found = begin + length // 2, []
     for place in range(0, len(speed) - short + 1, short):
-        around = half + int(FASTEST * abs(place + short // 2 - centre))
+        around = half + int(SETTINGS.fastest_clock * abs(place + short // 2 - centre))
         low = place + lag - around
         part = base[max(low, 0) : place + lag + short + around]
         if low < 0 or len(part) < short + 2 * around:
             continue
         score = _match(part, speed[place : place + short])
         best = int(np.argmax(score))
-        if score[best] > ALIKE and 0 < best < len(score) - 1:
+        if score[best] > SETTINGS.same_motion and 0 < best < len(score) - 1:
             a, b, c = score[best - 1 : best + 2]
             peak = best + 0.5 * (a - c) / (a - 2 * b + c)
             found.append((place + short / 2, low + peak - place))
@@ -178,8 +169,8 @@ def _coarse(first: Sensor, other: Sensor, ahead: float) -> tuple[float, float, f
     places, lags = np.array(found).T
     middle, (drift, here) = places.mean(), _line(places - places.mean(), lags)
     # a lag leads from the other's grid to the first's
-    offset = own + COARSE * middle - (start + COARSE * (middle + here))
-    return float(own + COARSE * middle), float(offset), float(-drift)
+    offset = own + SETTINGS.coarse * middle - (start + SETTINGS.coarse * (middle + here))
+    return float(own + SETTINGS.coarse * middle), float(offset), float(-drift)
 
 
 def _line(x, y) -> tuple[float, float]:
@@ -191,13 +182,13 @@ def _line(x, y) -> tuple[float, float]:
         slope, value = np.polyfit(x, y, 1, w=np.sqrt(weight))
         left = np.abs(y - slope * x - value)
         weight = 1 / (1 + (left / max(np.median(left), 1e-3)) ** 2)
-    return (slope, value) if abs(slope) < FASTEST else (0.0, float(np.median(y)))
+    return (slope, value) if abs(slope) < SETTINGS.fastest_clock else (0.0, float(np.median(y)))
 
 
 def _speed(sensor: Sensor) -> tuple[np.ndarray, float]:
     """|rate| on the coarse grid, rad/s, and where that starts."""
     start = float(sensor.time[0])
-    grid = start + COARSE * np.arange(int((sensor.time[-1] - start) / COARSE) + 1)
+    grid = start + SETTINGS.coarse * np.arange(int((sensor.time[-1] - start) / SETTINGS.coarse) + 1)
     return np.interp(grid, sensor.time, np.linalg.norm(sensor.values, axis=1)), start
 
 
@@ -221,16 +212,16 @@ def _placed(base, speed, length: int, zero: float, name: str) -> tuple[int, int]
     hop, best = max(length // 4, 1), 0.0
     begins = np.arange(0, len(speed) - length + 1, hop)
     spread = np.array([speed[b : b + length].std() for b in begins])
-    for begin in begins[np.argsort(-spread)][:PIECES]:
+    for begin in begins[np.argsort(-spread)][: SETTINGS.pieces]:
         part = speed[begin : begin + length]
         if part.std() < SLOWEST / 4:
             break
         score = _match(base, part)
         best = max(best, score.max())
-        if best > ALIKE:
+        if best > SETTINGS.same_motion:
             peaks = argrelextrema(score, np.greater_equal)[0]
-            lags = peaks[score[peaks] > best - NEARLY] - begin
-            return int(begin), int(lags[np.argmin(np.abs(COARSE * lags + zero))])
+            lags = peaks[score[peaks] > best - SETTINGS.nearly] - begin
+            return int(begin), int(lags[np.argmin(np.abs(SETTINGS.coarse * lags + zero))])
     raise InputError(
         f"{name}: expected the turning motion that the first log shows, too, found none alike"
         f" (correlation {best:.2f}); are both on one rigid body, and do the logs overlap?"

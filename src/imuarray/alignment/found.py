@@ -7,13 +7,11 @@ import numpy as np
 import xarray as xr
 
 from imuarray.alignment.clocks import Clock
+from imuarray.alignment.settings import SETTINGS
 from imuarray.firstorder.turns import TURNED, angle_of
 from imuarray.recording.record import AXES
 
 KINDS = {"accelerometer": ("m/s^2", 1.0), "gyroscope": ("deg/s", 180 / np.pi)}  # as lines show them
-NOISY = 3.0  # times the noise, from which a residual is explained
-JITTER = 5e-6  # s, that is said
-SMALLEST = 1e-4  # degrees, ms or ppm: an sd that is shown
 
 
 class Carried(NamedTuple):
@@ -32,8 +30,9 @@ class Carried(NamedTuple):
         """For a person."""
         unit, scale = KINDS[kind]
         off = f", stamps {1e3 * self.jitter:.2g} ms off even readings"
+        off *= self.jitter > SETTINGS.jitter
         return (
-            f"{kind} at {self.rate:.2f} Hz{off * (self.jitter > JITTER)}, interpolation misses"
+            f"{kind} at {self.rate:.2f} Hz{off}, interpolation misses"
             f" {scale * self.error:.2g} {unit} where noise is {scale * self.noise_sd:.2g}"
         )
 
@@ -98,7 +97,7 @@ class Alignment:
             f" {'slow' if clock.drift < 0 else 'fast'}; rates"
             f" agree to {self.agreement[k]:.2f} times the noise"
         )
-        if self.agreement[k] > NOISY:
+        if self.agreement[k] > SETTINGS.noisy_residual:
             text += f", as if its stamps were {1e3 * clock.stray:.2g} ms wrong"
         if self.declared[k] > TURNED:
             text += f"; {np.degrees(self.declared[k]):.1f} degrees off its declared axes"
@@ -135,7 +134,11 @@ class Alignment:
 
 def _with(value: float, sd: float) -> str:
     """A value with its sd to two digits; a bound where that is less than SMALLEST."""
-    if sd < SMALLEST:
-        return f"{value:.4f} +- < {SMALLEST:.4f}" if value >= SMALLEST else f"< {SMALLEST:.4f}"
+    if sd < SETTINGS.smallest_sd:
+        return (
+            f"{value:.4f} +- < {SETTINGS.smallest_sd:.4f}"
+            if value >= SETTINGS.smallest_sd
+            else f"< {SETTINGS.smallest_sd:.4f}"
+        )
     digits = int(np.clip(1 - np.floor(np.log10(sd)), 0, 4))
     return f"{value:.{digits}f} +- {sd:.{digits}f}"

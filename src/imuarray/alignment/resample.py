@@ -12,15 +12,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.interpolate import BSpline, make_interp_spline, make_lsq_spline
 
+from imuarray.alignment.settings import SETTINGS
 from imuarray.recording.record import pieces
-
-DEGREE = 5
-REACH = 8  # readings, or knots, beside a rail that show in the spline: 0.43^8 is 0.1 %
-WIDEST = 8  # readings that may be missing in a row where the motion is slow enough
-SEGMENT = 128  # readings in a piece of the spectrum
-NOISY = 3.0  # times the declared noise that a sensor's own may be
-MOVING = 10.0  # times the noise, from which a piece of the log shows motion
-SHOCKS = 0.1  # of these pieces, the worst, that do not count
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,12 +42,15 @@ class Sensor:
     def even(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """Runs at even steps, gaps filled by the spline: values, and which are railed."""
         found = []
-        for run in self.runs(WIDEST + 0.5):
+        for run in self.runs(SETTINGS.widest + 0.5):
             time, values, railed = self.time[run], self.values[run], self.railed[run]
-            if len(time) > 2 * DEGREE and (np.diff(time) > 1.5 * self.step).any():
+            if len(time) > 2 * SETTINGS.degree and (np.diff(time) > 1.5 * self.step).any():
                 at = np.arange(time[0], time[-1], self.step)
                 nearest = np.searchsorted((time[1:] + time[:-1]) / 2, at)
-                values, railed = make_interp_spline(time, values, DEGREE)(at), railed[nearest]
+                values, railed = (
+                    make_interp_spline(time, values, SETTINGS.degree)(at),
+                    railed[nearest],
+                )
             found.append((values, railed))
         return found
 
@@ -78,8 +74,8 @@ class Sensor:
         frequency = np.fft.rfftfreq(segment)
         noise = 6 * self.noise_sd**2 / segment
         quiet = np.argsort(power.sum(axis=1))[: len(power) // 4 + 1]
-        level = np.clip(power[quiet][:, frequency > 0.4].mean(), noise, NOISY**2 * noise)
-        moving = power.sum(axis=1) > MOVING**2 * level * len(frequency)
+        level = np.clip(power[quiet][:, frequency > 0.4].mean(), noise, SETTINGS.noisy**2 * noise)
+        moving = power.sum(axis=1) > SETTINGS.moving**2 * level * len(frequency)
         return frequency, power[moving] - level
 
     def runs(self, longest: float) -> list[slice]:
@@ -89,25 +85,27 @@ class Sensor:
     def error(self, spacing: float) -> float:
         """Rms of what a spline of knots ``spacing`` seconds apart misses, one axis, in motion."""
         # the window widens what is slow by 4.6 / segment, which must be little beside the knots
-        segment = SEGMENT * max(round(spacing / self.step / 2), 1)
+        segment = SETTINGS.segment * max(round(spacing / self.step / 2), 1)
         if segment not in self.spectra:
             self.spectra[segment] = self.spectrum(segment)
         frequency, power = self.spectra[segment]
         if not len(power):
             return 0.0
         missed = power @ spline_error(frequency * spacing / self.step)
-        missed = np.sort(missed)[: len(missed) - int(SHOCKS * len(missed))]
+        missed = np.sort(missed)[: len(missed) - int(SETTINGS.shocks * len(missed))]
         return float(np.sqrt(max(missed.mean(), 0.0) / 3))
 
     @cached_property
     def longest(self) -> float:
         """Usual steps between neighbours that the motion is slow enough to bridge."""
-        allowed = [n for n in range(2, WIDEST + 1) if self.error(n * self.step) < self.noise_sd]
+        allowed = [
+            n for n in range(2, SETTINGS.widest + 1) if self.error(n * self.step) < self.noise_sd
+        ]
         return 0.5 + max(allowed, default=1)
 
     def near_rail(self, at, spacing: float = 0.0) -> np.ndarray:
         """Where (T, 3) a railed reading shows at ``at`` (T,), with knots ``spacing`` s apart."""
-        reach = REACH * max(self.step, spacing)
+        reach = SETTINGS.reach * max(self.step, spacing)
         found = np.zeros((len(at), 3), bool)
         for axis in range(3):
             railed = self.time[self.railed[:, axis]]
@@ -121,7 +119,7 @@ def spline_error(frequency) -> np.ndarray:
     """Mean square error, over phases, of a sinusoid of power 1 at cycles a knot (F,)."""
     inside = np.minimum(frequency, 0.5)
     images = inside[:, None] + np.arange(-8, 9)
-    basis = np.sinc(images) ** (DEGREE + 1)
+    basis = np.sinc(images) ** (SETTINGS.degree + 1)
     response = basis / basis.sum(axis=1, keepdims=True)
     response[:, 8] -= 1.0
     return np.where(frequency > 0.5, 1.0, np.sum(response**2, axis=1))
@@ -135,7 +133,7 @@ class Splines:
         self.parts: list[tuple[float, float, BSpline]] = []
         for run in sensor.runs(sensor.longest):
             time = sensor.time[run]
-            if len(time) > 2 * DEGREE:
+            if len(time) > 2 * SETTINGS.degree:
                 spline = _spline(time, values[run], knots)
                 self.parts.append((time[0], time[-1], spline))
 
@@ -154,8 +152,8 @@ def _spline(time, values, knots) -> BSpline:
     if len(inner):
         # a reading between neighbours, or nothing determines the spline there
         inner = inner[np.unique(np.searchsorted(time, inner), return_index=True)[1]]
-        ends = [np.full(DEGREE + 1, end) for end in (time[0], time[-1])]
+        ends = [np.full(SETTINGS.degree + 1, end) for end in (time[0], time[-1])]
         knots = np.concatenate([ends[0], inner, ends[1]])
         with suppress(np.linalg.LinAlgError):  # where readings are missing, too little still does
-            return make_lsq_spline(time, values, knots, DEGREE, method="norm-eq")
-    return make_interp_spline(time, values, DEGREE)
+            return make_lsq_spline(time, values, knots, SETTINGS.degree, method="norm-eq")
+    return make_interp_spline(time, values, SETTINGS.degree)

@@ -145,16 +145,16 @@ def _together(found: Recording | Rig) -> Opened:
 
 def _sampled(recording: Recording, lines: list[str]) -> Opened:
     """Samples as they are: even instants where stamps jitter, and the rails that show."""
-    from imuarray.alignment.align import SHORTEST, steadied
-    from imuarray.alignment.found import JITTER
+    from imuarray.alignment.align import steadied
+    from imuarray.alignment.settings import SETTINGS as ALIGNMENT
 
     recording, cleaned = _less_garbage(recording)
     recording, more = _railed_triads(recording)
     more = cleaned + more
-    if len(recording.time) < SHORTEST:
+    if len(recording.time) < ALIGNMENT.shortest:
         return Opened(recording, [*lines, *more])
     time, off = steadied(recording.time, recording.angular_rate.mean(axis=1), SURE)
-    if off > JITTER:
+    if off > ALIGNMENT.jitter:
         recording = replace(recording, time=time)
         more.append(
             f"stamps {1e3 * off:.2g} ms off even readings, which the rates fit better: taken as"

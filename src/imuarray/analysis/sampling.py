@@ -25,10 +25,11 @@ from imuarray.model import ArrayModel
 from imuarray.model.array_model import parameter_names
 from imuarray.model.effects import KINDS
 from imuarray.posterior.chains import Chains, chain_tree, chains_of
-from imuarray.posterior.diagnostics import ENOUGH, RHAT, ess, rhat, summarise
+from imuarray.posterior.diagnostics import ess, rhat, summarise
 from imuarray.posterior.generic import SCALES
-from imuarray.posterior.independent import UNRELIABLE, run_independent
+from imuarray.posterior.independent import run_independent
 from imuarray.posterior.nuts import run_nuts
+from imuarray.posterior.settings import SETTINGS as POSTERIOR
 from imuarray.provenance import code_digest, digest, stamp
 from imuarray.recording import Recording
 from imuarray.streams import stream
@@ -135,8 +136,8 @@ def _exact(
 def _short(chains: Chains, k: float, steps: int | None) -> str:
     """Why independent proposals are not enough; empty where they are."""
     worst, least = rhat(chains.draws).max(), ess(chains.draws).min()
-    few = steps is None and (worst > RHAT or least < ENOUGH)
-    if k <= UNRELIABLE and not few:
+    few = steps is None and (worst > POSTERIOR.rhat or least < POSTERIOR.effective)
+    if k <= POSTERIOR.unreliable and not few:
         return ""
     return f"independent proposals: Pareto's k {k:.2f}, R-hat {worst:.3f}, ESS {least:.0f}"
 
@@ -166,7 +167,7 @@ def tree_of(
     recording, model = posterior.recording, posterior.model
     labels = recording.accelerometer_labels[1:]
     names = parameter_names(model, (recording.accelerometer_labels, recording.gyroscope_labels))
-    verdict, _, _ = summarise(chains, labels, RHAT)
+    verdict, _, _ = summarise(chains, labels, POSTERIOR.rhat)
     attrs: dict[str, Any] = {**stamp({"recording": key}, seed)}
     kept = "burn_in_draws", "burn_in_steps", "steps", "rhat_max", "ess_min"
     attrs |= {name: verdict[name] for name in kept} | more
@@ -186,4 +187,4 @@ def _noise(model: ArrayModel) -> dict[str, float]:
 def summary(posterior: xr.DataTree) -> pd.DataFrame:
     """One row per coordinate of what `sample` gave: mean, sd and quantiles (m), R-hat, ESS."""
     labels = [str(label) for label in posterior["posterior"]["accelerometer"].to_numpy()]
-    return summarise(chains_of(posterior), labels, RHAT)[1]
+    return summarise(chains_of(posterior), labels, POSTERIOR.rhat)[1]

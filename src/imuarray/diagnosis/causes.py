@@ -24,7 +24,6 @@ from imuarray.words import (
 )
 
 LEAST = -1e6  # log p; JSON has no infinity
-STRETCHES = 3  # of the longest, that are stated
 
 
 def causes_of(found: ProcedureResult, sds: np.ndarray) -> list[dict]:
@@ -115,7 +114,7 @@ def cause_in_words(cause: dict, labels, says: str = "") -> str:
     """A cause of `diagnosis.json` with its size, or what was read (``says``), test and class."""
     text = in_short(cause, labels, says)
     if stretches := cause.get("stretches_s"):
-        first = [f"{a:.4g} to {b:.4g}" for a, b in stretches[:STRETCHES]]
+        first = [f"{a:.4g} to {b:.4g}" for a, b in stretches[: SETTINGS.stretches_stated]]
         text += f"; longest at {', '.join(first)} s"
     gain = plus_minus(cause["heldout_gain_nats"], cause["heldout_gain_se"])
     p_value = probability(cause["log10_p_value"])

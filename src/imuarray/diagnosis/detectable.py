@@ -12,12 +12,11 @@ from imuarray.linear import scaled_inverse
 from imuarray.model.array_model import component, unit_of
 from imuarray.model.effects import EFFECTS
 
-POWER = 0.8  # chance to be named of an effect of the size that is stated
-DEVIATES = special.ndtri(POWER)
+DEVIATES = special.ndtri(SETTINGS.power)
 
 
 def detectable(search: Search) -> dict[str, dict]:
-    """Sizes that would be named with `POWER`, one parameter at a time, all else refitted.
+    """Sizes that would be named with `SETTINGS.power`, one parameter at a time, all else refitted.
 
     ``{effect: {"units": {parameter: unit}, "sizes": {sensor: {parameter: size}}}}``; parameters
     that motion or positions take up are left out, as are effects that a scan looks for.
@@ -73,13 +72,13 @@ def scatter(given: Information, scores, active, chosen) -> np.ndarray:
 
 
 def noncentrality(search: Search, effect: str, tests: int, freedom: int) -> float:
-    """Noncentrality of a chi-square that passes the effect's critical value with `POWER`.
+    """Noncentrality of a chi-square that passes the effect's critical value with `SETTINGS.power`.
 
     ``tests`` of the effect, of its IMUs and forms, all of which are allowed for.
     """
     log_p = SETTINGS.limit(effect, search.causes) - np.log(2 * max(tests, 1))
     critical = special.chdtri(max(freedom, 1), np.exp(log_p))
-    return float(special.chndtrinc(critical, max(freedom, 1), 1 - POWER))
+    return float(special.chndtrinc(critical, max(freedom, 1), 1 - SETTINGS.power))
 
 
 def _places(given: Information, columns: Columns, mask, chosen) -> list[tuple[int, ...]]:

@@ -19,7 +19,8 @@ from imuarray.diagnosis.special import SPECIAL
 from imuarray.diagnosis.state import Search, need
 from imuarray.engine.fit import Fit, flat_parameters, from_flat, in_use, prior_means, scaled_solve
 from imuarray.engine.linearise import linearise
-from imuarray.engine.widths import FIXED, mask_of_left, spread_of
+from imuarray.engine.settings import SETTINGS as ENGINE
+from imuarray.engine.widths import mask_of_left, spread_of
 from imuarray.model.effects import KINDS
 from imuarray.tails import log_normal
 
@@ -126,7 +127,9 @@ def beside_left(search: Search) -> tuple[Fit, Information]:
     spread = spread_of(left, columns, maps)
     place, every = given.places(maps), made.active | maps
     precision = given.precision.copy()
-    precision[np.ix_(place, place)] = np.linalg.inv(spread + FIXED**2 * np.eye(len(spread)))
+    precision[np.ix_(place, place)] = np.linalg.inv(
+        spread + ENGINE.fixed_map**2 * np.eye(len(spread))
+    )
     offset = flat_parameters(columns, made.state) - prior_means(search.readings, columns)
     both = given.places(every)
     precise = precision[np.ix_(both, both)]

@@ -14,7 +14,7 @@ from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.fit import Fit, seen_through
 from imuarray.engine.linearise import CHUNK, THREADS, leverage_of
 from imuarray.engine.readings import Readings, by_triad, few_at_once
-from imuarray.engine.robust import LEAST_FREE
+from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.tails import QUARTILE, log_normal
 
 DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / np.sqrt(70.0)
@@ -67,7 +67,7 @@ def observable(readings: Readings, basis) -> np.ndarray:
     ``basis`` (T, 6 N, D) of the motion.
     """
     free = by_triad(np.where(readings.keep, 1.0 - leverage_of(basis), 0.0)).sum(axis=0)
-    return readings.exists & (free > LEAST_FREE * by_triad(readings.keep).sum(axis=0))
+    return readings.exists & (free > ENGINE.least_free * by_triad(readings.keep).sum(axis=0))
 
 
 def to_unit(readings: Readings, residual, basis) -> np.ndarray:

@@ -10,12 +10,11 @@ from imuarray.diagnosis.noise import Noise, expected_ratio, observable
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.fit import Fit
 from imuarray.engine.heldout import blocks_of
-from imuarray.engine.robust import LEAST_FREE
+from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.model.effects import KINDS
 from imuarray.tails import QUARTILE, log_chi_square, log_normal
 
 TAILS, COLOURED = "heavy_tails", "coloured_noise"
-ALIKE = 1e-9  # share of the largest information below which there is none
 SCALES = tuple(f"{kind}_noise" for kind in KINDS)
 
 
@@ -65,10 +64,10 @@ def triad(fit: Fit, imu: int, kind: int) -> np.ndarray:
             known = np.einsum("tk,tk->t", factor[:, i, :j], factor[:, j, :j])
             factor[:, i, j] = (covariance[:, i, j] - known) / factor[:, j, j]
         own = covariance[:, i, i] - np.sum(factor[:, i, :i] ** 2, axis=1)
-        seen[:, i] &= own > LEAST_FREE
-        factor[:, i, i] = np.sqrt(np.maximum(own, LEAST_FREE))
+        seen[:, i] &= own > ENGINE.least_free
+        factor[:, i, i] = np.sqrt(np.maximum(own, ENGINE.least_free))
         taken = np.einsum("tk,tk->t", factor[:, i, :i], out[:, :i])
-        out[:, i] = np.where(own > LEAST_FREE, left[:, i] - taken, 0.0) / factor[:, i, i]
+        out[:, i] = np.where(own > ENGINE.least_free, left[:, i] - taken, 0.0) / factor[:, i, i]
     return np.where(seen, out, np.nan)
 
 
@@ -85,8 +84,8 @@ def verdict(log_ratio, covariance, limit):
     """
     number = len(log_ratio)
     single = log_normal(np.abs(log_ratio) / np.sqrt(np.diag(covariance))) + np.log(2)
-    inverse = np.linalg.pinv(covariance, ALIKE, hermitian=True)
-    freedom = int(np.linalg.matrix_rank(covariance, hermitian=True, rtol=ALIKE))
+    inverse = np.linalg.pinv(covariance, SETTINGS.least_share, hermitian=True)
+    freedom = int(np.linalg.matrix_rank(covariance, hermitian=True, rtol=SETTINGS.least_share))
     pooled = log_chi_square(float(log_ratio @ inverse @ log_ratio), freedom)
     log_p = min(single.min() + np.log(2 * number), pooled + np.log(2), 0.0)
     far = single + np.log(number) < limit
@@ -129,7 +128,9 @@ def whole_scales(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     known = observable(readings, fit.basis)
     there = known.ravel()
     # of two triads of a kind, how much of their difference is either's is not seen
-    covariance = np.linalg.pinv(information[np.ix_(there, there)], ALIKE, hermitian=True)
+    covariance = np.linalg.pinv(
+        information[np.ix_(there, there)], SETTINGS.least_share, hermitian=True
+    )
     wide = np.array([_width(fit, int(i), int(k)) for i, k in np.argwhere(known)])
     return covariance @ score[there], covariance * np.outer(wide, wide)
 

@@ -16,8 +16,6 @@ from imuarray.tails import log_poisson
 
 RAILS = "saturation"
 UNITS = ("m s-2", "rad s-1")  # of the two kinds
-SAME = 1e-9  # relative difference of equal readings
-LEAST_LOG = -700.0  # of a tail that a double holds
 TURNS = [
     np.array(signs)[:, None] * np.eye(3)[list(order)]
     for order in permutations(range(3)) for signs in product((1.0, -1.0), repeat=3)
@@ -82,12 +80,12 @@ def find_rails(readings: Readings):
         tops, at = zip(*(_largest(_sizes(readings, imu, kind)) for imu in there), strict=True)
         counts = np.array([here.sum() for here in at])
         for imu, top, here in zip(there, tops, at, strict=True):
-            count = counts[np.isclose(tops, top, rtol=SAME, atol=0.0)].sum()
+            count = counts[np.isclose(tops, top, rtol=SETTINGS.same, atol=0.0)].sum()
             log_p = float(log_poisson(count - 1, chance) + np.log(len(there)))
             if log_p < SETTINGS.check or _piles(_sizes(readings, imu, kind), here):
                 lost[:, imu, 3 * kind : 3 * kind + 3] = here
                 found.append((int(imu), kind, top))
-                logs.append(float(np.clip(log_p, LEAST_LOG, SETTINGS.check)))
+                logs.append(float(np.clip(log_p, SETTINGS.least_log, SETTINGS.check)))
     if not found:
         return [], lost
     says = "readings pile up at a rail that the declared range does not give"
@@ -103,7 +101,7 @@ def _sizes(readings: Readings, imu: int, kind: int) -> np.ndarray:
 def _largest(size) -> tuple[float, np.ndarray]:
     """The largest of sizes, and which of them are at it."""
     top = float(size.max())
-    return top, (size >= top * (1 - SAME)) & (size > 0)
+    return top, (size >= top * (1 - SETTINGS.same)) & (size > 0)
 
 
 def _tied(readings: Readings, kind: int) -> float:

@@ -12,11 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.diagnosis.noise import observable, standardised
+from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.fit import Fit
 from imuarray.model.effects import KINDS
 from imuarray.words import first_up
-
-REPLICATES = 99
 
 
 class Quantity(NamedTuple):
@@ -230,7 +229,7 @@ TESTS = {
 }
 
 
-def discrepancies(fit: Fit, ridge, rng, replicates=REPLICATES) -> list[Discrepancy]:
+def discrepancies(fit: Fit, ridge, rng, replicates=SETTINGS.replicates) -> list[Discrepancy]:
     """Every test quantity of a fit beside its band over replicates, most striking first."""
     replicator, seen = Replicator(fit, ridge), Seen(fit)
     share = fit.readings.keep / np.sqrt(np.maximum(1.0 - fit.leverage, 1e-6))

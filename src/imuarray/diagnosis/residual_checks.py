@@ -17,7 +17,7 @@ from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.clocks import delay_score
 from imuarray.engine.fit import Fit, seen_through
 from imuarray.engine.linearise import CHUNK
-from imuarray.engine.robust import LEAST_FREE
+from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.linear import scaled_inverse, scaled_square
 from imuarray.motion.state import lever
 from imuarray.tails import log_chi_square, log_normal, log_poisson
@@ -138,7 +138,7 @@ def left_by_motion(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
 def dependence(fit: Fit) -> float:
     """Variance of a sum of axes' chi-squares over that of independent ones: few IMUs share much."""
     covariance = left_by_motion(fit)[0]
-    there = np.flatnonzero(np.diag(covariance) > LEAST_FREE * len(fit.residual))
+    there = np.flatnonzero(np.diag(covariance) > ENGINE.least_free * len(fit.residual))
     size = np.sqrt(np.diag(covariance)[there])
     together = covariance[np.ix_(there, there)] / np.outer(size, size)
     return max(SETTINGS.crowd, float(np.sum(together**2)) / len(there))

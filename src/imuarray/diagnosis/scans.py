@@ -20,9 +20,6 @@ from imuarray.tails import log_chi_square
 
 SHIFT = "position_shift"
 WARM_UP = "warm_up"
-PACES = (-8.0, -4.0, -2.0, 0.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # in the recording's length
-SETTLED = 8.0  # pace; what is over in so short a part of the recording is called constant
-ZEROS = (-1.0, 2.0)  # of a course from 0 to 1, between which all offsets vanish
 
 
 def scan_shifts(fit: Fit, given: Information, imus) -> list[Scanned]:
@@ -167,14 +164,19 @@ class Courses:
     def best_zero(self, pace: float) -> tuple[float, float]:
         """(chi-square, zero) of the courses of a pace."""
         found = minimize_scalar(
-            lambda zero: -self.gain(self.course(pace, zero))[0], bounds=ZEROS, method="bounded"
+            lambda zero: -self.gain(self.course(pace, zero))[0],
+            bounds=SETTINGS.zeros,
+            method="bounded",
         )
         return -found.fun, found.x
 
     def best(self) -> tuple[float, float]:
         """Pace and zero of the course that gains most."""
-        first = int(np.argmax([self.best_zero(pace)[0] for pace in PACES]))
-        around = PACES[max(first - 1, 0)], PACES[min(first + 1, len(PACES) - 1)]
+        first = int(np.argmax([self.best_zero(pace)[0] for pace in SETTINGS.paces]))
+        around = (
+            SETTINGS.paces[max(first - 1, 0)],
+            SETTINGS.paces[min(first + 1, len(SETTINGS.paces) - 1)],
+        )
         pace = minimize_scalar(
             lambda pace: -self.best_zero(pace)[0], bounds=around, method="bounded",
             options={"xatol": 0.05},
@@ -211,7 +213,7 @@ def scan_warming(fit: Fit, given: Information, imus, _=None) -> list[Scanned]:
     if log_chi_square(max(gain - alone, 1e-9), rest) > SETTINGS.likely_drift:
         return []
     freedom = len(values) + 2
-    log_p = min(log_chi_square(gain, freedom) + np.log(2 * len(PACES)), 0.0)
+    log_p = min(log_chi_square(gain, freedom) + np.log(2 * len(SETTINGS.paces)), 0.0)
     each = values.reshape(len(imus), 6)
     starts = {
         imu: np.append(own, [pace / courses.span, zero])
@@ -226,7 +228,7 @@ def maybe_grown(search, cause) -> bool:
     imus = list(cause.imus)
     courses = Courses(search.fit, search.given, imus, back=True)
     own = courses.kind == KINDS.index(EFFECTS[cause.effect].sensors)
-    paces = [pace for pace in PACES if abs(pace) <= SETTLED]
+    paces = [pace for pace in SETTINGS.paces if abs(pace) <= SETTINGS.settled_pace]
     grown = max(courses.gain(courses.course(pace, 0.0), own)[0] for pace in paces)
     return bool(grown > courses.gain(np.ones_like(courses.time), own)[0] - 2 * SETTINGS.rival)
 

@@ -109,5 +109,29 @@ class Settings:
         own = known_effect(effect).critical
         return (self.effect if own is None else own) - bool(beside) * self.beside
 
+    # `detectable`
+    power: float = 0.8  # chance to be named of an effect of the size that is stated
+
+    # `scans`
+    # in the recording's length
+    paces: tuple[float, ...] = (-8.0, -4.0, -2.0, 0.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+    # pace; what is over in so short a part of the recording is called constant
+    settled_pace: float = 8.0
+    # of a course from 0 to 1, between which all offsets vanish
+    zeros: tuple[float, ...] = (-1.0, 2.0)
+
+    # `noise_effects`
+    least_share: float = 1e-9  # share of the largest information below which there is none
+
+    # `reading_effects`
+    same: float = 1e-9  # relative difference of equal readings
+    least_log: float = -700.0  # of a tail that a double holds
+
+    # `replicates`
+    replicates: int = 99
+
+    # `causes`
+    stretches_stated: int = 3  # of the longest
+
 
 SETTINGS = Settings()

@@ -9,14 +9,10 @@ from imuarray.engine.linearise import linearise
 from imuarray.engine.parameters import POSITION
 from imuarray.engine.readings import by_triad
 from imuarray.engine.robust import distances
+from imuarray.engine.settings import SETTINGS
 from imuarray.engine.widths import growing
 from imuarray.linear import scaled_inverse
 from imuarray.model.effects import KINDS
-
-STRETCHES = 60  # of time, at most, in which residuals are averaged
-FEWEST = 20  # samples of one
-SHAKEN = 1e-7  # chance of a triad's residual in plain noise, from which it is far off
-SEVERAL = 2  # IMUs off at once: motion faster than the samples, no single bad reading
 
 
 def course(found: Estimate, moving) -> tuple[dict, dict]:
@@ -31,7 +27,9 @@ def course(found: Estimate, moving) -> tuple[dict, dict]:
     time = readings.time + readings.origin
     far = distances(readings, seen)
     number = by_triad(readings.keep)
-    blocks = blocks_of(len(time), int(np.clip(len(time) // FEWEST, 1, STRETCHES)))
+    blocks = blocks_of(
+        len(time), int(np.clip(len(time) // SETTINGS.course_samples, 1, SETTINGS.course_stretches))
+    )
     squares = far * (readings.sd / readings.declared) ** 2
     rms = np.sqrt([
         squares[part].sum(axis=0) / np.maximum(number[part].sum(axis=0), 1) for part in blocks
@@ -42,7 +40,10 @@ def course(found: Estimate, moving) -> tuple[dict, dict]:
         for which, kind in enumerate(KINDS)
     }
     ends = [time[max(part.stop, 1) - 1] for part in blocks_of(len(time), len(found.blocks))]
-    shaken = np.sum((far > chdtri(3, SHAKEN)).any(axis=2), axis=1) >= SEVERAL
+    shaken = (
+        np.sum((far > chdtri(3, SETTINGS.course_shaken)).any(axis=2), axis=1)
+        >= SETTINGS.course_several
+    )
     variables |= {
         "position_sd_by_length": (
             ("length", "accelerometer", "axis"), position_sds(found), {"units": "m"},

@@ -9,8 +9,6 @@ from imuarray.engine.settings import SETTINGS
 from imuarray.model.effects import Prediction, Slow
 from imuarray.motion.state import lever
 
-MOST = 0.5  # of the samples
-
 
 def derivatives(readings: Readings, motion, positions) -> tuple:
     """Derivatives of a fitted motion (T, ...) that effects look at.
@@ -34,7 +32,7 @@ def derivatives(readings: Readings, motion, positions) -> tuple:
 
     # at the ends of so long a window a quartic's third derivative has even the wrong sign
     longer, short = odd_window(readings.time, SETTINGS.slow_window), both()
-    most = np.mean(run_lengths(readings.run) >= longer) > MOST
+    most = np.mean(run_lengths(readings.run) >= longer) > SETTINGS.most_gaps
     slow = both(longer, 3) if most else short
     return along(rate, 2), along(force, 1), *short, Slow(*slow)
 

@@ -5,8 +5,9 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
+from imuarray.engine.settings import SETTINGS
+
 AXES = "xyz"
-NAMED = 0.5  # share of a direction that a pattern must make up to give it its name
 
 
 class Direction(NamedTuple):
@@ -48,10 +49,10 @@ def weak_directions(positions, covariance, labels, count: int = 3) -> list[Direc
     for value, vector in list(zip(values, vectors.T, strict=True))[::-1][:count]:
         shares = {name: float(pattern @ vector) ** 2 for name, pattern in known.items()}
         best = max(shares, key=shares.get)
-        if shares[best] < NAMED:
+        if shares[best] < SETTINGS.named_share:
             place = int(np.argmax(np.abs(vector)))
             best = "a mixture of all positions"
-            if vector[place] ** 2 > NAMED / 2:
+            if vector[place] ** 2 > SETTINGS.named_share / 2:
                 best = f"IMU {labels[1 + place // 3]} along {AXES[place % 3]}, mostly"
         found.append(Direction(float(np.sqrt(max(value, 0.0))), vector.reshape(-1, 3), best))
     return found

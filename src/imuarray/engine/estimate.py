@@ -23,11 +23,7 @@ from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import is_smooth, start
 from imuarray.model.effects import EFFECTS
 
-ALIKE, APART = 0.85, 0.35  # share of a size's step that the next one is: about, and at most from it
-SHORT = 0.1  # log of a factor; longer steps are not yet those near the end
-SMOOTH = 0.2  # share of rough samples that are looked at as the smooth ones
 NORMAL, ROBUST = np.array([np.inf, np.inf]), np.array([4.0, 4.0])  # degrees of freedom
-SPARED = 1e-3  # least share of the information that blocks but one are taken to have
 
 
 @dataclass(frozen=True)
@@ -123,7 +119,7 @@ class Estimate:
             scale = (one.readings.sd / one.readings.declared) ** 2
             turn = np.linalg.norm(one.state.motion[:, 3:6], axis=1)
             turning = turn > np.median(turn)
-            smooth = turning & (jerk <= np.quantile(jerk[turning], SMOOTH))
+            smooth = turning & (jerk <= np.quantile(jerk[turning], SETTINGS.smooth_share))
             parts.append(distances(one.readings, seen)[smooth] * scale)
         return np.sqrt(np.median(np.concatenate(parts), axis=0) / MEDIAN)
 
@@ -148,7 +144,7 @@ def jackknifed(information, blocks) -> np.ndarray:
     variance = np.zeros(len(information))
     for inner, score in blocks:
         share, axes = np.linalg.eigh(back @ inner @ back.T)
-        spared = np.sqrt(np.maximum(1 - share, SPARED))
+        spared = np.sqrt(np.maximum(1 - share, SETTINGS.spared))
         variance += (back.T @ (axes @ (axes.T @ (back @ score) / spared))) ** 2
     return np.sqrt(variance)
 
@@ -253,7 +249,9 @@ def to_come(first, second, third) -> np.ndarray:
     shares = np.array([
         new / np.where(old == 0, np.inf, old) for old, new in ((first, second), (second, third))
     ])  # fmt: skip
-    alike = np.all(np.abs(shares - ALIKE) < APART, axis=0) & (np.abs(third) < SHORT)
+    alike = np.all(np.abs(shares - SETTINGS.size_step) < SETTINGS.size_step_most, axis=0) & (
+        np.abs(third) < SETTINGS.size_near
+    )
     return np.where(alike, 1.0 / np.clip(1.0 - shares[1], 1.0 / SETTINGS.farthest, 1.0), 1.0)
 
 

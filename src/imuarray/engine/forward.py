@@ -42,12 +42,6 @@ EFFECT_GROUPS = {
 # Where motion is rough, what the gyroscopes see of it is free, and these are in that; two IMUs take
 # their angular acceleration from the gyroscopes.
 ROUGH_GROUPS = {name: ids for name, ids in EFFECT_GROUPS.items() if not EFFECTS[ids[0]].smooth}
-AGREES = 1.02  # times the residual that a prior of omega_dot may make
-CHANCE = 1e-3  # of maps as far from those of first order, of positions as far apart
-LEAST_SHARE = 0.03  # of the variance, by which two estimates may differ at least
-LEAST_Z, LEAST_NATS = 2.0, 2.0  # standard errors of a gain, and nats, from which a group is kept
-KNOWN_SLOPE = 1e-2  # of the angular acceleration, to which slopes must know it to tell a curve
-CURVED_NATS = 10.0  # the same of a curve: two seconds of clean motion had three by chance
 
 
 class EffectGroup(NamedTuple):
@@ -156,14 +150,14 @@ def _with_slope(found: Estimate, kept: dict, curve: bool) -> tuple[Estimate, dic
     shown: dict[str, EffectGroup] = {}
     if pair:
         return better, shown
-    if better.residual_ratio() >= AGREES * found.residual_ratio():
+    if better.residual_ratio() >= SETTINGS.slope_agrees * found.residual_ratio():
         return found, shown
     slopes = [one.state.turning for one in begun]
-    told = all(np.median(x.sd) < KNOWN_SLOPE * np.sqrt(np.mean(x.mean**2)) for x in slopes)
+    told = all(np.median(x.sd) < SETTINGS.known_slope * np.sqrt(np.mean(x.mean**2)) for x in slopes)
     if curve and told:
         mask = found.columns.mask(EFFECT_GROUPS[CURVE])
         (group,) = gains(better, {CURVE: mask}, kept)
-        group = group._replace(kept=group.kept and group.gain > CURVED_NATS)
+        group = group._replace(kept=group.kept and group.gain > SETTINGS.curved_nats)
         if group.kept:
             return estimate(better.recorded, found.columns, found.active | mask), {CURVE: group}
         shown = {CURVE: group}
@@ -222,7 +216,7 @@ class Selected(NamedTuple):
         """
         columns, found = self.found.columns, []
         chance, _ = widths.settled(self.found).maps_hold.get("gyroscope", (1.0, []))
-        if chance < CHANCE:
+        if chance < SETTINGS.chance:
             found.append(GYROSCOPES)
         if LAG in self.kept:
             each = flat_parameters(columns, self.found.recorded[0].state)
@@ -296,7 +290,10 @@ def _of_one_truth(found: Estimate, more: Estimate) -> bool:
     share = np.linalg.solve(root, np.linalg.solve(root, spreads[0] - spreads[1]).T)
     sizes, turns = np.linalg.eigh((share + share.T) / 2)
     apart = turns.T @ np.linalg.solve(root, (more.positions - found.positions)[1:].ravel())
-    return bool(chdtrc(len(apart), np.sum(apart**2 / np.maximum(sizes, LEAST_SHARE))) > CHANCE)
+    return bool(
+        chdtrc(len(apart), np.sum(apart**2 / np.maximum(sizes, SETTINGS.least_difference)))
+        > SETTINGS.chance
+    )
 
 
 def _contradicted(parts, ridge, values, freed, spread) -> bool:
@@ -305,7 +302,7 @@ def _contradicted(parts, ridge, values, freed, spread) -> bool:
     spread = spread + scaled_inverse(information)[np.ix_(freed, freed)]
     step = np.linalg.solve(information, sum(part[1] for part in parts))
     off = (step + values)[freed]
-    return bool(chdtrc(len(off), off @ np.linalg.solve(spread, off)) < CHANCE)
+    return bool(chdtrc(len(off), off @ np.linalg.solve(spread, off)) < SETTINGS.chance)
 
 
 def gains(found: Estimate, masks: dict, kept: dict) -> list[EffectGroup]:
@@ -342,7 +339,7 @@ def _tried(name: str, given: Tested, own, beside, left) -> EffectGroup:
     parts = [(inner[square], slope[used]) for inner, slope in given.blocks]
     system = parts, ridge[square], given.values[used], freed[used]
     nats, error = gain_of(*system, spare[used])
-    good = nats > max(LEAST_Z * error, LEAST_NATS)
+    good = nats > max(SETTINGS.group_z * error, SETTINGS.group_nats)
     return EffectGroup(
         name, nats, error, bool(good and (known is None or _contradicted(*system, known)))
     )

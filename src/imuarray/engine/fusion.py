@@ -25,8 +25,6 @@ from imuarray.model.array_model import clock
 from imuarray.motion import Motion
 
 COMPONENTS = tuple(f"{name}_{axis}" for name in ("omega", "omega_dot", "s") for axis in "xyz")
-TOLERANCE, LIMIT = 1e-6, 50  # sds, steps
-TURNS = 2  # in which a pair's rate and its derivatives follow each other
 
 
 class Fused(NamedTuple):
@@ -131,7 +129,7 @@ def _with_neighbours(readings: Readings, model: ArrayModel, state: State, rails)
 def _in_turns(readings: Readings, model: ArrayModel, state: State, rails=None):
     """(`Motions`, state): the motion and the derivatives of its own course, in turns."""
     every = np.arange(len(readings.time))
-    for _ in range(TURNS):
+    for _ in range(SETTINGS.pair_turns):
         state = with_derivatives(readings, state, True)
         found = descend(readings, model, state, every, rails)
         state = state._replace(motion=found.motion)
@@ -212,7 +210,12 @@ def _put(found: Motions, index, part: Motions) -> None:
 
 
 def descend(
-    readings: Readings, model: ArrayModel, state: State, index, rails=None, tolerance=TOLERANCE
+    readings: Readings,
+    model: ArrayModel,
+    state: State,
+    index,
+    rails=None,
+    tolerance=SETTINGS.fusion_tolerance,
 ) -> Motions:
     """The motion of the samples ``index`` (n,), each by itself, by Gauss-Newton from a state.
 
@@ -223,7 +226,7 @@ def descend(
     found = Motions(x[index], *(np.zeros(len(index), t) for t in (bool, int, float)))
     information, slope, cost = equations(readings, model, state, index, rails)
     length, left = np.ones(len(index)), np.arange(len(index))
-    for _ in range(LIMIT):
+    for _ in range(SETTINGS.fusion_steps):
         step = np.linalg.solve(information[left], slope[left][..., None])[..., 0]
         # in units of the step's own sds: its length in the metric of the information
         size = np.einsum("ti,tij,tj->t", step, information[left], step)

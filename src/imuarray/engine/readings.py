@@ -19,11 +19,6 @@ from imuarray.model.structure import design
 from imuarray.recording import Recording, array_of
 from imuarray.recording.record import neighbours
 
-SAME = 0.05  # of their sds, from which maps are another calibration's
-COURSE = 200  # instants of a walk that a polynomial is laid through
-# of a gap between readings, in steps: looked at, off a multiple; shares that are chance
-FEW_STEPS, OFF_STEP, SELDOM = 5.5, 0.12, 0.05
-
 
 class Left(NamedTuple):
     """Maps and offsets that a first-order correction left in the readings, as uncertain as it says.
@@ -49,7 +44,9 @@ class Left(NamedTuple):
         if self.taken is None or other.taken is None:
             return np.array_equal(self.maps, other.maps)
         sds = np.sqrt(np.maximum(np.diag(self.maps), np.diag(other.maps)))
-        return bool(np.all(np.abs(self.taken - other.taken) <= SAME * sds + SETTINGS.same))
+        return bool(
+            np.all(np.abs(self.taken - other.taken) <= SETTINGS.same_maps * sds + SETTINGS.same)
+        )
 
 
 @dataclass(frozen=True)
@@ -246,10 +243,10 @@ def resolution(values) -> np.ndarray:
     apart = gaps > SETTINGS.same
     least = np.min(gaps, axis=0, initial=np.inf, where=apart)
     counts = gaps / least
-    near = apart & (counts < FEW_STEPS)
-    odd = near & (np.abs(counts - np.round(counts)) > OFF_STEP)
-    many = near.sum(axis=0) > SELDOM * apart.sum(axis=0)
-    return np.where(many & (odd.sum(axis=0) <= SELDOM * near.sum(axis=0)), least, 0.0)
+    near = apart & (counts < SETTINGS.few_steps)
+    odd = near & (np.abs(counts - np.round(counts)) > SETTINGS.off_step)
+    many = near.sum(axis=0) > SETTINGS.seldom * apart.sum(axis=0)
+    return np.where(many & (odd.sum(axis=0) <= SETTINGS.seldom * near.sum(axis=0)), least, 0.0)
 
 
 def few_at_once(far) -> np.ndarray:
@@ -351,7 +348,7 @@ def _left(recording: Recording, count: int) -> Left | None:
 def _course(recording: Recording) -> np.ndarray:
     """(4, 4) covariance of polynomials laid through a walk of 1 a second, known where it moves."""
     time = recording.time[~recording.still()]
-    time = np.quantile(time, np.linspace(0, 1, COURSE))
+    time = np.quantile(time, np.linspace(0, 1, SETTINGS.walk_instants))
     whole = recording.time[-1] - recording.time[0] or 1.0
     back = np.linalg.pinv(legvander(2 * (time - recording.time[0]) / whole - 1, 3))
     return back @ shared_walk(time - np.median(time)) @ back.T

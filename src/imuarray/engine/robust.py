@@ -14,12 +14,10 @@ from imuarray.engine.fit import normal
 from imuarray.engine.heldout import blocks_of, log_t
 from imuarray.engine.parameters import Columns
 from imuarray.engine.readings import Readings, by_triad
+from imuarray.engine.settings import SETTINGS
 from imuarray.estimation.threads import one_thread
 
-LEAST_FREE = 1e-3  # of a reading's variance that the motion leaves, or its size says nothing
 FREEDOMS = np.array([3.0, 4.0, 6.0, 10.0, 20.0, 50.0, np.inf])
-ROUNDS = 20  # of the scale that goes with each of them
-LEAST = 1e-4  # of the declared noise
 MEDIAN = 2.37  # of chi-square of three readings
 
 
@@ -62,7 +60,7 @@ def normal_pass(
         residual, leverage = seen.residual, linearise.leverage_of(seen.basis)
         left = np.where(readings.keep[part], 1.0 - leverage, 0.0)
         squares[part], freedom[part] = by_triad(residual**2), by_triad(left)
-        unit[part] = by_triad(residual**2 / np.maximum(1.0 - leverage, LEAST_FREE))
+        unit[part] = by_triad(residual**2 / np.maximum(1.0 - leverage, SETTINGS.least_free))
         if not improved:
             step = np.swapaxes(seen.inverse, 1, 2) @ seen.taken[..., None]
             motion[part] += step[..., 0]
@@ -127,7 +125,7 @@ def reweighted(readings: Readings, seen: Pass, owned, former: np.ndarray) -> Rea
             ratio[own, kind] = np.maximum(s.sum(axis=0) / free[own, kind], least[own, kind])
             continue
         scale = np.maximum(np.median(d, axis=0) / MEDIAN, least[own, kind])
-        for _ in range(ROUNDS):
+        for _ in range(SETTINGS.scale_rounds):
             scale = np.sum((nu + n) / (nu + d / scale) * s, axis=0) / free[own, kind]
             scale = np.maximum(scale, least[own, kind])
         ratio[own, kind], weight[:, own, kind] = scale, (nu + n) / (nu + d / scale)
@@ -141,7 +139,7 @@ def least_ratio(readings: Readings) -> np.ndarray:
     Sensors that read in coarse steps may agree to the last digit, which is not without error.
     """
     steps = 0.0 if readings.resolution is None else readings.resolution / np.sqrt(12.0)
-    return (np.maximum(steps, LEAST * readings.declared) / readings.sd) ** 2
+    return (np.maximum(steps, SETTINGS.least_scale * readings.declared) / readings.sd) ** 2
 
 
 def distances(readings: Readings, seen: Pass) -> np.ndarray:
@@ -165,6 +163,6 @@ def freedoms(readings: Readings, seen: Pass) -> np.ndarray:
 def _log_likelihood(d, nu) -> float:
     """Log likelihood of squared distances (n,) of three readings, at the best scale."""
     scale = np.mean(d) / 3
-    for _ in range(ROUNDS if np.isfinite(nu) else 0):
+    for _ in range(SETTINGS.scale_rounds if np.isfinite(nu) else 0):
         scale = np.mean((nu + 3) / (nu + d / scale) * d) / 3
     return float(np.sum(log_t(d / scale, 3, nu)) - 1.5 * len(d) * np.log(scale))

@@ -26,9 +26,6 @@ from imuarray.engine.settings import SETTINGS
 from imuarray.model import ArrayModel
 from imuarray.model.timing import clock_turns
 
-ROUNDS, NEAR = 6, 1e-2  # of weights and turns; sds of the motion that a search may be off
-LIGHT = 8.0  # degrees of freedom of a sample's noise, once its size is its own
-
 
 class Rough(NamedTuple):
     """Samples as an estimate sees them; motion (T, D) as in `State`, ``freedoms`` (2,) of t.
@@ -61,12 +58,14 @@ class Rough(NamedTuple):
         """
         now, every = self, np.arange(len(self.state.motion))
         nothing = np.zeros(self.columns.owner.shape, bool)
-        for number in range(ROUNDS):
-            found = descend(now.readings, self.columns.model, now.state, every, self.rails, NEAR)
+        for number in range(SETTINGS.rough_rounds):
+            found = descend(
+                now.readings, self.columns.model, now.state, every, self.rails, SETTINGS.rough_near
+            )
             now = now._replace(state=now._moved(found.motion), converged=found.converged)
             seen = normal_pass(now.readings, self.columns, now.state, nothing, improved=0)
-            last = number == ROUNDS - 1
-            now = now._replace(readings=now._trusted(seen, LIGHT if last else 0.0))
+            last = number == SETTINGS.rough_rounds - 1
+            now = now._replace(readings=now._trusted(seen, SETTINGS.rough_freedom if last else 0.0))
             if not last and now.readings.wander is not None:
                 other, doubt, _ = now.turns()
                 wander = np.where(doubt > 0.5, other.wander, now.readings.wander)
@@ -95,7 +94,7 @@ class Rough(NamedTuple):
             n, d, free = (part[..., kind] for part in (number, distance, seen.freedom))
             squares, whole = np.where(n > 0, d / np.maximum(n, 1), 0.0) * free, free.sum(axis=1)
             scale = np.ones((len(n), 1))
-            for _ in range(ROUNDS):
+            for _ in range(SETTINGS.rough_rounds):
                 sums = np.sum((nu + n) / (nu + d / scale) * squares, axis=1)
                 scale = np.maximum(1.0, sums / np.maximum(whole, 1.0))[:, None]
             trust[..., kind] = np.sqrt((nu + n) / (nu + d / scale) / scale)
@@ -120,7 +119,11 @@ class Rough(NamedTuple):
     @property
     def lost(self) -> float:
         """Normal noise's information over that of Student's t."""
-        return (LIGHT + 5) / (LIGHT + 3) if np.isfinite(self.freedoms).any() else 1.0
+        return (
+            (SETTINGS.rough_freedom + 5) / (SETTINGS.rough_freedom + 3)
+            if np.isfinite(self.freedoms).any()
+            else 1.0
+        )
 
     def covariance(self) -> np.ndarray:
         """(T, D, D) of the motion: noise as `fused` weighs it, and what the prior leaves."""

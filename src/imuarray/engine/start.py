@@ -14,9 +14,6 @@ from imuarray.engine.settings import SETTINGS
 from imuarray.errors import InputError
 from imuarray.model.structure import design, products
 
-CLEAR = 10.0  # times the noise's power, from which a frequency is motion
-COHERENT = 0.3  # sds of what a prior's samples say of one factor common to them all
-
 
 def turned(readings: Readings, state: State, follows: bool = False) -> State:
     """A state with the slope of its own rate as prior mean of omega_dot.
@@ -24,8 +21,8 @@ def turned(readings: Readings, state: State, follows: bool = False) -> State:
     The slope is a local sextic's, a quartic's in runs too short for that. The prior's sd is the
     gyroscopes' noise in it, and what a quartic leaves out, as the sextic shows it; in still shorter
     runs all that is known is omega_dot's size. A polynomial makes fast motion too small in all
-    samples alike: the sd is so wide that this is no more than `COHERENT` of what they say together.
-    ``follows``: as `TurningPrior` has it.
+    samples alike: the sd is so wide that this is no more than `coherent_gain` of what they say
+    together. ``follows``: as `TurningPrior` has it.
     """
     rate, quartic = state.motion[:, :3], readings.window
     sextic = 3 * quartic // 4 * 2 + 1
@@ -43,7 +40,9 @@ def turned(readings: Readings, state: State, follows: bool = False) -> State:
     known = spread > 0.0
     together = np.sqrt(np.sum((short[known] / sd[known]) ** 2))
     window, degree = (sextic, 6) if long.any() else (quartic, 4)
-    sd *= max(1.0, abs(gain_error(readings, rate, window, degree)) * together / COHERENT)
+    sd *= max(
+        1.0, abs(gain_error(readings, rate, window, degree)) * together / SETTINGS.coherent_gain
+    )
     alone = spread == 0.0  # in runs that are too short: as large as elsewhere
     sd[alone] = np.sqrt(np.mean(short[~alone] ** 2)) if not alone.all() else np.inf
     return state._replace(turning=TurningPrior(short, sd, np.full(len(sd), follows)))
@@ -62,7 +61,7 @@ def gain_error(readings: Readings, rate, window, degree) -> float:
     taper = np.hanning(len(values))[:, None]
     power = np.sum(np.abs(np.fft.rfft(taper * (values - values.mean(axis=0)), axis=0)) ** 2, axis=1)
     precision = np.sum(readings.keep[..., 3] / np.square(readings.sd[:, 1]), axis=1)
-    power[power < CLEAR * 3 * np.sum(taper**2) / np.median(precision)] = 0.0
+    power[power < SETTINGS.clear_motion * 3 * np.sum(taper**2) / np.median(precision)] = 0.0
     turns = 2 * np.pi * np.fft.rfftfreq(len(values))  # rad a sample
     places = np.arange(window) - window // 2
     response = np.sin(np.outer(turns, places)) @ polynomial_taps(window, window // 2, 1, degree)

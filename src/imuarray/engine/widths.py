@@ -12,6 +12,7 @@ from imuarray.engine.fit import flat_parameters, from_flat, scaled_solve, steppe
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import Columns, columns_of, gauge_masks
 from imuarray.engine.readings import Left
+from imuarray.engine.settings import SETTINGS
 from imuarray.linear import scaled_inverse
 from imuarray.model.catalogue import OFF_COLUMNS, OFF_ROWS
 from imuarray.model.effects import KINDS
@@ -19,8 +20,6 @@ from imuarray.model.effects import KINDS
 SCALES, SKEWS = ("accelerometer_scale", "gyroscope_scale"), (
     "accelerometer_misalignment", "gyroscope_misalignment",
 )  # fmt: skip
-NEARLY = 0.25  # of the largest distance of an IMU's map: as likely the one
-FIXED = 1e-7  # sd of a map's entry that is known
 MAPS = SCALES + SKEWS  # effects that are 3 x 3 maps, which first order corrects
 OFFSETS = "accelerometer_bias", "gyroscope_bias"
 DRIFT = "bias_drift"
@@ -66,7 +65,9 @@ def settled(found: Estimate) -> Estimate:
             for imu in np.unique(imus[mine]):
                 its = [place[mine & (imus == imu)] - count for place in places]
                 far[int(imu)] = _distance(off, spread, np.unique(its))
-            farthest = [k for k, each in far.items() if each > NEARLY * max(far.values())]
+            farthest = [
+                k for k, each in far.items() if each > SETTINGS.map_nearly * max(far.values())
+            ]
             holds[kind] = float(chdtrc(own.size, _distance(off, spread, own))), farthest
     recorded = tuple(
         replace(one, state=stepped(one.state, found.columns, found.active, step[place]))
@@ -100,7 +101,7 @@ def _places_left(lefts, spreads, of_maps, begin):
                 place[mine] = places[same][mine]
                 continue
             place[mine] = end + np.arange(mine.sum())
-            parts.append(spread[np.ix_(mine, mine)] + FIXED**2 * np.eye(mine.sum()))
+            parts.append(spread[np.ix_(mine, mine)] + SETTINGS.fixed_map**2 * np.eye(mine.sum()))
             end += mine.sum()
         places.append(place)
     return places, block_diag(*parts)

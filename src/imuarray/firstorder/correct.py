@@ -13,8 +13,8 @@ from imuarray.firstorder.gyroscopes import Gyroscopes, Still, calibrate_gyroscop
 from imuarray.firstorder.outliers import fit_triads
 from imuarray.firstorder.pose_noise import walked_mean
 from imuarray.firstorder.rails import nearest_rail, rails_shown
+from imuarray.firstorder.settings import SETTINGS
 from imuarray.firstorder.still import (
-    SHORTEST,
     averaged_sd,
     lag_correlation,
     outside_dead_band,
@@ -33,7 +33,6 @@ from imuarray.recording.record import CORRECTION, NUMBERS
 from imuarray.recording.units import GRAVITY
 
 GYROSCOPES = ("calibrate", "offset")
-APART = 0.2  # of gravity, root of the sum of squares: poses in more than two orientations
 
 
 @dataclass(frozen=True)
@@ -116,7 +115,7 @@ class FirstOrder:
 
 def calibrate_first_order(
     recording: Recording, gravity: float = GRAVITY, gyroscopes: str = GYROSCOPES[0],
-    shortest_pose: float = SHORTEST, others: Sequence[Recording] = (),
+    shortest_pose: float = SETTINGS.shortest, others: Sequence[Recording] = (),
 ) -> FirstOrder:  # fmt: skip
     """First-order model of every triad from still poses and the moves between them.
 
@@ -139,7 +138,7 @@ def calibrate_first_order(
 
 def calibrate_together(
     recordings: Sequence[Recording], gravity: float = GRAVITY, gyroscopes: str = GYROSCOPES[0],
-    shortest_pose: float = SHORTEST,
+    shortest_pose: float = SETTINGS.shortest,
 ) -> list[FirstOrder]:  # fmt: skip
     """`calibrate_first_order` of each of several recordings beside all others, at once."""
     return _calibrated(_all_still(recordings, gyroscopes, shortest_pose), gravity, gyroscopes)
@@ -194,7 +193,10 @@ def _tells(still: Still) -> bool:
     """True where poses say more than offsets of their own: in two orientations they do not."""
     means = np.array([force[:, 0].mean(axis=0) for force in still.force])
     apart = means - means.mean(axis=0)
-    return len(means) > 2 and np.linalg.svd(apart, compute_uv=False)[1] > APART * GRAVITY
+    return (
+        len(means) > 2
+        and np.linalg.svd(apart, compute_uv=False)[1] > SETTINGS.orientations * GRAVITY
+    )
 
 
 def _triads(every: Sequence[Still], gravity: float) -> TriadFit:

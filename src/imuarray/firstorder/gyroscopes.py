@@ -10,18 +10,12 @@ from scipy.special import stdtr
 
 from imuarray.errors import InputError
 from imuarray.firstorder.moves import CommonMap, Move, common_map, gather, prior_precision
+from imuarray.firstorder.settings import SETTINGS
 from imuarray.firstorder.triads import TriadFit
 from imuarray.firstorder.turns import nearest_orthogonal, require_rotations
 from imuarray.recording import Recording
 
 SLOWEST = np.radians(20.0)  # rad/s; slower samples say little of scales
-FEWEST = 100  # moving samples
-FLATTEST = 1e-3  # smallest share of the weakest axis in the mean squared rate
-SIZES = 0.5, 2.0  # of one gyroscope's rates over another's; beyond, a channel is not what it says
-BLOCK = 1.0  # s, within which residuals may be alike
-ROBUST_STEPS = 5
-ODD = 1e-4  # chance of a mean of all axes' scales, by how they scatter
-APART = 1000.0  # s, between recordings that are looked at as one
 
 
 class Relative(NamedTuple):
@@ -56,10 +50,10 @@ def compare(rate, time, usable, turn, labels) -> Relative | str:
     near = np.diff(time) < 1.5 * np.median(np.diff(time))
     usable[1:-1] &= near[1:] & near[:-1]
     usable[[0, -1]] = False
-    if usable.sum() < FEWEST:
-        return f"fewer than {FEWEST} moving samples off the rails"
+    if usable.sum() < SETTINGS.least_moving:
+        return f"fewer than {SETTINGS.least_moving} moving samples off the rails"
     sizes = np.linalg.eigvalsh(np.einsum("tki,tkj->kij", first[usable], first[usable]))
-    if np.median(sizes[:, 0] / sizes[:, 2]) < FLATTEST:
+    if np.median(sizes[:, 0] / sizes[:, 2]) < SETTINGS.weakest_axis:
         return "the array was turned about one or two axes only"
     turn = turn @ _turns(first[usable], turn, labels)
     aligned = np.einsum("kji,tkj->tki", turn, rate)
@@ -78,7 +72,7 @@ def _turns(rate, turn, labels) -> np.ndarray:
     middle = np.argmin(np.median(np.linalg.norm(maps - np.eye(3), axis=(2, 3)), axis=1))
     seen = maps[:, middle]
     sizes = np.linalg.norm(turn @ seen, axis=2)
-    wrong = np.argwhere((sizes < SIZES[0]) | (sizes > SIZES[1]))
+    wrong = np.argwhere((sizes < SETTINGS.same_size[0]) | (sizes > SETTINGS.same_size[1]))
     if len(wrong):
         k, axis = wrong[0]
         raise InputError(
@@ -100,7 +94,7 @@ def _maps(rate, time, usable) -> tuple[np.ndarray, np.ndarray]:
     columns = np.hstack([mean, slope, np.gradient(slope, time, axis=0)])[usable]
     columns /= np.sqrt(np.mean(columns**2, axis=0))
     size = np.sqrt(np.mean(mean[usable] ** 2, axis=0))
-    block = (time[usable] // BLOCK).astype(int)
+    block = (time[usable] // SETTINGS.gyroscope_block).astype(int)
     found = [_regress(columns, rate[usable, k], block) for k in range(rate.shape[1])]
     maps = np.array([solution[:, :3] / size for solution, _ in found])
     back = np.tile(1 / size, 3)
@@ -113,7 +107,7 @@ def _regress(columns, wanted, block) -> tuple[np.ndarray, np.ndarray]:
     The covariance allows residuals within one block of time to be alike.
     """
     weight = np.ones(len(wanted))
-    for _ in range(ROBUST_STEPS):
+    for _ in range(SETTINGS.robust_steps):
         normal = (columns * weight[:, None]).T @ columns
         inverse = np.linalg.pinv(normal, hermitian=True)
         rows = (inverse @ (columns * weight[:, None]).T @ wanted).T
@@ -169,7 +163,7 @@ class Gyroscopes:
 
         0 where so large a mean is likely, as the axes' scales scatter, or is within its sd.
         """
-        if isinstance(self.common, str) or shared_chance(self.matrix) > ODD:
+        if isinstance(self.common, str) or shared_chance(self.matrix) > SETTINGS.odd_scale:
             return 0.0
         return float(np.sqrt(max((self.common.scale - 1) ** 2 - self.common.scale_sd**2, 0.0)))
 
@@ -234,7 +228,7 @@ def calibrate_gyroscopes(every: Sequence[Still], triads: TriadFit) -> tuple[Gyro
     times = []
     for one in every:  # one after the other, far apart
         times.append(one.recording.time - one.recording.time[0] + begun)
-        begun = times[-1][-1] + APART
+        begun = times[-1][-1] + SETTINGS.recordings_apart
     rate = np.concatenate([one.rate() for one in every])
     free = np.concatenate([one.moving & ~one.recording.at_rail("gyroscope") for one in every])
     labels, turns = first.gyroscope_labels, nearest_orthogonal(triads.matrix)

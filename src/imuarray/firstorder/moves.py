@@ -13,15 +13,10 @@ from scipy.linalg import block_diag
 from scipy.spatial.transform import Rotation
 
 from imuarray.errors import InputError
+from imuarray.firstorder.settings import SETTINGS
 
-FEWEST = 4  # moves
-LONGEST, FARTHEST = 30.0, 30.0  # s and rad of a move; drift and other errors are too large beyond
-BRIDGED = 3.5  # steps from one sample to the next, over which a spline is good enough
-PRIOR, PRIOR_TURN = 0.01, 0.1  # sds about the identity: scales and skews, and (rad) a turn
-FREEDOM = 4.0  # of the t distribution of a move's error
 LOST = np.radians(10.0)  # median error of a move from which the rates are not what they say
 NODE = np.sqrt(3) / 6
-STEPS, CLOSE = 30, 1e-8  # of Gauss-Newton, in the map's entries
 
 
 class Move(NamedTuple):
@@ -97,8 +92,8 @@ def gather(rate, time, poses, offsets, good, noise_sd: float) -> list[Move]:
     for p, (one, two) in enumerate(zip(poses[:-1], poses[1:], strict=True)):
         part = slice(one.stop - 1, two.start + 1)
         own, length = time[part], time[two.start] - time[one.stop - 1]
-        whole = np.diff(own).max() < BRIDGED * usual and good[part].all()
-        if not whole or length > LONGEST or len(own) < 4:
+        whole = np.diff(own).max() < SETTINGS.move_bridged * usual and good[part].all()
+        if not whole or length > SETTINGS.longest_move or len(own) < 4:
             continue
         middles = [(time[pose.start] + time[pose.stop - 1]) / 2 for pose in (one, two)]
         share = ((own - middles[0]) / (middles[1] - middles[0]))[:, None]
@@ -118,11 +113,13 @@ def common_map(moves: list[Move], direction, covariance) -> CommonMap | str:
 
     InputError where the rates carry gravity only if their sign or unit is another.
     """
-    every, moves = moves, [move for move in moves if move.angle < FARTHEST]
-    if len(moves) < FEWEST:
-        if len(every) >= FEWEST:
+    every, moves = moves, [move for move in moves if move.angle < SETTINGS.farthest_move]
+    if len(moves) < SETTINGS.least_moves:
+        if len(every) >= SETTINGS.least_moves:
             _require_unit(every, direction)
-        return f"{len(moves)} moves between still poses off the rails, {FEWEST} are needed"
+        return (
+            f"{len(moves)} moves between still poses off the rails, {SETTINGS.least_moves} needed"
+        )
     turn = np.eye(3)
     before = _typical(moves, direction, turn)
     if before > LOST:
@@ -222,7 +219,9 @@ def _linear(moves, direction, change):
 def prior_precision() -> np.ndarray:
     """Precision (9, 9) of a map's entries, row by row, about the identity."""
     other = np.eye(9).reshape(3, 3, 3, 3).swapaxes(2, 3).reshape(9, 9)
-    return (np.eye(9) + other) / (2 * PRIOR**2) + (np.eye(9) - other) / (2 * PRIOR_TURN**2)
+    return (np.eye(9) + other) / (2 * SETTINGS.map_prior**2) + (np.eye(9) - other) / (
+        2 * SETTINGS.turn_prior**2
+    )
 
 
 def _fit(moves, direction, covariance, turn, before) -> CommonMap:
@@ -231,7 +230,7 @@ def _fit(moves, direction, covariance, turn, before) -> CommonMap:
     inflation, size = np.ones(len(moves)), 1.0
     # along a direction its covariance says nothing
     across = block_diag(*(np.eye(3) - direction[..., None] * direction[:, None]))
-    for _ in range(STEPS):
+    for _ in range(SETTINGS.move_steps):
         errors, slopes, along, own = _linear(moves, direction, change)
         along = along @ across
         given = along @ covariance @ along.T
@@ -246,7 +245,7 @@ def _fit(moves, direction, covariance, turn, before) -> CommonMap:
         shares = np.einsum("nii->n", np.linalg.solve(_each(total), _each(rest))) / 2
         free = np.clip(shares, 0.05, 1.0)
         inflation, size = _weights(errors - slopes @ delta, given, own, size, free)
-        if np.abs(delta).max() < CLOSE:
+        if np.abs(delta).max() < SETTINGS.move_close:
             break
     left, spread = errors - slopes @ delta, np.linalg.inv(normal)
     score, beside = -along.T @ np.linalg.solve(total, left), along.T @ solved @ spread
@@ -276,4 +275,6 @@ def _weights(left, given, own, size, free):
     for _ in range(5):
         # 1.386 is the median of a chi-squared variable with two degrees of freedom
         size = max(1.0, size * np.median(squares(size)) / 1.386)
-    return np.maximum((FREEDOM + squares(size)) / (FREEDOM + 2), 1.0), size
+    return np.maximum(
+        (SETTINGS.move_freedom + squares(size)) / (SETTINGS.move_freedom + 2), 1.0
+    ), size

@@ -14,20 +14,12 @@ from scipy.special import chdtrc
 
 from imuarray.errors import InputError
 from imuarray.firstorder.report import allan_table, axes_table
+from imuarray.firstorder.settings import SETTINGS
 from imuarray.firstorder.still import still_poses
 from imuarray.recording import Recording
 from imuarray.recording.record import KINDS
 
-BINS = 8  # an octave
-SLOWEST = 16  # of the readings' rate, the share up to which noise is fitted: filters shape the rest
-LEAST = 16  # coefficients; fewer say nothing of a spectrum
-GAIN = 4.5  # nats, those of three sds, from which a term is there
-CLOSE = 2.0  # nats, up to which flicker and walk are not told apart
-LINE = 1e-6  # chance of a power from which it is a line's
-ONE_SIDED = 1.645**2 / 2  # nats by which a limit of 95 % is less likely
-FARTHEST, HALVINGS = 1e4, 24  # of a limit's square over the least that is looked at
 WHITE, FLICKER, WALK = range(3)
-LONG = 0.5  # of the longest still stretch, what the others last that are pooled with it
 TERMS = ("noise_density", "bias_instability", "random_walk")
 UNITS = {
     "accelerometer": ("m s-2 Hz-1/2", "m s-2", "m s-3 Hz-1/2"),
@@ -68,13 +60,13 @@ class Terms(NamedTuple):
 def spectrum(pieces, step: float) -> Spectrum:
     """Spectrum of still pieces (n, ...), readings ``step`` s apart, pooled."""
     lowest = 0.5 / (step * max(len(piece) for piece in pieces))
-    size = int(BINS * np.log2(0.5 / step / lowest)) + 1
+    size = int(SETTINGS.bins * np.log2(0.5 / step / lowest)) + 1
     count, sums = np.zeros(size), np.zeros((size, 4))
     power = np.zeros((size, *pieces[0].shape[1:]))
     for piece in pieces:
         squares = step * dct(piece, axis=0, norm="ortho")[1:] ** 2
         frequency = np.arange(1, len(piece)) / (2 * step * len(piece))
-        place = np.minimum(BINS * np.log2(frequency / lowest) + 1e-9, size - 1).astype(int)
+        place = np.minimum(SETTINGS.bins * np.log2(frequency / lowest) + 1e-9, size - 1).astype(int)
         begin = np.flatnonzero(np.diff(place, prepend=-1))
         walk = (step / (2 * np.sin(np.pi * frequency * step))) ** 2
         shape = np.stack([frequency, np.ones_like(walk), 1 / (2 * np.pi * frequency), walk], axis=1)
@@ -93,7 +85,7 @@ def noise_terms(found: Spectrum, rate: float) -> Terms:
     Flicker and walk are there where the likelihood gains by them as by three sds. Lines are left
     out; where the spectrum scatters more than chance allows, sds and that limit grow.
     """
-    slow = found.frequency <= rate / SLOWEST
+    slow = found.frequency <= rate / SETTINGS.slowest
     own = found.power.shape[1:]
     flat = found.power[slow].reshape(slow.sum(), -1).T
     terms = np.array([_one(powers, found.count[slow], found.shape[slow]) for powers in flat])
@@ -116,9 +108,12 @@ def _one(power, count, shape) -> np.ndarray:
         tried = [sorted([*terms, new]) for new in (FLICKER, WALK) if new not in terms]
         fits = [_fit(power, count, shape, some) for some in tried]
         # where a record cannot tell them apart, the one that filters know
-        nats = [f.nats + CLOSE * (WALK in some) for f, some in zip(fits, tried, strict=True)]
+        nats = [
+            f.nats + SETTINGS.noise_close * (WALK in some)
+            for f, some in zip(fits, tried, strict=True)
+        ]
         most = int(np.argmax(nats))
-        if fits[most].nats - best.nats < GAIN * max(fits[most].scatter, 1.0):
+        if fits[most].nats - best.nats < SETTINGS.noise_gain * max(fits[most].scatter, 1.0):
             break
         terms, best = tried[most], fits[most]
     value, sd, below = np.full((3, 3), np.nan)
@@ -135,10 +130,10 @@ def _one(power, count, shape) -> np.ndarray:
 def _limit(power, count, shape, term, whole) -> float:
     """The square that a term stays below: larger ones, the others refitted, are too unlikely."""
     others = [other for other in (WHITE, FLICKER, WALK) if other != term]
-    least = whole.nats - ONE_SIDED * max(whole.scatter, 1.0)
-    low, high = whole.squares[term], whole.squares[term] + FARTHEST * whole.sd[term]
-    for _ in range(HALVINGS):
-        middle = np.sqrt(max(low, high / FARTHEST**2) * high)
+    least = whole.nats - SETTINGS.one_sided * max(whole.scatter, 1.0)
+    low, high = whole.squares[term], whole.squares[term] + SETTINGS.limit_farthest * whole.sd[term]
+    for _ in range(SETTINGS.limit_halvings):
+        middle = np.sqrt(max(low, high / SETTINGS.limit_farthest**2) * high)
         fit = _fit(power, count, shape, others, middle * shape[:, term])
         low, high = (middle, high) if fit.nats > least else (low, middle)
     return high
@@ -149,7 +144,7 @@ def _without_lines(power, count, shape) -> np.ndarray:
     kept = np.ones(len(power), bool)
     for _ in range(10):
         fit = _fit(power[kept], count[kept], shape[kept], [WHITE, FLICKER, WALK])
-        line = kept & (chdtrc(count, count * power / (shape @ fit.squares)) < LINE)
+        line = kept & (chdtrc(count, count * power / (shape @ fit.squares)) < SETTINGS.line)
         if not line.any() or kept.sum() - line.sum() < len(kept) / 2:
             break
         kept &= ~line
@@ -220,13 +215,13 @@ def allan(recording: Recording) -> StillNoise:
     """
     poses = still_poses(recording)
     longest = max(pose.stop - pose.start for pose in poses)
-    poses = [pose for pose in poses if pose.stop - pose.start >= LONG * longest]
+    poses = [pose for pose in poses if pose.stop - pose.start >= SETTINGS.long_stretch * longest]
     rate = float(f"{1 / np.median(np.diff(recording.time)):.10g}")
     lengths = [pose.stop - pose.start for pose in poses]
-    if sum(lengths) < LEAST * SLOWEST / 2:
+    least = SETTINGS.least_coefficients * SETTINGS.slowest // 2
+    if sum(lengths) < least:
         raise InputError(
-            f"recording: expected still stretches of {LEAST * SLOWEST // 2} samples at least,"
-            f" found {sum(lengths)}"
+            f"recording: expected still stretches of {least} samples at least, found {sum(lengths)}"
         )
     spectra, terms = [], []
     for kind, units in UNITS.items():

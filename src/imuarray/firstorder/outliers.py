@@ -7,15 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from imuarray.errors import InputError
-from imuarray.firstorder.pose_noise import SEEN, PoseNoise
+from imuarray.firstorder.pose_noise import PoseNoise
+from imuarray.firstorder.settings import SETTINGS
 from imuarray.firstorder.triads import Poses, TriadFit, doubted, least_squares, turns_of
-
-OUTLIER = 5.0  # times the median size of a residual
-SHARED = 5.0  # times the median of what leaving out a pose gains, the worst of its triads apart
-GONE = 0.07  # of gravity: readings without it; those in g have a tenth
-MOST_OFF = 0.5  # relative, of a pose's mean specific force from gravity
-MOST_LEFT_OUT = 0.2  # of a triad's poses
-NEARLY = 0.5  # of the largest gain: as many triads leave out a reading at once
 
 
 def fit_triads(mean, sd, magnitude: float, labels=None, recording=None, time=None) -> TriadFit:
@@ -47,7 +41,7 @@ def fit_triads(mean, sd, magnitude: float, labels=None, recording=None, time=Non
     IdentifiabilityError
         Where the poses are too few or too alike to determine all parameters.
     """
-    if 0 < (size := np.median(np.linalg.norm(mean, axis=2))) < GONE * magnitude:
+    if 0 < (size := np.median(np.linalg.norm(mean, axis=2))) < SETTINGS.gravity_gone * magnitude:
         raise InputError(
             f"still poses: expected gravity in the readings, found {size:.2g} m/s^2: it was taken"
             " out (linear acceleration); log the raw accelerometers"
@@ -58,7 +52,7 @@ def fit_triads(mean, sd, magnitude: float, labels=None, recording=None, time=Non
     # all triads' mean in the frame of the first
     unit = np.einsum("kji,pkj->pki", turns, mean).mean(axis=1) / magnitude
     size = np.linalg.norm(unit, axis=1)
-    wild = np.flatnonzero(~(np.abs(size - 1) < MOST_OFF))
+    wild = np.flatnonzero(~(np.abs(size - 1) < SETTINGS.gravity_off))
     if wild.size:
         raise InputError(
             f"still poses: expected specific forces of about {magnitude:g} m/s^2, found"
@@ -68,7 +62,10 @@ def fit_triads(mean, sd, magnitude: float, labels=None, recording=None, time=Non
     noise = PoseNoise.of(sd, time, recording)
     found = _without_outliers(given, noise)
     own = doubted(noise, found.doubtful)
-    if found.residual_ratio > SEEN or own.misfits(found.used, found.residual) > SEEN:
+    if (
+        found.residual_ratio > SETTINGS.walk_seen
+        or own.misfits(found.used, found.residual) > SETTINGS.walk_seen
+    ):
         noise = own.estimated(found.used, *given.linearised(found.fitted.values))
         if noise.walk.any():
             noise = noise._replace(sd=np.asarray(sd))
@@ -91,14 +88,14 @@ def _without_outliers(given: Poses, noise: PoseNoise, doubts: bool = True) -> Tr
     poses, triads = given.mean.shape[:2]
     used, doubtful = np.ones((poses, triads), bool), np.ones(poses)
     # nine unknowns are common to all triads
-    most, start = min(int(MOST_LEFT_OUT * poses), (poses - 9) // 3), given.start()
+    most, start = min(int(SETTINGS.poses_left_out * poses), (poses - 9) // 3), given.start()
     while True:
         found, rows, misfit = least_squares(given, noise, used, doubtful, start)
         gain = _spared(rows, misfit)
         whole = _spared(rows.reshape(poses, 3 * triads, -1), misfit.reshape(poses, -1))
         start = found.fitted.values
-        out = used & (gain > OUTLIER**2 * np.median(gain[used]))
-        out[:, (~used).sum(axis=0) >= MOST_LEFT_OUT * poses] = False
+        out = used & (gain > SETTINGS.pose_outlier**2 * np.median(gain[used]))
+        out[:, (~used).sum(axis=0) >= SETTINGS.poses_left_out * poses] = False
         out[used.sum(axis=1) <= 1] = False
         beside, gain = whole - gain.max(axis=1), np.where(out, gain, 0.0)
         worst = int(np.argmax(gain.max(axis=1)))
@@ -107,10 +104,10 @@ def _without_outliers(given: Poses, noise: PoseNoise, doubts: bool = True) -> Tr
             if (doubtful > 1).sum() >= most:
                 return _without_outliers(given, noise, doubts=False)
             # all err alike, but count as if each erred by itself
-            doubtful[pose], used[pose] = max(np.sqrt(whole[pose]), OUTLIER), True
+            doubtful[pose], used[pose] = max(np.sqrt(whole[pose]), SETTINGS.pose_outlier), True
         elif out.any():  # the worst of each triad, one in a pose, if nearly as bad as that of all
             own = gain.max(axis=0)
-            bad = np.argsort(-own)[: np.sum(own > NEARLY * own.max())]
+            bad = np.argsort(-own)[: np.sum(own > SETTINGS.pose_nearly * own.max())]
             place, first = np.unique(gain[:, bad].argmax(axis=0), return_index=True)
             used[place, bad[first]] = False
         else:
@@ -126,7 +123,9 @@ def _shared(out, worst: int, beside) -> int:
     if out.any() and 2 * out[worst].sum() <= out.shape[1]:
         return -1
     pose = worst if out.any() else int(np.argmax(beside))
-    return pose if beside[pose] > SHARED * max(np.median(beside), out.shape[1]) else -1
+    return (
+        pose if beside[pose] > SETTINGS.pose_shared * max(np.median(beside), out.shape[1]) else -1
+    )
 
 
 def _spared(rows, misfit) -> np.ndarray:

@@ -13,13 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from imuarray.firstorder.settings import SETTINGS
 from imuarray.linear import scaled_inverse, shared_walk
-
-SHOWN = 2.0  # nats that a walk must gain
-SEEN = 1.2  # times the noise; a walk is looked for beyond
-RANGE = 1e-4, 1e8  # of a walk in a second, as a share of an average's variance
-FREEDOM = 15.0  # of a triad's averages, from which its own walk and noise are asked
-STEPS, CLOSE = 60, 0.02  # of each triad's own walk, relative
 
 
 class PoseNoise(NamedTuple):
@@ -68,15 +63,15 @@ class PoseNoise(NamedTuple):
         unit = np.median(self.sd) ** 2
         found = minimize_scalar(
             lambda x: rows.profiled(self._replace(walk=unit * np.exp(x) * one), used)[0],
-            bounds=np.log(RANGE), method="bounded", options={"xatol": 0.05},
+            bounds=np.log(SETTINGS.walk_range), method="bounded", options={"xatol": 0.05},
         )  # fmt: skip
         # noise and walk that both grow: what of it is noise's, the fit's residual will show
         common = self._replace(walk=unit * np.exp(found.x) * one)
-        ways = [(self, 0.0), (common, 2 * SHOWN)]
+        ways = [(self, 0.0), (common, 2 * SETTINGS.walk_gain)]
         if len(one) > 2:  # of two, either may say that it is the other
             own, freedom = rows.own(self, used, unit)
-            if freedom > FREEDOM:
-                ways.append((own, 2 * (SHOWN + 2 * len(one) - 2)))
+            if freedom > SETTINGS.walk_freedom:
+                ways.append((own, 2 * (SETTINGS.walk_gain + 2 * len(one) - 2)))
         best = min(ways, key=lambda way: rows.profiled(way[0], used)[0] + way[1])[0]
         return best._replace(walk=best.walk * rows.profiled(best, used)[1])
 
@@ -141,7 +136,7 @@ class _Rows(NamedTuple):
         """
         parts = _diagonal(np.moveaxis(noise.sd, 0, -1) ** 2), noise.walked
         noise = noise._replace(walk=np.full(len(self.columns), unit))
-        for _ in range(STEPS):
+        for _ in range(SETTINGS.walk_steps):
             white = noise.whitening(used)
             left, rows, inner, _, step = self.solved(white)
             inverse = np.zeros(np.add(inner.shape, 1))
@@ -154,9 +149,12 @@ class _Rows(NamedTuple):
                 square = np.einsum("kip,kipq,kiq->k", rest, own, rest)
                 known = np.einsum("kmn,kinm->k", given, np.swapaxes(rows, -1, -2) @ own @ rows)
                 change.append(np.sqrt(square / (np.einsum("kipp->k", own) - known)))
-            before, walk = noise.walk, np.maximum(noise.walk * change[1], unit * RANGE[0])
+            before, walk = (
+                noise.walk,
+                np.maximum(noise.walk * change[1], unit * SETTINGS.walk_range[0]),
+            )
             noise = noise._replace(walk=walk, factor=np.maximum(noise.factor * change[0], 1.0))
-            if np.abs(np.log(walk / before)).max() < CLOSE:
+            if np.abs(np.log(walk / before)).max() < SETTINGS.walk_close:
                 break
         taken = np.einsum("kmn,kinm->k", given, np.swapaxes(rows, -1, -2) @ rows)
         return noise, float(np.min(3 * used.sum(axis=0) - taken))
@@ -177,7 +175,7 @@ def walked_mean(values, sd, time) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     used = np.ones(values.shape[:2], bool)
     noise = PoseNoise.of(sd, time, np.zeros(count, int))
     mean, spread, ratio = _weighted(values, noise.whitening(used))
-    if ratio > SEEN or noise.misfits(used, values - mean) > SEEN:
+    if ratio > SETTINGS.walk_seen or noise.misfits(used, values - mean) > SETTINGS.walk_seen:
         slopes = np.broadcast_to(np.eye(channels), (count, channels, channels))
         noise = noise.estimated(
             used, values - mean, slopes.reshape(*values.shape, channels), np.zeros((channels,) * 2)

@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
+from imuarray.firstorder.settings import SETTINGS
 from imuarray.recording import Recording
-
-COUPLED = 0.1  # a rail of one axis shows in another that the correction mixes it into by this much
 
 
 def rails_shown(inverse, rails) -> np.ndarray:
     """Where rails (T, K, 3) show when maps with an inverse (K, 3, 3) are taken out."""
-    near = np.abs(inverse) > COUPLED
+    near = np.abs(inverse) > SETTINGS.coupled
     return np.einsum("kij,tkj->tki", near.astype(np.int8), rails.astype(np.int8)) > 0
 
 

@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from imuarray.firstorder.correct import FirstOrder, correct
 from imuarray.firstorder.gyroscopes import Gyroscopes
+from imuarray.firstorder.settings import SETTINGS
 from imuarray.firstorder.still import allan_deviation
 from imuarray.firstorder.turns import TURNED, angle_of, nearest_orthogonal, parts_of, parts_sd_of
 from imuarray.provenance import digest, stamp
@@ -14,7 +15,6 @@ from imuarray.recording import Recording, write_recording
 from imuarray.recording.record import FIRST_ORDER, KINDS
 
 MISALIGNMENT = ("xy", "xz", "yz")
-APART = 3.0  # times the usual walk, from which a sensor's is told by itself
 
 
 UNITS = {"scale": "1", "misalignment": "1", "orientation": "rad"}
@@ -78,7 +78,7 @@ def walk_lines(found: FirstOrder, recording: Recording) -> list[str]:
         ("gyroscope", np.degrees(found.gyroscope_walk), "deg/s"),
     ):
         most, usual = int(np.argmax(walks)), root * np.median(walks)
-        if root * walks[most] > APART * usual:
+        if root * walks[most] > SETTINGS.walk_apart * usual:
             label = getattr(recording, f"{kind}_labels")[most]
             own = f"{kind} {label} {root * walks[most]:.2g} {unit}"
             shown.append(f"{own} (as a rule {usual:.2g})")

@@ -7,31 +7,14 @@ averaging can remove.
 import numpy as np
 
 from imuarray.errors import InputError
+from imuarray.firstorder.settings import SETTINGS
 from imuarray.firstorder.turns import nearest_orthogonal
 from imuarray.recording import Recording
 from imuarray.recording.channels import runs
 from imuarray.recording.record import KINDS
 from imuarray.recording.units import require_plausible_rate
 
-AVERAGED, BLOCK = 1.0, 0.25  # s
-WINDOW = 1.0  # s, over which a reading's spread is judged
-SHORTEST = 3.0  # s, of a pose by default, its ends included
-KEPT = 2.0  # s, of a pose after its ends are cut, that no margin is taken from
-THRESHOLD = 3.0  # times the noise floor
-DEAD = 0.5  # of still readings, from which 0 is a dead band's and says nothing of noise
-FLOOR = 0.02  # quantile of the windows' spreads taken as the noise floor
-# A floor this many times the declared noise is motion, not noise: nothing was still.
-MOVING = 10.0
-BRIDGED = 0.1  # s; a pose goes on over so short a gap, and where stamps are late
-MISSED = 3.5  # steps; and where so many are missing
-STEP_TIME = 0.25  # s, before and after an instant, whose means are compared
-STEP = 0.3  # m/s^2 between them: another pose, with nothing recorded on the way
 TURNING = np.radians(2.0)  # rad/s of all gyroscopes: a steady turn, as offsets do not go together
-TOGETHER = 0.1  # relative, what they agree to then
-BURSTS = 2.0  # of the mean step over the usual one; gaps beyond LOST are not counted
-LOST = 1.0  # s
-FAR = 1.0  # of a turn's matrix from the identity: 41 degrees
-ENOUGH = 20_000  # samples that tell how triads are turned
 
 
 def allan_deviation(pieces, step: float) -> tuple[np.ndarray, np.ndarray]:
@@ -74,7 +57,7 @@ def reading_sd(pieces, step: float) -> np.ndarray:
     """Noise sd of one reading, (...), within AVERAGED: blind to what drifts more slowly."""
     squares, freedom = 0.0, 0
     for piece in pieces:
-        count = max(round(len(piece) * step / AVERAGED), 1)
+        count = max(round(len(piece) * step / SETTINGS.averaged), 1)
         for part in np.array_split(piece, count):
             squares = squares + np.sum((part - part.mean(axis=0)) ** 2, axis=0)
             freedom += len(part) - 1
@@ -87,7 +70,7 @@ def averaged_sd(pieces, step: float) -> np.ndarray:
     Behind a filter neighbours are alike: averages scatter more than one reading's sd says.
     """
     usual = int(np.median([len(piece) for piece in pieces]))
-    width = max(min(round(BLOCK / step), usual // 4), 1)
+    width = max(min(round(SETTINGS.average_block / step), usual // 4), 1)
     return _deviation([_sums(piece) for piece in pieces], width) * np.sqrt(width)
 
 
@@ -114,7 +97,9 @@ def _neighbours(pieces, constant: float) -> np.ndarray:
 
 def outside_dead_band(sd, pieces, declared: float) -> np.ndarray:
     """Noise ``sd`` (...), the ``declared`` one where most still readings are exactly 0."""
-    return np.where(np.mean(np.concatenate(pieces) == 0.0, axis=0) > DEAD, declared, sd)
+    return np.where(
+        np.mean(np.concatenate(pieces) == 0.0, axis=0) > SETTINGS.dead_band, declared, sd
+    )
 
 
 def window_spread(readings: np.ndarray, window: int) -> np.ndarray:
@@ -130,7 +115,7 @@ def window_spread(readings: np.ndarray, window: int) -> np.ndarray:
     return np.sqrt(np.maximum(square - mean**2, 0.0).mean(axis=1))
 
 
-def still_poses(recording: Recording, shortest=SHORTEST) -> list[slice]:
+def still_poses(recording: Recording, shortest=SETTINGS.shortest) -> list[slice]:
     """Index ranges in which the array does not move, in the order of time.
 
     The spread of the array-averaged specific force and angular rate in a sliding window is
@@ -150,10 +135,10 @@ def still_poses(recording: Recording, shortest=SHORTEST) -> list[slice]:
     """
     require_plausible_rate(recording.time, "recording: time")
     step = usual_step(recording.time)
-    width = max(int(round(WINDOW / step)), 2)
+    width = max(int(round(SETTINGS.window / step)), 2)
     if len(recording.time) < 2 * width:
         raise InputError(
-            f"recording: expected at least {2 * WINDOW:g} s to look for still poses in,"
+            f"recording: expected at least {2 * SETTINGS.window:g} s to look for still poses in,"
             f" found {np.ptp(recording.time) if len(recording.time) else 0.0:.3g} s"
         )
     if recording.stationary is not None:
@@ -161,11 +146,13 @@ def still_poses(recording: Recording, shortest=SHORTEST) -> list[slice]:
     else:
         still, half = _quiet(recording, width), width // 2
     # a long gap ends a pose: what happened meanwhile is not known
-    breaks = np.flatnonzero(np.diff(recording.time) > max(MISSED * step, BRIDGED)) + 1
+    breaks = (
+        np.flatnonzero(np.diff(recording.time) > max(SETTINGS.missed * step, SETTINGS.bridged)) + 1
+    )
     still[breaks] = False
     found, least = runs(still), shortest - (2 * half + 0.5) * step
     lasts = [recording.time[b - 1] - recording.time[a] + step for a, b in found]
-    poses, kept = [], int(round(KEPT / step))
+    poses, kept = [], int(round(SETTINGS.kept / step))
     for (a, b), length in zip(found, lasts, strict=True):
         if b - a >= 2 and length > least:
             margin = min(half, max(b - a - kept, 0) // 2)
@@ -186,9 +173,9 @@ def usual_step(time) -> float:
     if len(time) < 2:
         return np.inf
     steps = np.diff(time)
-    usual, counted = float(np.median(steps)), steps[steps < LOST]
+    usual, counted = float(np.median(steps)), steps[steps < SETTINGS.lost]
     mean = float(counted.mean()) if counted.size else usual
-    if mean > BURSTS * usual:
+    if mean > SETTINGS.bursts * usual:
         raise InputError(
             f"recording: expected stamps in even steps, found bursts: {1e3 * usual:.3g} ms as a"
             f" rule, {1e3 * mean:.3g} in the mean; does the log have the times at which packets"
@@ -208,7 +195,7 @@ def _not_turning(recording: Recording, poses: list[slice]) -> list[slice]:
     off = np.linalg.norm(levels - np.median(levels, axis=0), axis=2)
     usual = np.median(off, axis=1)
     apart = np.median(np.abs(off - usual[:, None]), axis=1)
-    turning = (usual > TURNING) & (apart < TOGETHER * usual)
+    turning = (usual > TURNING) & (apart < SETTINGS.turning_together * usual)
     if 3 * turning.sum() > len(poses):
         return poses
     return [pose for pose, turns in zip(poses, turning, strict=True) if not turns]
@@ -216,10 +203,10 @@ def _not_turning(recording: Recording, poses: list[slice]) -> list[slice]:
 
 def _together(readings) -> np.ndarray:
     """Mean (T, 3) of triads (T, K, 3), each turned as the first is where it is turned far."""
-    few = readings[:: len(readings) // ENOUGH + 1]
+    few = readings[:: len(readings) // SETTINGS.enough + 1]
     few = few - few.mean(axis=0)
     turns = nearest_orthogonal(np.einsum("tki,tj->kij", few, few[:, 0]))
-    turns[np.linalg.norm(turns - np.eye(3), axis=(1, 2)) < FAR] = np.eye(3)
+    turns[np.linalg.norm(turns - np.eye(3), axis=(1, 2)) < SETTINGS.turn_far] = np.eye(3)
     if np.array_equal(turns, np.broadcast_to(np.eye(3), turns.shape)):
         return readings.mean(axis=1)
     return np.einsum("kij,tki->tj", turns, readings) / len(turns)
@@ -227,7 +214,7 @@ def _together(readings) -> np.ndarray:
 
 def _steps(recording: Recording, step: float) -> np.ndarray:
     """Near where the specific force of a declared pose jumps to another level, (T,) bool."""
-    width = max(int(round(STEP_TIME / step)), 1)
+    width = max(int(round(SETTINGS.step_time / step)), 1)
     levels = np.column_stack([_together(recording.specific_force), recording.stationary])
     sums = np.cumsum(np.vstack([np.zeros(4), levels]), axis=0)
     means = (sums[width:] - sums[:-width]) / width
@@ -235,7 +222,7 @@ def _steps(recording: Recording, step: float) -> np.ndarray:
     within = np.minimum(before[:, 3], after[:, 3]) > 1 - 1e-9
     found = np.zeros(len(recording.time), bool)
     change = np.linalg.norm(after[:, :3] - before[:, :3], axis=1)
-    found[width : width + len(change)] = (within & (change > STEP))[: len(found) - width]
+    found[width : width + len(change)] = (within & (change > SETTINGS.step))[: len(found) - width]
     return found
 
 
@@ -245,14 +232,16 @@ def _quiet(recording: Recording, width: int) -> np.ndarray:
     for kind, name in KINDS.items():
         readings, declared = getattr(recording, name), getattr(recording, f"{kind}_noise_sd")
         spread = window_spread(_together(readings), width)
-        floor = np.quantile(spread, FLOOR)
-        if floor > MOVING * declared:
+        floor = np.quantile(spread, SETTINGS.floor)
+        if floor > SETTINGS.moving * declared:
             raise InputError(
                 f"recording: expected still poses for the first-order calibration, found {name}"
-                f" to vary by {floor:.3g} in its quietest second, more than {MOVING:g} times the"
-                f" declared noise of {declared:.3g}; was it never still, or is the unit wrong?"
+                f" to vary by {floor:.3g} in its quietest second, more than {SETTINGS.moving:g}"
+                f" times the declared noise of {declared:.3g}; was it never still, or is the unit wrong?"
             )
-        still &= spread <= THRESHOLD * max(floor, 0.1 * declared / np.sqrt(readings.shape[1]))
+        still &= spread <= SETTINGS.threshold * max(
+            floor, 0.1 * declared / np.sqrt(readings.shape[1])
+        )
     return still
 
 

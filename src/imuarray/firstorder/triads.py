@@ -15,12 +15,12 @@ import numpy as np
 
 from imuarray.errors import IdentifiabilityError
 from imuarray.firstorder.pose_noise import PoseNoise
+from imuarray.firstorder.settings import SETTINGS
 from imuarray.firstorder.turns import parts_sd_of, procrustes, require_rotations
 from imuarray.model.jax64 import jax, jnp
 
 UPPER = np.triu_indices(3)
 
-MOST_STEPS, HALVED, CLOSE = 100, 12, 1e-8  # of Gauss-Newton; steps in sds
 SMALL = np.radians(20.0)  # a triad turned by less starts from the drawing
 
 
@@ -220,7 +220,7 @@ def _solved(residual, slopes, start, poses: int):
     IdentifiabilityError where they do not determine all values.
     """
     values, rest = start, residual(start)
-    for _ in range(MOST_STEPS):
+    for _ in range(SETTINGS.triad_steps):
         rows = slopes(values)
         norm = np.linalg.norm(rows, axis=0)
         left, right = np.linalg.qr(rows / np.where(norm > 0, norm, 1.0))
@@ -232,7 +232,7 @@ def _solved(residual, slopes, start, poses: int):
                 f" determine {rank} of {values.size} unknowns"
             )
         whole = -np.linalg.solve(right, left.T @ rest)
-        for share in 0.5 ** np.arange(HALVED):
+        for share in 0.5 ** np.arange(SETTINGS.triad_halvings):
             moved = values + share * whole / norm
             after = residual(moved)
             if after @ after <= rest @ rest:
@@ -240,7 +240,7 @@ def _solved(residual, slopes, start, poses: int):
                 break
         else:
             break
-        if np.abs(whole).max() < CLOSE:
+        if np.abs(whole).max() < SETTINGS.triad_close:
             break
     return values, left, right * norm
 

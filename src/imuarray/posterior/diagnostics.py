@@ -6,10 +6,9 @@ import numpy as np
 import pandas as pd
 
 from imuarray.posterior.chains import Chains
+from imuarray.posterior.settings import SETTINGS
 
 QUANTILES = (0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975)
-NOISE = 0.1  # of an effective sample size, from one burn-in to another
-RHAT, ENOUGH = 1.01, 1000  # largest R-hat, smallest effective size that a sampler aims at
 
 
 def _arviz(name, draws, **options) -> np.ndarray:
@@ -81,7 +80,7 @@ def find_burn_in(draws, log_target, threshold: float = 1.05, candidates: int = 1
     table = pd.DataFrame(rows)
     allowed = table[table.burn_in >= first]
     passing = allowed[allowed.rhat_max < threshold]
-    enough = passing[passing.ess_min >= (1 - NOISE) * passing.ess_min.max()]
+    enough = passing[passing.ess_min >= (1 - SETTINGS.burn_in_noise) * passing.ess_min.max()]
     best = enough.index[0] if len(enough) else allowed.rhat_max.idxmin()
     return int(table.burn_in[best]), table
 

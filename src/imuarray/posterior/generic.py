@@ -19,14 +19,13 @@ from imuarray.engine.readings import Readings
 from imuarray.errors import InputError
 from imuarray.model.effects import Prediction
 from imuarray.model.jax64 import cholesky, jax, jnp, log_determinant, solve_lower, solve_upper
+from imuarray.posterior.settings import SETTINGS
 
 # Of noise and of the motion's prior; `posterior.marginal.scaled` has all but the last.
 SCALES = (
     "accelerometer_noise", "gyroscope_noise", "angular_rate", "angular_acceleration",
     "specific_force",
 )  # fmt: skip
-STEPS = 3  # of Gauss-Newton
-CHUNK = 1000  # samples whose densities are in memory at a time, with their derivatives
 
 
 def _mode(flat, x, steps):
@@ -97,7 +96,7 @@ def _whitened(model, parameters, given: Unknown):
     return flat, used @ logs[:2] + sum(n * log for n, log in zip(counts, logs[2:], strict=True))
 
 
-def log_laplace(model, parameters, given: Unknown, steps: int = STEPS):
+def log_laplace(model, parameters, given: Unknown, steps: int = SETTINGS.laplace_steps):
     """log p(y | theta) by Laplace's method over each sample's whole motion, to be differentiated.
 
     The search for the mode carries no derivative; one step of Newton's method from the mode,
@@ -123,7 +122,7 @@ def log_laplace(model, parameters, given: Unknown, steps: int = STEPS):
         return -0.5 * (value @ value + spread + jnp.sum(inverse * bend))
 
     count = len(given.start)
-    parts = -(-count // CHUNK)
+    parts = -(-count // SETTINGS.chunk)
     size = -(-count // parts)
     # parts of one size, the last sample again and again: another size is compiled once more
     index = np.minimum(np.arange(parts * size), count - 1)

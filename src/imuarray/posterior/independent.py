@@ -14,14 +14,10 @@ from tqdm import tqdm
 
 from imuarray.model.jax64 import jax
 from imuarray.posterior.chains import Chains
-from imuarray.posterior.diagnostics import ENOUGH, RHAT, ess, pareto_k, rhat
+from imuarray.posterior.diagnostics import ess, pareto_k, rhat
 from imuarray.posterior.nuts import White
+from imuarray.posterior.settings import SETTINGS
 from imuarray.streams import stream
-
-CHAINS, BATCH, BATCHES = 4, 400, 10  # proposals of a chain at a time; so many times at most
-BLOCK = 50  # densities that one call evaluates
-PILOT, ROUNDS, SEEN = 200, 5, 4.0  # draws that look for the centre; looks; standard errors
-UNRELIABLE = 0.7  # of Pareto's k: above, the normal density says nothing of the posterior's tails
 
 
 def run_independent(
@@ -33,8 +29,8 @@ def run_independent(
     Parameters
     ----------
     draws : int or None
-        Of each of four chains; None: until R-hat and ESS are `RHAT` and `ENOUGH`, 4000 at most,
-        fewer where that will not be or k is above `UNRELIABLE`.
+        Of each of four chains; None: until R-hat and ESS are `rhat` and `effective` of the
+        settings, 4000 at most, fewer where that will not be or k is above `unreliable`.
     """
     white = White(np.asarray(centre), np.linalg.cholesky(covariance), data)
     seldom = 0.2 if sys.stderr.isatty() else 15.0
@@ -44,16 +40,18 @@ def run_independent(
     ):
         weigh = partial(_weights, log_density, pool, bar)
         white = centred(white, weigh, stream(seed, *names, "centre"))
-        z = np.empty((CHAINS, 0, len(white.centre)))
-        weights = np.empty((CHAINS, 0))
-        for batch in range(BATCHES):
-            rngs = [stream(seed, *names, chain, batch) for chain in range(CHAINS)]
-            fresh = np.stack([rng.standard_normal((draws or BATCH, z.shape[2])) for rng in rngs])
+        z = np.empty((SETTINGS.chains, 0, len(white.centre)))
+        weights = np.empty((SETTINGS.chains, 0))
+        for batch in range(SETTINGS.batches):
+            rngs = [stream(seed, *names, chain, batch) for chain in range(SETTINGS.chains)]
+            fresh = np.stack(
+                [rng.standard_normal((draws or SETTINGS.batch, z.shape[2])) for rng in rngs]
+            )
             z = np.concatenate([z, fresh], axis=1)
-            weighed = weigh(white, fresh.reshape(-1, z.shape[2])).reshape(CHAINS, -1)
+            weighed = weigh(white, fresh.reshape(-1, z.shape[2])).reshape(SETTINGS.chains, -1)
             weights = np.concatenate([weights, weighed], axis=1)
             chains, k = _chains(white, z, weights, seed, names), pareto_k(weights)
-            if draws or not k <= UNRELIABLE or _settled(chains, batch + 1):
+            if draws or not k <= SETTINGS.unreliable or _settled(chains, batch + 1):
                 break
     return chains, k
 
@@ -62,13 +60,17 @@ def _settled(chains: Chains, batches: int) -> bool:
     """True where the chains are enough, or so many as may be will hardly be."""
     size = ess(chains.draws).min()
     return bool(
-        (size >= ENOUGH and rhat(chains.draws).max() <= RHAT) or size * BATCHES < ENOUGH * batches
+        (size >= SETTINGS.effective and rhat(chains.draws).max() <= SETTINGS.rhat)
+        or size * SETTINGS.batches < SETTINGS.effective * batches
     )
 
 
 def _chains(white: White, z, weights, seed: int, names) -> Chains:
     uniforms = np.stack(
-        [stream(seed, *names, chain, "accept").random(z.shape[1]) for chain in range(CHAINS)]
+        [
+            stream(seed, *names, chain, "accept").random(z.shape[1])
+            for chain in range(SETTINGS.chains)
+        ]
     )
     place = walked(weights, np.log(uniforms))
     z = np.take_along_axis(z, place[..., None], axis=1)
@@ -94,14 +96,14 @@ def centred(white: White, weigh: Callable, rng) -> White:
     By Stein's lemma E[z w(z)] is w's mean slope; a shift by it takes it away where the density is
     normal. Slopes within their error are left.
     """
-    for _ in range(ROUNDS):
-        z = rng.standard_normal((PILOT, len(white.centre)))
+    for _ in range(SETTINGS.rounds):
+        z = rng.standard_normal((SETTINGS.pilot, len(white.centre)))
         weights = weigh(white, z)
         if not np.all(np.isfinite(weights)):
             break
         products = z * (weights - weights.mean())[:, None]
-        slope, error = products.mean(axis=0), products.std(axis=0) / PILOT**0.5
-        seen = np.abs(slope) > SEEN * error
+        slope, error = products.mean(axis=0), products.std(axis=0) / SETTINGS.pilot**0.5
+        seen = np.abs(slope) > SETTINGS.seen * error
         if not seen.any():
             break
         white = white._replace(centre=white.centre + white.factor @ np.where(seen, slope, 0.0))
@@ -110,17 +112,19 @@ def centred(white: White, weigh: Callable, rng) -> White:
 
 def _weights(log_density, pool, bar, white: White, z) -> np.ndarray:
     """Log density (n,) over the standard normal's at z (n, size), -inf where not a number."""
-    bar.total = (bar.total or 0) + -(-len(z) // BLOCK) * BLOCK  # as far as is known by now
+    bar.total = (bar.total or 0) + -(
+        -len(z) // SETTINGS.block
+    ) * SETTINGS.block  # as far as is known by now
     bar.refresh()
     theta = white.theta(z)
-    padded = np.concatenate([theta, np.repeat(theta[:1], -len(z) % BLOCK, axis=0)])
+    padded = np.concatenate([theta, np.repeat(theta[:1], -len(z) % SETTINGS.block, axis=0)])
     parts = []
     for part in pool.map(
         lambda block: np.asarray(_values(log_density, block, white.data)),
-        padded.reshape(-1, BLOCK, z.shape[1]),
+        padded.reshape(-1, SETTINGS.block, z.shape[1]),
     ):
         parts.append(part)
-        bar.update(BLOCK)
+        bar.update(SETTINGS.block)
     weights = np.concatenate(parts)[: len(z)] + 0.5 * np.sum(z**2, axis=1)
     return np.where(np.isfinite(weights), weights, -np.inf)
 

@@ -16,11 +16,9 @@ from imuarray.estimation.collapsed import Collapsed, motion_from
 from imuarray.model import structure_tensor
 from imuarray.model.jax64 import cholesky, jax, jnp, log_determinant, solve_lower, solve_upper
 from imuarray.model.structure import CURVATURES, PAIRS
+from imuarray.posterior.settings import SETTINGS
 
 NODE_COUNTS = (1, 3, 5, 7, 9, 11)  # nodes on each axis of omega
-ENOUGH = 1e-4  # nats in total between one count and the next: then the former is taken
-NEWTON = 6  # steps to the mode at most, from where it is at the reference positions
-NEAR = 1e-4  # sds: a step as short is the last, the next would be its square
 
 
 class MarginalData(NamedTuple):
@@ -121,7 +119,7 @@ def _modes_at(C, b, data):
     steps = jax.vmap(_step, (0, None, 0, 0, 0))
 
     def further(state):
-        return (state[2] < NEWTON) & (state[1] > NEAR**2)
+        return (state[2] < SETTINGS.newton) & (state[1] > SETTINGS.near**2)
 
     def again(state):
         rate, length = steps(state[0], C, b, data.mean, data.information)
@@ -219,7 +217,7 @@ class Marginal:
     @classmethod
     def of(
         cls, collapsed: Collapsed, positions, rates=None, motion_sd=(np.inf, np.inf),
-        nodes: int | None = None, spread=(0.0, 0), enough: float = ENOUGH,
+        nodes: int | None = None, spread=(0.0, 0), enough: float = SETTINGS.node_error,
     ) -> Marginal:  # fmt: skip
         """Marginal of a recording; modes are searched from those at ``positions`` (A, 3) m.
 

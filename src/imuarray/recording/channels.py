@@ -13,16 +13,9 @@ import numpy as np
 from imuarray.errors import InputError, require
 from imuarray.provenance import seal_of
 from imuarray.recording.record import AXES, KINDS, Recording
+from imuarray.recording.settings import SETTINGS
 
-LEAST = 10  # samples below which equal readings may be chance
-TURNING = 0.2  # rad/s; at rest, coarse readings do repeat
-HELD = 0.3  # share of repeated readings; a sensor of half the rate, filled up, has 0.5
-FROZEN = 20  # readings in a row
-COARSE, MANY = 5, 100  # values of a dead axis that flickers, in at least so many samples
-ALIKE = 1e-6  # share of a triad's readings that is its own; noise is 2e-5 of a MEMS sensor's range
 SIGNATURE = b"\x89HDF"
-PATIENCE = 60.0  # s, and as many again for each
-SIZE = 500e6  # bytes
 LOOK = """
 import sys, h5py
 def look(name, item):
@@ -63,13 +56,13 @@ def require_apart(recordings: Sequence[Recording]) -> None:
         for other, known in enumerate(before, 1):
             shared = len(np.intersect1d(marks, known, assume_unique=True))
             found = f"{shared} samples of number {other} in number {number}, too"
-            require(shared < LEAST, "recordings", "different ones", found)
+            require(shared < SETTINGS.least_samples, "recordings", "different ones", found)
         before.append(marks)
 
 
 def dead(recording: Recording) -> list[str]:
     """A sentence for each axis that hardly changes, and for each triad or axis that is a copy."""
-    if len(recording.time) < LEAST:
+    if len(recording.time) < SETTINGS.least_samples:
         return []
     return [
         sentence
@@ -85,7 +78,7 @@ def repeated(recording: Recording) -> list[str]:
     They leave an answer, off or with intervals that are too narrow.
     """
     turning = _turning(recording)
-    if turning.sum() < LEAST:
+    if turning.sum() < SETTINGS.least_samples:
         return []
     held = [sentence for kind in KINDS for sentence in _held(recording, kind, turning)]
     return dead(recording.select(turning)) + held + _twice(recording, turning)
@@ -101,7 +94,7 @@ def _constant(recording: Recording, kind: str) -> list[str]:
     labels = getattr(recording, f"{kind}_labels")
     count = _different(values for values, _ in _parts(recording, kind))
     first = next(_parts(recording, kind))[0][0]
-    least = np.where(len(recording.time) < MANY, 1, COARSE)
+    least = np.where(len(recording.time) < SETTINGS.dead_samples, 1, SETTINGS.dead_values)
     few = count <= least
     if few.any():
         few &= ~np.all([rail.all(axis=0) for _, rail in _parts(recording, kind)], axis=0)
@@ -115,18 +108,18 @@ def _constant(recording: Recording, kind: str) -> list[str]:
 
 
 def _different(parts) -> np.ndarray:
-    """(K, 3) how many different values each axis has, at most one more than `COARSE`."""
+    """(K, 3) how many different values each axis has, at most one more than `dead_values`."""
     known: list[np.ndarray] = []
     for values in parts:
         columns = values.reshape(len(values), -1).T
         known = known or [np.empty(0)] * len(columns)
         known = [
-            before if len(before) > COARSE else np.union1d(before, column)
+            before if len(before) > SETTINGS.dead_values else np.union1d(before, column)
             for before, column in zip(known, columns, strict=True)
         ]
-        if min(map(len, known)) > COARSE:
+        if min(map(len, known)) > SETTINGS.dead_values:
             break
-    return np.minimum([len(one) for one in known], COARSE + 1).reshape(-1, 3)
+    return np.minimum([len(one) for one in known], SETTINGS.dead_values + 1).reshape(-1, 3)
 
 
 def _copied(recording: Recording, kind: str) -> list[str]:
@@ -167,7 +160,7 @@ def _sums(recording: Recording, kind: str):
     covariance = square / len(recording.time) - np.outer(mean, mean)
     size = np.where(high > low, np.sqrt(np.abs(np.diag(covariance))), 0.0)
     scale = np.where(size > 0, size, 1.0)
-    return free >= LEAST, size, covariance / np.outer(scale, scale), mark
+    return free >= SETTINGS.least_samples, size, covariance / np.outer(scale, scale), mark
 
 
 def _source(gram, size, live) -> np.ndarray:
@@ -185,7 +178,7 @@ def _source(gram, size, live) -> np.ndarray:
             continue
         told = gram[later, i] @ np.linalg.solve(gram[i, i], gram[i, later])
         left = 1.0 - np.einsum("jaa->ja", told)
-        source[later[(left < ALIKE**2).all(axis=1)]] = i
+        source[later[(left < SETTINGS.own_share**2).all(axis=1)]] = i
     return source
 
 
@@ -204,12 +197,12 @@ def _held(recording: Recording, kind: str, turning) -> list[str]:
     for k, label in enumerate(labels):
         share = repeats[:, k].sum() / max(judged[k], 1)
         begin, end = max(runs(repeats[:, k]), key=lambda run: run[1] - run[0], default=(1, 1))
-        if share > HELD:
+        if share > SETTINGS.held_share:
             found.append(
                 f"{kind} {label!r} repeats {100 * share:.0f} % of its readings while the array"
                 " turns: slower than the log and filled up? keep the samples it took"
             )
-        elif end - begin >= FROZEN:
+        elif end - begin >= SETTINGS.frozen:
             found.append(
                 f"{kind} {label!r} is frozen at {recording.time[begin - 1]:g} s, for"
                 f" {end - begin + 1} samples in which the array turns: leave them out"
@@ -225,7 +218,7 @@ def _twice(recording: Recording, turning) -> list[str]:
     source = first[inverse]
     again = turning & (source < np.arange(samples))
     again[1:] &= marks[1:] != marks[:-1]
-    if again.sum() < LEAST:
+    if again.sum() < SETTINGS.least_samples:
         return []
     place = int(np.argmax(again))
     return [
@@ -238,7 +231,7 @@ def _twice(recording: Recording, turning) -> list[str]:
 def _turning(recording: Recording) -> np.ndarray:
     """(T,) bool"""
     squares = [np.mean(np.sum(p.angular_rate**2, axis=2), axis=1) for p in recording.parts()]
-    return np.sqrt(np.concatenate(squares)) > TURNING
+    return np.sqrt(np.concatenate(squares)) > SETTINGS.turning
 
 
 def _rows(recording: Recording) -> np.ndarray:
@@ -260,7 +253,7 @@ def _marks(rows, rng=None) -> np.ndarray:
     return np.sum(np.ascontiguousarray(rows, float).view(np.uint64) * odd, axis=1)
 
 
-def require_readable(path: Path, patience: float = PATIENCE) -> None:
+def require_readable(path: Path, patience: float = SETTINGS.patience) -> None:
     """InputError for an HDF5 file without a seal at which HDF5 hangs or dies.
 
     ``patience`` in s. What HDF5 refuses by itself, and what is no HDF5 file, is left to the reader.
@@ -268,7 +261,7 @@ def require_readable(path: Path, patience: float = PATIENCE) -> None:
     with open(path, "rb") as handle:
         if handle.read(len(SIGNATURE)) != SIGNATURE or seal_of(path) is not None:
             return
-    limit = patience * (1 + path.stat().st_size / SIZE)
+    limit = patience * (1 + path.stat().st_size / SETTINGS.patient_size)
     call = [sys.executable, "-c", LOOK, str(path)]
     try:
         status = subprocess.run(call, capture_output=True, timeout=limit, check=False).returncode

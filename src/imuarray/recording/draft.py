@@ -12,8 +12,9 @@ import pandas as pd
 from imuarray.errors import expecting, require
 from imuarray.recording import written
 from imuarray.recording.layout import SCHEMA
+from imuarray.recording.settings import SETTINGS
 from imuarray.recording.table import load
-from imuarray.recording.units import FASTEST, GRAVITY, SLOWEST, UNITS
+from imuarray.recording.units import GRAVITY, UNITS
 
 # what a column's words, or else its unit, tell of the sensor; neither kind's are left out
 KINDS = {
@@ -26,7 +27,6 @@ TIME = r"time|stamp|^t$|_t$|sec|millis|micros|^(ns|us|ms|s)$"
 FINE = "sampletimefine"  # as Xsens has it, in 0.1 ms
 UNIT = r"[\[(]([^\[(]*[^\[(\d][^\[(]*)[\])]"  # in brackets; a number there is none
 AXES = (("[xX]", {"x": "yz", "X": "YZ"}), (r"(?<=\[)0(?=\])", {"0": "12"}))
-WITHIN = 0.2  # of one unit of gravity, by which readings at rest may be off
 COUNTS = 2.0 ** np.arange(8, 17)  # of raw readings, in 1 g
 RANGES = {
     "g": (2, 4, 8, 16, 24, 32, 64), "mg": (2000, 4000, 8000, 16000, 32000),
@@ -34,10 +34,6 @@ RANGES = {
     "deg/s": (125, 250, 500, 1000, 2000, 4000),
     "rad/s": tuple(round(float(np.radians(r)), 1) for r in (125, 250, 500, 1000, 2000, 4000)),
 }  # fmt: skip
-SPINNING = 40.0  # rad/s, faster than a hand turns a board
-NOISIEST = 0.025  # rad/s, sd of a gyroscope's readings
-LEAST = 3  # rows
-EVEN = 0.2  # of a step between stamps, by which half of them may differ
 UNKNOWN = '"?"'
 WORDS = {"deg/s": "deg|dps|°", "rad/s": "rad"}
 RAW = "scale", "noise", "range"  # not known of counts
@@ -199,7 +195,11 @@ def _time(table: pd.DataFrame, given: dict[str, str]) -> tuple[str, float, list[
             steps = np.diff(values.to_numpy(float))
         step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else np.nan
         hint = re.search(r"(?:\b|_)(ns|us|ms|s)(?:\b|_)", f"{name} {given.get(name)}".lower())
-        likely = [u for u, size in units.items() if SLOWEST <= 1 / (step * size) <= FASTEST / 5]
+        likely = [
+            u
+            for u, size in units.items()
+            if SETTINGS.slowest <= 1 / (step * size) <= SETTINGS.fastest / 5
+        ]
         likely = [u for u in likely if hint and u == hint[1]] or likely
         if likely:
             rate, unit = 1 / (step * units[likely[0]]), likely[0]
@@ -211,11 +211,11 @@ def _time(table: pd.DataFrame, given: dict[str, str]) -> tuple[str, float, list[
 
 def _rises(values: pd.Series) -> bool:
     """True of numbers that rise in nearly even steps, as stamps do; a count of rows is none."""
-    if values.dtype.kind not in "iuf" or len(values) <= LEAST:
+    if values.dtype.kind not in "iuf" or len(values) <= SETTINGS.draft_rows:
         return False
     steps = np.diff(values.to_numpy(float))
     step = np.median(steps)
-    even = np.mean(np.abs(steps - step) < EVEN * step)
+    even = np.mean(np.abs(steps - step) < SETTINGS.draft_even * step)
     return bool(np.all(steps > 0) and even > 0.5 and np.any(steps != 1))
 
 
@@ -227,7 +227,7 @@ def _section(table, kind: str, triads: list[Triad], rate: float, raw: bool):
     numbers = table[sum(columns, [])].apply(pd.to_numeric, errors="coerce")
     values = np.stack([numbers[three].to_numpy(float) for three in columns], axis=1)
     rows = int(np.isfinite(values).all(axis=2).sum(axis=0).min())
-    require(rows >= LEAST, kind, f"{LEAST} rows of numbers", rows)
+    require(rows >= SETTINGS.draft_rows, kind, f"{SETTINGS.draft_rows} rows of numbers", rows)
     quiet = _quietest(values, rate)
     noise = float(np.nanmedian(np.nanstd(np.diff(values[quiet], axis=0), axis=0)) / np.sqrt(2))
     if kind == "accelerometers":
@@ -235,7 +235,7 @@ def _section(table, kind: str, triads: list[Triad], rate: float, raw: bool):
     else:
         words = " ".join([*triads[0].columns, triads[0].unit]).lower()
         named = [unit for unit, text in WORDS.items() if re.search(text, words)]
-        fast = np.nanmax(np.abs(values)) > SPINNING or noise > NOISIEST
+        fast = np.nanmax(np.abs(values)) > SETTINGS.spinning or noise > SETTINGS.noisiest
         unit, scale = [*named, "deg/s" if fast else "rad/s"][0], None
         if raw and not named:
             asked = f"{kind}: scale, a count in deg/s: 1/131 where the range is 250, 1/16.4 at 2000"
@@ -268,10 +268,12 @@ def _force(still) -> tuple[str, float | None]:
     """Unit, and scale of raw counts, by gravity at rest (T, n, 3)."""
     size = float(np.nanmedian(np.linalg.norm(np.nanmean(still, axis=0), axis=1)))
     for unit, one in (("g", 1.0), ("m/s^2", GRAVITY), ("mg", 1000.0)):
-        if abs(size / one - 1) < WITHIN:
+        if abs(size / one - 1) < SETTINGS.draft_gravity:
             return unit, None
     nearest = COUNTS[np.argmin(np.abs(np.log(COUNTS / max(size, 1e-300))))]
-    return ("g", 1 / nearest) if abs(size / nearest - 1) < WITHIN else (UNKNOWN, None)
+    return (
+        ("g", 1 / nearest) if abs(size / nearest - 1) < SETTINGS.draft_gravity else (UNKNOWN, None)
+    )
 
 
 def _quoted(name: str) -> str:

@@ -10,11 +10,10 @@ import numpy as np
 import yaml
 
 from imuarray.errors import LARGEST, SMALLEST, expecting, require
+from imuarray.recording.settings import SETTINGS
 from imuarray.recording.units import factor
 from imuarray.recording.validate import is_rotation
 
-WIDEST = 2.0  # m; beyond this, positions without a declared unit are taken to be in another
-PRIOR = 3e-3  # m, sd of nominal positions where none is declared
 KINDS = "accelerometers", "gyroscopes"
 QUANTITIES = {"accelerometers": "force", "gyroscopes": "rate"}
 # Which keys may be in each section, and which have to be there, the editors' schema says. A board's
@@ -130,7 +129,9 @@ def numbers(layout, where: str) -> dict[str, float]:
             value = positive(section[key], f"{place}: {key}")
             out[f"{name}_{attribute}"] = unit * value
     length = factor("length", layout.get("position_unit", "m"), f"{where}: position_unit")
-    prior = positive(layout.get("position_prior", PRIOR / length), f"{where}: position_prior")
+    prior = positive(
+        layout.get("position_prior", SETTINGS.position_prior / length), f"{where}: position_prior"
+    )
     return out | {"position_prior_sd": length * prior}
 
 
@@ -152,8 +153,8 @@ def positions(sections: dict[str, dict], layout, where: str) -> np.ndarray:
         for label, section in sections.items()
     ]
     size = float(np.ptp(places, axis=0).max())
-    near, found = size <= WIDEST, f"{size:g}: name the position_unit, mm or m"
-    expected = f"positions within {WIDEST:g} m of each other"
+    near, found = size <= SETTINGS.widest, f"{size:g}: name the position_unit, mm or m"
+    expected = f"positions within {SETTINGS.widest:g} m of each other"
     require(near or "position_unit" in layout, where, expected, found)
     return length * np.array(places)
 

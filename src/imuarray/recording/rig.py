@@ -9,8 +9,7 @@ import numpy as np
 from imuarray.errors import LARGEST, InputError, require
 from imuarray.recording.layout import numbers, positions, rotation
 from imuarray.recording.record import KINDS, Recording
-
-LONGEST = 86400.0  # s, between two readings: beyond, nothing on common instants would fit in memory
+from imuarray.recording.settings import SETTINGS
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +144,7 @@ def _in_order(readings: Readings) -> tuple[Readings, list[str]]:
     again = (steps == 0) & (values[rows[1:]] == values[rows[:-1]]).all(axis=1)
     for wrong, expected in (
         ((steps <= 0) & ~again, "that increase"),
-        (readings.unit * steps > LONGEST, "of one day (was the clock set meanwhile?)"),
+        (readings.unit * steps > SETTINGS.longest_gap, "of one day (was the clock set meanwhile?)"),
     ):
         if wrong.any():
             i = int(np.argmax(wrong))

@@ -17,16 +17,12 @@ from imuarray.recording import layout as layouts
 from imuarray.recording import written
 from imuarray.recording.record import Recording
 from imuarray.recording.rig import Readings, Rig, pair, to_rig
+from imuarray.recording.settings import SETTINGS
 from imuarray.recording.units import factor, require_plausible_rate
 
 LEAVE_OUT = "leave out"  # what `incomplete_rows` may be
-FEW = 20  # stamps, of which a rate is worth looking at
-OFTEN = 0.1  # share of blank cells from which a sensor is slower than the log
 BLANK = "; `incomplete_rows: leave out` keeps the rows that are whole"
 WHITESPACE = r"\s+"  # the one delimiter longer than a character
-HALF = 0.5  # of the rows share their stamps: one row for each sensor, perhaps
-CLOCK_SD = 1e-3  # of a rate that is declared: oscillators of chips are off by up to some 1 %
-LONG = 400  # rows, in which missed readings are bridged; blanks in fewer are a damaged table
 
 
 def recording_of(table: pd.DataFrame, layout, path, columns) -> tuple[Recording, list[str]]:
@@ -156,7 +152,7 @@ def stamps_of(table, section, where, layout_name, blank: bool = False) -> tuple[
         unit = factor("time", section["unit"], f"{layout_name}: time: unit")
         stamps = column(table, name, where, blank)
     known = stamps[np.isfinite(stamps)]
-    if len(known) >= FEW:
+    if len(known) >= SETTINGS.few_stamps:
         place = f"{where}: column {name!r}"
         require_plausible_rate(unit * (known - known[0]), place, section["unit"])
     return stamps, unit
@@ -169,7 +165,7 @@ def _clock(section: Any, where: str) -> tuple[Any, dict[str, float]]:
     rest = {key: value for key, value in section.items() if key != "clock_sd"}
     if len(rest) < len(section):
         return rest, {"clock_sd": layouts.positive(section["clock_sd"], f"{where}: time: clock_sd")}
-    return rest, {"clock_sd": CLOCK_SD} if "rate" in section else {}
+    return rest, {"clock_sd": SETTINGS.clock_sd} if "rate" in section else {}
 
 
 def _time(table, section, where, layout_name) -> tuple[np.ndarray, np.ndarray, list[str]]:
@@ -211,7 +207,7 @@ def read_tables(
     table = loaded[files[0]]
     of_triads = table.columns.isin(_named([layout[kind] for kind in layouts.KINDS]))
     blank = table.loc[:, of_triads].isna().mean()
-    slow = (blank > (0.0 if len(table) > LONG else OFTEN)).any()
+    slow = (blank > (0.0 if len(table) > SETTINGS.long_log else SETTINGS.blank_share)).any()
     if slow and "incomplete_rows" not in layout:
         freely = "output_rate" not in layout
         require(freely, f"{columns}: output_rate", "none where cells are blank", "one")
@@ -251,7 +247,7 @@ def _own(table: pd.DataFrame, layout, label: str, where: str) -> pd.DataFrame:
     name = str(layout["sensor"])
     require(name in table.columns, where, f"a column {name!r}", _alike(name, table))
     own = table[table[name].map(written.plain) == label]
-    have = ", ".join(map(written.plain, table[name].unique()[:FEW]))
+    have = ", ".join(map(written.plain, table[name].unique()[: SETTINGS.few_stamps]))
     require(len(own) > 0, where, f"rows of it by column {name!r}", have)
     return own
 
@@ -273,7 +269,7 @@ def _readings(table, path: str, names, time, unit: float, where: str) -> Reading
     values = [column(table, name, path, blank=True).astype(float) for name in names]
     stamps, second = stamps_of(table, time, path, where, blank=True)
     steps = np.diff(stamps[np.isfinite(stamps)])
-    if len(steps) and np.mean(steps == 0) > HALF and written.numbering(table):
+    if len(steps) and np.mean(steps == 0) > SETTINGS.shared_stamps and written.numbering(table):
         raise InputError(f"{path}: {written.shared_words(steps, table)}")
     return Readings(stamps, second, unit * np.stack(values, axis=1), f"{path}: {', '.join(names)}")
 

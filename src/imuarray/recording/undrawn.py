@@ -8,11 +8,8 @@ from scipy.signal import savgol_filter
 from imuarray.errors import require
 from imuarray.motion.state import lever
 from imuarray.recording.record import Recording
+from imuarray.recording.settings import SETTINGS
 
-WINDOW, ORDER = 7, 3  # samples and degree of the polynomial that gives the rates' derivative
-FAST = 0.5  # of the rates' root mean square: slower samples say little of positions
-SD = 0.05  # of the board's size, what gyroscopes and axes as bought leave uncertain
-SURE = 0.1  # of the board's size, beyond which the motion says too little
 UNKNOWNS = 15  # of a triad: arm, map of the first triad's force, offset
 
 
@@ -35,25 +32,32 @@ def rough_positions(recording: Recording) -> tuple[np.ndarray, float]:
         sd = float(np.sqrt(left * np.max(spread / scale[:3] ** 2)))
     size = float(np.ptp(positions, axis=0).max())
     require(
-        sd < SURE * size, "positions", "those of a drawing, or motion from which they follow",
+        sd < SETTINGS.rough_sure * size, "positions",
+        "those of a drawing, or motion from which they follow",
         "motion that leaves them open: twist the board faster, about all axes, or measure them with"
         " a ruler, from any point",
     )  # fmt: skip
-    return positions, float(np.hypot(sd, SD * size))
+    return positions, float(np.hypot(sd, SETTINGS.rough_sd * size))
 
 
 def _equations(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     """Coefficients (n, `UNKNOWNS`) and forces (n, A - 1) of fast samples off the rails."""
     lost = recording.at_rail("gyroscope") | recording.at_rail("accelerometer")
     rate = recording.angular_rate.mean(axis=1)
-    if len(rate) < WINDOW:
+    if len(rate) < SETTINGS.slope_window:
         return np.zeros((1, UNKNOWNS)), np.zeros((1, recording.specific_force.shape[1] - 1))
     step = np.median(np.diff(recording.time))
-    smooth = partial(savgol_filter, window_length=WINDOW, polyorder=ORDER, delta=step, axis=0)
+    smooth = partial(
+        savgol_filter,
+        window_length=SETTINGS.slope_window,
+        polyorder=SETTINGS.slope_order,
+        delta=step,
+        axis=0,
+    )
     rate = rate - np.median(rate, axis=0)
     force, rate, turning = smooth(recording.specific_force), smooth(rate), smooth(rate, deriv=1)
     speed = np.linalg.norm(rate, axis=1)
-    used = (speed > FAST * np.sqrt(np.mean(speed**2))) & ~lost
+    used = (speed > SETTINGS.fast * np.sqrt(np.mean(speed**2))) & ~lost
     arms = lever(rate[used, None], turning[used, None], np.eye(3)).swapaxes(1, 2)
     maps = np.einsum("ij,tk->tijk", np.eye(3), force[used, 0]).reshape(-1, 3, 9)
     offsets = np.broadcast_to(np.eye(3), arms.shape)

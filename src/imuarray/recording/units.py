@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from imuarray.errors import InputError, require
+from imuarray.recording.settings import SETTINGS
 
 GRAVITY = 9.80665  # m/s^2, the unit g of data sheets
 _DEGREE = math.pi / 180
@@ -21,14 +22,14 @@ UNITS = {
 }  # fmt: skip
 
 
-SLOWEST, FASTEST = 2.0, 5e4  # Hz, of an IMU that is to show a motion of the hand
-
-
 def require_plausible_rate(time, where: str, declared: object = "") -> None:
     """InputError for stamps (T,) s that no IMU makes: a unit; ``declared``: theirs, if known."""
     steps = np.abs(np.diff(time))
     steps = steps[steps > 0]
-    if not steps.size or 1 / FASTEST <= (step := float(np.median(steps))) <= 1 / SLOWEST:
+    if (
+        not steps.size
+        or 1 / SETTINGS.fastest <= (step := float(np.median(steps))) <= 1 / SETTINGS.slowest
+    ):
         return
     # the unit in which they would be plausible, from the last one that they were taken to be in
     units = UNITS["time"]
@@ -36,8 +37,8 @@ def require_plausible_rate(time, where: str, declared: object = "") -> None:
     hint = f"are they in {right[0]}" if right else "is their unit right"
     hint += f", declared {declared}?" if declared and right else "?"
     raise InputError(
-        f"{where}: expected stamps of {SLOWEST:g} to {FASTEST:g} samples a second, found"
-        f" {1 / step:.3g} over {_long(float(np.ptp(time)))}; {hint}"
+        f"{where}: expected stamps of {SETTINGS.slowest:g} to {SETTINGS.fastest:g} samples a second,"
+        f" found {1 / step:.3g} over {_long(float(np.ptp(time)))}; {hint}"
     )
 
 

@@ -16,16 +16,10 @@ from imuarray.errors import LARGEST, SMALLEST, IdentifiabilityError, InputError,
 from imuarray.geometry.array import require_apart, require_count
 from imuarray.recording import record
 from imuarray.recording.record import Recording, blocks
+from imuarray.recording.settings import SETTINGS
 
 # A file of a few bytes can declare far more than any memory or disk holds; deflate makes 1032 of 1.
 INFLATED = 1032
-
-# A pause this many times the usual step is reported: estimators that smooth would bridge it.
-GAP_FACTOR = 5.0
-
-# Calibrated values may pass the rail by some per cent, those of a triad that was turned by up to
-# sqrt 3; this is to find wrong units (57, 9.8, ...).
-BEYOND_RANGE = 1.8
 
 
 def check_sizes(file: h5py.File, where: str, whole: bool = True) -> None:
@@ -189,7 +183,7 @@ _CHECKS = {
 
 def _check_finite(recording: Recording, name: str, limit: float, where: str) -> None:
     """Finite numbers; and within a declared range."""
-    values, most = getattr(recording, name), min(LARGEST, BEYOND_RANGE * limit)
+    values, most = getattr(recording, name), min(LARGEST, SETTINGS.beyond_range * limit)
     if all((np.abs(part) <= most).all() for _, part in blocks(values)):  # NaN is not
         return
     strange = sum(int(np.sum(~(np.abs(part) <= LARGEST))) for _, part in blocks(values))
@@ -234,10 +228,10 @@ def _check_time(time: np.ndarray, where: str, declared: bool = False) -> None:
     if len(steps) == 0 or declared:
         return
     usual = float(np.median(steps))
-    gaps = np.flatnonzero(steps > GAP_FACTOR * usual)
+    gaps = np.flatnonzero(steps > SETTINGS.gap * usual)
     if len(gaps):
         warnings.warn(
-            f"{where}: time: {len(gaps)} gap(s) longer than {GAP_FACTOR:g} times the usual step "
+            f"{where}: time: {len(gaps)} gap(s) longer than {SETTINGS.gap:g} times the usual step "
             f"of {usual:g} s; the first, {steps[gaps[0]]:g} s, comes after index {gaps[0]}",
             stacklevel=2,
         )

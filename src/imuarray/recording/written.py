@@ -8,15 +8,12 @@ import numpy as np
 import pandas as pd
 
 from imuarray.errors import InputError
+from imuarray.recording.settings import SETTINGS
 
-SNIFFED, HEAD = 1 << 16, 60  # bytes that tell an encoding; lines among which the header is
 DELIMITERS = ",", ";", "\t", "|"
 DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
 WIDTHS = 16, 32  # bits of counters that begin anew
-OFTEN = 0.05  # share of rows from which equal stamps are how the logger stamps
-FEW = 20  # rows, of which nothing is sure
-SENSORS = 64  # distinct values of a column that may number the sensors
 
 
 def form_of(path: Path, named: set[str], given: dict) -> tuple[dict, list[str]]:
@@ -28,7 +25,7 @@ def form_of(path: Path, named: set[str], given: dict) -> tuple[dict, list[str]]:
     """
     encoding = encoding_of(path)
     with open(path, encoding=encoding, errors="replace", newline=None) as file:
-        lines = [line.rstrip("\n") for line in islice(file, HEAD)]
+        lines = [line.rstrip("\n") for line in islice(file, SETTINGS.head)]
     asked = given.get("sep")
     best, skip, sep = 0, 0, asked or ","
     for number, line in enumerate(lines):
@@ -73,7 +70,7 @@ def plain(value) -> str:
 def encoding_of(path: Path) -> str:
     """By the byte-order mark, or by what the first bytes can be read as."""
     with open(path, "rb") as file:
-        start = file.read(SNIFFED)
+        start = file.read(SETTINGS.sniffed)
     for mark, name in MARKS.items():
         if start.startswith(mark):
             return name
@@ -107,8 +104,8 @@ def in_order(stamps, table: pd.DataFrame, where: str) -> tuple[np.ndarray, np.nd
     stamps, bits = _carried_on(stamps)
     if bits:
         said.append(f"{where}: a counter of {bits} bits began anew: carried on")
-    steps, few = np.diff(stamps), OFTEN * len(stamps)
-    if np.sum(steps == 0) > few and len(stamps) > FEW:
+    steps, few = np.diff(stamps), SETTINGS.equal_stamps * len(stamps)
+    if np.sum(steps == 0) > few and len(stamps) > SETTINGS.few_rows:
         raise InputError(f"{where}: {shared_words(steps, table)}")
     usual = np.median(steps) if len(steps) else 0.0
     if 0 < np.sum(steps < 0) < few:
@@ -165,6 +162,9 @@ def numbering(table: pd.DataFrame) -> str:
     """The column whose few values come equally often, as numbers of sensors do, or ""."""
     for place, name in enumerate(table.columns):
         counts = table.iloc[:, place].value_counts()
-        if 1 < len(counts) <= SENSORS and counts.min() > 0.9 * counts.max() > FEW:
+        if (
+            1 < len(counts) <= SETTINGS.most_sensors
+            and counts.min() > 0.9 * counts.max() > SETTINGS.few_rows
+        ):
             return str(name)
     return ""

@@ -14,6 +14,7 @@ from imuarray.errors import LARGEST, SMALLEST, InputError, one_line, require
 from imuarray.model.effects import DATA_EFFECTS, EFFECTS, KINDS, own_version
 from imuarray.recording import Recording
 from imuarray.recording.record import CLOCKS, CORRECTION, DIMENSIONS, MATRICES
+from imuarray.trust.settings import SETTINGS
 
 _PLACE = ("accelerometer", "axis")
 # Variables by whether they are needed: always, with effects, or not at all.
@@ -30,8 +31,6 @@ _PERHAPS = {
     **dict.fromkeys((*CLOCKS, "log_rate"), ("accelerometer",)),
     **{name: ("recording", *dims) for name, dims in CORRECTION.items() if name[-3:] != "_sd"},
 }  # fmt: skip
-SAME_BOARD = 5.0  # prior sds by which two drawings of one board may differ
-INDEFINITE = 1e-3  # of a correlation matrix' least eigenvalue; rounding leaves less
 
 
 def require_fit(calibration: xr.Dataset, recording: Recording | None = None) -> None:
@@ -149,9 +148,9 @@ def _require_covariance(variable: xr.DataArray) -> None:
     variances = np.diag(matrix)
     scale = np.sqrt(np.where(variances > 0, variances, 1.0))
     correlation = matrix / np.outer(scale, scale)
-    proper = np.allclose(correlation, correlation.T, atol=INDEFINITE)
+    proper = np.allclose(correlation, correlation.T, atol=SETTINGS.indefinite)
     proper &= not np.any(matrix[variances <= 0])  # what is known, such as the reference's place
-    if not proper or np.linalg.eigvalsh(correlation)[0] < -INDEFINITE:
+    if not proper or np.linalg.eigvalsh(correlation)[0] < -SETTINGS.indefinite:
         raise InputError(f"{variable.name}: expected a covariance, found a matrix that is none")
 
 
@@ -165,7 +164,12 @@ def _require_board(calibration: xr.Dataset, recording: Recording) -> None:
     k = int(np.argmax(apart))
     off = f"{recording.accelerometer_labels[k]} is {1e3 * apart[k]:.3g} mm off in its drawing"
     other = f"one of another: accelerometer {off}"
-    require(not apart[k] > SAME_BOARD * prior, "", "a calibration of the recording's board", other)
+    require(
+        not apart[k] > SETTINGS.same_board * prior,
+        "",
+        "a calibration of the recording's board",
+        other,
+    )
 
 
 def _require_effects(calibration: xr.Dataset) -> None:

@@ -13,14 +13,8 @@ from scipy.spatial.transform import Rotation
 from scipy.special import chdtrc
 
 from imuarray.recording.units import GRAVITY
+from imuarray.trust.settings import SETTINGS
 
-ALARM = 1e-6  # p value from which a departure is no chance: 4.9 sds
-SIZES = 0.5, 2.0  # beyond these the size is the first thing to be said
-FAR = 5.0  # sds
-ALIKE = 0.3  # of the drawing's own size: shapes that agree to this are one shape
-FLAT = 0.02  # of the largest extent: a board in one plane
-LEFT = 0.1  # of chi-square may an explanation leave
-AS_GOOD = 10.0  # chi-square by which another explanation may be worse and still be named
 DEGREE = np.degrees(1.0)
 MISTAKES = (
     (DEGREE**-2, "gyroscopes in deg/s declared rad/s?", "57.3^2"),
@@ -89,8 +83,8 @@ def size_of(places: Places) -> tuple[float, float]:
 def departures(places: Places) -> str | None:
     """One sentence where the array found is not the array drawn, or None.
 
-    Tests of all coordinates jointly, of the size, the orientation and of each triad, at `ALARM`
-    among them all.
+    Tests of all coordinates jointly, of the size, the orientation and of each triad, at the settings'
+    `alarm` among them all.
     """
     weight, off = precision(places), places.found - places.nominal
     count = len(places.found)
@@ -102,7 +96,7 @@ def departures(places: Places) -> str | None:
     alone = _each(weight, off)
     tests = [chdtrc(3 * (count - 1), chi_square(weight, off)), chdtrc(1, ((size - 1) / sd) ** 2),
              chdtrc(3, turned), *chdtrc(3, alone)]  # fmt: skip
-    if len(tests) * min(tests) >= ALARM:
+    if len(tests) * min(tests) >= SETTINGS.alarm:
         return None
     if (unit := another_size(places)) or not places.learnt():
         return unit  # of what is known worse than by the drawing, only a unit's factor tells
@@ -124,7 +118,10 @@ def another_size(places: Places) -> str | None:
     size, drawn = places.size(), centred(places.nominal)
     off = np.linalg.norm(centred(places.found) / size - drawn) / np.linalg.norm(drawn)
     fitted, sd = size_of(places)
-    if not (abs(fitted - 1) > FAR * sd and off < ALIKE) or SIZES[0] < size < SIZES[1]:
+    if (
+        not (abs(fitted - 1) > SETTINGS.far * sd and off < SETTINGS.same_shape)
+        or SETTINGS.sizes[0] < size < SETTINGS.sizes[1]
+    ):
         return None
     return size_words(size) if places.learnt() or _mistake(size) else None
 
@@ -132,7 +129,7 @@ def another_size(places: Places) -> str | None:
 def size_words(size: float) -> str:
     """Words on how far off a size is, and the scales, or the mistake, that would make it so."""
     off = factor_words(size)
-    if SIZES[0] < size < SIZES[1]:
+    if SETTINGS.sizes[0] < size < SETTINGS.sizes[1]:
         return (
             f"the array comes out {off}: gyroscopes {factor_words(size**-0.5)}, or accelerometers"
             f" {off}?"
@@ -148,7 +145,7 @@ def size_words(size: float) -> str:
 def factor_words(factor: float) -> str:
     """By how much something is too large, or too small, as a user thinks of it."""
     word = "large" if factor > 1 else "small"
-    if SIZES[0] < factor < SIZES[1]:
+    if SETTINGS.sizes[0] < factor < SETTINGS.sizes[1]:
         return f"{100 * abs(factor - 1):.2g} % too {word}"
     return f"{max(factor, 1 / factor):.4g} times too {word}"
 
@@ -164,15 +161,23 @@ def _explained(places: Places) -> str | None:
     freedom = 3 * (len(places.found) - 1)
     # each further unknown has to pay for itself
     fits = [
-        (chi_square(weight, places.found - drawn) + AS_GOOD * unknowns, AS_GOOD * unknowns, words)
+        (
+            chi_square(weight, places.found - drawn) + SETTINGS.as_good * unknowns,
+            SETTINGS.as_good * unknowns,
+            words,
+        )
         for words, drawn, unknowns in _explanations(places)
     ]
     score, paid, best = min(fits, key=lambda fit: fit[0])
     left = score - paid
     explained = before - left > 0.5 * (before - freedom)
-    if not explained or (chdtrc(freedom, left) < ALARM and left > LEFT * before):
+    if not explained or (
+        chdtrc(freedom, left) < SETTINGS.alarm and left > SETTINGS.unexplained * before
+    ):
         return None
-    others = [words for fit, _, words in fits if words is not best and fit < score + AS_GOOD]
+    others = [
+        words for fit, _, words in fits if words is not best and fit < score + SETTINGS.as_good
+    ]
     return ", or ".join([best, *others[:2]])
 
 
@@ -211,7 +216,7 @@ def _mirrored_words(places: Places) -> str:
     sizes = np.linalg.svd(centred(places.nominal), compute_uv=False)
     words = ["left-handed axes"] if places.hand <= 0 else []
     words += ["was it drawn from the other side"] if places.hand >= 0 else []
-    words += ["or turned by 180 degrees"] if sizes[-1] < FLAT * sizes[0] else []
+    words += ["or turned by 180 degrees"] if sizes[-1] < SETTINGS.flat * sizes[0] else []
     return ", ".join(words)
 
 

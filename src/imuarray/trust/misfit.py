@@ -6,13 +6,10 @@ import xarray as xr
 from imuarray.model.effects import KINDS
 from imuarray.recording import Recording
 from imuarray.trust.drawing import Places
-from imuarray.trust.rigid import FEW, kept, turning
+from imuarray.trust.rigid import kept, turning
+from imuarray.trust.settings import SETTINGS
 from imuarray.trust.suspects import suspects
 from imuarray.words import joined
-
-UNSTEADY = 2.5  # times what noise explains between parts of a recording; 1.3 at most of sound ones
-APART = 1.5  # times that of the other IMUs: what disturbs one disturbs all a little
-RESIDUAL = 3.0  # times the declared noise: widths are too small, or scaled by what is no noise
 
 
 def is_papers(calibration: xr.Dataset) -> bool:
@@ -30,7 +27,7 @@ def unfitting(
     whole = residual.get("", 0.0)
     triads = {name: ratio for name, ratio in residual.items() if name}
     worst = max(triads, key=triads.__getitem__, default="")
-    if not (whole > RESIDUAL or triads.get(worst, 0.0) > limit):
+    if not (whole > SETTINGS.residual or triads.get(worst, 0.0) > limit):
         return [], False
     named = suspects(moving)
     if named:
@@ -71,8 +68,8 @@ def unsteady(calibration: xr.Dataset, corrected: bool, recordings: int = 1) -> l
     ratio = np.sqrt(np.divide(*squares))
     usual = np.sort(ratio)[(len(ratio) - 1) // 2]
     labels = calibration["accelerometer"].to_numpy()
-    found = labels[1:][ratio > max(UNSTEADY, APART * usual)]
-    if not len(found) and corrected and usual > UNSTEADY:
+    found = labels[1:][ratio > max(SETTINGS.unsteady, SETTINGS.unsteady_alone * usual)]
+    if not len(found) and corrected and usual > SETTINGS.unsteady:
         found = labels[:1] if len(ratio) > 1 else labels
     if not len(found):
         return []
@@ -95,7 +92,7 @@ def rigid(recording: Recording, places: Places, spread: bool = False) -> dict[st
     ``spread``: of the accelerometers alone.
     """
     moving = kept(recording)
-    if len(moving.time) < FEW:
+    if len(moving.time) < SETTINGS.few_samples:
         return {}
     force, rates = moving.specific_force, moving.angular_rate
     rate, counts = rates.mean(axis=1), (force.shape[1], rates.shape[1])

@@ -6,15 +6,11 @@ import h5py
 import numpy as np
 
 from imuarray.firstorder.correct import FirstOrder
-from imuarray.firstorder.gyroscopes import ODD, shared_chance
+from imuarray.firstorder.gyroscopes import shared_chance
+from imuarray.firstorder.settings import SETTINGS as FIRSTORDER
 from imuarray.model.effects import KINDS
 from imuarray.recording.record import FIRST_ORDER
-
-POSES = 3.0  # times the noise of a pose's mean; real boards have up to 1.9
-BENT = 0.01  # m/s^2, a residual that matters: 0.1 % of gravity
-SMOOTHED = 0.5  # correlation of neighbours; a low pass at a fifth of the sampling rate makes 0.3
-SCALED = 0.03  # of all gyroscopes' common scale: three of its prior's sds
-SEEN = 5e-3  # the same, where the axes' own scales scatter by less; below, sds allow for it
+from imuarray.trust.settings import SETTINGS
 
 
 class Poses(NamedTuple):
@@ -58,7 +54,7 @@ def _poses(ratio: float, residual, used, scale: float, maps, follow) -> Poses:
     ``follow``: of both kinds, the correlation of neighbours in the fastest noise.
     """
     pairs = zip(KINDS, follow, strict=True)
-    smoothed = tuple(kind for kind, own in pairs if np.nanmedian(own) > SMOOTHED)
+    smoothed = tuple(kind for kind, own in pairs if np.nanmedian(own) > SETTINGS.smoothed)
     squares = np.where(used[..., None], residual**2, np.nan)
     worst = np.sqrt(np.nanmax(np.nanmean(np.ascontiguousarray(squares), axis=(0, 2))))
     chance = shared_chance(maps) if scale == scale else 1.0
@@ -68,8 +64,8 @@ def _poses(ratio: float, residual, used, scale: float, maps, follow) -> Poses:
 def reasons_of_poses(*several: Poses) -> list[str]:
     """Why first-order calibrations are not to be trusted: their residual, and the common scale."""
     found = []
-    ratio = max((x.ratio for x in several if not x.residual <= BENT), default=1.0)
-    if ratio > POSES:
+    ratio = max((x.ratio for x in several if not x.residual <= SETTINGS.pose_residual), default=1.0)
+    if ratio > SETTINGS.pose_noise:
         found.append(
             f"the still poses fit {ratio:.2g} times worse than noise and a drift of offsets allow:"
             " the board bent or was not still, an offset jumped, a response is curved (imuarray"
@@ -85,8 +81,10 @@ def reasons_of_poses(*several: Poses) -> list[str]:
             " own rate"
         )
     worst = max(several, key=lambda x: abs(x.scale - 1) if x.scale == x.scale else 0.0)
-    scale, odd = worst.scale, worst.chance < ODD
-    if abs(scale - 1) > SCALED or (odd and abs(scale - 1) > SEEN):
+    scale, odd = worst.scale, worst.chance < FIRSTORDER.odd_scale
+    if abs(scale - 1) > SETTINGS.common_scale or (
+        odd and abs(scale - 1) > SETTINGS.common_scale_seen
+    ):
         off = 100 * abs(1 / scale - 1)
         much, large = ("much", "small") if scale < 1 else ("little", "large")
         found.append(

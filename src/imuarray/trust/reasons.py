@@ -15,24 +15,13 @@ from imuarray.model.effects import EFFECTS, KINDS, Effect
 from imuarray.recording import Recording
 from imuarray.recording.channels import repeated
 from imuarray.trust.checked import effect_names, reasons_in, values_of
-from imuarray.trust.drawing import FAR, Places, another_size, departures, factor_words, size_of
-from imuarray.trust.misfit import RESIDUAL, is_papers, residuals, rigid, unfitting, unsteady
-from imuarray.trust.rigid import COHERENT, FEW, SLOPE, Slope, elsewhere, kept, slope, turning
+from imuarray.trust.drawing import Places, another_size, departures, factor_words, size_of
+from imuarray.trust.misfit import is_papers, residuals, rigid, unfitting, unsteady
+from imuarray.trust.rigid import Slope, elsewhere, kept, slope, turning
+from imuarray.trust.settings import SETTINGS
 from imuarray.trust.suspects import MIRRORED, clipped, common, gravity, wrapped
 
-GROWN = 6.0  # sds of the growth; clean and real boards' is within one
-# s^2, that a filter may droop by more than the other kind's. An accelerometer's makes centrifugal
-# forces those of no rate: 3e-5 (20 Hz) is 3 sds of error; a gyroscope's of 3e-5 is 1.
-DROOPS = 2e-5, 6e-5
-ROOM = 2.5e-3  # m, from an accelerometer's middle; packages are 3 to 5 mm wide
-HOLD = 1e-6  # chance of maps that still poses gave; 0.97 and more of real and clean boards
-TRIAD = 10.0  # the same of one triad where the noise of each is estimated
-DRIFT = 3.0  # sds of the mean of all samples; offsets that differ by more bias positions
-LEARNT = 0.5  # of the drawing's sd: positions known worse are hardly known from the recording
-OTHER = 1.2  # times less residual elsewhere; 1.003 at most for the right board, 2 for another
-SAME = 0.1  # relative difference of rates, up to which they are those of one recording
 UNIT = re.compile(r"\bin \S+ declared ")  # in a reason that names a unit
-SHORT = 60.0  # s
 AS_READ = (
     "the recording is as read, and was corrected as the calibration's own was: offsets that have"
     " changed since are not seen; correct it by three still poses or more of its own (imuarray"
@@ -52,7 +41,7 @@ def reasons_of_calibration(
     several = [recordings] if isinstance(recordings, Recording) else list(recordings)
     found: dict[str, list[str]] = {}
     little: list[str] = []
-    limit = RESIDUAL if is_papers(calibration) else TRIAD
+    limit = SETTINGS.residual if is_papers(calibration) else SETTINGS.triad_residual
     filters = _filters(calibration)
     for number, recording in enumerate(several, 1):
         places = _places_of(recording, calibration)
@@ -83,7 +72,7 @@ def _filters(calibration: xr.Dataset) -> list[str]:
         for start in ("gyroscope_delay delay", "gyroscope_filter droop")
     )
     lower = int(lag < 0)
-    if abs(droop) > DROOPS[lower]:
+    if abs(droop) > SETTINGS.droops[lower]:
         others = f"the {KINDS[1 - lower]}s'"
         return [_low(f"the {KINDS[lower]}s' low pass", float(abs(droop)), others)]
     late, droops = (values_of(calibration, f"accelerometer_filter {x}") for x in ("lag", "droop"))
@@ -94,7 +83,7 @@ def _filters(calibration: xr.Dataset) -> list[str]:
     usual = np.median([*each.values()] or 0.0)
     return [
         _low(f"the low pass of accelerometer {k}", float(x - usual), "the others'")
-        for k, x in each.items() if x - usual > DROOPS[0]
+        for k, x in each.items() if x - usual > SETTINGS.droops[0]
     ]  # fmt: skip
 
 
@@ -102,7 +91,7 @@ def _arms(calibration: xr.Dataset) -> list[str]:
     """Words on lever arms that no chip has room for: another error was taken for one."""
     arms = values_of(calibration, "size_effect ")
     worst = max(arms, key=lambda name: abs(arms[name]), default="")
-    if not worst or abs(arms[worst]) < ROOM:
+    if not worst or abs(arms[worst]) < SETTINGS.package:
         return []
     axis, _, label = worst.partition("_")
     return [
@@ -126,14 +115,14 @@ def _moved_maps(calibration: xr.Dataset) -> list[str]:
         " not hold while the board is twisted: did it turn or come loose in between, or does its"
         " scale change with the rate, the force or the warmth, or is its filter another one? Record"
         " again, poses before and after"
-        for kind in KINDS if calibration.attrs.get(f"{kind}_maps_hold", 1.0) < HOLD
+        for kind in KINDS if calibration.attrs.get(f"{kind}_maps_hold", 1.0) < SETTINGS.maps_chance
     ]  # fmt: skip
 
 
 def _grows(calibration: xr.Dataset) -> list[str]:
     """Words on an array that does not keep its size: its accelerometers do not move."""
     growth, sd = (calibration.attrs.get(f"size_growth{name}", 0.0) for name in ("", "_sd"))
-    if not abs(growth) > GROWN * sd:
+    if not abs(growth) > SETTINGS.growth * sd:
         return []
     grows, change = ("grows", "fall") if growth > 0 else ("shrinks", "rise")
     return [
@@ -149,7 +138,7 @@ def _drifts(recording: Recording) -> list[str]:
     walk = float(recording.correction["accelerometer_offset_walk"].max())
     time = recording.time[~recording.still()]
     far = walk * np.sqrt(np.mean(np.abs(time - np.median(time)))) if len(time) else 0.0
-    if not far > DRIFT * recording.accelerometer_noise_sd / np.sqrt(max(len(time), 1)):
+    if not far > SETTINGS.drift * recording.accelerometer_noise_sd / np.sqrt(max(len(time), 1)):
         return []
     return [
         f"accelerometers' offsets drift by some {far:.2g} m/s^2 between the samples, and this model"
@@ -223,7 +212,10 @@ def _not_converged(attrs) -> list[str]:
 
 
 def _judged(
-    recording: Recording, places: Places, residual: dict[str, float], limit: float = RESIDUAL
+    recording: Recording,
+    places: Places,
+    residual: dict[str, float],
+    limit: float = SETTINGS.residual,
 ) -> list[str]:
     """All tests; where a sensor does not fit the others, its place is no matter.
 
@@ -231,7 +223,7 @@ def _judged(
     """
     moving = kept(recording)
     found = repeated(recording) + gravity(recording)
-    if len(moving.time) < FEW:
+    if len(moving.time) < SETTINGS.few_samples:
         return found + _drawn(places, None)
     found += clipped(moving) + wrapped(moving)
     alike = another_size(places) or common(moving)
@@ -250,7 +242,9 @@ def _drawn(places: Places, course: Slope | None) -> list[str]:
     if course is None:
         said = [departures(places)]
     else:
-        hand = 0 if abs(course.correlation) < COHERENT else int(np.sign(course.correlation))
+        hand = (
+            0 if abs(course.correlation) < SETTINGS.coherent else int(np.sign(course.correlation))
+        )
         change = _turning_words(course, places) if course.off else None
         said = [departures(places._replace(hand=hand)), change]
     return [sentence for sentence in said if sentence]
@@ -267,10 +261,10 @@ def _little(recording: Recording, places: Places) -> list[str]:
     bound = recording.accelerometer_noise_sd / np.sqrt(max(np.sum(speed**4), 1e-300))
     size, prior = 3 * (len(places.found) - 1), places.prior_sd
     rms = max(np.sqrt(np.trace(places.covariance) / size), bound)
-    if rms < LEARNT * prior:
+    if rms < SETTINGS.learnt * prior:
         return []
     seconds, more = float(np.ptp(recording.time)), "turn the array faster, and about all axes"
-    if seconds < SHORT:
+    if seconds < SETTINGS.short:
         more = f"{seconds:.2g} s are too short: record a dozen still poses and a minute of twisting"
     return [
         f"the recording says little of the positions: they are known to {1e3 * rms:.2g} mm by it,"
@@ -280,10 +274,10 @@ def _little(recording: Recording, places: Places) -> list[str]:
 
 def _elsewhere(moving: Recording, places: Places) -> list[str]:
     """One sentence where a recording that is not calibrated anew fits other positions better."""
-    if len(moving.time) < FEW:
+    if len(moving.time) < SETTINGS.few_samples:
         return []
     ratio, distance = elsewhere(moving, places.found)
-    if ratio < OTHER:
+    if ratio < SETTINGS.better_elsewhere:
         return []
     return [
         f"this recording fits positions {1e3 * distance:.2g} mm rms from the calibration's better,"
@@ -311,11 +305,14 @@ def _is_of(recording: Recording, calibration: xr.Dataset) -> bool:
         return False
     time = calibration["time"].to_numpy()
     inside = (time >= recording.time[0]) & (time <= recording.time[-1])
-    if inside.sum() < min(FEW, len(recording.time)):
+    if inside.sum() < min(SETTINGS.few_samples, len(recording.time)):
         return False
     rate, there = np.median(recording.angular_rate, axis=1), calibration["angular_rate"].to_numpy()
     here = np.stack([np.interp(time[inside], recording.time, axis) for axis in rate.T], axis=1)
-    return bool(np.median(np.abs(here - there[inside])) < SAME * np.median(np.abs(there[inside])))
+    return bool(
+        np.median(np.abs(here - there[inside]))
+        < SETTINGS.same_rate * np.median(np.abs(there[inside]))
+    )
 
 
 def _looks_at_time(effect: Effect) -> bool:
@@ -330,11 +327,11 @@ def _turning_words(course: Slope, places: Places) -> str:
     value = course.low if course.low > 1 else course.high
     size, sd = size_of(places)
     causes = []
-    if abs(size - value**2) < FAR * sd:
+    if abs(size - value**2) < SETTINGS.far * sd:
         causes.append(f"gyroscopes {factor_words(1 / value)}")
-    if abs(1000 * value - 1) < FAR * SLOPE:
+    if abs(1000 * value - 1) < SETTINGS.far * SETTINGS.slope:
         causes.append("time in ms declared s")
-    elif abs(size - 1) < FAR * sd or not causes:
+    elif abs(size - 1) < SETTINGS.far * sd or not causes:
         causes.append(f"steps of time {factor_words(1 / value)}")
     return (
         f"the rates change {value:.4g} times as fast as the accelerometers' angular acceleration"

@@ -10,16 +10,8 @@ import numpy as np
 
 from imuarray.motion.state import lever
 from imuarray.recording import Recording
+from imuarray.trust.settings import SETTINGS
 
-KNOWN = 0.03  # of the array's largest moment: turning about an axis with less is not seen
-STEP = 0.1  # share of the usual step by which stamps of neighbours may differ from it
-MOVES = 9
-FEW = 20  # samples, that anything is said of
-MOST, STRETCH = 20_000, 500  # samples that are looked at, in a row
-FEWEST = 60  # pairs of neighbouring samples
-COHERENT = 0.9  # correlation below which the samples are no course of one smooth motion
-SLOPE = 0.015  # gyroscopes' filters and scales make less
-COARSE = 3 * 11 / 720 * 144  # three times a single wave's: several have more of the fast ones
 # of the integral over the middle one of three intervals: exact for cubics
 WEIGHTS = np.array([-1.0, 13.0, 13.0, -1.0]) / 24
 
@@ -46,8 +38,8 @@ def turning(force, rate, positions) -> Turning:
     mean = left.mean(axis=1)
     moment = np.sum(arms**2) * np.eye(3) - arms.T @ arms
     sizes, axes = np.linalg.eigh(moment)
-    seen = axes[:, sizes > KNOWN * sizes[-1]]
-    inverse = seen @ np.diag(1 / sizes[sizes > KNOWN * sizes[-1]]) @ seen.T
+    seen = axes[:, sizes > SETTINGS.known_axis * sizes[-1]]
+    inverse = seen @ np.diag(1 / sizes[sizes > SETTINGS.known_axis * sizes[-1]]) @ seen.T
     turn = np.cross(arms, left - mean[:, None]).sum(axis=1) @ inverse
     at_origin = mean - np.cross(rate, np.cross(rate, middle)) - np.cross(turn, middle)
     return Turning(rate, turn, at_origin, seen @ seen.T)
@@ -59,7 +51,7 @@ def runs(time) -> np.ndarray:
         return np.empty(0, int)
     steps = np.diff(time)
     usual = np.quantile(steps, 0.1)  # of a selection, many steps are longer
-    even = np.abs(steps - usual) < STEP * usual
+    even = np.abs(steps - usual) < SETTINGS.step_spread * usual
     return np.flatnonzero(even[:-2] & even[1:-1] & even[2:])
 
 
@@ -79,9 +71,9 @@ class Slope(NamedTuple):
     @property
     def off(self) -> bool:
         """True where no errors of measurement explain that it is not 1."""
-        if self.correlation < COHERENT:
-            return self.correlation < -COHERENT
-        margin = SLOPE + 5 * self.sd + self.coarse
+        if self.correlation < SETTINGS.coherent:
+            return self.correlation < -SETTINGS.coherent
+        margin = SETTINGS.slope + 5 * self.sd + self.coarse
         return self.high < 1 - margin or self.low > 1 + margin
 
 
@@ -92,7 +84,7 @@ def slope(time, motion: Turning) -> Slope | None:
     filters. None where there are too few pairs.
     """
     first = runs(time)
-    if len(first) < FEWEST:
+    if len(first) < SETTINGS.fewest_pairs:
         return None
     four = first[:, None] + np.arange(4)
     turn = motion.acceleration[four]
@@ -116,7 +108,7 @@ def slope(time, motion: Turning) -> Slope | None:
     correlation = xy / np.sqrt(xx * yy)
     sd = np.sqrt(np.sum((y - forward * x) ** 2) / xx / calm.sum())
     low, high = sorted((float(forward), float(reverse)))
-    return Slope(low, high, float(sd), float(correlation), float(COARSE * rough))
+    return Slope(low, high, float(sd), float(correlation), float(SETTINGS.coarse * rough))
 
 
 def elsewhere(recording: Recording, positions) -> tuple[float, float]:
@@ -127,7 +119,7 @@ def elsewhere(recording: Recording, positions) -> tuple[float, float]:
     force, places = recording.specific_force, np.array(positions)
     rate = np.median(recording.angular_rate, axis=1)
     left = []
-    for _ in range(MOVES):
+    for _ in range(SETTINGS.moves):
         motion = turning(force, rate, places)
         off = force - motion.at(places)
         left.append(np.sqrt(np.mean(off**2)))
@@ -142,7 +134,7 @@ def kept(recording: Recording) -> Recording:
     """Moving samples off the rails; of a long recording, stretches spread over it."""
     lost = recording.at_rail("accelerometer") | recording.at_rail("gyroscope")
     index = np.flatnonzero(~(lost | recording.still()))
-    if len(index) > MOST:
-        stretches = np.array_split(index, len(index) // STRETCH)
-        index = np.concatenate(stretches[:: -(-len(index) // MOST)])
+    if len(index) > SETTINGS.most_samples:
+        stretches = np.array_split(index, len(index) // SETTINGS.stretch)
+        index = np.concatenate(stretches[:: -(-len(index) // SETTINGS.most_samples)])
     return recording.select(index).in_memory()

@@ -15,16 +15,10 @@ from imuarray.recording import Recording
 from imuarray.recording.record import few
 from imuarray.recording.units import GRAVITY
 from imuarray.trust.drawing import DEGREE, angle_words
-from imuarray.trust.rigid import COHERENT, FEWEST, runs, slope, turning
+from imuarray.trust.rigid import runs, slope, turning
+from imuarray.trust.settings import SETTINGS
 
-FAR = 4.0  # times the median triad's error, and the declared noise
-TAKEN = 0.35  # of the error must be left at most
 LAGS = range(-3, 4)  # samples
-LEAST_LAG = 0.3  # samples
-STILL = 0.05  # of gravity; raw accelerometers are off by some per cent
-JUMP, TWICE = 1.6, 3  # of the largest reading, a jump that is a wrap; how many are no chance
-ENDS, NEXT = 10, 5  # readings at a channel's end, and times those at the values next to it
-ALIKE = 9  # decimals to which equal readings are equal again when a correction is undone
 
 
 def suspects(recording: Recording) -> list[str]:
@@ -90,7 +84,7 @@ def _search(readings, others, labels, sd, chain, rise=None) -> list[tuple[str, s
         worst = left[np.argmax(error[left])]
         rest = np.setdiff1d(left, [worst])
         without = np.sqrt(np.mean((readings - others(rest)) ** 2, axis=(0, 2)))[rest]
-        if error[worst] < FAR * max(np.median(without), sd):
+        if error[worst] < SETTINGS.far_triad * max(np.median(without), sd):
             return found
         words = explain(readings[:, worst], expected[:, worst], chain, rise)
         found.append((labels[worst], words))
@@ -108,14 +102,14 @@ def explain(readings, expected, chain, rise=None) -> str:
     tries = [_axes(readings, expected), _turned(readings, expected), *_scaled(readings, expected)]
     # four samples on either side
     middle = chain[np.isin(chain - 4, chain) & np.isin(chain + 1, chain)]
-    if len(middle) > FEWEST:
+    if len(middle) > SETTINGS.fewest_pairs:
         tries.append(_late(readings, expected, middle))
     if rise is not None:
         seconds = -np.sum((readings - expected) * rise) / max(np.sum(rise**2), 1e-300)
         said = f"is {1e3 * abs(seconds):.2g} ms {'late' if seconds > 0 else 'early'}"
         tries.append((_rms(readings - expected + seconds * rise), said))
     left, words = min(tries)
-    return words if left < TAKEN * before else ""
+    return words if left < SETTINGS.suspect_left * before else ""
 
 
 def _rms(values) -> float:
@@ -161,7 +155,7 @@ def _late(readings, expected, middle) -> tuple[float, str]:
         off = readings[middle] - expected[then]
         part = -np.sum(off * rise) / max(np.sum(rise**2), 1e-300)
         samples = lag + part
-        if abs(part) > 0.6 or abs(samples) < LEAST_LAG:
+        if abs(part) > 0.6 or abs(samples) < SETTINGS.least_lag:
             continue
         size, word = round(abs(samples), 1), "late" if samples > 0 else "early"
         said = f"is {size:g} sample{'' if size == 1 else 's'} {word}"
@@ -177,7 +171,6 @@ WRONG_SIGN = (
     "specific force of the wrong sign (gravity's instead of minus gravity's), or a flat board's"
     " axes turned by 180 degrees"
 )
-LIKE = 0.1  # of one: a slope that a factor makes so is right
 FACTORS = (  # of time, force, rates, positions, to undo a mistake
     ((1, 1, DEGREE, 1), "all rates are 57.3 times too small: in rad/s declared deg/s"),
     ((1, 1, 1 / DEGREE, 1), "all rates are 57.3 times too large: in deg/s declared rad/s"),
@@ -203,16 +196,16 @@ def common(recording: Recording) -> str:
             force * recording.specific_force, rate * rates, places * recording.relative_positions()
         )
         found = slope(time * recording.time, motion)
-        if found is None or found.correlation < COHERENT:
+        if found is None or found.correlation < SETTINGS.coherent:
             return np.inf
         return max(abs(found.low - 1), abs(found.high - 1)) - found.coarse
 
-    if misfit(1, 1, 1, 1) < LIKE:
+    if misfit(1, 1, 1, 1) < SETTINGS.slope_within:
         return ""
     tried = [(misfit(*factors), words) for factors, words in FACTORS]
     tried += [(misfit(1, 1, signs, 1), _wrong_signs(signs)) for signs in SIGNS]
     least, words = min(tried)
-    return f"{words}?" if least < LIKE else ""
+    return f"{words}?" if least < SETTINGS.slope_within else ""
 
 
 def _wrong_signs(signs) -> str:
@@ -239,9 +232,9 @@ def gravity(recording: Recording) -> list[str]:
         return []
     force = recording.specific_force[few(np.flatnonzero(still))]
     size = float(np.median(np.linalg.norm(force, axis=2)))
-    if abs(size / GRAVITY - 1) < STILL:
+    if abs(size / GRAVITY - 1) < SETTINGS.gravity_within:
         return []
-    unit = ": in g declared m/s^2?" if abs(size - 1) < STILL else ""
+    unit = ": in g declared m/s^2?" if abs(size - 1) < SETTINGS.gravity_within else ""
     return [f"specific force in the still poses is {size:.4g} m/s^2, gravity {GRAVITY:.4g}{unit}"]
 
 
@@ -266,8 +259,11 @@ def wrapped(recording: Recording) -> list[str]:
     near = step < 1.5 * np.median(step) if len(step) else step > 0
     jump, end = np.abs(np.diff(rates, axis=0)), np.abs(rates).max(axis=0)
     around = np.pad(jump, ((1, 1), (0, 0), (0, 0)))
-    alone = np.maximum(around[:-2], around[2:]) < (2 - JUMP) * end
-    wraps = np.sum(near[:, None, None] & (jump > JUMP * end) & alone, axis=0) >= TWICE
+    alone = np.maximum(around[:-2], around[2:]) < (2 - SETTINGS.wrap_jump) * end
+    wraps = (
+        np.sum(near[:, None, None] & (jump > SETTINGS.wrap_jump * end) & alone, axis=0)
+        >= SETTINGS.least_wraps
+    )
     if not wraps.any():
         return []
     labels = zip(recording.gyroscope_labels, wraps, strict=True)
@@ -285,15 +281,19 @@ def _as_read(recording: Recording, kind: str) -> np.ndarray:
         return values
     inverse, offset = (recording.correction[f"{kind}_{name}"] for name in ("inverse", "offset"))
     raw = np.einsum("kij,tkj->tki", np.linalg.inv(inverse), values) + offset.to_numpy()
-    return np.round(raw, ALIKE)
+    return np.round(raw, SETTINGS.decimals)
 
 
 def ends(channel) -> list[float]:
     """Extreme values at which far more readings are than at the values next to them."""
     values, counts = np.unique(channel, return_counts=True)
-    if len(values) < 4 * NEXT:
+    if len(values) < 4 * SETTINGS.end_ratio:
         return []
-    sides = (values[0], counts[: NEXT + 1]), (values[-1], counts[::-1][: NEXT + 1])
+    sides = (
+        (values[0], counts[: SETTINGS.end_ratio + 1]),
+        (values[-1], counts[::-1][: SETTINGS.end_ratio + 1]),
+    )
+    least = SETTINGS.end_readings
     return [
-        float(end) for end, near in sides if near[0] >= max(ENDS, NEXT * near[1:].max())
+        float(end) for end, near in sides if near[0] >= max(least, SETTINGS.end_ratio * near[1:].max())
     ]  # fmt: skip
