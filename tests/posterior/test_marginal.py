@@ -1,5 +1,7 @@
 """The marginal likelihood without Monte Carlo noise, against quadrature, sampling and itself."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -220,7 +222,8 @@ def test_laplace_of_the_generic_likelihood(monkeypatch):
     jax.clear_caches()
     error = np.std(values, ddof=1) / np.sqrt(8)
     assert whole == pytest.approx(np.mean(values), abs=5 * error + 1e-3)
-    monkeypatch.setattr(generic_likelihood, "CHUNK", 2)
+    small = replace(generic_likelihood.SETTINGS, chunk=2)
+    monkeypatch.setattr(generic_likelihood, "SETTINGS", small)
     both = jax.jit(jax.value_and_grad(generic.log_density))
     value, slope = both(p)
     assert float(value) == pytest.approx(whole, abs=1e-8)

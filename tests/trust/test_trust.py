@@ -507,7 +507,7 @@ def test_a_map_that_does_not_hold_while_twisting_is_named(sound):
     count = len(sound.accelerometer_labels)
     sound = replace(sound, map_covariance=1e-8 * np.eye(9 * count))
     found = imuarray.calibrate(sound)
-    assert found.attrs["accelerometer_maps_hold"] > doubts.HOLD
+    assert found.attrs["accelerometer_maps_hold"] > SETTINGS.maps_chance
     assert doubts._moved_maps(found) == []
     turn = Rotation.from_rotvec([0, 0, np.radians(1.0)]).as_matrix()
     force = sound.specific_force.copy()

@@ -12,13 +12,14 @@ with job(snakemake) as settings:
     from imuarray_papers.config import model_from, motion_sds
     from imuarray_papers.studies import bound
     from imuarray_papers.studies.position_error import magnitudes
+    from imuarray_papers.studies.settings import SETTINGS
 
     paper, theory, scale = settings["paper2017"], settings["theory"], settings["scale"]
     model, seed, sizes = model_from(settings), settings["seed"], magnitudes(paper)
     threads, repeats = snakemake.threads, scale["theory_repeats"]
     options = {
         "position_sd": paper["position_sd"], "rail": np.radians(paper["gyroscope_range_dps"]),
-        "realisations": scale["theory_realisations"], "limit": bound.BCD_LIMIT,
+        "realisations": scale["theory_realisations"], "limit": SETTINGS.bcd_limit,
     }  # fmt: skip
 
     def efficiency():

@@ -7,7 +7,8 @@ with job(snakemake) as settings:
 
     from imuarray.analysis.sampling import sample
     from imuarray.provenance import write_csv
-    from imuarray_papers.studies.sbc import METHODS, ML_MORE, pit_values, pit_values_by_default
+    from imuarray_papers.studies.sbc import METHODS, pit_values, pit_values_by_default
+    from imuarray_papers.studies.settings import SETTINGS as STUDIES
     from imuarray_papers.studies.truths import setting_from, share
 
     chosen = snakemake.wildcards
@@ -20,7 +21,7 @@ with job(snakemake) as settings:
         table = pit_values_by_default(setting, few, sample, threads)
     else:
         samplers = [method for method in METHODS if method != "ML"]
-        many = share(range(ML_MORE * count), *place)
+        many = share(range(STUDIES.ml_more * count), *place)
         table = pd.concat(
             [
                 pit_values(setting, many, threads, ["ML"]),

@@ -7,6 +7,7 @@ from pathlib import Path
 from imuarray.analysis.logs import open_logs
 from imuarray.analysis.model import Say, silent
 from imuarray.analysis.sensors import calibrate_sensors
+from imuarray.analysis.settings import SETTINGS
 from imuarray.errors import IdentifiabilityError, InputError, require
 from imuarray.firstorder.correct import FirstOrder, calibrate_first_order, correct
 from imuarray.firstorder.still import still_poses
@@ -15,8 +16,6 @@ from imuarray.recording.units import GRAVITY
 from imuarray.recording.validate import check_values
 from imuarray.report.board import Board
 from imuarray.trust import of_first_order, reasons_of_calibration, reasons_of_poses
-
-FEWEST = 3  # samples
 
 
 def board(
@@ -36,7 +35,7 @@ def board(
     other = "one that is corrected: imuarray calibrate takes that"
     require(recording.correction is None, source, "a log, or a recording as read", other)
     samples, count = len(recording.time), len(recording.accelerometer_labels)
-    require(samples >= FEWEST, source, f"at least {FEWEST} samples", samples)
+    require(samples >= SETTINGS.fewest, source, f"at least {SETTINGS.fewest} samples", samples)
     say(f"{samples} samples of {count} IMUs; each sensor from still poses")
     found = _first_order(recording, gravity)
     corrected = recording

@@ -17,6 +17,7 @@ from imuarray.analysis.noise import (
     noise_estimate,
     noise_of,
 )
+from imuarray.analysis.settings import SETTINGS
 from imuarray.engine.dataset import effects_of, parameters_of, places_among
 from imuarray.engine.estimate import Estimate
 from imuarray.engine.fit import flat_parameters
@@ -35,13 +36,9 @@ from imuarray.posterior.prior import GaussianPrior, TiedPrior
 from imuarray.recording import Recording
 from imuarray.streams import stream
 
-GAP = 0.05  # nats in total, nearly the same at all positions: finer nodes would cost 27 times
 NOT_CONVERGED = (
     "the search for the posterior's mode did not converge; chains start from where it ended"
 )
-WIDE = 3.0  # prior sd of the log of a noise's sd, and of the motion's: a factor of twenty
-HELD = 1e-3  # of its prior's sd: the sd of a parameter that the estimate does not free
-FEW, STARTS = 50, 8  # samples; searches for the mode where there are no more
 
 
 class Posterior(NamedTuple):
@@ -85,7 +82,7 @@ def posterior_of(
     return Posterior(
         recording, chosen,
         GaussianPrior(
-            np.append(prior.mean, before), np.append(prior.sd, np.full(sum(free), WIDE))
+            np.append(prior.mean, before), np.append(prior.sd, np.full(sum(free), SETTINGS.wide))
         ),
         np.concatenate([found.positions[1:].ravel(), np.zeros(sum(free))]),
         block_diag(found.covariance, np.diag(0.5 / np.maximum(freedom, 1.0))),
@@ -107,8 +104,8 @@ def posterior_beyond(recording: Recording, found: Estimate) -> Posterior:
     model = _model(recording, found, readings, seen.motion_sd)
     prior = prior_of(recording, model)
     mode = np.concatenate([found.positions[1:].ravel(), parameters_of(found, model)])
-    mean, spread = mode.copy(), np.diag((HELD * prior.sd) ** 2)
-    mean[place], root = prior.mean[place], np.diag(1.0 / (HELD * prior.sd))
+    mean, spread = mode.copy(), np.diag((SETTINGS.held * prior.sd) ** 2)
+    mean[place], root = prior.mean[place], np.diag(1.0 / (SETTINGS.held * prior.sd))
     root[np.ix_(place, place)] = np.linalg.cholesky(precision).T
     spread[np.ix_(place, place)] = inverse
     own, number = np.log(seen.motion_sd / model.motion_sd), seen.freedom.sum(axis=0)
@@ -119,7 +116,9 @@ def posterior_beyond(recording: Recording, found: Estimate) -> Posterior:
         motion = np.hstack([motion, *one.state.jerk])
     return Posterior(
         recording, model,
-        TiedPrior.of(np.append(mean, before), block_diag(root, np.eye(len(SCALES)) / WIDE)),
+        TiedPrior.of(
+            np.append(mean, before), block_diag(root, np.eye(len(SCALES)) / SETTINGS.wide)
+        ),
         np.concatenate([mode, [0.0, 0.0], own]),
         block_diag(spread, np.diag(0.5 / np.maximum(freedom, 1.0))), SCALES, motion, readings,
         found.converged,
@@ -213,9 +212,9 @@ def mode_search(recording: Recording) -> Callable:
 
     def fit(model):
         found = search(model, last[0] if last else None)
-        if not last and len(recording.time) <= FEW:
+        if not last and len(recording.time) <= SETTINGS.few:
             rng = stream(0, "sample", "mode")
-            for _ in range(STARTS):
+            for _ in range(SETTINGS.starts):
                 off = recording.position_prior_sd * rng.standard_normal(found.positions.shape)
                 with suppress(IdentifiabilityError):  # it ran to triads on one line
                     other = search(model, model.array.relative + off)
@@ -255,9 +254,9 @@ def traced(posterior: Posterior, say: Say = silent):
     size = 3 * (posterior.model.array.accelerometers - 1)
     found = Marginal.of(
         collapsed, positions_of(posterior.mode[:size]), motion_sd=posterior.model.motion_sd[:2],
-        spread=(apart, saturated.size - saturated.sum()), enough=GAP,
+        spread=(apart, saturated.size - saturated.sum()), enough=SETTINGS.node_gap,
     )  # fmt: skip
-    if found.gap > GAP:
+    if found.gap > SETTINGS.node_gap:
         say("gyroscopes that see little of the motion: the likelihood is good to"
             f" {found.gap:.1g} nats only")  # fmt: skip
     return log_posterior, (

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from imuarray.analysis.settings import SETTINGS
 from imuarray.errors import InputError, require
 from imuarray.firstorder.rails import rails_shown
 from imuarray.recording import Recording, read_recording
@@ -21,11 +22,6 @@ from imuarray.trust import ends
 
 RECORDINGS = (".nc", ".nc4", ".h5")
 PACKETS = (".bin", ".bin.xz")
-GRAVITY_WITHIN = 0.1  # of 1 (g) or of 1000 (mg), by which most readings' size is told
-SURE = 0.8  # of the rates' roughness is left at even instants; a motion too slow shows nothing
-RARE = 0.05  # of the rows: more are no garbage
-SPIKE = 60.0  # times what a triad usually departs from its neighbours in time, or its noise
-LARGE = 0.5  # of the largest reading, from which an abrupt end is a rail and no rest
 
 
 class Opened(NamedTuple):
@@ -153,7 +149,7 @@ def _sampled(recording: Recording, lines: list[str]) -> Opened:
     more = cleaned + more
     if len(recording.time) < ALIGNMENT.shortest:
         return Opened(recording, [*lines, *more])
-    time, off = steadied(recording.time, recording.angular_rate.mean(axis=1), SURE)
+    time, off = steadied(recording.time, recording.angular_rate.mean(axis=1), SETTINGS.sure)
     if off > ALIGNMENT.jitter:
         recording = replace(recording, time=time)
         more.append(
@@ -168,13 +164,13 @@ def _less_garbage(recording: Recording) -> tuple[Recording, list[str]]:
     lines: list[str] = []
     changed: dict[str, Any] = {}
     empty = ~(recording.specific_force.any(axis=(1, 2)) | recording.angular_rate.any(axis=(1, 2)))
-    if 0 < empty.sum() < RARE * empty.size:
+    if 0 < empty.sum() < SETTINGS.rare * empty.size:
         recording = recording.select(~empty)
         lines.append(f"{empty.sum()} rows of zeros left out")
     for kind, name in KINDS.items():
         values = getattr(recording, name)
         spikes = _spikes(values, getattr(recording, f"{kind}_noise_sd"))
-        if not 0 < spikes.sum() < RARE * len(values):
+        if not 0 < spikes.sum() < SETTINGS.rare * len(values):
             continue
         t, k = np.nonzero(spikes)
         values = values.copy()
@@ -202,7 +198,7 @@ def _spikes(values, noise: float) -> np.ndarray:
     halves = [np.sum(bend[1:-1] * part, axis=2) / square for part in (bend[:-2], bend[2:])]
     alone = np.all([(part > -0.8) & (part < -0.2) for part in halves], axis=0)
     largest = size == size.max(axis=1, keepdims=True)
-    found[2:-2] = ((size > SPIKE) & largest)[1:-1] & alone
+    found[2:-2] = ((size > SETTINGS.spike) & largest)[1:-1] & alone
     return found
 
 
@@ -234,7 +230,7 @@ def _require_gravity(log: Log) -> None:
     for unit, gravity in (("g", 1.0), ("mg", 1000.0)):
         other = f"are they in {unit}, and the rates in deg/s? State each unit in the YAML"
         require(
-            not abs(usual / gravity - 1) < GRAVITY_WITHIN, f"accelerometer {log.label!r}",
+            not abs(usual / gravity - 1) < SETTINGS.gravity_within, f"accelerometer {log.label!r}",
             f"some {GRAVITY:.2g} m/s^2 of gravity", f"{usual:.3g}: {other}",
         )  # fmt: skip
 
@@ -275,7 +271,9 @@ def _railed_triads(recording: Recording) -> tuple[Recording, list[str]]:
 def _rail(values, limit: float, largest: float) -> float:
     """The range that a triad's readings (T, 3) show, or that declared; rests are no rails."""
     found = [abs(end) for axis in values.T for end in ends(axis)]
-    return min((end for end in found if LARGE * largest < end < RAIL * limit), default=limit)
+    return min(
+        (end for end in found if SETTINGS.large * largest < end < RAIL * limit), default=limit
+    )
 
 
 def _clipped(whose: str, kind: str, rail: float, limit: float) -> str:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.analysis.model import Say, silent
+from imuarray.analysis.settings import SETTINGS
 from imuarray.engine.derivatives import no_derivatives
 from imuarray.engine.fit import pick
 from imuarray.engine.linearise import CHUNK, State, chunk_at
@@ -14,10 +15,6 @@ from imuarray.engine.readings import Readings, measured
 from imuarray.estimation.identifiability import Calibration
 from imuarray.model import ArrayModel, Noise
 from imuarray.recording import Recording
-
-ROUNDS, ENOUGH = 6, 0.02  # of fit and noise by turns; change of all sds that ends them
-FREEDOM = 200.0  # degrees that a triad's own noise takes, 5 % of its sd; with fewer they share one
-APART = (4, 3)  # accelerometers, gyroscopes: fewer cannot be told apart, either
 
 
 class Fitted(NamedTuple):
@@ -84,7 +81,7 @@ def factors(seen: NoiseEstimate, exists, known: bool = False) -> np.ndarray:
     for kind in (1,) if known else (0, 1):
         own = exists[:, kind]
         squares, freedom = seen.squares[own, kind], seen.freedom[own, kind]
-        if len(squares) < APART[kind] or freedom.min() < FREEDOM:
+        if len(squares) < SETTINGS.apart[kind] or freedom.min() < SETTINGS.freedom:
             squares, freedom = squares.sum(), freedom.sum()
         if np.all(freedom >= 1):
             out[own, kind] = np.sqrt(np.maximum(squares / freedom, 1e-12))
@@ -116,16 +113,16 @@ def estimated_noise(
     readings = measured(
         model, recording.specific_force, recording.angular_rate, recording.saturated_gyroscopes()
     )
-    for number in range(ROUNDS + 1):
+    for number in range(SETTINGS.rounds + 1):
         found = fit(model)
         motion = np.hstack(found.motion.motion[:3])
         rest = no_derivatives(len(motion), len(found.positions))
         state = State(motion, found.positions, np.empty(0), rest)
         seen = noise_estimate(readings, columns, state, columns.owner, found.covariance)
         wrong = factors(seen, readings.exists, known)
-        if np.abs(np.log(wrong)).max() < ENOUGH:
+        if np.abs(np.log(wrong)).max() < SETTINGS.enough:
             break
-        if number == ROUNDS:
+        if number == SETTINGS.rounds:
             say("the estimates of noise and positions did not settle; the last ones are taken")
             break
         readings = readings.with_sd(readings.sd * wrong)

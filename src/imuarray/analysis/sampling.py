@@ -18,6 +18,7 @@ from imuarray.analysis.density import (
 )
 from imuarray.analysis.model import Say, assumed, require_together, silent, usable
 from imuarray.analysis.sensors import fitted_beyond
+from imuarray.analysis.settings import SETTINGS
 from imuarray.engine.dataset import effects_of
 from imuarray.engine.parameters import model_of
 from imuarray.errors import require_integer, require_one_of
@@ -36,8 +37,6 @@ from imuarray.streams import stream
 
 # 1000 left the worst of 93 R-hats above 1.01 now and then; with effects a step costs ten times more
 NUTS_STEPS, NUTS_WARMUP = (1250, 750), 300
-APART = 2.0  # posterior sds by which the starts differ
-FEW = 400  # effective draws; fewer tell neither quantiles nor R-hat (Vehtari and others, 2021)
 
 
 def sample(
@@ -125,7 +124,7 @@ def _exact(
     steps = steps or NUTS_STEPS[bool(posterior.model.effects)]
     # two starts some posterior sds from the mode: far away there are modes of others' own
     rng = stream(seed, "sample", "starts")
-    starts = rng.multivariate_normal(mode, APART**2 * posterior.covariance, size=2)
+    starts = rng.multivariate_normal(mode, SETTINGS.starts_apart**2 * posterior.covariance, size=2)
     chains = run_nuts(
         log_density, mode, posterior.covariance, starts, NUTS_WARMUP, steps, seed, quiet=quiet,
         data=data,
@@ -171,7 +170,7 @@ def tree_of(
     attrs: dict[str, Any] = {**stamp({"recording": key}, seed)}
     kept = "burn_in_draws", "burn_in_steps", "steps", "rhat_max", "ess_min"
     attrs |= {name: verdict[name] for name in kept} | more
-    sound = verdict["converged"] and verdict["ess_min"] >= FEW and not short
+    sound = verdict["converged"] and verdict["ess_min"] >= SETTINGS.few_effective and not short
     attrs |= {"converged": int(sound), "divergent": chains.divergent, **_noise(model)}
     unit = dict(zip(SCALES, [*_noise(model).values(), *model.motion_sd], strict=True))
     sds = {name: unit[name] for name in posterior.scales}

@@ -273,7 +273,7 @@ def _left(found: Estimate) -> list[tuple[np.ndarray, np.ndarray]]:
         if mask.any():
             own = every if EFFECTS[names[0]].own else every[:1]
             spread = block_diag(*(widths.spread_of(left, found.columns, mask) for left in own))
-            out.append((mask, spread + widths.FIXED**2 * np.eye(len(spread))))
+            out.append((mask, spread + SETTINGS.fixed_map**2 * np.eye(len(spread))))
     return out
 
 

@@ -237,7 +237,8 @@ def _quiet(recording: Recording, width: int) -> np.ndarray:
             raise InputError(
                 f"recording: expected still poses for the first-order calibration, found {name}"
                 f" to vary by {floor:.3g} in its quietest second, more than {SETTINGS.moving:g}"
-                f" times the declared noise of {declared:.3g}; was it never still, or is the unit wrong?"
+                f" times the declared noise of {declared:.3g}; was it never still,"
+                f" or is the unit wrong?"
             )
         still &= spread <= SETTINGS.threshold * max(
             floor, 0.1 * declared / np.sqrt(readings.shape[1])

@@ -114,7 +114,7 @@ def _read(path: Path) -> tuple[pd.DataFrame, dict[str, str]]:
     """
     with expecting(path, "a CSV file with a header", (OSError, ValueError)):
         with open(path, encoding=written.encoding_of(path), errors="replace") as file:
-            lines = [line.rstrip("\n") for line in islice(file, written.HEAD)]
+            lines = [line.rstrip("\n") for line in islice(file, SETTINGS.head)]
     width, number, sep = max(_header(lines, sep) for sep in written.DELIMITERS)
     require(width >= 0, path, "a header with names that differ by x, y, z or [0], [1]", "none")
     names = written.cells_of(lines[number], sep)

@@ -37,8 +37,8 @@ def require_plausible_rate(time, where: str, declared: object = "") -> None:
     hint = f"are they in {right[0]}" if right else "is their unit right"
     hint += f", declared {declared}?" if declared and right else "?"
     raise InputError(
-        f"{where}: expected stamps of {SETTINGS.slowest:g} to {SETTINGS.fastest:g} samples a second,"
-        f" found {1 / step:.3g} over {_long(float(np.ptp(time)))}; {hint}"
+        f"{where}: expected stamps of {SETTINGS.slowest:g} to {SETTINGS.fastest:g} samples a"
+        f" second, found {1 / step:.3g} over {_long(float(np.ptp(time)))}; {hint}"
     )
 
 

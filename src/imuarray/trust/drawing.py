@@ -83,8 +83,8 @@ def size_of(places: Places) -> tuple[float, float]:
 def departures(places: Places) -> str | None:
     """One sentence where the array found is not the array drawn, or None.
 
-    Tests of all coordinates jointly, of the size, the orientation and of each triad, at the settings'
-    `alarm` among them all.
+    Tests of all coordinates jointly, of the size, the orientation and of each triad, at
+    `alarm` of the settings among them all.
     """
     weight, off = precision(places), places.found - places.nominal
     count = len(places.found)

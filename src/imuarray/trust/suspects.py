@@ -295,5 +295,6 @@ def ends(channel) -> list[float]:
     )
     least = SETTINGS.end_readings
     return [
-        float(end) for end, near in sides if near[0] >= max(least, SETTINGS.end_ratio * near[1:].max())
+        float(end)
+        for end, near in sides if near[0] >= max(least, SETTINGS.end_ratio * near[1:].max())
     ]  # fmt: skip

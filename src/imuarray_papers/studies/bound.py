@@ -15,14 +15,8 @@ from imuarray.model.structure import products
 from imuarray.motion import normal_motion, sphere_motion
 from imuarray.streams import stream
 from imuarray_papers.estimation.bcd import calibrate_bcd
+from imuarray_papers.studies.settings import SETTINGS
 from imuarray_papers.studies.truths import batches, realisations, root_mean_square, run_batches
-
-NEAR = 1.01  # times the bound: as good as efficient
-BCD_LIMIT = 20000  # iterations after which ML-BCD is given up
-PATIENCE = 400  # iterations of Gauss-Newton where noise is large
-SCORING_LIMIT = 10  # and Gauss-Newton
-RANK = 1e-10  # of the largest eigenvalue of the scaled information
-REPEATS = 20  # motions averaged over; the bound varies little between them
 
 
 def block_information(model: ArrayModel, motion) -> np.ndarray:
@@ -103,7 +97,9 @@ def _one(model, rng, samples, motion, options):
     known = information_at(model, moves, truth, saturated)
     out = []
     for given in (None, prior):
-        found = fisher_scoring(data, model.array.relative, given, limit=PATIENCE, covariance=False)
+        found = fisher_scoring(
+            data, model.array.relative, given, limit=SETTINGS.patience, covariance=False
+        )
         error = (found.positions - truth)[1:].ravel()
         whole = known if given is None else known + given[1]
         out.append([
@@ -156,7 +152,7 @@ def rate_seen(bound, marks, away) -> float:
     return float((away[last] / away[first]) ** (1 / max(marks[last] - marks[first], 1)))
 
 
-def descents(model: ArrayModel, force, rate, saturated, limit: int = BCD_LIMIT):
+def descents(model: ArrayModel, force, rate, saturated, limit: int = SETTINGS.bcd_limit):
     """ML-BCD and Gauss-Newton from the nominal positions to the optimum, on the same measurements.
 
     The bound (m, rms), iterations of each to 1.01 times it, NaN if never, and `rate_seen`.
@@ -166,7 +162,9 @@ def descents(model: ArrayModel, force, rate, saturated, limit: int = BCD_LIMIT):
     bound = np.sqrt(np.trace(best.covariance) / len(best.covariance))
     if not best.converged:  # data that determine too little: there is no way to go
         return bound, np.nan, np.nan, np.nan
-    enough = bound * np.sqrt(NEAR**2 - 1)  # distance from the optimum, errors adding in squares
+    enough = bound * np.sqrt(
+        SETTINGS.near**2 - 1
+    )  # distance from the optimum, errors adding in squares
     marks = np.unique(np.geomspace(1, limit, 1000).astype(int))
     slow = calibrate_bcd(
         model, force, rate, saturated=saturated, tolerance=0.0, limit=limit, marks=marks
@@ -174,7 +172,7 @@ def descents(model: ArrayModel, force, rate, saturated, limit: int = BCD_LIMIT):
     away = np.sqrt(np.mean((slow.snapshots - best.positions)[:, 1:] ** 2, axis=(1, 2)))
     near = np.flatnonzero(away <= enough)
     newton = np.nan
-    for iteration in range(1, SCORING_LIMIT + 1):
+    for iteration in range(1, SETTINGS.scoring_limit + 1):
         tried = fisher_scoring(data, model.array.relative, limit=iteration, covariance=False)
         if np.sqrt(np.mean((tried.positions - best.positions)[1:] ** 2)) <= enough:
             newton = iteration
@@ -209,9 +207,9 @@ def ranks(cases) -> pd.DataFrame:
     for name, model, motion in cases:
         known = information_at(model, motion, model.array.relative)
         # a coordinate of which nothing is known must not be scaled up to something
-        scale = np.sqrt(np.maximum(np.diag(known), RANK * np.diag(known).max()))
+        scale = np.sqrt(np.maximum(np.diag(known), SETTINGS.rank * np.diag(known).max()))
         values = scaled_eigh(known, scale).values
-        seen = values > RANK * values[-1]
+        seen = values > SETTINGS.rank * values[-1]
         rows.append(
             {"case": name, "samples": len(motion.angular_rate), "unknowns": len(known),
              "rank": int(seen.sum()), "condition": float(values[-1] / values[seen][0])}
@@ -264,7 +262,7 @@ def bound_table(model, seed, cases) -> pd.DataFrame:
     for number, (samples, *sizes) in enumerate(cases):
         rng = stream(seed, "position bound", number)
         squares = []  # mean variance over coordinates for each of the motions
-        for _ in range(REPEATS):
+        for _ in range(SETTINGS.repeats):
             motion = sphere_motion(rng, (samples,), *sizes)
             values = np.linalg.eigvalsh(information_at(model, motion, model.array.relative))
             squares.append(np.mean(1.0 / np.maximum(values, 1e-14 * values[-1])))

@@ -22,23 +22,11 @@ from imuarray.simulation.recordings import simulate_samples
 from imuarray.streams import stream
 from imuarray_papers.posterior import tuning
 from imuarray_papers.posterior.likelihood import CompiledTarget
-from imuarray_papers.studies.truths import SPARE, Replicate, Setting, misfit, replicate, run_batches
+from imuarray_papers.studies.settings import SETTINGS
+from imuarray_papers.studies.truths import Replicate, Setting, misfit, replicate, run_batches
 
-DRAWS = 199  # kept of each posterior, nearly independent
-APART = 2.0  # posterior sds by which chains start off the mode
-WARMUP, SPACING = 200, 4  # NUTS: transitions of warm-up, transitions between kept draws
-PILOT, PILOT_ESS = 20000, 200  # transitions of PmMH at a time, until so many are effective
-BLOCKS = (1, 2, 5, 10, 20, 50, 100, 200, 500)  # of them, after which that is looked at
-ROUNDS, LEARNT = 6, 100  # of a burn-in, draws in each
-FIRST = 100  # transitions between them at least
-TINY = 1e-12
 Found = tuple[np.ndarray, np.ndarray]  # PIT values (R, P + 2), how many draws are independent (R,)
-WIDER = 1.05  # than the mode's curvature, for preconditioned Crank-Nicolson proposals
-SHORTER = 4.0  # every other stretch of transitions of preconditioned Crank-Nicolson proposals
-ML_MORE = 25  # times as many truths as for samplers, as they cost so little
 METHOD = "sample"  # the command's name in tables
-RATE = 1e9  # samples a second: instants tell the model nothing
-BEYOND = 1e6  # m/s^2, rad/s: a rail that nothing reaches
 
 
 def names_of(setting: Setting) -> list[str]:
@@ -79,7 +67,10 @@ def ml(setting: Setting, made, threads: int = 1) -> Found:
         away, sd = one.truth - one.ml, np.sqrt(np.diag(one.ml_covariance))
         along = size @ away / np.sqrt(size @ one.ml_covariance @ size)
         # 0 and 1 themselves have no normal score
-        found = [*np.clip(stats.norm.cdf([*away / sd, along]), TINY, 1 - TINY), np.nan]
+        found = [
+            *np.clip(stats.norm.cdf([*away / sd, along]), SETTINGS.tiny, 1 - SETTINGS.tiny),
+            np.nan,
+        ]
         out.append(found if one.ml_converged else [np.nan] * len(found))
     return np.array(out), np.full(len(out), np.nan)
 
@@ -87,7 +78,7 @@ def ml(setting: Setting, made, threads: int = 1) -> Found:
 def _start(setting: Setting, one: Replicate, name: str) -> np.ndarray:
     where = setting.name, setting.samples, one.number
     rng = stream(setting.seed, "calibrated", name, "start", *where)
-    return rng.multivariate_normal(one.mode, APART**2 * one.covariance)
+    return rng.multivariate_normal(one.mode, SETTINGS.apart**2 * one.covariance)
 
 
 def nuts(setting: Setting, made, threads: int = 1) -> Found:
@@ -101,17 +92,18 @@ def nuts(setting: Setting, made, threads: int = 1) -> Found:
     def chain(one):
         found = one.likelihood.marginal(positions_of(one.mode), count)
         start = _start(setting, one, name)[None]
+        steps = SETTINGS.draws * SETTINGS.spacing
         return run_nuts(
-            log_posterior, one.mode, one.covariance, start, WARMUP, DRAWS * SPACING, setting.seed,
-            (*where[1:], one.number), WARMUP + DRAWS * SPACING, True,
+            log_posterior, one.mode, one.covariance, start, SETTINGS.warmup, steps, setting.seed,
+            (*where[1:], one.number), SETTINGS.warmup + steps, True,
             (found.data, found.nodes, found.log_weights, None, prior.mean, prior.sd), 1,
         ).draws[0]  # fmt: skip
 
-    pilot = replicate(setting, SPARE)
+    pilot = replicate(setting, SETTINGS.spare)
     first = pilot.likelihood.marginal(positions_of(pilot.mode))
     count = round(len(first.nodes) ** (1 / 3))
     draws = np.array(run_batches(chain, made, threads, True, name))
-    kept = draws[:, SPACING - 1 :: SPACING]
+    kept = draws[:, SETTINGS.spacing - 1 :: SETTINGS.spacing]
     return of_draws(setting, made, kept, name), independent(kept)
 
 
@@ -140,7 +132,7 @@ def _preconditioned(setting: Setting, pilot: Replicate, rng):
     """
 
     def shape(one):
-        return one.mode, WIDER * np.linalg.cholesky(one.covariance)
+        return one.mode, SETTINGS.wider * np.linalg.cholesky(one.covariance)
 
     lengths = np.geomspace(0.05, 0.99, 10)
     tuned, best = tuning.tune_preconditioned(
@@ -151,7 +143,7 @@ def _preconditioned(setting: Setting, pilot: Replicate, rng):
         return CompiledTarget(one.likelihood, setting.prior, tuned.draws, *shape(one))
 
     # the tails are not the normal density's: where long steps are refused, short ones are not
-    return target, (best, best / SHORTER)
+    return target, (best, best / SETTINGS.shorter)
 
 
 def _pmmh(kernel: Callable, name: str):
@@ -159,18 +151,18 @@ def _pmmh(kernel: Callable, name: str):
 
     def pit_values(setting: Setting, made, threads: int = 1) -> Found:
         rng = stream(setting.seed, "calibrated", name, "pilot", setting.name, setting.samples)
-        pilot = replicate(setting, SPARE)
+        pilot = replicate(setting, SETTINGS.spare)
         make, lengths = kernel(setting, pilot, rng)
         theta = pilot.mode.copy()
-        target, _ = _learnt(make(pilot), theta, lengths, FIRST, rng)
+        target, _ = _learnt(make(pilot), theta, lengths, SETTINGS.first, rng)
         thin = _thinning(target, theta, lengths, rng)
 
         def chain(one):
             where = setting.name, setting.samples, one.number
             own = stream(setting.seed, "calibrated", name, "chain", *where)
             theta = _start(setting, one, name)
-            target, value = _learnt(make(one), theta, lengths, max(FIRST, thin // 4), own)
-            return _kept(DRAWS, target, theta, value, lengths, thin, own)[0]
+            target, value = _learnt(make(one), theta, lengths, max(SETTINGS.first, thin // 4), own)
+            return _kept(SETTINGS.draws, target, theta, value, lengths, thin, own)[0]
 
         draws = run_batches(chain, made, threads, True, name)
         return of_draws(setting, made, draws, name), independent(draws)
@@ -185,18 +177,18 @@ def _learnt(target, theta, lengths, spacing: int, rng):
     on: where data determine little the posterior's mass is some sds from its mode.
     """
     value = target.log_target(theta, rng)
-    for _ in range(ROUNDS):
-        kept, value = _kept(LEARNT, target, theta, value, lengths, spacing, rng)
+    for _ in range(SETTINGS.rounds):
+        kept, value = _kept(SETTINGS.learnt, target, theta, value, lengths, spacing, rng)
         if target.centre is not None:
-            target = _reshaped(target, kept[LEARNT // 4 :])
+            target = _reshaped(target, kept[SETTINGS.learnt // 4 :])
     return target, value
 
 
 def _reshaped(target: CompiledTarget, kept) -> CompiledTarget:
     """Around what was seen; the shape's prior weighs as much as a draw for each coordinate."""
     centre, (count, size) = kept.mean(axis=0), kept.shape
-    seen, before = np.cov(kept.T), target.factor @ target.factor.T / WIDER**2
-    factor = WIDER * np.linalg.cholesky((count * seen + size * before) / (count + size))
+    seen, before = np.cov(kept.T), target.factor @ target.factor.T / SETTINGS.wider**2
+    factor = SETTINGS.wider * np.linalg.cholesky((count * seen + size * before) / (count + size))
     return replace(target, centre=centre, factor=factor)
 
 
@@ -218,12 +210,12 @@ def _thinning(target, start, lengths, rng) -> int:
     theta = start.copy()
     value = target.log_target(theta, rng)
     blocks, effective = [], 0.0
-    while effective < PILOT_ESS and len(blocks) < BLOCKS[-1]:
-        kept, value = _kept(PILOT // 20, target, theta, value, lengths, 20, rng)
+    while effective < SETTINGS.pilot_effective and len(blocks) < SETTINGS.blocks[-1]:
+        kept, value = _kept(SETTINGS.pilot // 20, target, theta, value, lengths, 20, rng)
         blocks.append(kept)
-        if len(blocks) in BLOCKS:
+        if len(blocks) in SETTINGS.blocks:
             effective = ess(np.concatenate(blocks)[None]).min()
-    return max(1, int(np.ceil(2 * PILOT * len(blocks) / effective)))
+    return max(1, int(np.ceil(2 * SETTINGS.pilot * len(blocks) / effective)))
 
 
 METHODS: dict[str, Callable] = {
@@ -269,10 +261,10 @@ def drawn(setting: Setting, number: int) -> tuple[np.ndarray, Recording]:
     positions = prior.mean + prior.sd * rng.standard_normal(prior.mean.size)
     effects = model.effect_prior_sd * rng.standard_normal(model.effect_size)
     motion = normal_motion(rng, (setting.samples,), *setting.motion_sd)
-    time = np.arange(setting.samples) / RATE
+    time = np.arange(setting.samples) / SETTINGS.rate
     recording, _ = simulate_samples(
         model, motion, positions_of(positions), model.array.positions, rng, time, effects,
-        BEYOND, BEYOND, setting.prior_sd,
+        SETTINGS.beyond, SETTINGS.beyond, setting.prior_sd,
     )  # fmt: skip
     recording = replace(recording, gyroscope_labels=model.array.labels)
     return np.concatenate([positions, effects]), recording

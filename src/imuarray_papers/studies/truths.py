@@ -16,10 +16,7 @@ from imuarray.simulation.recordings import measure
 from imuarray.streams import stream
 from imuarray_papers.config import model_from, motion_sds
 from imuarray_papers.posterior.likelihood import Likelihood
-
-STARTS, GOOD = 50, 2.0  # of the search for a mode; mean square of residuals that ends it
-SPARE = 2**40  # a replicate that no study counts: for pilots
-BATCH = 25  # realisations, a random stream for each batch: results hang on it
+from imuarray_papers.studies.settings import SETTINGS
 
 
 class Realisations(NamedTuple):
@@ -127,9 +124,9 @@ def _most_likely(setting: Setting, likelihood: Likelihood, rng):
     off by 3 mm (`tests/papers/test_validation.py`). Their residuals, far beyond the noise, show it.
     """
     prior, data = setting.prior, likelihood.collapsed
-    enough = GOOD * 3 * setting.model.array.accelerometers * setting.samples
+    enough = SETTINGS.good * 3 * setting.model.array.accelerometers * setting.samples
     best, start = None, prior.mean
-    for _ in range(STARTS):
+    for _ in range(SETTINGS.starts):
         try:
             found = fisher_scoring(data, positions_of(start), (prior.mean, np.diag(prior.sd**-2.0)))
             best = found if best is None or found.cost[-1] < best.cost[-1] else best
@@ -150,8 +147,8 @@ def run_batches(function, jobs, threads: int, quiet: bool, label: str) -> list:
 
 def batches(realisations: int):
     """(number, size) of each batch."""
-    full, rest = divmod(realisations, BATCH)
-    return [(i, BATCH) for i in range(full)] + ([(full, rest)] if rest else [])
+    full, rest = divmod(realisations, SETTINGS.batch)
+    return [(i, SETTINGS.batch) for i in range(full)] + ([(full, rest)] if rest else [])
 
 
 def share(jobs, part: int, parts: int) -> list:
