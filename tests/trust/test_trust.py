@@ -22,6 +22,7 @@ from imuarray.trust import reasons as doubts
 from imuarray.trust.drawing import Places, departures
 from imuarray.trust.misfit import residuals, unsteady
 from imuarray.trust.rigid import slope, turning
+from imuarray.trust.settings import SETTINGS
 from imuarray.trust.suspects import clipped, suspects, wrapped
 from imuarray_papers.blind.cases import Case, make
 
