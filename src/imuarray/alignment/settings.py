@@ -8,8 +8,7 @@ class Settings:
     """Numbers of clocks, stamps and resampling, set by judgement; `SETTINGS` are those in use."""
 
     # `align`
-    # s between knots of a pace that changes slowly
-    paces: tuple[float, ...] = (1e9, 60.0, 20.0, 5.0)
+    paces: tuple[float, ...] = (1e9, 60.0, 20.0, 5.0)  # s between knots of a slow pace
     run: float = 8.5  # steps, beyond which a gap begins another run
     least_run: int = 16  # readings of a run
     rounded: int = 3  # different steps of rounded stamps
@@ -20,7 +19,6 @@ class Settings:
     unbroken: int = 32  # readings of a sensor, but for a few missing ones
     paused: int = 100  # times as long as its readings take, which a log may last
     uneven: float = 2.0  # s, by which logs may begin and end apart without a line
-
     # `clocks`
     coarse: float = 0.01  # s, of the grid on which speeds are compared
     window: float = 20.0  # s, of the piece of a log that is looked for
@@ -35,7 +33,6 @@ class Settings:
     block: float = 0.5  # s, within which residuals may be alike
     steps: int = 20  # of Gauss-Newton
     close: float = 1e-9  # s, a step that ends the search
-
     # `resample`
     degree: int = 5  # of the spline
     reach: int = 8  # readings, or knots, beside a rail that show in the spline: 0.43^8 is 0.1 %
@@ -44,7 +41,6 @@ class Settings:
     noisy: float = 3.0  # times the declared noise that a sensor's own may be
     moving: float = 10.0  # times the noise, from which a piece of the log shows motion
     shocks: float = 0.1  # of these pieces, the worst, that do not count
-
     # `found`
     noisy_residual: float = 3.0  # times the noise, from which a residual is explained
     jitter: float = 5e-6  # s, that is said

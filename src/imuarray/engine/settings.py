@@ -21,7 +21,6 @@ class Settings:
     window: float = 0.04  # s, length of the polynomials that give time derivatives
     slow_window: float = 0.1  # s, of those of the rate that a filter's shape multiplies
     smooth: float = 0.8  # correlation of omega's slope and omega_dot from which motion is smooth
-
     # Gauss-Newton over motion and parameters (`fit`, `parameters`)
     steps: int = 15  # Gauss-Newton steps at most
     least_step: float = 0.02  # nats; a step predicted to gain less ends the search
@@ -45,7 +44,6 @@ class Settings:
     tied: float = 1e-5  # of that sd, as long as it is not free
     near: int = 9  # samples that give the size of the motion's third derivatives
     stiff: float = 1e-3  # of a parameter's prior sd: the sd that a pinned mean keeps
-
     # Robust estimation of several recordings (`estimate`)
     iterations: int = 40  # Gauss-Newton steps at most
     group_steps: int = 6  # the same of the bare model, before groups of the sensor model are tried
@@ -56,13 +54,10 @@ class Settings:
     same_noise: float = 0.005  # relative change of a noise sd below which it is the same
     dense: float = 0.5  # share of samples in gapless runs from which neighbours are looked at
     longest_step: float = 0.025  # s, between neighbours: longer ones say nothing of derivatives
-
     # Parameters alike on all triads (`alike`)
     least_told: float = 1.0  # differences that readings must tell, for their size to be estimated
-
     # Held-out time (`heldout`)
     blocks: int = 10  # blocks of time that are held out in turn
-
     # Clocks by what a delay would gain (`clocks`)
     sawtooth: float = -10.0  # log p of a sawtooth beyond a constant delay
     many: float = 2.6  # log of the independent sawtooths per sample, from simulated white scores
@@ -70,7 +65,6 @@ class Settings:
     least_period: float = 3e-5  # s, of a clock: no IMU samples faster than 32 kHz
     least_turns: int = 3  # of a clock against the host's; fewer are a drift of the delay
     edge: float = 0.03  # of a turn: how near to a clock's jump a reading is left out
-
     # Clocks from the gyroscopes alone (`gyroscope_clocks`)
     enough: int = 4  # gyroscopes with a clock
     least_gyroscope_samples: int = 200  # samples at which all of them were read
@@ -84,7 +78,6 @@ class Settings:
     most_knots: int = 40  # of them
     jump_jitter: float = 0.1  # turns; a reading farther off is of another turn, and tells no phase
     around_jump: float = 0.25  # turns from a clock's jump within which a reading's side is asked
-
     # Sizes that are estimated, and widths (`estimate`)
     # share of a size's step that the next one is, where they go on alike
     size_step: float = 0.85
@@ -92,60 +85,49 @@ class Settings:
     size_near: float = 0.1  # log of a factor; longer steps are not yet those near the end
     smooth_share: float = 0.2  # share of rough samples that are looked at as the smooth ones
     spared: float = 1e-3  # least share of the information that blocks but one are taken to have
-
     # `forward`
     slope_agrees: float = 1.02  # times the residual that a prior of omega_dot may make
     chance: float = 1e-3  # of maps as far from those of first order, of positions as far apart
     least_difference: float = 0.03  # of the variance, by which two estimates may differ at least
     group_z: float = 2.0  # standard errors of a gain, from which a group is kept
     group_nats: float = 2.0  # nats, as well
-    # of the angular acceleration, to which slopes must know it to tell a curve
-    known_slope: float = 1e-2
-    # the same of a curve: two seconds of clean motion had three by chance
-    curved_nats: float = 10.0
-
+    known_slope: float = (
+        1e-2  # of the angular acceleration, to which slopes must know it for a curve
+    )
+    curved_nats: float = 10.0  # of a curve: two seconds of clean motion had three by chance
     # `readings`
     same_maps: float = 0.05  # of their sds, from which maps are another calibration's
     walk_instants: int = 200  # instants of a walk that a polynomial is laid through
     few_steps: float = 5.5  # steps of a gap between readings that is looked at
     off_step: float = 0.12  # of a step, off a multiple
     seldom: float = 0.05  # share that is chance
-
     # `robust`
-    # of a reading's variance that the motion leaves, or its size says nothing
-    least_free: float = 1e-3
+    least_free: float = (
+        1e-3  # of a reading's variance that the motion leaves, for its size to count
+    )
     scale_rounds: int = 20  # of the scale that goes with each of them
     least_scale: float = 1e-4  # of the declared noise
-
     # `fusion`
     fusion_tolerance: float = 1e-6  # sds, a step that ends the search
     fusion_steps: int = 50  # of it
     pair_turns: int = 2  # in which a pair's rate and its derivatives follow each other
-
     # `rough_fusion`
     rough_rounds: int = 6  # of weights and turns
     rough_near: float = 1e-2  # sds of the motion that a search may be off
     rough_freedom: float = 8.0  # degrees of freedom of a sample's noise, once its size is its own
-
     # `course`
     course_stretches: int = 60  # of time, at most, in which residuals are averaged
     course_samples: int = 20  # samples of one
-    # chance of a triad's residual in plain noise, from which it is far off
-    course_shaken: float = 1e-7
-    # IMUs off at once: motion faster than the samples, no single bad reading
-    course_several: int = 2
-
+    course_shaken: float = 1e-7  # chance of a triad's residual in plain noise: then it is far off
+    course_several: int = 2  # IMUs off at once: motion faster than samples, no single bad reading
     # `start`
     clear_motion: float = 10.0  # times the noise's power, from which a frequency is motion
     coherent_gain: float = 0.3  # sds of what a prior's samples say of one factor common to them all
-
     # `widths`
     map_nearly: float = 0.25  # of the largest distance of an IMU's map: as likely the one
     fixed_map: float = 1e-7  # sd of a map's entry that is known
-
     # `derivatives`
     most_gaps: float = 0.5  # of the samples
-
     # `directions`
     named_share: float = 0.5  # share of a direction that a pattern must make up to give it its name
 

@@ -14,11 +14,9 @@ class Settings:
     shortest: float = 3.0  # s, of a pose by default, its ends included
     kept: float = 2.0  # s, of a pose after its ends are cut, that no margin is taken from
     threshold: float = 3.0  # times the noise floor
-    # of still readings, from which 0 is a dead band's and says nothing of noise
-    dead_band: float = 0.5
+    dead_band: float = 0.5  # of still readings, from which 0 is a dead band's
     floor: float = 0.02  # quantile of the windows' spreads taken as the noise floor
-    # A floor this many times the declared noise is motion, not noise: nothing was still.
-    moving: float = 10.0
+    moving: float = 10.0  # a floor so many times the declared noise is motion: nothing was still
     bridged: float = 0.1  # s; a pose goes on over so short a gap, and where stamps are late
     missed: float = 3.5  # steps; and where so many are missing
     step_time: float = 0.25  # s, before and after an instant, whose means are compared
@@ -28,60 +26,49 @@ class Settings:
     lost: float = 1.0  # s
     turn_far: float = 1.0  # of a turn's matrix from the identity: 41 degrees
     enough: int = 20_000  # samples that tell how triads are turned
-
     # `correct`
-    # of gravity, root of the sum of squares: poses in more than two orientations
-    orientations: float = 0.2
-
+    orientations: float = 0.2  # of gravity, root of the sum of squares: more than two orientations
     # `triads`
     triad_steps: int = 100  # of Gauss-Newton
     triad_halvings: int = 12  # of a step that raises the cost
     triad_close: float = 1e-8  # sds, a step that ends the search
-
     # `outliers`
     pose_outlier: float = 5.0  # times the median size of a residual
-    # times the median of what leaving out a pose gains, the worst of its triads apart
-    pose_shared: float = 5.0
+    pose_shared: float = (
+        5.0  # times the median gain of leaving out a pose, without its worst triad's
+    )
     gravity_gone: float = 0.07  # of gravity: readings without it; those in g have a tenth
     gravity_off: float = 0.5  # relative, of a pose's mean specific force from gravity
     poses_left_out: float = 0.2  # of a triad's poses
     pose_nearly: float = 0.5  # of the largest gain: as many triads leave out a reading at once
-
     # `pose_noise`
     walk_gain: float = 2.0  # nats that a walk must gain
     walk_seen: float = 1.2  # times the noise; a walk is looked for beyond
-    # of a walk in a second, as a share of an average's variance
-    walk_range: tuple[float, ...] = (1e-4, 1e8)
+    walk_range: tuple[float, ...] = (1e-4, 1e8)  # in a second, of an average's variance
     walk_freedom: float = 15.0  # of a triad's averages, from which its own walk and noise are asked
     walk_steps: int = 60  # of the search for each triad's own walk
     walk_close: float = 0.02  # relative change that ends it
-
     # `moves`
     least_moves: int = 4  # moves
     longest_move: float = 30.0  # s; drift is too large beyond
     farthest_move: float = 30.0  # rad; other errors are too large beyond
-    # steps from one sample to the next, over which a spline is good enough
-    move_bridged: float = 3.5
+    move_bridged: float = 3.5  # steps between samples, over which a spline is good enough
     map_prior: float = 0.01  # sd about the identity of scales and skews
     turn_prior: float = 0.1  # rad, of a turn
     move_freedom: float = 4.0  # of the t distribution of a move's error
     move_steps: int = 30  # of Gauss-Newton
     move_close: float = 1e-8  # in the map's entries, a step that ends the search
-
     # `gyroscopes`
     least_moving: int = 100  # moving samples
     weakest_axis: float = 1e-3  # smallest share of the weakest axis in the mean squared rate
-    # of one gyroscope's rates over another's; beyond, a channel is not what it says
-    same_size: tuple[float, ...] = (0.5, 2.0)
+    same_size: tuple[float, ...] = (0.5, 2.0)  # of two gyroscopes' rates; else a channel is wrong
     gyroscope_block: float = 1.0  # s, within which residuals may be alike
     robust_steps: int = 5  # of reweighting
     odd_scale: float = 1e-4  # chance of a mean of all axes' scales, by how they scatter
     recordings_apart: float = 1000.0  # s, between recordings that are looked at as one
-
     # `noise`
     bins: int = 8  # an octave
-    # of the readings' rate, the share up to which noise is fitted: filters shape the rest
-    slowest: int = 16
+    slowest: int = 16  # the share of the readings' rate up to which noise is fitted, 1 in so many
     least_coefficients: int = 16  # coefficients; fewer say nothing of a spectrum
     noise_gain: float = 4.5  # nats, those of three sds, from which a term is there
     noise_close: float = 2.0  # nats, up to which flicker and walk are not told apart
@@ -89,13 +76,9 @@ class Settings:
     one_sided: float = 1.645**2 / 2  # nats by which a limit of 95 % is less likely
     limit_farthest: float = 1e4  # of a limit's square over the least that is looked at
     limit_halvings: int = 24  # of the interval that it is looked for in
-    # of the longest still stretch, what the others last that are pooled with it
-    long_stretch: float = 0.5
-
+    long_stretch: float = 0.5  # of the longest still stretch: what is pooled with it lasts as long
     # `rails`
-    # a rail of one axis shows in another that the correction mixes it into by this much
-    coupled: float = 0.1
-
+    coupled: float = 0.1  # entry of the correction from which a rail shows in the other axis, too
     # `report`
     walk_apart: float = 3.0  # times the usual walk, from which a sensor's is told by itself
 

@@ -11,11 +11,9 @@ class Settings:
     burn_in_noise: float = 0.1  # of an effective sample size, from one burn-in to another
     rhat: float = 1.01  # largest R-hat that a sampler aims at
     effective: int = 1000  # smallest effective size
-
     # `generic`
     laplace_steps: int = 3  # of Gauss-Newton
     chunk: int = 1000  # samples whose densities are in memory at a time, with their derivatives
-
     # `independent`
     chains: int = 4
     batch: int = 400  # proposals of a chain at a time
@@ -24,12 +22,9 @@ class Settings:
     pilot: int = 200  # draws that look for the centre
     rounds: int = 5  # of looking
     seen: float = 4.0  # standard errors by which it is off, at which it is moved
-    # of Pareto's k: above, the normal density says nothing of the posterior's tails
-    unreliable: float = 0.7
-
+    unreliable: float = 0.7  # of Pareto's k: above, the normal says nothing of the tails
     # `marginal`
-    # nats in total between one count and the next: then the former is taken
-    node_error: float = 1e-4
+    node_error: float = 1e-4  # nats in total from one count to the next: then the former is taken
     newton: int = 6  # steps to the mode at most, from where it is at the reference positions
     near: float = 1e-4  # sds: a step as short is the last, the next would be its square
 

@@ -10,60 +10,44 @@ class Settings:
     # `channels`
     least_samples: int = 10  # samples below which equal readings may be chance
     turning: float = 0.2  # rad/s; at rest, coarse readings do repeat
-    # share of repeated readings; a sensor of half the rate, filled up, has 0.5
-    held_share: float = 0.3
+    held_share: float = 0.3  # share of repeated readings; filled up from half the rate it is 0.5
     frozen: int = 20  # readings in a row
     dead_values: int = 5  # values of a dead axis that flickers
     dead_samples: int = 100  # in at least so many samples
-    # share of a triad's readings that is its own; noise is 2e-5 of a MEMS sensor's range
-    own_share: float = 1e-6
+    own_share: float = 1e-6  # of a triad's readings that is its own; noise is 2e-5 of the range
     patience: float = 60.0  # s, that reading a file may last
     patient_size: float = 500e6  # bytes, for each of which it may last as long again
-
     # `draft`
     draft_gravity: float = 0.2  # of one unit of gravity, by which readings at rest may be off
     spinning: float = 40.0  # rad/s, faster than a hand turns a board
     noisiest: float = 0.025  # rad/s, sd of a gyroscope's readings
     draft_rows: int = 3  # rows
     draft_even: float = 0.2  # of a step between stamps, by which half of them may differ
-
     # `layout`
-    # m; beyond this, positions without a declared unit are taken to be in another
-    widest: float = 2.0
+    widest: float = 2.0  # m; positions without a declared unit beyond it are in another one
     position_prior: float = 3e-3  # m, sd of nominal positions where none is declared
-
     # `rig`
-    # s, between two readings: beyond, nothing on common instants would fit in memory
-    longest_gap: float = 86400.0
-
+    longest_gap: float = 86400.0  # s, between readings: beyond, common instants fit no memory
     # `table`
     few_stamps: int = 20  # stamps, of which a rate is worth looking at
     blank_share: float = 0.1  # share of blank cells from which a sensor is slower than the log
     shared_stamps: float = 0.5  # of the rows share their stamps: one row for each sensor, perhaps
-    # of a rate that is declared: oscillators of chips are off by up to some 1 %
-    clock_sd: float = 1e-3
-    # rows, in which missed readings are bridged; blanks in fewer are a damaged table
-    long_log: int = 400
-
+    clock_sd: float = 1e-3  # of a rate that is declared: oscillators of chips are off by up to 1 %
+    long_log: int = 400  # rows, in which missed readings are bridged; else a table is damaged
     # `undrawn`
     slope_window: int = 7  # samples of the polynomial that gives the rates' derivative
     slope_order: int = 3  # its degree
     fast: float = 0.5  # of the rates' root mean square: slower samples say little of positions
-    # of the board's size, what gyroscopes and axes as bought leave uncertain
-    rough_sd: float = 0.05
+    rough_sd: float = 0.05  # of the board's size, left by gyroscopes and axes as bought
     rough_sure: float = 0.1  # of the board's size, beyond which the motion says too little
-
     # `units`
     slowest: float = 2.0  # Hz, of an IMU that is to show a motion of the hand
     fastest: float = 5e4  # Hz
-
     # `validate`
-    # A pause this many times the usual step is reported: estimators that smooth would bridge it.
-    gap: float = 5.0
+    gap: float = 5.0  # times the usual step, a pause to report: estimators that smooth bridge it
     # Calibrated values may pass the rail by some per cent, those of a triad that was turned by up
     # to sqrt 3; this is to find wrong units (57, 9.8, ...).
     beyond_range: float = 1.8
-
     # `written`
     sniffed: int = 1 << 16  # bytes from which an encoding is recognised
     head: int = 60  # lines among which the header is

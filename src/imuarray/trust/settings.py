@@ -10,7 +10,6 @@ class Settings:
     # `checked`
     same_board: float = 5.0  # prior sds by which two drawings of one board may differ
     indefinite: float = 1e-3  # of a correlation matrix' least eigenvalue; rounding leaves less
-
     # `drawing`
     alarm: float = 1e-6  # p value from which a departure is no chance: 4.9 sds
     sizes: tuple[float, ...] = (0.5, 2.0)  # beyond these the size is the first thing to be said
@@ -19,47 +18,32 @@ class Settings:
     flat: float = 0.02  # of the largest extent: a board in one plane
     unexplained: float = 0.1  # of chi-square may an explanation leave
     as_good: float = 10.0  # chi-square by which another explanation may be worse and still be named
-
     # `misfit`
-    # times what noise explains between parts of a recording; 1.3 at most of sound ones
-    unsteady: float = 2.5
-    # times that of the other IMUs: what disturbs one disturbs all a little
-    unsteady_alone: float = 1.5
-    # times the declared noise: widths are too small, or scaled by what is no noise
-    residual: float = 3.0
-
+    unsteady: float = 2.5  # times what noise explains between parts; 1.3 at most of sound ones
+    unsteady_alone: float = 1.5  # times the other IMUs': what disturbs one disturbs all a little
+    residual: float = 3.0  # times the declared noise: widths are too small
     # `poses`
     pose_noise: float = 3.0  # times the noise of a pose's mean; real boards have up to 1.9
     pose_residual: float = 0.01  # m/s^2, a residual that matters: 0.1 % of gravity
-    # correlation of neighbours; a low pass at a fifth of the sampling rate makes 0.3
-    smoothed: float = 0.5
+    smoothed: float = 0.5  # correlation of neighbours; a low pass at a fifth of the rate makes 0.3
     common_scale: float = 0.03  # of all gyroscopes' common scale: three of its prior's sds
-    # the same, where the axes' own scales scatter by less; below, sds allow for it
-    common_scale_seen: float = 5e-3
-
+    common_scale_seen: float = 5e-3  # the same, where the axes' own scales scatter by less
     # `reasons`
     growth: float = 6.0  # sds of the growth; clean and real boards' is within one
     # s^2, that a filter may droop by more than the other kind's. An accelerometer's makes
     # centrifugal forces those of no rate: 3e-5 (20 Hz) is 3 sds of error; a gyroscope's is 1
     droops: tuple[float, ...] = (2e-5, 6e-5)
     package: float = 2.5e-3  # m, from an accelerometer's middle; packages are 3 to 5 mm wide
-    # chance of maps that still poses gave; 0.97 and more of real and clean boards
-    maps_chance: float = 1e-6
+    maps_chance: float = 1e-6  # chance of maps that poses gave; 0.97 and more of clean boards
     triad_residual: float = 10.0  # the same of one triad where the noise of each is estimated
     drift: float = 3.0  # sds of the mean of all samples; offsets that differ by more bias positions
-    # of the drawing's sd: positions known worse are hardly known from the recording
-    learnt: float = 0.5
-    # times less residual elsewhere; 1.003 at most for the right board, 2 for another
-    better_elsewhere: float = 1.2
-    # relative difference of rates, up to which they are those of one recording
-    same_rate: float = 0.1
+    learnt: float = 0.5  # of the drawing's sd: positions known worse are hardly learnt
+    better_elsewhere: float = 1.2  # times less residual; 1.003 of the right board, 2 of another
+    same_rate: float = 0.1  # relative difference of rates, up to which they are of one recording
     short: float = 60.0  # s
-
     # `rigid`
-    # of the array's largest moment: turning about an axis with less is not seen
-    known_axis: float = 0.03
-    # share of the usual step by which stamps of neighbours may differ from it
-    step_spread: float = 0.1
+    known_axis: float = 0.03  # of the largest moment: turning about an axis with less is not seen
+    step_spread: float = 0.1  # of the usual step, by which neighbours' stamps may differ from it
     moves: int = 9
     few_samples: int = 20  # samples, that anything is said of
     most_samples: int = 20_000  # samples that are looked at
@@ -67,9 +51,7 @@ class Settings:
     fewest_pairs: int = 60  # pairs of neighbouring samples
     coherent: float = 0.9  # correlation below which the samples are no course of one smooth motion
     slope: float = 0.015  # gyroscopes' filters and scales make less
-    # three times a single wave's: several have more of the fast ones
-    coarse: float = 3 * 11 / 720 * 144
-
+    coarse: float = 3 * 11 / 720 * 144  # three times a single wave's: several have more fast ones
     # `suspects`
     far_triad: float = 4.0  # times the median triad's error, and the declared noise
     suspect_left: float = 0.35  # of the error must be left at most
@@ -79,8 +61,7 @@ class Settings:
     least_wraps: int = 3  # of them, that are no chance
     end_readings: int = 10  # readings at a channel's end: a rail
     end_ratio: int = 5  # times those at the values next to it
-    # decimals to which equal readings are equal again when a correction is undone
-    decimals: int = 9
+    decimals: int = 9  # to which readings are equal again when a correction is undone
     slope_within: float = 0.1  # of one: a slope that a factor makes so is right
 
 

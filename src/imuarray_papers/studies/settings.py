@@ -14,7 +14,6 @@ class Settings:
     scoring_limit: int = 10  # and Gauss-Newton is
     rank: float = 1e-10  # of the largest eigenvalue of the scaled information
     repeats: int = 20  # motions averaged over; the bound varies little between them
-
     # `sbc`
     draws: int = 199  # kept of each posterior, nearly independent
     apart: float = 2.0  # posterior sds by which chains start off the mode
@@ -34,7 +33,6 @@ class Settings:
     ml_more: int = 25  # times as many truths as for samplers, as they cost so little
     rate: float = 1e9  # samples a second: instants tell the model nothing
     beyond: float = 1e6  # m/s^2, rad/s: a rail that nothing reaches
-
     # `truths`
     starts: int = 50  # of the search for a mode
     good: float = 2.0  # mean square of residuals that ends it
