@@ -50,3 +50,11 @@ def scaled_square(matrix, vector, cutoff: float, scale=None) -> tuple[float, int
 def shared_walk(time) -> np.ndarray:
     """(P, P) s, how long a walk both ways from time 0 is the same at each two of ``time`` (P,)."""
     return np.where(np.multiply.outer(time, time) > 0, np.minimum.outer(abs(time), abs(time)), 0.0)
+
+
+def scaled_solve(information, right):
+    """(solution, sds) of a positive definite system, scaled to a unit diagonal first."""
+    values, vectors, scale = scaled_eigh(information)
+    values = np.maximum(values, 1e-13)
+    solution = (vectors @ ((vectors.T @ (right / scale)) / values)) / scale
+    return solution, np.sqrt(np.sum(vectors**2 / values, axis=1)) / scale

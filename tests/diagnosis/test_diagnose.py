@@ -16,6 +16,7 @@ from imuarray.diagnosis import procedure
 from imuarray.diagnosis import state as elimination
 from imuarray.diagnosis.document import diagnose, precision_of, structural_gain
 from imuarray.diagnosis.final_checks import beside_left
+from imuarray.diagnosis.fit import log_scores
 from imuarray.diagnosis.noise_effects import verdict
 from imuarray.diagnosis.procedure import run_procedure
 from imuarray.diagnosis.reading_effects import find_structural
@@ -24,8 +25,7 @@ from imuarray.diagnosis.scans import Courses, maybe_grown
 from imuarray.diagnosis.scores import Candidate, Score
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Cause, Search, eliminate, need
-from imuarray.engine.fit import flat_parameters
-from imuarray.engine.heldout import gain, log_scores
+from imuarray.engine.heldout import gain
 from imuarray.engine.parameters import catalogue_effects, columns_of
 from imuarray.engine.readings import Left, arrange
 from imuarray.model import EFFECTS
@@ -168,7 +168,7 @@ def test_gyroscopes_offsets_that_walk_drift_by_what_they_walk():
     assert [cause.effect for cause in found.search.causes] == ["bias_drift"]
     assert not found.unexplained and not found.in_noise
     search = found.search
-    own = flat_parameters(search.columns, search.fit.state)[:, search.columns.of("bias_drift")]
+    own = search.columns.flat(search.fit.state)[:, search.columns.of("bias_drift")]
     own = own.reshape(8, 2, 3, 4)[:, 1]
     drift = np.polynomial.legendre.legval(np.linspace(-1, 1, len(walk)), own.transpose(2, 0, 1))
     apart = walk - walk.mean(axis=1, keepdims=True)

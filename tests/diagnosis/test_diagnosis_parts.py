@@ -14,6 +14,7 @@ import imuarray
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects as variance
 from imuarray.diagnosis.adoption import narrowest
+from imuarray.diagnosis.fit import Fit, fit, log_scores, search_optimum
 from imuarray.diagnosis.replicates import Replicator, discrepancies
 from imuarray.diagnosis.scores import (
     Candidate,
@@ -28,26 +29,16 @@ from imuarray.diagnosis.special import sawtooth_scan, wider
 from imuarray.diagnosis.state import Cause, Search, heldout_gain
 from imuarray.engine.clocks import sawtooth
 from imuarray.engine.derivatives import polynomial_taps
-from imuarray.engine.fit import (
-    Fit,
-    fit,
-    flat_parameters,
-    from_flat,
-    normal,
-    prior_means,
-    scaled_solve,
-    search_optimum,
-    summed_normal,
-    with_derivatives,
-)
-from imuarray.engine.heldout import blocks_of, log_scores
+from imuarray.engine.heldout import blocks_of
 from imuarray.engine.linearise import linearise
-from imuarray.engine.parameters import catalogue_effects, columns_of, prior_precision
+from imuarray.engine.normal import normal, summed_normal
+from imuarray.engine.parameters import catalogue_effects, columns_of
 from imuarray.engine.readings import arrange, part_of
 from imuarray.engine.settings import SETTINGS
-from imuarray.engine.start import start
+from imuarray.engine.start import start, with_derivatives
 from imuarray.errors import InputError
 from imuarray.geometry import sub_array
+from imuarray.linear import scaled_solve
 from imuarray.tails import QUARTILE, log_chi_square, log_normal, log_poisson
 from imuarray_papers.blind.cases import Case, make
 
@@ -77,17 +68,17 @@ def scaled():
 
 
 def ridge_of(made: Fit):
-    return prior_precision(made.columns, made.active)
+    return made.columns.prior_precision(made.active)
 
 
 def test_derivatives_are_those_of_finite_differences(clean):
     """Prediction by motion, positions and every effect, at values that are not zero."""
     columns, readings = clean.columns, clean.readings
     rng, state = np.random.default_rng(5), clean.fit.state
-    whole = flat_parameters(columns, state)
+    whole = columns.flat(state)
     whole += 0.1 * rng.standard_normal(whole.shape) * columns.prior_sd * columns.owner
     whole[0, :3] = 0.0
-    state = from_flat(columns, state, whole)
+    state = columns.unflat(state, whole)
 
     def residual(state, wanted=(0,)):
         # the motion's share would hide it: readings less prediction, whitened
@@ -105,7 +96,7 @@ def test_derivatives_are_those_of_finite_differences(clean):
         for sign in (1, -1):
             other = whole.copy()
             other[imu, column] += sign * step
-            moved.append(residual(from_flat(columns, state, other))[0])
+            moved.append(residual(columns.unflat(state, other))[0])
         slope = -(moved[0] - moved[1]).reshape(len(here), -1, 6)[:, imu] / (2 * step)
         wanted = seen.whitened[:, imu, :, column]
         scale = np.abs(wanted).max() + 1e-12
@@ -182,7 +173,7 @@ def test_a_score_is_what_a_refit_gains(scaled):
 
 def objective(made):
     """Misfit and priors."""
-    values = flat_parameters(made.columns, made.state)
+    values = made.columns.flat(made.state)
     nominal = np.zeros_like(values)
     nominal[: len(made.state.positions), :3] = made.readings.array.relative
     away = ((values - nominal) / made.columns.prior_sd)[made.active]
@@ -231,12 +222,12 @@ def test_heldout_scores_are_those_of_refits_without_each_block(clean):
         inside = np.zeros(len(made.residual), bool)
         inside[blocks[block]] = True
         information, score = normal(made, made.active, ~inside)
-        values = flat_parameters(made.columns, made.state)[made.active]
+        values = made.columns.flat(made.state)[made.active]
         offset = values - nominal_of(made)[made.active]
         step = np.linalg.solve(information + ridge_of(made), score - ridge_of(made) @ offset)
-        flat = flat_parameters(made.columns, made.state)
+        flat = made.columns.flat(made.state)
         flat[made.active] += step
-        state = from_flat(made.columns, made.state, flat)
+        state = made.columns.unflat(made.state, flat)
         moved = fit(clean.readings, clean.columns, np.zeros_like(made.active), state, clean.smooth)
         difference = -(moved.misfits[inside].sum() - made.misfits[inside].sum()) / 2
         own = scores.nats[block] + made.misfits[inside].sum() / 2 + constants(made, inside)
@@ -317,8 +308,8 @@ def test_the_search_ends_at_the_optimum(effect):
     state, converged, _ = search_optimum(readings, columns, active, state, True, False)
     seen = linearise(readings, columns, with_derivatives(readings, state, True))
     information, score = summed_normal(seen, active)
-    precision = prior_precision(columns, active)
-    off = flat_parameters(columns, state)[active] - prior_means(readings, columns)[active]
+    precision = columns.prior_precision(active)
+    off = columns.flat(state)[active] - columns.prior_means()[active]
     step, sds = scaled_solve(information + precision, score - precision @ off)
     assert converged and np.max(np.abs(step) / sds) < 0.5
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from imuarray.engine.alike import with_likely_spread
-from imuarray.engine.parameters import POSITION, columns_of, gauge_masks, prior_precision
+from imuarray.engine.parameters import POSITION, columns_of
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.motion.state import Motion
@@ -45,10 +45,10 @@ def test_a_turned_chip_reads_what_it_reads_in_its_own_axes():
 
 def test_the_prior_is_of_what_is_shared_and_of_what_is_own():
     columns, active = columns_with_all(board())
-    precision = prior_precision(columns, active)
+    precision = columns.prior_precision(active)
     pinned = np.zeros_like(precision)
     sds = columns.prior_sd[np.nonzero(active)[1]]
-    for _, mask in gauge_masks(columns, active):
+    for _, mask in columns.gauges(active):
         along = mask[active] / np.abs(mask[active]).sum() / (1e-3 * sds[mask[active] != 0].mean())
         pinned += np.outer(along, along)
     column = np.nonzero(active)[1]
@@ -65,7 +65,7 @@ def test_arms_common_along_the_arrays_axes_are_the_gauge(turned):
         [[t.T @ arms[np.argmax(np.abs(t[:, i]))] for i in range(3)] for t in array.turns]
     )
     values = own.reshape(4, 9)
-    weights = [mask[:, columns.of("size_effect")] for _, mask in gauge_masks(columns, active)]
+    weights = [mask[:, columns.of("size_effect")] for _, mask in columns.gauges(active)]
     common = [np.sum(values * w) / np.abs(w).sum() for w in weights[:9]]
     np.testing.assert_allclose(common, arms.ravel(), atol=1e-12)
     # what a chip's arms have in common is a gauge only where all are mounted alike
@@ -84,7 +84,7 @@ def test_the_differences_size_is_found():
     values = own.ravel()
     place, told = np.arange(len(values)), np.eye(len(values)) / 2e-6**2
     for _ in range(30):
-        whole = told + prior_precision(columns, active)
+        whole = told + columns.prior_precision(active)
         columns = with_likely_spread(
             columns, active, np.linalg.solve(whole, told @ values), whole, place
         )
@@ -102,7 +102,7 @@ def test_the_common_part_of_drifts_is_no_larger_than_their_differences_say():
     told = np.kron(differing, np.eye(12)) / 1e-5**2
     place = np.arange(len(drift))
     for _ in range(30):
-        whole = told + prior_precision(columns, active)
+        whole = told + columns.prior_precision(active)
         found = np.linalg.solve(whole, told @ drift)
         columns = with_likely_spread(columns, active, found, whole, place)
     own = columns.of("bias_drift")
@@ -113,7 +113,7 @@ def test_the_common_part_of_drifts_is_no_larger_than_their_differences_say():
     assert np.all(columns.prior_sd[own[kind[own] == 0]] == 0.1)
     # a model that is far off: no larger than such sensors can have
     for _ in range(30):
-        whole = told + prior_precision(columns, active)
+        whole = told + columns.prior_precision(active)
         columns = with_likely_spread(columns, active, 1e5 * drift, whole, place)
     assert columns.prior_sd[own[kind[own] == 1]] == pytest.approx(30 * 0.005)
 

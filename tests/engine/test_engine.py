@@ -9,7 +9,6 @@ import pytest
 import imuarray
 from imuarray.engine.dataset import engine_dataset
 from imuarray.engine.estimate import Recorded, estimate, jackknifed, to_come
-from imuarray.engine.fit import flat_parameters
 from imuarray.engine.forward import _of_one_truth, select_forward
 from imuarray.engine.linearise import linearise, reading, seen_again
 from imuarray.engine.parameters import POSITION, columns_of
@@ -58,7 +57,7 @@ def test_normal_equations_are_the_dense_ones():
     state = Recorded.of(readings, columns).state
     seen = normal_pass(readings, columns, state, active, improved=2)
     model, pairs = columns.model, np.argwhere(active)
-    base = flat_parameters(columns, state)
+    base = columns.flat(state)
 
     def residual(unknowns):
         motion, p = unknowns[: seen.motion.size].reshape(seen.motion.shape), unknowns[-len(pairs) :]
@@ -301,14 +300,14 @@ def test_recordings_of_a_board_are_fitted_jointly():
     both = estimate([Recorded.of(one, columns) for one in readings], columns, active)
     assert len(both.values) == len(alone[0].values) + 4 * 3
     for one, other in zip(both.recorded, alone, strict=True):
-        bias = [flat_parameters(columns, r.state)[2, 3] for r in (one, other.recorded[0])]
+        bias = [columns.flat(r.state)[2, 3] for r in (one, other.recorded[0])]
         assert abs(bias[0]) > 0.05 and bias[0] == pytest.approx(bias[1], abs=2e-3)
     np.testing.assert_array_equal(*(one.state.positions for one in both.recorded))
     file = engine_dataset(recordings, both)
     assert file["position"].attrs["scope"] == "board" and set(file["scope"].values) == {"recording"}
     np.testing.assert_array_equal(file["own"], file["parameter"])
     x = file["own_parameter"].isel(own=6)  # of the third triad
-    np.testing.assert_allclose(x, [flat_parameters(columns, r.state)[2, 3] for r in both.recorded])
+    np.testing.assert_allclose(x, [columns.flat(r.state)[2, 3] for r in both.recorded])
     ratio = file["own_sd"] / engine_dataset(recordings[:1], alone[0])["effect_sd"].to_numpy()
     np.testing.assert_allclose(ratio.median("own"), 1.0, atol=0.1)
     # the same readings twice say twice as much

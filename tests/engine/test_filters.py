@@ -10,7 +10,6 @@ from scipy.signal import lfilter
 import imuarray
 from imuarray.engine import forward
 from imuarray.engine.derivatives import derivatives
-from imuarray.engine.fit import flat_parameters
 from imuarray.engine.forward import FILTER, select_forward, with_effects
 from imuarray.engine.readings import arrange
 from imuarray.geometry import sub_array
@@ -88,7 +87,7 @@ def test_an_accelerometers_low_pass_is_found():
     effects = "gyroscope_delay", "accelerometer_filter"
     found = with_effects([arrange(recording, sparse=True)], effects)
     assert distance(found, truth)[0] < 2 and found.residual_ratio() < 1.02
-    shape = flat_parameters(found.columns, found.recorded[0].state)
+    shape = found.columns.flat(found.recorded[0].state)
     lag, droop, _ = shape[:, found.columns.of("accelerometer_filter")].T
     times = 1 / (2 * np.pi * np.array([40.0, 98.0]))
     late, wide = (each[2] - np.mean(each[[0, 1, 3]]) for each in (lag, droop - lag**2 / 2))

@@ -10,7 +10,6 @@ import xarray as xr
 import imuarray
 from imuarray import provenance
 from imuarray.cli import main
-from imuarray.engine.parameters import prior_precision
 from imuarray.model import DATA_EFFECTS, EFFECTS
 from imuarray.model import effects as own
 from tests.cases import model
@@ -175,7 +174,7 @@ def test_an_effect_with_a_gauge_of_its_own_is_one_place(tmp_path):
     gains = np.array([item["value"] for item in cause["parameters"].values()])
     assert abs(gains.mean()) < 1e-4
     assert np.abs(gains - (true - true.mean())).max() < 2e-3
-    pinned = prior_precision(made.extended.fit.columns, made.extended.fit.active)
+    pinned = made.extended.fit.columns.prior_precision(made.extended.fit.active)
     assert np.linalg.eigvalsh(pinned)[-1] > 1e5 / 0.02**2
 
 

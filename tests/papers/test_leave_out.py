@@ -8,10 +8,10 @@ import pytest
 from scipy.stats import multivariate_t
 
 from imuarray.analysis.known import with_board
+from imuarray.diagnosis.fit import at, log_scores
 from imuarray.engine.course import block_scores
 from imuarray.engine.dataset import engine_dataset
-from imuarray.engine.fit import at, flat_parameters
-from imuarray.engine.heldout import log_densities, log_scores
+from imuarray.engine.heldout import log_densities
 from imuarray.engine.linearise import linearise
 from imuarray_papers.figures.board import table_experiment, table_left_out
 from imuarray_papers.measured.left_out import located, predicted
@@ -68,9 +68,9 @@ def test_a_board_predicts_another_recording():
         for values in (state.parameters, calibration["effect_parameter"].to_numpy())
     )
     np.testing.assert_array_equal(kept, known)
-    bias = flat_parameters(columns, state)[2, columns.of("accelerometer_bias")[0]]
+    bias = columns.flat(state)[2, columns.of("accelerometer_bias")[0]]
     alone = fitted(parts[1], effects).recorded[0].state
-    assert bias == pytest.approx(flat_parameters(columns, alone)[2, 6], abs=5e-3) and bias < -0.05
+    assert bias == pytest.approx(columns.flat(alone)[2, 6], abs=5e-3) and bias < -0.05
     table = predicted(parts[1], calibration)
     by = table.set_index("model")
     assert by.over_inflated.board > 5 and abs(by.over_board.own) < 0.3

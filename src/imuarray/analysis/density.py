@@ -20,9 +20,8 @@ from imuarray.analysis.noise import (
 from imuarray.analysis.settings import SETTINGS
 from imuarray.engine.dataset import effects_of, parameters_of, places_among
 from imuarray.engine.estimate import Estimate
-from imuarray.engine.fit import flat_parameters
 from imuarray.engine.linearise import State
-from imuarray.engine.parameters import gauge_masks, model_of, prior_precision
+from imuarray.engine.parameters import model_of
 from imuarray.engine.readings import Readings
 from imuarray.errors import IdentifiabilityError
 from imuarray.estimation.collapsed import Collapsed
@@ -143,9 +142,9 @@ def _known(found: Estimate) -> np.ndarray:
     parameters that differ as these do.
     """
     columns, active = found.columns, found.active
-    precision = prior_precision(columns, active, resized=False)
-    values = flat_parameters(columns, found.recorded[0].state)
-    for effect, mask in gauge_masks(columns, active):
+    precision = columns.prior_precision(active, resized=False)
+    values = columns.flat(found.recorded[0].state)
+    for effect, mask in columns.gauges(active):
         if effect.resizes:
             weights, own = mask[active] / np.abs(mask).sum(), mask[active] != 0
             prior = np.mean(np.diag(precision)[own])

@@ -8,7 +8,6 @@ import xarray as xr
 from imuarray.analysis.model import Say, silent
 from imuarray.engine.clocks import CLOCK, refined, shown_clocks, timed, with_clocks
 from imuarray.engine.estimate import Estimate, Recorded, estimate
-from imuarray.engine.fit import flat_parameters
 from imuarray.engine.forward import resumed
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import POSITION, Columns, columns_of, model_of
@@ -77,7 +76,7 @@ def again(recording: Recording, calibration: xr.Dataset, say: Say = silent) -> E
         for name in ("effect_parameter", "effect_sd")
     )
     state = start(readings, columns)._replace(positions=positions, parameters=values)
-    active = flat_parameters(columns, state._replace(parameters=(free > 0).astype(float))) > 0
+    active = columns.flat(state._replace(parameters=(free > 0).astype(float))) > 0
     active[:, columns.of(POSITION)] = True
     return resumed(readings, columns, active & columns.owner, state)
 

@@ -8,8 +8,8 @@ import numpy as np
 from imuarray.analysis.model import Say, silent
 from imuarray.analysis.settings import SETTINGS
 from imuarray.engine.derivatives import no_derivatives
-from imuarray.engine.fit import pick
 from imuarray.engine.linearise import CHUNK, State, chunk_at
+from imuarray.engine.normal import pick
 from imuarray.engine.parameters import Columns, columns_of
 from imuarray.engine.readings import Readings, measured
 from imuarray.estimation.identifiability import Calibration

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from imuarray.diagnosis.detectable import detectable
+from imuarray.diagnosis.fit import Fit, at, likely_sizes, normal_blocks
 from imuarray.diagnosis.scores import (
     Candidate,
     Information,
@@ -23,9 +24,6 @@ from imuarray.diagnosis.scores import (
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL, scans
 from imuarray.diagnosis.state import Cause, Search, freed_places, heldout_gain, need, prune
-from imuarray.engine.alike import likely_sizes
-from imuarray.engine.fit import Fit, at
-from imuarray.engine.heldout import normal_blocks
 from imuarray.engine.parameters import POSITION
 from imuarray.linear import scaled_eigh, scaled_inverse, scaled_square
 from imuarray.model.effects import EFFECTS

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from imuarray.diagnosis.fit import at
 from imuarray.diagnosis.noise_effects import held_out
 from imuarray.diagnosis.procedure import ProcedureResult
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import placebo_gain
 from imuarray.diagnosis.state import Cause, Search, heldout_gain, need
-from imuarray.engine.fit import at, flat_parameters
 from imuarray.model.array_model import component, unit_of
 from imuarray.model.effects import DATA_EFFECTS, known_effect
 from imuarray.words import (
@@ -91,7 +91,7 @@ def structural_gain(found: ProcedureResult, item) -> tuple[float, float, np.ndar
 
 def parameters_of(search: Search, cause: Cause, sds) -> dict:
     """{name: {value, sd, unit}} of a cause; ``sds`` (N, m), of what a scan fixed there is none."""
-    values, columns = flat_parameters(search.columns, search.fit.state), search.columns
+    values, columns = search.columns.flat(search.fit.state), search.columns
     active, item = search.active, known_effect(cause.effect)
     held = (*item.held, *(item.held_rough if search.fit.state.gyroscopes_free else ()))
     found = {}

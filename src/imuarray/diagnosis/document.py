@@ -9,6 +9,7 @@ import numpy as np
 
 import imuarray
 from imuarray.diagnosis.causes import causes_of, structural_gain
+from imuarray.diagnosis.fit import Fit, fit, log_scores
 from imuarray.diagnosis.noise import observable, per_triad, standardised
 from imuarray.diagnosis.procedure import ProcedureResult, run_procedure
 from imuarray.diagnosis.replicates import Discrepancy, discrepancies
@@ -16,10 +17,9 @@ from imuarray.diagnosis.scores import Information, information_at
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.shocks import SHOCK
 from imuarray.engine.estimate import Estimate
-from imuarray.engine.fit import Fit, fit
 from imuarray.engine.forward import resumed
-from imuarray.engine.heldout import Scores, gain, log_scores
-from imuarray.engine.parameters import POSITION, prior_precision
+from imuarray.engine.heldout import Scores, gain
+from imuarray.engine.parameters import POSITION
 from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.engine.widths import widths
 from imuarray.estimation.threads import one_thread
@@ -166,7 +166,7 @@ def nats_beside(found: ProcedureResult) -> np.ndarray:
 
 def precision_of(made: Fit) -> np.ndarray:
     """Prior precision of a fit's active parameters, gauges pinned."""
-    return prior_precision(made.columns, made.active)
+    return made.columns.prior_precision(made.active)
 
 
 def fitted(made: Fit, given: Information | None = None) -> Fitted:

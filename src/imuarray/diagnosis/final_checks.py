@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.diagnosis import noise_effects
+from imuarray.diagnosis.fit import Fit
 from imuarray.diagnosis.noise import Noise
 from imuarray.diagnosis.reading_effects import RAILS, Structural, rails_cause, unique
 from imuarray.diagnosis.residual_checks import Check, all_checks, normal_checks
@@ -17,10 +18,10 @@ from imuarray.diagnosis.scores import Information
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL
 from imuarray.diagnosis.state import Search, need
-from imuarray.engine.fit import Fit, flat_parameters, from_flat, in_use, prior_means, scaled_solve
 from imuarray.engine.linearise import linearise
 from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.engine.widths import mask_of_left, spread_of
+from imuarray.linear import scaled_solve
 from imuarray.model.effects import KINDS
 from imuarray.tails import log_normal
 
@@ -130,7 +131,7 @@ def beside_left(search: Search) -> tuple[Fit, Information]:
     precision[np.ix_(place, place)] = np.linalg.inv(
         spread + ENGINE.fixed_map**2 * np.eye(len(spread))
     )
-    offset = flat_parameters(columns, made.state) - prior_means(search.readings, columns)
+    offset = columns.flat(made.state) - columns.prior_means()
     both = given.places(every)
     precise = precision[np.ix_(both, both)]
     slope = given.score[both] - precise @ offset[every]
@@ -160,8 +161,8 @@ def outlier_checks(search: Search) -> list[Check]:
     whole = replace(search.readings, keep=search.allowed)
     # by the motion that was fitted without them: an outlier would be part of its own prediction
     state = search.fit.state
-    columns, kept = in_use(search.columns, search.active, state)
-    state = from_flat(columns, state, flat_parameters(search.columns, state)[:, kept])
+    columns, kept = search.columns.in_use(search.active, state)
+    state = columns.unflat(state, search.columns.flat(state)[:, kept])
     # derivatives as the fit had them: compiled already
     seen = linearise(whole, columns, state, np.flatnonzero(search.active[:, kept].any(axis=0)))
     missed = seen.residual + np.einsum("tri,ti->tr", seen.basis, seen.taken).reshape(away.shape)
@@ -180,7 +181,7 @@ def outlier_checks(search: Search) -> list[Check]:
 def plausibility_checks(search: Search) -> list[Check]:
     """Causes whose parameters are larger than such sensors have: misattributed."""
     columns, found = search.columns, []
-    whole = flat_parameters(columns, search.fit.state) / columns.usual_sd
+    whole = columns.flat(search.fit.state) / columns.usual_sd
     for cause in search.causes:
         free = search.active[:, columns.of(cause.effect)]
         sizes = np.where(free, np.abs(whole[:, columns.of(cause.effect)]), 0.0)

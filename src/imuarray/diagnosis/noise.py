@@ -10,9 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from imuarray.diagnosis.fit import Fit
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.engine.fit import Fit, seen_through
 from imuarray.engine.linearise import CHUNK, THREADS, leverage_of
+from imuarray.engine.normal import seen_through
 from imuarray.engine.readings import Readings, by_triad, few_at_once
 from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.tails import QUARTILE, log_normal

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from imuarray.diagnosis.fit import Fit
 from imuarray.diagnosis.noise import Noise, expected_ratio, observable
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.engine.fit import Fit
 from imuarray.engine.heldout import blocks_of
 from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.model.effects import KINDS

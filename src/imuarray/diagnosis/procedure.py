@@ -16,6 +16,7 @@ from imuarray.diagnosis.final_checks import (
     together,
     within_tolerance,
 )
+from imuarray.diagnosis.fit import Fit, fit
 from imuarray.diagnosis.noise_effects import COLOURED, SCALES, TAILS
 from imuarray.diagnosis.reading_effects import Structural, find_structural
 from imuarray.diagnosis.residual_checks import Check, all_checks
@@ -24,7 +25,6 @@ from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.shocks import SHOCK, find_shocks, with_neighbours
 from imuarray.diagnosis.state import Search, eliminate
 from imuarray.engine.clocks import DELAY
-from imuarray.engine.fit import Fit, fit, flat_parameters
 from imuarray.engine.parameters import catalogue_effects, columns_of
 from imuarray.engine.readings import Readings, arrange, determined, few_at_once, part_of
 from imuarray.errors import InputError
@@ -276,7 +276,7 @@ def least_ratios(search: Search) -> np.ndarray:
     The less of it the shorter they are.
     """
     least = np.zeros(len(search.readings.labels))
-    sizes = np.abs(flat_parameters(search.columns, search.fit.state)) / search.columns.prior_sd
+    sizes = np.abs(search.columns.flat(search.fit.state)) / search.columns.prior_sd
     for cause in search.causes:
         if EFFECTS[cause.effect].shifts_time:
             delay, imus = search.columns.of(cause.effect)[0], list(cause.imus)

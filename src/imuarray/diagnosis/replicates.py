@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from imuarray.diagnosis.fit import Fit
 from imuarray.diagnosis.noise import observable, standardised
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.engine.fit import Fit
 from imuarray.model.effects import KINDS
 from imuarray.words import first_up
 

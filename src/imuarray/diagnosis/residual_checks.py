@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import median_filter
 
+from imuarray.diagnosis.fit import Fit, delay_score
 from imuarray.diagnosis.noise import Noise, observable, standardised
 from imuarray.diagnosis.replicates import motion_sizes
 from imuarray.diagnosis.scores import Information
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.engine.clocks import delay_score
-from imuarray.engine.fit import Fit, seen_through
 from imuarray.engine.linearise import CHUNK
+from imuarray.engine.normal import seen_through
 from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.linear import scaled_inverse, scaled_square
 from imuarray.motion.state import lever

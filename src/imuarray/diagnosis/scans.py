@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from imuarray.diagnosis.fit import Fit
 from imuarray.diagnosis.scores import Candidate, Information, Scanned, Score
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.engine.fit import Fit, flat_parameters, from_flat
 from imuarray.engine.heldout import blocks_of
 from imuarray.engine.parameters import POSITION
 from imuarray.linear import scaled_inverse
@@ -105,10 +105,10 @@ def refine_instants(search, imus, times=3):
     columns, imus = search.columns, list(imus)
     chosen = columns.of(SHIFT)
     for _ in range(times):
-        whole = flat_parameters(columns, search.fit.state)
+        whole = columns.flat(search.fit.state)
         last = whole[imus[0], chosen[3]]
         whole[imus, chosen[3]] = found = refine_instant(search.fit, imus, last)
-        search = search.refit(from_flat(columns, search.fit.state, whole))
+        search = search.refit(columns.unflat(search.fit.state, whole))
         if found == last:
             break
     return search
@@ -127,7 +127,7 @@ class Courses:
         values = np.zeros(len(imus) * len(columns))
         if back:
             beside[places] = False
-            values = flat_parameters(fit.columns, fit.state)[places].ravel()
+            values = fit.columns.flat(fit.state)[places].ravel()
         mask = beside.copy()
         mask[places] = True
         own, rest = _places(mask, beside, imus, columns)

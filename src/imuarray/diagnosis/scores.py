@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from imuarray.diagnosis.fit import Fit
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.engine.fit import Fit, flat_parameters
-from imuarray.engine.parameters import Columns, prior_precision
+from imuarray.engine.parameters import Columns
 from imuarray.linear import scaled_eigh, scaled_inverse
 from imuarray.model.effects import EFFECTS, KINDS
 from imuarray.tails import log_chi_square
@@ -184,7 +184,7 @@ class Information:
 
 def information_at(fit: Fit) -> Information:
     """The quadratic form at a fit, in the parameters whose derivatives it has."""
-    flat = flat_parameters(fit.columns, fit.state)
+    flat = fit.columns.flat(fit.state)
     owner = fit.described
     information, score = fit.normal(owner)
     index = np.full(owner.shape, -1)
@@ -194,7 +194,7 @@ def information_at(fit: Fit) -> Information:
         for sd in (fit.columns.prior_sd, fit.columns.usual_sd)
     )
     precision, places = np.diag(ridge), index[fit.active]
-    precision[np.ix_(places, places)] = prior_precision(fit.columns, fit.active)
+    precision[np.ix_(places, places)] = fit.columns.prior_precision(fit.active)
     return Information(information, score, index, flat[owner], ridge, usual, precision)
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from scipy import special
 from scipy.ndimage import binary_propagation
 
+from imuarray.diagnosis.fit import Fit
 from imuarray.diagnosis.noise_effects import NoiseCause, held_out
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.engine.fit import Fit
 from imuarray.tails import log_poisson
 
 SHOCK = "shock"

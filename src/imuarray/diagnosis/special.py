@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.diagnosis import scans as along_time
+from imuarray.diagnosis.fit import Fit, delay_score
 from imuarray.diagnosis.residual_checks import Check
 from imuarray.diagnosis.scores import Candidate, Information, Scanned, Score, score_all
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import need
-from imuarray.engine.clocks import CLOCK, DELAY, age_of, delay_score, sawtooth, sawtooths
-from imuarray.engine.fit import Fit, flat_parameters
+from imuarray.engine.clocks import CLOCK, DELAY, age_of, sawtooth, sawtooths
 from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.model.effects import EFFECTS
 from imuarray.model.timing import clock_turns
@@ -191,7 +191,7 @@ def placebo_gain(search, cause) -> tuple[float, float]:
         return special.placebo(search)
     given, columns = search.given, search.columns
     every = columns.mask([cause.effect]) & search.active.any(axis=0)
-    flat = flat_parameters(columns, search.fit.state)
+    flat = columns.flat(search.fit.state)
     rows = np.flatnonzero(every.any(axis=1))
     moved = flat.copy()
     moved[rows] = flat[np.roll(rows, 1)]

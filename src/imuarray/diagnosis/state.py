@@ -13,15 +13,14 @@ from functools import cached_property
 import numpy as np
 
 from imuarray.diagnosis import noise as noises
+from imuarray.diagnosis.fit import Fit, at, likely_sizes, normal_blocks, search_optimum
 from imuarray.diagnosis.scores import Candidate, Information, information_at, mask_of
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.engine.alike import likely_sizes
 from imuarray.engine.clocks import CLOCK, estimated_again, started_by_gyroscopes, without_jumps
 from imuarray.engine.estimate import Recorded
-from imuarray.engine.fit import Fit, at, flat_parameters, from_flat, search_optimum
-from imuarray.engine.heldout import gain_of, normal_blocks
+from imuarray.engine.heldout import gain_of
 from imuarray.engine.linearise import State
-from imuarray.engine.parameters import POSITION, Columns, prior_precision
+from imuarray.engine.parameters import POSITION, Columns
 from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS as CLOCKS
 from imuarray.engine.widths import mask_of_left, spread_of
@@ -208,7 +207,7 @@ class Search:
         ``values``: {imu: its parameters}, or None for effects that are not scanned for.
         """
         columns, state = self.columns, self.fit.state
-        whole = flat_parameters(columns, state)
+        whole = columns.flat(state)
         held = np.zeros_like(whole, bool)
         for item in columns.model.chain:
             if item.scanned:
@@ -223,7 +222,7 @@ class Search:
             state, values = started_by_gyroscopes(self.readings, state, values)
         for imu, value in (values or {}).items():
             whole[imu, chosen] = value
-        return from_flat(columns, state, whole)
+        return columns.unflat(state, whole)
 
 
 def freed_places(search: Search, effect: str, imus=None, among=None) -> np.ndarray:
@@ -253,9 +252,9 @@ def heldout_gain(
     """
     columns, mask = search.columns, search.active
     freed = columns.mask([effect], imus) & mask & ~np.asarray(there)
-    values = flat_parameters(columns, search.fit.state)[mask]
+    values = columns.flat(search.fit.state)[mask]
     parts = normal_blocks(search.fit, mask) if parts is None else parts
-    return gain_of(parts, prior_precision(columns, mask), values, freed[mask])
+    return gain_of(parts, columns.prior_precision(mask), values, freed[mask])
 
 
 def prune(search: Search, effect: str) -> Search:
@@ -272,9 +271,9 @@ def prune(search: Search, effect: str) -> Search:
     )
     pruned = replace(search, causes=causes)
     state = pruned.started(effect)
-    whole = flat_parameters(search.columns, state)
+    whole = search.columns.flat(state)
     whole[np.ix_(rest, search.columns.of(effect))] = 0.0
-    pruned = pruned.refit(from_flat(search.columns, state, whole))
+    pruned = pruned.refit(search.columns.unflat(state, whole))
     if search.smooth:
         return pruned
     gains = [heldout_gain(one, effect)[0] for one in (pruned, search)]

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from imuarray.engine.fit import Fit, flat_parameters, prior_means, scaled_solve
-from imuarray.engine.parameters import Columns, prior_precision
+from imuarray.engine.parameters import Columns
 from imuarray.engine.settings import SETTINGS
 from imuarray.linear import scaled_inverse
 from imuarray.model.array_model import unit_of
@@ -34,7 +33,7 @@ def with_likely_spread(columns: Columns, active, values, information, place) -> 
     sized = np.setdiff1d(groups[column], "")
     if len(sized) == 0:
         return columns
-    prior = scaled_inverse(prior_precision(columns, active))
+    prior = scaled_inverse(columns.prior_precision(active))
     covariance, values = scaled_inverse(information)[np.ix_(place, place)], values[place]
     for group in sized:
         mine = np.flatnonzero(groups[column] == group)
@@ -52,24 +51,3 @@ def with_likely_spread(columns: Columns, active, values, information, place) -> 
     # where the model is far off sizes would grow without end
     least, most = (size * columns.usual_sd for size in (SETTINGS.least_size, SETTINGS.most_size))
     return replace(columns, prior_sd=np.clip(sds, least, most))
-
-
-def likely_sizes(fit: Fit, equations=None) -> Columns:
-    """The columns of a fit, its sized effects as large as is likeliest, all else quadratic.
-
-    ``equations``: information and score of its active parameters, if they are known.
-    """
-    columns, active = fit.columns, fit.active
-    if not np.any(sized_groups(columns)[active.any(axis=0)] != ""):
-        return columns
-    every = np.arange(active.sum())
-    values, means = flat_parameters(columns, fit.state)[active], prior_means(fit.readings, columns)
-    inner, score = equations or fit.normal(active)
-    right = score + inner @ values
-    for _ in range(SETTINGS.iterations):
-        precision, last = prior_precision(columns, active), columns.prior_sd
-        values, _ = scaled_solve(inner + precision, right + precision @ means[active])
-        columns = with_likely_spread(columns, active, values, inner + precision, every)
-        if np.allclose(columns.prior_sd, last, rtol=SETTINGS.same_noise):
-            break
-    return columns

@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 
 from imuarray.engine.estimate import Recorded
-from imuarray.engine.fit import Fit, flat_parameters, from_flat, with_free_gyroscopes
 from imuarray.engine.gyroscope_clocks import clocks_from_gyroscopes, enough_gyroscopes, with_phases
 from imuarray.engine.linearise import State, linearise
 from imuarray.engine.parameters import Columns
 from imuarray.engine.readings import Readings, few_at_once
 from imuarray.engine.settings import SETTINGS
+from imuarray.engine.start import with_free_gyroscopes
 from imuarray.model.timing import clock_turns
 from imuarray.tails import log_chi_square
 
@@ -164,11 +164,11 @@ def estimated_again(readings: Readings, columns: Columns, state: State, imus) ->
     if not imus or state.gyroscopes_free:
         return state
     parts = delay_of(readings, columns, state)
-    whole, chosen = flat_parameters(columns, state), columns.of(CLOCK)
+    whole, chosen = columns.flat(state), columns.of(CLOCK)
     for imu in imus:
         own = (part[:, imu] for part in parts)
         whole[imu, chosen] = refine_clock(readings, whole[imu, chosen], *own)
-    return from_flat(columns, state, whole)
+    return columns.unflat(state, whole)
 
 
 def without_jumps(readings: Readings, columns: Columns, state: State, imus, width):
@@ -203,15 +203,15 @@ def shown_clocks(one: Recorded, columns: Columns) -> dict[int, np.ndarray]:
 
 def with_clocks(one: Recorded, columns: Columns, clocks: dict) -> Recorded:
     """The recording with clocks {imu: (P, f, phi, c, g)} in its parameters."""
-    whole, chosen = flat_parameters(columns, one.state), columns.of(CLOCK)
+    whole, chosen = columns.flat(one.state), columns.of(CLOCK)
     for imu, values in clocks.items():
         whole[imu, chosen] = values
-    return replace(one, state=from_flat(columns, one.state, whole))
+    return replace(one, state=columns.unflat(one.state, whole))
 
 
 def clocks_in(one: Recorded, columns: Columns, imus) -> dict[int, np.ndarray]:
     """The inverse, of those of ``imus`` that turn."""
-    values = flat_parameters(columns, one.state)[:, columns.of(CLOCK)]
+    values = columns.flat(one.state)[:, columns.of(CLOCK)]
     return {imu: values[imu] for imu in map(int, imus) if values[imu, 1] != 0.0}
 
 
@@ -242,12 +242,6 @@ def timed(one: Recorded, keep, columns: Columns, imus) -> Recorded:
     if state.rough_prior.sd.shape[1] < 15:
         state = with_free_gyroscopes(readings, state)
     return replace(one, readings=with_phases(readings, state, clocks), state=state)
-
-
-def delay_score(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
-    """Each sample's score and information of each IMU's delay, (T, N) each, motion projected."""
-    column = int(fit.columns.of(DELAY)[0])
-    return delay_parts(fit.residual, fit.whitened[..., column], fit.through([column])[..., 0])
 
 
 def started_by_gyroscopes(readings: Readings, state: State, clocks: dict) -> tuple[State, dict]:

@@ -13,14 +13,14 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from imuarray.engine import fit as fits
 from imuarray.engine.alike import with_likely_spread
 from imuarray.engine.linearise import State
-from imuarray.engine.parameters import Columns, prior_precision
+from imuarray.engine.parameters import Columns, stepped
 from imuarray.engine.readings import Readings
 from imuarray.engine.robust import MEDIAN, Pass, distances, freedoms, normal_pass, reweighted
 from imuarray.engine.settings import SETTINGS
-from imuarray.engine.start import is_smooth, start
+from imuarray.engine.start import is_smooth, start, with_derivatives, with_rough_prior
+from imuarray.linear import scaled_solve
 from imuarray.model.effects import EFFECTS
 
 NORMAL, ROBUST = np.array([np.inf, np.inf]), np.array([4.0, 4.0])  # degrees of freedom
@@ -44,7 +44,7 @@ class Recorded:
             first = first._replace(positions=former.positions, parameters=former.parameters)
         smooth = readings.gapless and is_smooth(readings, first.motion)
         if readings.gapless and not smooth:
-            first = fits.with_rough_prior(readings, first)
+            first = with_rough_prior(readings, first)
         return cls(readings, first, smooth)
 
     def select(self, used) -> Self:
@@ -158,7 +158,7 @@ def estimate(
     ``active`` (N, m) bool. ``robust``: Student's t with estimated degrees of freedom instead of
     normal noise. ``steps``: at most. LinAlgError where the readings do not determine the motion.
     """
-    active = fits.movable(columns, active, [one.state for one in recorded])
+    active = columns.movable(active, [one.state for one in recorded])
     places = places_of(columns, active, len(recorded))
     recorded = tuple(replace(one, resized=()) for one in recorded)
     nu, length, last, moved = NORMAL, 1.0, None, []
@@ -181,7 +181,7 @@ def estimate(
         columns = with_likely_spread(columns, active, values, information + precision, places[0])
         precision = pinned(columns, active, places)
         slope = score - precision @ (values - means(recorded, columns, active, places))
-        step, sds = fits.scaled_solve(information + precision, slope)
+        step, sds = scaled_solve(information + precision, slope)
         sds = np.maximum(sds, jackknifed(information + precision, blocks))
         moved.append(float(np.max(np.abs(step) / sds, initial=0.0)))
         if moved[-1] < SETTINGS.settled and change < SETTINGS.same_noise and number > first:
@@ -192,7 +192,7 @@ def estimate(
         length = max(length / 2, SETTINGS.shortest) if back else min(1.0, 1.5 * length)
         last = step
         recorded = tuple(
-            replace(one, state=fits.stepped(one.state, columns, active, length * step[place]))
+            replace(one, state=stepped(one.state, columns, active, length * step[place]))
             for one, place in zip(noisy, places, strict=True)
         )
     return Estimate(
@@ -219,7 +219,7 @@ def _passed(recorded, columns, active, improved: int = 1):
     """Each recording linearised, its motion improved."""
     seen, moved = [], []
     for one in recorded:
-        state = fits.with_derivatives(one.readings, one.state, one.smooth)
+        state = with_derivatives(one.readings, one.state, one.smooth)
         seen.append(normal_pass(one.readings, columns, state, active, improved))
         state = state._replace(motion=seen[-1].motion)
         moved.append(_sized(replace(one, state=state), seen[-1].rough))
@@ -280,16 +280,16 @@ def _spread(parts, places) -> np.ndarray:
 
 
 def _values(recorded, columns, active, places) -> np.ndarray:
-    return _spread([fits.flat_parameters(columns, one.state)[active] for one in recorded], places)
+    return _spread([columns.flat(one.state)[active] for one in recorded], places)
 
 
 def means(recorded, columns, active, places) -> np.ndarray:
-    return _spread([fits.prior_means(one.readings, columns)[active] for one in recorded], places)
+    return _spread([columns.prior_means()[active] for one in recorded], places)
 
 
 def pinned(columns, active, places, resized=True) -> np.ndarray:
     """Precision (n, n) of the priors, gauges pinned."""
-    inner = prior_precision(columns, active, resized)
+    inner = columns.prior_precision(active, resized)
     out = np.zeros((_size(places),) * 2)
     for place in places:  # what several recordings share is written by each of them
         out[np.ix_(place, place)] = inner

@@ -13,7 +13,6 @@ from scipy.special import chdtrc
 from imuarray.engine import widths
 from imuarray.engine.clocks import CLOCK, refined, shown_clocks, timed, with_clocks
 from imuarray.engine.estimate import Estimate, Recorded, Tested, estimate, tested
-from imuarray.engine.fit import flat_parameters, from_flat, in_use
 from imuarray.engine.heldout import gain_of
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import POSITION, Columns, columns_of
@@ -72,8 +71,8 @@ def resumed(readings: Readings, columns: Columns, active, state: State) -> Estim
     With columns for what the model has, and for maps that first order may have left.
     """
     maps = widths.corrected(readings.left)
-    few, kept = in_use(columns, active, state, maps)
-    state = from_flat(few, state, flat_parameters(columns, state)[:, kept])
+    few, kept = columns.in_use(active, state, maps)
+    state = few.unflat(state, columns.flat(state)[:, kept])
     columns, active = few, active[:, kept]
     recorded = Recorded.of(most_informative(readings, lambda text: None), columns, state)
     imus = np.flatnonzero(active[:, columns.of(CLOCK)].any(axis=1))
@@ -197,9 +196,9 @@ class Selected(NamedTuple):
         now = self._replace(kept={n: mask for n, mask in self.kept.items() if n not in names})
         found, recorded = self.found, []
         for one in found.recorded:
-            whole = flat_parameters(found.columns, one.state)
+            whole = found.columns.flat(one.state)
             whole[found.active & ~now.active] = 0.0
-            recorded.append(replace(one, state=from_flat(found.columns, one.state, whole)))
+            recorded.append(replace(one, state=found.columns.unflat(one.state, whole)))
         return now._replace(found=replace(found, recorded=tuple(recorded)))
 
     def tried(self, names) -> list[EffectGroup]:
@@ -219,7 +218,7 @@ class Selected(NamedTuple):
         if chance < SETTINGS.chance:
             found.append(GYROSCOPES)
         if LAG in self.kept:
-            each = flat_parameters(columns, self.found.recorded[0].state)
+            each = columns.flat(self.found.recorded[0].state)
             if np.abs(each[:, columns.of(*EFFECT_GROUPS[LAG])]).max() > LONG:
                 found.append(FILTER)
         return [name for name in found if name in names]

@@ -11,12 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.engine.derivatives import no_derivatives
-from imuarray.engine.fit import flat_parameters, pick, with_derivatives
 from imuarray.engine.linearise import CHUNK, RoughPrior, State, chunk_at, motion_equations, padded
+from imuarray.engine.normal import pick
 from imuarray.engine.parameters import Columns, columns_of
 from imuarray.engine.readings import Readings, by_imu, measured
 from imuarray.engine.settings import SETTINGS
-from imuarray.engine.start import is_smooth, start
+from imuarray.engine.start import is_smooth, start, with_derivatives
 from imuarray.engine.start import turned as with_slope
 from imuarray.estimation.collapsed import Collapsed, MotionEstimate, motion_at, motion_from
 from imuarray.geometry.array import positions_of, require_planar_extent
@@ -281,5 +281,5 @@ def _places(columns: Columns, positions: int, effects: int) -> tuple[np.ndarray,
     numbers = 1.0 + np.arange(positions + effects)
     relative = np.vstack([np.zeros((1, 3)), numbers[:positions].reshape(-1, 3)])
     state = State(np.empty((0, 9)), relative, numbers[positions:], ())
-    whole = flat_parameters(columns, state)
+    whole = columns.flat(state)
     return whole > 0, whole[whole > 0].astype(int) - 1

@@ -5,7 +5,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import gammaln
 
-from imuarray.engine.fit import Fit
 from imuarray.engine.linearise import State
 from imuarray.engine.readings import Readings, by_triad
 from imuarray.engine.settings import SETTINGS
@@ -27,19 +26,6 @@ def blocks_of(samples: int, number=SETTINGS.blocks) -> list[slice]:
     """Consecutive blocks of time, as equal as whole samples allow."""
     edges = np.linspace(0, samples, number + 1).astype(int)
     return [slice(first, last) for first, last in zip(edges[:-1], edges[1:], strict=True)]
-
-
-def normal_blocks(fit: Fit, active) -> list[tuple[np.ndarray, np.ndarray]]:
-    """(information (n, n), score (n,)) of the n ``active`` (N, m) parameters from each block."""
-    return [fit.normal(active, block) for block in blocks_of(len(fit.residual))]
-
-
-def log_scores(fit: Fit, ridge) -> Scores:
-    """Scores of a fit under normal noise; ``ridge`` (n, n) prior precision of what is active."""
-    nats = log_densities(
-        fit.readings, fit.state, fit.residual, fit.misfits, fit.log_volume, (np.inf, np.inf)
-    )
-    return scores_of(nats, normal_blocks(fit, fit.active), ridge)
 
 
 def scores_of(nats, parts, ridge) -> Scores:

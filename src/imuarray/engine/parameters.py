@@ -10,7 +10,8 @@ common part, and the reported sds say what the priors leave open.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -58,6 +59,81 @@ class Columns:
         """m."""
         return len(self.names)
 
+    def flat(self, state) -> np.ndarray:
+        """Positions and effect parameters by IMU and column, (N, m); zero where there is none."""
+        count = self.owner.shape[0]
+        out = np.zeros((count, self.size))
+        out[: len(state.positions), self.of(POSITION)] = state.positions
+        values = self.model.split(state.parameters)
+        for name, value in values.items():
+            rows = np.asarray(value).reshape(len(value), -1)
+            out[: len(rows), self.of(name)] = rows
+        return out
+
+    def unflat(self, state, whole):
+        """The inverse of `flat`: a state with the parameters ``whole`` (N, m)."""
+        model = self.model
+        shapes = {e.id: s for e, s in zip(model.chain, model.shapes, strict=True)}
+        values = {n: whole[: s[0], self.of(n)].reshape(s) for n, s in shapes.items()}
+        positions = whole[: len(state.positions), self.of(POSITION)]
+        return state._replace(positions=positions, parameters=self.model.join(values))
+
+    def prior_means(self) -> np.ndarray:
+        """(N, m): nominal positions, no effect."""
+        out = np.zeros(self.owner.shape)
+        nominal = self.model.array.relative
+        out[: len(nominal), self.of(POSITION)] = nominal
+        return out
+
+    def in_use(self, active, state, also=()) -> tuple[Self, np.ndarray]:
+        """Columns of the effects that are active or not zero, or in ``also``; (m,) bool, which."""
+        used = (active | (self.flat(state) != 0)).any(axis=0)
+        names = {name for name, one in zip(self.names, used, strict=True) if one} | {*also}
+        kept = np.isin(self.names, [POSITION, *names])
+        effects = [name for name in self.model.effects if name in names]
+        few = columns_of(self.model.array, effects, self.prior_sd[0])
+        return replace(few, prior_sd=self.prior_sd[kept]), kept
+
+    def movable(self, active, states) -> np.ndarray:
+        """The active parameters (N, m) less those held where gyroscopes' turning is free."""
+        if not any(state.gyroscopes_free for state in states):
+            return active
+        found = active.copy()
+        for item in self.model.chain:
+            found[:, self.of(item.id)[list(item.held_rough)]] = False
+        return found
+
+    def prior_precision(self, active, resized: bool = True) -> np.ndarray:
+        """(n, n) precision of the active parameters (N, m): their priors, and the pinned gauges.
+
+        ``resized``: whether those that the array's size takes up are pinned, too.
+        """
+        sds = np.broadcast_to(self.prior_sd, active.shape)[active]
+        precision = np.diag(1.0 / sds**2)
+        column, common = np.nonzero(active)[1], self.common_sd[np.nonzero(active)[1]]
+        alike = (column[:, None] == column) & (common > 0)
+        for mine in np.unique(alike[common > 0], axis=0):
+            # own variance of each, and a common one: Sherman and Morrison
+            own, shared = sds[mine][0] ** 2, common[mine][0] ** 2
+            precision[np.ix_(mine, mine)] -= shared / own / (own + mine.sum() * shared)
+        for effect, mask in self.gauges(active):
+            if effect.resizes and not resized:
+                continue
+            along = mask[active].astype(float)
+            along /= np.abs(along).sum() * SETTINGS.stiff * sds[along != 0].mean()
+            precision += np.outer(along, along)
+        return precision
+
+    def gauges(self, active) -> list[tuple[Effect, np.ndarray]]:
+        """Effects, and (N, m) weights of parameters whose mean is a gauge, where all are active."""
+        found, model = [], self.model
+        for item, shape in zip(model.chain, model.shapes, strict=True):
+            for own in item.gauge(shape, model.array.turns) if item.gauge else ():
+                mask = np.zeros(active.shape, np.asarray(own).dtype)
+                mask[: shape[0], self.of(item.id)] = np.reshape(own, (shape[0], -1))
+                found.append((item, mask * self.owner))
+        return [(item, mask) for item, mask in found if mask.any() and active[mask != 0].all()]
+
 
 def columns_of(array: Array, effects, position_sd: float) -> Columns:
     """The columns for an array and a set of effects."""
@@ -86,41 +162,15 @@ def catalogue_effects(without=()) -> tuple[str, ...]:
     return tuple(n for n, one in EFFECTS.items() if n not in without and not one.smooth)
 
 
-def prior_precision(columns: Columns, active, resized: bool = True) -> np.ndarray:
-    """(n, n) precision of the active parameters (N, m): their priors, and the pinned gauges.
-
-    ``resized``: whether those that the array's size takes up are pinned, too.
-    """
-    sds = np.broadcast_to(columns.prior_sd, active.shape)[active]
-    precision = np.diag(1.0 / sds**2)
-    column, common = np.nonzero(active)[1], columns.common_sd[np.nonzero(active)[1]]
-    alike = (column[:, None] == column) & (common > 0)
-    for mine in np.unique(alike[common > 0], axis=0):
-        # own variance of each, and a common one: Sherman and Morrison
-        own, shared = sds[mine][0] ** 2, common[mine][0] ** 2
-        precision[np.ix_(mine, mine)] -= shared / own / (own + mine.sum() * shared)
-    for effect, mask in gauge_masks(columns, active):
-        if effect.resizes and not resized:
-            continue
-        along = mask[active].astype(float)
-        along /= np.abs(along).sum() * SETTINGS.stiff * sds[along != 0].mean()
-        precision += np.outer(along, along)
-    return precision
-
-
-def gauge_masks(columns: Columns, active) -> list[tuple[Effect, np.ndarray]]:
-    """Effects, and (N, m) weights of parameters whose mean is a gauge, where all are active."""
-    found, model = [], columns.model
-    for item, shape in zip(model.chain, model.shapes, strict=True):
-        for own in item.gauge(shape, model.array.turns) if item.gauge else ():
-            mask = np.zeros(active.shape, np.asarray(own).dtype)
-            mask[: shape[0], columns.of(item.id)] = np.reshape(own, (shape[0], -1))
-            found.append((item, mask * columns.owner))
-    return [(item, mask) for item, mask in found if mask.any() and active[mask != 0].all()]
-
-
 def model_of(recording: Recording, effects: Sequence[str] = ()) -> ArrayModel:
     """The measurement model a recording declares: its geometry and noise."""
     return ArrayModel.isotropic(
         array_of(recording), recording.accelerometer_noise_sd, recording.gyroscope_noise_sd, effects
     )
+
+
+def stepped(state, columns: Columns, active, step):
+    """The state after a step (n,) of the ``active`` parameters (N, m) bool."""
+    whole = columns.flat(state)
+    whole[active] += step
+    return columns.unflat(state, whole)

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from imuarray.engine import linearise
-from imuarray.engine.fit import normal
 from imuarray.engine.heldout import blocks_of, log_t
+from imuarray.engine.normal import normal
 from imuarray.engine.parameters import Columns
 from imuarray.engine.readings import Readings, by_triad
 from imuarray.engine.settings import SETTINGS

@@ -15,7 +15,6 @@ from scipy.special import expit
 from imuarray.engine.clocks import CLOCK, clocks_in
 from imuarray.engine.derivatives import no_derivatives
 from imuarray.engine.estimate import Estimate, Recorded
-from imuarray.engine.fit import with_derivatives, with_free_gyroscopes, with_rough_prior
 from imuarray.engine.fusion import covariances, descend, fuse, one_sided
 from imuarray.engine.gyroscope_clocks import with_phases
 from imuarray.engine.linearise import CHUNK, State, chunk_at, predicted
@@ -23,6 +22,7 @@ from imuarray.engine.parameters import Columns
 from imuarray.engine.readings import Readings, by_triad
 from imuarray.engine.robust import distances, normal_pass
 from imuarray.engine.settings import SETTINGS
+from imuarray.engine.start import with_derivatives, with_free_gyroscopes, with_rough_prior
 from imuarray.model import ArrayModel
 from imuarray.model.timing import clock_turns
 

@@ -5,9 +5,15 @@ accelerometers leave it open about the line that joins them.
 """
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
-from imuarray.engine.derivatives import no_derivatives, polynomial_derivative, polynomial_taps
-from imuarray.engine.linearise import State, TurningPrior
+from imuarray.engine.derivatives import (
+    derivatives,
+    no_derivatives,
+    polynomial_derivative,
+    polynomial_taps,
+)
+from imuarray.engine.linearise import RoughPrior, State, TurningPrior
 from imuarray.engine.parameters import Columns
 from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS
@@ -129,3 +135,52 @@ def is_smooth(readings: Readings, motion) -> bool:
     """True where neighbouring samples determine derivatives: omega's slope is omega_dot."""
     slope = polynomial_derivative(readings.time, readings.run, motion[:, :3], readings.window, 1)
     return bool(np.corrcoef(slope.ravel(), motion[:, 3:6].ravel())[0, 1] > SETTINGS.smooth)
+
+
+def with_derivatives(readings, state, smooth) -> State:
+    """The state with the time derivatives of its own motion, if they are not free."""
+    if not smooth:
+        return state
+    if state.turning is not None:
+        state = turned(readings, state, bool(state.turning.follows.any()))
+    found = derivatives(readings, state.motion, state.positions)
+    return state._replace(derivatives=found)
+
+
+def with_rough_prior(readings: Readings, state: State) -> State:
+    """The state with omega double dot and s dot free: neighbours determine them only roughly.
+
+    Their prior has the polynomials' mean, and for sd ten times the size of the differences near by.
+    It is that of the first motion and stays: one that followed the fit would shrink with it.
+    What the gyroscopes' omega dot may have of its own is as large as twice the step from a sample
+    to the next, once it is `freed`.
+    """
+    dt = np.median(np.diff(readings.time))
+    found = derivatives(readings, state.motion, state.positions)
+    mean = np.hstack([*found[:2], np.zeros_like(found[0])])
+    steps = np.diff(state.motion[:, 3:], axis=0, append=state.motion[-1:, 3:]) / dt
+    steps[np.diff(readings.run, append=readings.run[-1]) > 0] = 0.0
+    near = uniform_filter1d(np.mean(steps.reshape(-1, 2, 3) ** 2, axis=-1), SETTINGS.near, axis=0)
+    size = np.repeat(np.sqrt(near) + 0.1 * np.sqrt(near.mean(axis=0)), 3, axis=1)
+    own = SETTINGS.gyroscopes_own * dt * size[:, :3]
+    sd = np.hstack([SETTINGS.wide * size, SETTINGS.tied * own])
+    nothing = no_derivatives(len(mean), len(state.positions))
+    return state._replace(
+        motion=np.hstack([state.motion, mean]), derivatives=nothing,
+        rough_prior=RoughPrior(mean, sd, own),
+    )  # fmt: skip
+
+
+def with_free_gyroscopes(readings: Readings, state: State) -> State:
+    """The state where all that gyroscopes see of rough motion is free: to third order, and omega.
+
+    The sds are where an `estimate` begins, which sizes them.
+    """
+    prior = state.rough_prior.freed()
+    dt, nothing = np.median(np.diff(readings.time)), np.zeros((len(readings.time), 6))
+    third = SETTINGS.wide / (SETTINGS.gyroscopes_own * dt) * prior.own
+    sd = np.hstack([prior.sd, third, SETTINGS.offset * prior.own])
+    return state._replace(
+        motion=np.hstack([state.motion, nothing]),
+        rough_prior=prior._replace(mean=np.hstack([prior.mean, nothing]), sd=sd),
+    )

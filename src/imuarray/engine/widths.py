@@ -8,12 +8,11 @@ from scipy.linalg import block_diag
 from scipy.special import chdtrc
 
 from imuarray.engine.estimate import Estimate, jackknifed, means, pinned, tested
-from imuarray.engine.fit import flat_parameters, from_flat, scaled_solve, stepped
 from imuarray.engine.linearise import State
-from imuarray.engine.parameters import Columns, columns_of, gauge_masks
+from imuarray.engine.parameters import Columns, columns_of, stepped
 from imuarray.engine.readings import Left
 from imuarray.engine.settings import SETTINGS
-from imuarray.linear import scaled_inverse
+from imuarray.linear import scaled_inverse, scaled_solve
 from imuarray.model.catalogue import OFF_COLUMNS, OFF_ROWS
 from imuarray.model.effects import KINDS
 
@@ -128,7 +127,7 @@ def growing(found: Estimate) -> np.ndarray:
 
 def _formal(found: Estimate) -> np.ndarray:
     """Gauges that the array's size takes up not pinned, but as large as they may well be."""
-    known, gauges = np.isfinite(found.scale_sd), gauge_masks(found.columns, found.active)
+    known, gauges = np.isfinite(found.scale_sd), found.columns.gauges(found.active)
     count, prior = len(found.values), found.precision.copy()
     prior[:count, :count] = pinned(found.columns, found.active, found.places, resized=known)
     sizes = [mask[found.active] for effect, mask in gauges if effect.resizes]
@@ -212,7 +211,7 @@ def _with_maps(found: Estimate) -> Estimate:
         return out
 
     def moved(state: State) -> State:
-        return from_flat(columns, state, wider(flat_parameters(old, state)))
+        return columns.unflat(state, wider(old.flat(state)))
 
     recorded = tuple(replace(one, state=moved(one.state)) for one in found.recorded)
     return replace(found, recorded=recorded, columns=columns, active=wider(found.active))

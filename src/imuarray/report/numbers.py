@@ -6,10 +6,10 @@ from scipy.special import ndtri
 
 from imuarray.diagnosis.adoption import separability
 from imuarray.diagnosis.document import Diagnosis, Fitted
+from imuarray.diagnosis.fit import Fit
 from imuarray.diagnosis.noise import standardised
 from imuarray.diagnosis.replicates import TESTS
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.engine.fit import Fit
 from imuarray.model.effects import KINDS
 
 BAND = ndtri(0.975)  # sds of a 95 % band

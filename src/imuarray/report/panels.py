@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 
 from imuarray.diagnosis.document import Diagnosis
-from imuarray.engine.clocks import age_of, delay_score
-from imuarray.engine.fit import Fit, flat_parameters
+from imuarray.diagnosis.fit import Fit, delay_score
+from imuarray.engine.clocks import age_of
 from imuarray.engine.heldout import blocks_of
 from imuarray.engine.parameters import POSITION
 from imuarray.linear import scaled_inverse
@@ -40,7 +40,7 @@ class Signal(NamedTuple):
 def signal_of(diagnosis: Diagnosis, cause) -> Signal:
     """The `Signal` of an adopted cause (effect, imus) in the extended model."""
     made, sds = diagnosis.extended.fit, diagnosis.extended.sds
-    columns, flat = made.columns, flat_parameters(made.columns, made.state)
+    columns, flat = made.columns, made.columns.flat(made.state)
     mask = columns.mask([cause.effect], cause.imus) & made.active
     sure = np.where(mask, np.abs(flat) / np.where(sds > 0, sds, np.inf), 0.0)
     left = made.less_motion(made.along(np.where(mask, flat, 0.0)))

@@ -15,11 +15,10 @@ from imuarray.analysis.known import fused, used, with_board
 from imuarray.engine.course import block_scores
 from imuarray.engine.dataset import engine_dataset, places_among, positions_dataset
 from imuarray.engine.estimate import Estimate, Recorded, estimate
-from imuarray.engine.fit import flat_parameters, prior_means, stepped
 from imuarray.engine.forward import DELAYS, ROUGH_GROUPS, Selected
 from imuarray.engine.fusion import fuse
 from imuarray.engine.heldout import gain
-from imuarray.engine.parameters import POSITION, columns_of
+from imuarray.engine.parameters import POSITION, columns_of, stepped
 from imuarray.engine.readings import Readings
 from imuarray.engine.robust import normal_pass
 from imuarray.engine.settings import SETTINGS
@@ -121,13 +120,13 @@ def _positions(found: Estimate, calibration: xr.Dataset) -> tuple[np.ndarray, np
     """Most likely (A, 3) m, and the covariance of r_2 ... r_A."""
     (one,), columns = found.recorded, found.columns
     active = columns.mask([POSITION])
-    nominal = prior_means(one.readings, columns)[active]
+    nominal = columns.prior_means()[active]
     prior = np.diag(1.0 / np.broadcast_to(columns.prior_sd, active.shape)[active] ** 2)
     for _ in range(STEPS):
         seen = normal_pass(one.readings, columns, one.state, active)
         state = one.state._replace(motion=seen.motion)
         information = seen.information.sum(axis=0) + prior
-        off = flat_parameters(columns, state)[active] - nominal
+        off = columns.flat(state)[active] - nominal
         step = np.linalg.solve(information, seen.score.sum(axis=0) - prior @ off)
         one = replace(one, state=stepped(state, columns, active, step))
         if np.max(np.abs(step) * np.sqrt(np.diag(information))) < SETTLED:

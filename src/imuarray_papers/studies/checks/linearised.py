@@ -7,8 +7,8 @@ is narrow; it is what the claims fall back on where the chains are too short to 
 import numpy as np
 import pandas as pd
 
+from imuarray.diagnosis.fit import at
 from imuarray.engine.derivatives import no_derivatives
-from imuarray.engine.fit import at
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import columns_of
 from imuarray.engine.readings import measured

@@ -1,0 +1,78 @@
+"""Normal equations of chosen parameters, each sample's motion eliminated, chunk by chunk."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from imuarray.engine.linearise import CHUNK, THREADS
+
+
+def summed_normal(seen, chosen, part=slice(None)):
+    """`normal` of many samples, chunk by chunk: what is made of each is small."""
+    first, last, _ = part.indices(len(seen.residual))
+
+    def over(starts):
+        information, score = np.zeros((chosen.sum(), chosen.sum())), np.zeros(chosen.sum())
+        for start in starts:
+            inner, slope = normal(seen, chosen, slice(start, min(start + CHUNK, last)))
+            information += inner
+            score += slope
+        return information, score
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        found = list(pool.map(over, np.array_split(np.arange(first, last, CHUNK), THREADS)))
+    return sum(inner for inner, _ in found), sum(slope for _, slope in found)
+
+
+def normal(seen, chosen, part):
+    """Information (n, n) and score (n,) of the chosen parameters, motion projected out.
+
+    ``seen``: an `Eliminated` or a `Fit`.
+    """
+    through, blocks = seen_through(seen.whitened[part], seen.basis[part], chosen)
+    course = np.empty((*seen.unexpected[part].shape, through.shape[2]))
+    for imu, places, _ in blocks:
+        course[..., places] = seen.course[part, :, imu][..., chosen[imu]]
+    if course.shape[1]:
+        through += seen.expected[part] @ course
+    flat, prior = (x.reshape(x.shape[0] * x.shape[1], x.shape[2]) for x in (through, course))
+    information = prior.T @ prior - flat.T @ flat
+    for _, places, block in blocks:
+        own = block.reshape(-1, block.shape[-1])
+        information[places, places] += own.T @ own
+    return information, score_of(seen, chosen, part)
+
+
+def score_of(seen, chosen, part=slice(None)):
+    """Score (n,) of the chosen parameters; the residual is orthogonal to the motion already."""
+    score = np.einsum("tkim,tki->km", seen.whitened[part], seen.residual[part])
+    score += np.einsum("tdkm,td->km", seen.course[part], seen.unexpected[part])
+    return score[chosen]
+
+
+def seen_through(whitened, basis, chosen):
+    """The n ``chosen`` (N, m) bool in the motion's basis: (T, D, n), and [(imu, places, block)].
+
+    A block is an IMU's own part of the derivatives ``whitened`` (T, N, 6, m), (T, 6, n_imu).
+    """
+    counts = chosen.sum(axis=1)
+    through, blocks = np.empty((len(basis), basis.shape[2], counts.sum())), []
+    for imu in np.flatnonzero(counts):
+        block = whitened[:, imu]
+        if not chosen[imu].all():
+            block = block[..., chosen[imu]]
+        places = slice(counts[:imu].sum(), counts[: imu + 1].sum())
+        own = np.swapaxes(basis[:, 6 * imu : 6 * imu + 6], 1, 2)
+        np.matmul(own, block, out=through[..., places])
+        blocks.append((imu, places, block))
+    return through, blocks
+
+
+def pick(through, chosen) -> tuple[np.ndarray, np.ndarray]:
+    """The (imu, column) pairs (n, 2) of ``chosen`` (N, m) bool, and through's columns (T, D, n)."""
+    pairs = np.argwhere(chosen)
+    seen = np.empty((len(through), through.shape[2], len(pairs)))
+    for imu in np.unique(pairs[:, 0]):
+        own = np.flatnonzero(pairs[:, 0] == imu)
+        seen[..., own] = through[:, imu][..., pairs[own, 1]]
+    return pairs, seen
