@@ -1,7 +1,5 @@
 """Clock and axes of one gyroscope against another's, from the rates of one rigid body."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

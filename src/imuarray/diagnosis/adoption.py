@@ -4,8 +4,6 @@ The most significant test is refitted jointly and kept if it predicts; correlati
 what cannot be told apart.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

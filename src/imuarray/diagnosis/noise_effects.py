@@ -1,7 +1,5 @@
 """Effects on the noise itself: its scale, its tails, its colour, named at the end of a search."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

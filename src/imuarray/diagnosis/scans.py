@@ -3,8 +3,6 @@
 How `position_shift` is found and its instant refined; how `warm_up` is found by its course.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.optimize import minimize_scalar
 

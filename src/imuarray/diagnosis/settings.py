@@ -1,7 +1,5 @@
 """Every number that a diagnosis rests on and that no equation gives: value, unit, origin."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from imuarray.model.effects import known_effect

@@ -3,8 +3,6 @@
 IMUs on clocks of their own (`sensor_clock`) are found by a scan (`imuarray.engine.clocks`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple

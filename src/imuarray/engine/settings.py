@@ -21,7 +21,7 @@ class Settings:
     window: float = 0.04  # s, length of the polynomials that give time derivatives
     slow_window: float = 0.1  # s, of those of the rate that a filter's shape multiplies
     smooth: float = 0.8  # correlation of omega's slope and omega_dot from which motion is smooth
-    # Gauss-Newton over motion and parameters (`fit`, `parameters`)
+    # Gauss-Newton over motion and parameters (`diagnosis.fit`, `parameters`, `start`)
     steps: int = 15  # Gauss-Newton steps at most
     least_step: float = 0.02  # nats; a step predicted to gain less ends the search
     rough_gain: float = 1e-4  # of the misfit that a step must gain while causes are looked for

@@ -1,7 +1,5 @@
 """Accelerometer triads from still poses without the readings, and whole poses, that stand out."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

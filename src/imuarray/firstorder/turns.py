@@ -1,7 +1,5 @@
 """A sensor's 3 x 3 matrix: its nearest orthogonal one, scale, misalignment, orientation."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.linalg import rq
 
