@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 SOURCES = Path(__file__).parents[1] / "src"
 PICTURE = Path(__file__).with_name("images") / "architecture.svg"
 PACKAGES = {"imuarray": "#0072B2", "imuarray_papers": "#D55E00"}
-SHARED = {"errors", "provenance", "streams", "linear", "tails", "walk", "caches", "compiled"}
+SHARED = {"errors", "provenance", "streams", "linear", "tails", "caches", "compiled"}
 DOORS = {"__init__", "__main__"}
 WIDTH, HEIGHT = 1.42, 0.62  # inches a column, a row
 

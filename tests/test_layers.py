@@ -14,7 +14,7 @@ TOOL, PAPERS = (Path(package.__file__).parent for package in (imuarray, imuarray
 # Each rests on those above it, or beside it; the injector of the blind study on no model at all.
 LAYERS = {
     TOOL: (
-        ("errors", "caches", "linear", "tails", "walk"), ("compiled",),
+        ("errors", "caches", "linear", "tails"), ("compiled",),
         ("streams", "provenance", "geometry"), ("motion",), ("model",), ("words",),
         ("recording",), ("simulation", "firstorder", "estimation"), ("alignment", "engine"),
         ("posterior",), ("diagnosis",), ("pictures",), ("report", "plots"), ("trust",),

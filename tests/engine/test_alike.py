@@ -4,12 +4,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from imuarray.diagnosis.fit import at
 from imuarray.engine.alike import with_likely_spread
 from imuarray.engine.parameters import POSITION, columns_of
+from imuarray.engine.readings import arrange
+from imuarray.engine.start import start, with_derivatives
 from imuarray.geometry import Array
-from imuarray.model import ArrayModel
+from imuarray.model import EFFECTS, ArrayModel
 from imuarray.motion.state import Motion
 from imuarray_papers.measured.causes import STEPS, repeated
+from tests.engine.test_engine import simulated
 
 POSITIONS = np.array([[0.0, 0, 0], [0.02, 0, 0], [0, 0.02, 0], [0.02, 0.02, -0.002]])
 TURNED = np.array([[0.0, -1, 0], [-1, 0, 0], [0, 0, -1]])
@@ -141,3 +145,29 @@ def test_repeatability_is_that_of_pairs():
     # brought to one size, a direction less is left
     assert found.same_size_rms_m == pytest.approx(np.sqrt(2 * 5 / 6) * 1e-6, rel=0.3)
     assert found.rms_m > 5 * found.same_size_rms_m and found.covered < 0.5
+
+
+@pytest.fixture(scope="module")
+def readings():
+    return arrange(simulated()[0])
+
+
+# the mean filter of the accelerometers is the gyroscopes', by convention: `gyroscope_filter`
+@pytest.mark.parametrize(
+    "name", [n for n, one in EFFECTS.items() if one.gauge and n != "accelerometer_filter"]
+)
+def test_no_reading_shows_a_gauge(readings, name):
+    """Motion and positions take it up whole; as large values without its pattern show."""
+    columns = columns_of(readings.array, (name,), readings.position_prior_sd)
+    state = with_derivatives(readings, start(readings, columns), True)
+    active = columns.mask([POSITION, name])
+    inner, _ = at(readings, columns, active, state, True).normal(active)
+    place = np.isin(np.nonzero(active)[1], columns.of(POSITION))
+    cross = inner[np.ix_(place, ~place)]
+    left = inner[np.ix_(~place, ~place)]
+    left = left - cross.T @ np.linalg.solve(inner[np.ix_(place, place)], cross)
+    signs = np.random.default_rng(1)
+    for _, mask in columns.gauges(active):
+        along = mask[active][~place]
+        other = along * signs.standard_normal(along.size)
+        assert abs(along @ left @ along) < 1e-10 * (other @ left @ other)

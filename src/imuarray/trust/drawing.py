@@ -100,7 +100,7 @@ def departures(places: Places) -> str | None:
         return None
     if (unit := another_size(places)) or not places.learnt():
         return unit  # of what is known worse than by the drawing, only a unit's factor tells
-    return _explained(places) or _unnamed(places, alone, tests[0])
+    return _explained(places) or _unnamed(places, alone, tests)
 
 
 def _each(weight, off) -> np.ndarray:
@@ -232,14 +232,16 @@ def angle_words(rotation: Rotation) -> str:
     return f"{angle:.0f} degrees" if angle >= 10 else f"{angle:.2g} degrees"
 
 
-def _unnamed(places: Places, alone, p: float) -> str:
-    """Words on the triad that departs most, and by how much."""
+def _unnamed(places: Places, alone, tests) -> str:
+    """Words on the triad that departs most, by how much, and on the least likely of the tests."""
     off = centred(places.found) - centred(places.nominal)
     worst = int(np.argmax(alone))
     distance = float(np.linalg.norm(_apart(places, worst)))
     rms = float(np.sqrt(np.mean(off**2)))
+    least = int(np.argmin(tests))
+    names = "all positions", "the size", "the orientation", *map("IMU {}".format, places.labels)
     return (
         f"the positions are {1e3 * rms:.3g} mm rms from the drawing, {rms / places.prior_sd:.2g} of"
-        f" its sds (p = {max(p, 1e-300):.1g}); most of all IMU {places.labels[worst]},"
-        f" {1e3 * distance:.3g} mm"
+        f" its sds (p = {max(tests[least], 1e-300):.1g} of {names[least]}); most of all IMU"
+        f" {places.labels[worst]}, {1e3 * distance:.3g} mm"
     )
