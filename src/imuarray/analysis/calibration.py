@@ -72,11 +72,9 @@ def calibrate(
 
 
 def calibrate_papers(
-    recording: Recording,
-    accelerometer_noise: float | None = None,
-    say: Say = silent,
+    recording: Recording, accelerometer_noise: float | None = None, say: Say = silent,
     search=calibrate_gauss_newton,
-) -> xr.Dataset:
+) -> xr.Dataset:  # fmt: skip
     """`calibrate` by maximum likelihood with the declared noise (paper 2017).
 
     ``search``: another search of the arguments of `calibrate_gauss_newton`.

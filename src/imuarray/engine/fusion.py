@@ -210,13 +210,9 @@ def _put(found: Motions, index, part: Motions) -> None:
 
 
 def descend(
-    readings: Readings,
-    model: ArrayModel,
-    state: State,
-    index,
-    rails=None,
+    readings: Readings, model: ArrayModel, state: State, index, rails=None,
     tolerance=SETTINGS.fusion_tolerance,
-) -> Motions:
+) -> Motions:  # fmt: skip
     """The motion of the samples ``index`` (n,), each by itself, by Gauss-Newton from a state.
 
     Damped by halving: a step that raises its sample's cost is halved. Converged is a sample whose

@@ -120,15 +120,9 @@ class Collapsed:
             energy = np.einsum("kct,kct->t", centred, weighted)
         mean, information = model.noise.angular_rate_given_gyroscopes(rate, saturated)
         return cls(
-            centred,
-            offset,
-            energy,
-            base,
-            np.ascontiguousarray(mean.T),
-            np.ascontiguousarray(information.transpose(1, 2, 0)),
-            weights,
-            precision,
-        )
+            centred, offset, energy, base, np.ascontiguousarray(mean.T),
+            np.ascontiguousarray(information.transpose(1, 2, 0)), weights, precision,
+        )  # fmt: skip
 
     @cached_property
     def weighted(self) -> np.ndarray:

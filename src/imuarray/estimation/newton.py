@@ -249,16 +249,9 @@ def _solve(factor, slope, step):
 
 
 def calibrate_gauss_newton(
-    model: ArrayModel,
-    specific_force,
-    angular_rate,
-    start=None,
-    saturated=None,
-    position_prior=None,
-    rate_covariance=None,
-    tolerance: float = 1e-6,
-    limit: int = 50,
-) -> Calibration:
+    model: ArrayModel, specific_force, angular_rate, start=None, saturated=None,
+    position_prior=None, rate_covariance=None, tolerance: float = 1e-6, limit: int = 50,
+) -> Calibration:  # fmt: skip
     """ML (or MAP) positions of the papers' model, with their covariance (`newton.fisher_scoring`).
 
     Parameters

@@ -59,13 +59,10 @@ def rate_information(x, y, z, c, p):
         w * c22 + x * c42 + y * c52, w * c42 + x * c44 + y * c54, w * c52 + x * c54 + y * c55
     )  # fmt: skip
     return (
-        u * x0 + y * x3 + z * x4 + p[0],
-        v * x1 + x * x3 + z * x5 + p[1],
-        w * x2 + x * x4 + y * x5 + p[2],
-        v * y1 + x * y3 + z * y5 + p[3],
-        w * y2 + x * y4 + y * y5 + p[4],
-        w * z2 + x * z4 + y * z5 + p[5],
-    )
+        u * x0 + y * x3 + z * x4 + p[0], v * x1 + x * x3 + z * x5 + p[1],
+        w * x2 + x * x4 + y * x5 + p[2], v * y1 + x * y3 + z * y5 + p[3],
+        w * y2 + x * y4 + y * y5 + p[4], w * z2 + x * z4 + y * z5 + p[5],
+    )  # fmt: skip
 
 
 @njit(inline="always")

@@ -256,22 +256,19 @@ def correct(recording: Recording, found: FirstOrder) -> Recording:
     doubt = 0.0 if found.gyroscopes is None else found.gyroscopes.time_base_sd
     clock_sd = np.hypot(np.nan_to_num(recording.clock_sd), doubt) if doubt else recording.clock_sd
     return replace(
-        recording,
-        specific_force=corrected(back, offset, recording.specific_force),
+        recording, specific_force=corrected(back, offset, recording.specific_force),
         angular_rate=corrected(turn_back, found.gyroscope_offset, recording.angular_rate),
         accelerometer_position=recording.accelerometer_position @ found.drawing_turn,
         accelerometer_noise_sd=_noise(matrix, found.accelerometer_noise),
         gyroscope_noise_sd=_noise(maps, found.gyroscope_noise),
         accelerometer_range=nearest_rail(recording.accelerometer_range, matrix, offset),
         gyroscope_range=nearest_rail(recording.gyroscope_range, maps, found.gyroscope_offset),
-        map_covariance=found.left(),
-        clock_sd=float(clock_sd),
-        stationary=still,
+        map_covariance=found.left(), clock_sd=float(clock_sd), stationary=still,
         accelerometer_axes=axes,
         specific_force_saturated=rails_shown(back, recording.saturated_accelerometers()),
         angular_rate_saturated=rails_shown(turn_back, recording.saturated_gyroscopes()),
         correction=_correction(recording, found, back, turn_back),
-    )
+    )  # fmt: skip
 
 
 def corrected(inverse, offset, readings) -> np.ndarray:

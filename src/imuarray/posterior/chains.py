@@ -82,10 +82,7 @@ def chains_of(tree: xr.DataTree) -> Chains:
             draws = np.concatenate([draws, tree["posterior"][name].to_numpy()], axis=2)
     stats = tree["sample_stats"]
     return Chains(
-        draws,
-        stats["log_target"].to_numpy(),
-        stats["acceptance"].to_numpy(),
-        int(tree.attrs["thin"]),
-        float(tree.attrs["step_length_m"]),
+        draws, stats["log_target"].to_numpy(), stats["acceptance"].to_numpy(),
+        int(tree.attrs["thin"]), float(tree.attrs["step_length_m"]),
         int(tree.attrs.get("divergent", 0)),
-    )
+    )  # fmt: skip

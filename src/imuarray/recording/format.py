@@ -90,12 +90,9 @@ def read_truth(path: str | Path) -> xr.Dataset:
 
 
 def write_recording(
-    recording: Recording,
-    path: str | Path,
-    truth: xr.Dataset | None = None,
-    attrs: Mapping[str, Any] | None = None,
-    groups: dict[str, xr.Dataset] | None = None,
-) -> None:
+    recording: Recording, path: str | Path, truth: xr.Dataset | None = None,
+    attrs: Mapping[str, Any] | None = None, groups: dict[str, xr.Dataset] | None = None,
+) -> None:  # fmt: skip
     """Write a recording, in group `truth` what it was simulated from, and further `groups`.
 
     `attrs` (such as `provenance.stamp` gives) join the recording's own attributes, which win. The

@@ -50,14 +50,10 @@ def turned_labels(labels, text: str | None) -> tuple[str, ...]:
 
 
 def read_board(
-    path: str | Path,
-    positions: str | Path,
-    underside: str | None = None,
-    accelerometer_noise_sd: float = 0.04,
-    gyroscope_noise_sd: float = float(np.radians(0.06)),
-    position_prior_sd: float = 3e-3,
-    output_rate: float = OUTPUT_RATE,
-) -> tuple[Recording, Account]:
+    path: str | Path, positions: str | Path, underside: str | None = None,
+    accelerometer_noise_sd: float = 0.04, gyroscope_noise_sd: float = float(np.radians(0.06)),
+    position_prior_sd: float = 3e-3, output_rate: float = OUTPUT_RATE,
+) -> tuple[Recording, Account]:  # fmt: skip
     """A file of packets as a recording, and the account of what was dropped.
 
     Counts become SI units, and the underside's axes are turned into the array frame.

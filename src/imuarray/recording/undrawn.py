@@ -48,12 +48,9 @@ def _equations(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros((1, UNKNOWNS)), np.zeros((1, recording.specific_force.shape[1] - 1))
     step = np.median(np.diff(recording.time))
     smooth = partial(
-        savgol_filter,
-        window_length=SETTINGS.slope_window,
-        polyorder=SETTINGS.slope_order,
-        delta=step,
-        axis=0,
-    )
+        savgol_filter, window_length=SETTINGS.slope_window, polyorder=SETTINGS.slope_order,
+        delta=step, axis=0,
+    )  # fmt: skip
     rate = rate - np.median(rate, axis=0)
     force, rate, turning = smooth(recording.specific_force), smooth(rate), smooth(rate, deriv=1)
     speed = np.linalg.norm(rate, axis=1)

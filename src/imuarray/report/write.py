@@ -130,21 +130,13 @@ def html(diagnosis: Diagnosis, drawings: list[Drawing]) -> str:
     """report.html, every text escaped."""
     document = diagnosis.document
     return rendered(
-        "report.html.j2",
-        document=document,
-        facts=facts(diagnosis),
-        verdict=verdict(diagnosis),
-        alarming=alarming(document),
-        answers=answers(diagnosis),
-        figures=drawings,
-        usual=USUAL,
+        "report.html.j2", document=document, facts=facts(diagnosis), verdict=verdict(diagnosis),
+        alarming=alarming(document), answers=answers(diagnosis), figures=drawings, usual=USUAL,
         checks=diagnosis.base.discrepancies,
         after={item.check: item for item in diagnosis.extended.discrepancies},
-        labels=diagnosis.found.search.readings.labels,
-        positions=numbers.position_table(diagnosis),
-        noise=numbers.noise_table(diagnosis),
-        scores=numbers.score_table(diagnosis),
-    )
+        labels=diagnosis.found.search.readings.labels, positions=numbers.position_table(diagnosis),
+        noise=numbers.noise_table(diagnosis), scores=numbers.score_table(diagnosis),
+    )  # fmt: skip
 
 
 def facts(diagnosis: Diagnosis) -> str:

@@ -21,14 +21,9 @@ def clip(values, rail):
 
 
 def measure(
-    model: ArrayModel,
-    motion: Motion,
-    positions,
-    rng,
-    parameters=(),
-    gyroscope_range=np.inf,
+    model: ArrayModel, motion: Motion, positions, rng, parameters=(), gyroscope_range=np.inf,
     time=None,
-):
+):  # fmt: skip
     """y_a, y_g and which gyroscope axes saturated, for motion fields (..., T, 3).
 
     Parameters

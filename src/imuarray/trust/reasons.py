@@ -212,11 +212,9 @@ def _not_converged(attrs) -> list[str]:
 
 
 def _judged(
-    recording: Recording,
-    places: Places,
-    residual: dict[str, float],
+    recording: Recording, places: Places, residual: dict[str, float],
     limit: float = SETTINGS.residual,
-) -> list[str]:
+) -> list[str]:  # fmt: skip
     """All tests; where a sensor does not fit the others, its place is no matter.
 
     ``limit``: of the residual of one triad.

@@ -102,20 +102,13 @@ def make(case: Case, seed: int) -> tuple[Recording, dict]:
         changes.append(draw_seeded(scene, effect, sensors, directions, amplitude))
     readings = noisy_readings(scene, changes, rng)
     recording = Recording(
-        time=scene.time,
-        specific_force=readings.force,
-        angular_rate=readings.rate,
-        accelerometer_position=scene.array.positions,
-        accelerometer_labels=scene.array.labels,
-        gyroscope_labels=scene.array.labels,
-        accelerometer_noise_sd=scene.noise[0],
-        gyroscope_noise_sd=scene.noise[1],
-        accelerometer_range=scene.limits[0],
-        gyroscope_range=scene.limits[1],
-        position_prior_sd=scene.position_prior_sd,
-        source="simulated",
-        accelerometer_axes=scene.array.axes,
-    )
+        time=scene.time, specific_force=readings.force, angular_rate=readings.rate,
+        accelerometer_position=scene.array.positions, accelerometer_labels=scene.array.labels,
+        gyroscope_labels=scene.array.labels, accelerometer_noise_sd=scene.noise[0],
+        gyroscope_noise_sd=scene.noise[1], accelerometer_range=scene.limits[0],
+        gyroscope_range=scene.limits[1], position_prior_sd=scene.position_prior_sd,
+        source="simulated", accelerometer_axes=scene.array.axes,
+    )  # fmt: skip
     effects = []
     for change in changes:
         labels = [scene.array.labels[k] for k in change.sensors]

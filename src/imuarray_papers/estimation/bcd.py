@@ -81,15 +81,9 @@ def block_descent(data, positions, tolerance, limit, marks):
 
 
 def calibrate_bcd(
-    model: ArrayModel,
-    specific_force,
-    angular_rate,
-    start=None,
-    saturated=None,
-    tolerance: float = 1e-10,
-    limit: int = 5000,
-    marks=(),
-) -> Calibration:
+    model: ArrayModel, specific_force, angular_rate, start=None, saturated=None,
+    tolerance: float = 1e-10, limit: int = 5000, marks=(),
+) -> Calibration:  # fmt: skip
     """Positions by ML-BCD for the papers' model with isotropic triads.
 
     Parameters

@@ -104,16 +104,13 @@ def _draw_seen(axes, rows) -> None:
 
 
 HIDDEN = (
-    Column("recording", "recording", "recording"),
-    Column("hidden", "hidden", "hidden"),
-    Column("sensors", "in IMU", "in IMU"),
-    Column("named", "named", "named"),
-    Column("named_sensors", "in IMU", "in IMU"),
-    Column("size", "size ± sd", r"size $\pm$ sd"),
+    Column("recording", "recording", "recording"), Column("hidden", "hidden", "hidden"),
+    Column("sensors", "in IMU", "in IMU"), Column("named", "named", "named"),
+    Column("named_sensors", "in IMU", "in IMU"), Column("size", "size ± sd", r"size $\pm$ sd"),
     Column("true_size", "true size", "true size"),
     Column("gain", "gain, held out (nats)", "gain, held out (nats)"),
     Column("control", "the same without it", "the same without it"),
-)
+)  # fmt: skip
 
 
 def table_criticism_hidden(diagnoses: list, truths: list, controls: list, names: list):

@@ -27,10 +27,8 @@ KEYS = ["setting", "method", "samples"]  # of a histogram, and a row
 WHOLE = ("size", "misfit")  # quantities that hang on all coordinates
 
 COVERAGE = (
-    Column("setting", "setting", "setting"),
-    Column("method", "method", "method"),
-    Column("samples", "T", "$T$"),
-    Column("replicates", "replicates", "replicates"),
+    Column("setting", "setting", "setting"), Column("method", "method", "method"),
+    Column("samples", "T", "$T$"), Column("replicates", "replicates", "replicates"),
     Column("covered_50", "50 % intervals cover (%)", r"50 \%", "{:.1f}", 100.0),
     Column("se_50", "±", r"$\pm$", "{:.1f}", 100.0),
     Column("covered_90", "90 % (%)", r"90 \%", "{:.1f}", 100.0),
@@ -42,10 +40,9 @@ COVERAGE = (
     Column("size_z", "z, the array's size", r"$z$, size", "{:+.1f}"),
     Column("misfit_z", "z, misfit of the data", r"$z$, misfit", "{:+.1f}"),
     Column("p", "p of uniform ranks", "$p$", "{:.2g}"),
-    Column("none", "truths without intervals", "none"),
-    Column("slow", "slow chains", "slow"),
+    Column("none", "truths without intervals", "none"), Column("slow", "slow chains", "slow"),
     Column("apart", "farthest from NUTS", "from NUTS", "{:.2f}"),
-)
+)  # fmt: skip
 COVERAGE_NOTE = (
     "Truths drawn from the prior, motion from its own, which the samplers know, but 'sample', which"
     " is the command as it is: to it the noise and the motion's size are unknown (the paper's limit"

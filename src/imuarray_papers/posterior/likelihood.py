@@ -39,15 +39,9 @@ class Likelihood:
 
     @classmethod
     def of(
-        cls,
-        model: ArrayModel,
-        specific_force,
-        angular_rate,
-        saturated=None,
-        determinant: str = "derived",
-        rate_distribution=None,
-        motion_sd=(np.inf, np.inf),
-    ) -> Likelihood:
+        cls, model: ArrayModel, specific_force, angular_rate, saturated=None,
+        determinant: str = "derived", rate_distribution=None, motion_sd=(np.inf, np.inf),
+    ) -> Likelihood:  # fmt: skip
         """Arrange measurements (T, A, 3) m/s^2 and (T, G, 3) rad/s for the estimator.
 
         ``rate_distribution``: None for p(omega | y_g) from the declared noise, or a pair
@@ -68,18 +62,11 @@ class Likelihood:
         mean = np.ascontiguousarray(mean.T)
         general = collapsed.weights is None
         data = kernels.LikelihoodData(
-            collapsed.weighted,
-            collapsed.energy,
-            collapsed.base,
-            mean,
-            _lower(covariance),
-            np.empty((10, 0)),
-            np.empty(0) if general else collapsed.weights,
+            collapsed.weighted, collapsed.energy, collapsed.base, mean, _lower(covariance),
+            np.empty((10, 0)), np.empty(0) if general else collapsed.weights,
             np.ascontiguousarray(collapsed.precision) if general else np.empty((0, 0)),
-            np.array(structure_tensor()),
-            tables(),
-            np.full(3, float(motion_sd[1]) ** -2.0),
-        )
+            np.array(structure_tensor()), tables(), np.full(3, float(motion_sd[1]) ** -2.0),
+        )  # fmt: skip
         return cls(data, DETERMINANTS[determinant], collapsed, mean.T, covariance, motion_sd)
 
     def marginal(self, positions, nodes: int | None = None) -> Marginal:

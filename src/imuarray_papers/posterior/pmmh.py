@@ -26,15 +26,8 @@ class PseudoMarginalMove(emcee.moves.Move):
     """
 
     def __init__(
-        self,
-        target: CompiledTarget,
-        step: float,
-        thin: int,
-        seed: int,
-        names,
-        iteration: int,
-        accepted: np.ndarray,
-        threads: int,
+        self, target: CompiledTarget, step: float, thin: int, seed: int, names, iteration: int,
+        accepted: np.ndarray, threads: int,
     ):  # fmt: skip
         self.target, self.step, self.thin = target, step, thin
         self.seed, self.names, self.iteration = seed, tuple(names), iteration
@@ -63,19 +56,10 @@ class PseudoMarginalMove(emcee.moves.Move):
 
 
 def run_chains(
-    target: CompiledTarget,
-    starts,
-    step: float,
-    draws: int,
-    thin: int,
-    seed: int,
-    names=("pmmh",),
-    checkpoint: str | Path | None = None,
-    key: str = "",
-    block: int = 500,
-    quiet: bool = False,
+    target: CompiledTarget, starts, step: float, draws: int, thin: int, seed: int, names=("pmmh",),
+    checkpoint: str | Path | None = None, key: str = "", block: int = 500, quiet: bool = False,
     threads: int = 2,
-) -> Chains:
+) -> Chains:  # fmt: skip
     """Run one chain from each of ``starts`` (chains, size) for draws * thin transitions.
 
     Parameters
