@@ -2,9 +2,8 @@
 
 `python benchmarks/samplers.py [--samples 5 50 500] [--seconds 60] [--out results/samplers.md]`.
 Every sampler runs twice on the same data of section IV-A of paper 2021: PmMH's walks and NUTS from
-starts spread over the prior, preconditioned Crank-Nicolson (pCN) proposals and emcee's walkers
-around the mode, whose search is not counted; NUTS 300 + 1000 draws, the others for a budget of core
-seconds. ESS is the smallest over all parameters, bulk, after the burn-in that the chains themselves
+starts spread over the prior, emcee's walkers around the mode, whose search is not counted; NUTS
+300 + 1000 draws, the others for a budget of core seconds. ESS is the smallest over all parameters, bulk, after the burn-in that the chains themselves
 show; emcee's by its own autocorrelation time, as its walkers are not independent, and R-hat between
 two ensembles.
 Core seconds are those of all threads.
@@ -34,7 +33,6 @@ from imuarray_papers.posterior.pmmh import run_chains
 from imuarray_papers.sampling import flat
 from imuarray_papers.studies.bayes import simulate_dataset
 
-WIDER = 1.05  # than the mode's curvature, for pCN proposals
 WIDENING = 1.005  # of the draws of omega beyond the integrand's curvature
 PAPER_CORE_SECONDS = 320 * 3600.0  # 8 hours on 40 cores, T = 500
 ENOUGH = 1000
@@ -126,23 +124,13 @@ def pmmh_rows(problem, seconds, rng):
         )  # fmt: skip
         return f", N = {found.target.draws}", found.target, found.step
 
-    def shaped():
-        centred = problem.likelihood.centred(problem.centre, WIDENING)
-        lengths, factor = np.geomspace(0.02, 0.999, 12), WIDER * problem.factor
-        target, step = tuning.tune_preconditioned(
-            centred, prior, problem.mode, factor, lengths, rng
-        )
-        return f", N = {target.draws}, step {step:.2f}", target, step
-
-    spread, near = problem.starts(rng), problem.starts(rng, 2.0)
+    spread = problem.starts(rng)
     yield compiled(
         problem, "PmMH, isotropic walk (27)", lambda: walk(problem.likelihood), spread, seconds
     )
     centred = problem.likelihood.centred(problem.centre, WIDENING)
     name = "the same, omega drawn around each mode"
     yield compiled(problem, name, lambda: walk(centred), spread, seconds)
-    name = "PmMH, pCN around the mode"
-    yield compiled(problem, name, shaped, near, seconds)
 
 
 def nuts_row(problem, rng) -> Row:

@@ -18,7 +18,6 @@ CONVERGED = 1.05  # R-hat, as paper 2021 has it
 SHORT = {  # how a method's name begins: what the figure calls it
     "PmMH, isotropic walk (27)": "PmMH, paper's walk",
     "the same, omega": "its omega centred",
-    "PmMH, pCN": "PmMH, pCN",
     "NUTS": "NUTS",
     "emcee": "emcee",
 }

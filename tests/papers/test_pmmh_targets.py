@@ -153,20 +153,3 @@ def test_generic_target_has_the_same_law():
     sample = run.draws[:, 50:]
     assert ess(sample).min() > 100
     assert np.abs(deviations(sample, 0.5)).max() < 5
-
-
-def test_preconditioned_proposals_have_the_same_law():
-    """Around a centre that is off and a shape too wide: quantiles within five standard errors."""
-    model, force, rate, prior = problem()
-    thetas, weights = exact(0.5)
-    mean = weights @ thetas
-    spread = (thetas - mean).T @ (weights[:, None] * (thetas - mean))
-    centre = mean + 0.3 * np.sqrt(np.diag(spread))
-    factor = 1.2 * np.linalg.cholesky(spread)
-    likelihood = Likelihood.of(model, force, rate)
-    target = CompiledTarget(likelihood, prior, 20, centre, factor)
-    starts = mean + 1e-3 * np.random.default_rng(5).standard_normal((4, 6))
-    run = run_chains(target, starts, 0.7, 2000, 20, seed=6, quiet=True)
-    sample = run.draws[:, 200:]
-    assert ess(sample).min() > 1500
-    assert np.abs(deviations(sample, 0.5)).max() < 5

@@ -1,8 +1,7 @@
 """Least squares on one recording, with the derivatives that score tests of causes need."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -77,7 +76,7 @@ class Fit:
         """(N, m) bool: the parameters that there are derivatives by."""
         return self.columns.owner & np.isin(np.arange(self.columns.size), self.wanted)
 
-    def only_active(self) -> Fit:
+    def only_active(self) -> Self:
         """The fit with derivatives by the active parameters' columns alone."""
         kept = self.active.any(axis=0)[self.wanted]
         return replace(

@@ -4,10 +4,8 @@ A replicate is what the fitted model simulates at the recording's own times, mot
 fits again: noise of the declared size, the motion and the parameters projected out of it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -107,7 +105,7 @@ class Part(NamedTuple):
     square: np.ndarray
 
     @classmethod
-    def of(cls, seen: Seen, there, unit) -> Part:
+    def of(cls, seen: Seen, there, unit) -> Self:
         """From the residuals (T, N, 6) of all, zero where left out."""
         values = unit.reshape(len(unit), -1)[:, there].reshape(len(unit), -1, 3)
         return cls(seen, there, values, values**2)

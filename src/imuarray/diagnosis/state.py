@@ -4,11 +4,10 @@ It is frozen: each step of the procedure makes another one of it. Adopted effect
 zero, and on held-out time.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -144,19 +143,19 @@ class Search:
         """Standard errors that a cause's gain on held-out time must have."""
         return SETTINGS.least_z if self.smooth else SETTINGS.rough_z
 
-    def fitted(self) -> Search:
+    def fitted(self) -> Self:
         """With the papers' model fitted."""
         begun = Recorded.of(self.readings, self.columns)
         search = replace(self, allowed=self.readings.keep, smooth=begun.smooth).refit(begun.state)
         return replace(search, excess=search.left)
 
-    def light(self) -> Search:
+    def light(self) -> Self:
         """The search without the derivatives that its next fit makes anew."""
         return replace(self, fit=self.fit.only_active(), weighed=None)
 
     def refit(
         self, state: State | None = None, turns=2, rough=True, sizings=SETTINGS.sizings
-    ) -> Search:
+    ) -> Self:
         """Fit what is adopted, with the noise that the residual's fast part shows."""
         state = self.fit.state if state is None else state
         search, turns = self, turns + bool(self.clocks)
@@ -191,13 +190,13 @@ class Search:
         """The readings, those near a clock's jump too."""
         return replace(self.readings, keep=self.readings.keep | self.jumps)
 
-    def _without_jumps(self, state: State, turn: int) -> Search:
+    def _without_jumps(self, state: State, turn: int) -> Self:
         """Without the readings near the jumps of the clocks at a state."""
         width = SETTINGS.jitter if state.gyroscopes_free else CLOCKS.edge / (1 + turn)
         readings, jumps = without_jumps(self._with_jumps, self.columns, state, self.clocks, width)
         return replace(self, readings=readings, jumps=jumps)
 
-    def ending(self, made: Fit, noise: noises.Noise) -> Search:
+    def ending(self, made: Fit, noise: noises.Noise) -> Self:
         """With a fit, and the noise there."""
         return replace(self, fit=made, noise=noise, weighed=ScoreAtFit(made, noise.correlation))
 

@@ -5,8 +5,6 @@ restricted maximum likelihood and Student's t (`imuarray.engine.robust`), all re
 Effects that a recording has of its own (biases, clocks) have parameters in each of them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple, Self
@@ -37,7 +35,7 @@ class Recorded:
     resized: tuple[np.ndarray, ...] = ()
 
     @classmethod
-    def of(cls, readings: Readings, columns: Columns, former: State | None = None) -> Recorded:
+    def of(cls, readings: Readings, columns: Columns, former: State | None = None) -> Self:
         """At the nominal positions and no effect, or at another fit's (``former``)."""
         first = start(readings, columns)
         if former is not None:

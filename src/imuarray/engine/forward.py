@@ -1,10 +1,8 @@
 """The standard sensor model: what most boards need, each group kept where held-out time gains."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -186,12 +184,12 @@ class Selected(NamedTuple):
         placed = self.found.columns.mask([POSITION])
         return np.any([placed, *self.kept.values()], axis=0)
 
-    def with_kept(self, names) -> Selected:
+    def with_kept(self, names) -> Self:
         """With more groups kept."""
         new = {name: self.found.columns.mask(EFFECT_GROUPS[name]) for name in names}
         return self._replace(kept=new | self.kept)
 
-    def without(self, names) -> Selected:
+    def without(self, names) -> Self:
         """Without some of those kept, their parameters back at zero."""
         now = self._replace(kept={n: mask for n, mask in self.kept.items() if n not in names})
         found, recorded = self.found, []
@@ -223,7 +221,7 @@ class Selected(NamedTuple):
                 found.append(FILTER)
         return [name for name in found if name in names]
 
-    def clocked(self) -> tuple[Selected, list[EffectGroup]]:
+    def clocked(self) -> tuple[Self, list[EffectGroup]]:
         """With clocks, if IMUs' ages show some and these gain; and that group, if there is one."""
         columns, recorded = self.found.columns, self.found.recorded
         each = [shown_clocks(one, columns) for one in recorded]
@@ -245,7 +243,7 @@ class Selected(NamedTuple):
         found = self.with_kept([DELAYS, FILTER]).fitted(SETTINGS.rung_again).found
         return any(shown_clocks(one, found.columns) for one in found.recorded)
 
-    def fitted(self, steps: int = SETTINGS.iterations) -> Selected:
+    def fitted(self, steps: int = SETTINGS.iterations) -> Self:
         """With all that is kept estimated, each reading in its clock's turn."""
         columns, recorded = self.found.columns, list(self.found.recorded)
         if CLOCKS in self.kept:

@@ -1,10 +1,8 @@
 """The model's prediction and its derivatives over a recording, by automatic differentiation."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -33,11 +31,11 @@ class RoughPrior(NamedTuple):
     sd: np.ndarray
     own: np.ndarray  # (T, 3) sd of what the gyroscopes' omega dot has of its own, once free
 
-    def freed(self) -> RoughPrior:
+    def freed(self) -> Self:
         """The gyroscopes' omega dot free."""
         return self._replace(sd=np.hstack([self.sd[:, :6], self.own]))
 
-    def scaled(self, factors) -> RoughPrior:
+    def scaled(self, factors) -> Self:
         """The sds of each three components times a factor (G,)."""
         wide = np.repeat(factors, 3)
         return self._replace(sd=wide * self.sd, own=wide[6:9] * self.own)
@@ -76,7 +74,7 @@ class State(NamedTuple):
     rough_prior: RoughPrior | None = None  # where the motion is rough
     turning: TurningPrior | None = None
 
-    def select(self, used) -> State:
+    def select(self, used) -> Self:
         """At the samples ``used``, (T,) bool or indices."""
         own = self.motion, self.derivatives, self.rough_prior, self.turning
         motion, derivatives, prior, turning = jax.tree.map(lambda field: field[used], own)

@@ -1,10 +1,8 @@
 """A recording arranged for its diagnosis: readings by IMU, which of them count, runs of time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
@@ -37,7 +35,7 @@ class Left(NamedTuple):
         """True where some offset changes along the recording."""
         return bool(self.offsets[..., 1:, 1:].any())
 
-    def is_of(self, other: Left) -> bool:
+    def is_of(self, other: Self) -> bool:
         """True where one calibration corrected both: each may have made it, begun with its own."""
         if self.maps.shape != other.maps.shape:
             return False
@@ -126,11 +124,11 @@ class Readings:
         """Samples in a derivative's polynomial, odd, at least five."""
         return odd_window(self.time)
 
-    def with_sd(self, sd) -> Readings:
+    def with_sd(self, sd) -> Self:
         """The readings with another noise sd (N, 2)."""
         return self.with_noise(sd, self.trust)
 
-    def with_noise(self, sd, trust) -> Readings:
+    def with_noise(self, sd, trust) -> Self:
         """The readings with another noise sd (N, 2), and a robust loss' weights (T, N, 2) or None.
 
         Two triads of a kind share their sd: the motion leaves but their difference.
@@ -141,11 +139,11 @@ class Readings:
             sd[own, kind] = np.sqrt(np.mean(sd[own, kind] ** 2))
         return replace(self, sd=sd, trust=trust)
 
-    def without(self, lost) -> Readings:
+    def without(self, lost) -> Self:
         """The readings without those in ``lost`` (T, N, 6) bool."""
         return replace(self, keep=self.keep & ~lost)
 
-    def select(self, used) -> Readings:
+    def select(self, used) -> Self:
         """The samples in ``used`` (T,) bool, in new runs."""
         time = self.time[used]
         trust, wander = (None if p is None else p[used] for p in (self.trust, self.wander))

@@ -4,10 +4,8 @@ What `analysis.known` has fitted to samples off the rails (noise and its tails, 
 what rough motion adds) holds for those at a rail, too.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from scipy.special import expit
@@ -41,7 +39,7 @@ class Rough(NamedTuple):
     late: float
     converged: np.ndarray
 
-    def select(self, index) -> Rough:
+    def select(self, index) -> Self:
         """Some of the samples; each of them is by itself."""
         return self._replace(
             readings=self.readings.select(index),
@@ -50,7 +48,7 @@ class Rough(NamedTuple):
             converged=self.converged[index],
         )
 
-    def fused(self) -> Rough:
+    def fused(self) -> Self:
         """The most likely motion of every sample, readings far out having lost their say.
 
         Readings near their clock's jump are in the turn that suits them. A shock reaches all

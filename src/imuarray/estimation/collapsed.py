@@ -1,10 +1,8 @@
 """Data of a recording, arranged for the collapsed problem."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -97,7 +95,7 @@ class Collapsed:
         )  # fmt: skip
 
     @classmethod
-    def of(cls, model: ArrayModel, specific_force, angular_rate, saturated=None) -> Collapsed:
+    def of(cls, model: ArrayModel, specific_force, angular_rate, saturated=None) -> Self:
         """From measurements (T, A, 3) m/s^2 and (T, G, 3) rad/s, and saturated axes.
 
         InputError for other shapes.
@@ -131,7 +129,7 @@ class Collapsed:
             return _weighted(self.precision, self.specific_force)
         return self.weights[:, None, None] * self.specific_force
 
-    def with_rates(self, covariance, mean=None) -> Collapsed:
+    def with_rates(self, covariance, mean=None) -> Self:
         """The data with the covariance (T, 3, 3) (rad/s)^2, and mean (T, 3), of angular rates."""
         require_shape("rate_covariance", np.asarray(covariance), (self.samples, 3, 3))
         precision = np.linalg.inv(covariance).transpose(1, 2, 0)

@@ -6,9 +6,7 @@ likelihood beside a factor of the readings' own noise: one for all triads, or ea
 that gains more than as many parameters do by chance.
 """
 
-from __future__ import annotations
-
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -31,7 +29,7 @@ class PoseNoise(NamedTuple):
     factor: np.ndarray
 
     @classmethod
-    def of(cls, sd, time, recording) -> PoseNoise:
+    def of(cls, sd, time, recording) -> Self:
         """``time`` (P,) s of each pose, after the instant of its recording's offset."""
         together = np.where(recording[:, None] == recording, shared_walk(time), 0.0)
         return cls(sd, together, np.zeros(sd.shape[1]), np.ones(sd.shape[1]))
@@ -51,7 +49,7 @@ class PoseNoise(NamedTuple):
         each = squares.sum(axis=0) / np.maximum(used.sum(axis=0), 1)
         return float(np.sqrt(each.max() / max(np.median(each), np.finfo(float).tiny)))
 
-    def estimated(self, used, misfit, slopes, fixed) -> PoseNoise:
+    def estimated(self, used, misfit, slopes, fixed) -> Self:
         """With the walks that misfits show, if they do.
 
         ``misfit`` (P, A, 3) m/s^2 at an estimate, ``slopes`` (P, A, 3, n) of the averages in its
@@ -88,7 +86,7 @@ class _Rows(NamedTuple):
     fixed: np.ndarray
 
     @classmethod
-    def of(cls, misfit, slopes, fixed) -> _Rows:
+    def of(cls, misfit, slopes, fixed) -> Self:
         slopes, count = np.moveaxis(slopes, 0, -2), slopes.shape[-1]
         has = np.any(slopes != 0, axis=(1, 2))
         most = int(has.sum(axis=1).max())

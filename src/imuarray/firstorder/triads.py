@@ -6,8 +6,6 @@ triangular, which makes its axes the array frame (paper 2021, section IV-B, afte
 Several recordings of a board share the matrices, and have offsets b_k of their own.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
@@ -29,7 +27,7 @@ class Fitted(NamedTuple):
 
     values: np.ndarray
     covariance: np.ndarray
-    given: Poses
+    given: "Poses"
 
 
 @dataclass(frozen=True)
@@ -72,7 +70,7 @@ class TriadFit:
         out[place] = self.fitted.covariance[: len(place), -out.shape[1] :]
         return out.reshape(-1, 12, out.shape[1])[:, :9].reshape(-1, out.shape[1])
 
-    def carried(self, score, information) -> TriadFit:
+    def carried(self, score, information) -> Self:
         """The fit once rates have carried gravity from pose to pose.
 
         ``score`` (3 P,) and ``information`` (3 P, 3 P) of the directions, as `CommonMap` has them.

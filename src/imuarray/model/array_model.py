@@ -1,9 +1,8 @@
 """The array's measurement model: geometry, noise and a list of effects."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
+from typing import Self
 
 import numpy as np
 
@@ -58,7 +57,7 @@ class ArrayModel:
     clock: tuple[float, float] | None = None
 
     @classmethod
-    def isotropic(cls, array, accelerometer_sd, gyroscope_sd, effects=()) -> ArrayModel:
+    def isotropic(cls, array, accelerometer_sd, gyroscope_sd, effects=()) -> Self:
         """The papers' noise: one sd (m/s^2, rad/s) for all triads of a kind."""
         noise = Noise.of(array.accelerometers, array.gyroscopes, accelerometer_sd, gyroscope_sd)
         return cls(array, noise, tuple(effects))

@@ -1,9 +1,8 @@
 """Measurement noise: Gaussian, white in time, any covariance across the array."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -51,7 +50,7 @@ class Noise:
     gyroscope: np.ndarray
 
     @classmethod
-    def of(cls, accelerometers, gyroscopes, accelerometer, gyroscope) -> Noise:
+    def of(cls, accelerometers, gyroscopes, accelerometer, gyroscope) -> Self:
         """Noise for A and G triads from sds (m/s^2, rad/s), per-triad or full covariances."""
         return cls(
             _covariance(accelerometer, accelerometers, "accelerometer"),
@@ -70,7 +69,7 @@ class Noise:
         scalar = np.diag(np.repeat(variances[:, 0], 3))
         return 1.0 / variances[:, 0] if np.array_equal(scalar, self.accelerometer) else None
 
-    def times(self, factor) -> Noise:
+    def times(self, factor) -> Self:
         """The noise with all sds ``factor`` times as large."""
         return Noise(factor**2 * self.accelerometer, factor**2 * self.gyroscope)
 

@@ -5,10 +5,8 @@ integral over omega_t in three dimensions, has an exponent that is a quartic pol
 quadratic. Gauss-Hermite nodes are laid around its mode at every theta, scaled by its curvature.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -218,7 +216,7 @@ class Marginal:
     def of(
         cls, collapsed: Collapsed, positions, rates=None, motion_sd=(np.inf, np.inf),
         nodes: int | None = None, spread=(0.0, 0), enough: float = SETTINGS.node_error,
-    ) -> Marginal:  # fmt: skip
+    ) -> Self:  # fmt: skip
         """Marginal of a recording; modes are searched from those at ``positions`` (A, 3) m.
 
         Parameters

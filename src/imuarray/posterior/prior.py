@@ -1,8 +1,7 @@
 """Normal priors of a posterior's parameters."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -15,7 +14,7 @@ class GaussianPrior:
     sd: np.ndarray
 
     @classmethod
-    def of(cls, mean, sd) -> GaussianPrior:
+    def of(cls, mean, sd) -> Self:
         """Spread a scalar sd over all parameters."""
         mean = np.asarray(mean, float)
         return cls(mean, np.broadcast_to(np.asarray(sd, float), mean.shape).copy())
@@ -28,6 +27,6 @@ class TiedPrior(GaussianPrior):
     root: np.ndarray
 
     @classmethod
-    def of(cls, mean, root) -> TiedPrior:
+    def of(cls, mean, root) -> Self:
         """With the sds that follow."""
         return cls(mean, np.sqrt(np.sum(np.linalg.inv(root) ** 2, axis=1)), root)

@@ -3,13 +3,11 @@
 A recording larger than memory is read part by part.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import xarray as xr
@@ -117,7 +115,7 @@ class Stored:
     def __len__(self) -> int:
         return self.shape[0]
 
-    def __getitem__(self, wanted) -> np.ndarray | Stored:
+    def __getitem__(self, wanted) -> np.ndarray | Self:
         if isinstance(wanted, slice):
             start, stop, step = wanted.indices(len(self))
             if step == 1:
@@ -318,7 +316,7 @@ class Recording:
         method = f"saturated_{kind}s"
         return np.concatenate([getattr(p, method)().any(axis=(1, 2)) for p in self.parts()])
 
-    def select(self, index: Any) -> Recording:
+    def select(self, index: Any) -> Self:
         """The samples that `index` picks: a slice, a (T,) mask or an array of time indices."""
         left = self._at(index)
         if len(left.time) == len(self.time):
@@ -326,16 +324,16 @@ class Recording:
         whole = self.selected.partition(" of ")[2] or f"{len(self.time)} samples"
         return replace(left, selected=f"{len(left.time)} of {whole}")
 
-    def parts(self) -> Iterator[Recording]:
+    def parts(self) -> Iterator[Self]:
         """The samples in turn, `PART` at a time, in memory."""
         for first in range(0, max(len(self.time), 1), PART):
             yield self._at(slice(first, first + PART))
 
-    def in_memory(self) -> Recording:
+    def in_memory(self) -> Self:
         """The recording with its readings read; InputError where they are too many."""
         return self._at(slice(None))
 
-    def _at(self, index: Any) -> Recording:
+    def _at(self, index: Any) -> Self:
         parts = {name: getattr(self, name) for name in SAMPLED}
         return replace(self, **{n: x[index] for n, x in parts.items() if x is not None})
 

@@ -1,7 +1,5 @@
 """The page of `imuarray board`: how good, to be trusted or not and why, and what to do next."""
 
-from __future__ import annotations
-
 import warnings
 from pathlib import Path
 from typing import NamedTuple
@@ -26,7 +24,7 @@ SHAKEN = 1.2  # times the smooth samples' residual: that of all is clearly above
 NOTHING = " Nothing speaks against them."
 
 
-def verdict(board: Board) -> str:
+def verdict(board: "Board") -> str:
     """The quality of the positions, in a sentence."""
     sds = position_sds(board.calibration)[1:]
     rms, worst = (size_in_words(size) for size in (np.sqrt(np.mean(sds**2)), sds.max()))
@@ -40,7 +38,7 @@ def verdict(board: Board) -> str:
     )
 
 
-def turned(board: Board) -> list[str]:
+def turned(board: "Board") -> list[str]:
     """Sensors whose axes are not those declared."""
     if isinstance(board.first_order, str):
         return []
@@ -63,7 +61,7 @@ def size_in_words(size: float) -> str:
     return quantity(float(f"{size:.2g}"), None, "m")
 
 
-def facts(board: Board) -> str:
+def facts(board: "Board") -> str:
     """The log in a line."""
     time, calibration = board.recording.time, board.calibration
     rate, count = 1 / np.median(np.diff(time)), len(board.recording.accelerometer_labels)
@@ -91,7 +89,7 @@ def misfit(calibration: xr.Dataset) -> float:
     return max(float(np.median(calibration[f"{kind}_smooth_residual"])) for kind in KINDS)
 
 
-def advice(board: Board, folder: Path = Path()) -> list[str]:
+def advice(board: "Board", folder: Path = Path()) -> list[str]:
     """Advice, the most urgent first; ``folder``: where the files are.
 
     The motion of an answer that is not to be trusted is no ground for advice.
@@ -121,7 +119,7 @@ def advice(board: Board, folder: Path = Path()) -> list[str]:
     ]
 
 
-def _wanting(board: Board) -> list[str]:
+def _wanting(board: "Board") -> list[str]:
     """Words on what a better recording would have, by the motion that was found."""
     said, calibration = [], board.calibration
     gyroscopes = None if isinstance(board.first_order, str) else board.first_order.gyroscopes
@@ -174,7 +172,7 @@ def causes(calibration: xr.Dataset) -> list[str]:
     ]
 
 
-def before(board: Board) -> list[str]:
+def before(board: "Board") -> list[str]:
     """Words on what first order found."""
     if isinstance(board.first_order, str):
         return [f"First order was left out: {board.first_order}."]
@@ -202,7 +200,7 @@ def before(board: Board) -> list[str]:
     return said
 
 
-def account(board: Board) -> list[str]:
+def account(board: "Board") -> list[str]:
     """Lines on what became of the logs, as a page has them."""
     return [
         f"{line.replace('+-', '±').replace('^2', '²').replace(' -', ' −')}."

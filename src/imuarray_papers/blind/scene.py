@@ -4,11 +4,9 @@ The rigid-body formula is written out here once more, on purpose: an injector th
 measurement model with the diagnosis would share its mistakes too.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -35,7 +33,7 @@ class States(NamedTuple):
     acceleration: np.ndarray  # w', (T, K, 3) rad/s^2
     force: np.ndarray  # s, (T, K, 3) m/s^2
 
-    def columns(self, sensors) -> States:
+    def columns(self, sensors) -> Self:
         """The states at the instants of some sensors, (T, n, 3)."""
         if self.rate.shape[1] == 1:
             return self
@@ -108,7 +106,7 @@ class Scene:
     @classmethod
     def draw(
         cls, rng, imus: int = 8, sampling_rate=125.0, duration=24.0, rails: bool = False
-    ) -> Scene:
+    ) -> Self:
         """Draw motion and true positions; ``imus`` is 8 or 32, ``rails`` wants 2000 deg/s, 16 g."""
         boards = {8: mimu4444_corners, 32: mimu4444}
         if imus not in boards:

@@ -1,9 +1,8 @@
 """The result files of one scale, read when a claim asks for them."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 import pandas as pd
@@ -35,7 +34,7 @@ class Results:
         except InputError:
             return None
 
-    def replace(self, contents: dict) -> Results:
+    def replace(self, contents: dict) -> Self:
         """A copy with other ``contents`` by path."""
         return Results(self.root, self.settings, self._read | contents)
 

@@ -113,56 +113,24 @@ def repeated(positions, data, rng, count, power, out):
 
 
 @njit
-def transitions(theta, log_target, prior, centre, factor, step, draws, power, data, rng, count):
+def transitions(theta, log_target, prior, step, draws, power, data, rng, count):
     """``count`` transitions of Algorithm 1 (2021) from ``theta`` (3 (A - 1),), in place.
 
     ``prior`` (2, 3 (A - 1)) holds means and precisions. The accepted noisy estimate is kept, never
-    redrawn. Proposals are the walk (27) of sd ``step`` where ``centre`` and ``factor`` are empty,
-    else preconditioned Crank-Nicolson: reversible for a normal density of mean ``centre``
-    (3 (A - 1),) and covariance factor factor', ``factor`` lower. In its own coordinates a proposal
-    is sqrt(1 - step^2) z + step n, and only what the target departs from it can be refused.
-    Returns (accepted, log_target).
+    redrawn. Proposals are the walk (27) of sd ``step``. Returns (accepted, log_target).
     """
     work = workspace(data.energy.size, draws, rng)
-    size, shaped = theta.size, centre.size > 0
-    positions = np.zeros((size // 3 + 1, 3))
+    positions = np.zeros((theta.size // 3 + 1, 3))
     flat = positions.ravel()[3:]
-    z, new = theta.copy(), np.empty(size)
-    keep = math.sqrt(1.0 - step**2) if shaped else 1.0
-    square, accepted = _whiten(theta, centre, factor, z) if shaped else 0.0, 0
+    accepted = 0
     for _ in range(count):
-        proposed, moved = 0.0, 0.0
-        for i in range(size):
-            new[i] = keep * z[i] + step * rng.standard_normal()
-            moved += new[i] ** 2
-        for i in range(size):
-            value = new[i]
-            if shaped:
-                value = centre[i]
-                for j in range(i + 1):
-                    value += factor[i, j] * new[j]
-            flat[i] = value
-            proposed -= 0.5 * prior[1, i] * (value - prior[0, i]) ** 2
+        proposed = 0.0
+        for i in range(theta.size):
+            flat[i] = theta[i] + step * rng.standard_normal()
+            proposed -= 0.5 * prior[1, i] * (flat[i] - prior[0, i]) ** 2
         proposed += fresh_draws(positions, data, work, power)
-        ratio = proposed - log_target
-        if shaped:
-            ratio += 0.5 * (moved - square)
-        if math.log(rng.random()) < ratio:
+        if math.log(rng.random()) < proposed - log_target:
             theta[:] = flat
-            z[:] = new
-            log_target, square = proposed, moved
+            log_target = proposed
             accepted += 1
     return accepted, log_target
-
-
-@njit
-def _whiten(theta, centre, factor, z):
-    """Fills z with theta = centre + factor z, ``factor`` lower; returns its square."""
-    square = 0.0
-    for i in range(theta.size):
-        value = theta[i] - centre[i]
-        for j in range(i):
-            value -= factor[i, j] * z[j]
-        z[i] = value / factor[i, i]
-        square += z[i] ** 2
-    return square

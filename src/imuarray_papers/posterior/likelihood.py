@@ -1,8 +1,7 @@
 """The Rao-Blackwellised likelihood estimator of paper 2021, and the target of chains with it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -18,7 +17,6 @@ from imuarray_papers.posterior.proposals import WIDENING, log_weights, proposals
 # (19) and (23) imply |H' Lambda H|^(-1/2) for each sample; (25) and (26a) print the
 # determinant without the root. "derived" is right; "printed" exists to show the difference.
 DETERMINANTS = {"derived": 0.5, "printed": 1.0}
-WALK = np.empty(0), np.empty((0, 0))  # no centre, no factor: the walk (27)
 
 
 @dataclass(frozen=True)
@@ -41,7 +39,7 @@ class Likelihood:
     def of(
         cls, model: ArrayModel, specific_force, angular_rate, saturated=None,
         determinant: str = "derived", rate_distribution=None, motion_sd=(np.inf, np.inf),
-    ) -> Likelihood:  # fmt: skip
+    ) -> Self:  # fmt: skip
         """Arrange measurements (T, A, 3) m/s^2 and (T, G, 3) rad/s for the estimator.
 
         ``rate_distribution``: None for p(omega | y_g) from the declared noise, or a pair
@@ -76,7 +74,7 @@ class Likelihood:
         rates = self.rate_mean, self.rate_covariance
         return Marginal.of(self.collapsed, positions, rates, self.motion_sd, nodes)
 
-    def centred(self, positions, widening: float = WIDENING) -> Likelihood:
+    def centred(self, positions, widening: float = WIDENING) -> Self:
         """The likelihood estimated with draws from where its integrand is.
 
         omega_t is drawn around the integrand's mode at ``positions`` (A, 3) m, weighted by
@@ -132,21 +130,11 @@ def _lower(covariance) -> np.ndarray:
 
 @dataclass(frozen=True)
 class CompiledTarget:
-    """The posterior of theta, the positions r_2 ... r_A, with draws of omega anew at each estimate.
-
-    With a ``centre`` (size,) and a ``factor`` (lower (size, size)) proposals are preconditioned
-    Crank-Nicolson: they leave the normal density of that mean and covariance factor factor' as it
-    is. With a posterior close to it nearly all are accepted, however long the step. ``step`` is
-    then a share of that density's own spread, 1 an independent draw. Like the random walk it is
-    exact whatever the centre and shape; a ``factor`` a little wider than the posterior keeps it
-    from sticking in the tails.
-    """
+    """The posterior of theta, the positions r_2 ... r_A; each estimate draws omega anew."""
 
     likelihood: Likelihood
     prior: GaussianPrior
     draws: int
-    centre: np.ndarray | None = None
-    factor: np.ndarray | None = None
 
     def log_target(self, theta, rng) -> float:
         """log prior + log p-hat with fresh draws."""
@@ -160,8 +148,7 @@ class CompiledTarget:
         Compiled; releases the interpreter for other chains.
         """
         prior = np.stack([self.prior.mean, self.prior.sd**-2.0])
-        shape = WALK if self.centre is None else (self.centre, self.factor)
         return kernels.transitions(
-            theta, log_target, prior, *shape, step, self.draws, self.likelihood.power,
+            theta, log_target, prior, step, self.draws, self.likelihood.power,
             self.likelihood.data, rng, count,
         )  # fmt: skip

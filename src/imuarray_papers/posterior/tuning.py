@@ -69,22 +69,6 @@ def tune(
     return Tuned(target, choose_step(sweeps.steps, rates, sweeps.acceptance), first, centred)
 
 
-def tune_preconditioned(
-    likelihood: Likelihood, prior: GaussianPrior, centre, factor, lengths, rng
-) -> tuple[CompiledTarget, float]:  # fmt: skip
-    """(target, step) of preconditioned Crank-Nicolson proposals: N at the mode, the longest jumps.
-
-    ``centre`` (P,) and ``factor`` (P, P) as in `CompiledTarget`; of the ``lengths`` that
-    with the largest expected squared jump.
-    """
-    tried = Sweeps(lengths)
-    found = variance_sweep(likelihood, positions_of(centre), tried.draws, tried.realisations, rng)
-    draws = choose_draws(tried.draws, found, tried.variance)
-    target = CompiledTarget(likelihood, prior, draws, centre, factor)
-    rates = acceptance_sweep(target, centre, lengths, tried.transitions, rng)
-    return target, float(lengths[np.argmax(rates * np.square(lengths))])
-
-
 def _each(function, values, rng, threads: int) -> np.ndarray:
     """``function`` of each value and a stream of its own, which ``rng`` spawns.
 

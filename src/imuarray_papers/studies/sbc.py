@@ -107,11 +107,14 @@ def nuts(setting: Setting, made, threads: int = 1) -> Found:
     return of_draws(setting, made, kept, name), independent(kept)
 
 
-def _walk(setting: Setting, pilot: Replicate, rng):
-    """The paper's: (target of a replicate, step), N and sigma_q chosen as in section III-C.
+def pmmh(setting: Setting, made, threads: int = 1) -> Found:
+    """By PmMH; N and sigma_q as in section III-C, and thinning, from a pilot data set of its own.
 
     But N at the mode: here the prior's mean is as far off as the prior says, not a thirtieth of it.
     """
+    name = "walk"
+    rng = stream(setting.seed, "calibrated", name, "pilot", setting.name, setting.samples)
+    pilot = replicate(setting, SETTINGS.spare)
     steps = np.sqrt(np.diag(pilot.covariance)).mean() * np.geomspace(1e-3, 3.0, 12)
     found = tuning.tune(
         pilot.likelihood, setting.prior, positions_of(pilot.mode), lambda _: pilot.mode,
@@ -121,109 +124,53 @@ def _walk(setting: Setting, pilot: Replicate, rng):
     def target(one):
         return CompiledTarget(one.likelihood, setting.prior, found.target.draws)
 
-    return target, (found.step,)
+    theta = pilot.mode.copy()
+    _burnt_in(target(pilot), theta, found.step, SETTINGS.first, rng)
+    thin = _thinning(target(pilot), theta, found.step, rng)
+
+    def chain(one):
+        where = setting.name, setting.samples, one.number
+        own = stream(setting.seed, "calibrated", name, "chain", *where)
+        theta = _start(setting, one, name)
+        value = _burnt_in(target(one), theta, found.step, max(SETTINGS.first, thin // 4), own)
+        return _kept(SETTINGS.draws, target(one), theta, value, found.step, thin, own)[0]
+
+    draws = run_batches(chain, made, threads, True, name)
+    return of_draws(setting, made, draws, name), independent(draws)
 
 
-def _preconditioned(setting: Setting, pilot: Replicate, rng):
-    """The likelihood with proposals of the posterior's shape.
-
-    Omega is drawn as the paper has it: draws around the integrand's mode at one theta are too
-    narrow for others as far off as these posteriors are wide, and chains stick.
-    """
-
-    def shape(one):
-        return one.mode, SETTINGS.wider * np.linalg.cholesky(one.covariance)
-
-    lengths = np.geomspace(0.05, 0.99, 10)
-    tuned, best = tuning.tune_preconditioned(
-        pilot.likelihood, setting.prior, *shape(pilot), lengths, rng
-    )
-
-    def target(one):
-        return CompiledTarget(one.likelihood, setting.prior, tuned.draws, *shape(one))
-
-    # the tails are not the normal density's: where long steps are refused, short ones are not
-    return target, (best, best / SETTINGS.shorter)
-
-
-def _pmmh(kernel: Callable, name: str):
-    """PIT values by PmMH; step and thinning from a pilot data set of its own."""
-
-    def pit_values(setting: Setting, made, threads: int = 1) -> Found:
-        rng = stream(setting.seed, "calibrated", name, "pilot", setting.name, setting.samples)
-        pilot = replicate(setting, SETTINGS.spare)
-        make, lengths = kernel(setting, pilot, rng)
-        theta = pilot.mode.copy()
-        target, _ = _learnt(make(pilot), theta, lengths, SETTINGS.first, rng)
-        thin = _thinning(target, theta, lengths, rng)
-
-        def chain(one):
-            where = setting.name, setting.samples, one.number
-            own = stream(setting.seed, "calibrated", name, "chain", *where)
-            theta = _start(setting, one, name)
-            target, value = _learnt(make(one), theta, lengths, max(SETTINGS.first, thin // 4), own)
-            return _kept(SETTINGS.draws, target, theta, value, lengths, thin, own)[0]
-
-        draws = run_batches(chain, made, threads, True, name)
-        return of_draws(setting, made, draws, name), independent(draws)
-
-    return pit_values
-
-
-def _learnt(target, theta, lengths, spacing: int, rng):
-    """(target, log target) after a burn-in that moves ``theta`` in place.
-
-    Preconditioned Crank-Nicolson proposals learn centre and shape in it, and keep them from then
-    on: where data determine little the posterior's mass is some sds from its mode.
-    """
+def _burnt_in(target, theta, step, spacing: int, rng) -> float:
+    """The log target after a burn-in that moves ``theta`` in place."""
     value = target.log_target(theta, rng)
-    for _ in range(SETTINGS.rounds):
-        kept, value = _kept(SETTINGS.learnt, target, theta, value, lengths, spacing, rng)
-        if target.centre is not None:
-            target = _reshaped(target, kept[SETTINGS.learnt // 4 :])
-    return target, value
+    return _kept(SETTINGS.burn_in, target, theta, value, step, spacing, rng)[1]
 
 
-def _reshaped(target: CompiledTarget, kept) -> CompiledTarget:
-    """Around what was seen; the shape's prior weighs as much as a draw for each coordinate."""
-    centre, (count, size) = kept.mean(axis=0), kept.shape
-    seen, before = np.cov(kept.T), target.factor @ target.factor.T / SETTINGS.wider**2
-    factor = SETTINGS.wider * np.linalg.cholesky((count * seen + size * before) / (count + size))
-    return replace(target, centre=centre, factor=factor)
+def _kept(number, target, theta, value, step, count, rng):
+    """``number`` draws, ``count`` transitions for each, and log target at the last.
 
-
-def _kept(number, target, theta, value, lengths, count, rng):
-    """``number`` draws, and log target at the last: ``theta`` is moved in place.
-
-    At least ``count`` transitions for each draw, steps of each length by turns.
+    ``theta`` is moved in place.
     """
     kept = np.empty((number, theta.size))
     for row in kept:
-        for length in lengths:
-            _, value = target.transitions(theta, value, length, -(-count // len(lengths)), rng)
+        _, value = target.transitions(theta, value, step, count, rng)
         row[:] = theta
     return kept, value
 
 
-def _thinning(target, start, lengths, rng) -> int:
+def _thinning(target, start, step, rng) -> int:
     """Transitions after which a chain has nearly forgotten, for the slowest parameter."""
     theta = start.copy()
     value = target.log_target(theta, rng)
     blocks, effective = [], 0.0
     while effective < SETTINGS.pilot_effective and len(blocks) < SETTINGS.blocks[-1]:
-        kept, value = _kept(SETTINGS.pilot // 20, target, theta, value, lengths, 20, rng)
+        kept, value = _kept(SETTINGS.pilot // 20, target, theta, value, step, 20, rng)
         blocks.append(kept)
         if len(blocks) in SETTINGS.blocks:
             effective = ess(np.concatenate(blocks)[None]).min()
     return max(1, int(np.ceil(2 * SETTINGS.pilot * len(blocks) / effective)))
 
 
-METHODS: dict[str, Callable] = {
-    "ML": ml,
-    "PmMH": _pmmh(_walk, "walk"),
-    "PmMH, pCN": _pmmh(_preconditioned, "autoregressive"),  # the random stream's name
-    "NUTS": nuts,
-}
+METHODS: dict[str, Callable] = {"ML": ml, "PmMH": pmmh, "NUTS": nuts}
 
 
 def pit_values(

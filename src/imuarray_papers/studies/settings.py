@@ -23,13 +23,9 @@ class Settings:
     pilot_effective: int = 200  # until so many are effective
     # of them, after which that is looked at
     blocks: tuple[int, ...] = (1, 2, 5, 10, 20, 50, 100, 200, 500)
-    rounds: int = 6  # of a burn-in
-    learnt: int = 100  # draws in each
+    burn_in: int = 600  # draws
     first: int = 100  # transitions between them at least
     tiny: float = 1e-12
-    wider: float = 1.05  # than the mode's curvature, for preconditioned Crank-Nicolson proposals
-    # every other stretch of transitions of preconditioned Crank-Nicolson proposals
-    shorter: float = 4.0
     ml_more: int = 25  # times as many truths as for samplers, as they cost so little
     rate: float = 1e9  # samples a second: instants tell the model nothing
     beyond: float = 1e6  # m/s^2, rad/s: a rail that nothing reaches
