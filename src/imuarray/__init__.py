@@ -18,6 +18,5 @@ and claims. Heavy modules load when they are first used.
 import lazy_loader
 
 __version__ = "1.0.0"
-
 # the names above and others, as `__init__.pyi` lists them
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

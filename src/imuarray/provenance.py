@@ -31,10 +31,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 ROWS = 2**15  # of an array, digested at a time
-
 _LIBRARIES = ("numpy", "scipy", "jax", "numba", "emcee", "arviz")
-
-
 _ADDED: dict[str, tuple[str, str]] = {}  # name and text of code that is not the package's, by place
 
 

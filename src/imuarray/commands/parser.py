@@ -54,8 +54,6 @@ EFFECTS = (
         " none)", type=effects, default=(), metavar="A,B",
     ),
 )  # fmt: skip
-
-
 MODEL = (
     option("--model", "sensors: what a standard sensor model needs, noise estimated (default);"
             " papers: positions and motion alone, the declared noise; or a calibration's file:"

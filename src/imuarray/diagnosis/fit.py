@@ -80,11 +80,9 @@ class Fit:
         """The fit with derivatives by the active parameters' columns alone."""
         kept = self.active.any(axis=0)[self.wanted]
         return replace(
-            self,
-            wanted=self.wanted[kept],
-            whitened=self.whitened[..., kept],
+            self, wanted=self.wanted[kept], whitened=self.whitened[..., kept],
             course=self.course[..., kept],
-        )
+        )  # fmt: skip
 
     def along(self, step) -> np.ndarray:
         """Change of the whitened readings (T, N, 6) with the wanted parameters' step (N, m)."""

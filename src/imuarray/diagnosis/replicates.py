@@ -180,11 +180,6 @@ def _lag_one(part):
     return products / pairs.sum(axis=(0, 2)) / part.mean(part.square)
 
 
-def _kurtosis(part):
-    # a fourth power by pow is slow
-    return part.mean(part.square * part.square) / part.mean(part.square) ** 2 - 3.0
-
-
 def _drift(part):
     x = part.seen.time
     slope = x @ part.values.reshape(len(x), -1) / np.sum(x**2)
@@ -220,7 +215,11 @@ TESTS = {
     ),
     "whiteness": Test(_lag_one, "correlation in time", "the lag-one correlation of {}"),
     "drift": Test(_drift, "drift", "the drift of {} from start to end", by_axis=True),
-    "kurtosis": Test(_kurtosis, "tails (kurtosis)", "the excess kurtosis of {}"),
+    "kurtosis": Test(  # a fourth power by pow is slow
+        lambda part: part.mean(part.square * part.square) / part.mean(part.square) ** 2 - 3.0,
+        "tails (kurtosis)",
+        "the excess kurtosis of {}",
+    ),
     "correlation between IMUs": Test(
         _between, "correlation between IMUs", "the largest correlation of {} between two IMUs"
     ),

@@ -17,8 +17,7 @@ class Settings:
     # Critical values, from simulating the whole procedure on clean recordings
     # (benchmarks/thresholds.py): all tests together give under 5 % of false alarms.
     effect: float = -7.5  # log p of an effect's best test, its IMUs and forms allowed for
-    # nats more of one beside others: what they leave of themselves is not quite noise
-    beside: float = 4.0
+    beside: float = 4.0  # nats more of one beside others, which leave something of themselves
     check: float = -7.5  # log p of a check of what is left
     share: float = 0.002  # of the base model's excess that a cause must explain
     explained: float = 0.99  # share of the excess from which failing checks are within tolerance
@@ -70,8 +69,7 @@ class Settings:
     agree: float = 3.5  # sds within which two estimates are of one thing
     clear: float = 2.5  # sds of a triad's autocorrelation, where all together are beyond doubt
     tailed: float = 0.25  # log ratio by which a mixture's core may miss the noise
-    # sd of a triad's log noise about that of all, once maps of a few percent are taken out
-    pooled: float = 0.025
+    pooled: float = 0.025  # sd of a triad's log noise about that of all, without maps of a few %
     delayed: float = 0.1  # log ratio of noise that a delay of a prior sd may bring with it
     # Shocks (`shocks`)
     least_shaken: int = 4  # IMUs; with one of fewer left out, too little is there to agree
@@ -83,8 +81,7 @@ class Settings:
     stated: int = 20  # stretches
     calm: float = 1.5  # times the noise, up to which smooth samples of shaken motion are explained
     # Checks of what is left (`residual_checks`, `final_checks`, `words`)
-    # of a feature's own information must survive the projection to count
-    seen_feature: float = 1e-4
+    seen_feature: float = 1e-4  # of a feature's information must survive the projection
     coarse: float = 2.0  # noise sds of a step between readings
     slow: int = 3  # turns in the recording; slower ages are a drift
     around: int = 101  # frequencies that give a periodogram's level

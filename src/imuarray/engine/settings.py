@@ -11,8 +11,7 @@ class Settings:
     """
 
     # Readings (`readings`)
-    # least information of a sample on omega_dot and s, in shares of all readings'
-    weakest: float = 1e-2
+    weakest: float = 1e-2  # least information of a sample on omega_dot and s, of all readings'
     least_samples: int = 200  # samples; fewer determine next to nothing of any effect
     few: int = 4096  # samples that show in what steps a sensor reads
     same: float = 1e-9  # m/s^2 or rad/s: equal readings
@@ -33,8 +32,7 @@ class Settings:
     converged: float = 0.02  # of a parameter's own sd: steps below it end the search
     shortest: float = 0.2  # share of a Gauss-Newton step
     wide: float = 10.0  # prior sd of the third derivatives, in sizes of the differences near by
-    # prior sd of what the gyroscopes alone see of omega_dot, in its steps
-    gyroscopes_own: float = 2.0
+    gyroscopes_own: float = 2.0  # prior sd of what gyroscopes alone see of omega_dot, in its steps
     offset: float = 1e-4  # s, of what they see of omega, for each of that
     told: float = 0.03  # of these that readings must tell, for their sds to be estimated
     widening: float = 3.0  # factor by which an iteration may change such an sd
@@ -79,8 +77,7 @@ class Settings:
     jump_jitter: float = 0.1  # turns; a reading farther off is of another turn, and tells no phase
     around_jump: float = 0.25  # turns from a clock's jump within which a reading's side is asked
     # Sizes that are estimated, and widths (`estimate`)
-    # share of a size's step that the next one is, where they go on alike
-    size_step: float = 0.85
+    size_step: float = 0.85  # share of a size's step that the next one is, going on alike
     size_step_most: float = 0.35  # farthest from it
     size_near: float = 0.1  # log of a factor; longer steps are not yet those near the end
     smooth_share: float = 0.2  # share of rough samples that are looked at as the smooth ones

@@ -15,8 +15,6 @@ from imuarray.recording import Recording, write_recording
 from imuarray.recording.record import FIRST_ORDER, KINDS
 
 MISALIGNMENT = ("xy", "xz", "yz")
-
-
 UNITS = {"scale": "1", "misalignment": "1", "orientation": "rad"}
 
 

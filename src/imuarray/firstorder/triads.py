@@ -18,7 +18,6 @@ from imuarray.firstorder.turns import parts_sd_of, procrustes, require_rotations
 from imuarray.model.jax64 import jax, jnp
 
 UPPER = np.triu_indices(3)
-
 SMALL = np.radians(20.0)  # a triad turned by less starts from the drawing
 
 

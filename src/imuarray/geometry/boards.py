@@ -21,7 +21,6 @@ from imuarray.geometry.array import Array, require_count, require_planar_extent
 
 PITCH = 6.3e-3  # m, between package centres in the plane
 THICKNESS = 2.0e-3  # m, between top and underside
-
 # Takes a vector from an underside IMU's own axes to the array frame (180 degrees around
 # the line y = -x, drawn as y = x with the y axis down).
 UNDERSIDE_ROTATION = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])

@@ -12,7 +12,6 @@ from imuarray.model.jax64 import jnp
 
 # Rows and columns of the off-diagonal entries of a 3 x 3 matrix, row by row.
 OFF_ROWS, OFF_COLUMNS = np.array([0, 0, 1, 1, 2, 2]), np.array([1, 2, 0, 2, 0, 1])
-
 FULL_SCALE_FORCE = 157.0  # m/s^2, 16 g: non-linearity is given as a share of it
 FULL_SCALE_RATE = 34.9  # rad/s, 2000 deg/s
 

@@ -12,7 +12,6 @@ jax.config.update("jax_enable_x64", True)
 keep_compiled(jax)
 
 jnp = jax.numpy
-
 __all__ = ["jax", "jnp"]
 
 

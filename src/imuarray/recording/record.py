@@ -20,19 +20,14 @@ PART = 2**15  # samples: 50 MB of 32 IMUs
 MAX_VALUES = 200_000_000  # 1.6 GB as float64: what is held in memory at once
 NEAR = 64  # samples between two that are read in one go
 AXES = ("x", "y", "z")
-
 # Kinds of sensors, and what they read.
 KINDS = {"accelerometer": "specific_force", "gyroscope": "angular_rate"}
-
 # Group with what a simulated recording was made from.
 TRUTH = "truth"
-
 # Group with the per-triad calibration that a corrected recording went through.
 FIRST_ORDER = "first_order"
-
 # Group with how the logs of loose IMUs were brought together.
 ALIGNMENT = "alignment"
-
 # Optional variables, all or none: how the readings were corrected, inverse @ (raw - offset).
 CORRECTION = {
     f"{kind}_{name}": (kind, *dims)
@@ -42,7 +37,6 @@ CORRECTION = {
         ("offset_walk", ()),
     )
 }  # fmt: skip
-
 DIMENSIONS = {
     "time": ("time",),
     "specific_force": ("time", "accelerometer", "axis"),
@@ -55,10 +49,8 @@ DIMENSIONS = {
     "accelerometer_axes": ("accelerometer", "axis", "axis_other"),
     **CORRECTION,
 }
-
 # Optional variables that are true or false.
 FLAGS = ("stationary", "specific_force_saturated", "angular_rate_saturated")
-
 # What each number is, by name in `units.UNITS`.
 QUANTITIES = {
     "time": "time",
@@ -66,9 +58,7 @@ QUANTITIES = {
     "angular_rate": "rate",
     "accelerometer_position": "length",
 }
-
 SI = {name: next(iter(UNITS[quantity])) for name, quantity in QUANTITIES.items()}
-
 # Attributes that are positive numbers, and their units.
 NUMBERS = {
     "accelerometer_noise_sd": "m s-2",
@@ -77,22 +67,16 @@ NUMBERS = {
     "gyroscope_range": "rad s-1",
     "position_prior_sd": "m",
 }
-
 # Attributes that need not be there.
 OPTIONAL_NUMBERS = {"output_period": "s", "clock_sd": "1"}
-
 # Optional variables without a unit.
 MATRICES = ("map_covariance", "accelerometer_axes")
-
 # Of `Recording.alignment`: a log's stamp t is t - offset - drift (t - middle) of the first's clock.
 CLOCKS = ("clock_offset", "clock_offset_sd", "clock_drift", "clock_drift_sd", "clock_middle")
-
 # Optional attributes that are text.
 TEXTS = ("title", "source", "license", "selected")
-
 # Variables with a value for each sample.
 SAMPLED = ("time", "specific_force", "angular_rate", *FLAGS)
-
 # Of a range: a rail is a count; turning counts into SI units and back may cost the last digits.
 RAIL = 1 - 1e-6
 

@@ -45,9 +45,7 @@ class Settings:
     fastest: float = 5e4  # Hz
     # `validate`
     gap: float = 5.0  # times the usual step, a pause to report: estimators that smooth bridge it
-    # Calibrated values may pass the rail by some per cent, those of a triad that was turned by up
-    # to sqrt 3; this is to find wrong units (57, 9.8, ...).
-    beyond_range: float = 1.8
+    beyond_range: float = 1.8  # times; turned triads reach sqrt 3: this finds wrong units
     # `written`
     sniffed: int = 1 << 16  # bytes from which an encoding is recognised
     head: int = 60  # lines among which the header is

@@ -9,7 +9,6 @@ from imuarray.recording.settings import SETTINGS
 
 GRAVITY = 9.80665  # m/s^2, the unit g of data sheets
 _DEGREE = math.pi / 180
-
 # The first of each is SI, and what is written.
 UNITS = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "0.1 ms": 1e-4},

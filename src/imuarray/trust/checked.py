@@ -165,11 +165,9 @@ def _require_board(calibration: xr.Dataset, recording: Recording) -> None:
     off = f"{recording.accelerometer_labels[k]} is {1e3 * apart[k]:.3g} mm off in its drawing"
     other = f"one of another: accelerometer {off}"
     require(
-        not apart[k] > SETTINGS.same_board * prior,
-        "",
-        "a calibration of the recording's board",
+        not apart[k] > SETTINGS.same_board * prior, "", "a calibration of the recording's board",
         other,
-    )
+    )  # fmt: skip
 
 
 def _require_effects(calibration: xr.Dataset) -> None:

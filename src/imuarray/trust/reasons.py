@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from imuarray.model.effects import EFFECTS, KINDS, Effect
+from imuarray.model.effects import EFFECTS, KINDS
 from imuarray.recording import Recording
 from imuarray.recording.channels import repeated
 from imuarray.trust.checked import effect_names, reasons_in, values_of
@@ -286,7 +286,9 @@ def _elsewhere(moving: Recording, places: Places) -> list[str]:
 def _of_another_time(recording: Recording, calibration: xr.Dataset, own_clocks: bool) -> list[str]:
     """One sentence where clocks and drifts of the calibration are those of another recording."""
     known = [name for name in effect_names(calibration) if name in EFFECTS]
-    effects = [name for name in known if _looks_at_time(EFFECTS[name])]
+    # a recording's own effect whose function reads the time differs between instants
+    own = [(name, EFFECTS[name].apply) for name in known if EFFECTS[name].own]
+    effects = [name for name, apply in own if apply and "time" in apply.__code__.co_names]
     if own_clocks:
         effects = [n for n in effects if not (EFFECTS[n].scanned and EFFECTS[n].shifts_time)]
     if not effects or _is_of(recording, calibration):
@@ -311,11 +313,6 @@ def _is_of(recording: Recording, calibration: xr.Dataset) -> bool:
         np.median(np.abs(here - there[inside]))
         < SETTINGS.same_rate * np.median(np.abs(there[inside]))
     )
-
-
-def _looks_at_time(effect: Effect) -> bool:
-    """True where a recording's own effect differs between instants: its function reads the time."""
-    return effect.own and effect.apply is not None and "time" in effect.apply.__code__.co_names
 
 
 def _turning_words(course: Slope, places: Places) -> str:

@@ -30,9 +30,3 @@ from imuarray.words.numbers import (
     symbols,
     unit_shown,
 )
-
-__all__ = [
-    "DEGREE", "NARROW", "equation", "first_up", "fixed", "imus_named", "in_short", "joined",
-    "meaning", "number", "part_in_words", "plus_minus", "power_of_ten", "probability", "quantity",
-    "ratio", "sensors_of", "sentences", "span", "spelled", "split_name", "symbols", "unit_shown",
-]  # fmt: skip

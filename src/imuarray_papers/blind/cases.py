@@ -16,7 +16,6 @@ SIZES = (4.0, 8.0, 12.0, 20.0, 50.0, None)
 OUTSIDE_SIZES = (20.0, 50.0)
 PAIR_SIZE, STRUCK_SIZE = 12.0, 20.0
 HOW_MANY = ("one", "all")
-
 # Repeats of each set: "one" per effect, size and number of IMUs; "gauge" per gauge; "outside" per
 # effect, size and number of IMUs; "struck" per effect and number of IMUs.
 REPEATS = {
@@ -25,7 +24,6 @@ REPEATS = {
 }
 # The quick scale takes so many of the default one, evenly spread.
 QUICK = {"clean": 4, "one": 12, "pair": 4, "gauge": 3, "outside": 4, "struck": 3}
-
 # Settings and how often: the criteria are for 8 IMUs, 125 Hz, 24 s.
 SETTINGS = (
     (0.68, {}),

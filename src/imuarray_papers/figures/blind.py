@@ -17,7 +17,6 @@ GROUPS = {
 }  # fmt: skip
 STRUCK = "struck effects, all"
 TEXT = 5.0  # pt, in cells
-
 CRITERIA = (
     Column("bar", "set and what is counted", "set and what is counted"),
     Column("aim", "bar", "bar"),

@@ -10,7 +10,6 @@ from imuarray.pictures import style
 from imuarray_papers.figures.style import Column, marks, points, scale_line
 
 ESTIMATORS = ("maximum likelihood", "with the prior")
-
 RANKS = (
     Column("case", "motion and geometry", "motion and geometry"),
     Column("samples", "samples", "$N$"),

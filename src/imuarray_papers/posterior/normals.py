@@ -23,8 +23,6 @@ INTEGER = 1.5 * 2.0**52  # added to a small integer, its bits are the last ones
 INTEGER_BITS = np.uint64(0x4338000000000000)  # of INTEGER
 LOG2E = 1.4426950408889634
 LOG2_HIGH, LOG2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10  # their sum: log 2
-
-
 EXP = tuple(1.0 / math.factorial(k) for k in range(12, -1, -1))
 ARTANH = tuple(2.0 / k for k in range(19, 2, -2))
 SIN = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(7, 0, -1))
