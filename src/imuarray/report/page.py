@@ -104,7 +104,5 @@ def rendered(template: str, **given) -> str:
         loader=PackageLoader("imuarray.report", "."), undefined=StrictUndefined, autoescape=True
     )
     environment.filters["numbered"] = numbered
-    environment.globals |= {
-        name: getattr(words, name) for name in words.__all__
-    }  # which the tables call
+    environment.globals |= vars(words)  # which the tables call
     return environment.get_template(template).render(version=imuarray.__version__, **given)
