@@ -2,10 +2,10 @@
 
 `python benchmarks/samplers.py [--samples 5 50 500] [--seconds 60] [--out results/samplers.md]`.
 Every sampler runs twice on the same data of section IV-A of paper 2021: PmMH's walks and NUTS from
-starts spread over the prior, emcee's walkers around the mode, whose search is not counted; NUTS
-300 + 1000 draws, the others for a budget of core seconds. ESS is the smallest over all parameters, bulk, after the burn-in that the chains themselves
-show; emcee's by its own autocorrelation time, as its walkers are not independent, and R-hat between
-two ensembles.
+starts spread over the prior, emcee's walkers around the mode, whose search is not counted; NUTS 300
++ 1000 draws, the others for a budget of core seconds. ESS is the smallest over all parameters,
+bulk, after the burn-in that the chains themselves show; emcee's by its own autocorrelation time, as
+its walkers are not independent, and R-hat between two ensembles.
 Core seconds are those of all threads.
 """
 

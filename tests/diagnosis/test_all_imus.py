@@ -141,20 +141,35 @@ def test_a_triad_that_the_motion_follows_keeps_some_noise(clean):
     assert np.all(np.isfinite(judged.sd[clean.readings.exists]))
 
 
-def test_a_pinned_mean_does_not_blow_up_what_one_imu_has():
-    """Readings show differences of four IMUs' parameters; their mean is pinned by the prior.
+@pytest.mark.parametrize(
+    ("has", "freed"),
+    [([3, 4], [0, 1, 2, 5, 6, 7]), ([3, 4], [3, 4]), ([3], [3]), ([], [7]), ([3], range(8))],
+)
+def test_the_rival_of_some_imus_keeps_no_pinned_mean(has, freed):
+    """Readings show eight IMUs' differences; ``has`` three prior sds, and ``freed`` are asked for.
 
-    How hard it is pinned makes no difference to what the first one's gains.
+    The gain is that of refits on all blocks but one; without the freed ones nothing is pinned.
     """
-    rng = np.random.default_rng(3)
-    values = np.array([2.0, -1.0, 0.5, -1.5])
-    differences = np.eye(4) - 0.25
-    parts = []
-    for _ in range(10):
-        noise = differences @ rng.normal(size=4) * np.sqrt(50.0)
-        parts.append((50.0 * differences, noise))
-    first, pin = np.arange(4) == 0, np.full((4, 4), 1 / 16)
-    tight, less = (
-        gain_of(parts, 0.1 * np.eye(4) + size * pin, values, first) for size in (1e9, 1e5)
-    )
-    assert tight[0] == pytest.approx(less[0], rel=0.05) and tight[0] > 3 * tight[1]
+    rng, count, blocks = np.random.default_rng(3), 8, 10
+    data = 50.0 * (np.eye(count) - 1 / count)
+    scores = [
+        data @ np.isin(range(count), has) * 3.0 + np.sqrt(1 / 50) * data @ rng.normal(size=count)
+        for _ in range(blocks)
+    ]
+    own, pin = np.eye(count), np.full((count, count), (1e3 / count) ** 2)
+    values = np.linalg.solve(blocks * data + own + pin, sum(scores))
+    parts = [(data, score - data @ values) for score in scores]
+    mine = np.isin(range(count), freed)
+    alone = own * ~mine * ~mine[:, None]
+    found = gain_of(parts, own + pin, values, mine, prior=(alone, np.zeros(count)))
+    wanted = []
+    for held in scores:
+        trained, more = sum(scores) - held, (blocks - 1) * data
+        rest, less = ~mine, np.zeros(count)
+        square = np.ix_(rest, rest)
+        less[rest] = np.linalg.solve((more + own)[square], trained[rest])
+        both = np.linalg.solve(more + own + pin, trained), less
+        nats = [held @ x - x @ data @ x / 2 for x in both]
+        wanted.append(nats[0] - nats[1])
+    assert found[0] == pytest.approx(sum(wanted), abs=0.05 * abs(sum(wanted)) + 1.5)
+    assert (found[0] > 3 * found[1]) == (len(freed) == count)  # else the others shift alike

@@ -253,7 +253,10 @@ def heldout_gain(
     freed = columns.mask([effect], imus) & mask & ~np.asarray(there)
     values = columns.flat(search.fit.state)[mask]
     parts = normal_blocks(search.fit, mask) if parts is None else parts
-    return gain_of(parts, columns.prior_precision(mask), values, freed[mask])
+    rest, alone = ~freed[mask], np.zeros((len(values), len(values)))
+    alone[np.ix_(rest, rest)] = columns.prior_precision(mask & ~freed)
+    prior = alone, columns.prior_means()[mask]
+    return gain_of(parts, columns.prior_precision(mask), values, ~rest, prior=prior)
 
 
 def prune(search: Search, effect: str) -> Search:
@@ -295,8 +298,13 @@ def _gaining(search: Search, effect: str, imus) -> tuple[int, ...]:
     nothing.
     """
     parts = normal_blocks(search.fit, search.active)
-    own = {k: heldout_gain(search, effect, parts, [k])[0] for k in imus}
-    order = sorted(imus, key=own.__getitem__, reverse=True)
+    columns, mine = search.columns, search.columns.of(effect)
+    own = [heldout_gain(search, effect, parts, [k])[0] for k in imus]
+    if any(item.id == effect for item, _ in columns.gauges(search.active)):
+        # a common part is nobody's, so none gains by itself: those far from most go first
+        size = (columns.flat(search.fit.state) / columns.prior_sd)[list(imus)][:, mine]
+        own = np.sum((size - np.median(size, axis=0)) ** 2, axis=1)
+    order = [imus[place] for place in np.argsort(own)[::-1]]
     for number in range(1, (len(imus) + 1) // 2):
         gain, error = heldout_gain(search, effect, parts, order[number:])
         if gain < search.least_z * error:

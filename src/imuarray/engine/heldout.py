@@ -101,28 +101,32 @@ def gain(one: Scores, other: Scores) -> tuple[float, float]:
     return float(difference.sum() / samples), float(error / samples)
 
 
-def gain_of(parts, ridge, values, freed, spare=None) -> tuple[float, float]:
+def gain_of(parts, ridge, values, freed, spare=None, prior=None) -> tuple[float, float]:
     """Nats that ``freed`` (n,) bool parameters gain on held-out blocks over zero, and their error.
 
     ``parts`` [(information (n, n), score (n,))] of the blocks at ``values`` (n,), ``ridge`` (n, n)
     the prior's precision. Both rivals are trained without the block, the freed parameters shrunk
     as their score in the training blocks deserves (positive-part James-Stein, of as many as data
     and not the prior determine). ``spare`` (n,) bool: parameters that both rivals have beside.
+    ``prior``, without spare ones: the precision (n, n) where the freed are zero, which pins no mean
+    that only all have, and the means (n,); else ``ridge``, about the values.
     """
     information, score = sum(p[0] for p in parts), sum(p[1] for p in parts)
     spare = np.zeros(len(freed), bool) if spare is None else spare
-    freed, values, gains = freed[~spare], values[~spare], []
+    rival, means = (ridge, values) if prior is None else prior
+    off, freed, values, gains = values - means, freed[~spare], values[~spare], []
     # a pinned mean holds those of some IMUs no more than the other IMUs let it
-    prior = _schur(ridge[np.ix_(~spare, ~spare)], freed)
+    own = _schur(ridge[np.ix_(~spare, ~spare)], freed)
     for part in parts:
-        trained = information - part[0] + ridge, score - part[1]
-        trained, (block, slope) = _eliminated(trained, part, spare)
-        without = _solve(*trained, values, freed, 0.0)
+        data, left = information - part[0], score - part[1]
+        trained, (block, slope) = _eliminated((data + ridge, left - ridge @ off), part, spare)
+        other = trained if spare.any() else (data + rival, left - rival @ off)
+        without = _solve(*other, values, freed, 0.0)
         full = np.linalg.solve(*trained)
         found = (full + values)[freed]
         effective = _schur(trained[0], freed)
         statistic = found @ effective @ found
-        determined = freed.sum() - np.trace(np.linalg.solve(effective, prior))
+        determined = freed.sum() - np.trace(np.linalg.solve(effective, own))
         shrink = max(0.0, 1 - determined / max(statistic, 1e-300))
         kept = _solve(*trained, values, freed, shrink * found)
         gains.append(_predicted(kept, block, slope) - _predicted(without, block, slope))
