@@ -1,6 +1,7 @@
 """Independence Metropolis-Hastings against laws whose moments and quantiles are known."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -94,7 +95,7 @@ def test_where_it_is_not_enough_nuts_is_taken_and_that_is_told(monkeypatch):
     first = imuarray.sample(recording, "papers")
     assert first.attrs["sampler"] == "independent" and first.attrs["converged"]
     assert first.attrs["ess_min"] >= 1000 and first.attrs["rhat_max"] <= 1.01
-    monkeypatch.setattr(sampling, "SETTINGS.unreliable", -np.inf)
+    monkeypatch.setattr(sampling, "POSTERIOR", replace(SETTINGS, unreliable=-np.inf))
     refused = imuarray.sample(recording, "papers", method="independent")
     assert not refused.attrs["converged"]
     made = sampling.posterior_of
