@@ -95,11 +95,9 @@ def _step(x, y, z, c, b, dx, dy, dz, p, damping):
     determinant = hxx * cxx + hxy * cxy + hxz * cxz
     scale = -1.0 / determinant
     return (
-        scale * (cxx * gx + cxy * gy + cxz * gz),
-        scale * (cxy * gx + cyy * gy + cyz * gz),
-        scale * (cxz * gx + cyz * gy + czz * gz),
-        determinant,
-    )
+        scale * (cxx * gx + cxy * gy + cxz * gz), scale * (cxy * gx + cyy * gy + cyz * gz),
+        scale * (cxz * gx + cyz * gy + czz * gz), determinant,
+    )  # fmt: skip
 
 
 @njit(inline="always")

@@ -104,12 +104,10 @@ class SmoothMotion:
         """Motion and its derivatives at ``time`` (T,) seconds, each field (T, 3)."""
         time = np.asarray(time, float)
         return Motion(
-            self.rotation.derivative(time),
-            self.rotation.derivative(time, 1),
-            self.force.derivative(time),
-            self.rotation.derivative(time, 2),
+            self.rotation.derivative(time), self.rotation.derivative(time, 1),
+            self.force.derivative(time), self.rotation.derivative(time, 2),
             self.force.derivative(time, 1),
-        )
+        )  # fmt: skip
 
 
 def hand_twisting(

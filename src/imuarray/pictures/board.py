@@ -240,11 +240,9 @@ def _rows(recording: Recording, calibration: xr.Dataset) -> list[tuple[str, str,
     shaken[np.clip(places, 0, count - 1)] = calibration["shaken"].to_numpy() > 0
     rails = [recording.at_rail(kind) for kind in KINDS]
     return [
-        ("still poses", SKY, recording.still()),
-        ("used for positions", GREEN, used),
-        ("at a rail", ORANGE, np.any(rails, axis=0)),
-        ("shocks", VERMILLION, shaken),
-    ]
+        ("still poses", SKY, recording.still()), ("used for positions", GREEN, used),
+        ("at a rail", ORANGE, np.any(rails, axis=0)), ("shocks", VERMILLION, shaken),
+    ]  # fmt: skip
 
 
 def sphere(recording: Recording, calibration: xr.Dataset, axes: Axes | None = None) -> Axes:

@@ -51,11 +51,9 @@ def simulate_twisting(settings: dict, accelerometer_sd: float):
     paper, experiment, seed = settings["paper2021"], settings["experiment"], settings["seed"]
     model = model_from(settings, accelerometer_sd)
     motion = hand_twisting(
-        stream(seed, "twisting"),
-        np.radians(paper["angular_rate_sd_dps"]) / 2,
-        paper["specific_force_sd"],
-        experiment["bandwidth"],
-    )
+        stream(seed, "twisting"), np.radians(paper["angular_rate_sd_dps"]) / 2,
+        paper["specific_force_sd"], experiment["bandwidth"],
+    )  # fmt: skip
     truth = prior_mean(model.array, paper["prior_mean_error"], stream(seed, "mounting"))
     return simulate_recording(
         model, motion, truth, model.array.positions,

@@ -22,11 +22,9 @@ def square_errors(model, rng, count, motion, position_sd, rail, gyroscopes: bool
     found = estimate_motion(model, force, rate, saturated=lost)
     true = [field[:, 0] for field in moves]
     pairs = (
-        (found.motion.angular_rate, true[0]),
-        (rate.mean(axis=1), true[0]),
-        (found.motion.angular_acceleration, true[1]),
-        (found.motion.specific_force, true[2]),
-    )
+        (found.motion.angular_rate, true[0]), (rate.mean(axis=1), true[0]),
+        (found.motion.angular_acceleration, true[1]), (found.motion.specific_force, true[2]),
+    )  # fmt: skip
     squares = [np.mean((estimate - value) ** 2, axis=1) for estimate, value in pairs]
     return (*squares, found.converged)
 
