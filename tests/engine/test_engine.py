@@ -5,17 +5,19 @@ from dataclasses import replace
 import jax
 import numpy as np
 import pytest
+from scipy.stats import kstest
 
 import imuarray
 from imuarray.engine.dataset import engine_dataset
 from imuarray.engine.estimate import Recorded, estimate, jackknifed, to_come
 from imuarray.engine.forward import _of_one_truth, select_forward
 from imuarray.engine.linearise import linearise, reading, seen_again
+from imuarray.engine.normal import uncorrelated
 from imuarray.engine.parameters import POSITION, columns_of
 from imuarray.engine.readings import arrange, most_informative, resolution
 from imuarray.engine.robust import normal_pass
 from imuarray.engine.start import turned
-from imuarray.engine.widths import settled, widths
+from imuarray.engine.widths import hausman, settled, widths
 from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.geometry import Array, sub_array
 from imuarray.model.effects import Prediction
@@ -386,23 +388,52 @@ def test_a_clock_that_wanders_is_read_at_other_ages():
     assert np.abs(read[0][0, 3:] - x[:3]).max() > 1e-4
 
 
-def test_a_block_that_holds_most_of_the_information_widens_no_sd():
+@pytest.mark.parametrize("known", [0.0, 300.0])
+def test_a_block_that_holds_most_of_the_information_widens_no_sd(known):
     """3000 lines through blocks of 200 and nine times 4 points, the model right: E[sd^2] is the
     formal variance; leaving each block out, as a plain jackknife does, gives several times that.
+
+    Where a slope is ``known`` beforehand, as well: what the prior says scatters, too.
     """
     rng, sizes = np.random.default_rng(5), [200, *[4] * 9]
     rows = [np.stack([np.ones(n), rng.uniform(0, 1 + 3 * (n > 4), n)], axis=1) for n in sizes]
     inner = [x.T @ x for x in rows]
-    information = sum(inner)
+    prior = np.diag([0.0, known])
+    information = sum(inner) + prior
     found, plain = [], []
     for _ in range(3000):
-        scores = [x.T @ rng.standard_normal(len(x)) for x in rows]
+        truth = np.array([0.0, rng.standard_normal() / known**0.5 if known else 0.0])
+        scores = [x.T @ (rng.standard_normal(len(x)) + x @ truth) for x in rows]
         at = np.linalg.solve(information, sum(scores))
         left = [score - own @ at for own, score in zip(inner, scores, strict=True)]
         blocks = list(zip(inner, left, strict=True))
-        found.append(jackknifed(information, blocks) ** 2)
+        found.append(jackknifed(sum(inner), prior, blocks) ** 2)
         moved = [np.linalg.solve(information - own, score) for own, score in blocks]
         plain.append(0.9 * np.sum(np.square(moved - np.mean(moved, axis=0)), axis=0))
     formal = np.diag(np.linalg.inv(information))
     np.testing.assert_allclose(np.mean(found, axis=0), formal, rtol=0.1)
-    assert (np.mean(plain, axis=0) > 3 * formal).any()
+    assert known or (np.mean(plain, axis=0) > 3 * formal).any()
+
+
+def test_a_triads_residual_is_as_many_normal_ones_as_the_motion_leaves():
+    """A triad that lies in the motion's basis but for two directions: two, of their chi-square."""
+    rng = np.random.default_rng(3)
+    basis = np.linalg.qr(rng.standard_normal((50, 3, 3)))[0] * [1.0, 0.4, 0.9]
+    inside = np.eye(3) - basis @ basis.swapaxes(1, 2)
+    residual = np.einsum("tij,tj->ti", inside, rng.standard_normal((50, 3)))
+    found = uncorrelated(residual, basis, np.ones((50, 3), bool))
+    assert (np.isfinite(found).sum(axis=1) == 2).all()
+    expected = np.einsum("ti,tij,tj->t", residual, np.linalg.pinv(inside, 1e-6), residual)
+    np.testing.assert_allclose(np.nansum(found**2, axis=1), expected, rtol=1e-2)
+
+
+def test_estimates_of_one_truth_differ_by_chi_square():
+    """200 means of three with a prior of which two agree with it, one only as far as data say."""
+    rng, told = np.random.default_rng(8), np.array([4.0, 0.5, 1e-6])
+    wide, far = np.diag([4.0, 1.0, 9.0]), []
+    narrow = np.linalg.inv(np.linalg.inv(wide) + np.diag(told))
+    for truth in rng.multivariate_normal(np.zeros(3), wide, 200):
+        seen = truth + rng.standard_normal(3) / np.sqrt(told)
+        far.append(hausman(narrow @ (told * seen), wide, narrow))
+    assert {freedom for _, freedom in far} == {2}
+    assert kstest([statistic for statistic, _ in far], "chi2", (2,)).pvalue > 1e-3

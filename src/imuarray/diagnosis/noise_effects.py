@@ -8,7 +8,7 @@ from imuarray.diagnosis.fit import Fit
 from imuarray.diagnosis.noise import Noise, expected_ratio, observable
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.heldout import blocks_of
-from imuarray.engine.settings import SETTINGS as ENGINE
+from imuarray.engine.normal import uncorrelated
 from imuarray.model.effects import KINDS
 from imuarray.tails import QUARTILE, log_chi_square, log_normal
 
@@ -47,26 +47,10 @@ class Mixture(NamedTuple):
 
 
 def triad(fit: Fit, imu: int, kind: int) -> np.ndarray:
-    """A triad's residual (T, 3) as three uncorrelated ones of unit variance, NaN where left out.
-
-    What the motion takes up correlates them: on a small array the sum of their squares would have
-    tails where the noise has none. NaN, too, where it leaves hardly anything.
-    """
-    rows = slice(6 * imu + 3 * kind, 6 * imu + 3 * kind + 3)
-    basis, left = fit.basis[:, rows], fit.residual[:, imu, 3 * kind : 3 * kind + 3]
-    covariance = np.eye(3) - basis @ basis.swapaxes(1, 2)
-    out, factor = np.empty_like(left), np.zeros_like(covariance)
-    seen = fit.readings.keep[:, imu, 3 * kind : 3 * kind + 3].copy()
-    for i in range(3):  # Cholesky's factor and the forward substitution, all samples at once
-        for j in range(i):
-            known = np.einsum("tk,tk->t", factor[:, i, :j], factor[:, j, :j])
-            factor[:, i, j] = (covariance[:, i, j] - known) / factor[:, j, j]
-        own = covariance[:, i, i] - np.sum(factor[:, i, :i] ** 2, axis=1)
-        seen[:, i] &= own > ENGINE.least_free
-        factor[:, i, i] = np.sqrt(np.maximum(own, ENGINE.least_free))
-        taken = np.einsum("tk,tk->t", factor[:, i, :i], out[:, :i])
-        out[:, i] = np.where(own > ENGINE.least_free, left[:, i] - taken, 0.0) / factor[:, i, i]
-    return np.where(seen, out, np.nan)
+    """A triad's residual (T, 3) as three uncorrelated ones of unit variance, NaN where left out."""
+    rows, own = slice(6 * imu + 3 * kind, 6 * imu + 3 * kind + 3), slice(3 * kind, 3 * kind + 3)
+    keep = fit.readings.keep[:, imu, own]
+    return uncorrelated(fit.residual[:, imu, own], fit.basis[:, rows], keep)
 
 
 def held_out(nats) -> tuple[float, float, np.ndarray]:

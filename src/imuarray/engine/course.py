@@ -26,13 +26,12 @@ def course(found: Estimate, moving) -> tuple[dict, dict]:
     readings, seen = found.recorded[0].readings, found.passes[0]
     time = readings.time + readings.origin
     far = distances(readings, seen)
-    number = by_triad(readings.keep)
     blocks = blocks_of(
         len(time), int(np.clip(len(time) // SETTINGS.course_samples, 1, SETTINGS.course_stretches))
     )
     squares = far * (readings.sd / readings.declared) ** 2
     rms = np.sqrt([
-        squares[part].sum(axis=0) / np.maximum(number[part].sum(axis=0), 1) for part in blocks
+        squares[part].sum(axis=0) / np.maximum(seen.number[part].sum(axis=0), 1) for part in blocks
     ])  # fmt: skip
     counts = readings.array.accelerometers, readings.array.gyroscopes
     variables: dict[str, tuple] = {

@@ -15,7 +15,7 @@ from imuarray.engine.alike import with_likely_spread
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import Columns, stepped
 from imuarray.engine.readings import Readings
-from imuarray.engine.robust import MEDIAN, Pass, distances, freedoms, normal_pass, reweighted
+from imuarray.engine.robust import Pass, distances, freedoms, median_of, normal_pass, reweighted
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import is_smooth, start, with_derivatives, with_rough_prior
 from imuarray.linear import scaled_solve
@@ -100,7 +100,7 @@ class Estimate:
         for one, seen in zip(self.recorded, self.passes, strict=True):
             scale = (one.readings.sd / one.readings.declared) ** 2
             squares += np.sum(distances(one.readings, seen) * scale)
-            number += one.readings.keep.sum()
+            number += seen.number.sum()
         return float(np.sqrt(squares / number))
 
     def smooth_ratio(self) -> np.ndarray | None:
@@ -118,8 +118,9 @@ class Estimate:
             turn = np.linalg.norm(one.state.motion[:, 3:6], axis=1)
             turning = turn > np.median(turn)
             smooth = turning & (jerk <= np.quantile(jerk[turning], SETTINGS.smooth_share))
-            parts.append(distances(one.readings, seen)[smooth] * scale)
-        return np.sqrt(np.median(np.concatenate(parts), axis=0) / MEDIAN)
+            far = distances(one.readings, seen) / median_of(seen.number)
+            parts.append(far[smooth] * scale)
+        return np.sqrt(np.median(np.concatenate(parts), axis=0))
 
     def noise_sd(self) -> np.ndarray:
         """Sds (N, 2), m/s^2 and rad/s, that Student's t has; rms over the recordings."""
@@ -129,17 +130,18 @@ class Estimate:
         return np.sqrt(wide * np.mean(squares, axis=0))
 
 
-def jackknifed(information, blocks) -> np.ndarray:
-    """Sds (n,) from what each block of time says against all, priors in the information.
+def jackknifed(information, precision, blocks) -> np.ndarray:
+    """Sds (n,) from what each block of time says against all, beside the priors' ``precision``.
 
     A block left out moves the estimate by (1 - h)^-1, h its share of the information, and so by too
     much where it holds most of it; with (1 - h)^-1/2 the variance is unbiased where the model holds
     (Bell and McCaffrey, "Bias reduction in standard errors ...", 2002).
     """
-    scale = 1 / np.sqrt(np.diag(information))
-    root = np.linalg.cholesky(information * np.outer(scale, scale))
-    back = np.linalg.inv(root) * scale
-    variance = np.zeros(len(information))
+    whole = information + precision
+    scale = 1 / np.sqrt(np.diag(whole))
+    back = np.linalg.inv(np.linalg.cholesky(whole * np.outer(scale, scale))) * scale
+    inverse = back.T @ back
+    variance = np.maximum(np.sum((inverse @ precision) * inverse, axis=1), 0.0)
     for inner, score in blocks:
         share, axes = np.linalg.eigh(back @ inner @ back.T)
         spared = np.sqrt(np.maximum(1 - share, SETTINGS.spared))
@@ -180,7 +182,7 @@ def estimate(
         precision = pinned(columns, active, places)
         slope = score - precision @ (values - means(recorded, columns, active, places))
         step, sds = scaled_solve(information + precision, slope)
-        sds = np.maximum(sds, jackknifed(information + precision, blocks))
+        sds = np.maximum(sds, jackknifed(information, precision, blocks))
         moved.append(float(np.max(np.abs(step) / sds, initial=0.0)))
         if moved[-1] < SETTINGS.settled and change < SETTINGS.same_noise and number > first:
             break

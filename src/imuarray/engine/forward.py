@@ -275,22 +275,14 @@ def _left(found: Estimate) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def _of_one_truth(found: Estimate, more: Estimate) -> bool:
-    """True where positions by a prior are where the readings alone may have them.
-
-    Hausman's test (Econometrica 46, 1978): what differs has the difference of the covariances.
-    """
+    """True where positions by a prior are where the readings alone may have them."""
     spreads = []
     for one in (found, more):
         placed = one.places[0][np.argwhere(one.active)[:, 1] < 3]
-        spreads.append(scaled_inverse(one.information + one.precision)[np.ix_(placed, placed)])
-    root = np.linalg.cholesky(spreads[0])
-    share = np.linalg.solve(root, np.linalg.solve(root, spreads[0] - spreads[1]).T)
-    sizes, turns = np.linalg.eigh((share + share.T) / 2)
-    apart = turns.T @ np.linalg.solve(root, (more.positions - found.positions)[1:].ravel())
-    return bool(
-        chdtrc(len(apart), np.sum(apart**2 / np.maximum(sizes, SETTINGS.least_difference)))
-        > SETTINGS.chance
-    )
+        known = one.information / widths.lost(one.freedoms) + one.precision
+        spreads.append(scaled_inverse(known)[np.ix_(placed, placed)])
+    statistic, freedom = widths.hausman((more.positions - found.positions)[1:].ravel(), *spreads)
+    return bool(chdtrc(max(freedom, 1), statistic) > SETTINGS.chance)
 
 
 def _contradicted(parts, ridge, values, freed, spread) -> bool:

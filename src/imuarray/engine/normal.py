@@ -5,6 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from imuarray.engine.linearise import CHUNK, THREADS
+from imuarray.engine.settings import SETTINGS
 
 
 def summed_normal(seen, chosen, part=slice(None)):
@@ -66,6 +67,30 @@ def seen_through(whitened, basis, chosen):
         np.matmul(own, block, out=through[..., places])
         blocks.append((imu, places, block))
     return through, blocks
+
+
+def uncorrelated(residual, basis, keep) -> np.ndarray:
+    """Triads' residuals (..., 3) as three uncorrelated ones of unit variance, NaN where left out.
+
+    What the motion takes up, by its basis (..., 3, D), correlates them: on a small array the sum of
+    their squares would have tails where the noise has none. NaN, too, where it leaves hardly
+    anything; ``keep`` (..., 3) bool.
+    """
+    out, factor = np.empty_like(residual), np.zeros((*residual.shape, 3))
+    seen = keep.copy()
+    for i in range(3):  # Cholesky's factor and the forward substitution, all samples at once
+        for j in range(i):
+            known = np.sum(factor[..., i, :j] * factor[..., j, :j], axis=-1)
+            known += np.einsum("...d,...d->...", basis[..., i, :], basis[..., j, :])
+            factor[..., i, j] = -known / factor[..., j, j]
+        own = 1.0 - np.einsum("...d,...d->...", basis[..., i, :], basis[..., i, :])
+        own -= np.sum(factor[..., i, :i] ** 2, axis=-1)
+        clear = own > SETTINGS.least_free
+        factor[..., i, i] = np.sqrt(np.where(clear, own, SETTINGS.least_free))
+        taken = np.sum(factor[..., i, :i] * out[..., :i], axis=-1)
+        out[..., i] = np.where(clear, residual[..., i] - taken, 0.0) / factor[..., i, i]
+        seen[..., i] &= clear
+    return np.where(seen, out, np.nan)
 
 
 def pick(through, chosen) -> tuple[np.ndarray, np.ndarray]:

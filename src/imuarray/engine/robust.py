@@ -11,14 +11,13 @@ import numpy as np
 
 from imuarray.engine import linearise
 from imuarray.engine.heldout import blocks_of, log_t
-from imuarray.engine.normal import normal
+from imuarray.engine.normal import normal, uncorrelated
 from imuarray.engine.parameters import Columns
 from imuarray.engine.readings import Readings, by_triad
 from imuarray.engine.settings import SETTINGS
 from imuarray.estimation.threads import one_thread
 
 FREEDOMS = np.array([3.0, 4.0, 6.0, 10.0, 20.0, 50.0, np.inf])
-MEDIAN = 2.37  # of chi-square of three readings
 
 
 class Pass(NamedTuple):
@@ -29,7 +28,8 @@ class Pass(NamedTuple):
     motion: np.ndarray  # (T, D), improved
     squares: np.ndarray  # (T, N, 2) squared residuals of each triad
     freedom: np.ndarray  # (T, N, 2) their expectation where noise is as assumed
-    unit: np.ndarray  # (T, N, 2) the same squares, each reading's of unit expectation
+    unit: np.ndarray  # (T, N, 2) squares of what is uncorrelated and of unit variance in it,
+    number: np.ndarray  # (T, N, 2) and how many these are: three, less what the motion takes up
     rough: np.ndarray  # (2, G) of what rough motion adds: squares in prior sds, and how many it saw
 
 
@@ -49,7 +49,8 @@ def normal_pass(
     few = active[:, wanted]
     blocks = blocks_of(samples)
     motion = state.motion.copy()
-    squares, freedom, unit = (np.empty((samples, count, 2)) for _ in range(3))
+    squares, freedom, unit, number = (np.empty((samples, count, 2)) for _ in range(4))
+    triads = -1, count, 2, 3
 
     def one(start):
         part = slice(start, min(start + linearise.CHUNK, samples))
@@ -60,7 +61,11 @@ def normal_pass(
         residual, leverage = seen.residual, linearise.leverage_of(seen.basis)
         left = np.where(readings.keep[part], 1.0 - leverage, 0.0)
         squares[part], freedom[part] = by_triad(residual**2), by_triad(left)
-        unit[part] = by_triad(residual**2 / np.maximum(1.0 - leverage, SETTINGS.least_free))
+        own = uncorrelated(
+            residual.reshape(triads), seen.basis.reshape(*triads, seen.basis.shape[2]),
+            readings.keep[part].reshape(triads),
+        )  # fmt: skip
+        unit[part], number[part] = np.nansum(own**2, axis=-1), np.isfinite(own).sum(axis=-1)
         if not improved:
             step = np.swapaxes(seen.inverse, 1, 2) @ seen.taken[..., None]
             motion[part] += step[..., 0]
@@ -77,7 +82,7 @@ def normal_pass(
         information[block] += inner
         score[block] += slope
     rough = sum(one for _, one in found)
-    return Pass(information, score, motion, squares, freedom, unit, rough)
+    return Pass(information, score, motion, squares, freedom, unit, number, rough)
 
 
 def _seen_of_prior(state: linearise.State, motion, inverse, part) -> np.ndarray:
@@ -112,7 +117,6 @@ def reweighted(readings: Readings, seen: Pass, owned, former: np.ndarray) -> Rea
     """
     free = seen.freedom.sum(axis=0)
     free = np.maximum(free - owned, 0.1 * free)
-    number = by_triad(readings.keep)
     trust = 1.0 if readings.trust is None else readings.trust
     squares, distance = seen.squares / trust**2, distances(readings, seen)
     ratio, weight, least = np.ones_like(free), np.ones_like(distance), least_ratio(readings)
@@ -120,11 +124,11 @@ def reweighted(readings: Readings, seen: Pass, owned, former: np.ndarray) -> Rea
         own = readings.exists[:, kind] & (free[:, kind] > 0)
         if readings.exists[:, kind].sum() == 1:  # nothing to hold it against: as declared
             continue
-        d, n, s = (part[:, own, kind] for part in (distance, number, squares))
+        d, n, s = (part[:, own, kind] for part in (distance, seen.number, squares))
         if not np.isfinite(nu):
             ratio[own, kind] = np.maximum(s.sum(axis=0) / free[own, kind], least[own, kind])
             continue
-        scale = np.maximum(np.median(d, axis=0) / MEDIAN, least[own, kind])
+        scale = np.maximum(np.median(d / median_of(n), axis=0), least[own, kind])
         for _ in range(SETTINGS.scale_rounds):
             scale = np.sum((nu + n) / (nu + d / scale) * s, axis=0) / free[own, kind]
             scale = np.maximum(scale, least[own, kind])
@@ -149,20 +153,26 @@ def distances(readings: Readings, seen: Pass) -> np.ndarray:
 
 def freedoms(readings: Readings, seen: Pass) -> np.ndarray:
     """Degrees of freedom (2,) that make the triads' distances likeliest, of each kind of sensor."""
-    number = by_triad(readings.keep)
     found, far = np.full(2, np.inf), distances(readings, seen)
-    told = np.median(far, axis=0) / MEDIAN > least_ratio(readings)
+    told = np.median(far / median_of(seen.number), axis=0) > least_ratio(readings)
     for kind in range(2):
-        used = (number[..., kind] == 3) & told[:, kind]
+        used = (seen.number[..., kind] > 0) & told[:, kind]
         if used.any() and readings.exists[:, kind].sum() > 1:  # one alone is normal, as declared
-            d = far[..., kind][used]
-            found[kind] = FREEDOMS[np.argmax([_log_likelihood(d, nu) for nu in FREEDOMS])]
+            own = far[..., kind][used], seen.number[..., kind][used]
+            found[kind] = FREEDOMS[np.argmax([_log_likelihood(*own, nu) for nu in FREEDOMS])]
     return found
 
 
-def _log_likelihood(d, nu) -> float:
-    """Log likelihood of squared distances (n,) of three readings, at the best scale."""
-    scale = np.mean(d) / 3
+def _log_likelihood(d, n, nu) -> float:
+    """Log likelihood of squared distances (T,) of as many as ``n`` (T,), at the best scale."""
+    whole = np.sum(n)
+    scale = np.sum(d) / whole
     for _ in range(SETTINGS.scale_rounds if np.isfinite(nu) else 0):
-        scale = np.mean((nu + 3) / (nu + d / scale) * d) / 3
-    return float(np.sum(log_t(d / scale, 3, nu)) - 1.5 * len(d) * np.log(scale))
+        scale = np.sum((nu + n) / (nu + d / scale) * d) / whole
+    return float(np.sum(log_t(d / scale, n, nu)) - whole / 2 * np.log(scale))
+
+
+def median_of(number) -> np.ndarray:
+    """Median of chi-square (Wilson and Hilferty's, within 3 %), of none as of one."""
+    number = np.maximum(number, 1)
+    return number * (1 - 2 / (9 * number)) ** 3

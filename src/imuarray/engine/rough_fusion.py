@@ -84,12 +84,12 @@ class Rough(NamedTuple):
 
         ``least``: degrees of freedom, if the estimate has fewer.
         """
-        readings, number = self.readings, by_triad(self.readings.keep)
-        distance, trust = distances(readings, seen), np.ones(number.shape)
+        readings, distance = self.readings, distances(self.readings, seen)
+        trust = np.ones(distance.shape)
         for kind, nu in enumerate(np.maximum(self.freedoms, least)):
             if not np.isfinite(nu):
                 continue
-            n, d, free = (part[..., kind] for part in (number, distance, seen.freedom))
+            n, d, free = (part[..., kind] for part in (seen.number, distance, seen.freedom))
             squares, whole = np.where(n > 0, d / np.maximum(n, 1), 0.0) * free, free.sum(axis=1)
             scale = np.ones((len(n), 1))
             for _ in range(SETTINGS.rough_rounds):

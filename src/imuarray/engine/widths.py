@@ -55,19 +55,21 @@ def settled(found: Estimate) -> Estimate:
     mean = means(found.recorded, found.columns, found.active, found.places)
     slope[:count] -= found.precision @ (found.values - mean)
     whole = scaled_solve(information + precision, slope)[0]
-    step, off, holds = whole[:count], whole[count:], {}
+    step, holds = whole[:count], {}
+    left = scaled_inverse(information / lost(found.freedoms) + precision)[count:, count:]
     for kind in KINDS:
-        mine = np.char.startswith(names, kind) & np.isin(names, MAPS)
-        own = np.unique([place[mine] - count for place in places])
-        if own.size:
-            imus, far = np.nonzero(maps)[0], {}
-            for imu in np.unique(imus[mine]):
-                its = [place[mine & (imus == imu)] - count for place in places]
-                far[int(imu)] = _distance(off, spread, np.unique(its))
-            farthest = [
-                k for k, each in far.items() if each > SETTINGS.map_nearly * max(far.values())
-            ]
-            holds[kind] = float(chdtrc(own.size, _distance(off, spread, own))), farthest
+        mine, far = np.char.startswith(names, kind) & np.isin(names, MAPS), {}
+        imus = np.nonzero(maps)[0]
+        for imu in (None, *np.unique(imus[mine])):  # all, and each
+            chosen = mine if imu is None else mine & (imus == imu)
+            own = np.unique([place[chosen] - count for place in places]).astype(int)
+            square = np.ix_(own, own)
+            far[imu] = hausman(whole[count:][own], spread[square], left[square])
+        every = far.pop(None)
+        if far:
+            most = SETTINGS.map_nearly * max(statistic for statistic, _ in far.values())
+            farthest = [int(imu) for imu, (statistic, _) in far.items() if statistic > most]
+            holds[kind] = float(chdtrc(max(every[1], 1), every[0])), farthest
     recorded = tuple(
         replace(one, state=stepped(one.state, found.columns, found.active, step[place]))
         for one, place in zip(found.recorded, found.places, strict=True)
@@ -80,9 +82,19 @@ def settled(found: Estimate) -> Estimate:
     )  # fmt: skip
 
 
-def _distance(off, spread, own) -> float:
-    """Chi-square of the deviations ``own`` of all ``off`` (k,) with covariance (k, k)."""
-    return float(off[own] @ np.linalg.solve(spread[np.ix_(own, own)], off[own]))
+def hausman(apart, wide, narrow) -> tuple[float, int]:
+    """(chi-square, degrees of freedom) of how far apart (k,) two estimates of one truth are.
+
+    Covariances ``wide`` and, of the one that knows all that the other does and more, ``narrow``:
+    what differs has their difference (Hausman, Econometrica 46, 1978). Directions of which more
+    tells hardly anything are left out.
+    """
+    root = np.linalg.cholesky(wide)
+    share = np.linalg.solve(root, np.linalg.solve(root, narrow).T)
+    told, axes = np.linalg.eigh(np.eye(len(wide)) - (share + share.T) / 2)
+    seen = told > SETTINGS.least_difference
+    along = (axes.T @ np.linalg.solve(root, apart))[seen]
+    return float(np.sum(along**2 / told[seen])), int(seen.sum())
 
 
 def _places_left(lefts, spreads, of_maps, begin):
@@ -110,7 +122,7 @@ def widths(found: Estimate) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Covariance (n, n); formal sds (n,), and a jackknife's: the covariance has the larger."""
     formal, count = _formal(found), len(found.values)
     sds = np.sqrt(np.diag(formal))
-    resampled = jackknifed(found.information + found.precision, found.blocks)[:count]
+    resampled = jackknifed(found.information, found.precision, found.blocks)[:count]
     wider = np.maximum(resampled / sds, 1.0)
     return formal * np.outer(wider, wider), sds, resampled
 
@@ -137,7 +149,7 @@ def _formal(found: Estimate) -> np.ndarray:
             mean[chosen] = mine[mine != 0] / np.abs(mine).sum()
             # the mean of so many that differ by so much
             prior += np.outer(mean, mean) * len(chosen) / np.var(found.values[chosen], ddof=1)
-    out = _lost(found.freedoms) * scaled_inverse(found.information + prior)[:count, :count]
+    out = lost(found.freedoms) * scaled_inverse(found.information + prior)[:count, :count]
     # r goes with the rate's scale to the power of -2, and a clock's is in all rates
     size, pairs = np.zeros(count), np.argwhere(found.active)
     mine = pairs[:, 1] < 3
@@ -148,7 +160,7 @@ def _formal(found: Estimate) -> np.ndarray:
     return out + variance * np.outer(size, size)
 
 
-def _lost(freedoms) -> float:
+def lost(freedoms) -> float:
     """Normal noise's information over Student's t's: weights fall as readings move away."""
     return max((nu + 5) / (nu + 3) if np.isfinite(nu) else 1.0 for nu in freedoms)
 
