@@ -10,7 +10,7 @@ from imuarray.diagnosis import noise_effects
 from imuarray.diagnosis.reading_effects import find_rails, find_repeats
 from imuarray.diagnosis.scans import maybe_warming, scan_shifts, scan_warming
 from imuarray.diagnosis.settings import SETTINGS
-from imuarray.diagnosis.state import Cause, Search
+from imuarray.diagnosis.state import Cause, Search, prune
 from imuarray.engine.heldout import gain_of
 from imuarray.engine.parameters import catalogue_effects, columns_of
 from imuarray.engine.readings import arrange
@@ -115,6 +115,15 @@ def test_small_biases_of_all_may_be_a_warm_up():
         assert maybe_warming(replace(search, causes=(cause,)).refit(), cause, 0.0) is may
 
 
+@pytest.mark.parametrize("effect", ["sensor_delay", "gyroscope_scale", "accelerometer_scale"])
+def test_all_are_not_named_for_two_of_eight(effect):
+    """As the delays' mean is nobody's, every delay is far from zero while it is pinned there."""
+    search, _ = searched(effect, (2, 5), 60.0)
+    cause = Cause(effect, EVERY, frozenset({""}), -20.0)
+    (found,) = prune(replace(search, causes=(cause,)).refit(), effect).causes
+    assert found.imus == (2, 5)
+
+
 def test_parameters_of_which_nothing_is_known_cost_no_gain():
     rng = np.random.default_rng(1)
     parts = []
@@ -124,11 +133,10 @@ def test_parameters_of_which_nothing_is_known_cost_no_gain():
     inner, score = (sum(part) for part in zip(*parts, strict=True))
     values = np.linalg.solve(inner + np.eye(3), score)
     left = [(block, slope - block @ values) for block, slope in parts]
-    wanted = gain_of(left, np.eye(3), values, np.array([True, True, False]))
+    wanted = gain_of(left, (np.eye(3), values), values, np.array([True, True, False]))
     more = [(np.pad(block, (0, 2)), np.pad(slope, (0, 2))) for block, slope in left]
-    found = gain_of(
-        more, np.eye(5), np.pad(values, (0, 2)), np.array([True, True, False, True, True])
-    )
+    values = np.pad(values, (0, 2))
+    found = gain_of(more, (np.eye(5), values), values, np.array([True, True, False, True, True]))
     assert found == pytest.approx(wanted, rel=1e-9)
 
 
@@ -161,7 +169,7 @@ def test_the_rival_of_some_imus_keeps_no_pinned_mean(has, freed):
     parts = [(data, score - data @ values) for score in scores]
     mine = np.isin(range(count), freed)
     alone = own * ~mine * ~mine[:, None]
-    found = gain_of(parts, own + pin, values, mine, prior=(alone, np.zeros(count)))
+    found = gain_of(parts, (own + pin, np.zeros(count)), values, mine, rival=alone)
     wanted = []
     for held in scores:
         trained, more = sum(scores) - held, (blocks - 1) * data

@@ -21,7 +21,7 @@ from imuarray.diagnosis.scores import (
 )
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL, scans
-from imuarray.diagnosis.state import Cause, Search, freed_places, heldout_gain, need, prune
+from imuarray.diagnosis.state import Cause, Search, freed_mask, heldout_gain, need, prune
 from imuarray.engine.parameters import POSITION
 from imuarray.linear import scaled_eigh, scaled_inverse, scaled_square
 from imuarray.model.effects import EFFECTS
@@ -277,15 +277,15 @@ def rivals(search: Search, cause: Cause) -> list[str]:
     of it.
     """
     effect, given, fit_ = cause.effect, search.given, search.fit
-    freed = freed_places(search, effect)
+    freed = given.places(freed_mask(search, effect))
     whole = len(cause.imus) > len(fit_.readings.exists) / 2
     tried = [
         c for c in candidates(fit_.columns, fit_.readings.exists, search.effects)
         if c.effect != effect and (c.whole if whole else c.imus == cause.imus)
     ]  # fmt: skip
     present = {c.effect for c in search.causes}
-    own, _ = need(search, effect)
-    own_log = log_chi_square(own, len(freed))
+    own, freedom = need(search, effect)
+    own_log = log_chi_square(own, freedom) if freedom else 0.0
     scores = {s.candidate.effect: s for s in reversed(score_all(given, fit_, tried, freed))}
     active = np.setdiff1d(given.places(search.active), freed)
     left = given.conditional(active, freed).information

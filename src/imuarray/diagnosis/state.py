@@ -224,21 +224,26 @@ class Search:
         return columns.unflat(state, whole)
 
 
-def freed_places(search: Search, effect: str, imus=None, among=None) -> np.ndarray:
-    """Places of an adopted effect's free parameters, of some of its IMUs or ``among`` columns."""
+def freed_mask(search: Search, effect: str, imus=None, among=None) -> np.ndarray:
+    """An adopted effect's free parameters (N, m) bool, of some IMUs or ``among`` columns."""
     chosen = search.columns.of(effect) if among is None else among
     mask = search.active & np.isin(np.arange(search.columns.size), chosen)
     if imus is not None:
         mask[np.setdiff1d(np.arange(len(mask)), imus)] = False
-    return search.given.places(mask)
+    return mask
 
 
 def need(search: Search, effect: str, imus=None, among=None) -> tuple[float, int]:
-    """(chi-square, degrees of freedom) of an adopted effect against zero, all else refitted."""
-    freed = freed_places(search, effect, imus, among)
-    active = np.setdiff1d(search.given.places(search.active), freed)
-    conditional = search.given.conditional(active, freed, freed)
-    return search.given.test(conditional, freed)
+    """(chi-square, degrees of freedom) of an adopted effect against zero, all else refitted.
+
+    Where that is not all that a mean was pinned of, none is.
+    """
+    mask, given = freed_mask(search, effect, imus, among), search.given
+    freed, active = given.places(mask), given.places(search.active & ~mask)
+    precision = given.precision.copy()
+    precision[np.ix_(active, active)] = search.columns.prior_precision(search.active & ~mask)
+    given = replace(given, precision=precision)
+    return given.test(given.conditional(active, freed, freed), freed)
 
 
 def heldout_gain(
@@ -255,8 +260,8 @@ def heldout_gain(
     parts = normal_blocks(search.fit, mask) if parts is None else parts
     rest, alone = ~freed[mask], np.zeros((len(values), len(values)))
     alone[np.ix_(rest, rest)] = columns.prior_precision(mask & ~freed)
-    prior = alone, columns.prior_means()[mask]
-    return gain_of(parts, columns.prior_precision(mask), values, ~rest, prior=prior)
+    prior = columns.prior_precision(mask), columns.prior_means()[mask]
+    return gain_of(parts, prior, values, ~rest, rival=alone)
 
 
 def prune(search: Search, effect: str) -> Search:
@@ -264,7 +269,7 @@ def prune(search: Search, effect: str) -> Search:
     imus = search.imus_with(effect)
     if len(imus) < 3:
         return search
-    keep = _needing(search, effect, imus) if search.smooth else _gaining(search, effect, imus)
+    keep = _fewest(search, effect, imus)
     rest = [imu for imu in imus if imu not in keep]
     if not keep:
         return search
@@ -282,32 +287,33 @@ def prune(search: Search, effect: str) -> Search:
     return pruned if gains[0] > SETTINGS.pruned * gains[1] else search
 
 
-def _needing(search: Search, effect: str, imus) -> tuple[int, ...]:
-    """The IMUs that need an effect; none if they are the more, or the rest need it, too."""
-    limit = SETTINGS.limit(effect) - np.log(len(imus))
-    keep = tuple(k for k in imus if needed(search, effect, limit, [k]))
-    rest = [imu for imu in imus if imu not in keep]
-    few = len(keep) <= len(imus) / 2
-    return keep if few and not needed(search, effect, SETTINGS.others, rest) else ()
+def _fewest(search: Search, effect: str, imus) -> tuple[int, ...]:
+    """The fewest IMUs beside which the rest do not need an effect; none if they are the more.
 
-
-def _gaining(search: Search, effect: str, imus) -> tuple[int, ...]:
-    """The fewest IMUs beside which the rest do not gain clearly on held-out time.
-
-    None if they are half of them. Rough motion leaves what is significant in all, and predicts
-    nothing.
+    Rough motion leaves what is significant in all, and predicts nothing: the rest must not gain
+    clearly on held-out time.
     """
-    parts = normal_blocks(search.fit, search.active)
     columns, mine = search.columns, search.columns.of(effect)
-    own = [heldout_gain(search, effect, parts, [k])[0] for k in imus]
-    if any(item.id == effect for item, _ in columns.gauges(search.active)):
-        # a common part is nobody's, so none gains by itself: those far from most go first
+    parts = None if search.smooth else normal_blocks(search.fit, search.active)
+
+    def gains(whose) -> tuple[float, float]:
+        return heldout_gain(search, effect, parts, whose)
+
+    common = any(item.id == effect for item, _ in columns.gauges(search.active))
+    if common:  # a common part is nobody's, so none has it by itself: those far from most go first
         size = (columns.flat(search.fit.state) / columns.prior_sd)[list(imus)][:, mine]
         own = np.sum((size - np.median(size, axis=0)) ** 2, axis=1)
+    else:
+        own = [(need(search, effect, [k]) if search.smooth else gains([k]))[0] for k in imus]
     order = [imus[place] for place in np.argsort(own)[::-1]]
-    for number in range(1, (len(imus) + 1) // 2):
-        gain, error = heldout_gain(search, effect, parts, order[number:])
-        if gain < search.least_z * error:
+    for number in range(1, (len(imus) - common) // 2 + 1):
+        rest = order[number:]
+        if search.smooth:
+            needs = needed(search, effect, SETTINGS.others, rest)
+        else:
+            gain, error = gains(rest)
+            needs = gain >= search.least_z * error
+        if not needs:
             return tuple(sorted(order[:number]))
     return ()
 

@@ -323,10 +323,11 @@ def _noise_change(before, after) -> float:
 
 
 class Tested(NamedTuple):
-    """[(information, score)] of blocks, prior precision (n, n) and values (n,) of ``active``."""
+    """[(information, score)] of blocks, prior precision, means (n,) and values of ``active``."""
 
     blocks: list
     precision: np.ndarray
+    means: np.ndarray
     values: np.ndarray
     active: np.ndarray
     places: tuple[np.ndarray, ...]
@@ -348,4 +349,5 @@ def tested(found: Estimate, active, places=None) -> Tested:
     recorded, passes = _passed(found.recorded, found.columns, active)
     values = _values(recorded, found.columns, active, places)
     precision = pinned(found.columns, active, places)
-    return Tested(_summed(passes, places)[2], precision, values, active, places)
+    mean = means(recorded, found.columns, active, places)
+    return Tested(_summed(passes, places)[2], precision, mean, values, active, places)

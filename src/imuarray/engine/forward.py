@@ -285,12 +285,13 @@ def _of_one_truth(found: Estimate, more: Estimate) -> bool:
     return bool(chdtrc(max(freedom, 1), statistic) > SETTINGS.chance)
 
 
-def _contradicted(parts, ridge, values, freed, spread) -> bool:
+def _contradicted(parts, prior, values, freed, spread) -> bool:
     """True where parameters known to be zero within ``spread`` (f, f) come out as others."""
+    ridge, mean = prior
     information = sum(part[0] for part in parts) + ridge
     spread = spread + scaled_inverse(information)[np.ix_(freed, freed)]
-    step = np.linalg.solve(information, sum(part[1] for part in parts))
-    off = (step + values)[freed]
+    slope = sum(part[1] for part in parts) - ridge @ (values - mean)
+    off = (np.linalg.solve(information, slope) + values)[freed]
     return bool(chdtrc(len(off), off @ np.linalg.solve(spread, off)) < SETTINGS.chance)
 
 

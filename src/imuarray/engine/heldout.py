@@ -101,20 +101,20 @@ def gain(one: Scores, other: Scores) -> tuple[float, float]:
     return float(difference.sum() / samples), float(error / samples)
 
 
-def gain_of(parts, ridge, values, freed, spare=None, prior=None) -> tuple[float, float]:
+def gain_of(parts, prior, values, freed, spare=None, rival=None) -> tuple[float, float]:
     """Nats that ``freed`` (n,) bool parameters gain on held-out blocks over zero, and their error.
 
-    ``parts`` [(information (n, n), score (n,))] of the blocks at ``values`` (n,), ``ridge`` (n, n)
-    the prior's precision. Both rivals are trained without the block, the freed parameters shrunk
-    as their score in the training blocks deserves (positive-part James-Stein, of as many as data
-    and not the prior determine). ``spare`` (n,) bool: parameters that both rivals have beside.
-    ``prior``, without spare ones: the precision (n, n) where the freed are zero, which pins no mean
-    that only all have, and the means (n,); else ``ridge``, about the values.
+    ``parts`` [(information (n, n), score (n,))] of the blocks at ``values`` (n,), ``prior`` its
+    precision (n, n) and means (n,). Both rivals are trained without the block, the freed parameters
+    shrunk as their score in the training blocks deserves (positive-part James-Stein, of as many as
+    data and not the prior determine). ``spare`` (n,) bool: parameters that both rivals have beside.
+    ``rival``, without spare ones: the precision (n, n) where the freed are zero, which pins no mean
+    that only all have, if not the same.
     """
     information, score = sum(p[0] for p in parts), sum(p[1] for p in parts)
     spare = np.zeros(len(freed), bool) if spare is None else spare
-    rival, means = (ridge, values) if prior is None else prior
-    off, freed, values, gains = values - means, freed[~spare], values[~spare], []
+    ridge, off = prior[0], values - prior[1]
+    rival, freed, values, gains = ridge if rival is None else rival, freed[~spare], values[~spare], []
     # a pinned mean holds those of some IMUs no more than the other IMUs let it
     own = _schur(ridge[np.ix_(~spare, ~spare)], freed)
     for part in parts:
