@@ -327,7 +327,7 @@ def _tried(name: str, given: Tested, own, beside, left) -> EffectGroup:
     used |= spare
     square = np.ix_(used, used)
     parts = [(inner[square], slope[used]) for inner, slope in given.blocks]
-    system = parts, ridge[square], given.values[used], freed[used]
+    system = parts, (ridge[square], given.means[used]), given.values[used], freed[used]
     nats, error = gain_of(*system, spare[used])
     good = nats > max(SETTINGS.group_z * error, SETTINGS.group_nats)
     return EffectGroup(
