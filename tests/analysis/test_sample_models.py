@@ -1,5 +1,7 @@
 """`imuarray.sample` under the models that `imuarray.calibrate` has."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -27,6 +29,19 @@ def test_too_few_samples_for_any_part_are_the_papers_model():
     one, other = (tree["posterior"]["position"].to_numpy() for tree in chains)
     np.testing.assert_array_equal(one, other)
     assert "effect_parameter" not in chains[0]["posterior"]
+
+
+def test_a_clock_of_which_little_is_known_leaves_the_arrays_size_unknown():
+    """Every coordinate of a draw larger by one factor, of twice the clock's relative sd."""
+    recording, _ = simulated(5)
+    sure, unsure = (
+        imuarray.sample(replace(recording, clock_sd=sd), method="nuts", steps=60)
+        for sd in (0.0, 0.02)
+    )
+    one, other = (tree["posterior"]["position"].to_numpy() for tree in (sure, unsure))
+    factor = other / one
+    np.testing.assert_allclose(factor, np.broadcast_to(factor[..., :1, :1], one.shape))
+    assert np.log(factor[..., 0, 0]).std() == pytest.approx(0.04, rel=0.3)
 
 
 def test_skewed_gyroscopes_are_found_and_sampled():

@@ -52,6 +52,7 @@ class Posterior(NamedTuple):
     motion: np.ndarray | None = None  # (T, 9 or 15) at the mode; with effects
     readings: Readings | None = None  # with effects: what is sampled from, with its noise
     converged: bool = True  # with effects: whether the search for the mode did
+    size_sd: float = 0.0  # of the logarithm of a factor that the density leaves out
 
     @property
     def spread(self) -> np.ndarray:
@@ -122,6 +123,12 @@ def posterior_beyond(recording: Recording, found: Estimate) -> Posterior:
         block_diag(spread, np.diag(0.5 / np.maximum(freedom, 1.0))), SCALES, motion, readings,
         found.converged,
     )  # fmt: skip
+
+
+def common_sd(recording: Recording, model: ArrayModel) -> float:
+    """Relative sd of a scale common to all rates and to time that a model has no parameter for."""
+    own = 0.0 if "gyroscope_scale" in model.effects else recording.gyroscope_common_scale_sd
+    return float(np.hypot(*np.nan_to_num([own, recording.clock_sd])))
 
 
 def _model(recording: Recording, found: Estimate, readings: Readings, sizes) -> ArrayModel:

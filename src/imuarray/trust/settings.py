@@ -34,7 +34,7 @@ class Settings:
     # centrifugal forces those of no rate: 3e-5 (20 Hz) is 3 sds of error; a gyroscope's is 1
     droops: tuple[float, ...] = (2e-5, 6e-5)
     package: float = 2.5e-3  # m, from an accelerometer's middle; packages are 3 to 5 mm wide
-    maps_chance: float = 1e-6  # chance of maps that poses gave; 0.97 and more of clean boards
+    maps_chance: float = 1e-5  # chance of maps so far from those that poses gave
     triad_residual: float = 10.0  # the same of one triad where the noise of each is estimated
     drift: float = 3.0  # sds of the mean of all samples; offsets that differ by more bias positions
     learnt: float = 0.5  # of the drawing's sd: positions known worse are hardly learnt
