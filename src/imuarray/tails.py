@@ -4,6 +4,7 @@ import numpy as np
 from scipy import special
 
 QUARTILE = special.ndtri(0.75)  # of a standard normal: the median of |z|
+MEDIAN = 2.37  # of chi-square of three readings
 
 
 def log_normal(z):
@@ -18,6 +19,16 @@ def log_chi_square(statistic, freedom) -> float:
         return float(np.log(tail))
     a, x = freedom / 2, statistic / 2
     return float((a - 1) * np.log(x) - x - special.gammaln(a) - np.log1p(-(a - 1) / x))
+
+
+def t4(squares, size) -> tuple[np.ndarray, np.ndarray]:
+    """(weights, slopes) of three readings' scores by their sums of ``squares`` (n,).
+
+    Student's t with 4 degrees of freedom, ``size`` its variance; slopes fall more than weights, as
+    these change with the residuals, too.
+    """
+    weight = 7.0 / (4.0 + squares / size)
+    return weight, weight * (1 - 2 / 3 * squares / (4 * size + squares))
 
 
 def log_poisson(count, expected):

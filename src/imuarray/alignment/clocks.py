@@ -12,6 +12,7 @@ from imuarray.firstorder.gyroscopes import SLOWEST
 from imuarray.firstorder.settings import SETTINGS as FIRSTORDER
 from imuarray.firstorder.turns import nearest_orthogonal, procrustes
 from imuarray.linear import scaled_inverse
+from imuarray.tails import MEDIAN, t4
 
 
 class Clock(NamedTuple):
@@ -103,9 +104,8 @@ def _fit(splines: Splines, other: Sensor, clock: Clock, used) -> Clock:
         found, map_ = np.nan_to_num(rate), values[2:11].reshape(3, 3)
         left = wanted - found @ map_.T - values[11:]
         squares = np.sum(left**2, axis=1)
-        # 2.37 is the median of a chi-squared variable with three degrees of freedom
-        size = max(np.median(squares[here]) / 2.37, 1e-30)
-        weight = here * 7.0 / (4.0 + squares / size)
+        size = max(np.median(squares[here]) / MEDIAN, 1e-30)
+        weight, bend = (here * part for part in t4(squares, size))
         columns = np.zeros((len(time), 3, 14))
         columns[..., 0] = -np.nan_to_num(slope) @ map_.T
         columns[..., 1] = columns[..., 0] * far[:, None]
@@ -119,8 +119,6 @@ def _fit(splines: Splines, other: Sensor, clock: Clock, used) -> Clock:
         values = values + change
         if step > 3 and abs(change[0]) + abs(change[1]) * np.ptp(far) < SETTINGS.close:
             break
-    # what the scores change by, as weights change with the residuals, too
-    bend = weight * (1 - 2 / 3 * squares / (4 * size + squares))
     flat = (columns * bend[:, None, None]).reshape(-1, 14)
     inverse = scaled_inverse(flat.T @ columns.reshape(-1, 14) + np.diag(ridge))
     covariance = _sandwich(columns, weight, left, time, inverse)

@@ -19,7 +19,6 @@ from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.special import SPECIAL
 from imuarray.diagnosis.state import Search, need
 from imuarray.engine.linearise import linearise
-from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.engine.widths import mask_of_left, spread_of
 from imuarray.linear import scaled_solve
 from imuarray.model.effects import KINDS
@@ -125,12 +124,9 @@ def beside_left(search: Search) -> tuple[Fit, Information]:
     maps = mask_of_left([left], columns, made.active)
     if not maps.any():
         return made, given
-    spread = spread_of(left, columns, maps)
     place, every = given.places(maps), made.active | maps
     precision = given.precision.copy()
-    precision[np.ix_(place, place)] = np.linalg.inv(
-        spread + ENGINE.fixed_map**2 * np.eye(len(spread))
-    )
+    precision[np.ix_(place, place)] = np.linalg.inv(spread_of(left, columns, maps))
     offset = columns.flat(made.state) - columns.prior_means()
     both = given.places(every)
     precise = precision[np.ix_(both, both)]

@@ -7,7 +7,6 @@ from imuarray.engine.estimate import Estimate
 from imuarray.engine.heldout import Scores, blocks_of, log_densities, scores_of
 from imuarray.engine.linearise import linearise
 from imuarray.engine.parameters import POSITION
-from imuarray.engine.readings import by_triad
 from imuarray.engine.robust import distances
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.widths import growing

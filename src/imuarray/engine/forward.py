@@ -269,8 +269,8 @@ def _left(found: Estimate) -> list[tuple[np.ndarray, np.ndarray]]:
         mask = known & found.columns.mask(names)
         if mask.any():
             own = every if EFFECTS[names[0]].own else every[:1]
-            spread = block_diag(*(widths.spread_of(left, found.columns, mask) for left in own))
-            out.append((mask, spread + SETTINGS.fixed_map**2 * np.eye(len(spread))))
+            spreads = (widths.spread_of(left, found.columns, mask) for left in own)
+            out.append((mask, block_diag(*spreads)))
     return out
 
 

@@ -114,7 +114,8 @@ def gain_of(parts, prior, values, freed, spare=None, rival=None) -> tuple[float,
     information, score = sum(p[0] for p in parts), sum(p[1] for p in parts)
     spare = np.zeros(len(freed), bool) if spare is None else spare
     ridge, off = prior[0], values - prior[1]
-    rival, freed, values, gains = ridge if rival is None else rival, freed[~spare], values[~spare], []
+    rival = ridge if rival is None else rival
+    freed, values, gains = freed[~spare], values[~spare], []
     # a pinned mean holds those of some IMUs no more than the other IMUs let it
     own = _schur(ridge[np.ix_(~spare, ~spare)], freed)
     for part in parts:

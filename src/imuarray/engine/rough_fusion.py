@@ -17,7 +17,7 @@ from imuarray.engine.fusion import covariances, descend, fuse, one_sided
 from imuarray.engine.gyroscope_clocks import with_phases
 from imuarray.engine.linearise import CHUNK, State, chunk_at, predicted
 from imuarray.engine.parameters import Columns
-from imuarray.engine.readings import Readings, by_triad
+from imuarray.engine.readings import Readings
 from imuarray.engine.robust import distances, normal_pass
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import with_derivatives, with_free_gyroscopes, with_rough_prior

@@ -112,7 +112,7 @@ def _places_left(lefts, spreads, of_maps, begin):
                 place[mine] = places[same][mine]
                 continue
             place[mine] = end + np.arange(mine.sum())
-            parts.append(spread[np.ix_(mine, mine)] + SETTINGS.fixed_map**2 * np.eye(mine.sum()))
+            parts.append(spread[np.ix_(mine, mine)])
             end += mine.sum()
         places.append(place)
     return places, block_diag(*parts)
@@ -186,10 +186,14 @@ def _accelerometers(columns: Columns) -> int:
 
 
 def spread_of(left: Left, columns: Columns, chosen) -> np.ndarray:
-    """Covariance of the parameters ``chosen`` (N, m) bool, in their order, of those left."""
+    """Covariance of the parameters ``chosen`` (N, m) bool, in their order, of those left.
+
+    Entries that are known are not singular, but tight.
+    """
     entry = [_entry(left, columns, *pair) for pair in np.argwhere(chosen)]
     offsets = left.offsets.reshape(-1, *left.offsets.shape[2:])
-    return block_diag(left.maps, *offsets)[np.ix_(entry, entry)]
+    own = block_diag(left.maps, *offsets)[np.ix_(entry, entry)]
+    return own + SETTINGS.fixed_map**2 * np.eye(len(own))
 
 
 def _entry(left: Left, columns: Columns, imu: int, column: int) -> int:

@@ -14,6 +14,7 @@ from imuarray.firstorder.settings import SETTINGS
 from imuarray.firstorder.triads import TriadFit
 from imuarray.firstorder.turns import nearest_orthogonal, require_rotations
 from imuarray.recording import Recording
+from imuarray.tails import MEDIAN, t4
 
 SLOWEST = np.radians(20.0)  # rad/s; slower samples say little of scales
 
@@ -113,11 +114,7 @@ def _regress(columns, wanted, block) -> tuple[np.ndarray, np.ndarray]:
         rows = (inverse @ (columns * weight[:, None]).T @ wanted).T
         left = wanted - columns @ rows.T
         squares = np.sum(left**2, axis=1)
-        # 2.37 is the median of a chi-squared variable with three degrees of freedom
-        size = np.median(squares) / 2.37
-        weight = 7.0 / (4.0 + squares / size)
-    # the scores' slope: weights fall as residuals grow
-    bend = weight * (1 - 2 / 3 * squares / (4 * size + squares))
+        weight, bend = t4(squares, np.median(squares) / MEDIAN)
     inverse = np.linalg.pinv((columns * bend[:, None]).T @ columns, hermitian=True)
     _, block = np.unique(block, return_inverse=True)
     scores = np.zeros((block.max() + 1, 3, columns.shape[1]))
