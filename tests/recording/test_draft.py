@@ -113,6 +113,23 @@ def test_a_row_of_units_and_counts(tmp_path):
     assert 'scale: "?"' in said and any("a count in deg/s" in line for line in asked)
 
 
+@pytest.mark.parametrize("head", ["", "logger v2, of today\n"])
+def test_columns_without_a_header_go_by_their_place(tmp_path, head):
+    """The same readings as with names; which are accelerometers', gravity tells."""
+    text = table(PLAIN, 1.0, DEGREE, range(0, 4000, 10))
+    (tmp_path / "log.csv").write_text(head + text.split("\n", 1)[1])
+    said, asked = draft([tmp_path / "log.csv"])
+    assert 'time: {column: "1", unit: ms}' in said and any("no header" in line for line in asked)
+    for label, columns in (("1", '"2", "3", "4"'), ("2", '"8", "9", "10"')):
+        assert f'"{label}": {{columns: [{columns}]}}  # ' in said
+    (tmp_path / "columns.yaml").write_text(said)
+    bare, lines = load(tmp_path / "log.csv", read_layout(tmp_path / "columns.yaml"), "")
+    assert "no header: columns by their place" in lines[0] and len(bare) == 400
+    (tmp_path / "named.csv").write_text(text)
+    named, _ = load(tmp_path / "named.csv", {"columns": PLAIN}, "")
+    np.testing.assert_array_equal(bare.to_numpy(), named.to_numpy())
+
+
 def test_tenths_of_milliseconds_by_the_name_of_who_counts_them(tmp_path):
     text = table(PLAIN, 1.0, 1.0, range(0, 40000, 100)).replace("t,", "SampleTimeFine,", 1)
     (tmp_path / "log.csv").write_text(text)

@@ -85,6 +85,9 @@ def draft(paths: Sequence[Path]) -> tuple[str, list[str]]:
         if sensor:
             parts.insert(2, f"sensor: {_quoted(sensor)}  # the column that numbers the IMUs")
         parts += ["imus:"] + [f'  "{label}": {{}}  # position: [?, ?, ?]' for label in labels]
+    asked += ["columns: no header; whose they are is guessed by gravity at rest"] * (
+        first.columns[0] == "1"
+    )
     asked.append("positions: from the drawing, else they begin from the motion")
     return "\n".join(parts) + "\n", asked + ["axes: where a chip is turned on the board"] * (
         len(paths) == 1
@@ -100,7 +103,9 @@ def _labels_of(paths) -> list[str]:
 
 def _triads(table: pd.DataFrame, units: dict[str, str], path: Path) -> list[Triad]:
     """Accelerometers first; InputError for a table without one."""
-    triads = sorted(triads_of(list(table.columns), units), key=lambda triad: triad.kind)
+    names = list(table.columns)
+    found = by_place(table) if names[0] == "1" else triads_of(names, units)
+    triads = sorted(found, key=lambda triad: triad.kind)
     expected = "columns of accelerometers that differ by x, y, z (ax1, ay1, az1)"
     found = ", ".join(map(str, table.columns[:12]))
     require(triads and triads[0].kind == "accelerometers", path, expected, found)
@@ -110,13 +115,19 @@ def _triads(table: pd.DataFrame, units: dict[str, str], path: Path) -> list[Tria
 def _read(path: Path) -> tuple[pd.DataFrame, dict[str, str]]:
     """The table, and units that a row of them gives to its columns.
 
-    Its header is the first line of words that is as wide as those below it.
+    Its header is the first line of words that is as wide as those below it; without one, columns
+    go by their place from 1.
     """
     with expecting(path, "a CSV file with a header", (OSError, ValueError)):
         with open(path, encoding=written.encoding_of(path), errors="replace") as file:
             lines = [line.rstrip("\n") for line in islice(file, SETTINGS.head)]
     width, number, sep = max(_header(lines, sep) for sep in written.DELIMITERS)
-    require(width >= 0, path, "a header with names that differ by x, y, z or [0], [1]", "none")
+    if width < 0:
+        number, sep = written.begin_of(lines)
+        count = len(written.cells_of("".join(lines[number : number + 1]), sep))
+        expected = "a header with names that differ by x, y, z or [0], [1], or numbers alone"
+        require(count > 6, path, expected, "neither")
+        return load(path, {"columns": [str(k + 1) for k in range(count)]}, path)[0], {}
     names = written.cells_of(lines[number], sep)
     below = written.cells_of("".join(lines[number + 1 : number + 2]), sep)
     units = dict(zip(names, below, strict=False)) if written.are_words(below) else {}
@@ -130,6 +141,28 @@ def _header(lines: list[str], sep: str) -> tuple[int, int, str]:
     marks = "|".join(mark for mark, _ in AXES)
     words = [n for n, line in enumerate(lines) if widths[n] == most and re.search(marks, line)]
     return (most, words[0], sep) if words else (-1, 0, sep)
+
+
+def by_place(table: pd.DataFrame) -> list[Triad]:
+    """Columns without names, three by three: those that show gravity at rest are accelerometers.
+
+    A column whose values rise steadily, as stamps and counts do, is none of a sensor's.
+    """
+    values = {name: pd.to_numeric(table[name], errors="coerce") for name in table.columns}
+    own = [
+        name for name, x in values.items() if x.notna().any() and not (x.diff() > 0).mean() > 0.9
+    ]
+    require(len(own) % 3 == 0, "columns", "three of each sensor beside the stamps", len(own))
+    found: dict[str, list] = {kind: [] for kind in KINDS}
+    for place in range(0, len(own), 3):
+        three = tuple(own[place : place + 3])
+        readings = np.stack([values[name].to_numpy(float) for name in three], axis=1)[:, None]
+        still = readings[_quietest(readings, SETTINGS.draft_rows)]
+        found[[*KINDS][_force(still)[0] == UNKNOWN]].append(three)
+    return [
+        Triad(kind, str(number + 1), three)
+        for kind, own in found.items() for number, three in enumerate(own)
+    ]  # fmt: skip
 
 
 def triads_of(names: list[str], units: dict[str, str] | None = None) -> list[Triad]:

@@ -21,6 +21,7 @@ class Settings:
     draft_gravity: float = 0.2  # of one unit of gravity, by which readings at rest may be off
     spinning: float = 40.0  # rad/s, faster than a hand turns a board
     noisiest: float = 0.025  # rad/s, sd of a gyroscope's readings
+    draft_rises: float = 0.9  # of a column's steps, upwards: no sensor's
     draft_rows: int = 3  # rows
     draft_even: float = 0.2  # of a step between stamps, by which half of them may differ
     # `layout`

@@ -61,9 +61,11 @@ def load(path, layout, columns) -> tuple[pd.DataFrame, list[str]]:
         options, lines = written.form_of(Path(path), _named(layout), options)
         # Two rows: a first data row longer than the header is an error here, while with a header
         # pandas would take its first cell for an index and move every name by one column.
+        header = options.pop("header")
         head = pd.read_csv(path, skipinitialspace=True, header=None, nrows=2, dtype=str, **options)
-        table = pd.read_csv(path, skipinitialspace=True, **options)
-        table.columns = head.iloc[0].fillna("").str.strip()
+        table = pd.read_csv(path, skipinitialspace=True, header=header, **options)
+        names = head.iloc[0].fillna("").str.strip()
+        table.columns = names if header == 0 else [str(k + 1) for k in range(table.shape[1])]
     return table, lines
 
 

@@ -22,6 +22,8 @@ def form_of(path: Path, named: set[str], given: dict) -> tuple[dict, list[str]]:
     ``named``: columns that it must have, ``given``: the YAML's own options.
 
     The header is the first line that has the most of the columns, as its delimiter parts them.
+    Without one, where all columns go by their place from 1, the table begins with the first line
+    of numbers as wide as most.
     """
     encoding = encoding_of(path)
     with open(path, encoding=encoding, errors="replace", newline=None) as file:
@@ -33,20 +35,34 @@ def form_of(path: Path, named: set[str], given: dict) -> tuple[dict, list[str]]:
             found = len(named & set(cells_of(line, delimiter)))
             if found > best:
                 best, skip, sep = found, number, delimiter
+    bare = best < len(named) and all(name.isdigit() for name in named)
+    if bare:
+        skip, sep = begin_of(lines, asked)
+        skip -= 1
     comma = sep != "," and any(
         DECIMAL_COMMA.fullmatch(cell) for line in lines[skip + 1 :] for cell in cells_of(line, sep)
     )
     below = cells_of("".join(lines[skip + 1 : skip + 2]), sep)
-    units = best > 0 and are_words(below)
+    units = best > 0 and not bare and are_words(below)
     said = [f"encoding {encoding}"] * (encoding != "utf-8")
+    said += ["no header: columns by their place"] * bare
     said += [f"{skip} lines before the header left out"] * (skip > 0)
     said += [f"columns parted by {sep!r}"] * (sep != (asked or ","))
     said += ["decimal commas"] * comma + ["a line of units below the header left out"] * units
     options = given | {
-        "sep": sep, "skiprows": [*range(skip), *[skip + 1] * units], "encoding": encoding,
-        "decimal": "," if comma else ".",
+        "sep": sep, "skiprows": [*range(skip + bare), *[skip + 1] * units], "encoding": encoding,
+        "decimal": "," if comma else ".", "header": None if bare else 0,
     }  # fmt: skip
     return options, [f"{path.name}: {', '.join(said)}"] if said else []
+
+
+def begin_of(lines: list[str], asked: str | None = None) -> tuple[int, str]:
+    """(number of the first line that is as wide as most and has no words, its delimiter)."""
+    sep = asked or max(DELIMITERS, key=lambda sep: np.median([line.count(sep) for line in lines]))
+    widths = [len(cells_of(line, sep)) for line in lines]
+    usual = int(np.median(widths or [0]))
+    whole = (n for n, line in enumerate(lines) if widths[n] == usual)
+    return next((n for n in whole if re.match(r"[+-]?[.,]?\d", lines[n].strip(' "'))), 0), sep
 
 
 def cells_of(line: str, delimiter: str) -> list[str]:
