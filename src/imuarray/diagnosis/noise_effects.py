@@ -331,7 +331,9 @@ def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> NoiseCause |
         plain = log_normal(abs(rho) * np.sqrt(pairs)) + np.log(2 * number)
         log_p = min(sharp, plain if untied and alike(fit, noise, imu, kind) else 0.0)
         marked = noise.correlation[imu, kind] != 0
-        far[place] = (log_p <= limit or marked) and (sharp <= limit or abs(rho) >= passed)
+        implied = expected_ratio(rho, len(fit.residual))
+        agree = abs(slope - implied) < max(SETTINGS.agree, SETTINGS.agree_share * abs(implied))
+        far[place] = (log_p <= limit or marked) and (sharp <= limit or abs(rho) >= passed) and agree
         if far[place]:
             logs.append(float(log_p))
     together = pooled_autocorrelation(fit, noise, lagged)

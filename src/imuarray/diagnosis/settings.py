@@ -67,6 +67,7 @@ class Settings:
     leaks: float = 0.1  # of a triad's tails that the motion may pass on to others
     maybe: float = -3.0  # log p of one triad's tails, where another's are sure
     agree: float = 3.5  # sds within which two estimates are of one thing
+    agree_share: float = 0.5  # of a spectrum's slope, by which colour of another form may differ
     clear: float = 2.5  # sds of a triad's autocorrelation, where all together are beyond doubt
     tailed: float = 0.25  # log ratio by which a mixture's core may miss the noise
     pooled: float = 0.025  # sd of a triad's log noise about that of all, without maps of a few %
