@@ -288,6 +288,18 @@ def test_samples_too_far_apart_for_an_integral_give_none(sound):
     assert found.low > 1.01 and not found.off
 
 
+@pytest.mark.parametrize("share", [0.0, 0.005])
+def test_samples_dropped_before_they_were_stamped_are_seen_as_longer_steps(share):
+    """One in 200 is gone, the stamps are even again: its neighbours' rates differ twice as much."""
+    whole, _ = imuarray.simulate(mimu4444(), 20.0, 200.0, seed=4, angular_rate=10.0)
+    left = np.random.default_rng(1).random(len(whole.time)) >= share
+    fewer = replace(whole.select(left), time=whole.time[: left.sum()])
+    rate = np.median(fewer.angular_rate, axis=1)
+    motion = turning(fewer.specific_force, rate, fewer.relative_positions())
+    skipped = slope(fewer.time, motion).skipped
+    assert 0.2 * np.sum(~left) <= skipped <= np.sum(~left) if share else skipped == 0
+
+
 def posterior_of(found, scale=1.0):
     """A posterior as of `sample`, its draws from a calibration's normal approximation."""
     covariance = found["position_covariance"].to_numpy().reshape((24, 24))[3:, 3:]

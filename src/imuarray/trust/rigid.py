@@ -59,7 +59,8 @@ class Slope(NamedTuple):
     """Turning by the gyroscopes over that by the accelerometers: between two bounds, 1 if sound.
 
     The bounds are those of errors in either; ``sd`` is the statistical one, ``coarse`` the share
-    that samples too far apart may leave out of the integral.
+    that samples too far apart may leave out of the integral. ``skipped``: steps twice as long as
+    their stamps say, 0 where these are no more than chance.
     """
 
     low: float
@@ -67,6 +68,7 @@ class Slope(NamedTuple):
     sd: float
     correlation: float
     coarse: float
+    skipped: int = 0
 
     @property
     def off(self) -> bool:
@@ -91,6 +93,9 @@ def slope(time, motion: Turning) -> Slope | None:
     steps = (time[first + 2] - time[first + 1])[:, None]
     change = (motion.rate[first + 2] - motion.rate[first + 1]) @ motion.seen
     whole = np.einsum("k,tkc->tc", WEIGHTS, turn) * steps
+    size = np.sum(whole**2, axis=1)
+    share = np.sum(change * whole, axis=1)[size > np.median(size)] / size[size > np.median(size)]
+    twice, never = (int(np.sum(np.abs(share - at) < SETTINGS.near_twice)) for at in (2, 0))
     # the instants of the two kinds may differ
     late = turn[:, 2] - turn[:, 1]
     jerk = np.linalg.norm(late, axis=1)
@@ -108,7 +113,10 @@ def slope(time, motion: Turning) -> Slope | None:
     correlation = xy / np.sqrt(xx * yy)
     sd = np.sqrt(np.sum((y - forward * x) ** 2) / xx / calm.sum())
     low, high = sorted((float(forward), float(reverse)))
-    return Slope(low, high, float(sd), float(correlation), float(SETTINGS.coarse * rough))
+    return Slope(
+        low, high, float(sd), float(correlation), float(SETTINGS.coarse * rough),
+        twice if twice > SETTINGS.least_skipped * (1 + never) else 0,
+    )  # fmt: skip
 
 
 def elsewhere(recording: Recording, positions) -> tuple[float, float]:

@@ -50,6 +50,8 @@ class Settings:
     stretch: int = 500  # of them in a row
     fewest_pairs: int = 60  # pairs of neighbouring samples
     coherent: float = 0.9  # correlation below which the samples are no course of one smooth motion
+    near_twice: float = 0.3  # of a step's length, that it may be off twice the stamped one
+    least_skipped: int = 5  # such steps, and times as many as those that seem not to be there
     slope: float = 0.015  # gyroscopes' filters and scales make less
     coarse: float = 3 * 11 / 720 * 144  # three times a single wave's: several have more fast ones
     # `suspects`
