@@ -67,8 +67,9 @@ def settled(found: Estimate) -> Estimate:
             far[imu] = hausman(whole[count:][own], spread[square], left[square])
         every = far.pop(None)
         if far:
-            most = SETTINGS.map_nearly * max(statistic for statistic, _ in far.values())
-            farthest = [int(imu) for imu, (statistic, _) in far.items() if statistic > most]
+            order = sorted(far, key=far.get, reverse=True)
+            most = SETTINGS.map_nearly * far[order[0]][0]
+            farthest = [int(imu) for imu in order if far[imu][0] > most]
             holds[kind] = float(chdtrc(max(every[1], 1), every[0])), farthest
     recorded = tuple(
         replace(one, state=stepped(one.state, found.columns, found.active, step[place]))
