@@ -21,7 +21,7 @@ from imuarray.pictures.style import GREY, look
 
 __all__ = [
     "allan", "board", "length", "motion", "positions", "posterior",
-    "residual_course", "sphere", "timeline", "trace",
+    "residual_course", "sphere", "timeline",
 ]  # fmt: skip
 MOTION = {
     "angular_rate": ("angular rate (deg/s)", np.degrees(1)),
@@ -50,19 +50,6 @@ def posterior(chains: xr.DataTree, accelerometer: str, axes: Axes | None = None)
         xlabel=f"triad {accelerometer}, from its nominal position (mm)", ylabel="density (1/mm)"
     )
     axes.legend()
-    return axes
-
-
-def trace(chains: xr.DataTree, accelerometer: str, axis: str, axes: Axes | None = None) -> Axes:
-    """The chains of one coordinate, in mm, against the transitions."""
-    draws, _, _ = _of(chains, accelerometer)
-    axes, number = given_or_new(axes), "xyz".index(axis)
-    steps = np.arange(draws.shape[1]) * int(chains.attrs["thin"])
-    for chain, values in enumerate(draws[..., number]):
-        style = {"linewidth": 0.6, "label": f"chain {chain + 1}"}
-        axes.plot(steps, 1e3 * values, **look(chain, "marker", "linestyle") | style)
-    axes.set(xlabel="transition", ylabel=f"triad {accelerometer}, {axis} (mm)")
-    axes.legend(ncols=2)
     return axes
 
 
