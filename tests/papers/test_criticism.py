@@ -153,7 +153,7 @@ def test_the_pages_say_what_was_published(committed):
         f"all samples {every[-1]:.0f} instead of {every[0]:.0f} (c)",
         f"repeat to {apart[-1]:.1f} µm instead of {apart[0]:.0f}; heavy tails alone give"
         f" {apart[1]:.0f}.",
-        f"{board.over_inflated:.0f} ± {board.over_inflated_error:.0f} nats a sample better",
+        f"{board.over_inflated:.1f} ± {board.over_inflated_error:.1f} nats a sample better",
     )
     for page in ("README.md", "docs/measured.md"):
         text = " ".join((ROOT / page).read_text(encoding="utf-8").split())

@@ -190,7 +190,7 @@ def draw_gained(axes, rows, said: str, ylabel: str) -> None:
 def _draw_between(axes, rows, left_out) -> None:
     """Differences between recordings, at one size too, and the size's error that all share."""
     gain, error = left_out.loc["board", ["over_inflated", "over_inflated_error"]]
-    said = f"left out: +{gain:.0f} ± {error:.0f} nats"
+    said = f"left out: +{gain:.1f} ± {error:.1f} nats"
     hollow = marks(3, markersize=5, markerfacecolor="none")
     axes.plot(range(len(rows)), 1e6 * rows.same_size_rms_m, **hollow)
     common = 1e6 * rows.common_size_m.iloc[-1]
@@ -239,7 +239,7 @@ def table_criticism(
         ("Extended: residual over noise, smooth and fast samples", f"{first.smooth_ratio:.1f}",
          f"{last.smooth_ratio:.2f}", "median", several),
         ("Gained: difference between recordings; nats a sample on a recording left out",
-         f"{1e6 * first.rms_m:.0f} µm", f"{1e6 * last.rms_m:.1f} µm; +{board.over_inflated:.0f}",
+         f"{1e6 * first.rms_m:.0f} µm", f"{1e6 * last.rms_m:.1f} µm; +{board.over_inflated:.1f}",
          f"95 % intervals cover {100 * last.covered:.0f} %; ± {board.over_inflated_error:.1f} nats",
          f"{several}; {name} left out"),
         ("Left over: all samples, shocks with them; and what no agreement shows",
