@@ -28,7 +28,7 @@ from imuarray.estimation.collapsed import Collapsed
 from imuarray.geometry import positions_of
 from imuarray.linear import scaled_inverse
 from imuarray.model import ArrayModel
-from imuarray.model.effects import KINDS
+from imuarray.model.effects import EFFECTS, KINDS
 from imuarray.posterior.generic import SCALES, log_laplace, unknown
 from imuarray.posterior.marginal import Marginal, log_posterior
 from imuarray.posterior.prior import GaussianPrior, TiedPrior
@@ -127,7 +127,8 @@ def posterior_beyond(recording: Recording, found: Estimate) -> Posterior:
 
 def common_sd(recording: Recording, model: ArrayModel) -> float:
     """Relative sd of a scale common to all rates and to time that a model has no parameter for."""
-    own = 0.0 if "gyroscope_scale" in model.effects else recording.gyroscope_common_scale_sd
+    has = any(EFFECTS[e].resizes and EFFECTS[e].kinds == [1] for e in model.effects)
+    own = 0.0 if has else recording.gyroscope_common_scale_sd
     return float(np.hypot(*np.nan_to_num([own, recording.clock_sd])))
 
 
