@@ -55,22 +55,14 @@ def settled(found: Estimate) -> Estimate:
     mean = means(found.recorded, found.columns, found.active, found.places)
     slope[:count] -= found.precision @ (found.values - mean)
     whole = scaled_solve(information + precision, slope)[0]
-    step, holds = whole[:count], {}
+    step = whole[:count]
     left = scaled_inverse(information / lost(found.freedoms) + precision)[count:, count:]
-    for kind in KINDS:
-        mine, far = np.char.startswith(names, kind) & np.isin(names, MAPS), {}
-        imus = np.nonzero(maps)[0]
-        for imu in (None, *np.unique(imus[mine])):  # all, and each
-            chosen = mine if imu is None else mine & (imus == imu)
-            own = np.unique([place[chosen] - count for place in places]).astype(int)
-            square = np.ix_(own, own)
-            far[imu] = hausman(whole[count:][own], spread[square], left[square])
-        every = far.pop(None)
-        if far:
-            order = sorted(far, key=far.get, reverse=True)
-            most = SETTINGS.map_nearly * far[order[0]][0]
-            farthest = [int(imu) for imu in order if far[imu][0] > most]
-            holds[kind] = float(chdtrc(max(every[1], 1), every[0])), farthest
+    places, imus = [place - count for place in places], np.nonzero(maps)[0]
+    of_kinds = {kind: np.char.startswith(names, kind) & np.isin(names, MAPS) for kind in KINDS}
+    holds = {
+        kind: _hold(places, np.where(mine, imus, -1), whole[count:], spread, left)
+        for kind, mine in of_kinds.items() if mine.any()
+    }  # fmt: skip
     recorded = tuple(
         replace(one, state=stepped(one.state, found.columns, found.active, step[place]))
         for one, place in zip(found.recorded, found.places, strict=True)
@@ -81,6 +73,25 @@ def settled(found: Estimate) -> Estimate:
         found, recorded=recorded, information=information, precision=precision, blocks=blocks,
         maps_hold=holds,
     )  # fmt: skip
+
+
+def _hold(places, imus, off, spread, left) -> tuple[float, list[int]]:
+    """(chance of maps so far ``off`` (k,) from a correction's, the farthest IMUs first).
+
+    ``places`` of each recording's (m,) among the k, ``imus`` (m,) whose they are, -1 of others;
+    covariances (k, k) ``spread`` before and ``left`` after.
+    """
+
+    def distance(chosen) -> tuple[float, int]:
+        own = np.unique([place[chosen] for place in places])
+        square = np.ix_(own, own)
+        return hausman(off[own], spread[square], left[square])
+
+    statistic, freedom = distance(imus >= 0)
+    far = {int(imu): distance(imus == imu)[0] for imu in np.unique(imus[imus >= 0])}
+    most = SETTINGS.map_nearly * max(far.values())
+    farthest = [imu for imu in sorted(far, key=far.get, reverse=True) if far[imu] > most]
+    return float(chdtrc(max(freedom, 1), statistic)), farthest
 
 
 def hausman(apart, wide, narrow) -> tuple[float, int]:

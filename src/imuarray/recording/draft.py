@@ -148,16 +148,14 @@ def by_place(table: pd.DataFrame) -> list[Triad]:
 
     A column whose values rise steadily, as stamps and counts do, is none of a sensor's.
     """
-    values = {name: pd.to_numeric(table[name], errors="coerce") for name in table.columns}
-    own = [
-        name for name, x in values.items() if x.notna().any() and not (x.diff() > 0).mean() > 0.9
-    ]
+    values = table.apply(pd.to_numeric, errors="coerce").dropna(axis="columns", how="all")
+    own = [name for name, x in values.items() if (x.diff() > 0).mean() < SETTINGS.draft_rises]
     require(len(own) % 3 == 0, "columns", "three of each sensor beside the stamps", len(own))
     found: dict[str, list] = {kind: [] for kind in KINDS}
     for place in range(0, len(own), 3):
         three = tuple(own[place : place + 3])
-        readings = np.stack([values[name].to_numpy(float) for name in three], axis=1)[:, None]
-        still = readings[_quietest(readings, SETTINGS.draft_rows)]
+        readings = values[list(three)].to_numpy(float)[:, None]
+        still = readings[_quietest(readings, len(table) / 100)]
         found[[*KINDS][_force(still)[0] == UNKNOWN]].append(three)
     return [
         Triad(kind, str(number + 1), three)
