@@ -100,6 +100,15 @@ def test_a_little_colour_of_all_gyroscopes(clean):
     assert all("gyroscope" in name for name in named.parameters)
 
 
+def test_a_spectrum_without_alike_neighbours_is_no_colour(clean):
+    """One triad's noise is alike two samples apart: its upper spectrum falls, neighbours differ."""
+    noise = np.random.default_rng(6).standard_normal(clean.fit.residual.shape)
+    noise[2:, 3, :3] -= 0.6 * noise[:-2, 3, :3]
+    made, judged = residual_of(clean, noise)
+    assert abs(judged.slope[3, 0]) > 7
+    assert noise_effects.coloured(made, judged, LIMIT, untied=False) is None
+
+
 def test_one_that_drifts_is_no_warm_up():
     search, _ = searched("bias_drift", (4,), 40.0)
     assert scan_warming(search.fit, search.given, list(EVERY)) == []
