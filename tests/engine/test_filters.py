@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 import imuarray
 from imuarray.engine import forward
 from imuarray.engine.derivatives import derivatives
-from imuarray.engine.forward import FILTER, select_forward, with_effects
+from imuarray.engine.forward import BAND, FILTER, OWN, select_forward, with_effects
 from imuarray.engine.readings import arrange
 from imuarray.geometry import sub_array
 from imuarray.model import ArrayModel
@@ -77,9 +77,24 @@ def test_runs_too_short_for_a_filter_have_the_derivatives_of_short_ones():
     assert np.abs(slow.second.angular_rate).max() > 0
 
 
+@pytest.mark.parametrize(("accelerometers", "group"), [([20] * 4, BAND), ([98, 98, 20, 98], OWN)])
+def test_a_low_pass_of_accelerometers_is_found(accelerometers, group, monkeypatch):
+    """Of all, it makes a square of the rate that no filtered rate has; of one, an IMU's delay."""
+    recording, truth = filtered([accelerometers[0]] * 4, accelerometers)
+    readings = [arrange(recording, sparse=True)]
+    found, groups = select_forward(readings)
+    assert group in {one.name for one in groups if one.kept}
+    z, off = distance(found, truth)
+    assert z < 2 and off < 1e-5
+    fewer = [name for name in forward.EFFECT_GROUPS if name != group]
+    monkeypatch.setattr(forward, "groups_of", lambda readings: fewer)
+    assert distance(select_forward(readings)[0], truth)[1] > 3 * off
+
+
 def test_filters_alike_are_none():
     readings = [arrange(filtered([98] * 4, [98] * 4)[0], sparse=True)]
-    assert FILTER not in {group.name for group in select_forward(readings)[1] if group.kept}
+    kept = {group.name for group in select_forward(readings)[1] if group.kept}
+    assert not kept & {FILTER, OWN}
 
 
 def test_an_accelerometers_low_pass_is_found():
@@ -101,7 +116,8 @@ LAG, DROOP = "gyroscope_delay delay", "gyroscope_filter droop"
 @pytest.mark.parametrize("values, word", [
     ({}, ""), ({LAG: -5e-3, DROOP: 3e-5}, ""),
     ({LAG: -9e-3, DROOP: 9e-5}, "the gyroscopes' low pass, of some 12 Hz"),
-    ({LAG: 9e-3, DROOP: -3e-5}, "the accelerometers' low pass, of some 21 Hz"),
+    ({LAG: 9e-3, DROOP: -9e-5}, "the accelerometers' low pass, of some 12 Hz"),
+    ({"accelerometer_band spread": 2e-4}, "the low pass of all sensors, of some 11 Hz"),
 ])  # fmt: skip
 def test_filters_too_far_apart_are_said(values, word):
     names = [f"{name}_{k} s" for name in values for k in "ab"]
@@ -118,11 +134,11 @@ def test_one_accelerometers_low_pass_is_said():
         for k in ("a", "b", "c", "d 1")
     ]
     file = xr.Dataset(
-        {"effect_parameter": ("parameter", [2e-3] * 3 + [-4e-3] + [-1e-5] * 3 + [3e-5])},
+        {"effect_parameter": ("parameter", [2e-3] * 3 + [-4e-3] + [-2e-5] * 3 + [6e-5])},
         {"parameter": names},
     )
     (said,) = _filters(file)
-    assert "accelerometer d 1, of some 19 Hz" in said
+    assert "accelerometer d 1, of some 13 Hz" in said
 
 
 def test_a_lever_arm_that_no_chip_has_room_for_is_said():

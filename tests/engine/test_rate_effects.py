@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import imuarray
-from imuarray.engine.forward import CURVE, SQUARE, select_forward
+from imuarray.engine import estimate
+from imuarray.engine.forward import CURVE, GYROSCOPES, SQUARE, select_forward
 from imuarray.engine.readings import arrange
 from imuarray.geometry import sub_array
 from imuarray.model import ArrayModel
@@ -42,6 +43,22 @@ def test_what_grows_with_the_rate_is_found(change, group):
     assert {one.name for one in groups if one.kept} - {"offsets"} == {group} - {""}
     off = errors(found, truth)
     assert np.sqrt(np.mean((off / position_sds(found)) ** 2)) < 2 and np.abs(off).max() < 3e-5
+
+
+def test_a_scale_of_all_gyroscopes_that_no_pose_tells_is_the_slopes(monkeypatch):
+    """Angular acceleration goes with the rate, centrifugal force with its square."""
+    model = ArrayModel.isotropic(sub_array(imuarray.mimu4444(), 4), 0.04, 0.002)
+    rng, places = np.random.default_rng(1), model.array.relative
+    motion, time = hand_twisting(rng, np.radians(700), 3.0), np.arange(0, 12, 0.005)
+    recording, truth = simulate_samples(model, motion.at(time), places, places, rng, time)
+    read = recording.angular_rate * [1.0, 1.006, 1.012]
+    readings = [arrange(replace(recording, angular_rate=read), sparse=True)]
+    found, groups = select_forward(readings)
+    assert GYROSCOPES in {group.name for group in groups if group.kept}
+    off, sds = errors(found, truth), position_sds(found)
+    assert np.sqrt(np.mean((off / sds) ** 2)) < 2 and np.abs(off).max() < 3e-5
+    monkeypatch.setattr(estimate, "priors", lambda one, *given: estimate.pinned(*given[:3]))
+    assert np.abs(errors(select_forward(readings)[0], truth)).max() > 3 * np.abs(off).max()
 
 
 def test_a_curve_is_not_asked_of_motion_too_fast_for_slopes():

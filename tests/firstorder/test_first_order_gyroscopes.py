@@ -6,12 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.linalg import rq
+from scipy.spatial.transform import Rotation
 
 from benchmarks.board import GRAVITY, Options, draw_board, draw_hand
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.firstorder.correct import calibrate_first_order, calibrate_together, correct
-from imuarray.firstorder.moves import Move, _carried, _to_end, common_map
+from imuarray.firstorder.moves import Move, _carried, _to_end, common_map, gather
 from imuarray.firstorder.report import gyroscope_lines, parameter_table, turned_lines
 from imuarray.firstorder.still import still_poses
 from imuarray.recording import read_recording, write_recording
@@ -140,6 +141,21 @@ def test_a_shock_in_a_move_counts_little(hand):
     assert found.weight[[2, 7]].max() < 0.01 and np.delete(found.weight, [2, 7]).min() > 0.1
     assert np.abs(found.map - CHANGE).max() < 4 * np.abs(plain.map - CHANGE).max()
     np.testing.assert_allclose(np.flatnonzero(found.error > 0.01), [2, 7])
+
+
+@pytest.mark.parametrize(("gap", "counts"), [((0.99, 1.06), True), ((0.6, 0.67), False)])
+def test_a_gap_in_a_move_costs_no_more_than_the_way_over_it(gap, counts):
+    """A log that lost what came when the board was at rest again has the move all the same."""
+    time = np.arange(0, 2, 0.005)
+    time = time[(time < gap[0]) | (time > gap[1])]
+    u = np.clip(2 * time - 1, 0, 1)[:, None]
+    rate = u**2 * (1 - u) ** 2 * [90.0, 0, 0]
+    poses = slice(0, np.sum(time < 0.5)), slice(np.sum(time < 1.0), len(time))
+    moves = gather(rate, time, poses, np.zeros((2, 3)), np.ones(len(time), bool), 1e-4)
+    assert len(moves) == counts
+    for move in moves:
+        turned = Rotation.from_matrix(_to_end(move, np.eye(3))[0]).as_rotvec()
+        assert abs(turned[0] - 1.5) < move.sd.max() < 4e-3
 
 
 def test_what_the_moves_do_not_tell_stays_with_the_priors_sd():

@@ -173,13 +173,13 @@ def estimate(
         noisy = _judged(recorded, passes, columns, active, nu)
         change = _noise_change(recorded, noisy)
         information, score, blocks = _summed(passes, places)
-        precision = pinned(columns, active, places)
+        values = _values(recorded, columns, active, places)
+        precision = priors(recorded, columns, active, places, values)
         if number == 0 and not weighted:  # what is far out is to have no say in the first step
             recorded = noisy
             continue
-        values = _values(recorded, columns, active, places)
         columns = with_likely_spread(columns, active, values, information + precision, places[0])
-        precision = pinned(columns, active, places)
+        precision = priors(recorded, columns, active, places, values)
         slope = score - precision @ (values - means(recorded, columns, active, places))
         step, sds = scaled_solve(information + precision, slope)
         sds = np.maximum(sds, jackknifed(information, precision, blocks))
@@ -287,13 +287,40 @@ def means(recorded, columns, active, places) -> np.ndarray:
     return _spread([columns.prior_means()[active] for one in recorded], places)
 
 
-def pinned(columns, active, places, resized=True) -> np.ndarray:
-    """Precision (n, n) of the priors, gauges pinned."""
-    inner = columns.prior_precision(active, resized)
+def priors(recorded, columns, active, places, values) -> np.ndarray:
+    """Precision (n, n) of the priors, gauges pinned but for a scale that the rate's slope shows."""
+    shown = all(
+        one.state.turning is not None and np.isnan(one.readings.scale_sd) for one in recorded
+    )
+    return pinned(columns, active, places, values if shown else None)
+
+
+def pinned(columns, active, places, values=None) -> np.ndarray:
+    """Precision (n, n) of the priors, gauges pinned.
+
+    ``values`` (n,) where gauges that the array's size takes up are not, but as near to zero as the
+    mean of as many that differ by so much.
+    """
+    inner = columns.prior_precision(active, values is None)
+    if values is not None:
+        for effect, mask in columns.gauges(active):
+            if effect.resizes:
+                own, weights = np.zeros(mask.shape), mask[active] / np.abs(mask).sum()
+                own[active] = values[places[0]]
+                stiff = SETTINGS.stiff * columns.prior_sd[(mask != 0).any(axis=0)].mean()
+                variance = max(_variance_of_mean(own, mask != 0), stiff**2)
+                inner += np.outer(weights, weights) / variance
     out = np.zeros((_size(places),) * 2)
     for place in places:  # what several recordings share is written by each of them
         out[np.ix_(place, place)] = inner
     return out
+
+
+def _variance_of_mean(values, chosen) -> float:
+    """Of all ``chosen`` (N, m) bool values, by how they, and the means of all IMUs', differ."""
+    axes = chosen.any(axis=0)
+    means = np.sum(values * chosen, axis=0)[axes] / chosen.sum(axis=0)[axes]
+    return float(max(np.var(x, ddof=1) / len(x) for x in (values[chosen], means)))
 
 
 def _freedoms(recorded, passes) -> np.ndarray:
@@ -348,6 +375,6 @@ def tested(found: Estimate, active, places=None) -> Tested:
     places = places or places_of(found.columns, active, len(found.recorded))
     recorded, passes = _passed(found.recorded, found.columns, active)
     values = _values(recorded, found.columns, active, places)
-    precision = pinned(found.columns, active, places)
+    precision = priors(recorded, found.columns, active, places, values)
     mean = means(recorded, found.columns, active, places)
     return Tested(_summed(passes, places)[2], precision, mean, values, active, places)

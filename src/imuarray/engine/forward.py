@@ -24,6 +24,7 @@ from imuarray.model.timing import LONG
 
 CLOCKS, DELAYS, GYROSCOPES = "clocks of the IMUs", "delay of each IMU", "gyroscope maps"
 LAG, FILTER = "lag of the gyroscopes", "filter of the gyroscopes"
+BAND, OWN = "filter of all sensors", "filter of each accelerometer"
 CURVE, SQUARE = "curve of the gyroscopes", "rates in accelerometers"
 EFFECT_GROUPS = {
     CLOCKS: (CLOCK,),
@@ -31,6 +32,8 @@ EFFECT_GROUPS = {
     DELAYS: ("sensor_delay",),
     LAG: ("gyroscope_delay",),
     FILTER: ("gyroscope_filter",),
+    BAND: ("accelerometer_band",),
+    OWN: ("accelerometer_filter",),
     CURVE: ("gyroscope_curve",),
     GYROSCOPES: ("gyroscope_scale", "gyroscope_misalignment"),
     SQUARE: ("accelerometer_rate_square",),
@@ -281,7 +284,7 @@ def _of_one_truth(found: Estimate, more: Estimate) -> bool:
     spreads = []
     for one in (found, more):
         placed = one.places[0][np.argwhere(one.active)[:, 1] < 3]
-        known = one.information / widths.lost(one.freedoms) + one.precision
+        known = one.information / widths.lost(one.freedoms) + widths.priors_of(one)
         spreads.append(scaled_inverse(known)[np.ix_(placed, placed)])
     statistic, freedom = widths.hausman((more.positions - found.positions)[1:].ravel(), *spreads)
     return bool(chdtrc(max(freedom, 1), statistic) > SETTINGS.chance)

@@ -19,6 +19,7 @@ from imuarray.engine.readings import Readings
 from imuarray.engine.settings import SETTINGS
 from imuarray.errors import InputError
 from imuarray.model.structure import design, products
+from imuarray.motion.state import lever
 
 
 def turned(readings: Readings, state: State, follows: bool = False) -> State:
@@ -132,9 +133,23 @@ def _linear_motion(readings, positions, rate) -> np.ndarray:
 
 
 def is_smooth(readings: Readings, motion) -> bool:
-    """True where neighbouring samples determine derivatives: omega's slope is omega_dot."""
-    slope = polynomial_derivative(readings.time, readings.run, motion[:, :3], readings.window, 1)
-    return bool(np.corrcoef(slope.ravel(), motion[:, 3:6].ravel())[0, 1] > SETTINGS.smooth)
+    """True where neighbouring samples determine derivatives: omega's slope is omega_dot.
+
+    That of four accelerometers or more may be without one, which is late or filtered.
+    """
+    rate, count = motion[:, :3], len(readings.array.positions)
+    slope = polynomial_derivative(readings.time, readings.run, rate, readings.window, 1)
+
+    def follows(turn) -> bool:
+        return bool(np.corrcoef(slope.ravel(), turn.ravel())[0, 1] > SETTINGS.smooth)
+
+    if follows(motion[:, 3:6]) or count < 4:
+        return follows(motion[:, 3:6])
+    seen = lever(rate[:, None], motion[:, None, 3:6], readings.array.relative) + motion[:, None, 6:9]
+    off = np.where(readings.keep[:, :count, :3], readings.values[:, :count, :3] - seen, 0.0)
+    worst = np.arange(len(readings.labels)) == np.argmax(np.sum(off**2, axis=(0, 2)))
+    few = readings.without(np.repeat([True, False], 3) & worst[:, None])
+    return follows(_linear_motion(few, readings.array.relative, rate)[:, :3])
 
 
 def with_derivatives(readings, state, smooth) -> State:

@@ -151,25 +151,23 @@ def growing(found: Estimate) -> np.ndarray:
 
 def _formal(found: Estimate) -> np.ndarray:
     """Gauges that the array's size takes up not pinned, but as large as they may well be."""
-    known, gauges = np.isfinite(found.scale_sd), found.columns.gauges(found.active)
     count, prior = len(found.values), found.precision.copy()
-    prior[:count, :count] = pinned(found.columns, found.active, found.places, resized=known)
-    sizes = [mask[found.active] for effect, mask in gauges if effect.resizes]
-    if not known:
-        for mine in sizes:
-            chosen, mean = found.places[0][mine != 0], np.zeros(len(prior))
-            mean[chosen] = mine[mine != 0] / np.abs(mine).sum()
-            # the mean of so many that differ by so much
-            prior += np.outer(mean, mean) * len(chosen) / np.var(found.values[chosen], ddof=1)
+    prior[:count, :count] = priors_of(found)
     out = lost(found.freedoms) * scaled_inverse(found.information + prior)[:count, :count]
     # r goes with the rate's scale to the power of -2, and a clock's is in all rates
     size, pairs = np.zeros(count), np.argwhere(found.active)
     mine = pairs[:, 1] < 3
     size[found.places[0][mine]] = 2.0 * found.positions[pairs[mine, 0], pairs[mine, 1]]
     variance = np.mean([one.readings.clock_sd**2 for one in found.recorded])
-    if known and sizes:
-        variance += found.scale_sd**2
+    if any(effect.resizes for effect, _ in found.columns.gauges(found.active)):
+        variance += np.nan_to_num(found.scale_sd) ** 2
     return out + variance * np.outer(size, size)
+
+
+def priors_of(found: Estimate) -> np.ndarray:
+    """Precision (n, n) of the priors; gauges that nothing is known of as wide as they may be."""
+    values = None if np.isfinite(found.scale_sd) else found.values
+    return pinned(found.columns, found.active, found.places, values)
 
 
 def lost(freedoms) -> float:

@@ -92,15 +92,30 @@ def gather(rate, time, poses, offsets, good, noise_sd: float) -> list[Move]:
     for p, (one, two) in enumerate(zip(poses[:-1], poses[1:], strict=True)):
         part = slice(one.stop - 1, two.start + 1)
         own, length = time[part], time[two.start] - time[one.stop - 1]
-        whole = np.diff(own).max() < SETTINGS.move_bridged * usual and good[part].all()
-        if not whole or length > SETTINGS.longest_move or len(own) < 4:
+        if not good[part].all() or length > SETTINGS.longest_move or len(own) < 4:
+            continue
+        longest = max(SETTINGS.longest_gap, SETTINGS.move_bridged * usual)
+        gap, (own, seen, bridged) = np.diff(own).max(), _bridged(own, rate[part], offsets[p], usual)
+        if bridged > SETTINGS.most_bridged or gap > longest:
             continue
         middles = [(time[pose.start] + time[pose.stop - 1]) / 2 for pose in (one, two)]
         share = ((own - middles[0]) / (middles[1] - middles[0]))[:, None]
         bias = (1 - share) * offsets[p] + share * offsets[p + 1]
         sd = np.sqrt((stray * length) ** 2 + len(own) * (noise_sd * usual) ** 2)
-        moves.append(Move(p, own, rate[part] - bias, sd))
+        moves.append(Move(p, own, seen - bias, sd + bridged))
     return moves
+
+
+def _bridged(time, rate, offset, usual):
+    """Times and rates (n, 3) with straight lines over gaps, and the way (rad) along these."""
+    steps = np.diff(time)
+    far = np.flatnonzero(steps >= SETTINGS.move_bridged * usual)
+    if not len(far):
+        return time, rate, 0.0
+    way = np.linalg.norm((rate[far] + rate[far + 1]) / 2 - offset, axis=1) * steps[far]
+    more = [np.arange(time[k] + usual, time[k + 1] - usual / 2, usual) for k in far]
+    every = np.sort(np.concatenate([time, *more]))
+    return every, np.stack([np.interp(every, time, axis) for axis in rate.T], 1), float(way.sum())
 
 
 def common_map(moves: list[Move], direction, covariance) -> CommonMap | str:

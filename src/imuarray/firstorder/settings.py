@@ -53,6 +53,8 @@ class Settings:
     longest_move: float = 30.0  # s; drift is too large beyond
     farthest_move: float = 30.0  # rad; other errors are too large beyond
     move_bridged: float = 3.5  # steps between samples, over which a spline is good enough
+    most_bridged: float = 0.02  # rad, the way over longer gaps: by so much it may be off
+    longest_gap: float = 0.15  # s; a turn may hide in a longer one
     map_prior: float = 0.01  # sd about the identity of scales and skews
     turn_prior: float = 0.1  # rad, of a turn
     move_freedom: float = 4.0  # of the t distribution of a move's error

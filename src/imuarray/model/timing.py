@@ -109,6 +109,22 @@ def accelerometer_filter(shape, instant, predicted):
     return predicted._replace(specific_force=predicted.specific_force + bend)
 
 
+@effect(
+    "accelerometer_band", unit="s2", prior_sd=3e-6, common_sd=5e-5, shape=lambda a, g: (a, 1),
+    components=(("spread",),), smooth=True, against="angular acceleration",
+    meaning="the sensors' filters average over a time in which the rate changes",
+)  # fmt: skip
+def accelerometer_band(spread, instant, predicted):
+    """u + v omega_dot x (omega_dot x r), v the variance of the filter's delay.
+
+    A filter passes the rate's square, not the square of the rate that it passes, whichever of the
+    sensors have it; a low pass of first order with time constant tau has v = tau^2.
+    """
+    turn = instant.motion.angular_acceleration
+    square = jnp.cross(turn, jnp.cross(turn, instant.positions))
+    return predicted._replace(specific_force=predicted.specific_force + spread * square)
+
+
 CLOCK = ("period", "frequency", "phase", "offset", "drift")
 
 

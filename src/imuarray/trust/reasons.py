@@ -66,15 +66,17 @@ def reasons_of_calibration(
 
 
 def _filters(calibration: xr.Dataset) -> list[str]:
-    """Words on filters so far apart that their first powers of frequency do not say it."""
-    lag, droop = (
-        np.mean([*values_of(calibration, start).values()] or 0.0)
-        for start in ("gyroscope_delay delay", "gyroscope_filter droop")
+    """Words on filters too slow, or too far apart, for their first powers of frequency."""
+    lag, droop, spread = (
+        float(np.mean([*values_of(calibration, start).values()] or 0.0))
+        for start in ("gyroscope_delay delay", "gyroscope_filter droop", "accelerometer_band spread")
     )
     lower = int(lag < 0)
-    if abs(droop) > SETTINGS.droops[lower]:
-        others = f"the {KINDS[1 - lower]}s'"
-        return [_low(f"the {KINDS[lower]}s' low pass", float(abs(droop)), others)]
+    if abs(droop) > SETTINGS.droop:
+        what = f"far below the {KINDS[1 - lower]}s'"
+        return [_low(f"the {KINDS[lower]}s' low pass", abs(droop), what)]
+    if spread / 2 > SETTINGS.droop:
+        return [_low("the low pass of all sensors", spread / 2, "too low for this motion")]
     late, droops = (values_of(calibration, f"accelerometer_filter {x}") for x in ("lag", "droop"))
     each = {
         name.partition("_")[2]: x - y**2 / 2
@@ -82,8 +84,8 @@ def _filters(calibration: xr.Dataset) -> list[str]:
     }
     usual = np.median([*each.values()] or 0.0)
     return [
-        _low(f"the low pass of accelerometer {k}", float(x - usual), "the others'")
-        for k, x in each.items() if x - usual > SETTINGS.droops[0]
+        _low(f"the low pass of accelerometer {k}", float(x - usual), "far below the others'")
+        for k, x in each.items() if x - usual > SETTINGS.droop
     ]  # fmt: skip
 
 
@@ -100,11 +102,11 @@ def _arms(calibration: xr.Dataset) -> list[str]:
     ]
 
 
-def _low(whose: str, droop: float, others: str) -> str:
+def _low(whose: str, droop: float, what: str) -> str:
     corner = 1 / (2 * np.pi * np.sqrt(2 * droop))
     return (
-        f"{whose}, of some {corner:.2g} Hz or less, is far below {others}: set the chips to filters"
-        " alike, and to a larger bandwidth"
+        f"{whose}, of some {corner:.2g} Hz or less, is {what}: set the chips to filters alike, and"
+        " to a larger bandwidth"
     )
 
 

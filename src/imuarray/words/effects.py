@@ -231,6 +231,14 @@ def _filtered(kind: str, sizes: Sizes) -> list[str]:
     ]
 
 
+def _averaged(sizes: Sizes) -> list[str]:
+    mean, sd = float(np.mean(sizes.values)), float(np.mean(sizes.sds))
+    if mean < SEEN * sd:
+        return ["the sensors' filters are allowed for, and average over no time that is seen"]
+    corner = 1 / (2 * np.pi * np.sqrt(mean))
+    return [f"the sensors' filters average like a low pass of some {number(corner, 2)} Hz"]
+
+
 def _curved(sizes: Sizes) -> list[str]:
     mean = float(np.mean(sizes.values @ [FAST, FAST**2]))  # errors of the two go together
     more, size = "more" if mean > 0 else "less", quantity(abs(mean), None, "%")
@@ -337,6 +345,7 @@ WORDS = {"sensor_delay": _late, "gyroscope_delay": _lag, "sensor_clock": _clocks
 WORDS["size_effect"] = _places
 WORDS["accelerometer_rate_square"] = _with_rate
 WORDS["gyroscope_curve"] = _curved
+WORDS["accelerometer_band"] = _averaged
 WORDS["gyroscope_filter"] = partial(_filtered, "gyroscope")
 WORDS["accelerometer_filter"] = partial(_filtered, "accelerometer")
 for _kind, _unit in (("accelerometer", "m s-2"), ("gyroscope", "rad s-1")):
