@@ -11,7 +11,7 @@ from imuarray.diagnosis.reading_effects import find_rails, find_repeats
 from imuarray.diagnosis.scans import maybe_warming, scan_shifts, scan_warming
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Cause, Search, prune
-from imuarray.engine.heldout import gain_of
+from imuarray.engine.heldout import gains_of, summed
 from imuarray.engine.parameters import catalogue_effects, columns_of
 from imuarray.engine.readings import arrange
 from imuarray_papers.blind.cases import Case, make
@@ -142,10 +142,10 @@ def test_parameters_of_which_nothing_is_known_cost_no_gain():
     inner, score = (sum(part) for part in zip(*parts, strict=True))
     values = np.linalg.solve(inner + np.eye(3), score)
     left = [(block, slope - block @ values) for block, slope in parts]
-    wanted = gain_of(left, (np.eye(3), values), values, np.array([True, True, False]))
+    wanted = gains_of(left, (np.eye(3), values), values, np.array([True, True, False]))
     more = [(np.pad(block, (0, 2)), np.pad(slope, (0, 2))) for block, slope in left]
     values = np.pad(values, (0, 2))
-    found = gain_of(more, (np.eye(5), values), values, np.array([True, True, False, True, True]))
+    found = gains_of(more, (np.eye(5), values), values, np.array([True, True, False, True, True]))
     assert found == pytest.approx(wanted, rel=1e-9)
 
 
@@ -178,7 +178,7 @@ def test_the_rival_of_some_imus_keeps_no_pinned_mean(has, freed):
     parts = [(data, score - data @ values) for score in scores]
     mine = np.isin(range(count), freed)
     alone = own * ~mine * ~mine[:, None]
-    found = gain_of(parts, (own + pin, np.zeros(count)), values, mine, rival=alone)
+    found = summed(gains_of(parts, (own + pin, np.zeros(count)), values, mine, rival=alone))
     wanted = []
     for held in scores:
         trained, more = sum(scores) - held, (blocks - 1) * data

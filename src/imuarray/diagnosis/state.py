@@ -17,7 +17,7 @@ from imuarray.diagnosis.scores import Candidate, Information, information_at, ma
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.clocks import CLOCK, estimated_again, started_by_gyroscopes, without_jumps
 from imuarray.engine.estimate import Recorded
-from imuarray.engine.heldout import gain_of
+from imuarray.engine.heldout import gains_of, summed
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import POSITION, Columns
 from imuarray.engine.readings import Readings
@@ -261,7 +261,7 @@ def heldout_gain(
     rest, alone = ~freed[mask], np.zeros((len(values), len(values)))
     alone[np.ix_(rest, rest)] = columns.prior_precision(mask & ~freed)
     prior = columns.prior_precision(mask), columns.prior_means()[mask]
-    return gain_of(parts, prior, values, ~rest, rival=alone)
+    return summed(gains_of(parts, prior, values, ~rest, rival=alone))
 
 
 def prune(search: Search, effect: str) -> Search:

@@ -289,9 +289,7 @@ def means(recorded, columns, active, places) -> np.ndarray:
 
 def priors(recorded, columns, active, places, values) -> np.ndarray:
     """Precision (n, n) of the priors, gauges pinned but for a scale that the rate's slope shows."""
-    shown = all(
-        one.state.turning is not None and np.isnan(one.readings.scale_sd) for one in recorded
-    )
+    shown = all(one.state.turning is not None for one in recorded)
     return pinned(columns, active, places, values if shown else None)
 
 

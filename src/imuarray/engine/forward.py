@@ -11,7 +11,7 @@ from scipy.special import chdtrc
 from imuarray.engine import widths
 from imuarray.engine.clocks import CLOCK, refined, shown_clocks, timed, with_clocks
 from imuarray.engine.estimate import Estimate, Recorded, Tested, estimate, tested
-from imuarray.engine.heldout import gain_of
+from imuarray.engine.heldout import gains_of, summed
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import POSITION, Columns, columns_of
 from imuarray.engine.readings import Readings, most_informative
@@ -307,18 +307,18 @@ def gains(found: Estimate, masks: dict, kept: dict) -> list[EffectGroup]:
     order has left are beside them all, as uncertain as it left them: what they explain is no
     group's gain.
     """
-    left = _left(found)
+    left, smooth = _left(found), all(one.smooth for one in found.recorded)
     every = [*masks.values(), *kept.values(), *(mask for mask, _ in left)]
     active = np.any([found.active, *every], axis=0)
     given, out = tested(found, active), []
     beside = np.any([found.active, *kept.values()], axis=0)
     for name, mask in masks.items():
-        out.append(_tried(name, given, mask, beside, left))
+        out.append(_tried(name, given, mask, beside, left, smooth))
         beside = beside | (mask & out[-1].kept)
     return out
 
 
-def _tried(name: str, given: Tested, own, beside, left) -> EffectGroup:
+def _tried(name: str, given: Tested, own, beside, left, smooth: bool) -> EffectGroup:
     """A group's gain, and whether it is kept; ``own`` and ``beside`` (N, m) bool."""
     freed, used, ridge = given.chosen(own), given.chosen(beside | own), given.precision.copy()
     spare, known = np.zeros(len(used), bool), None
@@ -333,8 +333,10 @@ def _tried(name: str, given: Tested, own, beside, left) -> EffectGroup:
     square = np.ix_(used, used)
     parts = [(inner[square], slope[used]) for inner, slope in given.blocks]
     system = parts, (ridge[square], given.means[used]), given.values[used], freed[used]
-    nats, error = gain_of(*system, spare[used])
-    good = nats > max(SETTINGS.group_z * error, SETTINGS.group_nats)
+    nats, error = summed(each := gains_of(*system, spare[used]))
+    # what moves much in one block gains most there: the error is large, and no doubt of the rest
+    steady = smooth and nats - np.max(each) > SETTINGS.steady_nats
+    good = nats > SETTINGS.group_nats and (nats > SETTINGS.group_z * error or steady)
     return EffectGroup(
         name, nats, error, bool(good and (known is None or _contradicted(*system, known)))
     )

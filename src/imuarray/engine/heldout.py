@@ -97,12 +97,17 @@ def trained_elsewhere(parts, ridge) -> np.ndarray:
 def gain(one: Scores, other: Scores) -> tuple[float, float]:
     """(nats per sample that ``other`` has over ``one``, standard error between blocks)."""
     difference, samples = other.nats - one.nats, one.samples.sum()
-    error = np.std(difference, ddof=1) * np.sqrt(len(difference))
-    return float(difference.sum() / samples), float(error / samples)
+    nats, error = summed(difference)
+    return nats / samples, error / samples
 
 
-def gain_of(parts, prior, values, freed, spare=None, rival=None) -> tuple[float, float]:
-    """Nats that ``freed`` (n,) bool parameters gain on held-out blocks over zero, and their error.
+def summed(gains) -> tuple[float, float]:
+    """Nats of all blocks together, (B,) each, and their standard error by how blocks differ."""
+    return float(np.sum(gains)), float(np.std(gains, ddof=1) * np.sqrt(len(gains)))
+
+
+def gains_of(parts, prior, values, freed, spare=None, rival=None) -> np.ndarray:
+    """Nats (B,) that ``freed`` (n,) bool parameters gain on each held-out block over zero.
 
     ``parts`` [(information (n, n), score (n,))] of the blocks at ``values`` (n,), ``prior`` its
     precision (n, n) and means (n,). Both rivals are trained without the block, the freed parameters
@@ -131,7 +136,7 @@ def gain_of(parts, prior, values, freed, spare=None, rival=None) -> tuple[float,
         shrink = max(0.0, 1 - determined / max(statistic, 1e-300))
         kept = _solve(*trained, values, freed, shrink * found)
         gains.append(_predicted(kept, block, slope) - _predicted(without, block, slope))
-    return float(np.sum(gains)), float(np.std(gains, ddof=1) * np.sqrt(len(gains)))
+    return np.array(gains)
 
 
 def _eliminated(trained, part, spare):

@@ -165,9 +165,8 @@ def _formal(found: Estimate) -> np.ndarray:
 
 
 def priors_of(found: Estimate) -> np.ndarray:
-    """Precision (n, n) of the priors; gauges that nothing is known of as wide as they may be."""
-    values = None if np.isfinite(found.scale_sd) else found.values
-    return pinned(found.columns, found.active, found.places, values)
+    """Precision (n, n) of the priors, gauges as wide as they may be."""
+    return pinned(found.columns, found.active, found.places, found.values)
 
 
 def lost(freedoms) -> float:
