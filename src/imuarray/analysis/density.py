@@ -23,6 +23,7 @@ from imuarray.engine.estimate import Estimate
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import model_of
 from imuarray.engine.readings import Readings
+from imuarray.engine.widths import priors_of
 from imuarray.errors import IdentifiabilityError
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.geometry import positions_of
@@ -98,7 +99,7 @@ def posterior_beyond(recording: Recording, found: Estimate) -> Posterior:
     """
     one, mine = found.recorded[0], found.places[0]
     place = places_among(found, effects_of(found))[0][mine]
-    precision = _known(found)
+    precision = priors_of(found)[np.ix_(mine, mine)]
     inverse = scaled_inverse(found.information[np.ix_(mine, mine)] + precision)
     readings, seen = _judged(found, inverse)
     model = _model(recording, found, readings, seen.motion_sd)
@@ -141,26 +142,6 @@ def _model(recording: Recording, found: Estimate, readings: Readings, sizes) -> 
         motion_sd=tuple(2.0 ** np.round(np.log2(sizes))),
         derivative_sd=_derivative_sd(plain, found.recorded[0].state),
     )  # fmt: skip
-
-
-def _known(found: Estimate) -> np.ndarray:
-    """Prior precision (n, n) of the active parameters: what the positions take up is pinned.
-
-    A gauge that the array's size takes up is as wide as is known of it, or as the mean of
-    parameters that differ as these do.
-    """
-    columns, active = found.columns, found.active
-    precision = columns.prior_precision(active, resized=False)
-    values = columns.flat(found.recorded[0].state)
-    for effect, mask in columns.gauges(active):
-        if effect.resizes:
-            weights, own = mask[active] / np.abs(mask).sum(), mask[active] != 0
-            prior = np.mean(np.diag(precision)[own])
-            more = max(1.0 / np.var(values[mask != 0], ddof=1) - prior, 0.0) * own.sum()
-            if effect.kinds == [1] and np.isfinite(found.scale_sd):
-                more = found.scale_sd**-2
-            precision += np.outer(weights, weights) * more
-    return precision
 
 
 def _judged(found: Estimate, covariance) -> tuple[Readings, NoiseEstimate]:
