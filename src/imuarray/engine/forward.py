@@ -121,7 +121,7 @@ def select_forward(
         groups = now.tried(names)
         now = now.with_kept([group.name for group in groups if group.kept])
         if set(now.kept) == before:
-            needed = now.needed(names, {group.name: group.gain for group in groups})
+            needed = now.needed(names)
             groups = [group._replace(kept=group.kept or group.name in needed) for group in groups]
             now = now.with_kept(needed)
             break
@@ -209,11 +209,10 @@ class Selected(NamedTuple):
         masks = {name: self.found.columns.mask(EFFECT_GROUPS[name]) for name in asked}
         return gains(self.found, masks, self.kept)
 
-    def needed(self, names, gain: dict[str, float]) -> list[str]:
+    def needed(self, names) -> list[str]:
         """Groups that another one's estimate calls for.
 
-        Gyroscope maps at odds with those of first order; the shape of filters behind a lag that is
-        long, or where they gain at all, however uncertain that is: what lags droops.
+        Gyroscope maps at odds with those of first order; the shape of filters behind a long lag.
         """
         columns, found = self.found.columns, []
         chance, _ = widths.settled(self.found).maps_hold.get("gyroscope", (1.0, []))
@@ -221,8 +220,7 @@ class Selected(NamedTuple):
             found.append(GYROSCOPES)
         if LAG in self.kept:
             each = columns.flat(self.found.recorded[0].state)
-            longest = np.abs(each[:, columns.of(*EFFECT_GROUPS[LAG])]).max()
-            if longest > LONG or gain.get(FILTER, 0.0) > SETTINGS.group_nats:
+            if np.abs(each[:, columns.of(*EFFECT_GROUPS[LAG])]).max() > LONG:
                 found.append(FILTER)
         return [name for name in found if name in names]
 
