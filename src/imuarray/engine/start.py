@@ -145,7 +145,8 @@ def is_smooth(readings: Readings, motion) -> bool:
 
     if follows(motion[:, 3:6]) or count < 4:
         return follows(motion[:, 3:6])
-    seen = lever(rate[:, None], motion[:, None, 3:6], readings.array.relative) + motion[:, None, 6:9]
+    turn, force = motion[:, None, 3:6], motion[:, None, 6:9]
+    seen = lever(rate[:, None], turn, readings.array.relative) + force
     off = np.where(readings.keep[:, :count, :3], readings.values[:, :count, :3] - seen, 0.0)
     worst = np.arange(len(readings.labels)) == np.argmax(np.sum(off**2, axis=(0, 2)))
     few = readings.without(np.repeat([True, False], 3) & worst[:, None])

@@ -67,9 +67,9 @@ def reasons_of_calibration(
 
 def _filters(calibration: xr.Dataset) -> list[str]:
     """Words on filters too slow, or too far apart, for their first powers of frequency."""
+    names = "gyroscope_delay delay", "gyroscope_filter droop", "accelerometer_band spread"
     lag, droop, spread = (
-        float(np.mean([*values_of(calibration, start).values()] or 0.0))
-        for start in ("gyroscope_delay delay", "gyroscope_filter droop", "accelerometer_band spread")
+        float(np.mean([*values_of(calibration, name).values()] or 0.0)) for name in names
     )
     lower = int(lag < 0)
     if abs(droop) > SETTINGS.droop:
