@@ -20,7 +20,7 @@ from imuarray.recording.record import CORRECTION
 from imuarray.trust import poses
 from imuarray.trust import reasons as doubts
 from imuarray.trust.drawing import Places, departures
-from imuarray.trust.misfit import residuals, unsteady
+from imuarray.trust.misfit import changed, residuals, unsteady
 from imuarray.trust.rigid import slope, turning
 from imuarray.trust.settings import SETTINGS
 from imuarray.trust.suspects import clipped, suspects, wrapped
@@ -502,6 +502,22 @@ def test_whom_parts_of_a_recording_disagree_on(ratios, corrected, named):
     assert not found if named is None else f"the place of {named}, by" in found[0]
     joint = unsteady(calibration, corrected, 2)
     assert not joint if named is None else joint[0].startswith("the recordings disagree")
+
+
+@pytest.mark.parametrize(
+    ("size", "stretches", "effects", "named"),
+    [(5, 5, "", True), (2, 5, "", False), (5, 1, "", False), (5, 20, "", False),
+     (5, 5, "gyroscope_filter", False)],
+)  # fmt: skip
+def test_a_triad_that_fits_a_part_of_the_time_is_named(size, stretches, effects, named):
+    rms = np.ones((20, 3))
+    rms[:stretches, 1] = size
+    found = changed(xr.Dataset(
+        {"gyroscope_residual": (("stretch", "gyroscope"), rms)},
+        {"stretch": np.arange(20.0), "gyroscope": ["a", "b", "c"]}, {"effects": effects},
+    ))  # fmt: skip
+    assert bool(found) == named
+    assert all(said.startswith("gyroscope b does not fit the others in 25 %") for said in found)
 
 
 def test_a_search_that_diverges_is_bad_input(monkeypatch, sound):

@@ -5,6 +5,7 @@ import xarray as xr
 
 from imuarray.model.effects import KINDS
 from imuarray.recording import Recording
+from imuarray.trust.checked import effect_names
 from imuarray.trust.drawing import Places
 from imuarray.trust.rigid import kept, turning
 from imuarray.trust.settings import SETTINGS
@@ -84,6 +85,28 @@ def unsteady(calibration: xr.Dataset, corrected: bool, recordings: int = 1) -> l
         f"parts of the recording {by}did it come loose, or did its accelerometer's offset jump?"
         " imuarray diagnose tells which"
     ]
+
+
+def changed(calibration: xr.Dataset) -> list[str]:
+    """Triads that do not fit the others in a part of smooth motion, and do in the rest.
+
+    Where no filter is estimated: of a slow one's, powers of frequency leave fast motion.
+    """
+    found: list[str] = []
+    if {"gyroscope_filter", "accelerometer_filter"} & {*effect_names(calibration)}:
+        return found
+    for kind in KINDS if "gyroscope_smooth_residual" not in calibration else ():
+        rms = calibration.get(f"{kind}_residual", xr.DataArray(np.empty((0, 0)))).to_numpy()
+        far = rms > SETTINGS.residual * np.maximum(np.median(rms, axis=1, keepdims=True), 1.0)
+        share = far.mean(axis=0) if len(far) else np.zeros(0)
+        for k in np.flatnonzero((share > SETTINGS.changed) & (share < 1 - SETTINGS.changed)):
+            when, label = calibration["stretch"].to_numpy()[far[:, k]], calibration[kind].values[k]
+            found.append(
+                f"{kind} {label} does not fit the others in {100 * share[k]:.0f} % of the motion,"
+                f" between {when[0]:.3g} and {when[-1]:.3g} s, and does in the rest: did its scale"
+                " change, or did it come loose?"
+            )
+    return found
 
 
 def rigid(recording: Recording, places: Places, spread: bool = False) -> dict[str, float]:

@@ -16,7 +16,7 @@ from imuarray.recording import Recording
 from imuarray.recording.channels import repeated
 from imuarray.trust.checked import effect_names, reasons_in, values_of
 from imuarray.trust.drawing import Places, another_size, departures, factor_words, size_of
-from imuarray.trust.misfit import is_papers, residuals, rigid, unfitting, unsteady
+from imuarray.trust.misfit import changed, is_papers, residuals, rigid, unfitting, unsteady
 from imuarray.trust.rigid import Slope, elsewhere, kept, slope, turning
 from imuarray.trust.settings import SETTINGS
 from imuarray.trust.suspects import MIRRORED, clipped, common, gravity, wrapped
@@ -57,7 +57,8 @@ def reasons_of_calibration(
         reason if len(whose) == len(several) else f"recording {', '.join(whose)}: {reason}"
         for reason, whose in found.items()
     ]
-    judged += _moved_maps(calibration) + _grows(calibration) + _arms(calibration)
+    judged += _moved_maps(calibration) + changed(calibration)
+    judged += _grows(calibration) + _arms(calibration)
     if not judged:
         corrected = all(one.correction is not None for one in several)
         judged = unsteady(calibration, corrected, len(several))

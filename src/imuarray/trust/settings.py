@@ -22,6 +22,7 @@ class Settings:
     unsteady: float = 2.5  # times what noise explains between parts; 1.3 at most of sound ones
     unsteady_alone: float = 1.5  # times the other IMUs': what disturbs one disturbs all a little
     residual: float = 3.0  # times the declared noise: widths are too small
+    changed: float = 0.1  # share of the motion in which a triad's is too large, or is not
     # `poses`
     pose_noise: float = 3.0  # times the noise of a pose's mean; real boards have up to 1.9
     pose_residual: float = 0.01  # m/s^2, a residual that matters: 0.1 % of gravity
