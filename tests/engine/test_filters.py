@@ -33,8 +33,9 @@ def low_passed(x, corners):
 
 
 def filtered(gyroscopes, accelerometers):
-    """(recording, truth) of four IMUs with low passes at so many Hz, (4,) each."""
-    model = ArrayModel.isotropic(sub_array(imuarray.mimu4444(), 4), 0.04, 0.002)
+    """(recording, truth) of IMUs with low passes at so many Hz, (n,) each."""
+    count = len(gyroscopes)
+    model = ArrayModel.isotropic(sub_array(imuarray.mimu4444(), count), 0.04, 0.002)
     rng, places = np.random.default_rng(1), model.array.relative
     motion, time = hand_twisting(rng, np.radians(700), 3.0), np.arange(12 * CHIP) / CHIP
     recording, truth = simulate_samples(
@@ -89,6 +90,14 @@ def test_a_low_pass_of_accelerometers_is_found(accelerometers, group, monkeypatc
     fewer = [name for name in forward.EFFECT_GROUPS if name != group]
     monkeypatch.setattr(forward, "groups_of", lambda readings: fewer)
     assert distance(select_forward(readings)[0], truth)[1] > 3 * off
+
+
+def test_filters_of_two_imus_droop_where_they_lag():
+    """Angular acceleration is the gyroscopes' own there, and no residual tells of their filter."""
+    recording, truth = filtered([98] * 2, [44] * 2)
+    found, groups = select_forward([arrange(recording, sparse=True)])
+    assert {FILTER, BAND} <= {group.name for group in groups if group.kept}
+    assert distance(found, truth)[0] < 2
 
 
 def test_filters_alike_are_none():

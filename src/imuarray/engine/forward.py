@@ -109,7 +109,7 @@ def select_forward(
     names = groups_of(readings)
     columns, begun = _begun(readings, names)
     rough = [name for name in names if name in ROUGH_GROUPS]
-    if rough != names and (readings[0].pair or not all(one.smooth for one in begun)):
+    if rough != names and not all(one.smooth for one in begun):
         names, (columns, begun) = rough, _begun(readings, rough)
     found = estimate(begun, columns, columns.mask([POSITION]), steps=SETTINGS.group_steps)
     now = Selected(found, tuple(one.readings.keep for one in begun), {})
@@ -207,12 +207,23 @@ class Selected(NamedTuple):
         part = {CLOCK, *EFFECTS[CLOCK].contains} if CLOCKS in self.kept else {CLOCK}
         asked = [n for n in names if n != CURVE and not set(EFFECT_GROUPS[n]) <= part]
         masks = {name: self.found.columns.mask(EFFECT_GROUPS[name]) for name in asked}
-        return gains(self.found, masks, self.kept)
+        # a pair's filter takes up what a delay leaves: it is for `needed` to say
+        never = FILTER if self.pair else ""
+        return [
+            one._replace(kept=one.kept and one.name != never)
+            for one in gains(self.found, masks, self.kept)
+        ]
+
+    @property
+    def pair(self) -> bool:
+        """True of two IMUs."""
+        return self.found.recorded[0].readings.pair
 
     def needed(self, names) -> list[str]:
         """Groups that another one's estimate calls for.
 
-        Gyroscope maps at odds with those of first order; the shape of filters behind a long lag.
+        Gyroscope maps at odds with those of first order; the shape of filters behind a lag that is
+        long, or of two IMUs, which do not tell it.
         """
         columns, found = self.found.columns, []
         chance, _ = widths.settled(self.found).maps_hold.get("gyroscope", (1.0, []))
@@ -220,7 +231,8 @@ class Selected(NamedTuple):
             found.append(GYROSCOPES)
         if LAG in self.kept:
             each = columns.flat(self.found.recorded[0].state)
-            if np.abs(each[:, columns.of(*EFFECT_GROUPS[LAG])]).max() > LONG:
+            longest = np.abs(each[:, columns.of(*EFFECT_GROUPS[LAG])]).max()
+            if longest > LONG or self.pair:
                 found.append(FILTER)
         return [name for name in found if name in names]
 
@@ -332,9 +344,10 @@ def _tried(name: str, given: Tested, own, beside, left, smooth: bool) -> EffectG
     parts = [(inner[square], slope[used]) for inner, slope in given.blocks]
     system = parts, (ridge[square], given.means[used]), given.values[used], freed[used]
     nats, error = summed(each := gains_of(*system, spare[used]))
-    # what moves much in one block gains most there: the error is large, and no doubt of the rest
+    # what moves much in one block gains most there: its error is large, and no doubt of the rest
     steady = smooth and nats - np.max(each) > SETTINGS.steady_nats
-    good = nats > SETTINGS.group_nats and (nats > SETTINGS.group_z * error or steady)
+    least = SETTINGS.steady_z if steady else SETTINGS.group_z
+    good = nats > max(least * error, SETTINGS.group_nats)
     return EffectGroup(
         name, nats, error, bool(good and (known is None or _contradicted(*system, known)))
     )

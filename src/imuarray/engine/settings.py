@@ -88,7 +88,8 @@ class Settings:
     least_difference: float = 0.03  # of the variance, by which two estimates may differ at least
     group_z: float = 2.0  # standard errors of a gain, from which a group is kept
     group_nats: float = 2.0  # nats, as well
-    steady_nats: float = 10.0  # of smooth motion without the best block, whatever the error
+    steady_z: float = 1.5  # the same of a gain of `steady_nats` without the best block
+    steady_nats: float = 10.0  # nats, in smooth motion
     known_slope: float = (
         1e-2  # of the angular acceleration, to which slopes must know it for a curve
     )
