@@ -16,9 +16,10 @@ rule copy_published:
     message:
         "{output}"
     shell:
-        # all kinds of it: one JSON file speaks for them
-        "for made in {params.made}.*; do cp $made paper_figures/{wildcards.name}.${{made##*.}}; done"
-        " 2> {log:q} && cp {input.settings:q} paper_figures/{wildcards.name}.json 2>> {log:q}"
+        # all kinds of it: one JSON file speaks for them; jobs of several kinds write the same files
+        "part=paper_figures/.{wildcards.name}.{wildcards.kind}.part; for made in {params.made}.*"
+        " {input.settings:q}; do cp $made $part && mv -f $part"
+        " paper_figures/{wildcards.name}.${{made##*.}} || exit 1; done 2> {log:q}"
 
 
 # A cause of a diagnosis, asked for by name.

@@ -174,12 +174,12 @@ def estimate(
         change = _noise_change(recorded, noisy)
         information, score, blocks = _summed(passes, places)
         values = _values(recorded, columns, active, places)
-        precision = priors(recorded, columns, active, places, values)
+        precision = pinned(columns, active, places, shown=shown(recorded))
         if number == 0 and not weighted:  # what is far out is to have no say in the first step
             recorded = noisy
             continue
         columns = with_likely_spread(columns, active, values, information + precision, places[0])
-        precision = priors(recorded, columns, active, places, values)
+        precision = pinned(columns, active, places, shown=shown(recorded))
         slope = score - precision @ (values - means(recorded, columns, active, places))
         step, sds = scaled_solve(information + precision, slope)
         sds = np.maximum(sds, jackknifed(information, precision, blocks))
@@ -287,27 +287,32 @@ def means(recorded, columns, active, places) -> np.ndarray:
     return _spread([columns.prior_means()[active] for one in recorded], places)
 
 
-def priors(recorded, columns, active, places, values) -> np.ndarray:
-    """Precision (n, n) of the priors, gauges pinned but for a scale that the rate's slope shows."""
-    shown = all(one.state.turning is not None for one in recorded)
-    return pinned(columns, active, places, values if shown else None)
+def shown(recorded) -> bool:
+    """True where the slope of each recording's own rate shows a scale common to all gyroscopes."""
+    turnings = [one.state.turning for one in recorded]
+    return all(turning is not None and turning.follows.any() for turning in turnings)
 
 
-def pinned(columns, active, places, values=None) -> np.ndarray:
+def pinned(columns, active, places, values=None, shown=False) -> np.ndarray:
     """Precision (n, n) of the priors, gauges pinned.
 
-    ``values`` (n,) where gauges that the array's size takes up are not, but as near to zero as the
-    mean of as many that differ by so much.
+    A mean that the array's size takes up has the prior of a single one where it is ``shown``, as a
+    gyroscopes' scale; else, if ``values`` (n,) are given, it is as near to zero as the mean of as
+    many that differ by so much.
     """
-    inner = columns.prior_precision(active, values is None)
-    if values is not None:
-        for effect, mask in columns.gauges(active):
-            if effect.resizes:
-                own, weights = np.zeros(mask.shape), mask[active] / np.abs(mask).sum()
+    inner = columns.prior_precision(active, values is None and not shown)
+    for effect, mask in columns.gauges(active) if shown or values is not None else ():
+        if effect.resizes:
+            chosen, own = mask != 0, np.zeros(mask.shape)
+            usual = float(np.mean(columns.prior_sd[chosen.any(axis=0)] ** 2))
+            variance = SETTINGS.stiff**2 * usual
+            if shown and effect.kinds == [1]:
+                variance = usual
+            elif values is not None:
                 own[active] = values[places[0]]
-                stiff = SETTINGS.stiff * columns.prior_sd[(mask != 0).any(axis=0)].mean()
-                variance = max(_variance_of_mean(own, mask != 0), stiff**2)
-                inner += np.outer(weights, weights) / variance
+                variance = max(_variance_of_mean(own, chosen), variance)
+            weights = mask[active] / np.abs(mask).sum()
+            inner += np.outer(weights, weights) * (1 / variance - chosen.sum() / usual)
     out = np.zeros((_size(places),) * 2)
     for place in places:  # what several recordings share is written by each of them
         out[np.ix_(place, place)] = inner
@@ -318,7 +323,8 @@ def _variance_of_mean(values, chosen) -> float:
     """Of all ``chosen`` (N, m) bool values, by how they, and the means of all IMUs', differ."""
     axes = chosen.any(axis=0)
     means = np.sum(values * chosen, axis=0)[axes] / chosen.sum(axis=0)[axes]
-    return float(max(np.var(x, ddof=1) / len(x) for x in (values[chosen], means)))
+    some = [x for x in (values[chosen], means) if len(x) > 1]
+    return float(max((np.var(x, ddof=1) / len(x) for x in some), default=0.0))
 
 
 def _freedoms(recorded, passes) -> np.ndarray:
@@ -373,6 +379,6 @@ def tested(found: Estimate, active, places=None) -> Tested:
     places = places or places_of(found.columns, active, len(found.recorded))
     recorded, passes = _passed(found.recorded, found.columns, active)
     values = _values(recorded, found.columns, active, places)
-    precision = priors(recorded, found.columns, active, places, values)
+    precision = pinned(found.columns, active, places, shown=shown(recorded))
     mean = means(recorded, found.columns, active, places)
     return Tested(_summed(passes, places)[2], precision, mean, values, active, places)

@@ -16,11 +16,10 @@ from imuarray.engine.linearise import State
 from imuarray.engine.parameters import POSITION, Columns, columns_of
 from imuarray.engine.readings import Readings, most_informative
 from imuarray.engine.settings import SETTINGS
-from imuarray.engine.start import turned
+from imuarray.engine.start import gain_error, turned
 from imuarray.errors import InputError
 from imuarray.linear import scaled_inverse
 from imuarray.model.effects import EFFECTS
-from imuarray.model.timing import LONG
 
 CLOCKS, DELAYS, GYROSCOPES = "clocks of the IMUs", "delay of each IMU", "gyroscope maps"
 LAG, FILTER = "lag of the gyroscopes", "filter of the gyroscopes"
@@ -39,8 +38,7 @@ EFFECT_GROUPS = {
     SQUARE: ("accelerometer_rate_square",),
     "lever arms of the axes": ("size_effect",),
 }
-# Where motion is rough, what the gyroscopes see of it is free, and these are in that; two IMUs take
-# their angular acceleration from the gyroscopes.
+# Where motion is rough, what the gyroscopes see of it is free, and these are in that.
 ROUGH_GROUPS = {name: ids for name, ids in EFFECT_GROUPS.items() if not EFFECTS[ids[0]].smooth}
 
 
@@ -76,10 +74,22 @@ def resumed(readings: Readings, columns: Columns, active, state: State) -> Estim
     state = few.unflat(state, columns.flat(state)[:, kept])
     columns, active = few, active[:, kept]
     recorded = Recorded.of(most_informative(readings, lambda text: None), columns, state)
+    values = columns.flat(state)
+    means = [np.sum(mask * values) for item, mask in columns.gauges(active) if item.kinds == [1]]
+    if recorded.smooth and np.any(np.abs(means) > SETTINGS.stiff):  # a scale that slopes have shown
+        recorded = replace(recorded, state=turned(recorded.readings, recorded.state, follows=True))
     imus = np.flatnonzero(active[:, columns.of(CLOCK)].any(axis=1))
     if imus.size:
         recorded = timed(recorded, recorded.readings.keep, columns, imus)
     return widths.settled(estimate([recorded], columns, active))
+
+
+def _slow(one: Recorded) -> bool:
+    """True of smooth motion: of a pair, whose omega_dot is its rate's slope, by that alone."""
+    readings, rate = one.readings, one.state.motion[:, :3]
+    if not (one.smooth and readings.pair):
+        return one.smooth
+    return abs(gain_error(readings, rate, readings.window, 4)) < SETTINGS.slow_enough
 
 
 def groups_of(readings: Sequence[Readings]) -> list[str]:
@@ -103,25 +113,30 @@ def select_forward(
     fitted, then the others are tested again. At last each must still gain beside all others, but
     for clocks, whose jumps a fit does not move, and for what the estimate of another calls for
     (`Selected.needed`). Where motion is smooth and no sensor late, the rate's own change is then a
-    prior of omega_dot. ``bare``: whether the last fit is wanted where no group is kept. InputError
-    or LinAlgError where the readings do not determine positions or motion.
+    prior of omega_dot. ``bare``: whether the last fit is wanted where no group is kept; else it is
+    to be sampled from, by a density that has no such change. InputError or LinAlgError where the
+    readings do not determine positions or motion.
     """
-    names = groups_of(readings)
+    names = [name for name in groups_of(readings) if bare or name != OWN]
     columns, begun = _begun(readings, names)
     rough = [name for name in names if name in ROUGH_GROUPS]
-    if rough != names and not all(one.smooth for one in begun):
+    if rough != names and not all(map(_slow, begun)):
         names, (columns, begun) = rough, _begun(readings, rough)
     found = estimate(begun, columns, columns.mask([POSITION]), steps=SETTINGS.group_steps)
     now = Selected(found, tuple(one.readings.keep for one in begun), {})
     clocks, groups = [], []
-    for _ in names:
+    for _ in range(len(names)):
         before = set(now.kept)
         if CLOCKS in names and CLOCKS not in now.kept:
             now, clocks = now.clocked()
         groups = now.tried(names)
         now = now.with_kept([group.name for group in groups if group.kept])
-        if set(now.kept) == before:
-            needed = now.needed(names)
+        each = {group.name: group.gain for group in groups}
+        if {LAG, OWN, DELAYS} <= before & each.keys():  # one says what the two others do
+            less = min(OWN, DELAYS, key=each.__getitem__)
+            now, names = now.without([less]), [name for name in names if name != less]
+        elif set(now.kept) == before:
+            needed = now.needed(names, {group.name for group in groups if group.kept})
             groups = [group._replace(kept=group.kept or group.name in needed) for group in groups]
             now = now.with_kept(needed)
             break
@@ -130,7 +145,7 @@ def select_forward(
     if not (now.kept or bare):
         return now.found, clocks + groups
     found = now.fitted().found
-    late = any(map(_needs_neighbours, now.kept))
+    late = any(map(_needs_neighbours, now.kept)) or (GYROSCOPES in now.kept and not bare)
     if all(one.smooth for one in found.recorded) and (readings[0].pair or not late):
         found, curved = _with_slope(found, now.kept, CURVE in names)
         groups = [*groups, *curved.values()]
@@ -208,32 +223,21 @@ class Selected(NamedTuple):
         asked = [n for n in names if n != CURVE and not set(EFFECT_GROUPS[n]) <= part]
         masks = {name: self.found.columns.mask(EFFECT_GROUPS[name]) for name in asked}
         # a pair's filter takes up what a delay leaves: it is for `needed` to say
-        never = FILTER if self.pair else ""
-        return [
-            one._replace(kept=one.kept and one.name != never)
-            for one in gains(self.found, masks, self.kept)
-        ]
+        return gains(self.found, masks, self.kept, FILTER if self.pair else "")
 
     @property
     def pair(self) -> bool:
         """True of two IMUs."""
         return self.found.recorded[0].readings.pair
 
-    def needed(self, names) -> list[str]:
-        """Groups that another one's estimate calls for.
+    def needed(self, names, kept) -> list[str]:
+        """Groups that the estimate of one of those ``kept`` calls for.
 
-        Gyroscope maps at odds with those of first order; the shape of filters behind a lag that is
-        long, or of two IMUs, which do not tell it.
+        Gyroscope maps at odds with those of first order; beside a lag the shape of filters, however
+        uncertain that is: what lags droops.
         """
-        columns, found = self.found.columns, []
         chance, _ = widths.settled(self.found).maps_hold.get("gyroscope", (1.0, []))
-        if chance < SETTINGS.chance:
-            found.append(GYROSCOPES)
-        if LAG in self.kept:
-            each = columns.flat(self.found.recorded[0].state)
-            longest = np.abs(each[:, columns.of(*EFFECT_GROUPS[LAG])]).max()
-            if longest > LONG or self.pair:
-                found.append(FILTER)
+        found = [GYROSCOPES] * (chance < SETTINGS.chance) + [FILTER] * (LAG in kept)
         return [name for name in found if name in names]
 
     def clocked(self) -> tuple[Self, list[EffectGroup]]:
@@ -310,7 +314,7 @@ def _contradicted(parts, prior, values, freed, spread) -> bool:
     return bool(chdtrc(len(off), off @ np.linalg.solve(spread, off)) < SETTINGS.chance)
 
 
-def gains(found: Estimate, masks: dict, kept: dict) -> list[EffectGroup]:
+def gains(found: Estimate, masks: dict, kept: dict, never: str = "") -> list[EffectGroup]:
     """Gain of each group on held-out time beside those kept, and those before it that gain.
 
     ``masks``, ``kept`` {group: (N, m) bool}. By one linearisation with all of them. Maps that first
@@ -323,7 +327,8 @@ def gains(found: Estimate, masks: dict, kept: dict) -> list[EffectGroup]:
     given, out = tested(found, active), []
     beside = np.any([found.active, *kept.values()], axis=0)
     for name, mask in masks.items():
-        out.append(_tried(name, given, mask, beside, left, smooth))
+        one = _tried(name, given, mask, beside, left, smooth)
+        out.append(one._replace(kept=one.kept and name != never))
         beside = beside | (mask & out[-1].kept)
     return out
 
@@ -344,7 +349,7 @@ def _tried(name: str, given: Tested, own, beside, left, smooth: bool) -> EffectG
     parts = [(inner[square], slope[used]) for inner, slope in given.blocks]
     system = parts, (ridge[square], given.means[used]), given.values[used], freed[used]
     nats, error = summed(each := gains_of(*system, spare[used]))
-    # what moves much in one block gains most there: its error is large, and no doubt of the rest
+    # what moves much in one block gains most there: the error is large, and less a doubt
     steady = smooth and nats - np.max(each) > SETTINGS.steady_nats
     least = SETTINGS.steady_z if steady else SETTINGS.group_z
     good = nats > max(least * error, SETTINGS.group_nats)

@@ -125,6 +125,8 @@ class Settings:
     # `widths`
     map_nearly: float = 0.25  # of the largest distance of an IMU's map: as likely the one
     fixed_map: float = 1e-7  # sd of a map's entry that is known
+    known_line: float = 0.01  # of the longest arm: accelerometers nearer to a line are on it
+    slow_enough: float = 0.02  # of a pair's slope, that a polynomial may make too small
     # `derivatives`
     most_gaps: float = 0.5  # of the samples
     # `directions`

@@ -137,20 +137,25 @@ def is_smooth(readings: Readings, motion) -> bool:
 
     That of four accelerometers or more may be without one, which is late or filtered.
     """
-    rate, count = motion[:, :3], len(readings.array.positions)
+    rate, count, places = motion[:, :3], len(readings.array.positions), readings.array.relative
     slope = polynomial_derivative(readings.time, readings.run, rate, readings.window, 1)
 
-    def follows(turn) -> bool:
-        return bool(np.corrcoef(slope.ravel(), turn.ravel())[0, 1] > SETTINGS.smooth)
+    def follows(turn, of=slope) -> bool:
+        return bool(np.corrcoef(of.ravel(), turn.ravel())[0, 1] > SETTINGS.smooth)
 
     if follows(motion[:, 3:6]) or count < 4:
         return follows(motion[:, 3:6])
-    turn, force = motion[:, None, 3:6], motion[:, None, 6:9]
-    seen = lever(rate[:, None], turn, readings.array.relative) + force
-    off = np.where(readings.keep[:, :count, :3], readings.values[:, :count, :3] - seen, 0.0)
-    worst = np.arange(len(readings.labels)) == np.argmax(np.sum(off**2, axis=(0, 2)))
-    few = readings.without(np.repeat([True, False], 3) & worst[:, None])
-    return follows(_linear_motion(few, readings.array.relative, rate)[:, :3])
+    whole = readings.keep[:, :count, :3].all(axis=(1, 2))
+    turn, force = motion[whole, None, 3:6], motion[whole, None, 6:9]
+    seen = lever(rate[whole, None], turn, places) + force
+    off = np.sum((readings.values[whole, :count, :3] - seen) ** 2, axis=(0, 2))
+    others = np.delete(places, np.argmax(off), axis=0)
+    sizes = np.linalg.svd(others - others.mean(axis=0), compute_uv=False)
+    if whole.sum() < SETTINGS.least_samples or sizes[1] < SETTINGS.known_line * sizes[0]:
+        return False
+    worst = np.arange(len(readings.labels)) == np.argmax(off)
+    few = readings.without(np.repeat([True, False], 3) & worst[:, None]).select(whole)
+    return follows(_linear_motion(few, places, rate[whole])[:, :3], slope[whole])
 
 
 def with_derivatives(readings, state, smooth) -> State:

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import chdtrc
 
-from imuarray.engine.estimate import Estimate, jackknifed, means, pinned, tested
+from imuarray.engine.estimate import Estimate, jackknifed, means, pinned, shown, tested
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import Columns, columns_of, stepped
 from imuarray.engine.readings import Left
@@ -159,14 +159,13 @@ def _formal(found: Estimate) -> np.ndarray:
     mine = pairs[:, 1] < 3
     size[found.places[0][mine]] = 2.0 * found.positions[pairs[mine, 0], pairs[mine, 1]]
     variance = np.mean([one.readings.clock_sd**2 for one in found.recorded])
-    if any(effect.resizes for effect, _ in found.columns.gauges(found.active)):
-        variance += np.nan_to_num(found.scale_sd) ** 2
     return out + variance * np.outer(size, size)
 
 
 def priors_of(found: Estimate) -> np.ndarray:
     """Precision (n, n) of the priors, gauges as wide as they may be."""
-    return pinned(found.columns, found.active, found.places, found.values)
+    given = found.columns, found.active, found.places, found.values
+    return pinned(*given, shown(found.recorded))
 
 
 def lost(freedoms) -> float:

@@ -112,7 +112,8 @@ def _bridged(time, rate, offset, usual):
     far = np.flatnonzero(steps >= SETTINGS.move_bridged * usual)
     if not len(far):
         return time, rate, 0.0
-    way = np.linalg.norm((rate[far] + rate[far + 1]) / 2 - offset, axis=1) * steps[far]
+    speed = np.linalg.norm(rate - offset, axis=1)
+    way = (speed[far] + speed[far + 1]) / 2 * steps[far]
     more = [np.arange(time[k] + usual, time[k + 1] - usual / 2, usual) for k in far]
     every = np.sort(np.concatenate([time, *more]))
     return every, np.stack([np.interp(every, time, axis) for axis in rate.T], 1), float(way.sum())

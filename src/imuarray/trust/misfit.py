@@ -88,23 +88,30 @@ def unsteady(calibration: xr.Dataset, corrected: bool, recordings: int = 1) -> l
 
 
 def changed(calibration: xr.Dataset) -> list[str]:
-    """Triads that do not fit the others in a part of smooth motion, and do in the rest.
+    """Triads, of three or more, that do not fit the others in a part of smooth motion.
 
-    Where no filter is estimated: of a slow one's, powers of frequency leave fast motion.
+    In many stretches between two instants and in none outside them: single bad readings are
+    elsewhere. Where no filter is estimated: of a slow one's, powers of frequency leave fast motion.
     """
     found: list[str] = []
     if {"gyroscope_filter", "accelerometer_filter"} & {*effect_names(calibration)}:
         return found
-    for kind in KINDS if "gyroscope_smooth_residual" not in calibration else ():
-        rms = calibration.get(f"{kind}_residual", xr.DataArray(np.empty((0, 0)))).to_numpy()
+    for kind in KINDS:
+        if f"{kind}_residual" not in calibration or f"{kind}_smooth_residual" in calibration:
+            continue
+        rms = calibration[f"{kind}_residual"].to_numpy()
         far = rms > SETTINGS.residual * np.maximum(np.median(rms, axis=1, keepdims=True), 1.0)
-        share = far.mean(axis=0) if len(far) else np.zeros(0)
-        for k in np.flatnonzero((share > SETTINGS.changed) & (share < 1 - SETTINGS.changed)):
-            when, label = calibration["stretch"].to_numpy()[far[:, k]], calibration[kind].values[k]
+        for k, share in enumerate(far.mean(axis=0)):
+            places = np.flatnonzero(far[:, k])
+            if not SETTINGS.changed < share < 1 - SETTINGS.changed:
+                continue
+            if len(places) < SETTINGS.changed_within * (np.ptp(places) + 1):
+                continue
+            when, label = calibration["stretch"].to_numpy()[places], calibration[kind].values[k]
             found.append(
-                f"{kind} {label} does not fit the others in {100 * share[k]:.0f} % of the motion,"
+                f"{kind} {label} does not fit the others in {100 * share:.0f} % of the motion,"
                 f" between {when[0]:.3g} and {when[-1]:.3g} s, and does in the rest: did its scale"
-                " change, or did it come loose?"
+                " change, did it come loose, or does it err where the motion is fast?"
             )
     return found
 

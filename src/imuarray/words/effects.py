@@ -233,6 +233,8 @@ def _filtered(kind: str, sizes: Sizes) -> list[str]:
 
 def _averaged(sizes: Sizes) -> list[str]:
     mean, sd = float(np.mean(sizes.values)), float(np.mean(sizes.sds))
+    if mean < -SEEN * sd:
+        return ["accelerometers depart from the rate's square as no filter makes them"]
     if mean < SEEN * sd:
         return ["the sensors' filters are allowed for, and average over no time that is seen"]
     corner = 1 / (2 * np.pi * np.sqrt(mean))
