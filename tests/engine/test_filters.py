@@ -12,6 +12,7 @@ from imuarray.engine import forward
 from imuarray.engine.derivatives import derivatives
 from imuarray.engine.forward import BAND, FILTER, OWN, select_forward, with_effects
 from imuarray.engine.readings import arrange
+from imuarray.engine.start import is_smooth
 from imuarray.geometry import sub_array
 from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting
@@ -98,6 +99,18 @@ def test_filters_of_two_imus_droop_where_they_lag():
     found, groups = select_forward([arrange(recording, sparse=True)])
     assert {FILTER, BAND} <= {group.name for group in groups if group.kept}
     assert distance(found, truth)[0] < 2
+
+
+@pytest.mark.parametrize("every", [1, 2, 700])
+def test_lost_readings_leave_rough_motion_rough(every):
+    """The worst accelerometer is left out to look again, where others have readings at rails."""
+    readings = arrange(filtered([98] * 4, [98] * 4)[0], sparse=True)
+    keep, motion = readings.keep.copy(), np.random.default_rng(0).standard_normal((2300, 9))
+    keep[::every, 2, :3] = False
+    for imu in (1, 3):
+        values = readings.values.copy()
+        values[:, imu, :3] += 50 * np.random.default_rng(1).standard_normal((2300, 3))
+        assert not is_smooth(replace(readings, keep=keep, values=values), 100 * motion)
 
 
 def test_filters_alike_are_none():

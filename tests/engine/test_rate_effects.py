@@ -45,13 +45,16 @@ def test_what_grows_with_the_rate_is_found(change, group):
     assert np.sqrt(np.mean((off / position_sds(found)) ** 2)) < 2 and np.abs(off).max() < 3e-5
 
 
-def test_a_scale_of_all_gyroscopes_that_no_pose_tells_is_the_slopes(monkeypatch):
+@pytest.mark.parametrize(("common", "differ"), [(1.006, [-0.006, 0.0, 0.006]), (1.01, 0.0005)])
+def test_a_scale_of_all_gyroscopes_that_no_pose_tells_is_the_slopes(common, differ, monkeypatch):
     """Angular acceleration goes with the rate, centrifugal force with its square."""
     model = ArrayModel.isotropic(sub_array(imuarray.mimu4444(), 4), 0.04, 0.002)
     rng, places = np.random.default_rng(1), model.array.relative
     motion, time = hand_twisting(rng, np.radians(700), 3.0), np.arange(0, 12, 0.005)
     recording, truth = simulate_samples(model, motion.at(time), places, places, rng, time)
-    read = recording.angular_rate * [1.0, 1.006, 1.012]
+    if np.ndim(differ) == 0:
+        differ = differ * rng.standard_normal((4, 3))
+    read = recording.angular_rate * (common + np.array(differ))
     readings = [arrange(replace(recording, angular_rate=read), sparse=True)]
     found, groups = select_forward(readings)
     assert GYROSCOPES in {group.name for group in groups if group.kept}

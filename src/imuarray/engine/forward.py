@@ -10,7 +10,7 @@ from scipy.special import chdtrc
 
 from imuarray.engine import widths
 from imuarray.engine.clocks import CLOCK, refined, shown_clocks, timed, with_clocks
-from imuarray.engine.estimate import Estimate, Recorded, Tested, estimate, tested
+from imuarray.engine.estimate import Estimate, Recorded, Tested, estimate, pinned, tested
 from imuarray.engine.heldout import gains_of, summed
 from imuarray.engine.linearise import State
 from imuarray.engine.parameters import POSITION, Columns, columns_of
@@ -298,7 +298,8 @@ def _of_one_truth(found: Estimate, more: Estimate) -> bool:
     spreads = []
     for one in (found, more):
         placed = one.places[0][np.argwhere(one.active)[:, 1] < 3]
-        known = one.information / widths.lost(one.freedoms) + widths.priors_of(one)
+        prior = pinned(one.columns, one.active, one.places, one.values, shown=True)
+        known = one.information / widths.lost(one.freedoms) + prior
         spreads.append(scaled_inverse(known)[np.ix_(placed, placed)])
     statistic, freedom = widths.hausman((more.positions - found.positions)[1:].ravel(), *spreads)
     return bool(chdtrc(max(freedom, 1), statistic) > SETTINGS.chance)
