@@ -320,7 +320,7 @@ def pinned(columns, active, places, values=None, shown=False) -> np.ndarray:
 
 
 def _variance_of_mean(values, chosen) -> float:
-    """Of all ``chosen`` (N, m) bool values, by how they, and the means of all IMUs', differ."""
+    """Variance of the mean of the ``chosen`` (N, m) bool, by how they or axes' means differ."""
     axes = chosen.any(axis=0)
     means = np.sum(values * chosen, axis=0)[axes] / chosen.sum(axis=0)[axes]
     some = [x for x in (values[chosen], means) if len(x) > 1]

@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from imuarray.model.effects import KINDS
+from imuarray.model.effects import EFFECTS, KINDS
 from imuarray.recording import Recording
 from imuarray.trust.checked import effect_names
 from imuarray.trust.drawing import Places
@@ -94,7 +94,8 @@ def changed(calibration: xr.Dataset) -> list[str]:
     elsewhere. Where no filter is estimated: of a slow one's, powers of frequency leave fast motion.
     """
     found: list[str] = []
-    if {"gyroscope_filter", "accelerometer_filter"} & {*effect_names(calibration)}:
+    effects = [EFFECTS[name] for name in effect_names(calibration) if name in EFFECTS]
+    if any(effect.smooth and effect.sampling for effect in effects):
         return found
     for kind in KINDS:
         if f"{kind}_residual" not in calibration or f"{kind}_smooth_residual" in calibration:
