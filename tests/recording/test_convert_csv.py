@@ -198,7 +198,7 @@ def test_units_are_spelled_as_in_recordings(tmp_path, kind, unit, known):
 @pytest.mark.parametrize(
     ("factor", "unit", "words"),
     [
-        (1, "s", "found 0.1 over 4.83 minutes; are they in ms, declared s"),
+        (1, "s", "found 0.1 over 290 s; are they in ms, declared s"),
         (1e-3, "ms", "found 1e.05 over 0.00029 s; are they in s, declared ms"),
         (1e3, "ms", "are they in us, declared ms"),
     ],

@@ -50,16 +50,12 @@ def sawtooths(time, score, information, imus, delays: dict, wider=lambda imu, cl
         log_p = log_chi_square(max(gain, 1e-9), 3) + SETTINGS.many + np.log(len(time) * len(imus))
         if log_p < SETTINGS.sawtooth and gain > SETTINGS.fair * delays.get((imu,), 0.0):
             each[imu] = (gain, values)
-    for imu in list(each):
-        if any(_echo(each[imu], other) for other in each.values()):
+    for imu, (gain, clock) in list(each.items()):
+        # a far stronger one of the same frequency leaves an echo elsewhere
+        if any(abs(abs(clock[1]) - abs(other[1])) < 0.1 and gain < 0.2 * more
+               for more, other in each.values()):  # fmt: skip
             del each[imu]
     return each
-
-
-def _echo(one, other) -> bool:
-    """True of a sawtooth that a far stronger one of the same frequency leaves elsewhere."""
-    same = abs(abs(one[1][1]) - abs(other[1][1])) < 0.1
-    return same and one[0] < 0.2 * other[0]
 
 
 def sawtooth(time, score, information):

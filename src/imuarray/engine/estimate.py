@@ -169,9 +169,13 @@ def estimate(
         far = number < first
         recorded, passes = _passed(recorded, columns, active, int(far))
         if robust:
-            nu = ROBUST if far else _freedoms(recorded, passes)
+            pairs = zip(recorded, passes, strict=True)  # the least of all recordings' is all's
+            nu = ROBUST if far else np.min([freedoms(x.readings, y) for x, y in pairs], axis=0)
         noisy = _judged(recorded, passes, columns, active, nu)
-        change = _noise_change(recorded, noisy)
+        change = max(
+            float(np.max(np.abs(new.readings.sd / old.readings.sd - 1)[old.readings.exists]))
+            for old, new in zip(recorded, noisy, strict=True)
+        )
         information, score, blocks = _summed(passes, places)
         values = _values(recorded, columns, active, places)
         precision = pinned(columns, active, places, shown=shown(recorded))
@@ -327,13 +331,6 @@ def _variance_of_mean(values, chosen) -> float:
     return float(max((np.var(x, ddof=1) / len(x) for x in some), default=0.0))
 
 
-def _freedoms(recorded, passes) -> np.ndarray:
-    """The least of all recordings'."""
-    return np.min(
-        [freedoms(one.readings, seen) for one, seen in zip(recorded, passes, strict=True)], axis=0
-    )
-
-
 def _judged(recorded, passes, columns, active, nu) -> tuple[Recorded, ...]:
     """Noise and weights anew; a triad has paid for its share of the parameters."""
     paid = np.zeros((len(active), 2))
@@ -343,13 +340,6 @@ def _judged(recorded, passes, columns, active, nu) -> tuple[Recorded, ...]:
     return tuple(
         replace(one, readings=reweighted(one.readings, seen, paid / len(recorded), nu))
         for one, seen in zip(recorded, passes, strict=True)
-    )
-
-
-def _noise_change(before, after) -> float:
-    return max(
-        float(np.max(np.abs(new.readings.sd / old.readings.sd - 1)[old.readings.exists]))
-        for old, new in zip(before, after, strict=True)
     )
 
 

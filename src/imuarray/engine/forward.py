@@ -223,12 +223,8 @@ class Selected(NamedTuple):
         asked = [n for n in names if n != CURVE and not set(EFFECT_GROUPS[n]) <= part]
         masks = {name: self.found.columns.mask(EFFECT_GROUPS[name]) for name in asked}
         # a pair's filter takes up what a delay leaves: it is for `needed` to say
-        return gains(self.found, masks, self.kept, FILTER if self.pair else "")
-
-    @property
-    def pair(self) -> bool:
-        """True of two IMUs."""
-        return self.found.recorded[0].readings.pair
+        pair = self.found.recorded[0].readings.pair
+        return gains(self.found, masks, self.kept, FILTER if pair else "")
 
     def needed(self, names, kept) -> list[str]:
         """Groups that the estimate of one of those ``kept`` calls for.

@@ -146,8 +146,7 @@ def is_smooth(readings: Readings, motion) -> bool:
     if follows(motion[:, 3:6]) or count < 4:
         return follows(motion[:, 3:6])
     whole = readings.keep[:, :count, :3].all(axis=(1, 2))
-    turn, force = motion[whole, None, 3:6], motion[whole, None, 6:9]
-    seen = lever(rate[whole, None], turn, places) + force
+    seen = lever(rate[whole, None], motion[whole, None, 3:6], places) + motion[whole, None, 6:9]
     off = np.sum((readings.values[whole, :count, :3] - seen) ** 2, axis=(0, 2))
     others = np.delete(places, np.argmax(off), axis=0)
     sizes = np.linalg.svd(others - others.mean(axis=0), compute_uv=False)

@@ -37,16 +37,8 @@ def require_plausible_rate(time, where: str, declared: object = "") -> None:
     hint += f", declared {declared}?" if declared and right else "?"
     raise InputError(
         f"{where}: expected stamps of {SETTINGS.slowest:g} to {SETTINGS.fastest:g} samples a"
-        f" second, found {1 / step:.3g} over {_long(float(np.ptp(time)))}; {hint}"
+        f" second, found {1 / step:.3g} over {np.ptp(time):.6g} s; {hint}"
     )
-
-
-def _long(seconds: float) -> str:
-    """A time in the largest unit of which it has one."""
-    for unit, size in (("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):
-        if seconds > 2 * size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds:.3g} s"
 
 
 def factor(quantity: str, unit: object, where: str) -> float:

@@ -95,18 +95,16 @@ def changed(calibration: xr.Dataset) -> list[str]:
     """
     found: list[str] = []
     effects = [EFFECTS[name] for name in effect_names(calibration) if name in EFFECTS]
-    if any(effect.smooth and effect.sampling for effect in effects):
-        return found
-    for kind in KINDS:
+    slow = any(effect.smooth and effect.sampling for effect in effects)
+    for kind in () if slow else KINDS:
         if f"{kind}_residual" not in calibration or f"{kind}_smooth_residual" in calibration:
             continue
         rms = calibration[f"{kind}_residual"].to_numpy()
         far = rms > SETTINGS.residual * np.maximum(np.median(rms, axis=1, keepdims=True), 1.0)
         for k, share in enumerate(far.mean(axis=0)):
             places = np.flatnonzero(far[:, k])
-            if not SETTINGS.changed < share < 1 - SETTINGS.changed:
-                continue
-            if len(places) < SETTINGS.changed_within * (np.ptp(places) + 1):
+            part = SETTINGS.changed < share < 1 - SETTINGS.changed
+            if not part or len(places) < SETTINGS.changed_within * (np.ptp(places) + 1):
                 continue
             when, label = calibration["stretch"].to_numpy()[places], calibration[kind].values[k]
             found.append(

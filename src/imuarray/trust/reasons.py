@@ -247,18 +247,12 @@ def _drawn(places: Places, course: Slope | None) -> list[str]:
             0 if abs(course.correlation) < SETTINGS.coherent else int(np.sign(course.correlation))
         )
         change = _turning_words(course, places) if course.off else None
-        said = [_skipped_words(course), departures(places._replace(hand=hand)), change]
+        lost = (
+            f"samples were dropped: {course.skipped} steps or more between rows are twice as long,"
+            " by the motion, as their stamps or the declared rate say; log the sensors' own stamps"
+        )
+        said = [lost * bool(course.skipped), departures(places._replace(hand=hand)), change]
     return [sentence for sentence in said if sentence]
-
-
-def _skipped_words(course: Slope) -> str | None:
-    """Samples that are missing between rows stamped as neighbours."""
-    if not course.skipped:
-        return None
-    return (
-        f"samples were dropped: {course.skipped} steps or more between rows are twice as long, by"
-        " the motion, as their stamps or the declared rate say; log the sensors' own stamps"
-    )
 
 
 def _little(recording: Recording, places: Places) -> list[str]:
