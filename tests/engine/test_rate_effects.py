@@ -12,6 +12,7 @@ from imuarray.engine.readings import arrange
 from imuarray.geometry import sub_array
 from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting
+from imuarray.provenance import write_netcdf
 from imuarray.simulation.recordings import simulate_samples
 from imuarray.words import sentences
 from tests.engine.test_engine import errors, position_sds
@@ -62,6 +63,20 @@ def test_a_scale_of_all_gyroscopes_that_no_pose_tells_is_the_slopes(common, diff
     assert np.sqrt(np.mean((off / sds) ** 2)) < 2 and np.abs(off).max() < 3e-5
     monkeypatch.setattr(estimate, "shown", lambda recorded: False)
     assert np.abs(errors(select_forward(readings)[0], truth)).max() > 3 * np.abs(off).max()
+
+
+def test_a_scale_that_slopes_have_shown_stays_where_a_calibration_is_the_model(tmp_path):
+    model = ArrayModel.isotropic(sub_array(imuarray.mimu4444(), 4), 0.04, 0.002)
+    rng, places = np.random.default_rng(1), model.array.relative
+    motion, time = hand_twisting(rng, np.radians(700), 3.0), np.arange(0, 12, 0.005)
+    recording, _ = simulate_samples(model, motion.at(time), places, places, rng, time)
+    differ = 0.0005 * rng.standard_normal((4, 3))
+    recording = replace(recording, angular_rate=recording.angular_rate * (1.01 + differ))
+    found = imuarray.calibrate(recording)
+    write_netcdf(found, tmp_path / "cal.nc")
+    again = imuarray.calibrate(recording, tmp_path / "cal.nc")
+    # pinned, the array would be 2 % larger or smaller: 0.4 mm
+    np.testing.assert_allclose(again["position"], found["position"], atol=5e-6)
 
 
 def test_a_curve_is_not_asked_of_motion_too_fast_for_slopes():

@@ -177,11 +177,11 @@ def estimate(
             for old, new in zip(recorded, noisy, strict=True)
         )
         information, score, blocks = _summed(passes, places)
-        values = _values(recorded, columns, active, places)
         precision = pinned(columns, active, places, shown=shown(recorded))
         if number == 0 and not weighted:  # what is far out is to have no say in the first step
             recorded = noisy
             continue
+        values = _values(recorded, columns, active, places)
         columns = with_likely_spread(columns, active, values, information + precision, places[0])
         precision = pinned(columns, active, places, shown=shown(recorded))
         slope = score - precision @ (values - means(recorded, columns, active, places))

@@ -75,8 +75,12 @@ def resumed(readings: Readings, columns: Columns, active, state: State) -> Estim
     columns, active = few, active[:, kept]
     recorded = Recorded.of(most_informative(readings, lambda text: None), columns, state)
     values = columns.flat(state)
-    means = [np.sum(mask * values) for item, mask in columns.gauges(active) if item.kinds == [1]]
-    if recorded.smooth and np.any(np.abs(means) > SETTINGS.stiff):  # a scale that slopes have shown
+    common = [
+        np.sum(mask * values) / np.sum(mask)
+        for item, mask in columns.gauges(active) if item.resizes and item.kinds == [1]
+    ]  # fmt: skip
+    # pinned it would be some 1e-5: slopes have shown it
+    if recorded.smooth and np.any(np.abs(common) > SETTINGS.stiff / 10):
         recorded = replace(recorded, state=turned(recorded.readings, recorded.state, follows=True))
     imus = np.flatnonzero(active[:, columns.of(CLOCK)].any(axis=1))
     if imus.size:
@@ -125,7 +129,7 @@ def select_forward(
     found = estimate(begun, columns, columns.mask([POSITION]), steps=SETTINGS.group_steps)
     now = Selected(found, tuple(one.readings.keep for one in begun), {})
     clocks, groups = [], []
-    for _ in range(len(names)):
+    for _ in names:
         before = set(now.kept)
         if CLOCKS in names and CLOCKS not in now.kept:
             now, clocks = now.clocked()

@@ -83,13 +83,16 @@ class Settings:
     smooth_share: float = 0.2  # share of rough samples that are looked at as the smooth ones
     spared: float = 1e-3  # least share of the information that blocks but one are taken to have
     # `forward`
+    slow_enough: float = 0.02  # of a pair's slope, that a polynomial may make too small
     slope_agrees: float = 1.02  # times the residual that a prior of omega_dot may make
     chance: float = 1e-3  # of maps as far from those of first order, of positions as far apart
     least_difference: float = 0.03  # of the variance, by which two estimates may differ at least
     group_z: float = 2.0  # standard errors of a gain, from which a group is kept
     group_nats: float = 2.0  # nats, as well
-    steady_z: float = 1.5  # the same of a gain of `steady_nats` without the best block
-    steady_nats: float = 10.0  # nats, in smooth motion
+    steady_z: float = (
+        1.5  # the same, where smooth motion gains `steady_nats` without its best block
+    )
+    steady_nats: float = 10.0  # nats
     known_slope: float = (
         1e-2  # of the angular acceleration, to which slopes must know it for a curve
     )
@@ -120,13 +123,12 @@ class Settings:
     course_shaken: float = 1e-7  # chance of a triad's residual in plain noise: then it is far off
     course_several: int = 2  # IMUs off at once: motion faster than samples, no single bad reading
     # `start`
+    known_line: float = 0.01  # of the longest arm: accelerometers nearer to a line are on it
     clear_motion: float = 10.0  # times the noise's power, from which a frequency is motion
     coherent_gain: float = 0.3  # sds of what a prior's samples say of one factor common to them all
     # `widths`
     map_nearly: float = 0.25  # of the largest distance of an IMU's map: as likely the one
     fixed_map: float = 1e-7  # sd of a map's entry that is known
-    known_line: float = 0.01  # of the longest arm: accelerometers nearer to a line are on it
-    slow_enough: float = 0.02  # of a pair's slope, that a polynomial may make too small
     # `derivatives`
     most_gaps: float = 0.5  # of the samples
     # `directions`
