@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
+from imuarray.analysis.calibration import calibrate
 from imuarray.analysis.logs import open_logs
 from imuarray.analysis.model import Say, silent
-from imuarray.analysis.sensors import calibrate_sensors
 from imuarray.analysis.settings import SETTINGS
 from imuarray.errors import IdentifiabilityError, InputError, require
 from imuarray.firstorder.correct import FirstOrder, calibrate_first_order, correct
@@ -44,7 +44,7 @@ def board(
     else:
         corrected = correct(recording, found)
     say("positions from the motion")
-    calibration = calibrate_sensors([corrected])
+    calibration = calibrate(corrected)
     if isinstance(found, str):
         known = [
             f"first order was left out ({found}): offsets, scales and axes of the sensors are taken"

@@ -1,18 +1,34 @@
-"""Positions of a board and parameters of its sensors from recordings, as one labelled dataset."""
+"""Positions of a board, parameters of its sensors and motion from recordings, as one dataset."""
 
-from collections.abc import Sequence
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from os import PathLike
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
+from imuarray.analysis import methods
+from imuarray.analysis.known import again, used
 from imuarray.analysis.model import Say, assumed, require_together, silent, usable
-from imuarray.analysis.sensors import calibrate_sensors, finished
-from imuarray.engine.dataset import motion_variables, noise_variables, positions_dataset
+from imuarray.engine.dataset import (
+    engine_dataset,
+    motion_variables,
+    noise_variables,
+    positions_dataset,
+    with_readings,
+)
+from imuarray.engine.estimate import Estimate
+from imuarray.engine.forward import EffectGroup, groups_of, select_forward, with_effects
 from imuarray.engine.parameters import model_of
+from imuarray.errors import InputError, one_line
 from imuarray.estimation.newton import calibrate_gauss_newton, parameter_covariance
+from imuarray.firstorder.rails import less_leak_by_others
 from imuarray.model import ArrayModel
-from imuarray.recording import Recording
+from imuarray.provenance import digest, stamp
+from imuarray.recording import Recording, load_dataset
+from imuarray.recording.channels import require_apart, require_live
 
 
 def calibrate(
@@ -68,7 +84,14 @@ def calibrate(
     require_together(model, recordings, effects, accelerometer_noise)
     if model == "papers":
         return calibrate_papers(recordings[0], accelerometer_noise, say)
-    return calibrate_sensors(recordings, str(model), tuple(effects), say)
+    for one in recordings:
+        require_live(one)
+    require_apart(recordings)
+    whole = [less_leak_by_others(one) for one in recordings]
+    found, groups = fitted(whole, str(model), effects, say)
+    dataset = engine_dataset(whole, found)
+    dataset.attrs["parts"] = json.dumps([group._asdict() for group in groups])
+    return finished(dataset, recordings, str(model))
 
 
 def calibrate_papers(
@@ -81,18 +104,11 @@ def calibrate_papers(
     """
     given, recording = recording, assumed(usable(recording, say), accelerometer_noise)
     model = model_of(recording)
-    whole = recording.in_memory()
-    found = search(
-        model, whole.specific_force, whole.angular_rate, saturated=whole.saturated_gyroscopes()
-    )
-    return finished(papers_dataset(recording, model, found), [given], "papers")
-
-
-def papers_dataset(recording: Recording, model: ArrayModel, found) -> xr.Dataset:
-    """Calibration of an estimator of the papers' model."""
+    whole, saturated = recording.in_memory(), recording.saturated_gyroscopes()
+    found = search(model, whole.specific_force, whole.angular_rate, saturated=saturated)
     covariance = found.covariance
     if covariance is None:
-        covariance = parameter_covariance(model, found, recording.saturated_gyroscopes())
+        covariance = parameter_covariance(model, found, saturated)
     dataset = positions_dataset(recording, found.positions, covariance)
     variables = motion_variables(found.motion.motion[:3]) | noise_variables(model.noise)
     variables |= {
@@ -103,7 +119,7 @@ def papers_dataset(recording: Recording, model: ArrayModel, found) -> xr.Dataset
     dataset = dataset.assign(variables).assign_coords(time=recording.time)
     dataset.attrs |= {"converged": int(found.converged), "samples": len(recording.time)}
     dataset.attrs["residual_ratio"] = residual_ratio(recording, model, found)
-    return dataset
+    return finished(dataset, [given], "papers")
 
 
 def residual_ratio(recording: Recording, model: ArrayModel, found) -> float:
@@ -119,3 +135,69 @@ def residual_ratio(recording: Recording, model: ArrayModel, found) -> float:
         misfit += model.noise.misfit(*off, saturated)
         freedom, start = freedom - int(saturated.sum()), start + len(part.time)
     return float(np.sqrt(misfit / freedom)) if freedom > 0 else float("nan")
+
+
+def fitted(
+    recordings: Sequence[Recording], model: str, effects: Sequence[str], say: Say
+) -> tuple[Estimate, list[EffectGroup]]:
+    """(estimate, groups tried) under a calibration's model, ``effects``, or the sensor model.
+
+    InputError where no model of the kind is near the readings.
+    """
+    if methods.is_file(model):
+        with _near_the_model():
+            try:
+                return again(recordings[0], load_dataset(Path(model)), say), []
+            except InputError as error:
+                raise InputError(f"--model {model}: {error}") from None
+    readings = [used(one, say) for one in recordings]
+    if not effects:
+        return _selected(readings, True, say)
+    with _near_the_model():
+        return with_effects(readings, effects), []
+
+
+@contextmanager
+def _near_the_model() -> Iterator[None]:
+    """A search that diverges is bad input, in one line."""
+    try:
+        yield
+    except np.linalg.LinAlgError as error:
+        raise InputError(
+            "recording: expected readings near those of the model, found a search that diverges"
+            f" ({one_line(error)}); are they corrected (imuarray first-order), and units, axes and"
+            " times as declared?"
+        ) from error
+
+
+def fitted_beyond(
+    recording: Recording, model: str, effects: Sequence[str], say: Say
+) -> Estimate | None:
+    """`fitted` of one recording, None where no more than positions and motion are in the model."""
+    if methods.is_file(model) or effects:
+        return fitted([recording], model, effects, say)[0]
+    readings = [used(recording, say)]
+    if not groups_of(readings):
+        return None
+    found, groups = _selected(readings, False, say)
+    return found if any(group.kept for group in groups) else None
+
+
+def _selected(readings, bare: bool, say: Say) -> tuple[Estimate, list[EffectGroup]]:
+    """`select_forward`, each group's verdict told."""
+    with _near_the_model():
+        found, groups = select_forward(readings, bare=bare)
+    for group in groups:
+        verdict = "kept" if group.kept else "left out"
+        say(f"{group.name}: {verdict}, {group.gain:.3g} ({group.error:.2g}) nats on held-out time")
+    return found, groups
+
+
+def finished(dataset: xr.Dataset, recordings, model: str) -> xr.Dataset:
+    """With what the recordings say of themselves, and the origin."""
+    if not all(np.isfinite(dataset[f"position{name}"]).all() for name in ("", "_covariance")):
+        raise InputError("recording: expected one that determines the positions, found no solution")
+    dataset = with_readings(dataset, recordings)
+    data = [part for one in recordings for part in (one.specific_force, one.angular_rate)]
+    dataset.attrs |= {"model": model, **stamp({"recording": digest(*data)}, 0)}
+    return dataset

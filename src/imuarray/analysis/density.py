@@ -70,14 +70,14 @@ def posterior_of(
     log-normal priors a factor of twenty wide. ``known``: whether the accelerometers' noise is the
     model's own.
     """
-    fitted = estimated_noise(recording, model, mode_search(recording), known, say)
-    found, chosen = fitted.calibration, fitted.model
+    chosen, found, seen = estimated_noise(recording, model, mode_search(recording), known, say)
     if not found.converged:
         say(NOT_CONVERGED)
     # s is flat: differences between triads do not show it
-    chosen = replace(chosen, motion_sd=(*fitted.motion_sd[:2], np.inf))
+    chosen = replace(chosen, motion_sd=(*seen.motion_sd[:2], np.inf))
     free = [not known, True, True, True, False]
-    unknown = unknown_scales(model, chosen, fitted.freedom, np.zeros(3), len(recording.time))
+    number = seen.freedom.sum(axis=0)
+    unknown = unknown_scales(model, chosen, number, np.zeros(3), len(recording.time))
     before, freedom = (part[free] for part in unknown)
     prior = prior_of(recording, chosen)
     return Posterior(

@@ -21,40 +21,6 @@ from imuarray.recording import Recording
 from imuarray.trust import effect_names, require_fit
 
 
-def with_own(readings: Readings, effects, positions, values: dict) -> Estimate:
-    """The parameters of a recording's own beside those of its board, which stay.
-
-    ``effects``: of the board's model; ``positions`` (A, 3) m; ``values`` {effect: parameters}, of
-    which those of a recording's own are not looked at. Clocks are looked for where they are among
-    the effects.
-    """
-    own = [name for name in effects if EFFECTS[name].own]
-    timing = ["sensor_delay"] * (CLOCK in own and "sensor_delay" not in effects)
-    columns = columns_of(readings.array, [*effects, *timing], readings.position_prior_sd)
-    kept = {name: value for name, value in values.items() if name not in own}
-    state = State(np.empty((0, 9)), positions, columns.model.join(kept), ())
-    one = Recorded.of(readings, columns, state)
-    free = columns.mask([name for name in own if name != CLOCK])
-    if CLOCK not in own:
-        return estimate([one], columns, free)
-    one = estimate([one], columns, free, steps=SETTINGS.group_steps).recorded[0]
-    clocks, keep = shown_clocks(one, columns), readings.keep
-    imus = sorted(clocks)
-    one = with_clocks(one, columns, clocks)
-    one = timed(refined(one, keep, columns, imus), keep, columns, imus)
-    return _finished(one, columns, tuple(effects), [name for name in own if name != CLOCK], imus)
-
-
-def _finished(one: Recorded, columns: Columns, effects, own, imus) -> Estimate:
-    """All ``own`` effects and the clocks of some IMUs, no more than ``effects`` in the model."""
-    found = columns.model.split(one.state.parameters)
-    columns = columns_of(one.readings.array, effects, one.readings.position_prior_sd)
-    values = columns.model.join({name: found[name] for name in effects})
-    mask = columns.mask([CLOCK], imus)
-    one = replace(one, state=one.state._replace(parameters=values))
-    return estimate([one], columns, columns.mask(own) | mask)
-
-
 def again(recording: Recording, calibration: xr.Dataset, say: Say = silent) -> Estimate:
     """The estimate of a recording from where a calibration has it.
 
@@ -92,10 +58,38 @@ def used(recording: Recording, say: Say = silent) -> Readings:
 
 
 def with_board(recording: Recording, calibration: xr.Dataset) -> tuple[Readings, Estimate]:
-    """A recording's samples, and what is its own beside a calibration's positions and effects."""
+    """A recording's samples, and its own parameters beside a calibration's, which stay.
+
+    Clocks are looked for where they are among the calibration's effects.
+    """
     readings, effects = used(recording), effect_names(calibration)
+    own = [name for name in effects if EFFECTS[name].own]
+    timing = ["sensor_delay"] * (CLOCK in own and "sensor_delay" not in effects)
+    columns = columns_of(readings.array, [*effects, *timing], readings.position_prior_sd)
     values = model_of(recording, effects).split(calibration["effect_parameter"].to_numpy())
-    return readings, with_own(readings, effects, calibration["position"].to_numpy(), values)
+    kept = {name: value for name, value in values.items() if name not in own}
+    positions = calibration["position"].to_numpy()
+    state = State(np.empty((0, 9)), positions, columns.model.join(kept), ())
+    one = Recorded.of(readings, columns, state)
+    fitted = [name for name in own if name != CLOCK]
+    free = columns.mask(fitted)
+    if CLOCK not in own:
+        return readings, estimate([one], columns, free)
+    one = estimate([one], columns, free, steps=SETTINGS.group_steps).recorded[0]
+    clocks, keep = shown_clocks(one, columns), readings.keep
+    imus = sorted(clocks)
+    one = with_clocks(one, columns, clocks)
+    one = timed(refined(one, keep, columns, imus), keep, columns, imus)
+    return readings, _finished(one, columns, effects, fitted, imus)
+
+
+def _finished(one: Recorded, columns: Columns, effects, own, imus) -> Estimate:
+    """All ``own`` effects and the clocks of some IMUs, no more than ``effects`` in the model."""
+    found = columns.model.split(one.state.parameters)
+    columns = columns_of(one.readings.array, effects, one.readings.position_prior_sd)
+    values = columns.model.join({name: found[name] for name in effects})
+    one = replace(one, state=one.state._replace(parameters=values))
+    return estimate([one], columns, columns.mask(own) | columns.mask([CLOCK], imus))
 
 
 def fused(recording: Recording, calibration: xr.Dataset, chosen) -> Rough:

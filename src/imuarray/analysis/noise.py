@@ -17,15 +17,6 @@ from imuarray.model import ArrayModel, Noise
 from imuarray.recording import Recording
 
 
-class Fitted(NamedTuple):
-    """A fit at the noise that it shows."""
-
-    model: ArrayModel  # with that noise
-    calibration: Calibration
-    motion_sd: np.ndarray  # (3,) of omega, omega_dot, s: what is not noise of their estimates
-    freedom: np.ndarray  # (2,) degrees that the two kinds of noise rest on
-
-
 class NoiseEstimate(NamedTuple):
     """Noise and motion's size by residuals and motion of a fit."""
 
@@ -96,8 +87,8 @@ def noise_of(readings: Readings) -> Noise:
 
 def estimated_noise(
     recording: Recording, model: ArrayModel, fit, known: bool = False, say: Say = silent
-) -> Fitted:
-    """The papers' model's fit of a recording, and the noise of each triad that goes with it.
+) -> tuple[ArrayModel, Calibration, NoiseEstimate]:
+    """The papers' model with the noise of each triad, its fit of a recording, and what that shows.
 
     Restricted maximum likelihood: each triad's squared residuals against the degrees of freedom
     that motion and positions leave it, fit and noise by turns. Where those are few, or triads too
@@ -127,4 +118,4 @@ def estimated_noise(
             break
         readings = readings.with_sd(readings.sd * wrong)
         model = replace(model, noise=noise_of(readings))
-    return Fitted(model, found, seen.motion_sd, seen.freedom.sum(axis=0))
+    return model, found, seen

@@ -10,6 +10,7 @@ import pandas as pd
 import xarray as xr
 
 from imuarray.analysis import methods
+from imuarray.analysis.calibration import fitted_beyond
 from imuarray.analysis.density import (
     NOT_CONVERGED,
     Posterior,
@@ -19,7 +20,6 @@ from imuarray.analysis.density import (
     traced,
 )
 from imuarray.analysis.model import Say, assumed, require_together, silent, usable
-from imuarray.analysis.sensors import fitted_beyond
 from imuarray.analysis.settings import SETTINGS
 from imuarray.engine.dataset import effects_of
 from imuarray.engine.parameters import model_of
