@@ -19,10 +19,12 @@ from imuarray.errors import IdentifiabilityError, InputError
 def calls(monkeypatch, tmp_path):
     """Stand-ins for the commands, which note what they were called with."""
     seen = []
-    for name in ("simulate", "calibrate", "sample"):
-        command = types.ModuleType(f"imuarray.commands.{name}")
+    for module, name in (
+        ("recordings", "simulate"), ("calibrate", "calibrate"), ("sample", "sample")
+    ):  # fmt: skip
+        command = types.ModuleType(f"imuarray.commands.{module}")
         setattr(command, name, lambda arguments, name=name: seen.append((name, arguments)))
-        monkeypatch.setitem(sys.modules, f"imuarray.commands.{name}", command)
+        monkeypatch.setitem(sys.modules, f"imuarray.commands.{module}", command)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "rec.nc").write_text("stands for a recording")
     (tmp_path / "c.yaml").write_text("scale: quick")

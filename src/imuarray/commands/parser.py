@@ -101,14 +101,14 @@ COMMANDS = (
         folder=True,
     ),
     Command(
-        "columns", "convert.draft_columns",
+        "columns", "recordings.draft_columns",
         "Draft the YAML that describes a log: columns, units, rate, noise, and what it could not"
         " know.",
         "log.csv --out columns.yaml", "YAML to write, a new file",
         (TABLES,),
     ),
     Command(
-        "simulate", "simulate.simulate",
+        "simulate", "recordings.simulate",
         "Simulate a recording; its truth is stored in the group 'truth'.",
         "--out rec.nc", "recording to write (NetCDF-4)",
         (
@@ -119,7 +119,7 @@ COMMANDS = (
         ),
     ),
     Command(
-        "convert mimu", "convert.convert_mimu",
+        "convert mimu", "recordings.convert_mimu",
         "Read the packets of a MIMU board; damage is located and counted.",
         "data.bin --positions IMU_positions.csv --out rec.nc", "recording to write (NetCDF-4)",
         (
@@ -139,14 +139,14 @@ COMMANDS = (
         ),
     ),
     Command(
-        "convert csv", "convert.convert_logs",
+        "convert csv", "recordings.convert_logs",
         "Read a table, or several of a rig; a small YAML names columns and units"
         " (docs/convert.md).",
         "log.csv --columns columns.yaml --out rec.nc", "recording to write (NetCDF-4)",
         (TABLES, file_option("--columns", "YAML: columns, units, positions", required=True)),
     ),
     Command(
-        "convert ros", "convert.convert_logs",
+        "convert ros", "recordings.convert_logs",
         "Read the sensor_msgs/Imu of ROS 1 or ROS 2 bags; a small YAML has positions and noise"
         " (docs/convert.md).",
         "run.bag --columns rig.yaml --out rec.nc", "recording to write (NetCDF-4)",
@@ -157,7 +157,7 @@ COMMANDS = (
         ),
     ),
     Command(
-        "first-order", "measured.first_order",
+        "first-order", "recordings.first_order",
         "Calibrate accelerometers from still poses, gyroscopes from the moves between them.",
         "rec.nc --gravity 9.818 --out corrected.nc",
         "corrected recording to write (NetCDF-4), with the calibration in group 'first_order'",
@@ -174,7 +174,7 @@ COMMANDS = (
         ),
     ),
     Command(
-        "select", "measured.select",
+        "select", "recordings.select",
         "Keep moving, unsaturated, informative samples; says what each criterion removed.",
         "corrected.nc --samples 500 --out subset.nc", "recording to write (NetCDF-4)",
         (
