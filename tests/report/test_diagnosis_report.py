@@ -25,7 +25,6 @@ from imuarray.report import drawings as drawn
 from imuarray.report import numbers
 from imuarray.report import write as report
 from imuarray.report.answers import answers, verdict
-from imuarray.report.drawings_model import cause_figure
 from imuarray.report.panels import abscissa, binned, cause_table, signal_of
 from imuarray.words import (
     equation,
@@ -455,7 +454,7 @@ def test_labels_of_neighbouring_panels_do_not_meet(name):
         ).assign(panel=panel, title=title, x_label=x_label, y_label=y_label, series="")
         for panel, title, x_label, y_label in rows
     ]
-    figure = cause_figure(pd.concat(frames))
+    figure = drawn.cause_figure(pd.concat(frames))
     figure.draw_without_rendering()
     for part in ("xaxis", "title"):
         boxes = [

@@ -10,7 +10,7 @@ with job(snakemake):
 
     import pandas as pd
 
-    from imuarray.report.drawings_model import cause_figure
+    from imuarray.report.drawings import cause_figure
     from imuarray.report.write import footer
     from imuarray_papers.figures.style import write_figure
 

@@ -1,17 +1,31 @@
-"""Drawings of one recording's diagnosis: what is wrong, and what its causes gain."""
+"""Drawings of one recording's diagnosis, each of its table of `imuarray.report.numbers`."""
 
 import matplotlib.ticker as ticks
 import numpy as np
 import pandas as pd
 
+from imuarray.diagnosis.settings import SETTINGS
 from imuarray.model.effects import KINDS
-from imuarray.pictures.board import plain
-from imuarray.pictures.style import BLACK, BLUE, GREY, ORANGE, PAGE, VERMILLION, new_figure, styled
+from imuarray.pictures.board import SURE, plain
+from imuarray.pictures.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    LOOKS,
+    ORANGE,
+    PAGE,
+    VERMILLION,
+    new_figure,
+    shade,
+    styled,
+)
 from imuarray.words import number, power_of_ten, spelled
 
 MODELS = {"base": {"color": VERMILLION, "marker": "o"}, "extended": {"color": BLUE, "marker": "s"}}
 NAMES = {"base": "plain model", "extended": "extended model"}
 PLAIN = 0.05  # p-value below which a mark is filled
+ALIKE = SETTINGS.alike  # squared correlation from which two effects are one class
+DARK = 0.75  # from which numbers are white
 
 
 def imu_ticks(axes, labels, most=16) -> float:
@@ -40,10 +54,7 @@ def by_kind(figure, table, **options) -> list:
 
 @styled
 def discrepancy_figure(table: pd.DataFrame, footer=()):
-    """Every check as a dot beside the band of simulations, in sds of that band; both models.
-
-    ``table``: `imuarray.report.numbers.discrepancy_table`.
-    """
+    """Every check as a dot beside the band of simulations, in sds of that band; both models."""
     names = list(dict.fromkeys(table.label))
     figure = new_figure(footer, PAGE, 0.75 + 0.23 * len(names))
     for axes, part in by_kind(figure, table, sharey=True):
@@ -96,7 +107,7 @@ def _ticks_at_powers(axes, values, first: int, most: int, room: float, text):
     powers = powers[:: 1 + (len(powers) > most)]
     low = -powers[powers <= room * abs(min(values.min(), 0))][::-1]
     axes.set_xticks([*low, 0, *powers])
-    axes.xaxis.set_major_formatter(ticks.FuncFormatter(text))
+    axes.xaxis.set_major_formatter(text)
 
 
 def _model_handles(axes, size) -> list:
@@ -109,10 +120,7 @@ def _model_handles(axes, size) -> list:
 
 @styled
 def residual_figure(table: pd.DataFrame, footer=()):
-    """rms residual of every IMU before and after, in declared noise sds.
-
-    ``table``: `imuarray.report.numbers.residual_table`.
-    """
+    """rms residual of every IMU before and after, in declared noise sds."""
     figure = new_figure(footer, PAGE, 2.7)
     for axes, part in by_kind(figure, table):
         _residuals(axes, part)
@@ -155,15 +163,12 @@ def _log_scale(axes, values):
     if high / low < 8:
         axes.yaxis.set_major_locator(ticks.MaxNLocator(5, steps=[1, 2, 5, 10]))
         axes.yaxis.set_minor_locator(ticks.NullLocator())
-    axes.yaxis.set_major_formatter(ticks.FuncFormatter(lambda y, _: f"{y:.10g}"))
+    axes.yaxis.set_major_formatter(lambda y, _: f"{y:.10g}")
 
 
 @styled
 def gain_figure(table: pd.DataFrame, footer=()):
-    """Nats gained on held-out time by each cause in the order of adoption, and by all.
-
-    ``table``: `imuarray.report.numbers.gain_table`.
-    """
+    """Nats gained on held-out time by each cause in the order of adoption, and by all."""
     figure = new_figure(footer, PAGE, 0.8 + 0.25 * len(table))
     axes = figure.subplots()
     places = np.arange(len(table))
@@ -222,10 +227,7 @@ def _power(value, _) -> str:
 
 @styled
 def detectable_figure(table: pd.DataFrame, footer=()):
-    """Smallest size that would be named, best to worst IMU, and what was found, over the usual.
-
-    ``table``: `imuarray.report.numbers.detectable_table`.
-    """
+    """Smallest size that would be named, best to worst IMU, and what was found, over the usual."""
     figure = new_figure(footer, PAGE, 0.75 + 0.2 * len(table))
     axes = figure.subplots()
     for place, row in enumerate(table.itertuples()):
@@ -242,3 +244,109 @@ def detectable_figure(table: pd.DataFrame, footer=()):
     axes.set(xscale="log", xlabel="size over that of a common chip", ylim=(len(table) - 0.4, -0.6))
     axes.legend()
     return figure
+
+
+@styled
+def position_figure(table: pd.DataFrame, footer=()):
+    """Where the extended model puts each triad, from where the plain model does, with 95 %."""
+    figure = new_figure(footer, PAGE, 2.4)
+    panels = figure.subplots(1, 3, sharey=True)
+    labels = list(dict.fromkeys(table.imu))
+    factor, unit = (1e6, "µm") if table.change.abs().max() < 2e-3 else (1e3, "mm")
+    for axes, axis in zip(panels, "xyz", strict=True):
+        part = table[table["axis"] == axis]
+        places = np.array([labels.index(name) for name in part.imu])
+        size = imu_ticks(axes, labels, 10)
+        for model, shift, centre in (
+            ("base", -0.15, 0 * part.change),
+            ("extended", 0.15, part.change),
+        ):
+            axes.errorbar(places + shift, factor * centre, factor * SURE * part[f"{model}_sd"],
+                          linestyle="", markersize=0.8 * size, elinewidth=0.9, label=NAMES[model],
+                          **MODELS[model])  # fmt: skip
+        axes.axhline(0, color=BLACK, linewidth=0.5)
+        axes.set_title(axis)
+    panels[0].set_ylabel(f"change of position ({unit})")
+    legend_above(figure, panels[0].get_legend_handles_labels()[0])
+    return figure
+
+
+@styled
+def separability_figure(table: pd.DataFrame, footer=()):
+    """Matrix of squared canonical correlations: largest below the diagonal, mean above."""
+    names = list(dict.fromkeys(table.effect))
+    figure = new_figure(footer, PAGE, 1.2 + 0.29 * len(names))
+    axes = figure.subplots()
+    for row in table.itertuples():
+        i, j = names.index(row.effect), names.index(row.other)
+        if i != j:
+            _cell(axes, i, j, row.largest if i > j else row.mean)
+    labels = [spelled(name) for name in names]
+    axes.set_yticks(range(len(names)), labels, size=7)
+    axes.set_xticks(range(len(names)), labels, size=7, rotation=60, ha="left",
+                    rotation_mode="anchor")  # fmt: skip
+    axes.xaxis.tick_top()
+    axes.plot([-0.5, len(names) - 0.5], [-0.5, len(names) - 0.5], color=BLACK, linewidth=0.8)
+    axes.set(xlim=(-0.5, len(names) - 0.5), ylim=(len(names) - 0.5, -0.5))
+    axes.grid(False)
+    axes.tick_params(length=0)
+    axes.set_xlabel("below the diagonal: the two most alike forms;  above: mean over the forms")
+    return figure
+
+
+def _cell(axes, line, column, value):
+    color = shade(BLUE, value)
+    axes.fill_between([column - 0.5, column + 0.5], line - 0.5, line + 0.5, color=color, lw=0)
+    one_class = value > ALIKE
+    axes.text(
+        column, line, f"{value:.2f}".replace("0.", ".").replace("1.00", "1"), size=6.5,
+        ha="center", va="center_baseline", color="white" if value > DARK else BLACK,
+        weight="bold" if one_class else "normal",
+    )  # fmt: skip
+    if one_class:
+        axes.fill_between(
+            [column - 0.46, column + 0.46], line - 0.46, line + 0.46, facecolor="none",
+            edgecolor=VERMILLION, linewidth=1.3, zorder=4,
+        )  # fmt: skip
+
+
+@styled
+def cause_figure(table: pd.DataFrame, footer=()):
+    """The added-variable plot of a cause, and panels of its own physics."""
+    count = int(table.panel.max()) + 1
+    figure = new_figure(footer, PAGE, 2.35)
+    panels = figure.subplots(1, count, squeeze=False)[0]
+    for axes, (place, part) in zip(panels, table.groupby("panel"), strict=True):
+        (_own if place else _added_variable)(axes, part)
+        axes.set_xlabel(part.x_label.iloc[0], size=7)
+        axes.set_ylabel(part.y_label.iloc[0], size=7)
+        axes.set_title(plain(part.title.iloc[0]), size=7.5)
+        axes.tick_params(labelsize=6.5)
+        axes.locator_params(nbins=5, steps=[1, 2, 5, 10])
+    return figure
+
+
+def _added_variable(axes, table):
+    """Means of bins, and the line on which they ought to be."""
+    ends = np.array([table.x.min(), table.x.max()])
+    axes.plot(ends, ends, color=BLACK, linewidth=0.9, zorder=1)
+    several = table.series.nunique() > 1
+    for (name, part), look in zip(table.groupby("series"), LOOKS, strict=False):
+        _points(axes, part, marker=look["marker"], color=look["color"], label=name)
+    if several:
+        axes.legend(fontsize=6)
+
+
+def _own(axes, table):
+    """Means of bins, and the fitted cause through them."""
+    table = table.sort_values("x")
+    axes.plot(table.x, table.model, color=BLUE, linewidth=1.1, zorder=1)
+    _points(axes, table, marker="o", color=VERMILLION)
+    axes.axhline(0, color=BLACK, linewidth=0.4)
+
+
+def _points(axes, table, **options):
+    """Means of bins with two standard errors."""
+    axes.errorbar(
+        table.x, table.y, 2 * table.se, linestyle="", markersize=3.2, elinewidth=0.7, **options
+    )

@@ -11,7 +11,6 @@ from imuarray.provenance import atomic_folder, write_bytes, write_netcdf
 from imuarray.report import drawings as drawn
 from imuarray.report import numbers
 from imuarray.report.answers import USUAL, alarming, answers, verdict
-from imuarray.report.drawings_model import ALIKE, cause_figure, position_figure, separability_figure
 from imuarray.report.page import SUFFIXES, Drawing, files, pictured, rendered
 from imuarray.report.panels import cause_table, panels_of
 from imuarray.words import imus_named, sensors_of, spelled
@@ -36,9 +35,10 @@ FIGURES = {  # by name: table, drawing, title, caption
         " with declared and with inflated noise. A placebo ought to gain nothing.",
     ),
     "separability": (
-        numbers.separability_table, separability_figure, "What this recording can distinguish",
+        numbers.separability_table, drawn.separability_figure,
+        "What this recording can distinguish",
         "Squared canonical correlation of the effects' signals, each on all IMUs, motion and"
-        f" positions projected out. Framed: above {ALIKE}, one class. Below the diagonal the"
+        f" positions projected out. Framed: above {drawn.ALIKE}, one class. Below the diagonal the"
         " two most alike forms of two effects, above it the mean over the forms of the smaller"
         " effect: 1 below and little above means that a single form is a gauge.",
     ),
@@ -50,7 +50,7 @@ FIGURES = {  # by name: table, drawing, title, caption
         " Dots: what was found. Steps and clocks, which a scan looks for, are left out.",
     ),
     "positions": (
-        numbers.position_table, position_figure, "Positions",
+        numbers.position_table, drawn.position_figure, "Positions",
         "Where the extended model puts each triad, relative to the plain model; bars are 95 %"
         " intervals as each model claims them.",
     ),
@@ -100,7 +100,7 @@ def draw(diagnosis: Diagnosis, calibration: xr.Dataset) -> list[Drawing]:
             f"cause_{place + 1:02d}_{cause.effect}",
             f"Cause: {spelled(cause.effect)}, {imus_named(sensors)}",
             CAUSE_CAPTION.format(panels_of(cause.effect)[1]),
-            files(cause_figure(table, said), table),
+            files(drawn.cause_figure(table, said), table),
         ))  # fmt: skip
     found += [
         _drawing(name, diagnosis, said) for name in ("separability", "detectable", "positions")
