@@ -10,9 +10,7 @@ In a notebook::
     diagnosis = imuarray.diagnose(recording)
     imuarray.plots.positions(calibration)
 
-The folders follow the path of the data: array geometry -> motion -> measurement model (and
-effects) -> simulation and recordings -> estimation -> posterior -> studies -> diagnosis -> figures
-and claims. Heavy modules load when they are first used.
+docs/architecture.md says what each folder holds. Heavy modules load when they are first used.
 """
 
 import lazy_loader

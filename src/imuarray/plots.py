@@ -35,8 +35,11 @@ def posterior(chains: xr.DataTree, accelerometer: str, axes: Axes | None = None)
 
     ``chains``: what `imuarray.sample` gave; InputError for a triad that it does not have.
     """
-    draws, mean, sd = _of(chains, accelerometer)
-    axes = given_or_new(axes)
+    known = [str(label) for label in chains["posterior"]["accelerometer"].to_numpy()]
+    require_one_of("accelerometer", accelerometer, known)
+    axes, one = given_or_new(axes), {"accelerometer": known.index(accelerometer)}
+    draws = chains["posterior"]["position"].isel(one).to_numpy()
+    mean, sd = (chains["prior"][f"position_{x}"].isel(one).to_numpy() for x in ("mean", "sd"))
     for number, name in enumerate("xyz"):
         values = 1e3 * (draws[..., number].ravel() - mean[number])
         style = look(number, "marker")
@@ -51,18 +54,6 @@ def posterior(chains: xr.DataTree, accelerometer: str, axes: Axes | None = None)
     )
     axes.legend()
     return axes
-
-
-def _of(chains: xr.DataTree, accelerometer: str):
-    """(draws (chain, draw, 3), prior mean (3,), prior sd (3,)) of one triad, in m."""
-    known = [str(label) for label in chains["posterior"]["accelerometer"].to_numpy()]
-    require_one_of("accelerometer", accelerometer, known)
-    of = {"accelerometer": known.index(accelerometer)}
-    prior = chains["prior"]
-    return tuple(
-        field.isel(of).to_numpy()
-        for field in (chains["posterior"]["position"], prior["position_mean"], prior["position_sd"])
-    )
 
 
 def motion(dataset: xr.Dataset, quantity: str = "angular_rate", axes: Axes | None = None) -> Axes:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from imuarray.posterior.diagnostics import agreement, autocorrelation, ess, find_burn_in, rhat
+from imuarray.posterior.diagnostics import agreement, ess, find_burn_in, rhat
 
 
 def ar1(rng, shape, coefficient):
@@ -107,12 +107,3 @@ def test_burn_in_that_is_never_reached():
     cut, table = find_burn_in(draws, ar1(rng, (2, 2000, 1), 0.5)[..., 0])
     assert not passed(cut, table)
     assert table.rhat_max.min() > 1.05
-
-
-def test_autocorrelation_of_an_autoregression():
-    """Seed 11; a^k within 0.05, six standard errors for 100 000 draws and a = 0.8."""
-    series = ar1(np.random.default_rng(11), (1, 100_000, 1), 0.8)[0, :, 0]
-    found = autocorrelation(series, 20)
-    assert found.shape == (20,)
-    np.testing.assert_allclose(found, 0.8 ** np.arange(20), atol=0.05)
-    assert found[0] == pytest.approx(1.0)

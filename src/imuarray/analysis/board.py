@@ -38,20 +38,17 @@ def board(
     require(samples >= SETTINGS.fewest, source, f"at least {SETTINGS.fewest} samples", samples)
     say(f"{samples} samples of {count} IMUs; each sensor from still poses")
     found = _first_order(recording, gravity)
-    corrected = recording
     if isinstance(found, str):
         say(f"first order left out: {found}")
-    else:
-        corrected = correct(recording, found)
-    say("positions from the motion")
-    calibration = calibrate(corrected)
-    if isinstance(found, str):
+        corrected = recording
         known = [
             f"first order was left out ({found}): offsets, scales and axes of the sensors are taken"
             " as read, and the sds do not know how far these are off"
         ]
     else:
-        known = reasons_of_poses(of_first_order(found))
+        corrected, known = correct(recording, found), reasons_of_poses(of_first_order(found))
+    say("positions from the motion")
+    calibration = calibrate(corrected)
     reasons = reasons_of_calibration(corrected, calibration, known)
     return Board(source, opened.lines, recording, found, corrected, calibration, reasons)
 

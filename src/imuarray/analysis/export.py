@@ -84,7 +84,10 @@ def describe(calibration: xr.Dataset, noise: StillNoise | None = None) -> dict[s
                 value, sd = (part[k] for part in times[kind])
                 imu[kind] = {
                     "label": labels[kind][k], "unit": NUMBERS[f"{kind}_noise_sd"],
-                    "corrections": [_step(step, k) for step in steps[kind]],
+                    "corrections": [
+                        {name: part if name == "from" else part[k] for name, part in step.items()}
+                        for step in steps[kind]
+                    ],
                     "time_offset_s": value, "time_offset_sd_s": sd,
                     "noise": _noise(calibration, noise, kind, k, rate),
                 }  # fmt: skip
@@ -149,10 +152,6 @@ def _linear(model: ArrayModel, values: dict, kind: int) -> tuple[np.ndarray, np.
 
     columns = [read(unit, MATRICES) for unit in np.eye(3)]
     return np.stack(columns, axis=2), read(np.zeros(3), (*MATRICES, *BIASES))
-
-
-def _step(step: dict, k: int) -> dict[str, Any]:
-    return {name: part if name == "from" else part[k] for name, part in step.items()}
 
 
 def _times(calibration: xr.Dataset, model: ArrayModel) -> dict[str, tuple]:

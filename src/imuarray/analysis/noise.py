@@ -94,11 +94,8 @@ def estimated_noise(
     that motion and positions leave it, fit and noise by turns. Where those are few, or triads too
     few to be told apart, all triads of a kind share one factor.
 
-    Parameters
-    ----------
-    fit : callable, model -> `Calibration` of ``recording`` with its covariance
-    known
-        Whether the accelerometers' noise is the model's own.
+    ``fit``: a function of the model, `Calibration` of ``recording`` with its covariance; ``known``:
+    whether the accelerometers' noise is the model's own.
     """
     columns = columns_of(model.array, (), recording.position_prior_sd)
     readings = measured(

@@ -1,6 +1,7 @@
 """Types of a command line's texts; each refuses a wrong one with what was expected."""
 
 import argparse
+import math
 from functools import partial
 from pathlib import Path
 
@@ -46,28 +47,21 @@ def model(text: str) -> str | InputFile:
     return InputFile(text)
 
 
-def _at_least(least: int, text: str) -> int:
-    """An integer that is not less."""
+def _number(kind: type, least: float, most: float, expected: str, text: str) -> float:
+    """A number of a ``kind`` (int or float) within bounds."""
     try:
-        value = int(text)
+        value = kind(text)
     except ValueError:
-        value = -1
-    if not least <= value < 2**63:
-        raise argparse.ArgumentTypeError(f"expected an integer of at least {least}, found {text!r}")
+        value = math.nan
+    if not least <= value <= most:
+        raise argparse.ArgumentTypeError(f"expected {expected}, found {text!r}")
     return value
 
 
-def positive(text: str) -> float:
-    """A number above 0, of a size that can be computed with."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not SMALLEST <= value <= LARGEST:
-        bounds = f"between {SMALLEST:g} and {LARGEST:g}"
-        raise argparse.ArgumentTypeError(f"expected a positive number, {bounds}, found {text!r}")
-    return value
-
-
-count = partial(_at_least, 1)
-seed = partial(_at_least, 0)
+count, seed = (
+    partial(_number, int, least, 2**63 - 1, f"an integer of at least {least}") for least in (1, 0)
+)
+positive = partial(
+    _number, float, SMALLEST, LARGEST,
+    f"a positive number, between {SMALLEST:g} and {LARGEST:g}",
+)  # fmt: skip

@@ -17,6 +17,7 @@ from imuarray.recording import Recording
 from imuarray.recording.channels import runs
 from imuarray.words import fixed, joined, number
 
+TRIED = 2000  # directions, of which the farthest from all poses is taken
 GAP = 80.0  # deg, from a pose, of a direction that is missed; six faces leave 55
 LITTLE = 0.1  # of the squared rate about an axis; a third is even
 NEAR = 25.0  # deg, within which a direction has an axis' name
@@ -52,17 +53,12 @@ def poses_of(recording: Recording) -> np.ndarray:
 
 def gap_of(poses) -> tuple[float, np.ndarray]:
     """(deg, unit vector (3,)) of the direction farthest from all poses (P, 3)."""
-    tried = spiral(2000)
+    # evenly over the sphere, along a spiral
+    z = 1 - (2 * np.arange(TRIED) + 1) / TRIED
+    angle, radius = np.pi * (3 - np.sqrt(5)) * np.arange(TRIED), np.sqrt(1 - z**2)
+    tried = np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
     apart = np.degrees(np.arccos(np.clip(tried @ poses.T, -1, 1))).min(axis=1)
     return float(apart.max()), tried[int(np.argmax(apart))]
-
-
-def spiral(count: int) -> np.ndarray:
-    """Directions spread evenly over the sphere, (count, 3)."""
-    z = 1 - (2 * np.arange(count) + 1) / count
-    angle = np.pi * (3 - np.sqrt(5)) * np.arange(count)
-    radius = np.sqrt(1 - z**2)
-    return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
 
 
 def missing(recording: Recording, calibration: xr.Dataset) -> list[str]:

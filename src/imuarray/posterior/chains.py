@@ -52,10 +52,9 @@ def chain_tree(chains: Chains, labels, prior, attrs: dict, effects=(), sds=None)
         posterior = posterior.assign_coords(quantity=list(sds))
     stats = xr.Dataset({"log_target": (dims[:2], chains.log_target)})
     stats["acceptance"] = (("chain",), chains.acceptance)
-    split = [prior.mean[: 3 * count].reshape(count, 3), prior.sd[: 3 * count].reshape(count, 3)]
     fields = {
-        name: (dims[2:], value, {"units": "m"})
-        for name, value in zip(("position_mean", "position_sd"), split, strict=True)
+        f"position_{name}": (dims[2:], part[: 3 * count].reshape(count, 3), {"units": "m"})
+        for name, part in (("mean", prior.mean), ("sd", prior.sd))
     }
     groups = {
         "/": xr.Dataset(attrs={**attrs, "thin": chains.thin, "step_length_m": chains.step}),

@@ -65,19 +65,11 @@ def find_burn_in(draws, log_target, threshold: float = 1.05, candidates: int = 1
     first = min(_entry(log_target), length // 2)
     cuts = np.unique([0, *np.linspace(first, length // 2, candidates - 1).astype(int)])
     joined = np.concatenate([draws, log_target[..., None]], axis=2)
-    rows = []
-    for cut in cuts:
-        left = joined[:, cut:]
-        worst = rhat(left)
-        rows.append(
-            {
-                "burn_in": int(cut),
-                "rhat_max": float(worst.max()),
-                "rhat_log_target": float(worst[-1]),
-                "ess_min": float(ess(left).min()),
-            }
-        )
-    table = pd.DataFrame(rows)
+    worst = np.array([rhat(joined[:, cut:]) for cut in cuts])
+    table = pd.DataFrame({
+        "burn_in": cuts, "rhat_max": worst.max(axis=1), "rhat_log_target": worst[:, -1],
+        "ess_min": [ess(joined[:, cut:]).min() for cut in cuts],
+    })  # fmt: skip
     allowed = table[table.burn_in >= first]
     passing = allowed[allowed.rhat_max < threshold]
     enough = passing[passing.ess_min >= (1 - SETTINGS.burn_in_noise) * passing.ess_min.max()]
@@ -95,13 +87,6 @@ def _entry(log_target) -> int:
         inside = values >= floor
         entries.append(int(inside.argmax()) if inside.any() else length)
     return max(entries)
-
-
-def autocorrelation(series, lags: int) -> np.ndarray:
-    """Normalised autocorrelation of a chain (draws,) at lags 0 ... lags - 1."""
-    import emcee
-
-    return emcee.autocorr.function_1d(np.asarray(series, float))[:lags]
 
 
 def summarise(chains: Chains, labels, threshold: float, truth=None):

@@ -4,18 +4,15 @@ That is what a posterior of many samples nearly is. The tail of the importance w
 it is from it (Vehtari, Simpson, Gelman, Yao and Gabry, Pareto smoothed importance sampling, 2024).
 """
 
-import sys
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import numpy as np
-from tqdm import tqdm
 
 from imuarray.model.jax64 import jax
 from imuarray.posterior.chains import Chains
 from imuarray.posterior.diagnostics import ess, pareto_k, rhat
-from imuarray.posterior.nuts import White
+from imuarray.posterior.nuts import White, side_by_side
 from imuarray.posterior.settings import SETTINGS
 from imuarray.streams import stream
 
@@ -33,20 +30,15 @@ def run_independent(
         settings, 4000 at most, fewer where that will not be or k is above `unreliable`.
     """
     white = White(np.asarray(centre), np.linalg.cholesky(covariance), data)
-    seldom = 0.2 if sys.stderr.isatty() else 15.0
-    with (
-        ThreadPoolExecutor(threads) as pool,
-        tqdm(total=0, disable=quiet, unit="draw", mininterval=seldom) as bar,
-    ):
+    with side_by_side(threads, 0, quiet) as (pool, bar):
         weigh = partial(_weights, log_density, pool, bar)
         white = centred(white, weigh, stream(seed, *names, "centre"))
         z = np.empty((SETTINGS.chains, 0, len(white.centre)))
         weights = np.empty((SETTINGS.chains, 0))
         for batch in range(SETTINGS.batches):
             rngs = [stream(seed, *names, chain, batch) for chain in range(SETTINGS.chains)]
-            fresh = np.stack(
-                [rng.standard_normal((draws or SETTINGS.batch, z.shape[2])) for rng in rngs]
-            )
+            size = draws or SETTINGS.batch, z.shape[2]
+            fresh = np.stack([rng.standard_normal(size) for rng in rngs])
             z = np.concatenate([z, fresh], axis=1)
             weighed = weigh(white, fresh.reshape(-1, z.shape[2])).reshape(SETTINGS.chains, -1)
             weights = np.concatenate([weights, weighed], axis=1)
@@ -59,20 +51,13 @@ def run_independent(
 def _settled(chains: Chains, batches: int) -> bool:
     """True where the chains are enough, or so many as may be will hardly be."""
     size = ess(chains.draws).min()
-    return bool(
-        (size >= SETTINGS.effective and rhat(chains.draws).max() <= SETTINGS.rhat)
-        or size * SETTINGS.batches < SETTINGS.effective * batches
-    )
+    enough = size >= SETTINGS.effective and rhat(chains.draws).max() <= SETTINGS.rhat
+    return bool(enough or size * SETTINGS.batches < SETTINGS.effective * batches)
 
 
 def _chains(white: White, z, weights, seed: int, names) -> Chains:
-    uniforms = np.stack(
-        [
-            stream(seed, *names, chain, "accept").random(z.shape[1])
-            for chain in range(SETTINGS.chains)
-        ]
-    )
-    place = walked(weights, np.log(uniforms))
+    accept = [stream(seed, *names, chain, "accept") for chain in range(SETTINGS.chains)]
+    place = walked(weights, np.log([rng.random(z.shape[1]) for rng in accept]))
     z = np.take_along_axis(z, place[..., None], axis=1)
     log_target = np.take_along_axis(weights, place, axis=1) - 0.5 * np.sum(z**2, axis=2)
     accepted = np.mean(np.diff(place, axis=1) != 0, axis=1)
@@ -112,12 +97,10 @@ def centred(white: White, weigh: Callable, rng) -> White:
 
 def _weights(log_density, pool, bar, white: White, z) -> np.ndarray:
     """Log density (n,) over the standard normal's at z (n, size), -inf where not a number."""
-    bar.total = (bar.total or 0) + -(
-        -len(z) // SETTINGS.block
-    ) * SETTINGS.block  # as far as is known by now
-    bar.refresh()
     theta = white.theta(z)
     padded = np.concatenate([theta, np.repeat(theta[:1], -len(z) % SETTINGS.block, axis=0)])
+    bar.total = (bar.total or 0) + len(padded)  # as far as is known by now
+    bar.refresh()
     parts = []
     for part in pool.map(
         lambda block: np.asarray(_values(log_density, block, white.data)),

@@ -1,7 +1,9 @@
 """The no-U-turn sampler on a density with a gradient, whitened at its mode (numpyro's)."""
 
 import sys
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import partial
 from typing import NamedTuple
 
@@ -35,6 +37,15 @@ class White(NamedTuple):
         """z (..., size) of theta (..., size)."""
         away = np.asarray(theta) - self.centre
         return np.linalg.solve(self.factor, away[..., None])[..., 0]
+
+
+@contextmanager
+def side_by_side(threads: int, total: int, quiet: bool) -> Iterator[tuple]:
+    """(pool of threads for the chains, bar that counts draws)."""
+    seldom = 0.2 if sys.stderr.isatty() else 15.0
+    bar = tqdm(total=total, disable=quiet, unit="draw", mininterval=seldom)
+    with ThreadPoolExecutor(threads) as pool, bar:
+        yield pool, bar
 
 
 def _kernel(log_density, white: White):
@@ -97,13 +108,9 @@ def run_nuts(
         for z, key in zip(white.white(starts), keys, strict=True)
     ]
     kept = [[] for _ in starts]
-    seldom = 0.2 if sys.stderr.isatty() else 15.0
     blocks = -(-(warmup + draws) // block)
     run = partial(_advance, log_density, warmup, block, white)
-    with (
-        ThreadPoolExecutor(threads) as pool,
-        tqdm(total=blocks * block, disable=quiet, unit="draw", mininterval=seldom) as bar,
-    ):
+    with side_by_side(threads, blocks * block, quiet) as (pool, bar):
         for _ in range(blocks):
             for chain, (state, made) in enumerate(pool.map(run, states)):
                 states[chain] = state

@@ -140,10 +140,10 @@ def _autocorrelations(left) -> np.ndarray:
 
     At most a quarter of the chain: what lies beyond is noise.
     """
-    from imuarray.posterior.diagnostics import autocorrelation
+    from emcee.autocorr import function_1d
 
     longest = max(2, left.shape[1] // 4)
-    functions = np.array([autocorrelation(draws, longest) for draws in left])
+    functions = np.array([function_1d(draws)[:longest] for draws in left])
     low = np.flatnonzero((functions < 0.05).all(axis=0))
     return functions[:, : max(20, 3 * low[0]) if low.size else longest]
 
