@@ -24,7 +24,7 @@ from imuarray.model.effects import DATA_EFFECTS, EFFECTS
 from imuarray.report import drawings as drawn
 from imuarray.report import numbers
 from imuarray.report import write as report
-from imuarray.report.answers import answers, verdict
+from imuarray.report.answers import ANSWERS, verdict
 from imuarray.report.panels import abscissa, binned, cause_table, signal_of
 from imuarray.words import (
     equation,
@@ -120,6 +120,10 @@ def test_a_browser_shows_the_page(page, tmp_path):
     seen = in_browser(page, tmp_path)
     assert len(seen["widths"]) == page.count("<img ") and min(seen["widths"]) > 1000
     assert seen["fetched"] == [] and seen["wide"]
+
+
+def answers(diagnosis):
+    return [answer(diagnosis) for answer in ANSWERS.values()]
 
 
 def test_page_answers_the_four_questions(page):

@@ -7,7 +7,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from imuarray.analysis.known import fused
 from imuarray.analysis.model import assumed
+from imuarray.engine.clocks import CLOCK
+from imuarray.engine.fusion import COMPONENTS, fuse
 from imuarray.engine.parameters import model_of
 from imuarray.errors import InputError, require
 from imuarray.firstorder.correct import corrected
@@ -58,8 +61,6 @@ def motion_parts(
 
     Where samples depend on each other (two IMUs, IMUs on clocks of their own) there is one part.
     """
-    from imuarray.engine.clocks import CLOCK
-
     recording = as_calibrated(assumed(recording, accelerometer_noise), calibration)
     require_fit(calibration, recording)
     used = [calibration[name].to_numpy() for name in sorted(map(str, calibration.data_vars))]
@@ -168,8 +169,6 @@ def motion_under(
 
     ``saturated`` (T, G, 3) bool: gyroscope axes to be left out; ``origin`` (s): of the recording.
     """
-    from imuarray.engine.fusion import fuse
-
     positions, attrs = calibration["position"].to_numpy(), calibration.attrs
     parameters = (positions - positions[0])[1:].ravel()
     since, span = recording.time - origin, None
@@ -197,9 +196,6 @@ def motion_under(
 
 def _with_own_clocks(found, calibration: xr.Dataset, recording: Recording, covariance):
     """`Fused` with rough motion anew, by the recording's own biases and clocks; whether it is."""
-    from imuarray.analysis.known import fused
-    from imuarray.engine.clocks import CLOCK
-
     if CLOCK not in effect_names(calibration) or covariance is None:
         return found, False
     moving = ~recording.still()
@@ -228,8 +224,6 @@ def _require_parameters(calibration: xr.Dataset, recording: Recording, model: Ar
 
 def motion_dataset(recording: Recording, found, lost) -> xr.Dataset:
     """Motion of the reference triad, its sds and covariances; NaN where ``lost``."""
-    from imuarray.engine.fusion import COMPONENTS
-
     covariance = np.where(lost[:, None, None], np.nan, found.covariance)
     sds = np.sqrt(np.einsum("tii->ti", covariance)).reshape(-1, 3, 3)
     variables: dict[str, tuple] = {

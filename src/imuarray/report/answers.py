@@ -30,17 +30,11 @@ PAPERS = "specific force ω × (ω × r) + dω/dt × r + s, angular rate ω, and
 
 
 class Answer(NamedTuple):
-    """A question, its answer, details, and what must not be overlooked ("" if nothing)."""
+    """The answer to a question, details, and what must not be overlooked ("" if nothing)."""
 
-    question: str
     lead: str
     items: list[str]
     loud: str = ""
-
-
-def answers(diagnosis: Diagnosis) -> list[Answer]:
-    """Answers: what is wrong, why, the extended model, its gain, and what to do with them."""
-    return [part(diagnosis) for part in (wrong, why, extended, gained, onward)]
 
 
 def verdict(diagnosis: Diagnosis) -> str:
@@ -97,7 +91,7 @@ def of_noise(sizes: dict[str, float]) -> str:
 
 
 def wrong(diagnosis: Diagnosis) -> Answer:
-    """Answer to: what does the simulation get wrong?"""
+    """Checks of the residual under the plain model that simulations do not give."""
     document = diagnosis.document
     checks = document["discrepancies"]
     out = [check for check in checks if check["p_value"] <= USUAL]
@@ -114,12 +108,10 @@ def wrong(diagnosis: Diagnosis) -> Answer:
             says = quoted(checks[0])
             lead += f" The most striking, as there always is one: {says[:1].lower()}{says[1:]}"
         lead += " These checks describe. The verdict rests on stricter tests of the residual, which"
-        lead += " all pass."
-        return Answer("What does the simulation get wrong?", lead, [])
+        return Answer(f"{lead} all pass.", [])
     if document["causes"] and max(in_noise_sds(diagnosis.base).values()) < BELOW_NOISE:
         lead += " The misfit is smaller than the noise; its pattern shows it."
-    items = [quoted(check) for check in out[:FEW]]
-    return Answer("What does the simulation get wrong?", lead, items)
+    return Answer(lead, [quoted(check) for check in out[:FEW]])
 
 
 def quoted(check: dict) -> str:
@@ -129,7 +121,7 @@ def quoted(check: dict) -> str:
 
 
 def why(diagnosis: Diagnosis) -> Answer:
-    """Why? The causes in their order; what is left is said loudly."""
+    """The causes in their order; what is left is said loudly."""
     document = diagnosis.document
     items = [cause["says"] for cause in document["causes"]]
     loud = ""
@@ -141,9 +133,9 @@ def why(diagnosis: Diagnosis) -> Answer:
         )
     if clean(document):
         lead = "There is nothing to explain: no effect of the catalogue is significant, and no test"
-        return Answer("Why?", f"{lead} of the residual fails.", [])
+        return Answer(f"{lead} of the residual fails.", [])
     if not items:
-        return Answer("Why?", "No effect of the catalogue explains it.", [], loud)
+        return Answer("No effect of the catalogue explains it.", [], loud)
     lead = f"{len(items)} causes, in the order in which they were found:"
     lead = lead if len(items) > 1 else "One cause:"
     if document["smooth"]:
@@ -157,7 +149,7 @@ def why(diagnosis: Diagnosis) -> Answer:
             f"The causes below leave {left} % of the excess misfit: within tolerance, though it"
             f" still shows in {some(document['remaining'])}. {lead}"
         )
-    return Answer("Why?", lead, items, loud)
+    return Answer(lead, items, loud)
 
 
 def some(checks, most=8) -> str:
@@ -168,13 +160,12 @@ def some(checks, most=8) -> str:
 
 
 def extended(diagnosis: Diagnosis) -> Answer:
-    """Answer to: what does the extended model look like?"""
+    """The extended model: its effects, parameters and noise."""
     document = diagnosis.document
-    question = "What does the extended model look like?"
     noise = noise_in_words(diagnosis)
     if not document["causes"]:
         lead = f"It is the plain model as it stands, {PAPERS}."
-        return Answer(question, lead, [noise])
+        return Answer(lead, [noise])
     items = [
         f"{spelled(cause['effect'])} ({imus_named(cause['sensors'])}): {equation(cause['effect'])}"
         for cause in document["causes"]
@@ -186,7 +177,7 @@ def extended(diagnosis: Diagnosis) -> Answer:
         f" the {int(fits[0].active.sum())} of the positions. u is the true specific force at a"
         " triad:"
     )
-    return Answer(question, lead, [*items, noise])
+    return Answer(lead, [*items, noise])
 
 
 def noise_in_words(diagnosis: Diagnosis) -> str:
@@ -199,9 +190,9 @@ def noise_in_words(diagnosis: Diagnosis) -> str:
 
 
 def gained(diagnosis: Diagnosis) -> Answer:
-    """Answer to: what did it gain? Prediction, residual, positions and their widths."""
+    """What the extended model gained: prediction, residual, positions and their widths."""
     document, gain = diagnosis.document, diagnosis.document["gain"]
-    question, samples = "What did it gain?", document["samples"]
+    samples = document["samples"]
     over_base, over_inflated = (
         plus_minus(gain[key], gain[f"{key}_se"])
         for key in ("heldout_log_score_nats_per_sample", "over_inflated_noise_nats_per_sample")
@@ -213,7 +204,7 @@ def gained(diagnosis: Diagnosis) -> Answer:
             f" {over_base} nats per sample over the declared noise, {over_inflated} over noise of"
             " the residual's size."
         ]
-        return Answer(question, lead, [*items, positions_in_words(diagnosis)])
+        return Answer(lead, [*items, positions_in_words(diagnosis)])
     total = number(samples * gain["over_inflated_noise_nats_per_sample"])
     lead = (
         f"Each of the {samples} samples, predicted from the other stretches of time, is"
@@ -226,7 +217,7 @@ def gained(diagnosis: Diagnosis) -> Answer:
     loud = ""
     if alarming(document):
         loud = "Widths are those of the extended model: what is unexplained is not in them."
-    return Answer(question, lead, items, loud)
+    return Answer(lead, items, loud)
 
 
 def readings_in_words(causes) -> list[str]:
@@ -282,7 +273,7 @@ def positions_in_words(diagnosis: Diagnosis) -> str:
 
 
 def onward(diagnosis: Diagnosis) -> Answer:
-    """Answer to: what to do next?"""
+    """What to do with the diagnosis."""
     document, named = diagnosis.document, [c["effect"] for c in diagnosis.document["causes"]]
     items = [f"Mend this first: {reason}" for reason in document.get("reasons", [])[:1]]
     data = [DATA_EFFECTS[name] for name in named if name in DATA_EFFECTS]
@@ -309,4 +300,13 @@ def onward(diagnosis: Diagnosis) -> Answer:
         " size, what happened once does not."
     )
     lead = "" if named or alarming(document) else "The plain model is enough for this recording."
-    return Answer("What to do next?", lead, items)
+    return Answer(lead, items)
+
+
+ANSWERS = {  # of a diagnosis, by question
+    "What does the simulation get wrong?": wrong,
+    "Why?": why,
+    "What does the extended model look like?": extended,
+    "What did it gain?": gained,
+    "What to do next?": onward,
+}

@@ -10,7 +10,7 @@ from imuarray.engine.dataset import diagnosed
 from imuarray.provenance import atomic_folder, write_bytes, write_netcdf
 from imuarray.report import drawings as drawn
 from imuarray.report import numbers
-from imuarray.report.answers import USUAL, alarming, answers, verdict
+from imuarray.report.answers import ANSWERS, USUAL, alarming, verdict
 from imuarray.report.page import SUFFIXES, Drawing, files, pictured, rendered
 from imuarray.report.panels import cause_table, panels_of
 from imuarray.words import imus_named, sensors_of, spelled
@@ -131,7 +131,8 @@ def html(diagnosis: Diagnosis, drawings: list[Drawing]) -> str:
     document = diagnosis.document
     return rendered(
         "report.html.j2", document=document, facts=facts(diagnosis), verdict=verdict(diagnosis),
-        alarming=alarming(document), answers=answers(diagnosis), figures=drawings, usual=USUAL,
+        alarming=alarming(document), figures=drawings, usual=USUAL,
+        answers={question: answer(diagnosis) for question, answer in ANSWERS.items()},
         checks=diagnosis.base.discrepancies,
         after={item.check: item for item in diagnosis.extended.discrepancies},
         labels=diagnosis.found.search.readings.labels, positions=numbers.position_table(diagnosis),
