@@ -15,6 +15,8 @@ from imuarray.provenance import trust, write_netcdf_parts
 from imuarray.recording import load_dataset, read_recording
 from imuarray.trust import reasons_of_motion
 
+COUNTED = "samples", "left_out", "gyroscope_at_rail", "not_converged"
+RAILED = "off_the_rail", "at_the_rail"
 LATE = 1e-4  # s, worth a line
 
 
@@ -23,7 +25,7 @@ def apply(arguments) -> None:
     output = Output(arguments)
     read = read_recording(arguments.recording, stored=True)
     calibration = load_dataset(arguments.calibration)
-    noise, sums = arguments.accelerometer_noise, Sums()
+    noise, tallies = arguments.accelerometer_noise, []
     try:
         recording = as_calibrated(read, calibration)
         parts = motion_parts(calibration, recording, noise)
@@ -34,11 +36,14 @@ def apply(arguments) -> None:
     as_read = recording is not read
     reasons = reasons_of_motion(assumed(recording, noise), calibration, own, as_read)
     first = first.assign_attrs(trust(reasons))
-    write_netcdf_parts(
-        (sums.add(part) for part in chain((first,), parts)), len(recording.time), arguments.out
-    )
+
+    def counted(part: xr.Dataset) -> xr.Dataset:
+        tallies.append(tally(part))
+        return part
+
+    write_netcdf_parts(map(counted, chain((first,), parts)), len(recording.time), arguments.out)
     average = recording.gyroscope_noise_sd / np.sqrt(recording.angular_rate.shape[1])
-    found = sums.document() | {
+    found = totals(tallies) | {
         "gyroscopes_averaged_sd_rad_s": average, "late_s": first.attrs["late_s"],
         "out": str(arguments.out),
     }  # fmt: skip
@@ -46,37 +51,27 @@ def apply(arguments) -> None:
     output.done(found, reasons)
 
 
-class Sums:
-    """The motion's main numbers, added part by part; sds are rms over samples."""
+def tally(part: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """Of samples: the counts of `COUNTED`; by `RAILED`, values and sums of their squared sds."""
+    lost = np.isnan(part["angular_rate"].to_numpy()).any(axis=1)
+    railed = part["gyroscope_at_rail"].to_numpy() & ~lost
+    missed = ~part["converged"].to_numpy() & ~lost
+    sums = [
+        [3 * where.sum(), *(np.sum(part[f"{name}_sd"].to_numpy()[where] ** 2) for name in UNITS)]
+        for where in (~railed & ~lost, railed)
+    ]
+    return np.array([lost.size, lost.sum(), railed.sum(), missed.sum()]), np.array(sums)
 
-    def __init__(self):
-        self.counts = dict.fromkeys(
-            ("samples", "left_out", "gyroscope_at_rail", "not_converged"), 0
-        )
-        self.squares = {name: [0, np.zeros(len(UNITS))] for name in ("off_the_rail", "at_the_rail")}
 
-    def add(self, part: xr.Dataset) -> xr.Dataset:
-        """The part, counted."""
-        lost = np.isnan(part["angular_rate"].to_numpy()).any(axis=1)
-        railed = part["gyroscope_at_rail"].to_numpy() & ~lost
-        missed = ~part["converged"].to_numpy() & ~lost
-        own = lost.size, lost.sum(), railed.sum(), missed.sum()
-        for name, count in zip(self.counts, own, strict=True):
-            self.counts[name] += int(count)
-        for total, where in zip(self.squares.values(), (~railed & ~lost, railed), strict=True):
-            total[0] += 3 * int(where.sum())
-            total[1] += [np.sum(part[f"{name}_sd"].to_numpy()[where] ** 2) for name in UNITS]
-        return part
-
-    def document(self) -> dict[str, Any]:
-        """For the JSON line."""
-        return self.counts | {
-            name: {
-                f"{field}_sd": float(np.sqrt(x / n)) for field, x in zip(UNITS, sums, strict=True)
-            }
-            for name, (n, sums) in self.squares.items()
-            if n
-        }
+def totals(tallies: list[tuple[np.ndarray, np.ndarray]]) -> dict[str, Any]:
+    """The motion's main numbers; sds are rms over samples."""
+    counts, sums = (sum(parts) for parts in zip(*tallies, strict=True))
+    found: dict[str, Any] = dict(zip(COUNTED, map(int, counts), strict=True))
+    for name, (number, *squares) in zip(RAILED, sums, strict=True):
+        if number:
+            sds = zip(UNITS, np.sqrt(np.array(squares) / number), strict=True)
+            found[name] = {f"{field}_sd": float(sd) for field, sd in sds}
+    return found
 
 
 def report(found: dict) -> list[str]:
@@ -90,7 +85,7 @@ def report(found: dict) -> list[str]:
         lines.append(
             f"gyroscopes averaged, off the rail: sd {average:.3g} deg/s (angular rate, noise alone)"
         )
-    for name in ("off_the_rail", "at_the_rail"):
+    for name in RAILED:
         if name in found:
             rate, acceleration, force = (found[name][f"{field}_sd"] for field in UNITS)
             lines.append(
