@@ -20,7 +20,6 @@ from imuarray.analysis.noise import (
 from imuarray.analysis.settings import SETTINGS
 from imuarray.engine.dataset import effects_of, parameters_of, places_among
 from imuarray.engine.estimate import Estimate
-from imuarray.engine.linearise import State
 from imuarray.engine.parameters import model_of
 from imuarray.engine.readings import Readings
 from imuarray.engine.widths import priors_of
@@ -134,13 +133,18 @@ def common_sd(recording: Recording, model: ArrayModel) -> float:
 
 
 def _model(recording: Recording, found: Estimate, readings: Readings, sizes) -> ArrayModel:
-    """With the readings' noise and clock, and priors of the motion's size (3,)."""
+    """With the readings' noise and clock, and priors of the motion's own size: ``sizes`` (3,)."""
     plain = model_of(recording, effects_of(found))
+    derivative_sd = plain.derivative_sd
+    rms = [np.sqrt(np.mean(field**2)) for field in found.recorded[0].state.jerk]
+    if plain.needs_derivatives and all(rms):
+        first, second = (float(2.0 ** np.ceil(np.log2(size))) for size in rms)
+        derivative_sd = first, second
     return replace(
         plain, noise=noise_of(readings), clock=(readings.origin, readings.span),
         # a compiled function has them: powers of two serve other recordings, too
         motion_sd=tuple(2.0 ** np.round(np.log2(sizes))),
-        derivative_sd=_derivative_sd(plain, found.recorded[0].state),
+        derivative_sd=derivative_sd,
     )  # fmt: skip
 
 
@@ -152,14 +156,6 @@ def _judged(found: Estimate, covariance) -> tuple[Readings, NoiseEstimate]:
     readings = one.readings.with_noise(sds, None)
     seen = noise_estimate(readings, found.columns, one.state, found.active, covariance)
     return readings.with_sd(sds * factors(seen, readings.exists)), seen
-
-
-def _derivative_sd(model: ArrayModel, state: State) -> tuple[float, float]:
-    """Prior sds of omega double dot and s dot: the recording's own where it shows them."""
-    sizes = [np.sqrt(np.mean(field**2)) for field in state.jerk]
-    if not model.needs_derivatives or not all(sizes):
-        return model.derivative_sd
-    return float(2.0 ** np.ceil(np.log2(sizes[0]))), float(2.0 ** np.ceil(np.log2(sizes[1])))
 
 
 def unknown_scales(declared: ArrayModel, chosen: ArrayModel, freedom, own, samples: int):

@@ -62,7 +62,10 @@ def report(dataset: xr.Dataset) -> str:
     state = "converged" if dataset.attrs["converged"] else "NOT converged"
     count, samples = dataset.sizes["iteration"], dataset.attrs["samples"]
     lines = [f"{state} after {count} iterations, {samples} samples", *position_lines(dataset)]
-    return "\n".join([*lines, *_effects(dataset), *_informative(dataset), *_misfit(dataset)])
+    parameters = parameters_of(dataset)  # in their own units (docs/effects.md)
+    lines += ["effect parameter: value (sd)"] * bool(parameters)
+    lines += [f"{name}: {at['value']:.4g} ({at['sd']:.2g})" for name, at in parameters.items()]
+    return "\n".join([*lines, *_informative(dataset), *_misfit(dataset)])
 
 
 def position_lines(dataset: xr.Dataset) -> list[str]:
@@ -75,13 +78,6 @@ def position_lines(dataset: xr.Dataset) -> list[str]:
         values = "  ".join(f"{1e3 * value:8.4f}" for value in row)
         lines.append(f"{label:>5} {values}    {', '.join(number(factor * x, 2) for x in sd)}")
     return lines
-
-
-def _effects(dataset: xr.Dataset) -> list[str]:
-    """The effects' parameters, in their own units (docs/effects.md)."""
-    rows = parameters_of(dataset).items()
-    lines = [f"{name}: {found['value']:.4g} ({found['sd']:.2g})" for name, found in rows]
-    return ["effect parameter: value (sd)", *lines] if lines else []
 
 
 def _informative(dataset: xr.Dataset) -> list[str]:
