@@ -65,7 +65,7 @@ def tally(part: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 
 def totals(tallies: list[tuple[np.ndarray, np.ndarray]]) -> dict[str, Any]:
     """The motion's main numbers; sds are rms over samples."""
-    counts, sums = (sum(parts) for parts in zip(*tallies, strict=True))
+    counts, sums = (np.sum(parts, axis=0) for parts in zip(*tallies, strict=True))
     found: dict[str, Any] = dict(zip(COUNTED, map(int, counts), strict=True))
     for name, (number, *squares) in zip(RAILED, sums, strict=True):
         if number:
