@@ -23,11 +23,8 @@ def run_independent(
 ) -> tuple[Chains, float]:  # fmt: skip
     """(chains, Pareto's k of the proposals' importance weights); arguments as `run_nuts` has them.
 
-    Parameters
-    ----------
-    draws : int or None
-        Of each of four chains; None: until R-hat and ESS are `rhat` and `effective` of the
-        settings, 4000 at most, fewer where that will not be or k is above `unreliable`.
+    ``draws`` of each of four chains; None: until R-hat and ESS are `rhat` and `effective` of the
+    settings, 4000 at most, fewer where that will not be or k is above `unreliable`.
     """
     white = White(np.asarray(centre), np.linalg.cholesky(covariance), data)
     with side_by_side(threads, 0, quiet) as (pool, bar):

@@ -219,19 +219,12 @@ class Marginal:
     ) -> Self:  # fmt: skip
         """Marginal of a recording; modes are searched from those at ``positions`` (A, 3) m.
 
-        Parameters
-        ----------
-        rates : (mean (T, 3) rad/s, covariance (T, 3, 3))
-            p(omega | y_g); by default `Collapsed.rate_density`.
-        motion_sd : (float, float)
-            Prior sds of omega (rad/s) and omega_dot (rad/s^2), infinite as in the paper.
-        nodes : int
-            On each axis of omega; 1 is Laplace's method. By default the fewest of `NODE_COUNTS`
-            that differ by less than ``enough`` nats in total from the next at ``positions``, or
-            the most: ``gap`` says. Two poor gyroscopes already need more than three (tests).
-        spread : (float, int)
-            Chi-square of the gyroscopes about their mean and the number of their readings, which
-            `scaled` needs.
+        ``rates``: p(omega | y_g), mean (T, 3) rad/s and covariance (T, 3, 3), by default
+        `Collapsed.rate_density`; ``motion_sd``: prior sds of omega (rad/s) and omega_dot
+        (rad/s^2); ``nodes`` on each axis of omega, by default the fewest of `NODE_COUNTS` that
+        differ by less than ``enough`` nats in total from the next, or the most: ``gap`` says. Two
+        poor gyroscopes already need more than three (tests). ``spread``: chi-square of the
+        gyroscopes about their mean and the number of their readings, which `scaled` needs.
         """
         mean, covariance = collapsed.rate_density(motion_sd[0]) if rates is None else rates
         relative = np.ascontiguousarray(np.asarray(positions, float) - positions[0])

@@ -79,20 +79,11 @@ def run_nuts(
 ) -> Chains:  # fmt: skip
     """One chain from each of ``starts`` (chains, size), side by side.
 
-    Parameters
-    ----------
-    log_density : callable (theta (size,), *data) -> log density, traceable by JAX
-        Compiled once for each such function and shapes of ``data``, pytrees of arrays.
-    centre, covariance : (size,), (size, size)
-        About the density's mode and the covariance there: what the sampler sees is then nearly
-        a standard normal density.
-    warmup, draws : int
-        Transitions of the warm-up, in which the step length is chosen, not kept; and those kept.
-
-    Raises
-    ------
-    InputError
-        A start where the density or its gradient is not finite.
+    ``log_density``: a function of theta (size,) and ``data``, pytrees of arrays, traceable by JAX;
+    it is compiled once for each function and shapes of data. ``centre`` (size,) and ``covariance``
+    are about the density's mode and the covariance there: the sampler then sees nearly a standard
+    normal density. ``warmup`` transitions, in which the step length is chosen, are not kept.
+    InputError for a start where the density or its gradient is not finite.
     """
     white = White(np.asarray(centre), np.linalg.cholesky(covariance), data)
     starts = np.atleast_2d(np.asarray(starts, float))
