@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import imuarray
-from imuarray.analysis.calibration import fitted_beyond
+from imuarray.analysis.calibration import fitted
 from imuarray.analysis.density import posterior_beyond
 from imuarray.engine.widths import widths
 from imuarray.errors import InputError
@@ -51,7 +51,7 @@ def test_skewed_gyroscopes_are_found_and_sampled():
     """
     recording, truth = simulated(40, ["gyroscope_misalignment"])
     said = []
-    found = fitted_beyond(recording, "sensors", (), said.append)
+    found, _ = fitted([recording], "sensors", (), said.append, bare=False)
     assert any(line.startswith("gyroscope maps: kept") for line in said)
     posterior = posterior_beyond(recording, found)
     off = posterior.mode[:9] - (truth["position"].to_numpy()[1:]).ravel()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import imuarray
-from imuarray.analysis.calibration import fitted_beyond
+from imuarray.analysis.calibration import fitted
 from imuarray.analysis.density import posterior_beyond, traced
 from imuarray.analysis.known import fused
 from imuarray.cli import main
@@ -94,7 +94,7 @@ def test_a_calibration_is_a_model_to_sample(withheld, found, tmp_path):
     """The density stands at the estimate from its effects: all coordinates within 5 sds."""
     recording, truth = withheld
     write_netcdf(found, tmp_path / "cal.nc")
-    estimate = fitted_beyond(recording, str(tmp_path / "cal.nc"), (), print)
+    estimate, _ = fitted([recording], str(tmp_path / "cal.nc"), (), print, bare=False)
     posterior = posterior_beyond(recording, estimate)
     assert posterior.model.effects == ("gyroscope_scale",)
     off = posterior.mode[:12] - truth["position"].to_numpy()[1:].ravel()

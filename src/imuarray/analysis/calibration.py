@@ -89,6 +89,7 @@ def calibrate(
     require_apart(recordings)
     whole = [less_leak_by_others(one) for one in recordings]
     found, groups = fitted(whole, str(model), effects, say)
+    assert found is not None  # for it is wanted in any case
     dataset = engine_dataset(whole, found)
     dataset.attrs["parts"] = json.dumps([group._asdict() for group in groups])
     return finished(dataset, recordings, str(model))
@@ -137,26 +138,6 @@ def residual_ratio(recording: Recording, model: ArrayModel, found) -> float:
     return float(np.sqrt(misfit / freedom)) if freedom > 0 else float("nan")
 
 
-def fitted(
-    recordings: Sequence[Recording], model: str, effects: Sequence[str], say: Say
-) -> tuple[Estimate, list[EffectGroup]]:
-    """(estimate, groups tried) under a calibration's model, ``effects``, or the sensor model.
-
-    InputError where no model of the kind is near the readings.
-    """
-    if methods.is_file(model):
-        with _near_the_model():
-            try:
-                return again(recordings[0], load_dataset(Path(model)), say), []
-            except InputError as error:
-                raise InputError(f"--model {model}: {error}") from None
-    readings = [used(one, say) for one in recordings]
-    if not effects:
-        return _selected(readings, True, say)
-    with _near_the_model():
-        return with_effects(readings, effects), []
-
-
 @contextmanager
 def _near_the_model() -> Iterator[None]:
     """A search that diverges is bad input, in one line."""
@@ -170,27 +151,31 @@ def _near_the_model() -> Iterator[None]:
         ) from error
 
 
-def fitted_beyond(
-    recording: Recording, model: str, effects: Sequence[str], say: Say
-) -> Estimate | None:
-    """`fitted` of one recording, None where no more than positions and motion are in the model."""
-    if methods.is_file(model) or effects:
-        return fitted([recording], model, effects, say)[0]
-    readings = [used(recording, say)]
-    if not groups_of(readings):
-        return None
-    found, groups = _selected(readings, False, say)
-    return found if any(group.kept for group in groups) else None
+@_near_the_model()
+def fitted(
+    recordings: Sequence[Recording], model: str, effects: Sequence[str], say: Say,
+    bare: bool = True,
+) -> tuple[Estimate | None, list[EffectGroup]]:  # fmt: skip
+    """(estimate, groups tried) under a calibration's model, ``effects``, or the sensor model.
 
-
-def _selected(readings, bare: bool, say: Say) -> tuple[Estimate, list[EffectGroup]]:
-    """`select_forward`, each group's verdict told."""
-    with _near_the_model():
-        found, groups = select_forward(readings, bare=bare)
+    ``bare``: whether an estimate is wanted where no group of the sensor model gains, or can be
+    tried; else it is None there. InputError where no model of the kind is near the readings.
+    """
+    if methods.is_file(model):
+        try:
+            return again(recordings[0], load_dataset(Path(model)), say), []
+        except InputError as error:
+            raise InputError(f"--model {model}: {error}") from None
+    readings = [used(one, say) for one in recordings]
+    if effects:
+        return with_effects(readings, effects), []
+    if not bare and not groups_of(readings):
+        return None, []
+    found, groups = select_forward(readings, bare=bare)
     for group in groups:
         verdict = "kept" if group.kept else "left out"
         say(f"{group.name}: {verdict}, {group.gain:.3g} ({group.error:.2g}) nats on held-out time")
-    return found, groups
+    return found if bare or any(group.kept for group in groups) else None, groups
 
 
 def finished(dataset: xr.Dataset, recordings, model: str) -> xr.Dataset:

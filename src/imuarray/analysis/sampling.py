@@ -10,7 +10,7 @@ import pandas as pd
 import xarray as xr
 
 from imuarray.analysis import methods
-from imuarray.analysis.calibration import fitted_beyond
+from imuarray.analysis.calibration import fitted
 from imuarray.analysis.density import (
     NOT_CONVERGED,
     Posterior,
@@ -95,7 +95,7 @@ def sample(
     require_together(model, [recording], effects, accelerometer_noise)
     moving, posterior = usable(recording, say), None
     if model != "papers":
-        found = fitted_beyond(recording, str(model), effects, say)
+        found, _ = fitted([recording], str(model), effects, say, bare=False)
         if found is not None and effects_of(found):
             if not found.converged:
                 say(NOT_CONVERGED)
