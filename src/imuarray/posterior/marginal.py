@@ -245,7 +245,8 @@ class Marginal:
         value = coarser(positions)
         for count in NODE_COUNTS[1:]:
             finer = cls(data, *grid(count))
-            gap, value = abs(value - finer(positions)), finer(positions)
+            before, value = value, finer(positions)
+            gap = abs(before - value)
             if gap < enough:
                 return replace(coarser, gap=gap)
             coarser = finer
