@@ -5,8 +5,9 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from imuarray.analysis.density import NOT_CONVERGED, Posterior, mode_search, prior_of
+from imuarray.analysis.density import NOT_CONVERGED, Posterior, prior_of
 from imuarray.analysis.model import Say, assumed, silent, usable
+from imuarray.analysis.noise import mode_of
 from imuarray.analysis.sampling import NUTS_STEPS, NUTS_WARMUP, tree_of
 from imuarray.engine.parameters import model_of
 from imuarray.errors import InputError, require_one_of
@@ -67,7 +68,7 @@ def flat(recording: Recording, rates: str = "declared", say: Say = silent) -> Fl
         found = locate(recording, recording.accelerometer_noise_sd)
         mode, density = found.mean, sample_covariance(recording.angular_rate)
     else:
-        found = mode_search(recording)(model)
+        found = mode_of(recording, model)
         mode = found.positions
     if not found.converged:
         say(NOT_CONVERGED)

@@ -1,7 +1,6 @@
 """The posterior density of a recording's positions: noise, motion's prior, likelihood, mode."""
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
@@ -23,7 +22,6 @@ from imuarray.engine.estimate import Estimate
 from imuarray.engine.parameters import model_of
 from imuarray.engine.readings import Readings
 from imuarray.engine.widths import priors_of
-from imuarray.errors import IdentifiabilityError
 from imuarray.estimation.collapsed import Collapsed
 from imuarray.geometry import positions_of
 from imuarray.linear import scaled_inverse
@@ -33,7 +31,6 @@ from imuarray.posterior.generic import SCALES, log_laplace, unknown
 from imuarray.posterior.marginal import Marginal, log_posterior
 from imuarray.posterior.prior import GaussianPrior, TiedPrior
 from imuarray.recording import Recording
-from imuarray.streams import stream
 
 NOT_CONVERGED = (
     "the search for the posterior's mode did not converge; chains start from where it ended"
@@ -69,7 +66,7 @@ def posterior_of(
     log-normal priors a factor of twenty wide. ``known``: whether the accelerometers' noise is the
     model's own.
     """
-    chosen, found, seen = estimated_noise(recording, model, mode_search(recording), known, say)
+    chosen, found, seen = estimated_noise(recording, model, known, say)
     if not found.converged:
         say(NOT_CONVERGED)
     # s is flat: differences between triads do not show it
@@ -176,37 +173,6 @@ def prior_of(recording: Recording, model: ArrayModel) -> GaussianPrior:
     sd = np.full(mean.size, recording.position_prior_sd)
     sd[3 * (model.array.accelerometers - 1) :] = model.effect_prior_sd
     return GaussianPrior.of(mean, sd)
-
-
-def mode_search(recording: Recording) -> Callable:
-    """A function of the model that searches the posterior's mode, from where it was last found.
-
-    The first time from elsewhere, too, where few samples leave local optima.
-    """
-    from imuarray.estimation.newton import calibrate_gauss_newton
-
-    last: list[np.ndarray] = []
-
-    def search(model, start):
-        return calibrate_gauss_newton(
-            model, recording.specific_force, recording.angular_rate, start,
-            saturated=recording.saturated_gyroscopes(),
-            position_prior=(model.array.parameters, recording.position_prior_sd),
-        )  # fmt: skip
-
-    def fit(model):
-        found = search(model, last[0] if last else None)
-        if not last and len(recording.time) <= SETTINGS.few:
-            rng = stream(0, "sample", "mode")
-            for _ in range(SETTINGS.starts):
-                off = recording.position_prior_sd * rng.standard_normal(found.positions.shape)
-                with suppress(IdentifiabilityError):  # it ran to triads on one line
-                    other = search(model, model.array.relative + off)
-                    found = min(found, other, key=lambda one: one.cost[-1])
-        last[:] = [found.positions]
-        return found
-
-    return fit
 
 
 @cache

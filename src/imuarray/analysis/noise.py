@@ -1,5 +1,6 @@
 """The noise and the motion's size that a recording itself shows, by restricted likelihood."""
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -12,9 +13,12 @@ from imuarray.engine.linearise import CHUNK, State, chunk_at
 from imuarray.engine.normal import pick
 from imuarray.engine.parameters import Columns, columns_of
 from imuarray.engine.readings import Readings, measured
+from imuarray.errors import IdentifiabilityError
 from imuarray.estimation.identifiability import Calibration
+from imuarray.estimation.newton import calibrate_gauss_newton
 from imuarray.model import ArrayModel, Noise
 from imuarray.recording import Recording
+from imuarray.streams import stream
 
 
 class NoiseEstimate(NamedTuple):
@@ -85,8 +89,32 @@ def noise_of(readings: Readings) -> Noise:
     return Noise.of(*counts, *(readings.sd[:n, kind] for kind, n in enumerate(counts)))
 
 
+def mode_of(recording: Recording, model: ArrayModel, start=None) -> Calibration:
+    """The mode of the positions' posterior under the papers' model, searched from ``start`` (A, 3).
+
+    Without one from the nominal positions, and from others where few samples leave local optima.
+    """
+
+    def search(begin):
+        return calibrate_gauss_newton(
+            model, recording.specific_force, recording.angular_rate, begin,
+            saturated=recording.saturated_gyroscopes(),
+            position_prior=(model.array.parameters, recording.position_prior_sd),
+        )  # fmt: skip
+
+    found = search(start)
+    if start is None and len(recording.time) <= SETTINGS.few:
+        rng = stream(0, "sample", "mode")
+        for _ in range(SETTINGS.starts):
+            off = recording.position_prior_sd * rng.standard_normal(found.positions.shape)
+            with suppress(IdentifiabilityError):  # it ran to triads on one line
+                other = search(model.array.relative + off)
+                found = min(found, other, key=lambda one: one.cost[-1])
+    return found
+
+
 def estimated_noise(
-    recording: Recording, model: ArrayModel, fit, known: bool = False, say: Say = silent
+    recording: Recording, model: ArrayModel, known: bool = False, say: Say = silent
 ) -> tuple[ArrayModel, Calibration, NoiseEstimate]:
     """The papers' model with the noise of each triad, its fit of a recording, and what that shows.
 
@@ -94,15 +122,16 @@ def estimated_noise(
     that motion and positions leave it, fit and noise by turns. Where those are few, or triads too
     few to be told apart, all triads of a kind share one factor.
 
-    ``fit``: a function of the model, `Calibration` of ``recording`` with its covariance; ``known``:
-    whether the accelerometers' noise is the model's own.
+    ``known``: whether the accelerometers' noise is the model's own.
     """
     columns = columns_of(model.array, (), recording.position_prior_sd)
     readings = measured(
         model, recording.specific_force, recording.angular_rate, recording.saturated_gyroscopes()
     )
+    start = None
     for number in range(SETTINGS.rounds + 1):
-        found = fit(model)
+        found = mode_of(recording, model, start)
+        start = found.positions
         motion = np.hstack(found.motion.motion[:3])
         rest = no_derivatives(len(motion), len(found.positions))
         state = State(motion, found.positions, np.empty(0), rest)

@@ -13,8 +13,6 @@ class Settings:
     node_gap: float = 0.05  # nats in total, alike at all positions; finer nodes cost 27 times
     wide: float = 3.0  # prior sd of the log of a noise's and of the motion's sd: a factor of 20
     held: float = 1e-3  # of its prior's sd: the sd of a parameter that the estimate does not free
-    few: int = 50  # samples, up to which several searches for the mode are made
-    starts: int = 8  # of them
     # `logs`
     gravity_within: float = 0.1  # of 1 (g) or of 1000 (mg), by which most readings' size is told
     sure: float = 0.8  # of the rates' roughness is left at even instants; slow motion shows none
@@ -22,6 +20,8 @@ class Settings:
     spike: float = 60.0  # times what a triad usually departs from its neighbours, or its noise
     large: float = 0.5  # of the largest reading, from which an abrupt end is a rail and no rest
     # `noise`
+    few: int = 50  # samples, up to which several searches for the mode are made
+    starts: int = 8  # of them
     rounds: int = 6  # of fit and noise by turns
     enough: float = 0.02  # change of all sds that ends them
     freedom: float = (
