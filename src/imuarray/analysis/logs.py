@@ -103,31 +103,27 @@ def _opened(paths, columns, topics) -> Opened:
     if not logs or any(log.suffix in RECORDINGS for log in logs):
         raise InputError(f"logs: expected one recording, or what loggers wrote, found {len(logs)}")
     if all(map(bags.is_bag, logs)):
-        return _together(bags.read_bags(logs, columns, topics))
+        return _together(bags.read_bags(logs, columns, topics), [])
     none = "none: name it by --columns (imuarray columns drafts one)"
     require(columns is not None, str(logs[0]), "a YAML that describes it", none)
     if len(logs) == 1 and logs[0].name.endswith(PACKETS):
         recording, account = read_board(logs[0], Path(columns))
         return Opened(recording, account.lines())
     found, lines = read_tables(logs, columns)
-    if isinstance(found, Recording):
-        found = _with_rails(found, read_layout(columns))
-    opened = _together(found)
-    return opened._replace(lines=[*lines, *opened.lines])
+    if isinstance(found, Rig):
+        return _together(found, lines)
+    return _sampled(_with_rails(found, read_layout(columns)), lines)
 
 
-def _together(found: Recording | Rig) -> Opened:
+def _together(found: Rig, lines: list[str]) -> Opened:
     """Samples as they are, or brought to common instants and axes, which is kept."""
-    if isinstance(found, Recording):
-        return _sampled(found, [])
     for log in found.logs:
         _require_gravity(log)
-    recording = recording_of(found)
+    recording, lines, logs = recording_of(found), [*lines, *found.lines], []
     if recording is not None:
-        return _sampled(_with_rails(recording), found.lines)
+        return _sampled(_with_rails(recording), lines)
     from imuarray.alignment import align
 
-    lines, logs = list(found.lines), []
     for log in found.logs:
         _require_own(log)
         log, said = _railed(log)
@@ -145,18 +141,18 @@ def _sampled(recording: Recording, lines: list[str]) -> Opened:
     from imuarray.alignment.settings import SETTINGS as ALIGNMENT
 
     recording, cleaned = _less_garbage(recording)
-    recording, more = _railed_triads(recording)
-    more = cleaned + more
+    recording, railed = _railed_triads(recording)
+    lines = [*lines, *cleaned, *railed]
     if len(recording.time) < ALIGNMENT.shortest:
-        return Opened(recording, [*lines, *more])
+        return Opened(recording, lines)
     time, off = steadied(recording.time, recording.angular_rate.mean(axis=1), SETTINGS.sure)
     if off > ALIGNMENT.jitter:
         recording = replace(recording, time=time)
-        more.append(
+        lines.append(
             f"stamps {1e3 * off:.2g} ms off even readings, which the rates fit better: taken as"
             " even"
         )
-    return Opened(recording, [*lines, *more])
+    return Opened(recording, lines)
 
 
 def _less_garbage(recording: Recording) -> tuple[Recording, list[str]]:
@@ -241,7 +237,7 @@ def _railed(log: Log) -> tuple[Log, list[str]]:
     lines = []
     for kind, name in KINDS.items():
         limit, values = getattr(log, f"{kind}_range"), getattr(log, name)
-        least = _rail(values, limit, np.abs(values).max())
+        (least,) = _rails(values[:, None], limit)
         if least < limit:
             ranges[f"{kind}_range"] = least
             lines.append(_clipped(f"{log.label}: {kind}", kind, least, limit))
@@ -254,8 +250,7 @@ def _railed_triads(recording: Recording) -> tuple[Recording, list[str]]:
     lines = []
     for kind, name in KINDS.items():
         limit, values = getattr(recording, f"{kind}_range"), getattr(recording, name)
-        largest = np.abs(values).max(initial=0.0)
-        rails = np.array([_rail(own, limit, largest) for own in values.swapaxes(0, 1)])
+        rails = _rails(values, limit)
         if (rails == limit).all():
             continue
         known = getattr(recording, f"saturated_{kind}s")()
@@ -268,11 +263,12 @@ def _railed_triads(recording: Recording) -> tuple[Recording, list[str]]:
     return replace(recording, **changed), lines
 
 
-def _rail(values, limit: float, largest: float) -> float:
-    """The range that a triad's readings (T, 3) show, or that declared; rests are no rails."""
-    found = [abs(end) for axis in values.T for end in ends(axis)]
-    return min(
-        (end for end in found if SETTINGS.large * largest < end < RAIL * limit), default=limit
+def _rails(values, limit: float) -> np.ndarray:
+    """Ranges (K,) that readings (T, K, 3) of triads show, or that declared; rests are no rails."""
+    least = SETTINGS.large * np.abs(values).max(initial=0.0)
+    found = [[abs(end) for axis in own.T for end in ends(axis)] for own in values.swapaxes(0, 1)]
+    return np.array(
+        [min((end for end in own if least < end < RAIL * limit), default=limit) for own in found]
     )
 
 
