@@ -90,9 +90,8 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> None:
 def draw(diagnosis: Diagnosis, calibration: xr.Dataset) -> list[Drawing]:
     """All figures in the report's order; those of causes only where there are any."""
     document, said = diagnosis.document, footer(diagnosis.document)
-    found = [_drawing("discrepancies", diagnosis, said), _drawing("residual", diagnosis, said)]
-    if document["causes"]:
-        found.append(_drawing("gain", diagnosis, said))
+    first = ["discrepancies", "residual", *["gain"] * bool(document["causes"])]
+    found = [_drawing(name, diagnosis, said) for name in first]
     for place, cause in enumerate(diagnosis.found.search.causes):
         table = cause_table(diagnosis, cause)
         sensors = sensors_of(diagnosis.found.search.readings.labels, cause.imus)
