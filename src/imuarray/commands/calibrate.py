@@ -63,7 +63,8 @@ def report(dataset: xr.Dataset) -> str:
     count, samples = dataset.sizes["iteration"], dataset.attrs["samples"]
     lines = [f"{state} after {count} iterations, {samples} samples", *position_lines(dataset)]
     parameters = parameters_of(dataset)  # in their own units (docs/effects.md)
-    lines += ["effect parameter: value (sd)"] * bool(parameters)
+    if parameters:
+        lines.append("effect parameter: value (sd)")
     lines += [f"{name}: {at['value']:.4g} ({at['sd']:.2g})" for name, at in parameters.items()]
     return "\n".join([*lines, *_informative(dataset), *_misfit(dataset)])
 

@@ -122,8 +122,8 @@ def select(arguments) -> None:
     write_recording(recording.select(index), arguments.out, attrs=attrs, groups=groups)
     lines = [f"{len(recording.time)} samples"]
     lines += [f"{-count:7d} {words}" for words, count in found.removed.items()]
+    lines.append(f"{len(found.informative)} informative, {len(index)} written to {arguments.out}")
     output.say("\n".join(lines))
-    output.say(f"{len(found.informative)} informative, {len(index)} written to {arguments.out}")
     output.done({
         "out": str(arguments.out), "samples": len(recording.time), "removed": found.removed,
         "informative": len(found.informative), "written": len(index),

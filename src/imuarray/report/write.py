@@ -90,7 +90,7 @@ def write_report(diagnosis: Diagnosis, folder: str | Path) -> None:
 def draw(diagnosis: Diagnosis, calibration: xr.Dataset) -> list[Drawing]:
     """All figures in the report's order; those of causes only where there are any."""
     document, said = diagnosis.document, footer(diagnosis.document)
-    first = ["discrepancies", "residual", *["gain"] * bool(document["causes"])]
+    first = ["discrepancies", "residual"] + (["gain"] if document["causes"] else [])
     found = [_drawing(name, diagnosis, said) for name in first]
     for place, cause in enumerate(diagnosis.found.search.causes):
         table = cause_table(diagnosis, cause)
