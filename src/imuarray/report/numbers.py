@@ -11,6 +11,7 @@ from imuarray.diagnosis.noise import standardised
 from imuarray.diagnosis.replicates import TESTS
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.model.effects import KINDS
+from imuarray.words import sensors_of
 
 BAND = ndtri(0.975)  # sds of a 95 % band
 
@@ -183,16 +184,14 @@ def score_table(diagnosis: Diagnosis) -> pd.DataFrame:
 
     ``log10_p`` allows for its IMUs and forms; ``limit`` is the critical value.
     """
-    search, exists = diagnosis.found.search, diagnosis.found.base.readings.exists
-    best = {}
+    search, best = diagnosis.found.search, {}
     for score in diagnosis.found.base_scores:  # best first
         best.setdefault(score.candidate.effect, score)
     adopted = {cause.effect for cause in search.causes}
     return pd.DataFrame([
         {
             "effect": effect, "form": score.candidate.variant,
-            "imus": "all" if len(score.candidate.imus) == len(exists)
-            else ", ".join(search.readings.labels[k] for k in score.candidate.imus),
+            "imus": ", ".join(sensors_of(search.readings.labels, score.candidate.imus)),
             "statistic": score.statistic, "freedom": score.freedom,
             "log10_p": score.log_p / np.log(10),
             "limit": SETTINGS.limit(effect) / np.log(10), "adopted": effect in adopted,
