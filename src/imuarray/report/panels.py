@@ -252,19 +252,18 @@ def clock_panels(signal: Signal) -> list[pd.DataFrame]:
 
 def shift_panels(signal: Signal) -> list[pd.DataFrame]:
     """A triad that moved: its position in blocks of time, from the residual without the step."""
-    made, panels = signal.made, []
+    made, imu, panels = signal.made, signal.imus[0], []
     chosen = made.columns.of(POSITION)
-    for imu in signal.imus[:1]:
-        blocks = blocks_of(len(made.residual), BLOCKS)
-        found = [position_of_block(signal, imu, chosen, block) for block in blocks]
-        for axis in range(3):
-            frame = pd.DataFrame(
-                [(t, *(value[axis] for value in values)) for t, *values in found],
-                columns=["x", "y", "se", "model"],
-            )
-            frame = frame[frame.se < VAGUE * frame.se.min()]
-            title = f"IMU {made.readings.labels[imu]}, position {AXES[axis]}"
-            panels.append(panel(frame, title, "time (s)", "from the mean", LENGTH, least=1.0))
+    blocks = blocks_of(len(made.residual), BLOCKS)
+    found = [position_of_block(signal, imu, chosen, block) for block in blocks]
+    for axis in range(3):
+        frame = pd.DataFrame(
+            [(t, *(value[axis] for value in values)) for t, *values in found],
+            columns=["x", "y", "se", "model"],
+        )
+        frame = frame[frame.se < VAGUE * frame.se.min()]
+        title = f"IMU {made.readings.labels[imu]}, position {AXES[axis]}"
+        panels.append(panel(frame, title, "time (s)", "from the mean", LENGTH, least=1.0))
     return panels
 
 
