@@ -12,6 +12,8 @@ from imuarray.firstorder.correct import calibrate_first_order, correct
 from imuarray.geometry import Array
 from imuarray.model import ArrayModel
 from imuarray.motion import hand_twisting
+from imuarray.posterior.chains import read_chains
+from imuarray.provenance import is_damaged
 from imuarray.recording import Recording, load_dataset
 from imuarray.recording.units import GRAVITY
 from imuarray.streams import stream
@@ -47,9 +49,6 @@ def read_calibration(path: str | PathLike) -> xr.Dataset:
 
 def read_posterior(path: str | PathLike) -> xr.DataTree:
     """A posterior from the file that `imuarray sample` has written; InputError for another."""
-    from imuarray.posterior.chains import read_chains
-    from imuarray.provenance import is_damaged
-
     path = Path(path)
     require(path.is_file(), str(path), "a posterior (a NetCDF-4 file)", "none")
     require(not is_damaged(path), str(path), "a file as it was written", "it damaged")
