@@ -5,7 +5,6 @@ import pytest
 
 import imuarray
 from imuarray.analysis.density import posterior_of
-from imuarray.engine.parameters import model_of
 from imuarray.geometry import sub_array
 
 
@@ -23,7 +22,7 @@ def ratios(made, louder=None):
         rng = np.random.default_rng(2)
         shape = made.specific_force.shape[0], 3
         made.specific_force[:, louder] += 0.12 * rng.standard_normal(shape)
-    noise = posterior_of(made, model_of(made)).model.noise
+    noise = posterior_of(made).model.noise
     return (np.sqrt(np.diag(noise.accelerometer)).reshape(-1, 3) / made.accelerometer_noise_sd,
             np.sqrt(np.diag(noise.gyroscope)).reshape(-1, 3) / made.gyroscope_noise_sd)  # fmt: skip
 
@@ -50,7 +49,7 @@ def test_few_samples_share_one_factor_without_bias():
 
 def test_what_is_known_is_kept():
     made = recording(100, triads=4)
-    found = posterior_of(made, model_of(made), known=True)
+    found = posterior_of(made, known=True)
     np.testing.assert_array_equal(found.model.noise.accelerometer, 0.04**2 * np.eye(12))
     assert found.scales == ("gyroscope_noise", "angular_rate", "angular_acceleration")
 
@@ -59,7 +58,7 @@ def test_the_motions_size_is_that_of_the_motion_not_of_its_noise():
     """Four triads nearly on a line, 1 m/s^2: about it omega_dot's estimate is noise, 5 times as
     large as the motion."""
     quiet, loud = (
-        posterior_of(made, model_of(made)).model.motion_sd
+        posterior_of(made).model.motion_sd
         for made in (recording(300, triads=4, accelerometer_noise=noise) for noise in (0.04, 1.0))
     )
     assert np.isinf(quiet[2]) and np.isinf(loud[2])

@@ -9,7 +9,6 @@ import xarray as xr
 import imuarray
 from imuarray.analysis.density import posterior_of
 from imuarray.cli import main
-from imuarray.engine.parameters import model_of
 from imuarray.errors import InputError
 from imuarray.estimation import newton
 from imuarray.geometry import positions_of, sub_array
@@ -109,11 +108,11 @@ def test_a_chain_that_falls_into_the_flat_priors_hole_is_told():
 def test_a_mode_that_was_not_reached_is_told(monkeypatch):
     recording, _ = imuarray.simulate(imuarray.mimu4444(), duration=2.0, sampling_rate=50.0, seed=1)
     said: list[str] = []
-    posterior_of(recording, model_of(recording), say=said.append)
+    posterior_of(recording, say=said.append)
     assert not said
     stopped = partial(newton.calibrate_gauss_newton, limit=1)
     monkeypatch.setattr(newton, "calibrate_gauss_newton", stopped)
-    posterior_of(recording, model_of(recording), say=said.append)
+    posterior_of(recording, say=said.append)
     (text,) = said
     assert "did not converge" in text
 

@@ -57,23 +57,20 @@ class Posterior(NamedTuple):
         return np.eye(len(SCALES))[:, [SCALES.index(name) for name in self.scales]]
 
 
-def posterior_of(
-    recording: Recording, model: ArrayModel, known: bool = False, say: Say = silent
-) -> Posterior:
+def posterior_of(recording: Recording, known: bool = False, say: Say = silent) -> Posterior:
     """The posterior of a recording under the papers' model, around its mode.
 
     omega and omega_dot are normal of the recording's own size; that and the noise are unknown, with
     log-normal priors a factor of twenty wide. ``known``: whether the accelerometers' noise is the
-    model's own.
+    declared one.
     """
-    chosen, found, seen = estimated_noise(recording, model, known, say)
+    chosen, found, seen = estimated_noise(recording, known, say)
     if not found.converged:
         say(NOT_CONVERGED)
     # s is flat: differences between triads do not show it
     chosen = replace(chosen, motion_sd=(*seen.motion_sd[:2], np.inf))
     free = [not known, True, True, True, False]
-    number = seen.freedom.sum(axis=0)
-    unknown = unknown_scales(model, chosen, number, np.zeros(3), len(recording.time))
+    unknown = unknown_scales(recording, chosen, seen, np.zeros(3), len(recording.time))
     before, freedom = (part[free] for part in unknown)
     prior = prior_of(recording, chosen)
     return Posterior(
@@ -105,9 +102,8 @@ def posterior_beyond(recording: Recording, found: Estimate) -> Posterior:
     mean[place], root = prior.mean[place], np.diag(1.0 / (SETTINGS.held * prior.sd))
     root[np.ix_(place, place)] = np.linalg.cholesky(precision).T
     spread[np.ix_(place, place)] = inverse
-    own, number = np.log(seen.motion_sd / model.motion_sd), seen.freedom.sum(axis=0)
-    declared = model_of(recording)
-    before, freedom = unknown_scales(declared, model, number, own, len(readings.time))
+    own = np.log(seen.motion_sd / model.motion_sd)
+    before, freedom = unknown_scales(recording, model, seen, own, len(readings.time))
     motion = one.state.motion[:, :9]
     if model.needs_derivatives:
         motion = np.hstack([motion, *one.state.jerk])
@@ -155,16 +151,19 @@ def _judged(found: Estimate, covariance) -> tuple[Readings, NoiseEstimate]:
     return readings.with_sd(sds * factors(seen, readings.exists)), seen
 
 
-def unknown_scales(declared: ArrayModel, chosen: ArrayModel, freedom, own, samples: int):
+def unknown_scales(
+    recording: Recording, chosen: ArrayModel, seen: NoiseEstimate, own, samples: int
+):  # fmt: skip
     """(prior means, degrees of freedom) (5,) of the logs of `SCALES`, 0 at the model ``chosen``.
 
     ``own`` (3,): where the logs of the motion's size are expected.
     """
+    declared = model_of(recording).noise
     ratios = [
-        np.trace(getattr(declared.noise, kind)) / np.trace(getattr(chosen.noise, kind))
-        for kind in KINDS
+        np.trace(getattr(declared, kind)) / np.trace(getattr(chosen.noise, kind)) for kind in KINDS
     ]
-    return np.append(0.5 * np.log(ratios), own), np.append(freedom, np.full(3, 3.0 * samples))
+    freedom = np.append(seen.freedom.sum(axis=0), np.full(3, 3.0 * samples))
+    return np.append(0.5 * np.log(ratios), own), freedom
 
 
 def prior_of(recording: Recording, model: ArrayModel) -> GaussianPrior:

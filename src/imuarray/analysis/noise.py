@@ -11,7 +11,7 @@ from imuarray.analysis.settings import SETTINGS
 from imuarray.engine.derivatives import no_derivatives
 from imuarray.engine.linearise import CHUNK, State, chunk_at
 from imuarray.engine.normal import pick
-from imuarray.engine.parameters import Columns, columns_of
+from imuarray.engine.parameters import Columns, columns_of, model_of
 from imuarray.engine.readings import Readings, measured
 from imuarray.errors import IdentifiabilityError
 from imuarray.estimation.identifiability import Calibration
@@ -114,7 +114,7 @@ def mode_of(recording: Recording, model: ArrayModel, start=None) -> Calibration:
 
 
 def estimated_noise(
-    recording: Recording, model: ArrayModel, known: bool = False, say: Say = silent
+    recording: Recording, known: bool = False, say: Say = silent
 ) -> tuple[ArrayModel, Calibration, NoiseEstimate]:
     """The papers' model with the noise of each triad, its fit of a recording, and what that shows.
 
@@ -122,13 +122,13 @@ def estimated_noise(
     that motion and positions leave it, fit and noise by turns. Where those are few, or triads too
     few to be told apart, all triads of a kind share one factor.
 
-    ``known``: whether the accelerometers' noise is the model's own.
+    ``known``: whether the accelerometers' noise is the declared one.
     """
+    model, start = model_of(recording), None
     columns = columns_of(model.array, (), recording.position_prior_sd)
     readings = measured(
         model, recording.specific_force, recording.angular_rate, recording.saturated_gyroscopes()
     )
-    start = None
     for number in range(SETTINGS.rounds + 1):
         found = mode_of(recording, model, start)
         start = found.positions

@@ -22,7 +22,6 @@ from imuarray.analysis.density import (
 from imuarray.analysis.model import Say, assumed, require_together, silent, usable
 from imuarray.analysis.settings import SETTINGS
 from imuarray.engine.dataset import effects_of
-from imuarray.engine.parameters import model_of
 from imuarray.errors import require_integer, require_one_of
 from imuarray.model import ArrayModel
 from imuarray.model.array_model import parameter_names
@@ -102,7 +101,7 @@ def sample(
             posterior = posterior_beyond(recording, found)
     if posterior is None:
         moving, known = assumed(moving, accelerometer_noise), accelerometer_noise is not None
-        posterior = posterior_of(moving, model_of(moving), known, say)
+        posterior = posterior_of(moving, known, say)
     if model != "papers":
         posterior = posterior._replace(size_sd=2.0 * common_sd(moving, posterior.model))
     return _exact(posterior, method, steps, seed, not progress, say)
