@@ -43,17 +43,23 @@ def open_logs(
     share their stamps, with known axes, become samples as they are; others are aligned
     (`alignment`), which the lines say and the recording keeps. InputError says what does not fit.
     """
-    found, lines = _opened(paths, columns, topics)
-    _require_paired(found)
+    found = _opened(paths, columns, topics)
+    _require_paired(found.recording)
+    return _placed(found)
+
+
+def _placed(opened: Opened) -> Opened:
+    """With positions to begin with, where no drawing gave any."""
+    found = opened.recording
     if not np.isnan(found.accelerometer_position).any():
-        return Opened(found, lines)
+        return opened
     places, sd = rough_positions(found)
     line = (
         f"no positions given: they begin from the motion, to {1e3 * sd:.2g} mm; no drawing was"
         " compared with the answer"
     )
     found = replace(found, accelerometer_position=places, position_prior_sd=sd)
-    return Opened(found, [*lines, line])
+    return Opened(found, [*opened.lines, line])
 
 
 def _with_rails(recording: Recording, layout=None) -> Recording:
