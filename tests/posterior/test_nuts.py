@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 import imuarray
+from imuarray.analysis import noise
 from imuarray.analysis.density import posterior_of
 from imuarray.cli import main
 from imuarray.errors import InputError
@@ -111,7 +112,7 @@ def test_a_mode_that_was_not_reached_is_told(monkeypatch):
     posterior_of(recording, say=said.append)
     assert not said
     stopped = partial(newton.calibrate_gauss_newton, limit=1)
-    monkeypatch.setattr(newton, "calibrate_gauss_newton", stopped)
+    monkeypatch.setattr(noise, "calibrate_gauss_newton", stopped)
     posterior_of(recording, say=said.append)
     (text,) = said
     assert "did not converge" in text
