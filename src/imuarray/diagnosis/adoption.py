@@ -4,7 +4,8 @@ The most significant test is refitted jointly and kept if it predicts; correlati
 what cannot be told apart.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from imuarray.engine.parameters import POSITION
 from imuarray.linear import scaled_eigh, scaled_inverse, scaled_square
 from imuarray.model.effects import EFFECTS
 from imuarray.tails import log_chi_square
+from imuarray.words import sensors_of
 
 
 def tried(search: Search) -> list[Candidate]:
@@ -49,7 +51,7 @@ def proposals(search: Search):
     """[(score, start values by IMU or None)] of all tests and scans, most significant first."""
     scores = score_all(search.given, search.fit, tried(search))
     found = [(score, None) for score in scores]
-    found += scans(search.fit, search.given, search.effects, scores, search.imus_with)
+    found += scans(search, scores)
     named = [(s, v) for s, v in found if s.candidate not in search.refused]
     return sorted(named, key=lambda pair: log_odds(search, pair[0]))
 
@@ -64,7 +66,6 @@ def log_odds(search: Search, score) -> float:
 def adopt(search: Search, proposed=None) -> Search:
     """Forward: adopt while a test is significant, large enough and gains on held-out time.
 
-    What else would have been adopted is `detectable` there.
     ``proposed``: the `proposals` at the search as it is, where they are known.
     """
     vain: list[str] = []  # effects refused since the last was adopted
@@ -87,11 +88,10 @@ def narrowest(proposed, search: Search):
     """The first of the `proposals`, or a narrower one that has most of its test.
 
     One IMU's of an effect of all, if what the others have beyond it is too little for a cause. In
-    rough motion, which leaves something for all that has parameters, parts of an effect as well,
-    whatever the rest has. Refused, it leaves the wider one to be the first again.
+    rough motion, which leaves something for all that has parameters, parts of an effect as well.
     """
     first, own = proposed[0][0], proposed[0][0].candidate
-    parts = EFFECTS[own.effect].contains + EFFECTS[own.effect].resembles
+    parts = parts_of(own.effect)
     rest = (1 - SETTINGS.most) * first.statistic
     if search.smooth:
         parts, rest = (), min(search.least, rest)
@@ -130,7 +130,8 @@ def attempt(search: Search, score, values) -> Search:
         found = prune(found, effect)
         new = np.any(found.active & ~search.active)  # or pruned to what was there
         gain, error = heldout_gain(found, effect, there=search.active) if new else (-np.inf, 0.0)
-    words = f"{effect} {candidate.variant} of {label(search, candidate)}"
+    whose = ", ".join(sensors_of(search.readings.labels, candidate.imus))
+    words = f"{effect} {candidate.variant} of {whose}"
     if not keeps(search, score, gain, error):
         search.say(f"refused {words}: held-out gain {gain:.1f} +- {error:.1f}")
         return replace(search, refused=search.refused | {candidate})
@@ -147,10 +148,7 @@ def keeps(search: Search, score, gain: float, error: float) -> bool:
 
 
 def predicted_gain(search: Search, candidate: Candidate, values, there) -> tuple[float, float]:
-    """The held-out gain that one linearisation predicts: it spares hopeless fits.
-
-    ``there`` (N, m) bool: parameters adopted before.
-    """
+    """The held-out gain, beside what is ``there`` (N, m), that one linearisation predicts."""
     state, made = search.started(candidate.effect, values), search.fit
     if not np.array_equal(state.parameters, made.state.parameters):
         made = at(search.readings, search.columns, search.active, state, False, all_columns=False)
@@ -162,13 +160,6 @@ def predicted_gain(search: Search, candidate: Candidate, values, there) -> tuple
     )
 
 
-def label(search: Search, candidate) -> str:
-    """Whose, in words."""
-    return (
-        "all" if candidate.whole else ", ".join(search.readings.labels[k] for k in candidate.imus)
-    )
-
-
 def merged(causes, score: Score) -> tuple[Cause, ...]:
     """The causes with a test's candidate: in one of the same effect, or as one more.
 
@@ -176,14 +167,12 @@ def merged(causes, score: Score) -> tuple[Cause, ...]:
     constant.
     """
     candidate, log_p = score.candidate, score.log_p
-    if any(cause.effect == candidate.effect for cause in causes):
-        return tuple(
-            replace(
-                cause, imus=tuple(sorted({*cause.imus, *candidate.imus})),
-                variants=cause.variants | {candidate.variant}, log_p=min(cause.log_p, log_p),
-            ) if cause.effect == candidate.effect else cause
-            for cause in causes
-        )  # fmt: skip
+    for place, old in enumerate(causes):
+        if old.effect == candidate.effect:
+            imus = tuple(sorted({*old.imus, *candidate.imus}))
+            variants = old.variants | {candidate.variant}
+            wider = replace(old, imus=imus, variants=variants, log_p=min(old.log_p, log_p))
+            return (*causes[:place], wider, *causes[place + 1 :])
     left = [replace(c, imus=_beside(c, candidate)) for c in causes]
     variants = frozenset({candidate.variant})
     new = Cause(candidate.effect, candidate.imus, variants, log_p, score.tries)
@@ -198,28 +187,19 @@ def _beside(cause: Cause, wider: Candidate) -> tuple[int, ...]:
     return tuple(k for k in cause.imus if k not in wider.imus)
 
 
-@dataclass(frozen=True)
-class Separability:
-    """Squared canonical correlations between effects, motion and positions projected out.
-
-    Attributes
-    ----------
-    effects : n effect ids
-    largest : (n, n) of the two most alike forms of two effects; 1 is an exact gauge in one form
-    mean : (n, n) mean over the forms of the smaller effect; 1 where it is contained in the other
-    """
+class Separability(NamedTuple):
+    """Squared canonical correlations between n effects, motion and positions projected out."""
 
     effects: tuple[str, ...]
-    largest: np.ndarray
-    mean: np.ndarray
+    largest: np.ndarray  # (n, n) of the two most alike forms; 1 is an exact gauge in one form
+    mean: np.ndarray  # (n, n) over the forms of the smaller effect; 1 where the other contains it
 
 
 def separability(given: Information, fit: Fit, adopted=()) -> Separability:
     """Likeness of the effects on this recording, each on all IMUs that can have it.
 
-    ``given`` is the `Information` at ``fit``, ``adopted`` its causes, as (effect, imus) pairs.
-    Effects that only a scan sees (a clock, a step) have a direction once they are adopted, on the
-    IMUs that have them; else they are left out.
+    ``adopted``: (effect, imus) pairs. Effects that only a scan sees (a clock, a step) have a
+    direction once they are adopted, on the IMUs that have them; else they are left out.
     """
     left = conditional(given, given.places(fit.columns.mask([POSITION])))
     imus = dict(adopted)
@@ -243,22 +223,16 @@ def separability(given: Information, fit: Fit, adopted=()) -> Separability:
 
 
 def conditional(given: Information, known) -> np.ndarray:
-    """Information (K, K) on all parameters when those at ``known`` are refitted to any change.
-
-    Their own prior alone holds them: no gauge is pinned, whatever the fit did.
-    """
+    """Information (K, K) on all parameters, those at ``known`` held by their own prior alone."""
     cross = given.information[:, known]
     inner = cross[known] + np.diag(given.ridge[known])
     return given.information - cross @ scaled_inverse(inner) @ cross.T
 
 
 def orthonormal(information, chosen, scale) -> np.ndarray:
-    """(n, d) combinations of the n chosen parameters whose signals are orthonormal.
-
-    Combinations that the projection leaves less than `visible` of are left out: they are gauges of
-    motion and positions, and no data determine what else they resemble.
-    """
+    """(n, d) combinations of the n chosen parameters whose signals are orthonormal."""
     values, vectors, _ = scaled_eigh(information[np.ix_(chosen, chosen)], scale)
+    # the rest are gauges of motion and positions: no data determine what else they resemble
     seen = values > SETTINGS.visible
     return vectors[:, seen] / np.sqrt(values[seen]) / scale[:, None]
 
@@ -271,11 +245,7 @@ def squared_correlations(information, one, other) -> np.ndarray:
 
 
 def rivals(search: Search, cause: Cause) -> list[str]:
-    """Ids of the effects that explain nearly as well as an adopted one.
-
-    Put back to zero, it leaves a signal: rivals explain it nearly as well, or more than `alike`
-    of it.
-    """
+    """Ids of effects that explain nearly as well as an adopted one, or most of its signal."""
     effect, given, fit_ = cause.effect, search.given, search.fit
     freed = given.places(freed_mask(search, effect))
     whole = len(cause.imus) > len(fit_.readings.exists) / 2
@@ -297,29 +267,27 @@ def rivals(search: Search, cause: Cause) -> list[str]:
             continue
         score = scores.get(candidate.effect)
         close = score is not None and score.log_p - own_log < SETTINGS.rival
-        alike = not nested(effect, candidate.effect) and _shared(
-            given, fit_, candidate, left, signal
-        ) > (SETTINGS.alike * power)
-        if close or alike:
+        nested = (
+            candidate.effect in parts_of(effect) or effect in EFFECTS[candidate.effect].contains
+        )
+        shared = 0.0 if nested else _shared(given, fit_, candidate, left, signal)
+        if close or shared > SETTINGS.alike * power:
             found.append(candidate.effect)
     return list(dict.fromkeys([*found, *wider(search, cause, own)]))
 
 
-def nested(effect: str, other: str) -> bool:
-    """True where another effect contains an adopted one, or is contained in it or for it."""
-    one = EFFECTS[effect]
-    return other in (*one.contains, *one.resembles) or effect in EFFECTS[other].contains
+def parts_of(effect: str) -> tuple[str, ...]:
+    """Effects that an effect contains or resembles."""
+    return EFFECTS[effect].contains + EFFECTS[effect].resembles
 
 
 def wider(search: Search, cause: Cause, own: float) -> list[str]:
     """Effects of which the adopted one may be no more than a part."""
-    found = []
-    for effect, special in SPECIAL.items():
-        parts = (*EFFECTS[effect].contains, *EFFECTS[effect].resembles)
-        possible = special.maybe is not None and effect in search.effects
-        if possible and cause.effect in parts and special.maybe(search, cause, own):
-            found.append(effect)
-    return found
+    return [
+        effect for effect, special in SPECIAL.items()
+        if special.maybe is not None and effect in search.effects
+        and cause.effect in parts_of(effect) and special.maybe(search, cause, own)
+    ]  # fmt: skip
 
 
 def _shared(given, fit_, candidate, left, signal) -> float:

@@ -72,9 +72,8 @@ def _entry(item, labels, parameters, nats, rivals=(), says="", **tests) -> dict:
 
 
 def structural_gain(found: ProcedureResult, item) -> tuple[float, float, np.ndarray]:
-    """Nats by which the readings, as recorded, miss the extended model's prediction.
+    """Nats by which the readings, as recorded, miss the extended model's prediction, as `held_out`.
 
-    Returns their sum, its standard error and each held-out block's share.
     Nothing was fitted to the readings that were left out, so this is held out as it stands.
     What the other effects of whole readings did stays mended: theirs is not counted here.
     """

@@ -7,7 +7,6 @@ from imuarray.diagnosis.scores import Information, candidates, mask_of
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.state import Search
 from imuarray.engine.heldout import blocks_of
-from imuarray.engine.parameters import Columns
 from imuarray.linear import scaled_inverse
 from imuarray.model.array_model import component, unit_of
 from imuarray.model.effects import EFFECTS
@@ -49,8 +48,9 @@ def detectable(search: Search) -> dict[str, dict]:
         label = search.readings.labels[candidate.imus[0]]
         entry = found.setdefault(candidate.effect, {"units": {}, "sizes": {}})
         own = entry["sizes"].setdefault(label, {})
-        places = _places(given, columns, mask, chosen)
-        for place, size, share in zip(places, sizes, shown, strict=True):
+        column_at = {int(given.index[k, column]): column for k, column in np.argwhere(mask)}
+        for number, size, share in zip(chosen, sizes, shown, strict=True):
+            place = columns.places[column_at[int(number)]]
             name = component(candidate.effect, place)
             if share > SETTINGS.seen:  # of the parameter's own information
                 own[name] = min(float(size), own.get(name, np.inf))
@@ -59,10 +59,7 @@ def detectable(search: Search) -> dict[str, dict]:
 
 
 def scatter(given: Information, scores, active, chosen) -> np.ndarray:
-    """Sds of the scores of ``chosen`` places between blocks (B, K), in those of white noise.
-
-    All at the ``active`` places refitted. At least 1.
-    """
+    """Sds (at least 1) of blocks' scores (B, K) at ``chosen`` places, in those of white noise."""
     square, cross = np.ix_(active, active), given.information[np.ix_(chosen, active)]
     gain = cross @ scaled_inverse(given.information[square] + given.precision[square])
     left = scores[:, chosen] - scores[:, active] @ gain.T
@@ -72,16 +69,7 @@ def scatter(given: Information, scores, active, chosen) -> np.ndarray:
 
 
 def noncentrality(search: Search, effect: str, tests: int, freedom: int) -> float:
-    """Noncentrality of a chi-square that passes the effect's critical value with `SETTINGS.power`.
-
-    ``tests`` of the effect, of its IMUs and forms, all of which are allowed for.
-    """
+    """Noncentrality of a chi-square that passes one of an effect's ``tests`` with the power."""
     log_p = SETTINGS.limit(effect, search.causes) - np.log(2 * max(tests, 1))
     critical = special.chdtri(max(freedom, 1), np.exp(log_p))
     return float(special.chndtrinc(critical, max(freedom, 1), 1 - SETTINGS.power))
-
-
-def _places(given: Information, columns: Columns, mask, chosen) -> list[tuple[int, ...]]:
-    """Where in its effect each of the parameters at ``chosen`` places is."""
-    where = {int(given.index[k, column]): column for k, column in np.argwhere(mask)}
-    return [columns.places[where[int(place)]] for place in chosen]

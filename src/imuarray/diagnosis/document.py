@@ -11,6 +11,7 @@ import imuarray
 from imuarray.diagnosis.causes import causes_of, structural_gain
 from imuarray.diagnosis.fit import Fit, fit, log_scores
 from imuarray.diagnosis.noise import observable, per_triad, standardised
+from imuarray.diagnosis.noise_effects import COLOURED
 from imuarray.diagnosis.procedure import ProcedureResult, run_procedure
 from imuarray.diagnosis.replicates import Discrepancy, discrepancies
 from imuarray.diagnosis.scores import Information, information_at
@@ -64,18 +65,14 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """A diagnosis as `imuarray diagnose` writes it and as its figures draw it.
-
-    ``base`` is the papers' model with the declared noise, ``inflated`` the same with the noise
-    that its residual shows (paper 2021's way out), ``extended`` has the causes.
-    """
+    """A diagnosis as `imuarray diagnose` writes it and as its figures draw it."""
 
     document: dict
     recording: Recording
     found: ProcedureResult
-    base: Fitted
-    inflated: Fitted
-    extended: Fitted
+    base: Fitted  # the papers' model with the declared noise
+    inflated: Fitted  # the same with the noise that its residual shows (paper 2021's way out)
+    extended: Fitted  # with the causes
 
     def to_json(self) -> str:
         """diagnosis.json."""
@@ -133,8 +130,7 @@ def diagnose(
 def smooth_samples(robust: Estimate, found: ProcedureResult) -> dict | None:
     """Residual over the declared noise of each triad in the smooth samples of rough motion.
 
-    ``unexplained``: more than shocks, which are among the causes, is left. The rms over the triads
-    of a kind counts, as they differ in noise.
+    ``unexplained``: more is left than shocks explain, in the rms over the triads of a kind.
     """
     ratios = robust.smooth_ratio()
     if ratios is None:
@@ -152,11 +148,10 @@ def smooth_samples(robust: Estimate, found: ProcedureResult) -> dict | None:
 def nats_beside(found: ProcedureResult) -> np.ndarray:
     """Nats of each held-out block that the extended fit's own score does not have, (blocks,).
 
-    Outliers are in no model's score, so what a mixture gains on them is not in the gain either;
-    it stands with its cause.
+    Outliers are in no model's score, so what a mixture gains on them stands with its cause alone.
     """
     # a fit's score takes noise for white
-    beside = [item.blocks for item in found.in_noise if item.beside]
+    beside = [item.blocks for item in found.in_noise if item.effect == COLOURED]
     # nor has any model's score the readings left out; exchanged axes are in the rivals' scores,
     # which take the readings as they are
     left_out = [item for item in found.structural if DATA_EFFECTS[item.effect].left_out]
@@ -170,10 +165,9 @@ def precision_of(made: Fit) -> np.ndarray:
 
 
 def fitted(made: Fit, given: Information | None = None) -> Fitted:
-    """A fit with its held-out score and the sds of its parameters.
+    """A fit with its held-out score and its parameters' sds (the sandwich's in coloured noise).
 
-    ``given``: the information there, if it is known; where it has the covariance of a score under
-    coloured noise the sds are those of the sandwich.
+    ``given``: the information there, if it is known.
     """
     given = information_at(made) if given is None else given
     # gauges are pinned for the fit; what is known of them is what the priors say
@@ -190,21 +184,19 @@ def fitted(made: Fit, given: Information | None = None) -> Fitted:
 
 def rivals_of(found: ProcedureResult) -> tuple[Fitted, Fitted]:
     """The papers' model on the extended model's readings: declared noise, and inflated."""
-    search = found.search
+    search, options = found.search, {"rough": True, "all_columns": False}
     alone = search.columns.mask([POSITION])
     start = found.base.state._replace(parameters=np.zeros_like(found.base.state.parameters))
     bare = replace(search.readings, sd=search.readings.declared)
     if found.structural:
         # as read: the rivals know neither of rails nor of repeats nor of exchanged axes
         bare = replace(bare, values=found.raw.values)
-    declared = fit(bare, search.columns, alone, start, search.smooth, True, all_columns=False)
+    declared = fit(bare, search.columns, alone, start, search.smooth, **options)
     known = observable(bare, declared.basis)[..., None]
     squares = np.where(known, per_triad(standardised(declared)) ** 2, 1.0)
     inflated_sd = bare.declared * np.maximum(np.sqrt(np.nanmean(squares, axis=-1)), 1e-3)
-    again = fit(
-        bare.with_sd(inflated_sd), search.columns, alone, declared.state, search.smooth, True,
-        all_columns=False,
-    )  # fmt: skip
+    wide = bare.with_sd(inflated_sd)
+    again = fit(wide, search.columns, alone, declared.state, search.smooth, **options)
     return fitted(declared), fitted(again)
 
 
@@ -233,10 +225,9 @@ def gains(base: Fitted, inflated: Fitted, extended: Fitted) -> dict:
     """Held-out nats per sample over both rivals, residual ratios, and the positions' change."""
     over_base, over_inflated = (gain(m.scores, extended.scores) for m in (base, inflated))
     before, after = residual_sd(base.fit), residual_sd(extended.fit)
-    place = base.fit.columns.of("position")
-    owner = base.fit.active[:, place][: len(base.fit.state.positions)]
-    change = (extended.positions[0] - base.fit.state.positions)[owner]
-    sds = base.sds[: len(base.fit.state.positions), place][owner]
+    (before_m, before_sds), (after_m, _) = base.positions, extended.positions
+    owner = base.fit.active[:, base.fit.columns.of(POSITION)][: len(before_m)]
+    change, sds = (after_m - before_m)[owner], before_sds[owner]
     return {
         "heldout_log_score_nats_per_sample": over_base[0],
         "heldout_log_score_nats_per_sample_se": over_base[1],

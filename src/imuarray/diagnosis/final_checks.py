@@ -76,10 +76,7 @@ def clipped(found: list[Peak], limit: float) -> tuple[list[Peak], float]:
 
 
 def leave_out_clips(search: Search, without=()) -> tuple[Search, list[Structural]]:
-    """Triads whose largest reading falls short of its prediction, far more than any other does.
-
-    Those readings are left out of the search from here on.
-    """
+    """Without readings that fall short of their prediction far more than any other does."""
     hit, log_p = ([], 0.0) if RAILS in without else clipped(peaks(search), SETTINGS.check)
     if not hit:
         return search, []
@@ -115,10 +112,7 @@ def lone_checks(made: Fit, tailed) -> list[Check]:
 
 
 def beside_left(search: Search) -> tuple[Fit, Information]:
-    """The fit, and its information, one step on beside what a correction left of the maps.
-
-    They are as uncertain as the correction says: that is no fault of the model.
-    """
+    """The fit and its information, one step on in maps as uncertain as their correction says."""
     made, given, columns = search.fit, search.given, search.columns
     left = search.readings.left
     maps = mask_of_left([left], columns, made.active)
@@ -149,10 +143,7 @@ def final_checks(search: Search, tailed) -> list[Check]:
 
 
 def outlier_checks(search: Search) -> list[Check]:
-    """Readings left out as outliers: is what they miss tied to the reading's own change?
-
-    Tails of the noise are not; a reading that came late, or twice, is.
-    """
+    """Outliers left out: is what they miss tied to the reading's own change, as of a late one?"""
     away = search.allowed & ~search.readings.keep & ~search.jumps
     whole = replace(search.readings, keep=search.allowed)
     # by the motion that was fitted without them: an outlier would be part of its own prediction
@@ -201,8 +192,9 @@ def tail_checks(made: Fit, noise: Noise, tailed) -> list[Check]:
 def within_tolerance(search: Search, checks, in_noise) -> tuple[float, bool]:
     """(share of the base's excess that is explained, whether checks fail beyond tolerance)."""
     explained = 1.0 - search.left / search.excess if search.excess > 0 else 1.0
-    accounted = {name for item in in_noise for name in item.accounts_for}
-    failing = [c for c in checks if c.log_p < SETTINGS.check and c.name not in accounted]
+    coloured = any(item.effect == noise_effects.COLOURED for item in in_noise)
+    failing = [c for c in checks if c.log_p < SETTINGS.check]
+    failing = [c for c in failing if not (coloured and c.name == "whiteness")]
     large = search.excess > 30 * np.sqrt(2 * search.fit.free)
     small = search.left < SETTINGS.little * search.fit.free
     tolerated = large and small and explained > SETTINGS.explained

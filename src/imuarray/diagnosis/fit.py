@@ -26,33 +26,21 @@ from imuarray.linear import scaled_solve
 
 @dataclass(frozen=True)
 class Fit:
-    """A model fitted to readings, and what score tests need at that point.
-
-    Attributes
-    ----------
-    active : (N, m) bool, the parameters that were fitted
-    wanted : (w,) the columns that derivatives are by
-    residual : (T, N, 6) in the units of the noise sd, the motion's share taken out
-    whitened : (T, N, 6, w) derivative by the shared parameters, in those units
-    basis : (T, 6 N, D) basis of what the motion can explain, orthonormal with its prior's
-    expected, unexpected, course : of omega_dot's prior, as `Eliminated` has them
-    log_volume : (T,) log determinant of the motion's information
-    misfits : (T,) sums of squared residuals, the motion's prior included
-    """
+    """A model fitted to readings; arrays from ``residual`` on as `Eliminated` has them."""
 
     readings: Readings
     columns: Columns
     state: State
-    active: np.ndarray
-    wanted: np.ndarray
-    residual: np.ndarray
-    whitened: np.ndarray
-    basis: np.ndarray
+    active: np.ndarray  # (N, m) bool, the parameters that were fitted
+    wanted: np.ndarray  # (w,) the columns that derivatives are by
+    residual: np.ndarray  # (T, N, 6) in noise sds
+    whitened: np.ndarray  # (T, N, 6, w)
+    basis: np.ndarray  # (T, 6 N, D)
     expected: np.ndarray
     unexpected: np.ndarray
     course: np.ndarray
-    log_volume: np.ndarray
-    misfits: np.ndarray
+    log_volume: np.ndarray  # (T,)
+    misfits: np.ndarray  # (T,)
     converged: bool
 
     @property
@@ -113,8 +101,8 @@ def fit(
 ) -> Fit:  # fmt: skip
     """Gauss-Newton over motion and the active parameters from a state, priors included.
 
-    ``smooth`` says whether the motion's time derivatives may be had from its neighbours, ``rough``
-    that it may stop when a step gains little; ``all_columns`` as for `at`.
+    ``smooth``: whether the motion's time derivatives may be had from its neighbours; ``rough``: it
+    may stop when a step gains little; ``all_columns`` as for `at`.
     """
     state, converged, _ = search_optimum(readings, columns, active, state, smooth, rough)
     return at(readings, columns, active, state, converged, all_columns)
@@ -172,10 +160,7 @@ def search_optimum(readings, columns, active, state, smooth, rough):
 
 
 def advance(columns, state, active, step, few, seen: Eliminated, length) -> State:
-    """The state after a step of the active parameters, and the motion's own.
-
-    ``length`` is the share of the parameters' step that is taken.
-    """
+    """The state after ``length`` of a step of the active parameters, and the motion's own step."""
     step = length * step
     blocks = np.zeros(few.shape)
     blocks[few] = step
@@ -199,10 +184,7 @@ def at(
 
 
 def likely_sizes(fit: Fit, equations=None) -> Columns:
-    """The columns of a fit, its sized effects as large as is likeliest, all else quadratic.
-
-    ``equations``: information and score of its active parameters, if they are known.
-    """
+    """The columns of a fit, its sized effects as large as is likeliest by its ``equations``."""
     columns, active = fit.columns, fit.active
     if not np.any(sized_groups(columns)[active.any(axis=0)] != ""):
         return columns

@@ -26,8 +26,6 @@ class NoiseCause(NamedTuple):
     gain: float  # nats
     gain_se: float
     blocks: np.ndarray  # nats of each held-out block
-    beside: bool = False  # whether its gain is in no fit's score, which takes noise for white
-    accounts_for: tuple[str, ...] = ()  # checks that must fail where it is
     where: tuple = ()  # (first, last) s of stretches of time
 
 
@@ -39,11 +37,6 @@ class Mixture(NamedTuple):
     core: float  # sd of the rest, in assumed sds
     outlier: np.ndarray  # (T,) probability of being of the share
     nats: np.ndarray  # (T,) log likelihood above a single normal's
-
-    @property
-    def gain(self) -> float:
-        """Twice its log likelihood above a single normal's."""
-        return 2 * float(self.nats.sum())
 
 
 def triad(fit: Fit, imu: int, kind: int) -> np.ndarray:
@@ -60,10 +53,7 @@ def held_out(nats) -> tuple[float, float, np.ndarray]:
 
 
 def verdict(log_ratio, covariance, limit):
-    """(places far from zero, log p of the worst or of all) for normals (n,) of a covariance.
-
-    All places where the others of those far off are not at zero either.
-    """
+    """(places far from zero, log p of the worst or of all) for normals (n,) of a covariance."""
     number = len(log_ratio)
     single = log_normal(np.abs(log_ratio) / np.sqrt(np.diag(covariance))) + np.log(2)
     inverse = np.linalg.pinv(covariance, SETTINGS.least_share, hermitian=True)
@@ -72,7 +62,7 @@ def verdict(log_ratio, covariance, limit):
     log_p = min(single.min() + np.log(2 * number), pooled + np.log(2), 0.0)
     far = single + np.log(number) < limit
     rest = np.flatnonzero(~far)
-    if far.any() and len(rest):
+    if far.any() and len(rest):  # all places, where those beside the far ones are not at zero
         own = log_ratio[rest] @ np.linalg.solve(covariance[np.ix_(rest, rest)], log_ratio[rest])
         far |= log_chi_square(float(own), len(rest)) < SETTINGS.others
     return np.flatnonzero(far), float(log_p)
@@ -157,9 +147,9 @@ def alike(fit: Fit, noise: Noise, imu: int, kind: int) -> bool:
 def noise_scale(
     fit: Fit, noise: Noise, kind: int, limit, least, skip=(), untied=True
 ) -> NoiseCause | None:
-    """A triad's (0 accelerometer, 1 gyroscope) noise against the declared one, or None.
+    """The noise of a kind's triads against the declared one, but of IMUs to ``skip``, or None.
 
-    ``least`` (N,) log ratios below which a departure is not believed, ``skip`` IMUs to leave out.
+    ``least`` (N,) log ratios below which a departure is not believed.
     """
     readings = fit.readings
     pairs = np.argwhere(observable(readings, fit.basis))
@@ -193,7 +183,7 @@ def noise_scale(
     return NoiseCause(SCALES[kind], imus, log_p, numbers, *held_out(nats))
 
 
-def mixture(fit: Fit, imu: int, kind: int, steps=60, without=None) -> Mixture:
+def mixture(fit: Fit, imu: int, kind: int, without=None) -> Mixture:
     """EM for a triad's standardised residual, its three axes together; ``without`` (T,) bool."""
     unit = triad(fit, imu, kind)
     if without is not None:
@@ -201,7 +191,7 @@ def mixture(fit: Fit, imu: int, kind: int, steps=60, without=None) -> Mixture:
     axes, square = np.sum(np.isfinite(unit), axis=1), np.nansum(unit**2, axis=1)
     plain = np.sqrt(np.sum(square) / max(np.sum(axes), 1))
     share, factor, core = 0.05, 3.0, float(np.nanmedian(np.abs(unit)) / QUARTILE)
-    for _ in range(steps):
+    for _ in range(60):
         odds = np.log(share / (1 - share)) - axes * np.log(factor)
         odds = odds + square / (2 * core**2) * (1 - 1 / factor**2)
         outlier = np.where(axes > 0, 1 / (1 + np.exp(-np.clip(odds, -500, 500))), 0.0)
@@ -264,10 +254,7 @@ def heavy_tails(fit: Fit, noise: Noise, limit: float):
 
 
 def _all_tails(gains) -> float:
-    """log p of several triads' tails together.
-
-    One that has none gains nothing half the times, and one degree's chi-square else.
-    """
+    """log p of several tails together: half of triads without gain nothing, the rest chi-square."""
     return log_chi_square(max(float(gains.sum()), 1e-9), len(gains)) + np.log(len(KINDS))
 
 
@@ -285,17 +272,14 @@ def _numbers(fit: Fit, hits):
 
 
 def _tail_gain(fit: Fit, noise: Noise, imu: int, kind: int, mix: Mixture) -> float:
-    """A mixture's gain, less where neighbours are alike; none for a handful of outliers."""
+    """Twice a mixture's nats, less where neighbours are alike; none for a handful of outliers."""
     rho = noise.correlation[imu, kind]
     several = mix.share * len(fit.residual) > SETTINGS.few
-    return mix.gain * (1 - rho**2) / (1 + rho**2) if several else 0.0
+    return 2 * float(mix.nats.sum()) * (1 - rho**2) / (1 + rho**2) if several else 0.0
 
 
 def pooled_autocorrelation(fit: Fit, noise: Noise, lagged) -> float:
-    """log p of lag-one correlations (n, 2: value, pairs) of a kind's triads, or of all, together.
-
-    0 where their spectra disagree.
-    """
+    """log p of triads' lag-one correlations (n, 2: value, pairs) together; 0 by other spectra."""
     known = observable(fit.readings, fit.basis)
     kind = np.argwhere(known)[:, 1]
     implied = np.array([expected_ratio(value, len(fit.residual)) for value, _ in lagged])
@@ -314,12 +298,11 @@ def pooled_autocorrelation(fit: Fit, noise: Noise, lagged) -> float:
 def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> NoiseCause | None:
     """Noise correlated in time: neighbours alike, and a spectrum that agrees with it.
 
-    ``untied``: no check finds the residual tied to the motion; else only the spectrum above the
-    motion's frequencies counts.
+    ``untied``: no check ties the residual to the motion; else only the spectrum above it counts.
     """
     readings, triads = fit.readings, np.argwhere(observable(fit.readings, fit.basis))
     number = len(triads)
-    hits, nats, numbers, logs = [], np.zeros(len(fit.residual)), {}, []
+    nats, numbers, logs = np.zeros(len(fit.residual)), {}, []
     step = float(np.median(np.diff(readings.time)))
     lagged = np.array([autocorrelation(fit, *pair) for pair in triads])
     # the common motion passes a little of one triad's autocorrelation on to the others
@@ -348,7 +331,6 @@ def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> NoiseCause |
     if not far.any():
         return None
     for (imu, kind), (rho, pairs) in zip(triads[far], lagged[far], strict=True):
-        hits.append((int(imu), int(kind)))
         name = f"{KINDS[kind]}_{readings.labels[imu]}"
         error = float(np.sqrt((1 - rho**2) / pairs))
         numbers[f"correlation_{name}"] = (float(rho), error, "1")
@@ -360,6 +342,6 @@ def coloured(fit: Fit, noise: Noise, limit: float, untied: bool) -> NoiseCause |
         unit = unit / max(unit.std(), 1e-9)
         jump = (unit[1:] - rho * unit[:-1]) ** 2 / (1 - rho**2)
         nats[1:] += np.sum(unit[1:] ** 2 - jump - np.log1p(-(rho**2)), axis=1) / 2
-    imus = tuple(sorted({imu for imu, _ in hits}))
+    imus = tuple(sorted({int(imu) for imu in triads[far, 0]}))
     best = min(*logs, together, 0.0)
-    return NoiseCause(COLOURED, imus, best, numbers, *held_out(nats), True, ("whiteness",))
+    return NoiseCause(COLOURED, imus, best, numbers, *held_out(nats))

@@ -17,7 +17,7 @@ from imuarray.diagnosis.final_checks import (
     within_tolerance,
 )
 from imuarray.diagnosis.fit import Fit, fit
-from imuarray.diagnosis.noise_effects import COLOURED, SCALES, TAILS
+from imuarray.diagnosis.noise_effects import COLOURED, SCALES, TAILS, NoiseCause
 from imuarray.diagnosis.reading_effects import Structural, find_structural
 from imuarray.diagnosis.residual_checks import Check, all_checks
 from imuarray.diagnosis.scores import Score
@@ -35,24 +35,19 @@ from imuarray.tails import log_poisson
 
 @dataclass(frozen=True)
 class ProcedureResult:
-    """A diagnosis' end: its last `Search`, the base model's fit, tests, checks, all causes.
-
-    ``explained``: share of the base model's excess misfit; ``unexplained``: whether checks fail
-    beyond tolerance; ``raw``: the search's readings as recorded; ``whole``: all readings, put
-    right; ``rivals``: {effect: ids of its class}.
-    """
+    """A diagnosis' end: its last `Search`, the base model's fit, tests, checks, all causes."""
 
     search: Search
     base: Fit
     base_scores: list[Score]
     structural: list[Structural]
-    in_noise: list[noise_effects.NoiseCause]
+    in_noise: list[NoiseCause]
     checks: list[Check]
-    explained: float
-    unexplained: bool
-    raw: Readings
-    whole: Readings
-    rivals: dict = field(default_factory=dict)
+    explained: float  # share of the base model's excess misfit
+    unexplained: bool  # whether checks fail beyond tolerance
+    raw: Readings  # the search's as recorded
+    whole: Readings  # all, put right
+    rivals: dict = field(default_factory=dict)  # {effect: ids of its class}
 
 
 def run_procedure(
@@ -101,9 +96,11 @@ def run_procedure(
     if fewer is not found:
         found, checks, named = ended(fewer, without, tailed)
     search, in_noise = found, [*in_noise, *shock, *named]
-    in_noise = [item for item in in_noise if sure(item)]
+    # a shock is in little of the held-out time
+    in_noise = [x for x in in_noise if x.effect == SHOCK or x.gain > SETTINGS.least_z * x.gain_se]
     explained, failing = within_tolerance(search, checks, in_noise)
-    in_noise = [item for item in in_noise if not weak(item, len(in_noise) + len(search.causes))]
+    beside = len(in_noise) + len(search.causes) > 1
+    in_noise = [x for x in in_noise if x.log_p <= SETTINGS.limit(x.effect, beside)]
     say("looking for what cannot be distinguished")
     classes = {cause.effect: rivals(search, cause) for cause in search.causes}
     return ProcedureResult(
@@ -112,9 +109,7 @@ def run_procedure(
     )  # fmt: skip
 
 
-def ended(
-    search: Search, without, tailed
-) -> tuple[Search, list[Check], list[noise_effects.NoiseCause]]:
+def ended(search: Search, without, tailed) -> tuple[Search, list[Check], list[NoiseCause]]:
     """The search with the colour of its noise, the checks of what is left, causes in the noise."""
     search = fit_coloured_noise(search, without)
     checks = final_checks(search, tailed)
@@ -122,21 +117,8 @@ def ended(
     return search, checks, named_noise(search, without, tailed, untied)
 
 
-def sure(item: noise_effects.NoiseCause) -> bool:
-    """True of a cause in the noise that gains on held-out time; a shock is in little of it."""
-    return item.effect == SHOCK or item.gain > SETTINGS.least_z * item.gain_se
-
-
-def weak(item: noise_effects.NoiseCause, causes: int) -> bool:
-    """True of a cause in the noise that is there, but not worth a name beside others."""
-    return item.log_p > SETTINGS.limit(item.effect, causes > 1)
-
-
-def prepared(recording: Recording, without=()):
-    """(readings as recorded, causes in them, readings put right, whether they could be).
-
-    InputError where a recording has too few moving samples.
-    """
+def prepared(recording: Recording, without):
+    """(readings as recorded, causes in them, readings put right, whether they could be)."""
     raw = arrange(recording)
     structural, readings, mended = find_structural(raw, without)
     used = determined(readings)
@@ -151,15 +133,12 @@ def with_outliers(search: Search) -> Search:
 
 
 def unshaken(search: Search, without) -> tuple[list, np.ndarray]:
-    """Shocks, if there are any, and the samples (T,) bool to go on with.
-
-    All of them where the motion is rough: clocks and lags show in what is shaken, too.
-    """
+    """Shocks, if there are any, and the samples (T,) bool to go on with."""
     every = np.ones(len(search.readings.time), bool)
     if SHOCK in without:
         return [], every
     shock, shaken = find_shocks(search.fit, SETTINGS.limit(SHOCK))
-    if shock is None or not search.smooth:
+    if shock is None or not search.smooth:  # in rough motion clocks and lags show when shaken, too
         return [shock] if shock else [], every
     left = with_neighbours(shaken, search.readings.run, SETTINGS.beside_shocks)
     try:
@@ -189,11 +168,7 @@ def drop_outliers(search: Search) -> Search:
 
 
 def fit_heavy_tails(search: Search, without) -> tuple[Search, list, list]:
-    """Heavy tails: judged on all readings (`with_outliers`), then left out of the fit.
-
-    Returns the search, the triads [(imu, kind, Mixture)] that have them, or may have, and the
-    causes.
-    """
+    """Heavy tails, left out of the fit: (search, triads as `heavy_tails` has them, causes)."""
     if TAILS in without:
         return search, [], []
     limit = SETTINGS.limit(TAILS)
@@ -221,10 +196,7 @@ def fit_heavy_tails(search: Search, without) -> tuple[Search, list, list]:
 
 
 def fit_coloured_noise(search: Search, without) -> Search:
-    """Where the spectrum shows coloured noise, take its size and correlation from all of it.
-
-    Many triads with a little autocorrelation each count together.
-    """
+    """Where the spectrum shows coloured noise, take its size and correlation from all of it."""
     if COLOURED in without:
         return search
     made = beside_left(search)[0]
@@ -247,11 +219,8 @@ def fit_coloured_noise(search: Search, without) -> Search:
     return replace(search, readings=readings).ending(made, noise)
 
 
-def named_noise(search: Search, without, tailed, untied: bool) -> list[noise_effects.NoiseCause]:
-    """Scale and colour of the noise, where they depart from what is declared.
-
-    ``untied``: no check finds the residual tied to the motion.
-    """
+def named_noise(search: Search, without, tailed, untied: bool) -> list[NoiseCause]:
+    """Scale and colour of the noise, where they depart from what is declared."""
     found, made, readings = [], beside_left(search)[0], search.readings
     for kind, name in enumerate(SCALES):
         if name not in without:
@@ -271,10 +240,7 @@ def named_noise(search: Search, without, tailed, untied: bool) -> list[noise_eff
 
 
 def least_ratios(search: Search) -> np.ndarray:
-    """Log ratios of noise not to be believed (N,): delays carry the derivatives' own noise.
-
-    The less of it the shorter they are.
-    """
+    """Log ratios of noise not to be believed (N,): delays carry the derivatives' own noise."""
     least = np.zeros(len(search.readings.labels))
     sizes = np.abs(search.columns.flat(search.fit.state)) / search.columns.prior_sd
     for cause in search.causes:

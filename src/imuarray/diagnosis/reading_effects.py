@@ -66,10 +66,7 @@ def find_repeats(readings: Readings):
 
 
 def find_rails(readings: Readings):
-    """Readings that pile up at a value below the declared range: (causes, lost).
-
-    In one triad, or in several of a kind that come to the same value.
-    """
+    """Readings of one triad or several that pile up below the declared range: (causes, lost)."""
     lost = np.zeros(readings.values.shape, bool)
     found, logs = [], []
     for kind in range(len(KINDS)):
@@ -208,28 +205,18 @@ def _axes(turn) -> str:
     return f"reads ({', '.join(names)})"
 
 
-def undo_swaps(readings: Readings, turns) -> Readings:
-    """The readings with the axes put right."""
-    values = readings.values.copy()
-    for imu, kind in np.argwhere(readings.exists):
-        block = slice(3 * kind, 3 * kind + 3)
-        values[:, imu, block] = readings.values[:, imu, block] @ turns[imu, kind]
-    return replace(readings, values=values)
-
-
 def unique(imus) -> tuple[int, ...]:
     """Sorted, each once."""
     return tuple(sorted(set(imus)))
 
 
-FINDERS = {"stale_samples": find_repeats, RAILS: find_rails}
 SWAP = "axis_swap"
 
 
 def find_structural(readings: Readings, without=()):
     """(causes, readings put right, whether they could be): axes turned back, the rest left out."""
     causes, mended = [], True
-    for name, find in FINDERS.items():
+    for name, find in (("stale_samples", find_repeats), (RAILS, find_rails)):
         if name not in without:
             found, lost = find(readings)
             causes += found
@@ -238,5 +225,10 @@ def find_structural(readings: Readings, without=()):
         # each triad against each: a part tells
         found, turns, mended = find_swaps(part_of(readings, SETTINGS.searched))
         causes += found
-        readings = undo_swaps(readings, turns) if found else readings
+        if found:
+            values = readings.values.copy()
+            for imu, kind in np.argwhere(readings.exists):
+                block = np.s_[:, imu, 3 * kind : 3 * kind + 3]
+                values[block] = readings.values[block] @ turns[imu, kind]
+            readings = replace(readings, values=values)
     return causes, readings, mended

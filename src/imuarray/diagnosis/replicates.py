@@ -5,7 +5,7 @@ fits again: noise of the declared size, the motion and the parameters projected 
 """
 
 from collections.abc import Callable
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,19 +22,15 @@ class Quantity(NamedTuple):
     values: np.ndarray
     sensors: tuple[str, ...]
     words: str  # "the accelerometers' residual"
-    unit: str = ""
 
 
 class Test(NamedTuple):
-    """A test quantity: ``function`` (`Part`) -> values or None.
+    """A test quantity."""
 
-    ``label`` in figures, ``words`` with a place for whose residual, ``by_axis`` or by triad.
-    """
-
-    function: Callable
-    label: str
-    words: str
-    by_axis: bool = False
+    function: Callable  # (`Part`) -> values or None
+    label: str  # in figures
+    words: str  # with a place for whose residual
+    by_axis: bool = False  # or by triad
 
 
 class Discrepancy(NamedTuple):
@@ -104,24 +100,23 @@ class Part(NamedTuple):
     values: np.ndarray
     square: np.ndarray
 
-    @classmethod
-    def of(cls, seen: Seen, there, unit) -> Self:
-        """From the residuals (T, N, 6) of all, zero where left out."""
-        values = unit.reshape(len(unit), -1)[:, there].reshape(len(unit), -1, 3)
-        return cls(seen, there, values, values**2)
-
     def kept(self, of) -> np.ndarray:
         """Weights (T, N, 6) of readings, as ``values``."""
-        return of.reshape(len(of), -1)[:, self.there].reshape(len(of), -1, 3)
+        return picked(of, self.there)
 
     def mean(self, values) -> np.ndarray:
         """Mean by triad of values that are zero where readings are left out."""
         return values.sum(axis=(0, 2)) / self.kept(self.seen.keep).sum(axis=(0, 2))
 
 
-def quantities(fit: Fit, unit, seen: Seen | None = None) -> dict[str, Quantity]:
+def picked(values, there) -> np.ndarray:
+    """(T, n, 3) of values (T, N, 6) at the readings that are ``there`` (6 N,) bool."""
+    return values.reshape(len(values), -1)[:, there].reshape(len(values), -1, 3)
+
+
+def quantities(fit: Fit, unit, seen: Seen) -> dict[str, Quantity]:
     """Test quantities of a standardised residual (T, N, 6), NaN where left out."""
-    readings, found, seen = fit.readings, {}, seen or Seen(fit)
+    readings, found = fit.readings, {}
     filled, known = np.nan_to_num(unit), observable(readings, fit.basis)
     for kind, name in enumerate(KINDS):
         there = np.flatnonzero(known[:, kind])
@@ -131,12 +126,13 @@ def quantities(fit: Fit, unit, seen: Seen | None = None) -> dict[str, Quantity]:
         axes = tuple(f"{label}{axis}" for label in labels for axis in "xyz")
         mask = np.zeros(unit.shape[1:], bool)
         mask[there, 3 * kind : 3 * kind + 3] = True
-        part = Part.of(seen, mask.ravel(), filled)
+        values = picked(filled, mask.ravel())
+        part = Part(seen, mask.ravel(), values, values**2)
         for check, test in TESTS.items():
-            values = test.function(part)
-            if values is not None:
+            size = test.function(part)
+            if size is not None:
                 said = test.words.format(f"the {name}s' residual")
-                found[f"{name} {check}"] = Quantity(values, axes if test.by_axis else labels, said)
+                found[f"{name} {check}"] = Quantity(size, axes if test.by_axis else labels, said)
     return found
 
 

@@ -121,10 +121,7 @@ def regression_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]
 
 
 def left_by_motion(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
-    """Covariance of the readings' residuals, and variance of their products, summed over time.
-
-    Both (6 N, 6 N): of white noise of unit variance, less the motion's share.
-    """
+    """Covariance of white noise less the motion's share, and its products' variance, (6 N, 6 N)."""
     kept = fit.readings.keep.reshape(len(fit.residual), -1).astype(float)
     free = np.maximum(kept - np.sum(fit.basis**2, axis=2), 0.0)
     covariance, variance = np.diag(kept.sum(axis=0)), free.T @ free
@@ -207,10 +204,7 @@ def normal_checks(name, found, alike=False) -> Check:
 
 
 def timing_check(fit: Fit) -> Check:
-    """Do ages come and go at some frequency? The periodogram of each IMU's delay.
-
-    Against white noise, or its own level around a frequency where that is higher.
-    """
+    """Do ages come and go at some frequency? The periodogram of each IMU's delay."""
     score, information = delay_score(fit)
     time = fit.readings.time
     step = np.median(np.diff(time))
@@ -224,6 +218,7 @@ def timing_check(fit: Fit) -> Check:
         power = np.abs(np.fft.rfft(grid))[SETTINGS.slow :] ** 2
         if len(power) < SETTINGS.around:
             continue
+        # against white noise, or its own level around a frequency where that is higher
         level = median_filter(power, SETTINGS.around, mode="nearest") / np.log(2)
         highest = float(np.max(power / np.maximum(level, known.sum())))
         found.append((int(imu), highest, np.log(len(power) * len(both)) - highest))
@@ -284,10 +279,7 @@ def noise_checks(noise: Noise, exists) -> list[Check]:
 
 
 def resolution_check(fit: Fit) -> Check:
-    """Are readings coarser than their noise? The least step between values against the sd.
-
-    Of so many continuous values some two would be far nearer to each other than any step.
-    """
+    """Are readings coarser than their noise? The least step between values against the sd."""
     readings = fit.readings
     steps = np.where(readings.exists, readings.resolution / readings.sd, 0.0).max(axis=1)
     imu = int(np.argmax(steps))

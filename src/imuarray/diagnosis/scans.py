@@ -73,8 +73,7 @@ def _step_gain(part, own, rest, outside, ridge):
 def refine_instant(fit: Fit, imus, around: float) -> float:
     """The instant of an adopted step of some IMUs, to a sample: where moving it gains most.
 
-    The step's derivative, taken from the residual sample by sample, is added before or removed
-    after; the shifts themselves stay.
+    The step's derivative is added before or removed after; the shifts themselves stay.
     """
     columns, state = fit.columns, fit.state
     chosen = columns.of(POSITION)
@@ -95,14 +94,11 @@ def refine_instant(fit: Fit, imus, around: float) -> float:
     return float(fit.readings.time[int(np.argmin(cost))])
 
 
-def refine_instants(search, imus, times=3):
-    """The search with the instant of a step adopted for ``imus`` refined, alternating with the fit.
-
-    It is one instant for all of them.
-    """
+def refine_instants(search, imus):
+    """The search, the one instant of a step of ``imus`` refined in turns with the fit."""
     columns, imus = search.columns, list(imus)
     chosen = columns.of(SHIFT)
-    for _ in range(times):
+    for _ in range(3):
         whole = columns.flat(search.fit.state)
         last = whole[imus[0], chosen[3]]
         whole[imus, chosen[3]] = found = refine_instant(search.fit, imus, last)
@@ -113,10 +109,9 @@ def refine_instants(search, imus, times=3):
 
 
 class Courses:
-    """Gains of all biases along a course of time, all else that is fitted projected out.
+    """Gains of all biases along a course of time, constant in each block, all else projected out.
 
-    From blocks of time, in each of which the course is taken for constant. ``back``: whether
-    biases that are fitted go back to zero.
+    ``back``: whether biases that are fitted go back to zero.
     """
 
     def __init__(self, fit: Fit, given: Information, imus, back: bool = False):
@@ -171,10 +166,8 @@ class Courses:
     def best(self) -> tuple[float, float]:
         """Pace and zero of the course that gains most."""
         first = int(np.argmax([self.best_zero(pace)[0] for pace in SETTINGS.paces]))
-        around = (
-            SETTINGS.paces[max(first - 1, 0)],
-            SETTINGS.paces[min(first + 1, len(SETTINGS.paces) - 1)],
-        )
+        near = SETTINGS.paces[max(first - 1, 0) : first + 2]
+        around = near[0], near[-1]
         pace = minimize_scalar(
             lambda pace: -self.best_zero(pace)[0], bounds=around, method="bounded",
             options={"xatol": 0.05},
@@ -185,8 +178,7 @@ class Courses:
 def scan_warming(fit: Fit, given: Information, imus, _=None) -> list[Scanned]:
     """All IMUs' biases along the course where they gain most.
 
-    Biases of both kinds must follow it, those of more than one IMU, and gain more by it than as
-    constants: else it is no thermometer.
+    Of both kinds and more than one IMU, more than as constants: else it is no thermometer.
     """
     biases = all(len(fit.columns.of(f"{kind}_bias")) for kind in KINDS)
     few = len(fit.residual) < 2 * SETTINGS.cuts or len(imus) < fit.readings.exists.all(axis=1).sum()
@@ -232,10 +224,7 @@ def maybe_grown(search, cause) -> bool:
 
 
 def maybe_warming(search, cause, own: float) -> bool:
-    """True where the biases of all sensors of a kind may as well follow one course as be constant.
-
-    Those of the other kind, found or not, follow it as well.
-    """
+    """True where the biases of all sensors may as well follow one course as be constant."""
     imus = [int(k) for k in np.flatnonzero(search.readings.exists.all(axis=1))]
     if len(search.imus_with(cause.effect)) < len(imus):
         return False

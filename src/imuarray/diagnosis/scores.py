@@ -47,28 +47,21 @@ class Scanned(NamedTuple):
 
 
 class Conditional(NamedTuple):
-    """An `Information` at the places ``of`` (k,), in order, others refitted.
+    """An `Information` at the places ``of`` (k,), in order, others refitted."""
 
-    ``information`` (k, k), ``score`` (k,) and the score's covariance ``meat`` (k, k).
-    """
-
-    information: np.ndarray
-    score: np.ndarray
-    meat: np.ndarray
+    information: np.ndarray  # (k, k)
+    score: np.ndarray  # (k,)
+    meat: np.ndarray  # (k, k), the score's covariance
     of: np.ndarray
 
 
 class ObservedDirections(NamedTuple):
-    """The d directions that a recording sees of a candidate's k parameters, scaled.
+    """The d directions that a recording sees of a candidate's k parameters, scaled."""
 
-    The information along them ``values`` (d,), themselves ``vectors`` (k, d), the parameters'
-    ``scale`` (k,) and the inverse of the score's covariance along them, ``precision`` (d, d).
-    """
-
-    values: np.ndarray
-    vectors: np.ndarray
-    scale: np.ndarray
-    precision: np.ndarray
+    values: np.ndarray  # (d,) the information along them
+    vectors: np.ndarray  # (k, d)
+    scale: np.ndarray  # (k,) of the parameters
+    precision: np.ndarray  # (d, d) inverse of the score's covariance along them
 
 
 def variants(effect: str) -> tuple[str, ...]:
@@ -108,25 +101,17 @@ def candidates(columns: Columns, exists, effects) -> list[Candidate]:
 
 @dataclass(frozen=True)
 class Information:
-    """The quadratic form of the misfit around a fit, in all parameters at once.
+    """The quadratic form of the misfit around a fit, in all K parameters at once."""
 
-    ``information`` (K, K), ``score`` (K,) at the fit, ``index`` (N, m) place of each parameter
-    (-1 where there is none), ``values`` (K,) of the parameters, ``ridge`` (K,) prior precision and
-    ``usual`` (K,) before sizes were estimated, which tests go by, ``precision`` (K, K) that of what
-    is fitted, gauges pinned.
-    ``meat`` (K, K) is the score's covariance where noise is not white or readings were corrected,
-    else None; ``correlation`` (N, 2) that of each triad's noise from sample to sample.
-    """
-
-    information: np.ndarray
-    score: np.ndarray
-    index: np.ndarray
-    values: np.ndarray
-    ridge: np.ndarray
-    usual: np.ndarray
-    precision: np.ndarray
-    meat: np.ndarray | None = None
-    correlation: np.ndarray | None = None
+    information: np.ndarray  # (K, K)
+    score: np.ndarray  # (K,)
+    index: np.ndarray  # (N, m) place of each parameter, -1 where there is none
+    values: np.ndarray  # (K,) of the parameters
+    ridge: np.ndarray  # (K,) prior precision
+    usual: np.ndarray  # (K,) the same before sizes were estimated, which tests go by
+    precision: np.ndarray  # (K, K) prior's of what is fitted, gauges pinned
+    meat: np.ndarray | None = None  # (K, K) score's covariance, of coloured noise or corrections
+    correlation: np.ndarray | None = None  # (N, 2) of each triad's noise from sample to sample
 
     @cached_property
     def scale(self) -> np.ndarray:
@@ -139,10 +124,7 @@ class Information:
         return found[found >= 0]
 
     def conditional(self, active, freed=None, of=None) -> Conditional:
-        """Information, score and its covariance of the places ``of``, or all, the active refitted.
-
-        ``freed``: places of parameters set back to zero before.
-        """
+        """At the places ``of``, or all, the active refitted; ``freed`` ones set to zero before."""
         of = np.arange(len(self.score)) if of is None else of
         score, square = self.score, np.ix_(active, active)
         if freed is not None and len(freed):

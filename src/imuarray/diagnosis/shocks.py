@@ -19,15 +19,12 @@ SHOCK = "shock"
 
 
 class Misfit(NamedTuple):
-    """Squares of each sample's residual (T,), in units of their usual size: all, and least.
-
-    ``least`` with the IMU left out that misses most, ``worst`` (T,); their degrees of freedom.
-    """
+    """Squares of each sample's residual (T,), in units of their usual size."""
 
     whole: np.ndarray
-    least: np.ndarray
-    worst: np.ndarray
-    freedom: np.ndarray
+    least: np.ndarray  # with the IMU left out that misses most
+    worst: np.ndarray  # that IMU
+    freedom: np.ndarray  # of the whole
 
 
 def misfits(fit: Fit) -> Misfit:

@@ -68,10 +68,7 @@ def _clock_score(imus, gain, delays, samples, count) -> Score:
 
 
 def maybe_clock(search, cause, own: float) -> bool:
-    """True where a clock, whose sawtooth has a third of its constant's power, is not ruled out.
-
-    ``own``: chi-square of the delay that was adopted as ``cause``.
-    """
+    """True where a clock, its sawtooth a third of the delay's chi-square ``own``, is possible."""
     score, information = delay_score(search.fit)
     total = 0.0
     for imu in cause.imus:
@@ -110,40 +107,31 @@ def placebo_of_ages(search) -> tuple[float, float]:
 
 
 class Special(NamedTuple):
-    """An effect's own steps; None where it has none.
+    """An effect's own steps; None where it has none."""
 
-    ``scan`` (fit, given, imus, scores) -> [Scanned] of those IMUs; ``linear``: whether one
-    linearisation at what was found predicts anything; ``refine`` (search, imus) -> search, after
-    its adoption; ``maybe`` (search, cause, chi-square) -> whether it may be what was named as
-    another ``cause``; ``placebo`` (search) -> (nats, nats); ``check`` (search, cause) -> [Check].
-    """
-
-    scan: Callable | None = None
-    linear: bool = True
-    refine: Callable | None = None
-    maybe: Callable | None = None
-    placebo: Callable | None = None
-    check: Callable | None = None
+    scan: Callable | None = None  # (fit, given, imus, scores) -> [Scanned] of those IMUs
+    linear: bool = True  # whether one linearisation at what was found predicts anything
+    refine: Callable | None = None  # (search, imus) -> search, after its adoption
+    maybe: Callable | None = None  # (search, cause, chi-square) -> may it be what is named so?
+    placebo: Callable | None = None  # (search) -> (nats, nats)
+    check: Callable | None = None  # (search, cause) -> [Check]
 
 
-def scans(fit, given, effects, scores, taken=lambda effect: ()) -> list[Scanned]:
-    """All scans, of IMUs that can have the effect and have not (``taken`` (effect) -> IMUs)."""
-    exists, found = fit.readings.exists, []
+def scans(search, scores) -> list[Scanned]:
+    """All scans, of IMUs that can have the effect and have not."""
+    exists, found = search.readings.exists, []
     for effect, special in SPECIAL.items():
-        if special.scan is None or effect not in effects:
+        if special.scan is None or effect not in search.effects:
             continue
         whole = EFFECTS[effect].sensors == "imu"
         able = exists.all(axis=1) if whole else exists[:, 0]
-        imus = [int(k) for k in np.flatnonzero(able) if k not in taken(effect)]
-        found += special.scan(fit, given, imus, scores) if imus else []
+        imus = [int(k) for k in np.flatnonzero(able) if k not in search.imus_with(effect)]
+        found += special.scan(search.fit, search.given, imus, scores) if imus else []
     return found
 
 
 def maybe_drift(search, cause, own) -> bool:
-    """True where a bias may change through the recording: not enough to be adopted, but likely.
-
-    Or as likely grows from nothing.
-    """
+    """True where a bias likely changes through the recording, or as likely grows from nothing."""
     if along_time.maybe_grown(search, cause):
         return True
     kind = EFFECTS[cause.effect].sensors

@@ -39,13 +39,10 @@ class Cause:
 
 @dataclass(frozen=True)
 class ScoreAtFit:
-    """Score and information at a fit, made when asked for: not every fit is tested.
-
-    ``correlation`` (N, 2) of the noise in time.
-    """
+    """Score and information at a fit, made when asked for: not every fit is tested."""
 
     fit: Fit
-    correlation: np.ndarray
+    correlation: np.ndarray  # (N, 2) of the noise in time
 
     @cached_property
     def given(self) -> Information:
@@ -67,38 +64,23 @@ class ScoreAtFit:
 
 @dataclass(frozen=True)
 class Search:
-    """The state of a diagnosis.
+    """The state of a diagnosis."""
 
-    Attributes
-    ----------
-    readings : those in use, with the noise sds in use
-    columns, effects : all parameters that are described, and the ids that may be adopted
-    say : is told of every step
-    smooth : whether the motion's derivatives may be had from neighbouring samples
-    causes : what is adopted, in order; ``refused`` what was and did not gain, ``trace`` (effect,
-        nats gained) of each adoption
-    fit, noise, weighed : the fit of what is adopted, the noise and the information there
-    excess : of the misfit over its degrees of freedom, before any cause
-    jumps : (T, N, 6) bool, readings left out near a clock's jump
-    allowed : (T, N, 6) bool, readings that count, outliers included
-    detectable : smallest sizes that would have been adopted, as `detectable` has them
-    """
-
-    readings: Readings
-    columns: Columns
-    effects: tuple[str, ...]
-    say: Callable[[str], None]
-    smooth: bool = True
-    causes: tuple[Cause, ...] = ()
-    fit: Fit | None = None
+    readings: Readings  # those in use, with the noise sds in use
+    columns: Columns  # of all parameters that are described
+    effects: tuple[str, ...]  # ids that may be adopted
+    say: Callable[[str], None]  # is told of every step
+    smooth: bool = True  # whether the motion's derivatives may be had from neighbouring samples
+    causes: tuple[Cause, ...] = ()  # what is adopted, in order
+    fit: Fit | None = None  # of what is adopted
     noise: noises.Noise | None = None
     weighed: ScoreAtFit | None = None
-    refused: frozenset[Candidate] = frozenset()
-    excess: float = 0.0
-    jumps: np.ndarray | bool = False
-    allowed: np.ndarray | None = None
-    trace: tuple[tuple[str, float], ...] = ()
-    detectable: dict[str, dict] = field(default_factory=dict)
+    refused: frozenset[Candidate] = frozenset()  # what did not gain
+    excess: float = 0.0  # of the misfit over its degrees of freedom, before any cause
+    jumps: np.ndarray | bool = False  # (T, N, 6) bool, readings left out near a clock's jump
+    allowed: np.ndarray | None = None  # (T, N, 6) bool, readings that count, outliers included
+    trace: tuple[tuple[str, float], ...] = ()  # (effect, nats gained) of each adoption
+    detectable: dict[str, dict] = field(default_factory=dict)  # as `detectable.detectable` has it
 
     @cached_property
     def active(self) -> np.ndarray:
@@ -201,10 +183,7 @@ class Search:
         return replace(self, fit=made, noise=noise, weighed=ScoreAtFit(made, noise.correlation))
 
     def started(self, effect: str = "", values: dict | None = None) -> State:
-        """The present state, dropped effects at zero, an adopted ``effect`` where a scan found it.
-
-        ``values``: {imu: its parameters}, or None for effects that are not scanned for.
-        """
+        """The present state, dropped effects at zero, ``effect`` at a scan's {imu: ``values``}."""
         columns, state = self.columns, self.fit.state
         whole = columns.flat(state)
         held = np.zeros_like(whole, bool)
@@ -234,12 +213,10 @@ def freed_mask(search: Search, effect: str, imus=None, among=None) -> np.ndarray
 
 
 def need(search: Search, effect: str, imus=None, among=None) -> tuple[float, int]:
-    """(chi-square, degrees of freedom) of an adopted effect against zero, all else refitted.
-
-    Where that is not all that a mean was pinned of, none is.
-    """
+    """(chi-square, degrees of freedom) of an adopted effect against zero, all else refitted."""
     mask, given = freed_mask(search, effect, imus, among), search.given
     freed, active = given.places(mask), given.places(search.active & ~mask)
+    # where that is not all that a mean was pinned of, none is
     precision = given.precision.copy()
     precision[np.ix_(active, active)] = search.columns.prior_precision(search.active & ~mask)
     given = replace(given, precision=precision)
@@ -251,8 +228,7 @@ def heldout_gain(
 ) -> tuple[float, float]:
     """Nats gained on held-out blocks of time by an adopted effect, with standard error.
 
-    ``parts``: the blocks' equations, if they are known; ``imus``: of which it is asked, if not all,
-    beside its parameters that are ``there`` (N, m) bool.
+    ``parts``: the blocks' equations, if known; of some ``imus``, beside what is ``there`` (N, m).
     """
     columns, mask = search.columns, search.active
     freed = columns.mask([effect], imus) & mask & ~np.asarray(there)
@@ -267,12 +243,10 @@ def heldout_gain(
 def prune(search: Search, effect: str) -> Search:
     """The search with an effect kept for those IMUs that need it, where they are the fewer."""
     imus = search.imus_with(effect)
-    if len(imus) < 3:
-        return search
-    keep = _fewest(search, effect, imus)
-    rest = [imu for imu in imus if imu not in keep]
+    keep = _fewest(search, effect, imus) if len(imus) > 2 else ()
     if not keep:
         return search
+    rest = [imu for imu in imus if imu not in keep]
     causes = tuple(
         replace(cause, imus=keep) if cause.effect == effect else cause for cause in search.causes
     )

@@ -31,18 +31,14 @@ MISTAKES = (
 
 
 class Places(NamedTuple):
-    """Found and nominal positions (A, 3) m, with the found ones' covariance (3 A, 3 A) m^2.
-
-    ``prior_sd`` (m): each coordinate of each triad of the drawing, the reference's too. ``hand``:
-    1 or -1 where rates and forces are known to turn in the same sense or not, 0 where not known.
-    """
+    """Found and nominal positions of triads."""
 
     labels: tuple[str, ...]
-    found: np.ndarray
-    nominal: np.ndarray
-    covariance: np.ndarray
-    prior_sd: float
-    hand: int = 0
+    found: np.ndarray  # (A, 3) m
+    nominal: np.ndarray  # (A, 3) m
+    covariance: np.ndarray  # (3 A, 3 A) m^2 of the found ones
+    prior_sd: float  # m, of each coordinate of each triad of the drawing, the reference's too
+    hand: int = 0  # 1 or -1 where rates and forces turn in the same sense or not; 0: not known
 
     def learnt(self) -> bool:
         """True where the positions are known better than by the drawing."""
@@ -83,8 +79,7 @@ def size_of(places: Places) -> tuple[float, float]:
 def departures(places: Places) -> str | None:
     """One sentence where the array found is not the array drawn, or None.
 
-    Tests of all coordinates jointly, of the size, the orientation and of each triad, at
-    `alarm` of the settings among them all.
+    Tests of all coordinates, the size, the orientation and each triad, at `alarm` among them all.
     """
     weight, off = precision(places), places.found - places.nominal
     count = len(places.found)
@@ -93,7 +88,9 @@ def departures(places: Places) -> str | None:
     pull = turns.T @ weight @ off.ravel()
     known = turns.T @ weight @ turns
     turned = float(pull @ np.linalg.lstsq(known, pull, rcond=1e-9)[0])
-    alone = _each(weight, off)
+    moments, blocks = (weight @ off.ravel()).reshape(-1, 3), weight.reshape(count, 3, count, 3)
+    # what a free place of each triad alone would take away
+    alone = np.array([moments[k] @ np.linalg.solve(blocks[k, :, k], moments[k]) for k in range(count)])
     tests = [chdtrc(3 * (count - 1), chi_square(weight, off)), chdtrc(1, ((size - 1) / sd) ** 2),
              chdtrc(3, turned), *chdtrc(3, alone)]  # fmt: skip
     if len(tests) * min(tests) >= SETTINGS.alarm:
@@ -101,13 +98,6 @@ def departures(places: Places) -> str | None:
     if (unit := another_size(places)) or not places.learnt():
         return unit  # of what is known worse than by the drawing, only a unit's factor tells
     return _explained(places) or _unnamed(places, alone, tests)
-
-
-def _each(weight, off) -> np.ndarray:
-    """Chi-square (A,) that a free place of each triad alone would take away."""
-    count, pull = len(off), (weight @ off.ravel()).reshape(-1, 3)
-    blocks = weight.reshape(count, 3, count, 3)
-    return np.array([pull[k] @ np.linalg.solve(blocks[k, :, k], pull[k]) for k in range(count)])
 
 
 def another_size(places: Places) -> str | None:
@@ -118,10 +108,8 @@ def another_size(places: Places) -> str | None:
     size, drawn = places.size(), centred(places.nominal)
     off = np.linalg.norm(centred(places.found) / size - drawn) / np.linalg.norm(drawn)
     fitted, sd = size_of(places)
-    if (
-        not (abs(fitted - 1) > SETTINGS.far * sd and off < SETTINGS.same_shape)
-        or SETTINGS.sizes[0] < size < SETTINGS.sizes[1]
-    ):
+    other = abs(fitted - 1) > SETTINGS.far * sd and off < SETTINGS.same_shape
+    if not other or SETTINGS.sizes[0] < size < SETTINGS.sizes[1]:
         return None
     return size_words(size) if places.learnt() or _mistake(size) else None
 
@@ -130,16 +118,12 @@ def size_words(size: float) -> str:
     """Words on how far off a size is, and the scales, or the mistake, that would make it so."""
     off = factor_words(size)
     if SETTINGS.sizes[0] < size < SETTINGS.sizes[1]:
-        return (
-            f"the array comes out {off}: gyroscopes {factor_words(size**-0.5)}, or accelerometers"
-            f" {off}?"
-        )
-    if found := _mistake(size):
-        return f"the array comes out {off} ({found[2]}): {found[1]}"
-    return (
-        f"the array comes out {off}: a unit of the rates, of the specific force or of the nominal"
-        " positions?"
-    )
+        cause = f": gyroscopes {factor_words(size**-0.5)}, or accelerometers {off}?"
+    elif found := _mistake(size):
+        cause = f" ({found[2]}): {found[1]}"
+    else:
+        cause = ": a unit of the rates, of the specific force or of the nominal positions?"
+    return f"the array comes out {off}{cause}"
 
 
 def factor_words(factor: float) -> str:
@@ -160,24 +144,18 @@ def _explained(places: Places) -> str | None:
     before = chi_square(weight, places.found - places.nominal)
     freedom = 3 * (len(places.found) - 1)
     # each further unknown has to pay for itself
-    fits = [
-        (
-            chi_square(weight, places.found - drawn) + SETTINGS.as_good * unknowns,
-            SETTINGS.as_good * unknowns,
-            words,
-        )
-        for words, drawn, unknowns in _explanations(places)
-    ]
+    fits = []
+    for words, drawn, unknowns in _explanations(places):
+        paid = SETTINGS.as_good * unknowns
+        fits.append((chi_square(weight, places.found - drawn) + paid, paid, words))
     score, paid, best = min(fits, key=lambda fit: fit[0])
     left = score - paid
     explained = before - left > 0.5 * (before - freedom)
-    if not explained or (
-        chdtrc(freedom, left) < SETTINGS.alarm and left > SETTINGS.unexplained * before
-    ):
+    unlikely = chdtrc(freedom, left) < SETTINGS.alarm and left > SETTINGS.unexplained * before
+    if unlikely or not explained:
         return None
-    others = [
-        words for fit, _, words in fits if words is not best and fit < score + SETTINGS.as_good
-    ]
+    close = score + SETTINGS.as_good
+    others = [words for fit, _, words in fits if words is not best and fit < close]
     return ", or ".join([best, *others[:2]])
 
 

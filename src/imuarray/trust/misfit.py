@@ -56,7 +56,7 @@ def residuals(recording: Recording, calibration: xr.Dataset, places: Places) -> 
 
 
 def unsteady(calibration: xr.Dataset, corrected: bool, recordings: int = 1) -> list[str]:
-    """IMUs on whose position parts of the recording disagree: it came loose, or its offset jumped.
+    """IMUs on whose position parts of the recording disagree: loose, or with jumped offsets.
 
     Where all do, it is the reference; if they are not ``corrected``, their scales do it as well.
     """

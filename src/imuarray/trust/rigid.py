@@ -56,19 +56,14 @@ def runs(time) -> np.ndarray:
 
 
 class Slope(NamedTuple):
-    """Turning by the gyroscopes over that by the accelerometers: between two bounds, 1 if sound.
+    """Turning by the gyroscopes over that by the accelerometers: between two bounds, 1 if sound."""
 
-    The bounds are those of errors in either; ``sd`` is the statistical one, ``coarse`` the share
-    that samples too far apart may leave out of the integral. ``skipped``: steps twice as long as
-    their stamps say, 0 where these are no more than chance.
-    """
-
-    low: float
+    low: float  # the bounds of errors in either
     high: float
-    sd: float
+    sd: float  # the statistical one
     correlation: float
-    coarse: float
-    skipped: int = 0
+    coarse: float  # share that samples too far apart may leave out of the integral
+    skipped: int = 0  # steps twice as long as their stamps say, 0 where no more than chance
 
     @property
     def off(self) -> bool:
@@ -120,10 +115,7 @@ def slope(time, motion: Turning) -> Slope | None:
 
 
 def elsewhere(recording: Recording, positions) -> tuple[float, float]:
-    """Gain of accelerometers (A, 3) m off ``positions``: ratio of residuals, rms move.
-
-    By moving each in turn with the motion; what other errors leave is left in both residuals.
-    """
+    """Gain of accelerometers moved off ``positions`` (A, 3) m: ratio of residuals, rms move in m."""
     force, places = recording.specific_force, np.array(positions)
     rate = np.median(recording.angular_rate, axis=1)
     left = []

@@ -70,8 +70,7 @@ def _accelerometers(recording: Recording) -> list[tuple[str, str]]:
 def _search(readings, others, labels, sd, chain, rise=None) -> list[tuple[str, str]]:
     """Labels, and what would make the triads agree with the others (empty if nothing known does).
 
-    One after the other: the worst is named and left out, until the rest agree. ``chain``, ``rise``
-    as of `explain`.
+    One after the other: the worst is named and left out, until the rest agree.
     """
     count = readings.shape[1]
     left = np.arange(count)
@@ -184,11 +183,7 @@ SIGNS = [np.array(signs) for signs in product((1, -1), repeat=3)][1:]
 
 
 def common(recording: Recording) -> str:
-    """A mistake in all sensors alike, by the course of the angular acceleration; or "".
-
-    With nominal positions the gyroscopes' and the accelerometers' turning is the same once it is
-    undone, and before is not.
-    """
+    """A mistake in all sensors alike, or "": gyroscopes and accelerometers turn alike once undone."""
     rate = np.median(recording.angular_rate, axis=1)
 
     def misfit(time, force, rates, places) -> float:
