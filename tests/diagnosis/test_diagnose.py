@@ -14,7 +14,7 @@ from imuarray.analysis.calibration import calibrate
 from imuarray.cli import main
 from imuarray.diagnosis import procedure
 from imuarray.diagnosis import state as elimination
-from imuarray.diagnosis.document import diagnose, precision_of, structural_gain
+from imuarray.diagnosis.document import diagnose, structural_gain
 from imuarray.diagnosis.final_checks import beside_left
 from imuarray.diagnosis.fit import log_scores
 from imuarray.diagnosis.noise_effects import verdict
@@ -454,7 +454,7 @@ def test_readings_count_once(effects):
     assert set(parts) == {name for name, _ in effects}
     assert all(blocks.sum() > 1e5 for blocks in parts.values())
     made_fit = made.extended.fit
-    alone = log_scores(made_fit, precision_of(made_fit))
+    alone = log_scores(made_fit)
     expected = parts.get("stale_samples", np.zeros(len(alone.nats)))
     np.testing.assert_allclose(made.extended.scores.nats - alone.nats, expected, rtol=1e-9)
     if "stale_samples" not in parts:

@@ -14,7 +14,7 @@ import imuarray
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects as variance
 from imuarray.diagnosis.adoption import narrowest
-from imuarray.diagnosis.fit import Fit, fit, log_scores, search_optimum
+from imuarray.diagnosis.fit import fit, log_scores, search_optimum
 from imuarray.diagnosis.replicates import Replicator, discrepancies
 from imuarray.diagnosis.scores import (
     Candidate,
@@ -65,10 +65,6 @@ def scaled():
     """Gyroscope 3 scaled, 12 sigma."""
     case = Case("criticism", (("gyroscope_scale", (2,)),), 12.0, kind="one", duration=SHORT)
     return started(case)[0]
-
-
-def ridge_of(made: Fit):
-    return made.columns.prior_precision(made.active)
 
 
 def test_derivatives_are_those_of_finite_differences(clean):
@@ -152,7 +148,7 @@ def jacobian_pattern(samples, count):
 def information_of(made):
     given = information_at(made)
     places = given.places(made.active)
-    return given.information[np.ix_(places, places)] + ridge_of(made)
+    return given.information[np.ix_(places, places)] + made.precision
 
 
 def test_a_score_is_what_a_refit_gains(scaled):
@@ -216,7 +212,7 @@ def test_tails_are_those_of_scipy_stats():
 def test_heldout_scores_are_those_of_refits_without_each_block(clean):
     """Parameters trained on nine tenths of time, the last tenth's density from its own misfit."""
     made = clean.fit
-    scores = log_scores(made, ridge_of(made))
+    scores = log_scores(made)
     blocks = blocks_of(len(made.residual))
     for block in (0, 5):
         inside = np.zeros(len(made.residual), bool)
@@ -224,7 +220,7 @@ def test_heldout_scores_are_those_of_refits_without_each_block(clean):
         information, score = normal(made, made.active, ~inside)
         values = made.columns.flat(made.state)[made.active]
         offset = values - nominal_of(made)[made.active]
-        step = np.linalg.solve(information + ridge_of(made), score - ridge_of(made) @ offset)
+        step = np.linalg.solve(information + made.precision, score - made.precision @ offset)
         flat = made.columns.flat(made.state)
         flat[made.active] += step
         state = made.columns.unflat(made.state, flat)
@@ -249,7 +245,7 @@ def constants(made, inside):
 
 def test_noise_scales_are_unbiased_with_the_errors_they_claim(clean):
     """The residual of replicates, refitted: z of the log ratios has mean 0 and sd 1."""
-    replicator = Replicator(clean.fit, ridge_of(clean.fit))
+    replicator = Replicator(clean.fit)
     rng, z = np.random.default_rng(8), []
     for _ in range(12):
         drawn = replace(clean.fit, residual=replicator.draw(rng))
@@ -345,7 +341,7 @@ def test_a_clock_in_coloured_noise_must_show_more():
 
 
 def test_replicates_have_the_residual_s_size(clean):
-    replicator = Replicator(clean.fit, ridge_of(clean.fit))
+    replicator = Replicator(clean.fit)
     rng = np.random.default_rng(4)
     drawn = np.array([replicator.draw(rng) for _ in range(8)])
     share = 1.0 - clean.fit.leverage
@@ -355,7 +351,7 @@ def test_replicates_have_the_residual_s_size(clean):
 
 
 def test_discrepancies_of_a_clean_recording_are_few(clean):
-    found = discrepancies(clean.fit, ridge_of(clean.fit), np.random.default_rng(1), 39)
+    found = discrepancies(clean.fit, np.random.default_rng(1), 39)
     p = np.array([item.p_value for item in found])
     assert len(p) > 14
     assert np.mean(p <= 0.05) < 0.3
@@ -363,7 +359,7 @@ def test_discrepancies_of_a_clean_recording_are_few(clean):
 
 
 def test_discrepancies_see_a_scaled_gyroscope(scaled):
-    found = discrepancies(scaled.fit, ridge_of(scaled.fit), np.random.default_rng(1), 39)
+    found = discrepancies(scaled.fit, np.random.default_rng(1), 39)
     assert found[0].p_value <= 0.05
     assert any("3" in sensor for sensor in found[0].sensors)
 

@@ -161,7 +161,7 @@ def test_no_reading_shows_a_gauge(readings, name):
     columns = columns_of(readings.array, (name,), readings.position_prior_sd)
     state = with_derivatives(readings, start(readings, columns), True)
     active = columns.mask([POSITION, name])
-    inner, _ = at(readings, columns, active, state, True).normal(active)
+    inner, _ = at(readings, columns, active, state).normal(active)
     place = np.isin(np.nonzero(active)[1], columns.of(POSITION))
     cross = inner[np.ix_(place, ~place)]
     left = inner[np.ix_(~place, ~place)]

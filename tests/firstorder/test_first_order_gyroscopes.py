@@ -17,7 +17,7 @@ from imuarray.firstorder.report import gyroscope_lines, parameter_table, turned_
 from imuarray.firstorder.still import still_poses
 from imuarray.recording import read_recording, write_recording
 from imuarray.recording.format import load_dataset
-from imuarray.trust.poses import Poses, of_file, reasons_of_poses
+from imuarray.trust.misfit import Poses, of_file, reasons_of_poses
 from imuarray.trust.settings import SETTINGS as TRUST
 
 SHORT = Options(sampling_rate=100.0, still=3.2, move=1.5, twisting=4.0)

@@ -32,8 +32,8 @@ def plain():
 
 def test_scores_of_normal_noise_are_those_of_the_diagnosis(plain):
     (one,) = plain.recorded
-    made = at(one.readings, plain.columns, plain.active, one.state, True, False)
-    expected, found = log_scores(made, plain.precision), block_scores(plain)
+    made = at(one.readings, plain.columns, plain.active, one.state, False)
+    expected, found = log_scores(made), block_scores(plain)
     np.testing.assert_array_equal(found.samples, expected.samples)
     np.testing.assert_allclose(found.nats, expected.nats, atol=0.02)
     np.testing.assert_allclose(densities(plain, 1e7), densities(plain, np.inf), atol=1e-2)

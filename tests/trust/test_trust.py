@@ -17,7 +17,7 @@ from imuarray.firstorder.gyroscopes import shared_chance
 from imuarray.firstorder.settings import SETTINGS as FIRSTORDER
 from imuarray.geometry import mimu4444, mimu4444_corners
 from imuarray.recording.record import CORRECTION
-from imuarray.trust import poses
+from imuarray.trust import misfit
 from imuarray.trust import reasons as doubts
 from imuarray.trust.drawing import Places, departures
 from imuarray.trust.misfit import changed, residuals, unsteady
@@ -560,10 +560,10 @@ def test_an_odd_scale_of_all_gyroscopes_is_the_time_base_or_theirs():
     maps += 0.005 * rng.standard_normal((6, 3, 1)) * np.eye(3)
     chances = [shared_chance(part * maps) for part in (1.0, 1.015)]
     assert chances[0] > FIRSTORDER.odd_scale > chances[1]
-    assert poses.reasons_of_poses(poses.Poses(scale=1.0, chance=chances[0])) == []
-    (said,) = poses.reasons_of_poses(poses.Poses(scale=1 / 1.015, chance=chances[1]))
+    assert misfit.reasons_of_poses(misfit.Poses(scale=1.0, chance=chances[0])) == []
+    (said,) = misfit.reasons_of_poses(misfit.Poses(scale=1 / 1.015, chance=chances[1]))
     assert "read 1.5 % too much" in said and "time base" in said
-    assert poses.reasons_of_poses(poses.Poses(scale=1.003, chance=1e-9)) == []
+    assert misfit.reasons_of_poses(misfit.Poses(scale=1.003, chance=1e-9)) == []
 
 
 def test_gyroscopes_that_wrap_are_named(sound):

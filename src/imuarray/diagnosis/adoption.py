@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from imuarray.diagnosis.detectable import detectable
 from imuarray.diagnosis.fit import Fit, at, likely_sizes, normal_blocks
 from imuarray.diagnosis.scores import (
     Candidate,
@@ -17,6 +16,7 @@ from imuarray.diagnosis.scores import (
     Score,
     able,
     candidates,
+    detectable,
     mask_of,
     score_all,
 )
@@ -151,7 +151,7 @@ def predicted_gain(search: Search, candidate: Candidate, values, there) -> tuple
     """The held-out gain, beside what is ``there`` (N, m), that one linearisation predicts."""
     state, made = search.started(candidate.effect, values), search.fit
     if not np.array_equal(state.parameters, made.state.parameters):
-        made = at(search.readings, search.columns, search.active, state, False, all_columns=False)
+        made = at(search.readings, search.columns, search.active, state, all_columns=False)
     made = replace(made, active=search.active)
     parts = normal_blocks(made, made.active)
     columns = likely_sizes(made, [sum(part) for part in zip(*parts, strict=True)])

@@ -84,7 +84,7 @@ def structural_gain(found: ProcedureResult, item) -> tuple[float, float, np.ndar
     mine = np.zeros_like(touched)
     mine[:, list(item.imus)] = touched[:, list(item.imus)]
     readings = replace(search.readings, values=values, keep=search.readings.keep | mine)
-    seen = at(readings, search.columns, search.active, search.fit.state, True, all_columns=False)
+    seen = at(readings, search.columns, search.active, search.fit.state, all_columns=False)
     return held_out((seen.misfits - search.fit.misfits - mine.sum(axis=(1, 2))) / 2)
 
 

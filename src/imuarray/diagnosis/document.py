@@ -102,8 +102,7 @@ def diagnose(
     rng = stream(seed, "diagnose", "replicates")
     say("replicating the recording")
     base, extended = (
-        replace(m, discrepancies=discrepancies(m.fit, precision_of(m.fit), rng, replicates))
-        for m in (base, extended)
+        replace(m, discrepancies=discrepancies(m.fit, rng, replicates)) for m in (base, extended)
     )
     document = {
         "recording": str(recording_path),
@@ -159,11 +158,6 @@ def nats_beside(found: ProcedureResult) -> np.ndarray:
     return sum((blocks for blocks in beside if np.sum(blocks) > 0), np.zeros(ENGINE.blocks))
 
 
-def precision_of(made: Fit) -> np.ndarray:
-    """Prior precision of a fit's active parameters, gauges pinned."""
-    return made.columns.prior_precision(made.active)
-
-
 def fitted(made: Fit, given: Information | None = None) -> Fitted:
     """A fit with its held-out score and its parameters' sds (the sandwich's in coloured noise).
 
@@ -179,7 +173,7 @@ def fitted(made: Fit, given: Information | None = None) -> Fitted:
         covariance = covariance @ middle @ covariance
     sds = np.zeros(made.active.shape)
     sds[made.active] = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    return Fitted(made, log_scores(made, precision_of(made)), sds)
+    return Fitted(made, log_scores(made), sds)
 
 
 def rivals_of(found: ProcedureResult) -> tuple[Fitted, Fitted]:

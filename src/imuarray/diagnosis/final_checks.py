@@ -12,7 +12,7 @@ import numpy as np
 from imuarray.diagnosis import noise_effects
 from imuarray.diagnosis.fit import Fit
 from imuarray.diagnosis.noise import Noise
-from imuarray.diagnosis.reading_effects import RAILS, Structural, rails_cause, unique
+from imuarray.diagnosis.reading_effects import RAILS, Structural, rails_cause
 from imuarray.diagnosis.residual_checks import Check, all_checks, normal_checks
 from imuarray.diagnosis.scores import Information
 from imuarray.diagnosis.settings import SETTINGS
@@ -94,8 +94,8 @@ def together(first: list[Structural], second: list[Structural]) -> list[Structur
     names = {item.effect: item for item in first}
     for new in second:
         old = names.get(new.effect, new)
-        imus, log_p = unique([*old.imus, *new.imus]), min(old.log_p, new.log_p)
-        names[new.effect] = old._replace(imus=imus, log_p=log_p)
+        imus = tuple(sorted({*old.imus, *new.imus}))
+        names[new.effect] = old._replace(imus=imus, log_p=min(old.log_p, new.log_p))
     return list(names.values())
 
 

@@ -41,7 +41,6 @@ class Fit:
     course: np.ndarray
     log_volume: np.ndarray  # (T,)
     misfits: np.ndarray  # (T,)
-    converged: bool
 
     @property
     def misfit(self) -> float:
@@ -52,6 +51,11 @@ class Fit:
     def leverage(self) -> np.ndarray:
         """Share of each reading's variance that the motion takes up, (T, N, 6)."""
         return leverage_of(self.basis)
+
+    @property
+    def precision(self) -> np.ndarray:
+        """Prior precision (n, n) of the active parameters, gauges pinned."""
+        return self.columns.prior_precision(self.active)
 
     def less_motion(self, values) -> np.ndarray:
         """Whitened readings (T, N, 6) without what the motion can explain of them."""
@@ -104,8 +108,8 @@ def fit(
     ``smooth``: whether the motion's time derivatives may be had from its neighbours; ``rough``: it
     may stop when a step gains little; ``all_columns`` as for `at`.
     """
-    state, converged, _ = search_optimum(readings, columns, active, state, smooth, rough)
-    return at(readings, columns, active, state, converged, all_columns)
+    state, *_ = search_optimum(readings, columns, active, state, smooth, rough)
+    return at(readings, columns, active, state, all_columns)
 
 
 def search_optimum(readings, columns, active, state, smooth, rough):
@@ -171,15 +175,13 @@ def advance(columns, state, active, step, few, seen: Eliminated, length) -> Stat
     return stepped(state._replace(motion=state.motion + move), columns, active, step)
 
 
-def at(
-    readings: Readings, columns: Columns, active, state: State, converged: bool, all_columns=True
-) -> Fit:
+def at(readings: Readings, columns: Columns, active, state: State, all_columns=True) -> Fit:
     """The fit's quantities at a state, with the derivative by every parameter or the active."""
     wanted = np.arange(columns.size) if all_columns else np.flatnonzero(active.any(axis=0))
     seen = linearise(readings, columns, state, wanted)
     return Fit(
         readings, columns, state, active, wanted, seen.residual, seen.whitened, seen.basis,
-        seen.expected, seen.unexpected, seen.course, seen.log_volume, seen.misfit, converged,
+        seen.expected, seen.unexpected, seen.course, seen.log_volume, seen.misfit,
     )  # fmt: skip
 
 
@@ -206,12 +208,12 @@ def normal_blocks(fit: Fit, active) -> list[tuple[np.ndarray, np.ndarray]]:
     return [fit.normal(active, block) for block in blocks_of(len(fit.residual))]
 
 
-def log_scores(fit: Fit, ridge) -> Scores:
-    """Scores of a fit under normal noise; ``ridge`` (n, n) prior precision of what is active."""
+def log_scores(fit: Fit) -> Scores:
+    """Scores of a fit under normal noise."""
     nats = log_densities(
         fit.readings, fit.state, fit.residual, fit.misfits, fit.log_volume, (np.inf, np.inf)
     )
-    return scores_of(nats, normal_blocks(fit, fit.active), ridge)
+    return scores_of(nats, normal_blocks(fit, fit.active), fit.precision)
 
 
 def delay_score(fit: Fit) -> tuple[np.ndarray, np.ndarray]:

@@ -8,7 +8,6 @@ import numpy as np
 from imuarray.diagnosis import noise as noises
 from imuarray.diagnosis import noise_effects
 from imuarray.diagnosis.adoption import adopt, proposals, rivals
-from imuarray.diagnosis.detectable import detectable
 from imuarray.diagnosis.final_checks import (
     beside_left,
     final_checks,
@@ -20,7 +19,7 @@ from imuarray.diagnosis.fit import Fit, fit
 from imuarray.diagnosis.noise_effects import COLOURED, SCALES, TAILS, NoiseCause
 from imuarray.diagnosis.reading_effects import Structural, find_structural
 from imuarray.diagnosis.residual_checks import Check, all_checks
-from imuarray.diagnosis.scores import Score
+from imuarray.diagnosis.scores import Score, detectable
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.shocks import SHOCK, find_shocks, with_neighbours
 from imuarray.diagnosis.state import Search, eliminate

@@ -61,7 +61,9 @@ def find_repeats(readings: Readings):
     numbers = {"share": (float(np.mean(shares)), float(np.std(shares)), "1")}
     says = f"{100 * np.mean(shares):.2g} % of the readings repeat the one before exactly"
     # a coarse converter at rest repeats itself, too, and is right
-    found = Structural("stale_samples", unique(hit), float(min(logs)), numbers, says, doubtful=True)
+    found = Structural(
+        "stale_samples", tuple(sorted({*hit})), float(min(logs)), numbers, says, doubtful=True
+    )
     return [found], lost
 
 
@@ -74,12 +76,14 @@ def find_rails(readings: Readings):
         if not len(there):
             continue
         chance = len(there) * _tied(readings, kind)
-        tops, at = zip(*(_largest(_sizes(readings, imu, kind)) for imu in there), strict=True)
+        sizes = [_sizes(readings, imu, kind) for imu in there]
+        tops = [float(size.max()) for size in sizes]
+        at = [(size >= size.max() * (1 - SETTINGS.same)) & (size > 0) for size in sizes]
         counts = np.array([here.sum() for here in at])
-        for imu, top, here in zip(there, tops, at, strict=True):
+        for imu, size, top, here in zip(there, sizes, tops, at, strict=True):
             count = counts[np.isclose(tops, top, rtol=SETTINGS.same, atol=0.0)].sum()
             log_p = float(log_poisson(count - 1, chance) + np.log(len(there)))
-            if log_p < SETTINGS.check or _piles(_sizes(readings, imu, kind), here):
+            if log_p < SETTINGS.check or _piles(size, here):
                 lost[:, imu, 3 * kind : 3 * kind + 3] = here
                 found.append((int(imu), kind, top))
                 logs.append(float(np.clip(log_p, SETTINGS.least_log, SETTINGS.check)))
@@ -93,12 +97,6 @@ def _sizes(readings: Readings, imu: int, kind: int) -> np.ndarray:
     """(T, 3) of a triad's readings, 0 where they do not count."""
     kept = readings.keep[:, imu, 3 * kind : 3 * kind + 3]
     return np.where(kept, np.abs(part(readings, kind)[:, imu]), 0.0)
-
-
-def _largest(size) -> tuple[float, np.ndarray]:
-    """The largest of sizes, and which of them are at it."""
-    top = float(size.max())
-    return top, (size >= top * (1 - SETTINGS.same)) & (size > 0)
 
 
 def _tied(readings: Readings, kind: int) -> float:
@@ -117,7 +115,7 @@ def rails_cause(found, log_p: float, says: str) -> Structural:
         if sizes:
             numbers[f"{name}_rail"] = float(np.median(sizes)), float(np.std(sizes)), UNITS[kind]
     where = ", ".join(f"{n} {v[0]:.4g} {v[2]}" for n, v in numbers.items())
-    imus = unique(imu for imu, *_ in found)
+    imus = tuple(sorted({imu for imu, *_ in found}))
     return Structural(RAILS, imus, log_p, numbers, f"{says} ({where})")
 
 
@@ -169,8 +167,8 @@ def find_swaps(readings: Readings):
     if not mended:
         turns[:] = np.eye(3)
         says = "no majority of the triads agrees on the axes: put them right first"
-    found = Structural(SWAP, unique([imu for imu, _ in hit]), -1e6, {}, says)
-    return [found], turns, mended
+    imus = tuple(sorted({imu for imu, _ in hit}))
+    return [Structural(SWAP, imus, -1e6, {}, says)], turns, mended
 
 
 def _matrix(reference, values) -> np.ndarray:
@@ -203,11 +201,6 @@ def _axes(turn) -> str:
     """A signed permutation in words: reads (+y, +x, +z)."""
     names = ["+-"[int(row.sum() < 0)] + AXES[int(np.argmax(np.abs(row)))] for row in turn]
     return f"reads ({', '.join(names)})"
-
-
-def unique(imus) -> tuple[int, ...]:
-    """Sorted, each once."""
-    return tuple(sorted(set(imus)))
 
 
 SWAP = "axis_swap"

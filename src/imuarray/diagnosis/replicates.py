@@ -47,10 +47,10 @@ class Discrepancy(NamedTuple):
 class Replicator:
     """Draws residuals (T, N, 6) of the fitted model, in the units of the noise sd in use."""
 
-    def __init__(self, fit: Fit, ridge):
+    def __init__(self, fit: Fit):
         self.fit, self.pairs = fit, np.argwhere(fit.active)
         information, _ = fit.normal(fit.active)
-        self.inverse = np.linalg.pinv(information + ridge, hermitian=True)
+        self.inverse = np.linalg.pinv(information + fit.precision, hermitian=True)
         place = np.searchsorted(fit.wanted, self.pairs[:, 1])
         own = [np.flatnonzero(self.pairs[:, 0] == k) for k in range(len(fit.active))]
         # of each IMU (T 6, n): what moves its readings
@@ -222,9 +222,9 @@ TESTS = {
 }
 
 
-def discrepancies(fit: Fit, ridge, rng, replicates=SETTINGS.replicates) -> list[Discrepancy]:
+def discrepancies(fit: Fit, rng, replicates=SETTINGS.replicates) -> list[Discrepancy]:
     """Every test quantity of a fit beside its band over replicates, most striking first."""
-    replicator, seen = Replicator(fit, ridge), Seen(fit)
+    replicator, seen = Replicator(fit), Seen(fit)
     share = fit.readings.keep / np.sqrt(np.maximum(1.0 - fit.leverage, 1e-6))
     measured = quantities(fit, standardised(fit), seen)
     drawn: dict[str, list] = {name: [] for name in measured}

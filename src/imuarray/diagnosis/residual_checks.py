@@ -203,16 +203,19 @@ def normal_checks(name, found, alike=False) -> Check:
     return Check(name, worst[1], float(min(log_p, 0.0)), (worst[0],))
 
 
-def timing_check(fit: Fit) -> Check:
-    """Do ages come and go at some frequency? The periodogram of each IMU's delay."""
+def age_checks(fit: Fit) -> list[Check]:
+    """Do IMUs' ages come and go at some frequency, or wander from sample to sample?"""
     score, information = delay_score(fit)
-    time = fit.readings.time
-    step = np.median(np.diff(time))
-    place = np.round((time - time[0]) / step).astype(int)
     both = np.flatnonzero(fit.readings.exists.all(axis=1))
+    parts = [(int(imu), score[:, imu], information[:, imu]) for imu in both]
+    return [_turning_ages(fit.readings.time, parts), _wandering_ages(parts)]
+
+
+def _turning_ages(time, parts) -> Check:
+    """The periodogram of each IMU's delay, by (imu, its score, its information)."""
+    place = np.round((time - time[0]) / np.median(np.diff(time))).astype(int)
     found = []
-    for imu in both:
-        own, known = score[:, imu], information[:, imu]
+    for imu, own, known in parts:
         grid = np.zeros(place[-1] + 1)
         np.add.at(grid, place, own - known * own.sum() / known.sum())
         power = np.abs(np.fft.rfft(grid))[SETTINGS.slow :] ** 2
@@ -221,23 +224,21 @@ def timing_check(fit: Fit) -> Check:
         # against white noise, or its own level around a frequency where that is higher
         level = median_filter(power, SETTINGS.around, mode="nearest") / np.log(2)
         highest = float(np.max(power / np.maximum(level, known.sum())))
-        found.append((int(imu), highest, np.log(len(power) * len(both)) - highest))
+        found.append((imu, highest, np.log(len(power) * len(parts)) - highest))
     if not found:
         return Check("ages in time", 0.0, 0.0, ())
     imu, highest, log_p = min(found, key=lambda f: f[2])
     return Check("ages in time", highest, float(min(log_p, 0.0)), (imu,))
 
 
-def jitter_check(fit: Fit) -> Check:
-    """Do ages wander from sample to sample? The residual along a delay where delays show most."""
-    score, information = delay_score(fit)
+def _wandering_ages(parts) -> Check:
+    """The residual along a delay where delays show most."""
     found = []
-    for imu in np.flatnonzero(fit.readings.exists.all(axis=1)):
-        known = information[:, imu]
-        square = score[:, imu] ** 2 / known
+    for imu, own, known in parts:
+        square = own**2 / known
         excess = (known - known.mean()) * (square - square.mean())
         spread = np.sqrt(np.sum(excess**2))
-        found.append((int(imu), float(excess.sum() / max(spread, 1e-300))))
+        found.append((imu, float(excess.sum() / max(spread, 1e-300))))
     if not found:
         return Check("ages that wander", 0.0, 0.0, ())
     return normal_checks("ages that wander", found, alike=True)
@@ -290,7 +291,7 @@ def resolution_check(fit: Fit) -> Check:
 def all_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]:
     """Everything that is tested of a residual."""
     return [
-        *regression_checks(fit, given, noise), *size_checks(fit), timing_check(fit),
-        jitter_check(fit), correlation_check(fit, noise),
+        *regression_checks(fit, given, noise), *size_checks(fit), *age_checks(fit),
+        correlation_check(fit, noise),
         *noise_checks(noise, observable(fit.readings, fit.basis)), resolution_check(fit),
     ]  # fmt: skip

@@ -20,7 +20,7 @@ SHIFT = "position_shift"
 WARM_UP = "warm_up"
 
 
-def scan_shifts(fit: Fit, given: Information, imus) -> list[Scanned]:
+def scan_shifts(fit: Fit, given: Information, imus, _=None) -> list[Scanned]:
     """A step of each triad's position, and of all at once, at the instant where it gains most."""
     active = given.places(fit.active)
     chosen = fit.columns.of(POSITION)

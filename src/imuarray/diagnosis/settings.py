@@ -91,14 +91,6 @@ class Settings:
     implausible: float = 10.0  # prior sds of a parameter
     doubtful: float = 0.5  # share of a cause's gain that a placebo must not have
 
-    def limit(self, effect: str, beside: object = False) -> float:
-        """Critical log p of an effect: its own, where its test has another tail.
-
-        ``beside``: whether there are other causes.
-        """
-        own = known_effect(effect).critical
-        return (self.effect if own is None else own) - bool(beside) * self.beside
-
     # `detectable`
     power: float = 0.8  # chance to be named of an effect of the size that is stated
     # `scans`
@@ -115,6 +107,11 @@ class Settings:
     replicates: int = 99
     # `causes`
     stretches_stated: int = 3  # of the longest
+
+    def limit(self, effect: str, beside: object = False) -> float:
+        """Critical log p of an effect, whose test may have another tail, ``beside`` others or not."""
+        own = known_effect(effect).critical
+        return (self.effect if own is None else own) - bool(beside) * self.beside
 
 
 SETTINGS = Settings()

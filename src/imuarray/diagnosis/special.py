@@ -158,10 +158,7 @@ SPECIAL = {
     CLOCK: Special(
         scan=sawtooth_scan, linear=False, maybe=maybe_clock, placebo=placebo_of_ages
     ),
-    along_time.SHIFT: Special(
-        scan=lambda fit, given, imus, _: along_time.scan_shifts(fit, given, imus),
-        refine=along_time.refine_instants,
-    ),
+    along_time.SHIFT: Special(scan=along_time.scan_shifts, refine=along_time.refine_instants),
     along_time.WARM_UP: Special(scan=along_time.scan_warming, maybe=along_time.maybe_warming),
     DRIFT: Special(maybe=maybe_drift, check=drift_check),
 }  # fmt: skip

@@ -158,7 +158,7 @@ class Search:
                 break
             state = estimated_again(search._with_jumps, search.columns, state, search.clocks)
             search = replace(search, readings=readings.with_sd(judged.sd))
-        made = at(search.readings, search.columns, search.active, state, converged)
+        made = at(search.readings, search.columns, search.active, state)
         noise = noises.estimated(made.readings, made.residual, made.basis)
         search = search.ending(made, noise)
         columns = likely_sizes(made)

@@ -12,7 +12,7 @@ from imuarray.trust.checked import (
     require_labels,
     values_of,
 )
-from imuarray.trust.poses import of_file, of_first_order, reasons_of_poses
+from imuarray.trust.misfit import of_file, of_first_order, reasons_of_poses
 from imuarray.trust.reasons import (
     reasons_of_calibration,
     reasons_of_diagnosis,

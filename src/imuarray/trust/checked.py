@@ -102,19 +102,15 @@ def reasons_in(calibration: xr.Dataset) -> list[str]:
 
 
 def _require_numbers(variable: xr.DataArray, dimensions: tuple[str, ...]) -> None:
-    if variable.dims != dimensions or variable.dtype.kind not in "fiu":
-        raise InputError(
-            f"{variable.name}: expected numbers by {', '.join(dimensions)}, found"
-            f" {variable.dtype} by {', '.join(map(str, variable.dims)) or 'nothing'}"
-        )
+    name, numeric = str(variable.name), variable.dtype.kind in "fiu"
+    found = f"{variable.dtype} by {', '.join(map(str, variable.dims)) or 'nothing'}"
+    wanted = f"numbers by {', '.join(dimensions)}"
+    require(numeric and variable.dims == dimensions, name, wanted, found)
     values = np.asarray(variable.to_numpy(), float)
-    least = SMALLEST if str(variable.name) in ("accelerometer_sd", "gyroscope_sd") else -LARGEST
-    wrong = ~((values >= least) & (values <= LARGEST))  # NaN, too
-    if wrong.any():
-        raise InputError(
-            f"{variable.name}: expected finite numbers from {least:g} to {LARGEST:g}, found"
-            f" {values[wrong][0]}"
-        )
+    least = SMALLEST if name in ("accelerometer_sd", "gyroscope_sd") else -LARGEST
+    wrong = values[~((values >= least) & (values <= LARGEST))]  # NaN, too
+    wanted = f"finite numbers from {least:g} to {LARGEST:g}"
+    require(not wrong.size, name, wanted, str(wrong[0]) if wrong.size else "")
 
 
 def require_labels(calibration: xr.Dataset, recording: Recording) -> None:
@@ -164,10 +160,8 @@ def _require_board(calibration: xr.Dataset, recording: Recording) -> None:
     k = int(np.argmax(apart))
     off = f"{recording.accelerometer_labels[k]} is {1e3 * apart[k]:.3g} mm off in its drawing"
     other = f"one of another: accelerometer {off}"
-    require(
-        not apart[k] > SETTINGS.same_board * prior, "", "a calibration of the recording's board",
-        other,
-    )  # fmt: skip
+    same = not apart[k] > SETTINGS.same_board * prior
+    require(same, "", "a calibration of the recording's board", other)
 
 
 def _require_effects(calibration: xr.Dataset) -> None:

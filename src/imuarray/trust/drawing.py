@@ -90,7 +90,9 @@ def departures(places: Places) -> str | None:
     turned = float(pull @ np.linalg.lstsq(known, pull, rcond=1e-9)[0])
     moments, blocks = (weight @ off.ravel()).reshape(-1, 3), weight.reshape(count, 3, count, 3)
     # what a free place of each triad alone would take away
-    alone = np.array([moments[k] @ np.linalg.solve(blocks[k, :, k], moments[k]) for k in range(count)])
+    alone = np.array(
+        [moments[k] @ np.linalg.solve(blocks[k, :, k], moments[k]) for k in range(count)]
+    )
     tests = [chdtrc(3 * (count - 1), chi_square(weight, off)), chdtrc(1, ((size - 1) / sd) ** 2),
              chdtrc(3, turned), *chdtrc(3, alone)]  # fmt: skip
     if len(tests) * min(tests) >= SETTINGS.alarm:

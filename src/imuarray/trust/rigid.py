@@ -115,7 +115,7 @@ def slope(time, motion: Turning) -> Slope | None:
 
 
 def elsewhere(recording: Recording, positions) -> tuple[float, float]:
-    """Gain of accelerometers moved off ``positions`` (A, 3) m: ratio of residuals, rms move in m."""
+    """Gain of accelerometers moved off ``positions`` (A, 3) m: ratio of residuals, rms move m."""
     force, places = recording.specific_force, np.array(positions)
     rate = np.median(recording.angular_rate, axis=1)
     left = []

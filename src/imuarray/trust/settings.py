@@ -24,7 +24,6 @@ class Settings:
     residual: float = 3.0  # times the declared noise: widths are too small
     changed: float = 0.1  # share of the motion in which a triad's is too large, or is not
     changed_within: float = 0.4  # the same between the first such stretch and the last
-    # `poses`
     pose_noise: float = 3.0  # times the noise of a pose's mean; real boards have up to 1.9
     pose_residual: float = 0.01  # m/s^2, a residual that matters: 0.1 % of gravity
     smoothed: float = 0.5  # correlation of neighbours; a low pass at a fifth of the rate makes 0.3

@@ -183,7 +183,7 @@ SIGNS = [np.array(signs) for signs in product((1, -1), repeat=3)][1:]
 
 
 def common(recording: Recording) -> str:
-    """A mistake in all sensors alike, or "": gyroscopes and accelerometers turn alike once undone."""
+    """A mistake in all sensors alike, or "": both kinds turn alike only once it is undone."""
     rate = np.median(recording.angular_rate, axis=1)
 
     def misfit(time, force, rates, places) -> float:

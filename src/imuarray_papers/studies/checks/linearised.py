@@ -34,7 +34,7 @@ def linearise(recording, truth, model, accelerometer_sd, gyroscopes: int):
     columns = columns_of(array, (), recording.position_prior_sd)
     nothing = no_derivatives(len(motion), len(positions))
     state = State(motion, positions, np.empty(0), nothing)
-    information, score = at(readings, columns, columns.owner, state, True).normal(columns.owner)
+    information, score = at(readings, columns, columns.owner, state).normal(columns.owner)
     weight = recording.position_prior_sd**-2.0
     pull = weight * (recording.relative_positions() - positions)[1:].ravel()
     covariance = np.linalg.inv(information + weight * np.eye(len(information)))
