@@ -17,8 +17,7 @@ from imuarray.diagnosis.adoption import (
     separability,
     squared_correlations,
 )
-from imuarray.diagnosis.causes import cause_in_words
-from imuarray.diagnosis.document import diagnose
+from imuarray.diagnosis.document import cause_in_words, diagnose
 from imuarray.diagnosis.replicates import _beside
 from imuarray.model.effects import DATA_EFFECTS, EFFECTS
 from imuarray.report import drawings as drawn

@@ -8,15 +8,16 @@ from pathlib import Path
 import numpy as np
 
 import imuarray
-from imuarray.diagnosis.causes import causes_of, structural_gain
-from imuarray.diagnosis.fit import Fit, fit, log_scores
+from imuarray.diagnosis.fit import Fit, at, fit, log_scores
 from imuarray.diagnosis.noise import observable, per_triad, standardised
-from imuarray.diagnosis.noise_effects import COLOURED
+from imuarray.diagnosis.noise_effects import COLOURED, held_out
 from imuarray.diagnosis.procedure import ProcedureResult, run_procedure
 from imuarray.diagnosis.replicates import Discrepancy, discrepancies
 from imuarray.diagnosis.scores import Information, information_at
 from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.shocks import SHOCK
+from imuarray.diagnosis.special import placebo_gain
+from imuarray.diagnosis.state import Cause, Search, heldout_gain, need
 from imuarray.engine.estimate import Estimate
 from imuarray.engine.forward import resumed
 from imuarray.engine.heldout import Scores, gain
@@ -25,10 +26,23 @@ from imuarray.engine.settings import SETTINGS as ENGINE
 from imuarray.engine.widths import widths
 from imuarray.estimation.threads import one_thread
 from imuarray.linear import scaled_inverse
-from imuarray.model.effects import DATA_EFFECTS, KINDS
+from imuarray.model.array_model import component, unit_of
+from imuarray.model.effects import DATA_EFFECTS, KINDS, known_effect
 from imuarray.recording import Recording
 from imuarray.recording.channels import require_live
 from imuarray.streams import stream
+from imuarray.words import (
+    NARROW,
+    first_up,
+    in_short,
+    joined,
+    plus_minus,
+    probability,
+    sensors_of,
+    spelled,
+)
+
+LEAST = -1e6  # log p; JSON has no infinity
 
 
 @dataclass(frozen=True)
@@ -231,3 +245,102 @@ def gains(base: Fitted, inflated: Fitted, extended: Fitted) -> dict:
         "position_change_sd": float(np.sqrt(np.mean((change / sds) ** 2))),
         "position_change_m": float(np.sqrt(np.mean(change**2))),
     }
+
+
+def causes_of(found: ProcedureResult, sds: np.ndarray) -> list[dict]:
+    """All causes: of whole readings, of the means in the order of adoption, of the noise."""
+    search, labels = found.search, found.search.readings.labels
+    causes = []
+    for item in found.structural:
+        nats = structural_gain(found, item)[:2]
+        if not item.doubtful or nats[0] > 0:
+            causes.append(_entry(item, labels, item.parameters, nats, says=item.says))
+    for cause in search.causes:
+        statistic, freedom = need(search, cause.effect)
+        true, placebo = placebo_gain(search, cause)
+        causes.append(_entry(
+            cause, labels, parameters_of(search, cause, sds),
+            heldout_gain(search, cause.effect), found.rivals.get(cause.effect, ()),
+            chi_square=statistic, degrees_of_freedom=freedom, placebo_gain_nats=placebo,
+            gain_in_sample_nats=true,
+        ))  # fmt: skip
+    for item in found.in_noise:
+        where = {"stretches_s": [list(pair) for pair in item.where]} if item.where else {}
+        nats = item.gain, item.gain_se
+        causes.append(_entry(item, labels, item.parameters, nats, **where))
+    return causes
+
+
+def _entry(item, labels, parameters, nats, rivals=(), says="", **tests) -> dict:
+    """One cause of `diagnosis.json`; ``parameters`` {name: (value, sd, unit)}."""
+    entry = {
+        "effect": item.effect,
+        "sensors": sensors_of(labels, item.imus),
+        "parameters": {
+            name: {"value": value, "sd": sd, "unit": unit}
+            for name, (value, sd, unit) in parameters.items()
+        },
+        "p_value": float(np.exp(item.log_p)),
+        "log10_p_value": float(max(item.log_p, LEAST) / np.log(10)),
+        "heldout_gain_nats": nats[0],
+        "heldout_gain_se": nats[1],
+        "indistinguishable_from": list(rivals),
+        **tests,
+    }
+    return entry | {"says": cause_in_words(entry, labels, says)}
+
+
+def structural_gain(found: ProcedureResult, item) -> tuple[float, float, np.ndarray]:
+    """Nats by which the readings, as recorded, miss the extended model's prediction, as `held_out`.
+
+    Nothing was fitted to the readings that were left out, so this is held out as it stands.
+    What the other effects of whole readings did stays mended: theirs is not counted here.
+    """
+    search, raw = found.search, found.raw
+    touched, values = raw.keep & ~search.allowed, search.readings.values
+    if not DATA_EFFECTS[item.effect].left_out:  # it is mended
+        touched, values = raw.keep & (raw.values != values), raw.values
+    mine = np.zeros_like(touched)
+    mine[:, list(item.imus)] = touched[:, list(item.imus)]
+    readings = replace(search.readings, values=values, keep=search.readings.keep | mine)
+    seen = at(readings, search.columns, search.active, search.fit.state, all_columns=False)
+    return held_out((seen.misfits - search.fit.misfits - mine.sum(axis=(1, 2))) / 2)
+
+
+def parameters_of(search: Search, cause: Cause, sds) -> dict:
+    """{name: (value, sd, unit)} of a cause; ``sds`` (N, m), of what a scan fixed there is none."""
+    values, columns = search.columns.flat(search.fit.state), search.columns
+    active, item = search.active, known_effect(cause.effect)
+    held = (*item.held, *(item.held_rough if search.fit.state.gyroscopes_free else ()))
+    found = {}
+    for imu in cause.imus:
+        for column in columns.of(cause.effect):
+            place = columns.places[column]
+            fixed = bool(place) and place[-1] in held
+            if not (active[imu, column] or fixed):
+                continue
+            name = f"{component(cause.effect, place)}_{search.readings.labels[imu]}"
+            sd = None if fixed else float(sds[imu, column])
+            found[name] = float(values[imu, column]), sd, unit_of(cause.effect, place)
+    return found
+
+
+def cause_in_words(cause: dict, labels, says: str = "") -> str:
+    """A cause of `diagnosis.json` with its size, or what was read (``says``), test and class."""
+    text = in_short(cause, labels, says)
+    if stretches := cause.get("stretches_s"):
+        first = [f"{a:.4g} to {b:.4g}" for a, b in stretches[: SETTINGS.stretches_stated]]
+        text += f"; longest at {', '.join(first)} s"
+    gain = plus_minus(cause["heldout_gain_nats"], cause["heldout_gain_se"])
+    p_value = probability(cause["log10_p_value"])
+    equals = "" if p_value.startswith("<") else f"={NARROW}"
+    text += f". Gain on held-out time {gain} nats, p{NARROW}{equals}{p_value}."
+    true, placebo = cause.get("gain_in_sample_nats", 0.0), cause.get("placebo_gain_nats", 0.0)
+    if cause["sensors"] != ["all"] and 0 < SETTINGS.doubtful * true < placebo:
+        text += (
+            " Its placebo, the same numbers at other IMUs, gains too: it is doubtful whose it is."
+        )
+    if cause["indistinguishable_from"]:
+        rivals = joined(spelled(name) for name in cause["indistinguishable_from"])
+        text += f" On this recording it cannot be distinguished from {rivals}: one class."
+    return first_up(text)

@@ -200,15 +200,10 @@ def mixture(fit: Fit, imu: int, kind: int, without=None) -> Mixture:
         core = float(np.sqrt(np.sum((1 - outlier) * square) / max(rest, 1)))
         wide = np.sum(outlier * square) / max(np.sum(outlier * axes), 1e-9)
         factor = max(float(np.sqrt(wide)) / core, 1.05)
-    nats = _tail_nats(axes, square, share, factor, core, plain)
-    return Mixture(share, factor, core, outlier, nats)
-
-
-def _tail_nats(axes, square, share, factor, core, plain) -> np.ndarray:
-    """Log density of the mixture less that of a single normal, by sample."""
-    logs = [-axes * np.log(sd) - square / (2 * sd**2) for sd in (core, core * factor)]
+    sds = core, core * factor, plain
+    *logs, single = (-axes * np.log(sd) - square / (2 * sd**2) for sd in sds)
     both = np.logaddexp(np.log1p(-share) + logs[0], np.log(share) + logs[1])
-    return both - (-axes * np.log(plain) - square / (2 * plain**2))
+    return Mixture(share, factor, core, outlier, both - single)
 
 
 def heavy_tails(fit: Fit, noise: Noise, limit: float):

@@ -109,7 +109,7 @@ class Settings:
     stretches_stated: int = 3  # of the longest
 
     def limit(self, effect: str, beside: object = False) -> float:
-        """Critical log p of an effect, whose test may have another tail, ``beside`` others or not."""
+        """Critical log p of an effect, ``beside`` others or not; some tests have another tail."""
         own = known_effect(effect).critical
         return (self.effect if own is None else own) - bool(beside) * self.beside
 
