@@ -96,7 +96,7 @@ class Diagnosis:
 @one_thread()
 def diagnose(
     recording: Recording, seed: int = 0, without=(), recording_path: str | Path = "",
-    say: Callable[[str], None] = lambda text: None, replicates: int = 99,
+    say: Callable[[str], None] = lambda text: None, replicates: int = SETTINGS.replicates,
 ) -> Diagnosis:  # fmt: skip
     """Test the papers' model on a recording and extend it.
 

@@ -11,17 +11,8 @@ import numpy as np
 
 from imuarray.diagnosis.fit import Fit
 from imuarray.diagnosis.noise import observable, standardised
-from imuarray.diagnosis.settings import SETTINGS
 from imuarray.model.effects import KINDS
 from imuarray.words import first_up
-
-
-class Quantity(NamedTuple):
-    """A test quantity by sensor: values (n,) and labels, and what a sentence says of them."""
-
-    values: np.ndarray
-    sensors: tuple[str, ...]
-    words: str  # "the accelerometers' residual"
 
 
 class Test(NamedTuple):
@@ -77,6 +68,9 @@ class Seen:
 
     def __init__(self, fit: Fit):
         self.keep = fit.readings.keep.astype(float)
+        known = observable(fit.readings, fit.basis)
+        self.known = np.repeat(known, 3, axis=1)  # (N, 6) bool, axes
+        self.labels = [[fit.readings.labels[k] for k in np.flatnonzero(own)] for own in known.T]
         time = fit.readings.time
         self.time, self.length = time - time.mean(), np.ptp(time)
         direction = fit.state.motion[:, 3:6]
@@ -114,25 +108,17 @@ def picked(values, there) -> np.ndarray:
     return values.reshape(len(values), -1)[:, there].reshape(len(values), -1, 3)
 
 
-def quantities(fit: Fit, unit, seen: Seen) -> dict[str, Quantity]:
-    """Test quantities of a standardised residual (T, N, 6), NaN where left out."""
-    readings, found = fit.readings, {}
-    filled, known = np.nan_to_num(unit), observable(readings, fit.basis)
-    for kind, name in enumerate(KINDS):
-        there = np.flatnonzero(known[:, kind])
-        if not len(there):
+def quantities(unit, seen: Seen) -> dict[tuple[int, str], np.ndarray]:
+    """Values by sensor of each kind's `TESTS` of a residual (T, N, 6), NaN where left out."""
+    filled, found = np.nan_to_num(unit), {}
+    for kind, labels in enumerate(seen.labels):
+        if not labels:
             continue
-        labels = tuple(readings.labels[k] for k in there)
-        axes = tuple(f"{label}{axis}" for label in labels for axis in "xyz")
-        mask = np.zeros(unit.shape[1:], bool)
-        mask[there, 3 * kind : 3 * kind + 3] = True
-        values = picked(filled, mask.ravel())
-        part = Part(seen, mask.ravel(), values, values**2)
-        for check, test in TESTS.items():
-            size = test.function(part)
-            if size is not None:
-                said = test.words.format(f"the {name}s' residual")
-                found[f"{name} {check}"] = Quantity(size, axes if test.by_axis else labels, said)
+        there = (seen.known & (np.arange(6) // 3 == kind)).ravel()
+        values = picked(filled, there)
+        part = Part(seen, there, values, values**2)
+        every = {(kind, check): test.function(part) for check, test in TESTS.items()}
+        found |= {key: values for key, values in every.items() if values is not None}
     return found
 
 
@@ -222,23 +208,25 @@ TESTS = {
 }
 
 
-def discrepancies(fit: Fit, rng, replicates=SETTINGS.replicates) -> list[Discrepancy]:
+def discrepancies(fit: Fit, rng, replicates: int) -> list[Discrepancy]:
     """Every test quantity of a fit beside its band over replicates, most striking first."""
     replicator, seen = Replicator(fit), Seen(fit)
     share = fit.readings.keep / np.sqrt(np.maximum(1.0 - fit.leverage, 1e-6))
-    measured = quantities(fit, standardised(fit), seen)
-    drawn: dict[str, list] = {name: [] for name in measured}
-    for _ in range(replicates):
-        for name, quantity in quantities(fit, replicator.draw(rng) * share, seen).items():
-            drawn[name].append(quantity.values)
-    found = [_compare(name, measured[name], np.array(drawn[name])) for name in measured]
+    measured = quantities(standardised(fit), seen)
+    drawn = [quantities(replicator.draw(rng) * share, seen) for _ in range(replicates)]
+    found = [
+        _compare(seen, *key, values, np.array([each[key] for each in drawn]))
+        for key, values in measured.items()
+    ]
     return [item for _, item in sorted(found, key=lambda pair: pair[0], reverse=True)]
 
 
-def _compare(name, quantity: Quantity, drawn):
+def _compare(seen: Seen, kind: int, check: str, values, drawn):
     """(how far out, Discrepancy) of the worst sensor, against the worst of each replicate."""
+    test, labels, name = TESTS[check], seen.labels[kind], KINDS[kind]
+    places = [f"{k}{axis}" for k in labels for axis in "xyz"] if test.by_axis else labels
     centre, spread = drawn.mean(axis=0), np.maximum(drawn.std(axis=0), 1e-12)
-    away = np.abs(quantity.values - centre) / spread
+    away = np.abs(values - centre) / spread
     worst = int(np.nanargmax(away))
     others = np.nanmax(np.abs(drawn - centre) / spread, axis=1)
     p_value = (1 + np.sum(others >= away[worst])) / (1 + len(others))
@@ -248,11 +236,11 @@ def _compare(name, quantity: Quantity, drawn):
         "q025": float(np.quantile(own, 0.025)), "q975": float(np.quantile(own, 0.975)),
     }  # fmt: skip
     limit = np.quantile(others, 0.95)
-    sensors = [quantity.sensors[k] for k in np.flatnonzero(away > limit)]
-    value = float(quantity.values[worst])
-    place = f"{first_up(quantity.words)} is {value:.3g} at IMU {quantity.sensors[worst]}"
-    says = f"{place}, {_beside(value, band, p_value)}."
-    return float(away[worst] / limit), Discrepancy(name, value, band, float(p_value), sensors, says)
+    sensors = [places[k] for k in np.flatnonzero(away > limit)]
+    value, words = float(values[worst]), first_up(test.words.format(f"the {name}s' residual"))
+    says = f"{words} is {value:.3g} at IMU {places[worst]}, {_beside(value, band, p_value)}."
+    found = Discrepancy(f"{name} {check}", value, band, float(p_value), sensors, says)
+    return float(away[worst] / limit), found
 
 
 def _beside(value, band, p_value) -> str:
