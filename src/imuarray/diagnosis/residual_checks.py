@@ -18,7 +18,7 @@ from imuarray.diagnosis.settings import SETTINGS
 from imuarray.engine.linearise import CHUNK
 from imuarray.engine.normal import seen_through
 from imuarray.engine.settings import SETTINGS as ENGINE
-from imuarray.linear import scaled_inverse, scaled_square
+from imuarray.linear import scaled_square
 from imuarray.motion.state import lever
 from imuarray.tails import log_chi_square, log_normal, log_poisson
 
@@ -76,9 +76,7 @@ def displaced(motion, causes, axis: int) -> np.ndarray:
 
 def regression_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]:
     """Each group of features over all axes, and each IMU's axes over all features."""
-    active = given.places(fit.active)
-    both = given.information + given.precision
-    inner = scaled_inverse(both[np.ix_(active, active)])
+    inner = given.covariance(given.places(fit.active))
     chosen = fit.active[:, fit.wanted]
     pairs, through = np.argwhere(chosen), seen_through(fit.whitened, fit.basis, chosen)[0]
     samples, count = fit.residual.shape[:2]

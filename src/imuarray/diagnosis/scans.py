@@ -22,11 +22,7 @@ WARM_UP = "warm_up"
 
 def scan_shifts(fit: Fit, given: Information, imus, _=None) -> list[Scanned]:
     """A step of each triad's position, and of all at once, at the instant where it gains most."""
-    active = given.places(fit.active)
-    chosen = fit.columns.of(POSITION)
-    outside = scaled_inverse(
-        given.information[np.ix_(active, active)] + given.precision[np.ix_(active, active)]
-    )
+    chosen, outside = fit.columns.of(POSITION), given.covariance(given.places(fit.active))
     blocks = blocks_of(len(fit.residual), SETTINGS.cuts)
     mask = fit.active.copy()
     mask[np.ix_(imus, chosen)] = True
@@ -137,9 +133,7 @@ class Courses:
         own = [k for k, kind in enumerate(KINDS) for _ in fit.columns.of(f"{kind}_bias")]
         self.ridge = np.diag(np.tile(sds[own, np.arange(len(own)) % 3] ** -2.0, len(imus)))
         self.kind = np.tile(own, len(imus))
-        active = given.places(beside)
-        inner = given.information[np.ix_(active, active)] + given.precision[np.ix_(active, active)]
-        self.outside = scaled_inverse(inner)
+        self.outside = given.covariance(given.places(beside))
 
     def gain(self, course, among=slice(None)) -> tuple[float, np.ndarray]:
         """(chi-square, coefficients (n,)) of n biases, or of some of them, along a course (B,)."""

@@ -131,6 +131,11 @@ class Information:
         found = self.index[mask]
         return found[found >= 0]
 
+    def covariance(self, places) -> np.ndarray:
+        """Covariance of the parameters at some places, all others held."""
+        square = np.ix_(places, places)
+        return scaled_inverse(self.information[square] + self.precision[square])
+
     def conditional(self, active, freed=None, of=None) -> Conditional:
         """At the places ``of``, or all, the active refitted; ``freed`` ones set to zero before."""
         of = np.arange(len(self.score)) if of is None else of
@@ -138,7 +143,7 @@ class Information:
         if freed is not None and len(freed):
             score = score + self.information[:, freed] @ self.values[freed]
         cross = self.information[np.ix_(of, active)]
-        gain = cross @ scaled_inverse(self.information[square] + self.precision[square])
+        gain = cross @ self.covariance(active)
         left = self.information[np.ix_(of, of)] - gain @ cross.T
         score = score[of] - gain @ score[active]
         if self.meat is None:
@@ -255,8 +260,8 @@ def detectable(search) -> dict[str, dict]:
 
 def scatter(given: Information, scores, active, chosen) -> np.ndarray:
     """Sds (at least 1) of blocks' scores (B, K) at ``chosen`` places, in those of white noise."""
-    square, cross = np.ix_(active, active), given.information[np.ix_(chosen, active)]
-    gain = cross @ scaled_inverse(given.information[square] + given.precision[square])
+    cross = given.information[np.ix_(chosen, active)]
+    gain = cross @ given.covariance(active)
     left = scores[:, chosen] - scores[:, active] @ gain.T
     own = np.diag(given.information)[chosen] - np.sum(gain * cross, axis=1)
     squares = len(scores) * np.var(left, axis=0, ddof=1)
