@@ -174,10 +174,8 @@ def plausibility_checks(search: Search) -> list[Check]:
         sizes = np.where(free, np.abs(whole[:, columns.of(cause.effect)]), 0.0)
         if sizes.max() > SETTINGS.implausible:
             imu = int(np.argmax(sizes.max(axis=1)))
-            largest = float(sizes.max())
-            found.append(
-                Check(f"size of {cause.effect}", largest, float(log_normal(largest)), (imu,))
-            )
+            largest, name = float(sizes.max()), f"size of {cause.effect}"
+            found.append(Check(name, largest, float(log_normal(largest)), (imu,)))
     return found
 
 

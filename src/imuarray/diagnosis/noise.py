@@ -89,9 +89,7 @@ def estimated(readings: Readings, residual, basis) -> Noise:
     far = _outliers(fast, core)
     expected = 2 * np.exp(log_normal(SETTINGS.far)) * counts
     slope, correlation = _colour(np.nan_to_num(unit), known)
-    passed = 1 + 2 * sum(
-        value * correlation ** (lag + 1) for lag, value in enumerate(AUTOCORRELATION)
-    )
+    passed = 1 + 2 * sum(value * correlation**lag for lag, value in enumerate(AUTOCORRELATION, 1))
     tails = np.nanmean(values**4, axis=-1) / scale**4 - 3.0
     error = np.sqrt(np.maximum(2 + tails, 1.0) * INFLATION / counts) / 2
     sd = readings.sd * np.where(known, scale / np.sqrt(passed), 1.0)

@@ -138,10 +138,8 @@ def scales(fit: Fit, noise: Noise, untied: bool) -> tuple[np.ndarray, np.ndarray
 
 def alike(fit: Fit, noise: Noise, imu: int, kind: int) -> bool:
     """True where a triad's spectrum has the slope that its lag-one correlation implies."""
-    rho = autocorrelation(fit, imu, kind)[0]
-    return bool(
-        abs(noise.slope[imu, kind] - expected_ratio(rho, len(fit.residual))) < SETTINGS.agree
-    )
+    implied = expected_ratio(autocorrelation(fit, imu, kind)[0], len(fit.residual))
+    return bool(abs(noise.slope[imu, kind] - implied) < SETTINGS.agree)
 
 
 def noise_scale(

@@ -79,7 +79,7 @@ def regression_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]
     inner = given.covariance(given.places(fit.active))
     chosen = fit.active[:, fit.wanted]
     pairs, through = np.argwhere(chosen), seen_through(fit.whitened, fit.basis, chosen)[0]
-    samples, count = fit.residual.shape[:2]
+    motion, (samples, count) = fit.state.motion, fit.residual.shape[:2]
     basis = fit.basis.reshape(samples, count, 6, -1)
     groups: dict[str, list] = {}
     axes = []
@@ -92,8 +92,7 @@ def regression_checks(fit: Fit, given: Information, noise: Noise) -> list[Check]
             if axis < 3:
                 # boards bend, mounts give way
                 for cause in ("force", "time"):
-                    moved = displaced(fit.state.motion, common[cause], axis)
-                    table[f"lever times {cause}"] = moved
+                    table[f"lever times {cause}"] = displaced(motion, common[cause], axis)
             names = np.repeat(list(table), [v.shape[1] for v in table.values()])
             stacked = np.hstack(list(table.values()))
             seen = -np.einsum("ti,tia->ta", basis[:, imu, axis], through)

@@ -199,10 +199,8 @@ def scan_warming(fit: Fit, given: Information, imus, _=None) -> list[Scanned]:
     freedom = len(values) + 2
     log_p = min(log_chi_square(gain, freedom) + np.log(2 * len(SETTINGS.paces)), 0.0)
     each = values.reshape(len(imus), 6)
-    starts = {
-        imu: np.append(own, [pace / courses.span, zero])
-        for imu, own in zip(imus, each, strict=True)
-    }
+    shape = [pace / courses.span, zero]
+    starts = {imu: np.append(own, shape) for imu, own in zip(imus, each, strict=True)}
     score = Score(Candidate(WARM_UP, tuple(imus), "", True), gain, freedom, log_p)
     return [Scanned(score, starts)]
 

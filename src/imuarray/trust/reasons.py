@@ -243,9 +243,8 @@ def _drawn(places: Places, course: Slope | None) -> list[str]:
     if course is None:
         said = [departures(places)]
     else:
-        hand = (
-            0 if abs(course.correlation) < SETTINGS.coherent else int(np.sign(course.correlation))
-        )
+        known = abs(course.correlation) >= SETTINGS.coherent
+        hand = int(np.sign(course.correlation)) if known else 0
         change = _turning_words(course, places) if course.off else None
         lost = (
             f"samples were dropped: {course.skipped} steps or more between rows are twice as long,"
@@ -316,10 +315,8 @@ def _is_of(recording: Recording, calibration: xr.Dataset) -> bool:
         return False
     rate, there = np.median(recording.angular_rate, axis=1), calibration["angular_rate"].to_numpy()
     here = np.stack([np.interp(time[inside], recording.time, axis) for axis in rate.T], axis=1)
-    return bool(
-        np.median(np.abs(here - there[inside]))
-        < SETTINGS.same_rate * np.median(np.abs(there[inside]))
-    )
+    off, size = (np.median(np.abs(x)) for x in (here - there[inside], there[inside]))
+    return bool(off < SETTINGS.same_rate * size)
 
 
 def _turning_words(course: Slope, places: Places) -> str:

@@ -255,10 +255,8 @@ def wrapped(recording: Recording) -> list[str]:
     jump, end = np.abs(np.diff(rates, axis=0)), np.abs(rates).max(axis=0)
     around = np.pad(jump, ((1, 1), (0, 0), (0, 0)))
     alone = np.maximum(around[:-2], around[2:]) < (2 - SETTINGS.wrap_jump) * end
-    wraps = (
-        np.sum(near[:, None, None] & (jump > SETTINGS.wrap_jump * end) & alone, axis=0)
-        >= SETTINGS.least_wraps
-    )
+    wrap = near[:, None, None] & (jump > SETTINGS.wrap_jump * end) & alone
+    wraps = np.sum(wrap, axis=0) >= SETTINGS.least_wraps
     if not wraps.any():
         return []
     labels = zip(recording.gyroscope_labels, wraps, strict=True)
@@ -284,10 +282,8 @@ def ends(channel) -> list[float]:
     values, counts = np.unique(channel, return_counts=True)
     if len(values) < 4 * SETTINGS.end_ratio:
         return []
-    sides = (
-        (values[0], counts[: SETTINGS.end_ratio + 1]),
-        (values[-1], counts[::-1][: SETTINGS.end_ratio + 1]),
-    )
+    looked_at = SETTINGS.end_ratio + 1
+    sides = (values[0], counts[:looked_at]), (values[-1], counts[::-1][:looked_at])
     least = SETTINGS.end_readings
     return [
         float(end)
