@@ -23,7 +23,7 @@ class Settings:
     explained: float = 0.99  # share of the excess from which failing checks are within tolerance
     rival: float = 3.0  # log p by which another effect may be worse and be listed beside a cause
     alike: float = 0.64  # share of an adopted effect's signal from which another is of its class
-    # Readings (`reading_effects`, `clipping`, `procedure`)
+    # Readings (`reading_effects`, `final_checks`, `procedure`)
     searched: int = 4096  # samples; of longer recordings, stretches spread over all of it
     large: int = 32  # IMUs; of more, so many samples less
     least_repeats: int = 1  # samples that a triad repeats
@@ -32,7 +32,9 @@ class Settings:
     near_turn: float = 0.5  # norm by which a triad's matrix may miss a signed permutation
     alone: float = 1.5  # times farther than any other reading of its triad
     next_largest: int = 30  # readings after the largest that show its usual shortfall
-    # Score tests and adoption (`scores`, `adoption`, `state`, `special`, `heldout`)
+    same: float = 1e-9  # relative difference of equal readings
+    least_log: float = -700.0  # of a tail that a double holds
+    # Score tests and adoption (`scores`, `adoption`, `state`, `special`)
     seen: float = 1e-5  # of a parameter's own information must survive the projection to count
     visible: float = 1e-3  # the same of a combination that is no gauge of motion and positions
     patience: int = 16  # refusals in a row: what is left is none of the catalogue
@@ -53,9 +55,14 @@ class Settings:
     likely_drift: float = -4.6  # log p of a drift beside an adopted bias
     changing: float = 0.05  # of a drift's chi-square that its change must gain
     steady_drift: float = -50.0  # log p of a drift that does not change: it is misattributed
-    # Clocks and shifts (`clocks`, `gyroscope_clocks`, `shifts`)
+    power: float = 0.8  # chance to be named of an effect of the size that is stated
+    # Clocks and shifts (`state`, `scans`)
     jitter: float = 0.04  # the same where clocks were estimated from the gyroscopes
     cuts: int = 24  # instants tried at first
+    # paces of a course, in the recording's length
+    paces: tuple[float, ...] = (-8.0, -4.0, -2.0, 0.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+    settled_pace: float = 8.0  # what is over in so short a part is called constant
+    zeros: tuple[float, ...] = (-1.0, 2.0)  # of a course from 0 to 1, where all offsets may vanish
     # Noise (`noise`, `noise_effects`, `procedure`)
     least_noise: float = 1e-3  # of the declared sd
     far: float = 4.0  # sds of a difference; beyond is an outlier's
@@ -72,6 +79,7 @@ class Settings:
     tailed: float = 0.25  # log ratio by which a mixture's core may miss the noise
     pooled: float = 0.025  # sd of a triad's log noise about that of all, without maps of a few %
     delayed: float = 0.1  # log ratio of noise that a delay of a prior sd may bring with it
+    least_share: float = 1e-9  # share of the largest information below which there is none
     # Shocks (`shocks`)
     least_shaken: int = 4  # IMUs; with one of fewer left out, too little is there to agree
     shaken: float = 1e-7  # chance of a sample of plain noise to be called shaken
@@ -81,7 +89,7 @@ class Settings:
     apart: int = 5  # samples between two shaken ones that are of two stretches
     stated: int = 20  # stretches
     calm: float = 1.5  # times the noise, up to which smooth samples of shaken motion are explained
-    # Checks of what is left (`residual_checks`, `final_checks`, `words`)
+    # Checks of what is left (`residual_checks`, `final_checks`, `document`)
     seen_feature: float = 1e-4  # of a feature's information must survive the projection
     coarse: float = 2.0  # noise sds of a step between readings
     slow: int = 3  # turns in the recording; slower ages are a drift
@@ -90,22 +98,7 @@ class Settings:
     little: float = 0.03  # of the noise's own misfit: so little left over is within tolerance
     implausible: float = 10.0  # prior sds of a parameter
     doubtful: float = 0.5  # share of a cause's gain that a placebo must not have
-
-    # `detectable`
-    power: float = 0.8  # chance to be named of an effect of the size that is stated
-    # `scans`
-    # in the recording's length
-    paces: tuple[float, ...] = (-8.0, -4.0, -2.0, 0.0, 2.0, 4.0, 8.0, 16.0, 32.0)
-    settled_pace: float = 8.0  # pace; what is over in so short a part is called constant
-    zeros: tuple[float, ...] = (-1.0, 2.0)  # of a course from 0 to 1, where all offsets may vanish
-    # `noise_effects`
-    least_share: float = 1e-9  # share of the largest information below which there is none
-    # `reading_effects`
-    same: float = 1e-9  # relative difference of equal readings
-    least_log: float = -700.0  # of a tail that a double holds
-    # `replicates`
     replicates: int = 99
-    # `causes`
     stretches_stated: int = 3  # of the longest
 
     def limit(self, effect: str, beside: object = False) -> float:
