@@ -272,7 +272,7 @@ def _tail_gain(fit: Fit, noise: Noise, imu: int, kind: int, mix: Mixture) -> flo
 
 
 def pooled_autocorrelation(fit: Fit, noise: Noise, lagged) -> float:
-    """log p of triads' lag-one correlations (n, 2: value, pairs) together; 0 by other spectra."""
+    """log p of lag-one correlations (n, 2: value, pairs) together, 0 where spectra disagree."""
     known = observable(fit.readings, fit.basis)
     kind = np.argwhere(known)[:, 1]
     implied = np.array([expected_ratio(value, len(fit.residual)) for value, _ in lagged])
