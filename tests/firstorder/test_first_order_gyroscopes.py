@@ -12,8 +12,10 @@ from benchmarks.board import GRAVITY, Options, draw_board, draw_hand
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.firstorder.correct import calibrate_first_order, calibrate_together, correct
+from imuarray.firstorder.gyroscopes import most_odds, shared_chance
 from imuarray.firstorder.moves import Move, _carried, _to_end, common_map, gather
 from imuarray.firstorder.report import gyroscope_lines, parameter_table, turned_lines
+from imuarray.firstorder.settings import SETTINGS
 from imuarray.firstorder.still import still_poses
 from imuarray.recording import read_recording, write_recording
 from imuarray.recording.format import load_dataset
@@ -390,6 +392,25 @@ def test_stamps_that_run_fast_make_the_size_uncertain():
     fast = replace(sound, time=1.003 * sound.time)
     known, doubtful = (correct(one, calibrate_first_order(one)).clock_sd for one in (sound, fast))
     assert not known > 1e-3 and doubtful == pytest.approx(3e-3, abs=1e-3)
+
+
+def test_a_declared_rate_is_doubted_sooner_than_stamps():
+    """One per cent off beside scales that scatter by half as much."""
+    sound = draw_board(7, SHORT).recording()
+    wrong = replace(sound, time=sound.time / 1.01)
+    found = calibrate_first_order(wrong)
+    assert shared_chance(found.gyroscopes.matrix) > SETTINGS.odd_scale
+    stamped, declared = (correct(replace(wrong, clock_sd=sd), found).clock_sd for sd in (0.0, 1e-3))
+    assert stamped == 0.0 and 5e-3 < declared < 0.02
+    right = correct(replace(sound, clock_sd=1e-3), calibrate_first_order(sound)).clock_sd
+    assert right < 1.5e-3
+
+
+def test_most_odds_are_those_of_the_table():
+    """-e p ln p of Sellke, Bayarri and Berger, 2001, written out."""
+    for chance, least in ((0.05, 0.407), (0.01, 0.125), (0.001, 0.0188)):
+        assert 1 / most_odds(chance) == pytest.approx(least, rel=0.01)
+    assert most_odds(0.5) == 1.0
 
 
 def test_a_gyroscope_that_failed_is_not_one_of_another_scale(recording):

@@ -237,7 +237,7 @@ class Selected(NamedTuple):
         uncertain that is: what lags droops.
         """
         chance, _ = widths.settled(self.found).maps_hold.get("gyroscope", (1.0, []))
-        found = [GYROSCOPES] * (chance < SETTINGS.chance) + [FILTER] * (LAG in kept)
+        found = [GYROSCOPES] * (chance < SETTINGS.chance) + [FILTER, BAND] * (LAG in kept)
         return [name for name in found if name in names]
 
     def clocked(self) -> tuple[Self, list[EffectGroup]]:

@@ -253,8 +253,9 @@ def correct(recording: Recording, found: FirstOrder) -> Recording:
     axes = np.swapaxes(nearest_orthogonal(matrix), 1, 2)
     if recording.accelerometer_axes is not None:
         axes = axes @ recording.accelerometer_axes
-    doubt = 0.0 if found.gyroscopes is None else found.gyroscopes.time_base_sd
-    clock_sd = np.hypot(np.nan_to_num(recording.clock_sd), doubt) if doubt else recording.clock_sd
+    clock_sd, known = recording.clock_sd, found.gyroscopes
+    if known is not None and (doubt := known.time_base_sd(declared=clock_sd > 0)):
+        clock_sd = np.hypot(np.nan_to_num(clock_sd), doubt)
     return replace(
         recording, specific_force=corrected(back, offset, recording.specific_force),
         angular_rate=corrected(turn_back, found.gyroscope_offset, recording.angular_rate),

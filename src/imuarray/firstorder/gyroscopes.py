@@ -154,15 +154,23 @@ class Gyroscopes:
         """Sd of the scale that all gyroscopes share; NaN where the moves did not tell it."""
         return np.nan if isinstance(self.common, str) else self.common.scale_sd
 
-    @property
-    def time_base_sd(self) -> float:
+    def time_base_sd(self, declared: bool) -> float:
         """Relative sd of the log's time: a scale that all axes share may be a clock's that is off.
 
-        0 where so large a mean is likely, as the axes' scales scatter, or is within its sd.
+        0 where so large a mean is likely, as the axes' scales scatter, or is within its sd; of a
+        rate that is ``declared``, and not stamped, as likely as it is the clock's
+        (`SETTINGS.wrong_rate`).
         """
-        if isinstance(self.common, str) or shared_chance(self.matrix) > SETTINGS.odd_scale:
+        if isinstance(self.common, str):
             return 0.0
-        return float(np.sqrt(max((self.common.scale - 1) ** 2 - self.common.scale_sd**2, 0.0)))
+        chance = shared_chance(self.matrix)
+        share = float(chance < SETTINGS.odd_scale)
+        if declared:
+            odds = SETTINGS.wrong_rate * most_odds(chance)
+            share = odds / (1.0 + odds)
+        return float(
+            np.sqrt(share * max((self.common.scale - 1) ** 2 - self.common.scale_sd**2, 0.0))
+        )
 
     def between(self, poses: range) -> Self:
         """The maps with the moves between some of the poses, numbered from the first of them."""
@@ -179,6 +187,12 @@ def shared_chance(matrices) -> float:
     scales = np.linalg.norm(matrices, axis=1).ravel() - 1
     sd = scales.std(ddof=1) / np.sqrt(scales.size)
     return float(2 * stdtr(scales.size - 1, -abs(scales.mean()) / max(sd, 1e-300)))
+
+
+def most_odds(chance: float) -> float:
+    """Odds against a hypothesis of that p value at the most (Sellke, Bayarri and Berger, 2001)."""
+    small = max(chance, 1e-300)
+    return float(-1.0 / (np.e * small * np.log(small))) if small < 1 / np.e else 1.0
 
 
 class Still(NamedTuple):

@@ -67,6 +67,7 @@ class Settings:
     gyroscope_block: float = 1.0  # s, within which residuals may be alike
     robust_steps: int = 5  # of reweighting
     odd_scale: float = 1e-4  # chance of a mean of all axes' scales, by how they scatter
+    wrong_rate: float = 0.1  # prior odds that a declared rate is off by more than its sd
     recordings_apart: float = 1000.0  # s, between recordings that are looked at as one
     # `noise`
     bins: int = 8  # an octave
