@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from imuarray.linear import scaled_eigh, scaled_inverse, scaled_square
+from imuarray.linear import matrix_function, scaled_eigh, scaled_inverse, scaled_square
 
 UNITS = np.array([1e-6, 1.0, 1e5, 30.0])
 
@@ -40,3 +40,19 @@ def test_square_leaves_out_what_lies_below_the_cutoff():
     assert scaled_square(matrix(), vector, 1e-9) == (pytest.approx(expected), 4)
     found, rank = scaled_square(np.outer(UNITS, UNITS), UNITS, 1e-9)
     assert rank == 1 and found == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("largest", [0.3, 1.0])
+@pytest.mark.parametrize("count", [1, 5, 80])
+def test_a_function_of_a_matrix_is_that_of_its_eigenvalues(count, largest):
+    rng = np.random.default_rng(count)
+    axes = np.linalg.qr(rng.standard_normal((count, count)))[0]
+    values, vector = largest * rng.random(count) ** 2, rng.standard_normal(count)
+    values[0] = largest  # where the function bends
+
+    def function(x):
+        return np.maximum(1 - x, 1e-3) ** -0.5
+
+    found = matrix_function((axes * values) @ axes.T, vector, function)
+    np.testing.assert_allclose(found, axes @ (function(values) * (axes.T @ vector)), rtol=1e-9)
+    assert np.all(matrix_function(np.eye(count), np.zeros(count), function) == 0.0)

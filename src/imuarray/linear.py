@@ -7,7 +7,9 @@ the square roots of the diagonal's numbers, they are those of a correlation matr
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import eigh_tridiagonal
 
+CHECKED = 6  # steps of Lanczos' method between two looks at what they add
 FLOOR = 1e-12  # of the scaled eigenvalues, beneath which rounding is all that they are made of
 
 
@@ -58,3 +60,32 @@ def scaled_solve(information, right):
     values = np.maximum(values, 1e-13)
     solution = (vectors @ ((vectors.T @ (right / scale)) / values)) / scale
     return solution, np.sqrt(np.sum(vectors**2 / values, axis=1)) / scale
+
+
+def matrix_function(matrix, vector, function, tolerance: float = 1e-13) -> np.ndarray:
+    """function(matrix) @ vector (n,) of a symmetric matrix (n, n), by Lanczos' method.
+
+    ``function`` takes eigenvalues (k,). Some twenty products with the matrix instead of all its
+    eigenvectors: ends where more would add no more than the ``tolerance`` of it.
+    """
+    size, count = float(np.linalg.norm(vector)), len(vector)
+    if size == 0.0:
+        return np.zeros_like(vector)
+    basis, diagonal, beside, before = np.empty((count, count)), [], [], np.zeros(count)
+    basis[0] = vector / size
+    while True:
+        k = len(diagonal)
+        after, known = matrix @ basis[k], basis[: k + 1]
+        diagonal.append(basis[k] @ after)
+        for _ in range(2):  # once leaves rounding of what was taken out
+            after -= known.T @ (known @ after)
+        norm = float(np.linalg.norm(after))
+        last = k + 1 == count or norm <= tolerance * max(np.abs(diagonal))
+        if last or k % CHECKED == CHECKED - 1:
+            values, vectors = eigh_tridiagonal(diagonal, beside)
+            found = size * known.T @ (vectors @ (function(values) * vectors[0]))
+            if last or np.linalg.norm(found - before) <= tolerance * np.linalg.norm(found):
+                return found
+            before = found
+        beside.append(norm)
+        basis[k + 1] = after / norm

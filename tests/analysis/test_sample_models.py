@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import imuarray
-from imuarray.analysis.calibration import fitted
 from imuarray.analysis.density import posterior_beyond
+from imuarray.analysis.sensors import fitted
 from imuarray.engine.widths import widths
 from imuarray.errors import InputError
 from imuarray.geometry import sub_array

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import imuarray
-from imuarray.analysis.calibration import fitted
 from imuarray.analysis.density import posterior_beyond, traced
 from imuarray.analysis.known import fused
+from imuarray.analysis.sensors import fitted
 from imuarray.cli import main
 from imuarray.errors import InputError
 from imuarray.provenance import write_netcdf

@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 
 import imuarray
-from imuarray.analysis.calibration import fitted
 from imuarray.analysis.model import silent
+from imuarray.analysis.sensors import fitted
 from imuarray.estimation.newton import fisher_scoring
 from imuarray.geometry import positions_of, sub_array
 from imuarray_papers.config import read_config

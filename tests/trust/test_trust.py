@@ -526,7 +526,7 @@ def test_a_search_that_diverges_is_bad_input(monkeypatch, sound):
     def diverge(*_, **__):
         raise np.linalg.LinAlgError("Eigenvalues did not converge")
 
-    monkeypatch.setattr("imuarray.analysis.calibration.select_forward", diverge)
+    monkeypatch.setattr("imuarray.analysis.sensors.select_forward", diverge)
     with pytest.raises(InputError, match="search that diverges.*imuarray first-order"):
         imuarray.calibrate(sound)
 

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
-from imuarray.analysis.calibration import calibrate
 from imuarray.analysis.logs import open_logs
 from imuarray.analysis.model import Say, silent
+from imuarray.analysis.sensors import calibrate_sensors
 from imuarray.analysis.settings import SETTINGS
 from imuarray.errors import IdentifiabilityError, InputError, require
 from imuarray.firstorder.correct import FirstOrder, calibrate_first_order, correct
@@ -48,7 +48,7 @@ def board(
     else:
         corrected, known = correct(recording, found), reasons_of_poses(of_first_order(found))
     say("positions from the motion")
-    calibration = calibrate(corrected)
+    calibration = calibrate_sensors([corrected])
     reasons = reasons_of_calibration(corrected, calibration, known)
     return Board(source, opened.lines, recording, found, corrected, calibration, reasons)
 

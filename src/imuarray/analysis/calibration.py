@@ -1,34 +1,18 @@
-"""Positions of a board, parameters of its sensors and motion from recordings, as one dataset."""
+"""Positions of a board and parameters of its sensors from recordings, as one labelled dataset."""
 
-import json
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
-from imuarray.analysis import methods
-from imuarray.analysis.known import again, used
 from imuarray.analysis.model import Say, assumed, require_together, silent, usable
-from imuarray.engine.dataset import (
-    engine_dataset,
-    motion_variables,
-    noise_variables,
-    positions_dataset,
-    with_readings,
-)
-from imuarray.engine.estimate import Estimate
-from imuarray.engine.forward import EffectGroup, groups_of, select_forward, with_effects
+from imuarray.analysis.sensors import calibrate_sensors, finished
+from imuarray.engine.dataset import motion_variables, noise_variables, positions_dataset
 from imuarray.engine.parameters import model_of
-from imuarray.errors import InputError, one_line
 from imuarray.estimation.newton import calibrate_gauss_newton, parameter_covariance
-from imuarray.firstorder.rails import less_leak_by_others
 from imuarray.model import ArrayModel
-from imuarray.provenance import digest, stamp
-from imuarray.recording import Recording, load_dataset
-from imuarray.recording.channels import require_apart, require_live
+from imuarray.recording import Recording
 
 
 def calibrate(
@@ -84,15 +68,7 @@ def calibrate(
     require_together(model, recordings, effects, accelerometer_noise)
     if model == "papers":
         return calibrate_papers(recordings[0], accelerometer_noise, say)
-    for one in recordings:
-        require_live(one)
-    require_apart(recordings)
-    whole = [less_leak_by_others(one) for one in recordings]
-    found, groups = fitted(whole, str(model), effects, say)
-    assert found is not None  # for it is wanted in any case
-    dataset = engine_dataset(whole, found)
-    dataset.attrs["parts"] = json.dumps([group._asdict() for group in groups])
-    return finished(dataset, recordings, str(model))
+    return calibrate_sensors(recordings, str(model), effects, say)
 
 
 def calibrate_papers(
@@ -136,53 +112,3 @@ def residual_ratio(recording: Recording, model: ArrayModel, found) -> float:
         misfit += model.noise.misfit(*off, saturated)
         freedom, start = freedom - int(saturated.sum()), start + len(part.time)
     return float(np.sqrt(misfit / freedom)) if freedom > 0 else float("nan")
-
-
-@contextmanager
-def _near_the_model() -> Iterator[None]:
-    """A search that diverges is bad input, in one line."""
-    try:
-        yield
-    except np.linalg.LinAlgError as error:
-        raise InputError(
-            "recording: expected readings near those of the model, found a search that diverges"
-            f" ({one_line(error)}); are they corrected (imuarray first-order), and units, axes and"
-            " times as declared?"
-        ) from error
-
-
-@_near_the_model()
-def fitted(
-    recordings: Sequence[Recording], model: str, effects: Sequence[str], say: Say,
-    bare: bool = True,
-) -> tuple[Estimate | None, list[EffectGroup]]:  # fmt: skip
-    """(estimate, groups tried) under a calibration's model, ``effects``, or the sensor model.
-
-    ``bare``: whether an estimate is wanted where no group of the sensor model gains, or can be
-    tried; else it is None there. InputError where no model of the kind is near the readings.
-    """
-    if methods.is_file(model):
-        try:
-            return again(recordings[0], load_dataset(Path(model)), say), []
-        except InputError as error:
-            raise InputError(f"--model {model}: {error}") from None
-    readings = [used(one, say) for one in recordings]
-    if effects:
-        return with_effects(readings, effects), []
-    if not bare and not groups_of(readings):
-        return None, []
-    found, groups = select_forward(readings, bare=bare)
-    for group in groups:
-        verdict = "kept" if group.kept else "left out"
-        say(f"{group.name}: {verdict}, {group.gain:.3g} ({group.error:.2g}) nats on held-out time")
-    return found if bare or any(group.kept for group in groups) else None, groups
-
-
-def finished(dataset: xr.Dataset, recordings, model: str) -> xr.Dataset:
-    """With what the recordings say of themselves, and the origin."""
-    if not all(np.isfinite(dataset[f"position{name}"]).all() for name in ("", "_covariance")):
-        raise InputError("recording: expected one that determines the positions, found no solution")
-    dataset = with_readings(dataset, recordings)
-    data = [part for one in recordings for part in (one.specific_force, one.angular_rate)]
-    dataset.attrs |= {"model": model, **stamp({"recording": digest(*data)}, 0)}
-    return dataset

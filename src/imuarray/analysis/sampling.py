@@ -10,7 +10,6 @@ import pandas as pd
 import xarray as xr
 
 from imuarray.analysis import methods
-from imuarray.analysis.calibration import fitted
 from imuarray.analysis.density import (
     NOT_CONVERGED,
     Posterior,
@@ -20,6 +19,7 @@ from imuarray.analysis.density import (
     traced,
 )
 from imuarray.analysis.model import Say, assumed, require_together, silent, usable
+from imuarray.analysis.sensors import fitted
 from imuarray.analysis.settings import SETTINGS
 from imuarray.engine.dataset import effects_of
 from imuarray.errors import require_integer, require_one_of

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from imuarray.analysis.board import board as answered
-from imuarray.commands.calibrate import document, position_lines
+from imuarray.commands.lines import document, position_lines
 from imuarray.commands.output import Output
 from imuarray.report import board as said
 from imuarray.report.board import Board, write_board

@@ -18,7 +18,7 @@ from imuarray.engine.readings import Readings
 from imuarray.engine.robust import Pass, distances, freedoms, median_of, normal_pass, reweighted
 from imuarray.engine.settings import SETTINGS
 from imuarray.engine.start import is_smooth, start, with_derivatives, with_rough_prior
-from imuarray.linear import scaled_solve
+from imuarray.linear import matrix_function, scaled_solve
 from imuarray.model.effects import EFFECTS
 
 NORMAL, ROBUST = np.array([np.inf, np.inf]), np.array([4.0, 4.0])  # degrees of freedom
@@ -143,10 +143,14 @@ def jackknifed(information, precision, blocks) -> np.ndarray:
     inverse = back.T @ back
     variance = np.maximum(np.sum((inverse @ precision) * inverse, axis=1), 0.0)
     for inner, score in blocks:
-        share, axes = np.linalg.eigh(back @ inner @ back.T)
-        spared = np.sqrt(np.maximum(1 - share, SETTINGS.spared))
-        variance += (back.T @ (axes @ (axes.T @ (back @ score) / spared))) ** 2
+        share, forth = back @ inner @ back.T, back @ score
+        variance += (back.T @ matrix_function(share, forth, _spared)) ** 2
     return np.sqrt(variance)
+
+
+def _spared(share) -> np.ndarray:
+    """(1 - h)^-1/2, as if no block held all of the information."""
+    return np.maximum(1 - share, SETTINGS.spared) ** -0.5
 
 
 def estimate(

@@ -1,0 +1,87 @@
+"""Recordings of a board under the sensor model, or under that of a calibration."""
+
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from imuarray.analysis import methods
+from imuarray.analysis.known import again, used
+from imuarray.analysis.model import Say, silent
+from imuarray.engine.dataset import engine_dataset, with_readings
+from imuarray.engine.estimate import Estimate
+from imuarray.engine.forward import EffectGroup, groups_of, select_forward, with_effects
+from imuarray.errors import InputError, one_line
+from imuarray.firstorder.rails import less_leak_by_others
+from imuarray.provenance import digest, stamp
+from imuarray.recording import Recording, load_dataset
+from imuarray.recording.channels import require_apart, require_live
+
+
+def calibrate_sensors(
+    recordings: Sequence[Recording], model: str = "sensors", effects: Sequence[str] = (),
+    say: Say = silent,
+) -> xr.Dataset:  # fmt: skip
+    """`imuarray.calibrate` by the engine: the sensor model, ``effects``, or a calibration's."""
+    for one in recordings:
+        require_live(one)
+    require_apart(recordings)
+    whole = [less_leak_by_others(one) for one in recordings]
+    found, groups = fitted(whole, str(model), effects, say)
+    assert found is not None  # for it is wanted in any case
+    dataset = engine_dataset(whole, found)
+    dataset.attrs["parts"] = json.dumps([group._asdict() for group in groups])
+    return finished(dataset, recordings, str(model))
+
+
+@contextmanager
+def _near_the_model() -> Iterator[None]:
+    """A search that diverges is bad input, in one line."""
+    try:
+        yield
+    except np.linalg.LinAlgError as error:
+        raise InputError(
+            "recording: expected readings near those of the model, found a search that diverges"
+            f" ({one_line(error)}); are they corrected (imuarray first-order), and units, axes and"
+            " times as declared?"
+        ) from error
+
+
+@_near_the_model()
+def fitted(
+    recordings: Sequence[Recording], model: str, effects: Sequence[str], say: Say,
+    bare: bool = True,
+) -> tuple[Estimate | None, list[EffectGroup]]:  # fmt: skip
+    """(estimate, groups tried) under a calibration's model, ``effects``, or the sensor model.
+
+    ``bare``: whether an estimate is wanted where no group of the sensor model gains, or can be
+    tried; else it is None there. InputError where no model of the kind is near the readings.
+    """
+    if methods.is_file(model):
+        try:
+            return again(recordings[0], load_dataset(Path(model)), say), []
+        except InputError as error:
+            raise InputError(f"--model {model}: {error}") from None
+    readings = [used(one, say) for one in recordings]
+    if effects:
+        return with_effects(readings, effects), []
+    if not bare and not groups_of(readings):
+        return None, []
+    found, groups = select_forward(readings, bare=bare)
+    for group in groups:
+        verdict = "kept" if group.kept else "left out"
+        say(f"{group.name}: {verdict}, {group.gain:.3g} ({group.error:.2g}) nats on held-out time")
+    return found if bare or any(group.kept for group in groups) else None, groups
+
+
+def finished(dataset: xr.Dataset, recordings, model: str) -> xr.Dataset:
+    """With what the recordings say of themselves, and the origin."""
+    if not all(np.isfinite(dataset[f"position{name}"]).all() for name in ("", "_covariance")):
+        raise InputError("recording: expected one that determines the positions, found no solution")
+    dataset = with_readings(dataset, recordings)
+    data = [part for one in recordings for part in (one.specific_force, one.angular_rate)]
+    dataset.attrs |= {"model": model, **stamp({"recording": digest(*data)}, 0)}
+    return dataset
