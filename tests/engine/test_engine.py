@@ -9,15 +9,22 @@ from scipy.stats import kstest
 
 import imuarray
 from imuarray.engine.dataset import engine_dataset
-from imuarray.engine.estimate import Recorded, estimate, jackknifed, to_come
+from imuarray.engine.estimate import Recorded, _passed, estimate, jackknifed, means, tested, to_come
 from imuarray.engine.forward import _of_one_truth, select_forward
 from imuarray.engine.linearise import linearise, reading, seen_again
 from imuarray.engine.normal import uncorrelated
-from imuarray.engine.parameters import POSITION, columns_of
+from imuarray.engine.parameters import POSITION, columns_of, stepped
 from imuarray.engine.readings import arrange, most_informative, resolution
 from imuarray.engine.robust import normal_pass
 from imuarray.engine.start import turned
-from imuarray.engine.widths import hausman, settled, widths
+from imuarray.engine.widths import (
+    _with_maps,
+    hausman,
+    mask_of_left,
+    settled,
+    spread_of,
+    widths,
+)
 from imuarray.errors import IdentifiabilityError, InputError
 from imuarray.geometry import Array, sub_array
 from imuarray.model.effects import Prediction
@@ -200,6 +207,41 @@ def test_maps_that_are_off_are_no_scatter_between_blocks():
     found = settled(jointly(replace(recording, specific_force=moved, map_covariance=spread)))
     _, formal, jackknife = widths(found)
     assert np.median(jackknife / formal) < 1.3
+
+
+def test_one_step_beside_the_maps_is_the_whole_problem():
+    """Positions and all maps, as far off as first order leaves them, fitted until nothing moves."""
+    recording, _ = simulated(4.0, bandwidth=2.0)
+    rng, sd = np.random.default_rng(4), np.repeat([1e-4, 3e-4], 36)
+    accelerometers, gyroscopes = (sd * rng.standard_normal(72)).reshape(2, 4, 3, 3)
+    moved = replace(
+        recording, map_covariance=np.diag(sd**2),
+        angular_rate_saturated=recording.saturated_gyroscopes(),
+        specific_force=recording.specific_force
+        + np.einsum("kij,tkj->tki", accelerometers, recording.specific_force),
+        angular_rate=recording.angular_rate
+        + np.einsum("kij,tkj->tki", gyroscopes, recording.angular_rate),
+    )  # fmt: skip
+    found = jointly(moved)
+    left, now = [found.recorded[0].readings.left], _with_maps(found)
+    maps = mask_of_left(left, now.columns, now.active)
+    active, given = now.active | maps, now.active[now.active | maps]
+    prior, values = np.zeros((len(given), len(given))), np.zeros(len(given))
+    prior[np.ix_(given, given)] = found.precision
+    prior[np.ix_(~given, ~given)] = np.linalg.inv(spread_of(left[0], now.columns, maps))
+    off = found.recorded, found.columns, found.active, found.places
+    values[given] = found.values - means(*off)
+    for _ in range(12):
+        now = replace(now, recorded=_passed(now.recorded, now.columns, active)[0])
+        blocks = tested(now, active, [np.arange(len(given))]).blocks
+        slope = sum(score for _, score in blocks) - prior @ values
+        step = np.linalg.solve(sum(inner for inner, _ in blocks) + prior, slope)
+        state = stepped(now.recorded[0].state, now.columns, active, step)
+        now, values = replace(now, recorded=(replace(now.recorded[0], state=state),)), values + step
+    first, whole = ((one.positions - found.positions)[1:] for one in (settled(found), now))
+    sds = position_sds(settled(found))
+    assert np.abs(step).max() < 1e-9 and np.abs(whole / sds).max() > 0.5
+    assert np.abs((first - whole) / sds).max() < 0.1
 
 
 def test_the_rates_change_says_more_than_the_accelerometers_of_turning():
