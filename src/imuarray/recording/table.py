@@ -125,7 +125,8 @@ def _sensors(table, layout, kind, where, layout_name):
         place = f"{layout_name}: {kind} {label!r}"
         names = layouts.three_columns(triad["columns"], place)
         own = np.stack([column(table, name, where).astype(float) for name in names], axis=1)
-        parts.append(unit * own @ _turn(triad, place).T)
+        with np.errstate(over="ignore"):  # what is infinite is refused where readings are checked
+            parts.append(unit * own @ _turn(triad, place).T)
     return np.stack(parts, axis=1), tuple(str(label) for label in section["triads"])
 
 
@@ -273,7 +274,9 @@ def _readings(table, path: str, names, time, unit: float, where: str) -> Reading
     steps = np.diff(stamps[np.isfinite(stamps)])
     if len(steps) and np.mean(steps == 0) > SETTINGS.shared_stamps and written.numbering(table):
         raise InputError(f"{path}: {written.shared_words(steps, table)}")
-    return Readings(stamps, second, unit * np.stack(values, axis=1), f"{path}: {', '.join(names)}")
+    with np.errstate(over="ignore"):  # as in `_sensors`
+        readings = unit * np.stack(values, axis=1)
+    return Readings(stamps, second, readings, f"{path}: {', '.join(names)}")
 
 
 def _imus(layout, where: str) -> dict[str, dict]:
