@@ -165,6 +165,7 @@ def test_one_file_in_which_each_kind_has_its_clock(tmp_path):
     ]  # fmt: skip
 
 
+@pytest.mark.filterwarnings("error")  # a refusal is one line
 @pytest.mark.parametrize(
     ("row", "cells", "words"),
     [
@@ -174,6 +175,7 @@ def test_one_file_in_which_each_kind_has_its_clock(tmp_path):
         (2, {1: "x"}, "rear.csv: column 'ax': expected numbers, found 'x' in data row 2"),
         (2, {5: "inf"}, "rear.csv: column 'gy': expected numbers, found inf in data row 2"),
         (2, {5: "1e40"}, "rear.csv: gx, gy, gz: expected finite numbers, found .* reading 2"),
+        (2, {1: "1e308"}, "rear.csv: ax, ay, az: expected finite numbers, found .*inf.* reading 2"),
     ],
 )
 def test_cells_that_cannot_be_used(tmp_path, row, cells, words):

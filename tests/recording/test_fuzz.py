@@ -25,7 +25,7 @@ FILES = 1000
 SLOW = 5.0  # s of processor time (machines are shared): nothing should take a tenth of that
 WORDS = [
     "nan", "inf", "-inf", "1e400", "-1e-400", "", " ", "NA", "None", "true", "0x10", "1_0", "1,5",
-    "1e308", "٣", "\x00", '"', "'", "#", ";", "\t", "\n", "\r", "\ufeff", "9" * 400, "1e5000", "- 1",
+    "٣", "\x00", '"', "'", "#", ";", "\t", "\n", "\r", "\ufeff", "9" * 400, "1e5000", "- 1",
     "*a", "&a [*a]", "!!python/object/apply:os.system ['true']", "!!binary x", "{", "[", "%", "|",
     "2001-01-01", "12:30:45", ".nan", "-.inf", "~", "<<: *x", "? x", "\U0001f600",
 ]  # fmt: skip

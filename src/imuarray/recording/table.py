@@ -125,7 +125,8 @@ def _sensors(table, layout, kind, where, layout_name):
         place = f"{layout_name}: {kind} {label!r}"
         names = layouts.three_columns(triad["columns"], place)
         own = np.stack([column(table, name, where).astype(float) for name in names], axis=1)
-        with np.errstate(over="ignore"):  # what is infinite is refused where readings are checked
+        # what is infinite is refused where readings are checked
+        with np.errstate(over="ignore", invalid="ignore"):
             parts.append(unit * own @ _turn(triad, place).T)
     return np.stack(parts, axis=1), tuple(str(label) for label in section["triads"])
 
