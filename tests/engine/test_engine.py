@@ -9,7 +9,8 @@ from scipy.stats import kstest
 
 import imuarray
 from imuarray.engine.dataset import engine_dataset
-from imuarray.engine.estimate import Recorded, _passed, estimate, jackknifed, means, tested, to_come
+from imuarray.engine.estimate import Recorded, _passed, estimate, jackknifed, means, to_come
+from imuarray.engine.estimate import tested as at_more
 from imuarray.engine.forward import _of_one_truth, select_forward
 from imuarray.engine.linearise import linearise, reading, seen_again
 from imuarray.engine.normal import uncorrelated
@@ -233,7 +234,7 @@ def test_one_step_beside_the_maps_is_the_whole_problem():
     values[given] = found.values - means(*off)
     for _ in range(12):
         now = replace(now, recorded=_passed(now.recorded, now.columns, active)[0])
-        blocks = tested(now, active, [np.arange(len(given))]).blocks
+        blocks = at_more(now, active, [np.arange(len(given))]).blocks
         slope = sum(score for _, score in blocks) - prior @ values
         step = np.linalg.solve(sum(inner for inner, _ in blocks) + prior, slope)
         state = stepped(now.recorded[0].state, now.columns, active, step)

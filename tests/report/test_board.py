@@ -57,7 +57,7 @@ def found(folder):
     """With the model given: the search for it has tests of its own, and takes its time."""
     with pytest.MonkeyPatch.context() as patch:
         given = partial(imuarray.calibrate, effects=["sensor_delay"])
-        patch.setattr("imuarray.analysis.board.calibrate", given)
+        patch.setattr("imuarray.analysis.board.calibrate_sensors", given)
         answer = board([folder / "log.csv"], folder / "columns.yaml", 9.81)
     write_board(answer, folder / "answer")
     return answer
