@@ -150,10 +150,10 @@ def test_the_pages_say_what_was_published(committed):
         f"up to {wrong[wrong.source == 'measured'].y.max():.0f} times the noise",
         f"{1e3 * lag['mean']:.2f} ± {1e3 * lag.sd:.2f} ms ahead",
         f"leave {smooth[-1]:.2f} times the noise instead of {smooth[0]:.0f}",
-        f"all samples {every[-1]:.0f} instead of {every[0]:.0f} (c)",
-        f"repeat to {apart[-1]:.1f} µm instead of {apart[0]:.0f}; heavy tails alone give"
-        f" {apart[1]:.0f}.",
-        f"{board.over_inflated:.1f} ± {board.over_inflated_error:.1f} nats a sample better",
+        f"All samples leave {every[-1]:.0f} instead of {every[0]:.0f}:",
+        f"repeat to {apart[-1]:.1f} µm rms between recordings instead of {apart[0]:.0f};"
+        f" heavy tails alone give {apart[1]:.0f}.",
+        f"{board.over_inflated:.1f} ± {board.over_inflated_error:.1f} nats a sample more",
     )
     for page in ("README.md", "docs/measured.md"):
         text = " ".join((ROOT / page).read_text(encoding="utf-8").split())
