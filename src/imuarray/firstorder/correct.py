@@ -30,6 +30,7 @@ from imuarray.model.effects import KINDS
 from imuarray.recording import Recording
 from imuarray.recording.channels import repeated, require_apart, require_live, require_once
 from imuarray.recording.record import CORRECTION, NUMBERS
+from imuarray.recording.settings import SETTINGS as RECORDING
 from imuarray.recording.units import GRAVITY
 
 GYROSCOPES = ("calibrate", "offset")
@@ -254,7 +255,8 @@ def correct(recording: Recording, found: FirstOrder) -> Recording:
     if recording.accelerometer_axes is not None:
         axes = axes @ recording.accelerometer_axes
     clock_sd, known = recording.clock_sd, found.gyroscopes
-    if known is not None and (doubt := known.time_base_sd(declared=clock_sd > 0)):
+    declared = clock_sd >= RECORDING.clock_sd  # a smaller one is the user's own word
+    if known is not None and (doubt := known.time_base_sd(declared)):
         clock_sd = np.hypot(np.nan_to_num(clock_sd), doubt)
     return replace(
         recording, specific_force=corrected(back, offset, recording.specific_force),

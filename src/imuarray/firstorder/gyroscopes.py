@@ -6,7 +6,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 from scipy.linalg import block_diag
-from scipy.special import stdtr
+from scipy.special import gammaln, stdtr
 
 from imuarray.errors import InputError
 from imuarray.firstorder.moves import CommonMap, Move, common_map, gather, prior_precision
@@ -157,20 +157,17 @@ class Gyroscopes:
     def time_base_sd(self, declared: bool) -> float:
         """Relative sd of the log's time: a scale that all axes share may be a clock's that is off.
 
-        0 where so large a mean is likely, as the axes' scales scatter, or is within its sd; of a
-        rate that is ``declared``, and not stamped, as likely as it is the clock's
-        (`SETTINGS.wrong_rate`).
+        As likely as it is the clock's, by the prior odds of a rate that is ``declared`` or of
+        stamps (`SETTINGS.wrong_rate`, `wrong_stamps`); 0 where that is unlikely.
         """
         if isinstance(self.common, str):
             return 0.0
-        chance = shared_chance(self.matrix)
-        share = float(chance < SETTINGS.odd_scale)
-        if declared:
-            odds = SETTINGS.wrong_rate * most_odds(chance)
-            share = odds / (1.0 + odds)
-        return float(
-            np.sqrt(share * max((self.common.scale - 1) ** 2 - self.common.scale_sd**2, 0.0))
-        )
+        mean, sd = mean_scale(self.matrix)
+        sd = np.hypot(sd, self.common.scale_sd)
+        odds = SETTINGS.wrong_rate if declared else SETTINGS.wrong_stamps
+        odds *= shift_odds(mean, sd, self.matrix[..., 0].size - 1, SETTINGS.wrong_by)
+        share = odds / (1.0 + odds)
+        return float(np.sqrt(share * (mean**2 + sd**2))) if share > SETTINGS.unlikely else 0.0
 
     def between(self, poses: range) -> Self:
         """The maps with the moves between some of the poses, numbered from the first of them."""
@@ -182,17 +179,27 @@ class Gyroscopes:
         return replace(self, common=replace(self.common, first=first, **moves))
 
 
+def mean_scale(matrices) -> tuple[float, float]:
+    """Mean of the scales of axes, less one, of maps (G, 3, 3), and its sd by how they scatter."""
+    scales = np.linalg.norm(matrices, axis=1).ravel() - 1
+    return float(scales.mean()), max(float(scales.std(ddof=1)) / np.sqrt(scales.size), 1e-300)
+
+
 def shared_chance(matrices) -> float:
     """Chance (t distribution) of such a mean of the scales of axes, of maps (G, 3, 3)."""
-    scales = np.linalg.norm(matrices, axis=1).ravel() - 1
-    sd = scales.std(ddof=1) / np.sqrt(scales.size)
-    return float(2 * stdtr(scales.size - 1, -abs(scales.mean()) / max(sd, 1e-300)))
+    mean, sd = mean_scale(matrices)
+    return float(2 * stdtr(matrices[..., 0].size - 1, -abs(mean) / sd))
 
 
-def most_odds(chance: float) -> float:
-    """Odds against a hypothesis of that p value at the most (Sellke, Bayarri and Berger, 2001)."""
-    small = max(chance, 1e-300)
-    return float(-1.0 / (np.e * small * np.log(small))) if small < 1 / np.e else 1.0
+def shift_odds(mean: float, sd: float, freedom: int, shift: float) -> float:
+    """Bayes factor of a normal shift of sd ``shift`` in a mean, its ``sd`` of so much ``freedom``.
+
+    Density of the mean with the shift, normal, over that without, Student's t.
+    """
+    wide = np.hypot(sd, shift)
+    t = gammaln((freedom + 1) / 2) - gammaln(freedom / 2) - np.log(freedom / 2) / 2
+    t -= (freedom + 1) / 2 * np.log1p((mean / sd) ** 2 / freedom)
+    return float(np.exp(np.log(sd / wide) - (mean / wide) ** 2 / 2 - t))
 
 
 class Still(NamedTuple):

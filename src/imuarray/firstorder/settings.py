@@ -67,7 +67,10 @@ class Settings:
     gyroscope_block: float = 1.0  # s, within which residuals may be alike
     robust_steps: int = 5  # of reweighting
     odd_scale: float = 1e-4  # chance of a mean of all axes' scales, by how they scatter
-    wrong_rate: float = 0.1  # prior odds that a declared rate is off by more than its sd
+    wrong_rate: float = 1.0  # prior odds that a declared rate is a chip's own, not a crystal's
+    wrong_stamps: float = 0.05  # the same of stamps
+    wrong_by: float = 0.01  # sd of how much they are off then: data sheets say 1 to 5 % at most
+    unlikely: float = 0.05  # chance, below which intervals of 95 % need not heed it
     recordings_apart: float = 1000.0  # s, between recordings that are looked at as one
     # `noise`
     bins: int = 8  # an octave
