@@ -43,7 +43,7 @@ def unfitting(
     elif triads.get(worst, 0.0) > limit:
         cause = f"most at {worst}, {triads[worst]:.3g} times"
     else:
-        cause = "in all alike, or only where one is at its rail"
+        cause = "in all alike, or only where one is at its rail; imuarray diagnose names causes"
     return [f"the residual is {whole:.3g} times the declared noise: {cause}"], bool(named)
 
 
