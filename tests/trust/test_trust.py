@@ -545,6 +545,18 @@ def test_a_map_that_does_not_hold_while_twisting_is_named(sound):
     assert len(said) == 1 and f"accelerometer {sound.accelerometer_labels[2]} does not" in said[0]
 
 
+def test_maps_of_all_others_are_the_first_ones():
+    """All maps are in the first accelerometer's axes."""
+    attrs = {"accelerometer_maps_hold": 0.0, "accelerometer_maps_farthest": "c, b"}
+    found = xr.Dataset(coords={"accelerometer": ["a", "b", "c"]}, attrs=attrs)
+    assert (
+        "gave accelerometer a (in its axes c, b all differ) does not"
+        in doubts._moved_maps(found)[0]
+    )
+    found.attrs["accelerometer_maps_farthest"] = "c"
+    assert "gave accelerometer c does not" in doubts._moved_maps(found)[0]
+
+
 def test_an_array_that_shrinks_while_it_moves_is_told(sound):
     """The scale of all gyroscopes rises by 0.5 %, and with its square the centrifugal force."""
     assert doubts._grows(imuarray.calibrate(sound)) == []

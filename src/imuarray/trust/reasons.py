@@ -112,14 +112,25 @@ def _low(whose: str, droop: float, what: str) -> str:
 
 
 def _moved_maps(calibration: xr.Dataset) -> list[str]:
-    """Words on maps that still poses gave and the twisting contradicts."""
-    return [
-        f"the map that still poses gave {kind} {calibration.attrs[f'{kind}_maps_farthest']} does"
-        " not hold while the board is twisted: did it turn or come loose in between, or does its"
-        " scale change with the rate, the force or the warmth, or is its filter another one? Record"
-        " again, poses before and after"
-        for kind in KINDS if calibration.attrs.get(f"{kind}_maps_hold", 1.0) < SETTINGS.maps_chance
-    ]  # fmt: skip
+    """Words on maps that still poses gave and the twisting contradicts.
+
+    All others' at once are rather the first accelerometer's, in whose axes they are.
+    """
+    first, *others = (str(label) for label in calibration["accelerometer"].to_numpy())
+    found = []
+    for kind in KINDS:
+        if not calibration.attrs.get(f"{kind}_maps_hold", 1.0) < SETTINGS.maps_chance:
+            continue
+        named = calibration.attrs[f"{kind}_maps_farthest"]
+        if kind == "accelerometer" and len(others) > 1 and set(named.split(", ")) == {*others}:
+            named = f"{first} (in its axes {named} all differ)"
+        found.append(
+            f"the map that still poses gave {kind} {named} does not hold while the board is"
+            " twisted: did it turn or come loose in between, or does its scale change with the"
+            " rate, the force or the warmth, or is its filter another one? Record again, poses"
+            " before and after"
+        )
+    return found
 
 
 def _grows(calibration: xr.Dataset) -> list[str]:
