@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import imuarray
-from imuarray.analysis.logs import _less_garbage
+from imuarray.analysis.garbage import without_garbage
 from tests.cases import model
 
 
@@ -16,14 +16,14 @@ def recording():
 
 
 def test_a_clean_log_stays_as_it_is(recording):
-    found, lines = _less_garbage(recording)
+    found, lines = without_garbage(recording)
     assert found is recording and not lines
 
 
 def test_rows_of_zeros_are_left_out(recording):
     force, rate = recording.specific_force.copy(), recording.angular_rate.copy()
     force[[7, 300]] = rate[[7, 300]] = 0
-    found, lines = _less_garbage(replace(recording, specific_force=force, angular_rate=rate))
+    found, lines = without_garbage(replace(recording, specific_force=force, angular_rate=rate))
     assert lines == ["2 rows of zeros left out"] and len(found.time) == len(recording.time) - 2
 
 
@@ -33,7 +33,7 @@ def test_spikes_are_bridged_and_lost(recording, kind):
     values = getattr(recording, name).copy()
     for row, axis in ((50, 0), (120, 2), (400, 1)):
         values[row, 1, axis] += 50.0
-    found, lines = _less_garbage(replace(recording, **{name: values}))
+    found, lines = without_garbage(replace(recording, **{name: values}))
     lost = getattr(found, f"saturated_{kind}s")()
     before = getattr(recording, f"saturated_{kind}s")()
     assert lost[[50, 120, 400], 1].all() and (lost & ~before).sum() == 9
@@ -42,13 +42,32 @@ def test_spikes_are_bridged_and_lost(recording, kind):
     assert np.abs(getattr(found, name) - getattr(recording, name)).max() < 5.0
 
 
+def test_bursts_of_garbage_are_lost_with_their_neighbours(recording):
+    rng, values = np.random.default_rng(5), recording.specific_force.copy()
+    for row, count in ((50, 2), (300, 5), (700, 20)):
+        values[row : row + count, 2] = rng.uniform(-150, 150, (count, 3))
+    found, lines = without_garbage(replace(recording, specific_force=values))
+    lost = found.saturated_accelerometers() & ~recording.saturated_accelerometers()
+    assert lost[:, 2].all(axis=1).sum() == 2 + 5 + 20 + 6 == lost.sum() / 3
+    label = recording.accelerometer_labels[2]
+    assert lines == [f"accelerometer {label}: 33 readings of bursts of garbage left out"]
+
+
+def test_a_knock_is_no_garbage(recording):
+    """All triads read it, each by its place; one far out reads most."""
+    values = recording.specific_force.copy()
+    share = np.linspace(0.5, 1.0, values.shape[1])[:, None]
+    values[300:306] += 50.0 * np.array([1, -1, 1, -1, 1, -1.0])[:, None, None] * share
+    assert not without_garbage(replace(recording, specific_force=values))[1]
+
+
 def test_a_step_of_one_triad_is_no_spike(recording):
     values = recording.specific_force.copy()
     values[300:, 1] += 50.0
-    assert not _less_garbage(replace(recording, specific_force=values))[1]
+    assert not without_garbage(replace(recording, specific_force=values))[1]
 
 
 def test_what_is_often_so_is_no_garbage(recording):
     values = recording.specific_force.copy()
     values[::10, 1] += 50.0
-    assert not _less_garbage(replace(recording, specific_force=values))[1]
+    assert not without_garbage(replace(recording, specific_force=values))[1]

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from imuarray.analysis.garbage import without_garbage
 from imuarray.analysis.settings import SETTINGS
 from imuarray.errors import InputError, require
 from imuarray.firstorder.rails import rails_shown
@@ -140,7 +141,7 @@ def _sampled(recording: Recording, lines: list[str]) -> Opened:
     from imuarray.alignment.align import steadied
     from imuarray.alignment.settings import SETTINGS as ALIGNMENT
 
-    recording, cleaned = _less_garbage(recording)
+    recording, cleaned = without_garbage(recording)
     recording, railed = _railed_triads(recording)
     lines = [*lines, *cleaned, *railed]
     if len(recording.time) < ALIGNMENT.shortest:
@@ -153,49 +154,6 @@ def _sampled(recording: Recording, lines: list[str]) -> Opened:
             " even"
         )
     return Opened(recording, lines)
-
-
-def _less_garbage(recording: Recording) -> tuple[Recording, list[str]]:
-    """Without rows of zeros; spikes of one triad bridged and marked as lost; lines that say so."""
-    lines: list[str] = []
-    changed: dict[str, Any] = {}
-    empty = ~(recording.specific_force.any(axis=(1, 2)) | recording.angular_rate.any(axis=(1, 2)))
-    if 0 < empty.sum() < SETTINGS.rare * empty.size:
-        recording = recording.select(~empty)
-        lines.append(f"{empty.sum()} rows of zeros left out")
-    for kind, name in KINDS.items():
-        values = getattr(recording, name)
-        spikes = _spikes(values, getattr(recording, f"{kind}_noise_sd"))
-        if not 0 < spikes.sum() < SETTINGS.rare * len(values):
-            continue
-        t, k = np.nonzero(spikes)
-        values = values.copy()
-        values[t, k] = (values[t - 1, k] + values[t + 1, k]) / 2
-        lost = getattr(recording, f"saturated_{kind}s")().copy()
-        lost[t, k] = True
-        changed |= {name: values, f"{name}_saturated": lost}
-        labels = getattr(recording, f"{kind}_labels")
-        whose = ", ".join(labels[i] for i in np.unique(k))
-        lines.append(f"{kind} {whose}: {len(t)} spikes left out")
-    return replace(recording, **changed) if changed else recording, lines
-
-
-def _spikes(values, noise: float) -> np.ndarray:
-    """(T, K) bool: one reading of one triad far from its neighbours, where the others are not."""
-    found = np.zeros(values.shape[:2], bool)
-    if values.shape[1] < 3 or len(values) < 5:
-        return found
-    apart = values - np.median(values, axis=1, keepdims=True)
-    bend = apart[1:-1] - (apart[:-2] + apart[2:]) / 2
-    usual = np.maximum(np.median(np.abs(bend), axis=0), noise)
-    size = np.max(np.abs(bend) / usual, axis=2)
-    # a spike bends its neighbours by half the other way, and moves what the others are held against
-    square = np.maximum(np.sum(bend**2, axis=2), 1e-300)[1:-1]
-    halves = [np.sum(bend[1:-1] * part, axis=2) / square for part in (bend[:-2], bend[2:])]
-    alone = np.all([(part > -0.8) & (part < -0.2) for part in halves], axis=0)
-    largest = size == size.max(axis=1, keepdims=True)
-    found[2:-2] = ((size > SETTINGS.spike) & largest)[1:-1] & alone
-    return found
 
 
 def _require_own(log: Log) -> None:

@@ -18,6 +18,8 @@ class Settings:
     sure: float = 0.8  # of the rates' roughness is left at even instants; slow motion shows none
     rare: float = 0.05  # of the rows: more are no garbage
     spike: float = 60.0  # times what a triad usually departs from its neighbours, or its noise
+    only: float = 3.0  # times as far as the next triad, where one alone reads garbage
+    burst: tuple[int, int] = (4, 40)  # readings of one, with a neighbour at each end
     large: float = 0.5  # of the largest reading, from which an abrupt end is a rail and no rest
     # `noise`
     few: int = 50  # samples, up to which several searches for the mode are made
