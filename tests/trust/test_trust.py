@@ -545,6 +545,27 @@ def test_a_map_that_does_not_hold_while_twisting_is_named(sound):
     assert len(said) == 1 and f"accelerometer {sound.accelerometer_labels[2]} does not" in said[0]
 
 
+def test_one_imu_that_moves_explains_what_all_growing_does_not(sound):
+    """Half a millimetre, in the middle."""
+    rate = np.median(sound.angular_rate, axis=1)
+    turn = np.gradient(rate, sound.time, axis=0)
+    shift = np.array([5e-4, 0.0, 0.0])
+    more = np.cross(rate, np.cross(rate, shift)) + np.cross(turn, shift)
+    late = (sound.time > np.median(sound.time))[:, None]
+    force = sound.specific_force.copy()
+    force[:, 2] += late * more
+    found = imuarray.calibrate(replace(sound, specific_force=force))
+    assert found.attrs["farthest_moved"] == sound.accelerometer_labels[2]
+    assert found.attrs["farthest_move"] > 100.0
+    found.attrs |= {"size_growth": 0.01, "size_growth_sd": 1e-3}
+    (reason,) = doubts._grows(found)
+    assert reason.startswith(
+        f"parts of the recording disagree on the place of IMU {found.attrs['farthest_moved']}"
+    )
+    found.attrs["farthest_move"] = 10.0
+    assert "the array grows by 1 %" in doubts._grows(found)[0]
+
+
 def test_maps_of_all_others_are_the_first_ones():
     """All maps are in the first accelerometer's axes."""
     attrs = {"accelerometer_maps_hold": 0.0, "accelerometer_maps_farthest": "c, b"}
@@ -604,3 +625,16 @@ def test_the_noise_of_the_only_gyroscope_stays_as_declared(sound):
     found = imuarray.calibrate(alone)
     np.testing.assert_allclose(found.gyroscope_sd, alone.gyroscope_noise_sd)
     assert doubts.reasons_of_calibration(alone, found) == []
+
+
+def test_a_late_imu_of_another_recording_contradicts_the_calibration(sound):
+    """Without effects the rigid array says so, with effects the residual under these."""
+    found = imuarray.calibrate(sound)
+    late = sound.angular_rate.copy()
+    late[20:, 1] = late[:-20, 1]
+    said = doubts.reasons_of_motion(replace(sound, angular_rate=late), found)
+    assert any("the residual is" in one for one in said), said
+    own = found.assign_attrs(effects="sensor_delay")
+    assert doubts.reasons_of_motion(sound, own, ratio=1.3) == []
+    (said,) = doubts.reasons_of_motion(sound, own, ratio=30.0)
+    assert "the residual is 30 times the declared noise" in said

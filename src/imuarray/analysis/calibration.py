@@ -56,7 +56,9 @@ def calibrate(
         ``model``, ``parts`` (json), ``accelerometer_maps_hold`` (chance that the maps of first
         order are those of this motion) and ``accelerometer_maps_farthest`` (the IMUs that are
         least so), the same of gyroscopes, ``size_growth`` and ``size_growth_sd`` (relative, of the
-        array from the beginning of the motion to its end), and the origin (config, seed, versions).
+        array from the beginning of the motion to its end), ``farthest_moved`` (the IMU whose
+        position changes most between these) and ``farthest_move`` (its chi-square, of three
+        degrees of freedom), and the origin (config, seed, versions).
 
     Raises
     ------

@@ -12,6 +12,7 @@ from imuarray.analysis.model import assumed
 from imuarray.engine.clocks import CLOCK
 from imuarray.engine.fusion import COMPONENTS, fuse
 from imuarray.engine.parameters import model_of
+from imuarray.engine.robust import median_of
 from imuarray.errors import InputError, require
 from imuarray.firstorder.correct import corrected
 from imuarray.firstorder.rails import less_leak, nearest_rail, rails_shown
@@ -45,7 +46,9 @@ def apply(
     alone then); ``motion_covariance`` (time, component, component_other);
     ``converged``, and the flags ``gyroscope_at_rail`` and ``accelerometer_at_rail`` (time; the
     motion is NaN where an accelerometer is, and of two IMUs where an axis has no gyroscope off its
-    rail). InputError says what does not fit together.
+    rail). Attribute ``residual_ratio``: under effects, residual over noise of the median fast
+    sample (NaN of two IMUs and where clocks are found anew). InputError says what does not fit
+    together.
     """
     parts = list(motion_parts(calibration, recording, accelerometer_noise))
     return parts[0] if len(parts) == 1 else xr.concat(
@@ -124,7 +127,21 @@ def _motion_of(calibration, recording: Recording, accelerometer_noise, origin) -
             dataset[f"{name}_sd_from_calibration"][:] = np.nan
     dataset["gyroscope_at_rail"] = (("time",), saturated.any(axis=(1, 2)))
     dataset["accelerometer_at_rail"] = (("time",), railed)
-    return dataset.assign_attrs(own_clocks=int(anew), late_s=_late(calibration))
+    own = anew or not effect_names(calibration)
+    ratio = np.nan if own else _residual(recording, found.estimate, lost | saturated.any((1, 2)))
+    late = _late(calibration)
+    return dataset.assign_attrs(own_clocks=int(anew), late_s=late, residual_ratio=ratio)
+
+
+def _residual(recording: Recording, estimate, lost) -> float:
+    """Residual over noise of the fastest quarter's median sample: shocks do not count."""
+    speed = np.where(lost, np.nan, np.linalg.norm(estimate.motion.angular_rate, axis=1))
+    counts = len(recording.accelerometer_labels), len(recording.gyroscope_labels)
+    number = 3 * sum(counts) - 3 * sum(field is not None for field in estimate.motion)
+    if lost.all() or counts[0] < 3:
+        return np.nan
+    fast = speed > np.nanquantile(speed, 0.75)
+    return float(np.sqrt(np.median(estimate.cost[fast]) / median_of(number)))
 
 
 def _late(calibration: xr.Dataset) -> float:

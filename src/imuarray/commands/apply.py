@@ -34,7 +34,8 @@ def apply(arguments) -> None:
         raise InputError(f"{arguments.calibration}: {error}") from None
     own = bool(first.attrs["own_clocks"])
     as_read = recording is not read
-    reasons = reasons_of_motion(assumed(recording, noise), calibration, own, as_read)
+    ratio = first.attrs["residual_ratio"]
+    reasons = reasons_of_motion(assumed(recording, noise), calibration, own, as_read, ratio)
     first = first.assign_attrs(trust(reasons))
 
     def counted(part: xr.Dataset) -> xr.Dataset:

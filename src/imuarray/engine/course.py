@@ -67,21 +67,53 @@ def position_sds(found: Estimate) -> np.ndarray:
 def size_growth(found: Estimate) -> tuple[float, float]:
     """(relative growth of the array from the beginning of the motion to its end, its sd).
 
-    By a score test, all parameters refitted: an array that keeps its shape grows where the
-    gyroscopes' common scale changes. The sd is infinite where nothing is known of it.
+    An array that keeps its shape grows where the gyroscopes' common scale changes. The sd is
+    infinite where nothing is known of it.
     """
-    size = np.zeros(len(found.information))
+    size = np.zeros((len(found.information), 1))
     placed = found.columns.mask([POSITION])
-    size[found.places[0][placed[found.active]]] = found.positions[1:].ravel()
-    share, along, all_of_it = 0.0, np.zeros(len(size)), 0.0
+    size[found.places[0][placed[found.active]], 0] = found.positions[1:].ravel()
+    moved, variance = _moved(found, size)
+    return float(moved[0]), float(np.sqrt(variance[0, 0]))
+
+
+def farthest_move(found: Estimate) -> tuple[int, float]:
+    """(IMU, chi-square of its three axes) whose position changes most from beginning to end.
+
+    Where all others move alike it is the reference.
+    """
+    pairs, count = np.argwhere(found.active), len(found.positions)
+    placed = pairs[:, 1] < 3
+    owners, places = pairs[placed, 0], found.places[0][placed]
+    moves = []
+    for k in range(count):
+        mine = owners == k if k else owners > 0
+        directions = np.zeros((len(found.information), 3))
+        directions[places[mine], pairs[placed, 1][mine]] = 1.0
+        moved, variance = _moved(found, directions)
+        known = np.isfinite(variance).all()
+        moves.append((k, float(moved @ np.linalg.solve(variance, moved)) if known else 0.0))
+    return max(moves, key=lambda move: move[1])
+
+
+def _moved(found: Estimate, directions) -> tuple[np.ndarray, np.ndarray]:
+    """Change (k,) along ``directions`` (n, k) from beginning to end, and its covariance (k, k).
+
+    By a score test, all parameters refitted.
+    """
+    size = directions.shape[1]
+    share, along, whole = np.zeros(size), np.zeros(directions.shape), np.zeros((size, size))
     counts = [len(seen.score) for seen in found.passes]
     middle = np.concatenate([(np.arange(count) + 0.5) / count - 0.5 for count in counts])
     for when, (inner, slope) in zip(middle, found.blocks, strict=True):
-        share += when * (size @ slope)
-        along += when * (inner @ size)
-        all_of_it += when**2 * (size @ inner @ size)
-    left = all_of_it - along @ scaled_inverse(found.information + found.precision) @ along
-    return (float(share / left), float(left**-0.5)) if left > 0 else (0.0, np.inf)
+        share += when * (directions.T @ slope)
+        along += when * (inner @ directions)
+        whole += when**2 * (directions.T @ inner @ directions)
+    left = whole - along.T @ scaled_inverse(found.information + found.precision) @ along
+    if np.linalg.eigvalsh(left)[0] <= 0:
+        return np.zeros(size), np.full((size, size), np.inf)
+    variance = np.linalg.inv(left)
+    return variance @ share, variance
 
 
 def block_scores(found: Estimate) -> Scores:

@@ -19,6 +19,8 @@ from imuarray.trust.settings import SETTINGS
 from imuarray.trust.suspects import suspects
 from imuarray.words import joined
 
+LOOSE = "did it come loose, or did its accelerometer's offset jump? imuarray diagnose tells which"
+
 
 def is_papers(calibration: xr.Dataset) -> bool:
     """True of the papers' model, in which nothing but noise is between the triads."""
@@ -88,10 +90,7 @@ def unsteady(calibration: xr.Dataset, corrected: bool, recordings: int = 1) -> l
             f"the recordings {by}was it glued anew, or is one recording of another board? Calibrate"
             " each alone, and compare their positions"
         ]
-    return [
-        f"parts of the recording {by}did it come loose, or did its accelerometer's offset jump?"
-        " imuarray diagnose tells which"
-    ]
+    return [f"parts of the recording {by}{LOOSE}"]
 
 
 def changed(calibration: xr.Dataset) -> list[str]:

@@ -16,7 +16,7 @@ from imuarray.recording import Recording
 from imuarray.recording.channels import repeated
 from imuarray.trust.checked import effect_names, reasons_in, values_of
 from imuarray.trust.drawing import Places, another_size, departures, factor_words, size_of
-from imuarray.trust.misfit import changed, is_papers, residuals, rigid, unfitting, unsteady
+from imuarray.trust.misfit import LOOSE, changed, is_papers, residuals, rigid, unfitting, unsteady
 from imuarray.trust.rigid import Slope, elsewhere, kept, slope, turning
 from imuarray.trust.settings import SETTINGS
 from imuarray.trust.suspects import MIRRORED, clipped, common, gravity, wrapped
@@ -134,10 +134,16 @@ def _moved_maps(calibration: xr.Dataset) -> list[str]:
 
 
 def _grows(calibration: xr.Dataset) -> list[str]:
-    """Words on an array that does not keep its size: its accelerometers do not move."""
+    """Words on an array that does not keep its size: its accelerometers do not move, but for one.
+
+    One IMU that moves explains it where it explains more.
+    """
     growth, sd = (calibration.attrs.get(f"size_growth{name}", 0.0) for name in ("", "_sd"))
     if not abs(growth) > SETTINGS.growth * sd:
         return []
+    if calibration.attrs.get("farthest_move", 0.0) > (growth / sd) ** 2 + SETTINGS.alone:
+        by = f"disagree on the place of IMU {calibration.attrs['farthest_moved']}: "
+        return [f"parts of the recording {by}{LOOSE}"]
     grows, change = ("grows", "fall") if growth > 0 else ("shrinks", "rise")
     return [
         f"the array {grows} by {100 * abs(growth):.2g} % while it moves: do the gyroscopes' scales"
@@ -183,16 +189,18 @@ def reasons_of_posterior(
 
 
 def reasons_of_motion(
-    recording: Recording, calibration: xr.Dataset, own_clocks: bool = False, as_read: bool = False
-) -> list[str]:
+    recording: Recording, calibration: xr.Dataset, own_clocks: bool = False, as_read: bool = False,
+    ratio: float = np.nan,
+) -> list[str]:  # fmt: skip
     """Why the motion that `imuarray.apply` gives for this recording is not to be trusted.
 
     A calibration that is not, or that this recording does not fit, as one of another board.
     ``own_clocks``: whether `imuarray.apply` has found the recording's own; ``as_read``: whether it
-    had to correct the readings as the calibration's were.
+    had to correct the readings as the calibration's were; ``ratio``: its residual over noise
+    under the calibration's effects.
     """
     said, places = reasons_in(calibration), _places_of(recording, calibration)
-    residual = rigid(recording, places) if is_papers(calibration) else {}
+    residual = {"": ratio} if effect_names(calibration) else rigid(recording, places)
     found = _judged(recording, places, residual) + _elsewhere(kept(recording), places)
     found += _of_another_time(recording, calibration, own_clocks)
     found += [AS_READ] if as_read else []

@@ -31,6 +31,7 @@ class Settings:
     common_scale_seen: float = 5e-3  # the same, where the axes' own scales scatter by less
     # `reasons`
     growth: float = 6.0  # sds of the growth; clean and real boards' is within one
+    alone: float = 20.0  # of chi-square, by which one IMU's move explains more than a growth
     droop: float = 6e-5  # s^2, that a filter may droop by more than the other kind's; 15 Hz alone
     package: float = 2.5e-3  # m, from an accelerometer's middle; packages are 3 to 5 mm wide
     maps_chance: float = 1e-5  # chance of maps so far from those that poses gave
