@@ -51,6 +51,17 @@ def test_a_table_s_form_is_found_and_said(tmp_path, plain, content, words):
     assert len(lines) == 1 and words in lines[0]
 
 
+def test_a_header_again_and_remarks_among_the_rows_are_left_out(tmp_path, plain):
+    """A logger that was started twice, and says how full its battery is."""
+    rows = table(ROWS)
+    content = text([*rows[:50], HEADER, *rows[50:90]]) + "# battery 3.71 V\n" + text(rows[90:])
+    found, lines = read(tmp_path, content)
+    np.testing.assert_array_equal(found.specific_force, plain.specific_force)
+    np.testing.assert_array_equal(found.time, plain.time)
+    left = ["log.csv: header again: 1, left out", "log.csv: remarks: 1, left out"]
+    assert lines == left
+
+
 @pytest.mark.parametrize(
     "form", ["2026-03-01T12:00:{:09.6f}Z", "2026-03-01 12:00:{:06.3f}", "12:00:{:06.3f}"]
 )

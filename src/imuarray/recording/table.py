@@ -66,7 +66,8 @@ def load(path, layout, columns) -> tuple[pd.DataFrame, list[str]]:
         table = pd.read_csv(path, skipinitialspace=True, header=header, **options)
         names = head.iloc[0].fillna("").str.strip()
         table.columns = names if header == 0 else [str(k + 1) for k in range(table.shape[1])]
-    return table, lines
+    table, more = written.rows_of_numbers(table)
+    return table, [*lines, *(f"{Path(path).name}: {line}" for line in more)]
 
 
 def _named(section) -> set[str]:

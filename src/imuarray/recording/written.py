@@ -78,6 +78,19 @@ def are_words(cells: list[str]) -> bool:
     return 2 * len(words) > len(cells) and not numbers
 
 
+def rows_of_numbers(table: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
+    """The table without its header again and lone comments among its rows; lines that say so."""
+    first = table.iloc[:, 0] if table.shape[1] else pd.Series(dtype=float)
+    if first.dtype.kind != "O":
+        return table, []
+    text = first.astype(str).str.strip()
+    again = (text == str(table.columns[0])).to_numpy()
+    remarks = text.str.match("#|//|%").to_numpy() & table.iloc[:, 1:].isna().all(axis=1).to_numpy()
+    found = (again, "header again"), (remarks, "remarks")
+    said = [f"{what}: {rows.sum()}, left out" for rows, what in found if rows.any()]
+    return (table[~(again | remarks)].reset_index(drop=True) if said else table), said
+
+
 def plain(value) -> str:
     """A sensor's number or name in a cell as a label: 2 and 2.0 are "2"."""
     return f"{value:g}" if isinstance(value, float) else str(value)
