@@ -4,11 +4,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from imuarray.analysis.settings import SETTINGS
 from imuarray.recording import Recording
 from imuarray.recording.channels import runs
 from imuarray.recording.record import KINDS
+from imuarray.recording.rig import Log
 
 
 def without_garbage(recording: Recording) -> tuple[Recording, list[str]]:
@@ -32,6 +34,39 @@ def without_garbage(recording: Recording) -> tuple[Recording, list[str]]:
                 whose = ", ".join(labels[k] for k in np.flatnonzero(part.any(axis=0)))
                 lines.append(f"{kind} {whose}: {part.sum()} {what} left out")
     return replace(recording, **changed) if changed else recording, lines
+
+
+def without_garbage_of(log: Log) -> tuple[Log, list[str]]:
+    """The same of a log of one IMU, of which nothing but itself tells; lines that say so."""
+    lines: list[str] = []
+    changed: dict[str, Any] = {}
+    empty = log.accelerometer_time[~log.specific_force.any(axis=1)]  # no accelerometer reads that
+    for kind, name in KINDS.items():
+        time, values = getattr(log, f"{kind}_time"), getattr(log, name)
+        zeros = ~values.any(axis=1) & np.isin(time, empty)
+        found = zeros | far_alone(values, getattr(log, f"{kind}_noise_sd"))
+        if 0 < found.sum() < SETTINGS.rare * len(time):
+            changed |= {f"{kind}_time": time[~found], name: values[~found]}
+            lines.append(f"{log.label}: {kind}: {found.sum()} readings of garbage left out")
+    return replace(log, **changed) if changed else log, lines
+
+
+def far_alone(values, noise: float) -> np.ndarray:
+    """(T,) bool: readings (T, 3) far from their neighbours, single or in short bursts.
+
+    Second differences, against the usual ones of all and of those near by.
+    """
+    lost = np.zeros(len(values), bool)
+    if len(values) < SETTINGS.near:
+        return lost
+    bend = np.abs(values[1:-1] - (values[:-2] + values[2:]) / 2)
+    near = median_filter(bend, size=(SETTINGS.near, 1)) * SETTINGS.spike / SETTINGS.spike_near
+    usual = np.maximum(np.maximum(np.median(bend, axis=0), noise), near)
+    far = np.max(bend / usual, axis=1) > SETTINGS.spike
+    for first, past in runs(_closed(far)):
+        if past - first <= SETTINGS.burst_near:
+            lost[first + 1 : past + 1] = True
+    return lost
 
 
 def bridged(values, lost) -> np.ndarray:

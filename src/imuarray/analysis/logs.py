@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from imuarray.analysis.garbage import without_garbage
+from imuarray.analysis.garbage import without_garbage, without_garbage_of
 from imuarray.analysis.settings import SETTINGS
 from imuarray.errors import InputError, require
 from imuarray.firstorder.rails import rails_shown
@@ -126,10 +126,11 @@ def _together(found: Rig, lines: list[str]) -> Opened:
     from imuarray.alignment import align
 
     for log in found.logs:
+        log, cleaned = without_garbage_of(log)
         _require_own(log)
-        log, said = _railed(log)
+        log, railed = _railed(log)
         logs.append(log)
-        lines += said
+        lines += cleaned + railed
     recording, alignment = align(
         logs, position_prior_sd=found.position_prior_sd, source=found.source
     )

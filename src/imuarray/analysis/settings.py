@@ -20,6 +20,9 @@ class Settings:
     spike: float = 60.0  # times what a triad usually departs from its neighbours, or its noise
     only: float = 3.0  # times as far as the next triad, where one alone reads garbage
     burst: tuple[int, int] = (4, 40)  # readings of one, with a neighbour at each end
+    near: int = 21  # readings of one log beside which garbage stands out
+    spike_near: float = 12.0  # times what these depart from their neighbours
+    burst_near: int = 12  # readings of one log; longer bursts may be knocks
     large: float = 0.5  # of the largest reading, from which an abrupt end is a rail and no rest
     # `noise`
     few: int = 50  # samples, up to which several searches for the mode are made

@@ -50,13 +50,14 @@ class Log:
 class Readings:
     """One kind of one IMU as logged: stamps (N,) of ``unit`` s, values (N, 3) in SI units.
 
-    Where either is NaN there is no reading; ``where`` is for messages.
+    Where either is NaN there is no reading; ``where`` is for messages, ``lines`` say what was done.
     """
 
     stamps: np.ndarray
     unit: float
     values: np.ndarray
     where: str
+    lines: tuple[str, ...] = ()
 
 
 class Rig(NamedTuple):
@@ -84,7 +85,7 @@ def to_rig(imus: Mapping[str, dict], read: Mapping[str, list[Readings]], layout,
         whole[label] = []
         for kind, readings in zip(KINDS, kinds, strict=True):
             kept, said = _in_order(readings)
-            lines += [f"{label}: {kind}: {part}" for part in said]
+            lines += [f"{label}: {kind}: {part}" for part in (*readings.lines, *said)]
             whole[label].append(kept)
     first, apart = _origins(list(whole.values()))
     lines += [

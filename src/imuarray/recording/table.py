@@ -278,7 +278,11 @@ def _readings(table, path: str, names, time, unit: float, where: str) -> Reading
         raise InputError(f"{path}: {written.shared_words(steps, table)}")
     with np.errstate(over="ignore"):  # as in `_sensors`
         readings = unit * np.stack(values, axis=1)
-    return Readings(stamps, second, readings, f"{path}: {', '.join(names)}")
+    lines: list[str] = []
+    if len(steps) == len(stamps) - 1 > 0 and np.mean(steps == 0) < SETTINGS.equal_stamps:
+        stamps, rows, lines = written.in_order(stamps, table, "stamps")
+        readings = readings[rows]
+    return Readings(stamps, second, readings, f"{path}: {', '.join(names)}", tuple(lines))
 
 
 def _imus(layout, where: str) -> dict[str, dict]:
