@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import imuarray
-from imuarray.analysis.garbage import without_garbage
+from imuarray.analysis.garbage import without_garbage, without_garbage_of
+from imuarray.recording.rig import Log
 from tests.cases import model
 
 
@@ -71,3 +72,34 @@ def test_what_is_often_so_is_no_garbage(recording):
     values = recording.specific_force.copy()
     values[::10, 1] += 50.0
     assert not without_garbage(replace(recording, specific_force=values))[1]
+
+
+def log_of(recording, **changed):
+    own = {"specific_force": recording.specific_force[:, 1],
+           "angular_rate": recording.angular_rate[:, 1]} | changed  # fmt: skip
+    return Log(
+        "a", recording.time, own["specific_force"], recording.time, own["angular_rate"],
+        np.zeros(3), None, 0.025, 157.0, 1.7e-3, 35.0,
+    )  # fmt: skip
+
+
+def test_a_log_alone_is_left_without_garbage(recording):
+    """Spikes, a burst of random readings, and rows of zeros, in motion of some 600 deg/s."""
+    rng, (force, rate) = np.random.default_rng(7), (
+        getattr(recording, name)[:, 1].copy() for name in ("specific_force", "angular_rate")
+    )  # fmt: skip
+    rate[[200, 450], 2] += [5.0, -5.0]
+    force[700:705] = rng.uniform(-150, 150, (5, 3))
+    force[[30, 900]], rate[[30, 900]] = 0.0, 0.0
+    found, lines = without_garbage_of(log_of(recording, specific_force=force, angular_rate=rate))
+    bad = {"accelerometer": [30, 900, *range(700, 705)], "gyroscope": [30, 200, 450, 900]}
+    for kind, rows in bad.items():
+        left = getattr(found, f"{kind}_time")
+        assert not np.isin(recording.time[rows], left).any()
+        assert len(recording.time) - len(left) <= 3 * len(rows)
+    assert [line.split(": ")[1] for line in lines] == ["accelerometer", "gyroscope"]
+
+
+def test_a_clean_log_alone_stays_as_it_is(recording):
+    log = log_of(recording)
+    assert without_garbage_of(log) == (log, [])

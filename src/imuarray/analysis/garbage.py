@@ -60,9 +60,9 @@ def far_alone(values, noise: float) -> np.ndarray:
     if len(values) < SETTINGS.near:
         return lost
     bend = np.abs(values[1:-1] - (values[:-2] + values[2:]) / 2)
-    near = median_filter(bend, size=(SETTINGS.near, 1)) * SETTINGS.spike / SETTINGS.spike_near
-    usual = np.maximum(np.maximum(np.median(bend, axis=0), noise), near)
-    far = np.max(bend / usual, axis=1) > SETTINGS.spike
+    near = median_filter(bend, size=(SETTINGS.near, 1))
+    least = SETTINGS.spike * np.maximum(np.median(bend, axis=0), noise)
+    far = np.any(bend > np.maximum(least, SETTINGS.spike_near * near), axis=1)
     for first, past in runs(_closed(far)):
         if past - first <= SETTINGS.burst_near:
             lost[first + 1 : past + 1] = True
