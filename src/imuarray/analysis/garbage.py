@@ -95,11 +95,10 @@ def garbage(values, noise: float) -> tuple[np.ndarray, np.ndarray]:
     square = np.maximum(np.sum(bend**2, axis=2), 1e-300)[1:-1]
     halves = [np.sum(bend[1:-1] * part, axis=2) / square for part in (bend[:-2], bend[2:])]
     alone = np.all([(part > -0.8) & (part < -0.2) for part in halves], axis=0)
-    largest = size == size.max(axis=1, keepdims=True)
-    far = (size > SETTINGS.spike) & largest
-    spikes[2:-2] = far[1:-1] & alone
+    # in rough motion all are far; one alone has the next far below it
     second = np.partition(size, -2, axis=1)[:, -2:-1]
-    far &= size > SETTINGS.only * second
+    far = size > np.maximum(SETTINGS.spike, SETTINGS.only * second)
+    spikes[2:-2] = far[1:-1] & alone
     for k in np.flatnonzero(far.any(axis=0)):
         for first, past in runs(_closed(far[:, k])):
             if SETTINGS.burst[0] <= past - first <= SETTINGS.burst[1]:
