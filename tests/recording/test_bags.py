@@ -112,6 +112,10 @@ def test_units_that_the_standard_does_not_have(tmp_path):
     bag = write(tmp_path / "still", "mcap", still)
     with pytest.raises(InputError, match="'/imu0': expected some 9.8 m/s.2 of gravity.* in g"):
         open_logs(bag, put(tmp_path, rig()))
+    fast = {name: (part[0], part[1], 90 + 0 * part[2]) for name, part in topics.items()}
+    bag = write(tmp_path / "fast", "mcap", fast)
+    with pytest.raises(InputError, match="'/imu0': expected rates within its range.* in deg/s"):
+        open_logs(bag, put(tmp_path, rig()))
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -119,7 +119,7 @@ def _opened(paths, columns, topics) -> Opened:
 def _together(found: Rig, lines: list[str]) -> Opened:
     """Samples as they are, or brought to common instants and axes, which is kept."""
     for log in found.logs:
-        _require_gravity(log)
+        _require_units(log)
     recording, lines, logs = recording_of(found), [*lines, *found.lines], []
     if recording is not None:
         return _sampled(_with_rails(recording), lines)
@@ -179,8 +179,11 @@ def _require_own(log: Log) -> None:
             raise InputError(f"{log.label}: expected each reading once, found: {said[0]}")
 
 
-def _require_gravity(log: Log) -> None:
-    """InputError for forces in g or mg that are declared m/s^2: most logs lie still for a while."""
+def _require_units(log: Log) -> None:
+    """InputError for forces in g or mg that are declared m/s^2: most logs lie still for a while.
+
+    And for rates far beyond the declared range, which they are in deg/s.
+    """
     usual = np.median(np.linalg.norm(log.specific_force, axis=1))
     for unit, gravity in (("g", 1.0), ("mg", 1000.0)):
         other = f"are they in {unit}, and the rates in deg/s? State each unit in the YAML"
@@ -188,6 +191,12 @@ def _require_gravity(log: Log) -> None:
             not abs(usual / gravity - 1) < SETTINGS.gravity_within, f"accelerometer {log.label!r}",
             f"some {GRAVITY:.2g} m/s^2 of gravity", f"{usual:.3g}: {other}",
         )  # fmt: skip
+    fast, most = np.quantile(np.abs(log.angular_rate), SETTINGS.fast), log.gyroscope_range
+    require(
+        not 1.5 * most < fast < most / np.radians(1.0), f"gyroscope {log.label!r}",
+        f"rates within its range of {most:.3g} rad/s",
+        f"{fast:.3g}: are they in deg/s? State each unit in the YAML",
+    )  # fmt: skip
 
 
 def _railed(log: Log) -> tuple[Log, list[str]]:

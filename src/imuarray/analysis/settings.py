@@ -20,6 +20,7 @@ class Settings:
     spike: float = 60.0  # times what a triad usually departs from its neighbours, or its noise
     only: float = 3.0  # times as far as the next triad, where one alone reads garbage
     burst: tuple[int, int] = (4, 40)  # readings of one, with a neighbour at each end
+    fast: float = 0.999  # quantile of the rates that is to be within their range
     near: int = 21  # readings of one log beside which garbage stands out
     spike_near: float = 12.0  # times what these depart from their neighbours
     burst_near: int = 12  # readings of one log; longer bursts may be knocks
