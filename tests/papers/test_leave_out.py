@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from scipy.stats import multivariate_t
 
-from imuarray.analysis.known import with_board
+from imuarray.analysis.beside import with_board
 from imuarray.diagnosis.fit import at, log_scores
 from imuarray.engine.course import block_scores
 from imuarray.engine.dataset import engine_dataset

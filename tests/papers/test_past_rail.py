@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import imuarray
+from imuarray.analysis.beside import fused
 from imuarray.analysis.density import posterior_beyond, traced
-from imuarray.analysis.known import fused
 from imuarray.analysis.sensors import fitted
 from imuarray.cli import main
 from imuarray.errors import InputError

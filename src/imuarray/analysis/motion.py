@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from imuarray.analysis.known import fused
+from imuarray.analysis.beside import fused
 from imuarray.analysis.model import assumed
 from imuarray.engine.clocks import CLOCK
 from imuarray.engine.fusion import COMPONENTS, fuse

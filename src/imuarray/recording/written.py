@@ -58,7 +58,9 @@ def form_of(path: Path, named: set[str], given: dict) -> tuple[dict, list[str]]:
 
 def begin_of(lines: list[str], asked: str | None = None) -> tuple[int, str]:
     """(number of the first line that is as wide as most and has no words, its delimiter)."""
-    sep = asked or max(DELIMITERS, key=lambda sep: np.median([line.count(sep) for line in lines] or [0]))
+    sep = asked or max(
+        DELIMITERS, key=lambda sep: np.median([line.count(sep) for line in lines] or [0])
+    )
     widths = [len(cells_of(line, sep)) for line in lines]
     usual = int(np.median(widths or [0]))
     whole = (n for n, line in enumerate(lines) if widths[n] == usual)

@@ -11,7 +11,8 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from imuarray.analysis.known import fused, used, with_board
+from imuarray.analysis.beside import fused, with_board
+from imuarray.analysis.known import used
 from imuarray.engine.course import block_scores
 from imuarray.engine.dataset import engine_dataset, places_among, positions_dataset
 from imuarray.engine.estimate import Estimate, Recorded, estimate
