@@ -5,7 +5,7 @@ import pytest
 import yaml
 
 from imuarray.errors import InputError
-from imuarray.recording.table import read_tables
+from imuarray.recording.table import load, read_tables
 from tests.recording.cases import HEADER, layout, table
 
 ROWS = 200
@@ -58,6 +58,8 @@ def test_a_header_again_and_remarks_among_the_rows_are_left_out(tmp_path, plain)
     found, lines = read(tmp_path, content)
     np.testing.assert_array_equal(found.specific_force, plain.specific_force)
     np.testing.assert_array_equal(found.time, plain.time)
+    drafted, _ = load(tmp_path / "log.csv", {}, "columns.yaml")
+    assert all(kind.kind in "if" for kind in drafted.dtypes)
     left = ["log.csv: header again: 1, left out", "log.csv: remarks: 1, left out"]
     assert lines == left
 

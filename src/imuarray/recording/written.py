@@ -90,7 +90,13 @@ def rows_of_numbers(table: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
     remarks = text.str.match("#|//|%").to_numpy() & table.iloc[:, 1:].isna().all(axis=1).to_numpy()
     found = (again, "header again"), (remarks, "remarks")
     said = [f"{what}: {rows.sum()}, left out" for rows, what in found if rows.any()]
-    return (table[~(again | remarks)].reset_index(drop=True) if said else table), said
+    if not said:
+        return table, []
+    parts = []
+    for _, text in table[~(again | remarks)].reset_index(drop=True).items():
+        numbers = pd.to_numeric(text, errors="coerce")  # words had made them text
+        parts.append(numbers if numbers.notna().equals(text.notna()) else text)
+    return pd.concat(parts, axis=1), said
 
 
 def plain(value) -> str:
