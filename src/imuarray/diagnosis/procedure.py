@@ -24,6 +24,7 @@ from imuarray.diagnosis.settings import SETTINGS
 from imuarray.diagnosis.shocks import SHOCK, find_shocks, with_neighbours
 from imuarray.diagnosis.state import Search, eliminate
 from imuarray.engine.clocks import DELAY
+from imuarray.engine.estimate import Recorded
 from imuarray.engine.parameters import catalogue_effects, columns_of
 from imuarray.engine.readings import Readings, arrange, determined, few_at_once, part_of
 from imuarray.errors import InputError
@@ -59,7 +60,8 @@ def run_procedure(
     raw, structural, whole, mended = prepared(recording, without)
     most = SETTINGS.searched // max(len(whole.labels) // SETTINGS.large, 1)
     raw, readings = part_of(raw, most), part_of(whole, most)
-    effects = catalogue_effects(without)
+    bare = columns_of(readings.array, (), readings.position_prior_sd)
+    effects = catalogue_effects(without, Recorded.of(readings, bare).smooth)
     # clocks are scanned for by what a delay would gain, whether or not it is a candidate
     described = effects if DELAY in effects else (*effects, DELAY)
     columns = columns_of(readings.array, described, readings.position_prior_sd)

@@ -157,9 +157,15 @@ def columns_of(array: Array, effects, position_sd: float) -> Columns:
     )
 
 
-def catalogue_effects(without=()) -> tuple[str, ...]:
-    """The mean effects that any motion may tell: those of a diagnosis, in the catalogue's order."""
-    return tuple(n for n, one in EFFECTS.items() if n not in without and not one.smooth)
+def catalogue_effects(without=(), smooth: bool = False) -> tuple[str, ...]:
+    """The mean effects of a diagnosis, in the catalogue's order: those that any motion may tell.
+
+    And those that ``smooth`` motion tells, but for filters: a delay is most of these.
+    """
+    return tuple(
+        name for name, one in EFFECTS.items()
+        if name not in without and (not one.smooth or (smooth and not one.sampling))
+    )  # fmt: skip
 
 
 def model_of(recording: Recording, effects: Sequence[str] = ()) -> ArrayModel:
