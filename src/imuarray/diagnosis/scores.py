@@ -124,7 +124,7 @@ class Information:
     @cached_property
     def scale(self) -> np.ndarray:
         """Square roots of the parameters' own information before projection, (K,)."""
-        return np.sqrt(np.maximum(np.diag(self.information), 1e-300))
+        return np.sqrt(np.maximum(np.diag(self.information), 1e-200))
 
     def places(self, mask) -> np.ndarray:
         """Places of the parameters in a mask (N, m)."""

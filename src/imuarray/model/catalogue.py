@@ -139,6 +139,7 @@ def gyroscope_nonlinearity(curvature, instant, predicted):
 
 @effect(
     "accelerometer_rate_square", unit="m rad-2", prior_sd=5e-4, shape=lambda a, g: (a, 3),
+    critical=-9.0,
     gauge=each_mean, smooth=True, against="angular rate",
     meaning="accelerometers read more with the square of the rate",
 )  # fmt: skip
@@ -152,7 +153,7 @@ def accelerometer_rate_square(growth, instant, predicted):
     "gyroscope_curve", unit="s rad-1, s2 rad-2",
     prior_sd=(0.001 / FULL_SCALE_RATE, 0.001 / FULL_SCALE_RATE**2),
     common_sd=(0.002 / FULL_SCALE_RATE, 0.002 / FULL_SCALE_RATE**2),
-    shape=lambda a, g: (g, 2), components=(("curve", "cubic"),), smooth=True,
+    shape=lambda a, g: (g, 2), components=(("curve", "cubic"),), smooth=True, critical=-9.0,
     meaning="the gyroscopes' scale changes with the rate", against="angular rate",
 )  # fmt: skip
 def gyroscope_curve(curvature, instant, predicted):
