@@ -189,7 +189,7 @@ def test_no_module_beside_the_finders_names_an_effect():
         "generic",  # names of sds
         "words",  # the sensor model's own in plain words; others by their names
         "export",  # what other tools have a place for
-        "known",  # how a recording's own clocks are found beside a known board
+        "beside",  # how a recording's own clocks are found beside a known board
     }
     package = Path(imuarray.__file__).parent
     folders = "diagnosis", "report", "trust", "analysis", "commands", "estimation", "posterior"
