@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import median_filter
+from scipy.ndimage import binary_closing, median_filter
 
 from imuarray.analysis.settings import SETTINGS
 from imuarray.recording import Recording
@@ -63,7 +63,7 @@ def far_alone(values, noise: float) -> np.ndarray:
     near = median_filter(bend, size=(SETTINGS.near, 1))
     least = SETTINGS.spike * np.maximum(np.median(bend, axis=0), noise)
     far = np.any(bend > np.maximum(least, SETTINGS.spike_near * near), axis=1)
-    for first, past in runs(_closed(far)):
+    for first, past in runs(binary_closing(far, np.ones(3))):
         if past - first <= SETTINGS.burst_near:
             lost[first + 1 : past + 1] = True
     return lost
@@ -100,16 +100,7 @@ def garbage(values, noise: float) -> tuple[np.ndarray, np.ndarray]:
     far = size > np.maximum(SETTINGS.spike, SETTINGS.only * second)
     spikes[2:-2] = far[1:-1] & alone
     for k in np.flatnonzero(far.any(axis=0)):
-        for first, past in runs(_closed(far[:, k])):
+        for first, past in runs(binary_closing(far[:, k], np.ones(3))):
             if SETTINGS.burst[0] <= past - first <= SETTINGS.burst[1]:
                 bursts[first + 1 : past + 1, k] = True
     return spikes & ~bursts, bursts
-
-
-def _closed(mask) -> np.ndarray:
-    """The mask (T,) with gaps of up to two filled."""
-    out = mask.copy()
-    for first, past in runs(~mask):
-        if past - first <= 2 and 0 < first and past < len(mask):
-            out[first:past] = True
-    return out

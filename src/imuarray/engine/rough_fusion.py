@@ -1,6 +1,6 @@
 """Each sample's motion under a recording's own estimate, what rough motion adds beside it.
 
-What `analysis.known` has fitted to samples off the rails (noise and its tails, clocks, the size of
+What `analysis.beside` has fitted to samples off the rails (noise and its tails, clocks, the size of
 what rough motion adds) holds for those at a rail, too.
 """
 

@@ -86,7 +86,7 @@ EXPERIMENT = (
 def table_experiment(located: list, names: list[str], summary: pd.DataFrame, group: str):
     """Table II of 2021 once more: positions from T samples under the papers' and the sensor model.
 
-    ``located``: `analysis.known.located` of the recordings ``names`` of the board ``group``;
+    ``located``: `measured.left_out.located` of the recordings ``names`` of the board ``group``;
     ``summary``: `measured.agreement` under the papers' model.
     """
     assumed = summary.assumed.astype(str)
@@ -127,7 +127,7 @@ PAST_RAIL = (
 
 
 def table_past_rail(tables: list[pd.DataFrame], names: list[str], group: str):
-    """Readings past a made-up rail by the others' board; `analysis.known.past_rail` of each."""
+    """Readings past a made-up rail by the others' board; `measured.left_out.past_rail` of each."""
     parts = [
         table[table.model == "board"].assign(recording=name)
         for name, table in zip(names, tables, strict=True)
@@ -152,7 +152,7 @@ LEFT_OUT = (
 
 
 def table_left_out(tables: list[pd.DataFrame], names: list[str], group: str):
-    """Gain of each recording by the others' board; `analysis.known.predicted` of each."""
+    """Gain of each recording by the others' board; `measured.left_out.predicted` of each."""
     rows = []
     for name, table in zip(names, tables, strict=True):
         by = table.set_index("model")

@@ -25,7 +25,7 @@ def figure_criticism(
 
     ``summary``: `measured.residuals` of the recording ``name``, ``noise`` of its still poses,
     ``diagnosis`` (diagnosis.json, tables), ``causes``: `measured.causes.repeated` of the board
-    ``group``, ``predicted``: `analysis.known.predicted` of the recording left out.
+    ``group``, ``predicted``: `measured.left_out.predicted` of the recording left out.
     """
     document, tables = diagnosis
     clock = next(table for key, table in tables.items() if key.endswith("sensor_clock"))

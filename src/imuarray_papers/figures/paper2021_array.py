@@ -193,7 +193,7 @@ def figure_2021_fig5(
 def figure_experiment(located: xr.Dataset, recordings: list, name: str, settings: dict):
     """`figure_2021_fig5` once more, under the sensor model.
 
-    ``located``: `analysis.known.located` of the recording ``name``.
+    ``located``: `measured.left_out.located` of the recording ``name``.
     """
     array = recordings[0]
     posteriors = {}

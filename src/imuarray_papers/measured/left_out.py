@@ -12,7 +12,7 @@ import pandas as pd
 import xarray as xr
 
 from imuarray.analysis.beside import fused, with_board
-from imuarray.analysis.known import used
+from imuarray.analysis.sensors import used
 from imuarray.engine.course import block_scores
 from imuarray.engine.dataset import engine_dataset, places_among, positions_dataset
 from imuarray.engine.estimate import Estimate, Recorded, estimate
