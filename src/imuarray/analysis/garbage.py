@@ -37,7 +37,7 @@ def without_garbage(recording: Recording) -> tuple[Recording, list[str]]:
 
 
 def without_garbage_of(log: Log) -> tuple[Log, list[str]]:
-    """The same of a log of one IMU, of which nothing but itself tells; lines that say so."""
+    """A log of one IMU without garbage, by its own readings alone; lines that say so."""
     lines: list[str] = []
     changed: dict[str, Any] = {}
     empty = log.accelerometer_time[~log.specific_force.any(axis=1)]  # no accelerometer reads that

@@ -12,7 +12,6 @@ from imuarray.analysis.model import assumed
 from imuarray.engine.clocks import CLOCK
 from imuarray.engine.fusion import COMPONENTS, fuse
 from imuarray.engine.parameters import model_of
-from imuarray.engine.robust import median_of
 from imuarray.errors import InputError, require
 from imuarray.firstorder.correct import corrected
 from imuarray.firstorder.rails import less_leak, nearest_rail, rails_shown
@@ -141,7 +140,7 @@ def _residual(recording: Recording, estimate, lost) -> float:
     if lost.all() or counts[0] < 3:
         return np.nan
     fast = speed > np.nanquantile(speed, 0.75)
-    return float(np.sqrt(np.median(estimate.cost[fast]) / median_of(number)))
+    return float(np.sqrt(np.median(estimate.cost[fast]) / number))
 
 
 def _late(calibration: xr.Dataset) -> float:

@@ -64,56 +64,38 @@ def position_sds(found: Estimate) -> np.ndarray:
     return whole[:, :count, found.columns.of(POSITION)]
 
 
-def size_growth(found: Estimate) -> tuple[float, float]:
-    """(relative growth of the array from the beginning of the motion to its end, its sd).
+def changes(found: Estimate) -> tuple[tuple[float, float], tuple[int, float]]:
+    """((relative growth, its sd) of the array, (IMU, chi-square) of whom moves most), of a motion.
 
-    An array that keeps its shape grows where the gyroscopes' common scale changes. The sd is
-    infinite where nothing is known of it.
+    From its beginning to its end, by score tests, all parameters refitted. An array that keeps its
+    shape grows where the gyroscopes' common scale changes; an sd is infinite where nothing is known
+    of it. Of an IMU by its three axes; where all others move alike it is the reference.
     """
-    size = np.zeros((len(found.information), 1))
-    placed = found.columns.mask([POSITION])
-    size[found.places[0][placed[found.active]], 0] = found.positions[1:].ravel()
-    moved, variance = _moved(found, size)
-    return float(moved[0]), float(np.sqrt(variance[0, 0]))
-
-
-def farthest_move(found: Estimate) -> tuple[int, float]:
-    """(IMU, chi-square of its three axes) whose position changes most from beginning to end.
-
-    Where all others move alike it is the reference.
-    """
-    pairs, count = np.argwhere(found.active), len(found.positions)
+    pairs = np.argwhere(found.active)
     placed = pairs[:, 1] < 3
-    owners, places = pairs[placed, 0], found.places[0][placed]
-    moves = []
-    for k in range(count):
-        mine = owners == k if k else owners > 0
-        directions = np.zeros((len(found.information), 3))
-        directions[places[mine], pairs[placed, 1][mine]] = 1.0
-        moved, variance = _moved(found, directions)
-        known = np.isfinite(variance).all()
-        moves.append((k, float(moved @ np.linalg.solve(variance, moved)) if known else 0.0))
-    return max(moves, key=lambda move: move[1])
+    places, owners = found.places[0][placed], pairs[placed, 0]
+    share, left = _changing(found, places)
+    size = found.positions[owners, pairs[placed, 1]]
+    known, moves = size @ left @ size, []
+    growth = (float(size @ share / known), float(known**-0.5)) if known > 0 else (0.0, np.inf)
+    for k in range(len(found.positions)):
+        each = (owners == k if k else owners > 0)[:, None] * (pairs[placed, 1:2] == np.arange(3))
+        inner, slope = each.T @ left @ each, each.T @ share
+        sound = np.linalg.eigvalsh(inner)[0] > 0
+        moves.append((k, float(slope @ np.linalg.solve(inner, slope)) if sound else 0.0))
+    return growth, max(moves, key=lambda move: move[1])
 
 
-def _moved(found: Estimate, directions) -> tuple[np.ndarray, np.ndarray]:
-    """Change (k,) along ``directions`` (n, k) from beginning to end, and its covariance (k, k).
-
-    By a score test, all parameters refitted.
-    """
-    size = directions.shape[1]
-    share, along, whole = np.zeros(size), np.zeros(directions.shape), np.zeros((size, size))
+def _changing(found: Estimate, places) -> tuple[np.ndarray, np.ndarray]:
+    """(score (k,), information (k, k)) of a change of the parameters at ``places``."""
+    share, along, whole = np.zeros(len(places)), 0.0, 0.0
     counts = [len(seen.score) for seen in found.passes]
     middle = np.concatenate([(np.arange(count) + 0.5) / count - 0.5 for count in counts])
     for when, (inner, slope) in zip(middle, found.blocks, strict=True):
-        share += when * (directions.T @ slope)
-        along += when * (inner @ directions)
-        whole += when**2 * (directions.T @ inner @ directions)
-    left = whole - along.T @ scaled_inverse(found.information + found.precision) @ along
-    if np.linalg.eigvalsh(left)[0] <= 0:
-        return np.zeros(size), np.full((size, size), np.inf)
-    variance = np.linalg.inv(left)
-    return variance @ share, variance
+        share += when * slope[places]
+        along = along + when * inner[:, places]
+        whole = whole + when**2 * inner[np.ix_(places, places)]
+    return share, whole - along.T @ scaled_inverse(found.information + found.precision) @ along
 
 
 def block_scores(found: Estimate) -> Scores:

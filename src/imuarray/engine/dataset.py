@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from imuarray.engine.course import course, farthest_move, size_growth
+from imuarray.engine.course import changes, course
 from imuarray.engine.estimate import Estimate
 from imuarray.engine.parameters import POSITION, model_of
 from imuarray.engine.widths import widths
@@ -120,9 +120,9 @@ def engine_dataset(recordings, found: Estimate) -> xr.Dataset:
         if len(recordings) > 1 and len(theirs):
             variables |= _of_recordings(found, model, theirs, np.sqrt(np.diag(covariance)))
             coords["own"] = [names[number] for number in theirs]
-    dataset.attrs["size_growth"], dataset.attrs["size_growth_sd"] = size_growth(found)
-    imu, dataset.attrs["farthest_move"] = farthest_move(found)
-    dataset.attrs["farthest_moved"] = readings.labels[imu]
+    growth, (imu, move) = changes(found)
+    dataset.attrs["size_growth"], dataset.attrs["size_growth_sd"] = growth
+    dataset.attrs["farthest_moved"], dataset.attrs["farthest_move"] = readings.labels[imu], move
     for kind, (chance, imus) in found.maps_hold.items():
         dataset.attrs[f"{kind}_maps_hold"] = chance
         dataset.attrs[f"{kind}_maps_farthest"] = ", ".join(readings.labels[k] for k in imus)
